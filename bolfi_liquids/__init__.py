@@ -1,0 +1,1 @@
+"""Learn a liquid's parameters by stirring it, then pour it without spilling."""
