@@ -1,1 +1,46 @@
 """Learn a liquid's parameters by stirring it, then pour it without spilling."""
+
+from importlib import import_module
+from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .calibration import Calibration
+    from .calibrator import calibrate
+    from .models import Cups
+    from .pouring import choose_pour
+    from .recordings import Recording, open_recording
+    from .reporting import report
+
+__version__ = version("bolfi-liquids")
+__all__ = [
+    "Calibration",
+    "Cups",
+    "Recording",
+    "__version__",
+    "calibrate",
+    "choose_pour",
+    "open_recording",
+    "report",
+]
+
+# loaded on use: `import bolfi_liquids` must cost neither JAX nor Taichi
+_HOME = {
+    "Calibration": ".calibration",
+    "Cups": ".models",
+    "Recording": ".recordings",
+    "calibrate": ".calibrator",
+    "choose_pour": ".pouring",
+    "open_recording": ".recordings",
+    "report": ".reporting",
+}
+
+
+def __getattr__(name: str):
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOME[name], __name__), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

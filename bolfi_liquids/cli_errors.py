@@ -1,0 +1,37 @@
+"""Errors on the command line: one line for what a person can mend, a traceback on --debug."""
+
+import shlex
+import sys
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+USAGE_ERROR = 2
+INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+
+
+class OneLineErrors(TyperGroup):
+    """A command group that turns expected errors into one line on stderr and exit code 2."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            _say(_how_to_go_on(sys.argv[1:]))
+            raise typer.Exit(INTERRUPTED) from None
+        except (ValueError, OSError) as err:
+            if ctx.params.get("debug"):
+                raise
+            _say(f"error: {' '.join(str(err).split())}")
+            raise typer.Exit(USAGE_ERROR) from None
+
+
+def _say(line: str) -> None:
+    typer.echo(line, err=True)
+
+
+def _how_to_go_on(arguments: list[str]) -> str:
+    needs_flag = "calibrate" in arguments and "--resume" not in arguments
+    command = shlex.join(["bolfi-liquids", *arguments, *(["--resume"] if needs_flag else [])])
+    return f"interrupted: finished simulations are kept; go on with: {command}"

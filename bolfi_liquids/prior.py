@@ -1,0 +1,43 @@
+"""The prior of the liquid's parameters."""
+
+from typing import TYPE_CHECKING
+
+from .errors import InputError
+
+if TYPE_CHECKING:
+    from .inference import Prior
+
+PARAMETERS = ("viscosity", "cohesion")
+
+
+def default_prior() -> "Prior":
+    """Every liquid that the simulator can tell from another, before any stirring.
+
+    `viscosity` [Pa s] is log-uniform from water's 1e-3 to a stiff gel's 20; `cohesion` is
+    uniform over its whole useful range, 0 to 1.
+    """
+    import numpyro.distributions as dist
+
+    from .inference import Prior
+
+    return Prior({"viscosity": dist.LogUniform(1e-3, 20.0), "cohesion": dist.Uniform(0.0, 1.0)})
+
+
+def check_prior(prior: "Prior") -> None:
+    """Raise `InputError` unless the prior is over the simulator's parameters."""
+    if set(prior.names) != set(PARAMETERS):
+        raise InputError(
+            f"parameters {', '.join(prior.names)}, expected {', '.join(PARAMETERS)}",
+            where="prior",
+            fix="give one distribution for each of them",
+        )
+
+
+def describe_prior(prior: "Prior") -> dict[str, str]:
+    """Each parameter's distribution and its arguments, as text."""
+    return {
+        name: f"{type(distribution).__name__}("
+        + ", ".join(f"{k}={getattr(distribution, k)}" for k in sorted(distribution.arg_constraints))
+        + ")"
+        for name, distribution in prior.distributions.items()
+    }

@@ -1,0 +1,66 @@
+"""Which fields, units and attributes a recording's file must have."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .errors import InputError
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+AXES = ("x", "y", "z")
+PLANES = ("inclination_xz", "inclination_yz")
+LENGTHS = ("cup_radius", "cup_height", "fill", "stick_radius", "stick_length")
+DENSITIES = ("liquid_density",)
+STICK_WEIGHT = ("stick_density", "stick_mass")
+
+_SECONDS = ("s", "sec", "second", "seconds")
+_METRES = ("m", "metre", "metres", "meter", "meters")
+_RADIANS = ("rad", "radian", "radians")
+_UNITS = {"time": _SECONDS} | dict.fromkeys(AXES, _METRES) | dict.fromkeys(PLANES, _RADIANS)
+
+
+def check_fields(dataset: "Dataset", path: Path) -> None:
+    """Raise `InputError` unless every field and attribute is there, in SI units."""
+    for name, units in _UNITS.items():
+        _check_variable(dataset, name, units, path)
+    for name in LENGTHS + DENSITIES:
+        if name not in dataset.attrs:
+            raise InputError(
+                "missing", where=f"{path}: attribute {name}", fix="add it to the file, in SI units"
+            )
+    if not any(name in dataset.attrs for name in STICK_WEIGHT):
+        raise InputError(
+            "missing",
+            where=f"{path}: attribute {' or '.join(STICK_WEIGHT)}",
+            fix="add one of them, in kg/m3 or kg",
+        )
+
+
+def _check_variable(dataset: "Dataset", name: str, units: tuple[str, ...], path: Path) -> None:
+    where = f"{path}: {name}"
+    if name not in dataset.variables:
+        held = ", ".join(sorted(map(str, dataset.variables))) or "no variables"
+        raise InputError(
+            f"missing (the file holds {held})",
+            where=where,
+            fix="a recording needs " + ", ".join(_UNITS),
+        )
+    variable = dataset[name]
+    if variable.dims != ("time",):
+        raise InputError(
+            f"has dimensions {variable.dims}", where=where, fix="it must have the dimension time"
+        )
+    if not np.issubdtype(variable.dtype, np.number):
+        raise InputError(
+            f"holds {variable.dtype}, not numbers", where=where, fix="store it as float64"
+        )
+    unit = str(variable.attrs.get("units", units[0]))
+    if unit not in units:
+        raise InputError(
+            f"has units {unit!r}",
+            where=where,
+            fix=f"convert it to {units[0]} and set units to {units[0]!r}",
+        )

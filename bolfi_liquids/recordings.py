@@ -1,0 +1,111 @@
+"""Recordings of a stir: the file format, read and checked."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError
+from .recording_checks import check_values
+from .recording_fields import AXES, PLANES, check_fields
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+
+class Gripper(NamedTuple):
+    """The path of the gripper, at which the stick pivots."""
+
+    time: NDArray[np.float64]  # (T,) s
+    position: NDArray[np.float64]  # (T, 3) m, z up, origin on the cup's axis at its floor
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One stir, as recorded; arrays are read-only, missing samples are NaN.
+
+    Attributes:
+        time: Times of the samples [s], shape (T,), increasing.
+        gripper: The gripper's times [s] and positions [m].
+        inclination: Angles of the stick from the downward vertical in the xz and yz planes
+            [rad], shape (T, 2), positive towards +x and +y.
+        attrs: The file's attributes: geometry [m], densities [kg/m3], `source`, `status`.
+        path: The file.
+        hash: SHA-256 of the file's bytes, in hexadecimal.
+    """
+
+    time: NDArray[np.float64]
+    gripper: Gripper
+    inclination: NDArray[np.float64]
+    attrs: Mapping[str, float | str]
+    path: Path
+    hash: str
+
+    def number(self, name: str) -> float:
+        """A numeric attribute, in SI units."""
+        return float(self.attrs[name])
+
+
+def open_recording(path: str | Path) -> Recording:
+    """Read a recording and check that it can be simulated.
+
+    Args:
+        path: A NetCDF file with the fields, units and attributes of the README.
+
+    Raises:
+        InputError: The file is missing, is no NetCDF file, or holds something a simulator
+            cannot use; the message names file, field, value and what to do.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError("no such file", where=str(path), fix="check the path")
+    recording = _as_recording(_read(path), path)
+    check_values(recording)
+    return recording
+
+
+def _read(path: Path) -> "Dataset":
+    import xarray
+
+    try:
+        # times stay numbers: a unit such as "ms" is then seen, not silently converted
+        dataset = xarray.load_dataset(path, decode_times=False)
+    except (OSError, ValueError) as err:
+        raise InputError(
+            "not a NetCDF file that can be read",
+            where=str(path),
+            fix="write it with xarray's to_netcdf, or record it again",
+        ) from err
+    check_fields(dataset, path)
+    return dataset
+
+
+def _as_recording(dataset: "Dataset", path: Path) -> Recording:
+    def stack(names: tuple[str, ...]) -> NDArray[np.float64]:
+        return _frozen(np.stack([dataset[name].to_numpy() for name in names], axis=-1))
+
+    time = _frozen(dataset["time"].to_numpy())
+    return Recording(
+        time=time,
+        gripper=Gripper(time, stack(AXES)),
+        inclination=stack(PLANES),
+        attrs=MappingProxyType({str(k): _plain(v) for k, v in dataset.attrs.items()}),
+        path=path,
+        hash=hashlib.sha256(path.read_bytes()).hexdigest(),
+    )
+
+
+def _frozen(values: NDArray) -> NDArray[np.float64]:
+    array = np.array(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array
+
+
+def _plain(value) -> float | str:
+    """NumPy's scalars and one-element arrays as Python's own, so that they can be written."""
+    return value.item() if isinstance(value, np.ndarray | np.generic) and value.size == 1 else value

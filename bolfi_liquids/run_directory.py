@@ -1,0 +1,92 @@
+"""The RUN directory: what it holds, and when a command may go on in it."""
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from .errors import InputError
+from .files import write_text
+from .toml_text import to_toml
+
+RUN_TOML = "run.toml"
+SIMULATIONS = "simulations.sqlite"
+POSTERIOR = "posterior.nc"
+POUR = "pour.nc"
+REPORT = "report.html"
+
+MUST_AGREE = ("settings", "simulator", "inputs")
+"""Sections of run.toml that decide the results; versions and dates may differ."""
+
+
+def enter_run(run: Path, record: Mapping[str, Any], *, resume: bool) -> None:
+    """Start a run, or go on with one of the same settings.
+
+    `record` is written to run.toml before anything else, so that whatever is found later in
+    the directory can be traced to its settings.
+
+    Raises:
+        InputError: The directory holds a run and `resume` is false, or the run in it was made
+            with another setting, seed or input; nothing is written then.
+    """
+    path = run / RUN_TOML
+    if run.exists() and not run.is_dir():
+        raise InputError("not a directory", where=str(run), fix="choose another --out")
+    if path.exists():
+        if not resume:
+            raise InputError(
+                "holds a run already",
+                where=str(run),
+                fix="give --resume to go on with it, or another --out",
+            )
+        _check_same(read_run(run), record, run)
+        return
+    if (run / SIMULATIONS).exists():
+        raise InputError(
+            f"holds {SIMULATIONS} without {RUN_TOML}",
+            where=str(run),
+            fix="choose another --out; nothing was overwritten",
+        )
+    run.mkdir(parents=True, exist_ok=True)
+    write_text(path, to_toml(record))
+
+
+def read_run(run: Path) -> dict[str, Any]:
+    """The run's settings, as written when it started.
+
+    Raises:
+        InputError: There is no run.toml, or it is not TOML.
+    """
+    path = run / RUN_TOML
+    if not path.is_file():
+        raise InputError(
+            f"no {RUN_TOML} in it",
+            where=str(run),
+            fix="give the directory of a run, as made by: bolfi-liquids calibrate ... --out RUN",
+        )
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except tomllib.TOMLDecodeError as err:
+        raise InputError(f"not TOML ({err})", where=str(path), fix="restore the file") from err
+
+
+def _check_same(old: Mapping[str, Any], new: Mapping[str, Any], run: Path) -> None:
+    # through TOML, so that a tuple or a None compares as what was written
+    wanted = dict(_fields({k: tomllib.loads(to_toml(new)).get(k) for k in MUST_AGREE}))
+    held = dict(_fields({k: old.get(k) for k in MUST_AGREE}))
+    for field in [*wanted, *(held.keys() - wanted.keys())]:
+        if wanted.get(field) != held.get(field):
+            raise InputError(
+                f"{field} is {held.get(field)!r} in the run, but {wanted.get(field)!r} was asked",
+                where=f"{run / RUN_TOML}",
+                fix="resume with the run's own value, or choose another --out",
+            )
+
+
+def _fields(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in table.items():
+        name = f"{path}.{key}" if path else str(key)
+        if isinstance(value, Mapping):
+            yield from _fields(value, name)
+        else:
+            yield name, value
