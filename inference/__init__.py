@@ -1,1 +1,31 @@
-"""Under construction."""
+"""Likelihood-free Bayesian inference for expensive, noisy simulators of time series.
+
+Public names only; what is not listed may change. Nothing here knows what is simulated.
+"""
+
+from .acquisition import LowerConfidenceBound
+from .bank import Simulation, SimulationBank
+from .base import Acquisition, Discrepancy, Simulator, Surrogate
+from .bolfi import Bolfi
+from .discrepancy import squared_difference
+from .likelihood import Quantile
+from .loop import fit
+from .posterior import Closest, Fit
+from .prior import Prior
+
+__all__ = [
+    "Acquisition",
+    "Bolfi",
+    "Closest",
+    "Discrepancy",
+    "Fit",
+    "LowerConfidenceBound",
+    "Prior",
+    "Quantile",
+    "Simulation",
+    "SimulationBank",
+    "Simulator",
+    "Surrogate",
+    "fit",
+    "squared_difference",
+]

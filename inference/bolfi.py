@@ -1,0 +1,258 @@
+"""Ask and tell: Bayesian optimisation for likelihood-free inference, one step at a time."""
+
+import time
+from collections.abc import Mapping
+
+import jax
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import acquisition as acquisitions
+from . import surrogate as surrogates
+from .base import Acquisition, Discrepancy, Theta
+from .design import sobol, start_size
+from .discrepancy import evaluate, squared_difference
+from .likelihood import Threshold, check_rule
+from .posterior import Fit
+from .prior import Prior
+from .state import UNKNOWN, History, init, remember_asked, remember_told
+from .transform import TRANSFORMS
+
+MIN_LEARN = 3  # successful simulations before the surrogate may choose
+
+
+class Bolfi:
+    """The engine between a prior and a simulator that somebody else runs.
+
+    What is asked depends only on `seed` and on the calls of `ask` and `tell` before, so a run
+    that is repeated from its stored simulations goes on as if it had never stopped.
+
+    Args:
+        prior: The parameters and their priors.
+        observed: The measured signal [*signal_shape], time first; NaN is a missing sample.
+        surrogate: "discrepancy".
+        acquisition: "lcb", an object (see `Acquisition`), or None for the surrogate's best.
+        seed: Fixes the start design and the acquisitions.
+        discrepancy: Callable (observed, simulated) -> float; None is `squared_difference()`.
+        initial: Points of the Sobol start design; None is 2 d + 3.
+        threshold: Rule for eps, see `likelihood.choose_threshold`.
+        transform: "identity", "sqrt" or "log" of the discrepancy; None chooses by
+            leave-one-out log predictive density.
+
+    Raises:
+        ValueError: an argument is not one of the above.
+    """
+
+    def __init__(  # noqa: PLR0913  one flat place for what defines a run
+        self,
+        prior: Prior,
+        observed: ArrayLike,
+        *,
+        surrogate: str = "discrepancy",
+        acquisition: str | Acquisition | None = None,
+        seed: int = 0,
+        discrepancy: Discrepancy | None = None,
+        initial: int | None = None,
+        threshold: Threshold = None,
+        transform: str | None = None,
+    ):
+        if not isinstance(prior, Prior):
+            raise ValueError(f"prior must be a Prior, got {type(prior).__name__}")
+        if surrogate not in surrogates.FAMILIES:
+            raise ValueError(
+                f"surrogate must be one of {tuple(surrogates.FAMILIES)}, got {surrogate!r}"
+            )
+        if transform is not None and transform not in TRANSFORMS:
+            raise ValueError(
+                f"transform must be one of {tuple(TRANSFORMS)} or None, got {transform!r}"
+            )
+        check_rule(threshold)
+        self.prior = prior
+        self.observed = np.asarray(observed, np.float64)
+        self.seed = checked_integer("seed", seed, 0)
+        self.initial = checked_integer(
+            "initial", start_size(len(prior)) if initial is None else initial, MIN_LEARN
+        )
+        self._learn = surrogates.FAMILIES[surrogate]
+        self._options = {"transform": transform, "threshold": threshold}
+        self._acquire = _resolve(acquisition)
+        self._any_shape = discrepancy is not None  # a user's own may compare unlike shapes
+        self._discrepancy = squared_difference() if discrepancy is None else discrepancy
+        if discrepancy is None:
+            self._discrepancy(self.observed, self.observed)  # raises if it cannot be used
+        self.settings: dict[str, object] = {
+            "surrogate": surrogate,
+            "acquisition": repr(self._acquire),
+            "seed": self.seed,
+            "initial": self.initial,
+            "threshold": str(threshold),
+            "transform": str(transform),
+        }
+        self._state = init(len(prior), self.observed.shape)
+        self._seconds = 0.0
+
+    @property
+    def asked(self) -> int:
+        """Points asked so far."""
+        return self._state.asked
+
+    @property
+    def told(self) -> int:
+        """Simulations told so far, failed ones included."""
+        return len(self._state.history.theta)
+
+    @property
+    def succeeded(self) -> int:
+        """Simulations told so far that gave a finite discrepancy."""
+        return int(self._state.history.succeeded.sum())
+
+    @property
+    def signal_shape(self) -> tuple[int, ...]:
+        """Shape of one simulated signal: that of `observed`, or of the signals told so far."""
+        return self._state.history.signals.shape[1:]
+
+    def ask(self, n: int = 1) -> dict[str, np.ndarray]:
+        """The next n different points to simulate, name -> [n].
+
+        Start-design points first, and for as long as fewer than three simulations have
+        succeeded; then the acquisition's, which take everything pending into account.
+
+        Raises:
+            ValueError: n < 1.
+        """
+        n = checked_integer("n", n)
+        started = time.perf_counter()
+        designed = self._designed_now(n)
+        parts = [
+            sobol(self.seed, self._state.designed, self._state.designed + designed, len(self.prior))
+        ]
+        if n > designed:
+            parts.append(self._acquired(n - designed, parts[0]))
+        theta = self.prior.from_unit(np.concatenate(parts))
+        self._state = remember_asked(self._state, self.prior.to_array(theta), designed)
+        self._seconds += time.perf_counter() - started
+        return theta
+
+    def _designed_now(self, n: int) -> int:
+        """How many of the next n points the start design provides."""
+        if self.succeeded < MIN_LEARN:
+            return n
+        covered = self.succeeded + len(self._state.pending)
+        return min(n, max(0, self.initial - covered))
+
+    def _acquired(self, n: int, designed: np.ndarray) -> np.ndarray:
+        history = self._state.history
+        fitted = self._learned()
+        # a failed point teaches nothing, but must not be asked for ever
+        settled = history.u[~history.succeeded]
+        pending = self.prior.to_unit(self.prior.to_dict(self._state.pending))
+        fitted = fitted.believe(np.concatenate([settled, pending, designed]))
+        key = jax.random.fold_in(jax.random.key(self.seed), self._state.asked)
+        return self._acquire(key, fitted, n)
+
+    def _learned(self) -> surrogates.DiscrepancySurrogate:
+        history = self._state.history
+        good = history.succeeded
+        return self._learn(history.u[good], history.discrepancy[good], **self._options)
+
+    def tell(self, theta: Theta, signals: ArrayLike, seeds: ArrayLike | None = None) -> None:
+        """Give the engine finished simulations: any number, any order, asked for or not.
+
+        A row of NaN reports a failed run. It counts as told, but nothing is learned from it.
+
+        Args:
+            theta: Name -> [n], in the prior's support.
+            signals: [n, *signal_shape].
+            seeds: Seeds of the runs [n], to be kept with the results.
+
+        Raises:
+            ValueError: shapes disagree, or theta lies outside the prior's support.
+        """
+        started = time.perf_counter()
+        natural = np.atleast_2d(self.prior.to_array(theta))
+        rows = self.prior.to_dict(natural)
+        signals = np.asarray(signals, np.float64)
+        self._check_signals(len(natural), signals)
+        outside = np.flatnonzero(~self.prior.contains(rows))
+        if outside.size:
+            first = {name: float(column[outside[0]]) for name, column in rows.items()}
+            raise ValueError(f"theta must lie in the support of the prior, got {first}")
+        told = History(
+            theta=natural,
+            u=self.prior.to_unit(rows),
+            signals=signals,
+            discrepancy=evaluate(self._discrepancy, self.observed, signals),
+            seeds=_seeds(seeds, len(natural)),
+            rounds=np.full(len(natural), UNKNOWN),
+        )
+        self._state = remember_told(self._state, told)
+        self._seconds += time.perf_counter() - started
+
+    def _check_signals(self, n: int, signals: np.ndarray) -> None:
+        free = self._any_shape and np.isnan(self._state.history.signals).all()
+        shape = signals.shape[1:] if free else self.signal_shape
+        if signals.shape != (n, *shape):
+            raise ValueError(
+                f"signals must have shape {(n, *shape)}, one row per theta, got {signals.shape}"
+            )
+
+    def fit(self, seconds: Mapping[str, float] | None = None) -> Fit:
+        """What can be concluded from the simulations told so far.
+
+        Args:
+            seconds: Times that the caller measured (such as the simulator's), to be kept.
+
+        Raises:
+            ValueError: fewer than three simulations succeeded.
+        """
+        if self.succeeded < MIN_LEARN:
+            raise ValueError(
+                f"a fit needs {MIN_LEARN} successful simulations, got {self.succeeded} of "
+                f"{self.told} told; tell more"
+            )
+        started = time.perf_counter()
+        fitted = self._learned()
+        spent = self._seconds + time.perf_counter() - started
+        return Fit(
+            prior=self.prior,
+            observed=self.observed,
+            history=self._state.history,
+            learned=fitted,
+            settings=self.settings,
+            seconds={"simulator": 0.0, **(seconds or {}), "engine": spent},
+        )
+
+
+def _resolve(acquisition: str | Acquisition | None) -> Acquisition:
+    if acquisition is None:
+        return acquisitions.LowerConfidenceBound()
+    if isinstance(acquisition, str):
+        if acquisition not in acquisitions.RULES:
+            raise ValueError(
+                f"acquisition must be one of {tuple(acquisitions.RULES)}, an object or None, "
+                f"got {acquisition!r}"
+            )
+        return acquisitions.RULES[acquisition]()
+    if not callable(acquisition):
+        raise ValueError(f"acquisition must be callable, got {type(acquisition).__name__}")
+    return acquisition
+
+
+def checked_integer(name: str, value: object, least: int = 1) -> int:
+    """`value` as int.
+
+    Raises:
+        ValueError: not an integer, or less than `least`.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise ValueError(f"{name} must be an integer of at least {least}, got {value!r}")
+    return int(value)
+
+
+def _seeds(seeds: ArrayLike | None, n: int) -> np.ndarray:
+    if seeds is None:
+        return np.full(n, UNKNOWN)
+    array = np.asarray(seeds, np.int64)
+    if array.shape != (n,):
+        raise ValueError(f"seeds must have shape ({n},), one per theta, got {array.shape}")
+    return array

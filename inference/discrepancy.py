@@ -1,0 +1,94 @@
+"""Discrepancies between an observed and a simulated signal."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .base import Discrepancy
+
+
+def squared_difference(time: ArrayLike | None = None) -> Discrepancy:
+    """Integrated squared difference, summed over channels.
+
+    Delta = int (y(t) - y~(t))^2 dt (Lopez-Guevara et al. 2018, problem definition), by the
+    trapezoidal rule over the samples that were observed: NaN in `observed` is a missing
+    sample, and the rule spans the gap between its neighbours.
+
+    Args:
+        time: Sample times [s], strictly increasing, shape [t]; steps of 1 if omitted.
+
+    Returns:
+        Callable (observed, simulated) -> float; both of shape [t, ...], time first.
+
+    Raises:
+        ValueError: `time` is not strictly increasing; on call, shapes differ or no channel
+            has two observed samples.
+    """
+    grid = None if time is None else np.asarray(time, np.float64)
+    if grid is not None and (grid.ndim != 1 or not (np.diff(grid) > 0).all()):
+        raise ValueError(f"time must be strictly increasing with shape [t], got {grid.shape}")
+
+    def distance(observed: np.ndarray, simulated: np.ndarray) -> float:
+        observed = np.asarray(observed, np.float64)
+        simulated = np.asarray(simulated, np.float64)
+        if observed.shape != simulated.shape:
+            raise ValueError(f"expected a signal of {observed.shape}, got {simulated.shape}")
+        weights = trapezoid_weights(np.isfinite(observed), grid)
+        used = weights > 0
+        return float(np.sum(weights[used] * (observed[used] - simulated[used]) ** 2))
+
+    return distance
+
+
+def trapezoid_weights(present: np.ndarray, time: np.ndarray | None) -> np.ndarray:
+    """Weights of the trapezoidal rule over the samples that are present, channel by channel.
+
+    Args:
+        present: bool [t, ...].
+        time: [t], or steps of 1 if None.
+
+    Returns:
+        [t, ...]; zero where absent.
+
+    Raises:
+        ValueError: lengths differ, or no channel has two samples.
+    """
+    steps = present.shape[0] if present.ndim else 0
+    grid = np.arange(steps, dtype=np.float64) if time is None else time
+    if grid.shape != (steps,):
+        raise ValueError(f"time has shape {grid.shape}, but observed has {steps} samples")
+    columns = present.reshape(steps, -1) if steps else np.zeros((0, 0), bool)
+    weights = np.zeros(columns.shape)
+    for column, where in zip(weights.T, columns.T, strict=True):
+        column[where] = _weights(grid[where])
+    if not weights.any():
+        raise ValueError(
+            "observed must have two finite samples in some channel; for data that are not a "
+            "time series give discrepancy="
+        )
+    return weights.reshape(present.shape)
+
+
+def _weights(time: np.ndarray) -> np.ndarray:
+    half = np.diff(time) / 2
+    return np.pad(half, (0, 1))[: time.size] + np.pad(half, (1, 0))[: time.size]
+
+
+def evaluate(
+    discrepancy: Discrepancy, observed: np.ndarray, signals: Sequence[np.ndarray] | np.ndarray
+) -> np.ndarray:
+    """Discrepancy of each signal, float64 [n]; NaN marks a failed simulation.
+
+    Raises:
+        ValueError: `discrepancy` returned something other than a scalar.
+    """
+    values = np.full(len(signals), np.nan)
+    for i, signal in enumerate(signals):
+        if np.isnan(signal).all():
+            continue  # the mark of a failed run, on which a user's function may stumble
+        value = np.asarray(discrepancy(observed, signal), np.float64)
+        if value.shape != ():
+            raise ValueError(f"discrepancy must return one number, got shape {value.shape}")
+        values[i] = value if np.isfinite(value) else np.nan
+    return values

@@ -1,0 +1,168 @@
+"""Independent priors, and the map between parameters and their prior quantiles."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import jax
+import numpy as np
+import numpyro.distributions as dist
+
+from ._float64 import in_float64
+from .base import Theta
+
+RESERVED = frozenset(
+    {"chain", "draw", "simulation", "seed", "discrepancy", "failed", "round", "signal"}
+)
+TAIL = 1e-12  # quantile at which an unbounded prior is cut, so that u = 0 and 1 stay finite
+
+
+class Prior:
+    """Independent univariate priors by parameter name.
+
+    The engine works in prior quantiles u = cdf(theta): there every prior is uniform on
+    [0, 1]^d, and whatever is learned depends on no parameter's unit or scale.
+
+    Args:
+        distributions: Name -> scalar numpyro distribution with `cdf` and `icdf`.
+
+    Raises:
+        ValueError: no parameter, a reserved name, or an unusable distribution.
+    """
+
+    def __init__(self, distributions: Mapping[str, dist.Distribution]):
+        if not distributions:
+            raise ValueError("a prior needs at least one parameter, got an empty mapping")
+        for name, distribution in distributions.items():
+            _check(name, distribution)
+        self.distributions = dict(distributions)
+        self._bounds = {name: _bounds(d) for name, d in self.distributions.items()}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.distributions)
+
+    def __len__(self) -> int:
+        return len(self.distributions)
+
+    def __repr__(self) -> str:
+        inside = ", ".join(f"{n!r}: {type(d).__name__}" for n, d in self.distributions.items())
+        return f"Prior({{{inside}}})"
+
+    def to_array(self, theta: Theta) -> np.ndarray:
+        """Stack parameters in the prior's order.
+
+        Args:
+            theta: Name -> scalar or [n].
+
+        Returns:
+            float64 [..., d].
+
+        Raises:
+            ValueError: names or shapes differ from the prior's, or a value is not finite.
+        """
+        if set(theta) != set(self.names):
+            raise ValueError(f"theta must have the parameters {self.names}, got {tuple(theta)}")
+        columns = [np.asarray(theta[name], np.float64) for name in self.names]
+        if len({c.shape for c in columns}) > 1 or columns[0].ndim > 1:
+            shapes = {name: c.shape for name, c in zip(self.names, columns, strict=True)}
+            raise ValueError(f"theta must hold scalars or [n] arrays of one length, got {shapes}")
+        stacked = np.stack(columns, -1)
+        if not np.isfinite(stacked).all():
+            raise ValueError(f"theta must be finite, got {dict(theta)}")
+        return stacked
+
+    def to_dict(self, array: np.ndarray) -> dict[str, np.ndarray]:
+        """Split [..., d] into name -> [...]; inverse of `to_array`."""
+        return {name: array[..., j] for j, name in enumerate(self.names)}
+
+    @in_float64
+    def to_unit(self, theta: Theta) -> np.ndarray:
+        """Prior quantiles u [..., d] in [0, 1] of theta; outside the support 0 or 1."""
+        natural = self.to_array(theta)
+        columns = [
+            np.asarray(self.distributions[name].cdf(np.clip(natural[..., j], *self._bounds[name])))
+            for j, name in enumerate(self.names)
+        ]
+        return np.clip(np.stack(columns, -1), 0.0, 1.0)
+
+    @in_float64
+    def from_unit(self, u: np.ndarray) -> dict[str, np.ndarray]:
+        """Parameters at prior quantiles u [..., d].
+
+        0 and 1 give exactly the bounds of a bounded prior, and a far but finite quantile of
+        an unbounded one.
+        """
+        return {
+            name: _quantile(self.distributions[name], self._bounds[name], u[..., j])
+            for j, name in enumerate(self.names)
+        }
+
+    def contains(self, theta: Theta) -> np.ndarray:
+        """Whether theta lies in the support, bool [...]."""
+        natural = self.to_array(theta)
+        low, high = np.array([self._bounds[name] for name in self.names]).T
+        return ((natural >= low) & (natural <= high)).all(-1)
+
+    @in_float64
+    def log_prob(self, theta: Theta) -> np.ndarray:
+        """Log prior density of theta in natural units, [...]; -inf outside the support."""
+        natural = self.to_array(theta)
+        inside = self.contains(theta)
+        total = np.zeros(natural.shape[:-1])
+        for j, name in enumerate(self.names):
+            # clip before the density: outside its support a distribution may answer anything
+            clipped = np.clip(natural[..., j], *self._bounds[name])
+            total = total + np.asarray(self.distributions[name].log_prob(clipped))
+        return np.where(inside, total, -np.inf)
+
+    @in_float64
+    def sample(self, key: jax.Array, n: int) -> dict[str, np.ndarray]:
+        """Draw n parameters, name -> [n]."""
+        return self.from_unit(np.asarray(jax.random.uniform(key, (n, len(self)))))
+
+
+def _bounds(distribution: dist.Distribution) -> tuple[float, float]:
+    support: Any = distribution.support
+    return (
+        float(getattr(support, "lower_bound", -np.inf)),
+        float(getattr(support, "upper_bound", np.inf)),
+    )
+
+
+def _quantile(
+    distribution: dist.Distribution, bounds: tuple[float, float], u: np.ndarray
+) -> np.ndarray:
+    low, high = bounds
+    inner = np.asarray(distribution.icdf(np.clip(u, TAIL, 1.0 - TAIL)), np.float64)
+    value = np.clip(inner, low, high)
+    value = np.where((u <= 0.0) & np.isfinite(low), low, value)
+    return np.where((u >= 1.0) & np.isfinite(high), high, value)
+
+
+@in_float64
+def _check(name: str, distribution: object) -> None:
+    if name in RESERVED:
+        raise ValueError(f"parameter name {name!r} is reserved for results; choose another")
+    if not isinstance(distribution, dist.Distribution):
+        raise ValueError(
+            f"prior of {name!r} must be a numpyro distribution, "
+            f"got {type(distribution).__name__}; for a fixed value leave the parameter out"
+        )
+    shape = distribution.batch_shape + distribution.event_shape
+    if shape:
+        raise ValueError(
+            f"prior of {name!r} must be univariate with shape (), got {shape}; "
+            "give one distribution per parameter"
+        )
+    try:
+        middle = np.asarray(distribution.cdf(distribution.icdf(np.array(0.5))))
+    except (NotImplementedError, ImportError) as error:  # numpyro asks for TFP in some icdf
+        raise ValueError(
+            f"prior of {name!r} needs cdf and icdf, which {type(distribution).__name__} lacks; "
+            "use for example Uniform, LogUniform, Normal, LogNormal or TruncatedNormal"
+        ) from error
+    if not np.isclose(middle, 0.5):
+        raise ValueError(
+            f"prior of {name!r} must be continuous: cdf(icdf(0.5)) gave {middle}; "
+            "check its arguments"
+        )

@@ -1,0 +1,89 @@
+"""Running a user's simulator: in batches or on an executor, and only where the bank is empty."""
+
+import time
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from typing import NamedTuple
+
+import numpy as np
+
+from .bank import Simulation, SimulationBank
+from .base import Simulator
+
+
+class Job(NamedTuple):
+    """One run to be made."""
+
+    theta: dict[str, float]
+    seed: int
+
+
+def simulation_seed(seed: int, index: int) -> int:
+    """Seed of the index-th simulation of a run, in [0, 2^31)."""
+    return int(np.random.SeedSequence([seed, index]).generate_state(1)[0] >> 1)
+
+
+def jobs(theta: Mapping[str, np.ndarray], seeds: Sequence[int]) -> list[Job]:
+    """One job per row of theta (name -> [n])."""
+    return [
+        Job({name: float(column[i]) for name, column in theta.items()}, int(seed))
+        for i, seed in enumerate(seeds)
+    ]
+
+
+def run_batch(simulate: Simulator, batch: Sequence[Job]) -> list[Simulation]:
+    """Simulate all jobs in one call.
+
+    An exception costs only the run that raised it: the batch is then repeated one by one.
+    Seconds are shared out evenly.
+
+    Raises:
+        ValueError: the simulator returned other than one row per job.
+    """
+    theta = {name: np.array([job.theta[name] for job in batch]) for name in batch[0].theta}
+    seeds = np.array([job.seed for job in batch], np.int64)
+    started = time.perf_counter()
+    try:
+        signals = np.asarray(simulate(theta, seeds), np.float64)
+    except Exception as error:  # whatever the user's code raises is a failed run, and kept
+        if len(batch) > 1:
+            return [run_batch(simulate, [job])[0] for job in batch]
+        seconds = time.perf_counter() - started
+        return [Simulation(None, f"{type(error).__name__}: {error}", seconds)]
+    seconds = (time.perf_counter() - started) / len(batch)
+    if signals.ndim < 1 or len(signals) != len(batch):
+        raise ValueError(
+            f"simulate must return one row per theta, shape ({len(batch)}, ...), "
+            f"got {signals.shape}"
+        )
+    return [Simulation(signal, None, seconds) for signal in signals]
+
+
+def run_missing(
+    simulate: Simulator,
+    batch: Sequence[Job],
+    bank: SimulationBank,
+    identity: str,
+    executor: Executor | None,
+) -> list[Simulation]:
+    """Results of all jobs, in order; those that the bank lacks are simulated and stored.
+
+    With an executor every missing job is a call of its own, and stored as soon as those
+    submitted before it are.
+    """
+    found = [bank.get(identity, job.theta, job.seed) for job in batch]
+    missing = [job for job, hit in zip(batch, found, strict=True) if hit is None]
+    if not missing:
+        made = iter(())
+    elif executor is None:
+        made = iter(run_batch(simulate, missing))
+    else:
+        futures = [executor.submit(run_batch, simulate, [job]) for job in missing]
+        made = (future.result()[0] for future in futures)
+    results = []
+    for job, hit in zip(batch, found, strict=True):
+        if hit is None:
+            hit = next(made)
+            bank.put(identity, job.theta, job.seed, hit)
+        results.append(hit)
+    return results

@@ -1,0 +1,57 @@
+"""Monotone transforms of the discrepancy on which the surrogate is learned."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Transform(NamedTuple):
+    """g(Delta + offset); offset > 0 only where a zero would break the log or the Jacobian."""
+
+    name: str
+    offset: float
+
+    def __call__(self, discrepancy: np.ndarray) -> np.ndarray:
+        return TRANSFORMS[self.name][0](np.asarray(discrepancy) + self.offset)
+
+    def log_jacobian(self, discrepancy: np.ndarray) -> np.ndarray:
+        """log |dg / dDelta|."""
+        return TRANSFORMS[self.name][1](np.asarray(discrepancy) + self.offset)
+
+
+Function = Callable[[np.ndarray], np.ndarray]
+TRANSFORMS: dict[str, tuple[Function, Function]] = {
+    "identity": (lambda x: x, np.zeros_like),
+    "sqrt": (np.sqrt, lambda x: -np.log(2.0) - 0.5 * np.log(x)),
+    "log": (np.log, lambda x: -np.log(x)),
+}
+
+
+def candidates(name: str | None, discrepancy: np.ndarray) -> list[Transform]:
+    """The transforms that `discrepancy` admits.
+
+    Args:
+        name: One of TRANSFORMS, or None for all that apply.
+        discrepancy: Finite values [n].
+
+    Raises:
+        ValueError: unknown name, or sqrt or log of negative discrepancies.
+    """
+    if name is not None and name not in TRANSFORMS:
+        raise ValueError(f"transform must be one of {tuple(TRANSFORMS)} or None, got {name!r}")
+    lowest = discrepancy.min()
+    if lowest < 0 and name not in (None, "identity"):
+        raise ValueError(
+            f"transform {name!r} needs discrepancies >= 0, got {lowest:.3g}; use 'identity'"
+        )
+    names = ("identity",) if lowest < 0 else tuple(TRANSFORMS) if name is None else (name,)
+    return [Transform(n, 0.0 if n == "identity" else _offset(discrepancy)) for n in names]
+
+
+def _offset(discrepancy: np.ndarray) -> float:
+    """Half the smallest positive discrepancy if some are zero, else 0."""
+    if discrepancy.min() > 0:
+        return 0.0
+    positive = discrepancy[discrepancy > 0]
+    return float(positive.min()) / 2 if positive.size else 1.0
