@@ -1,0 +1,50 @@
+"""What a liquid is to the simulator."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+
+FIELDS = ("viscosity", "cohesion", "density")
+
+
+@dataclass(frozen=True)
+class Liquid:
+    """A batch of liquids; scalars broadcast against arrays of shape (B,).
+
+    Attributes:
+        viscosity: Effective dynamic viscosity [Pa s].
+        cohesion: Dimensionless attraction between particles at free surfaces, useful from 0 to 1.
+        density: Rest density [kg/m³].
+    """
+
+    viscosity: ArrayLike
+    cohesion: ArrayLike
+    density: ArrayLike
+
+    def batch(self, size: int) -> "Liquid":
+        """The same liquids with every field of shape (size,) and dtype float32.
+
+        Raises:
+            ValueError: a field is not finite, is negative (density: not positive) or does not
+                broadcast to `size`.
+        """
+        fields = {}
+        for name in FIELDS:
+            value = np.asarray(getattr(self, name), dtype=np.float32)
+            if not np.isfinite(value).all() or (value < 0).any():
+                raise ValueError(f"{name} must be finite and not negative, got {value}")
+            if value.ndim > 1 or value.size not in (1, size):
+                raise ValueError(
+                    f"{name} has shape {value.shape}, but there are {size} simulations; "
+                    f"give a scalar or an array of shape ({size},)"
+                )
+            fields[name] = np.broadcast_to(value, (size,)).copy()
+        if (fields["density"] == 0).any():
+            raise ValueError("density must be positive [kg/m³], got 0")
+        return Liquid(**fields)
+
+    def __getitem__(self, part: slice) -> "Liquid":
+        """Part of a batch made by `batch`."""
+        return Liquid(*(np.asarray(getattr(self, name))[part] for name in FIELDS))

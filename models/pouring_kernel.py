@@ -1,0 +1,167 @@
+# type: ignore  (Taichi compiles this source and gives these names their types)
+"""The pouring scene: a cup of liquid turns about its lip, a receiver stands below.
+
+World frame: origin at the lip, x towards the receiver, z up. Cup frame: origin at the centre of
+the cup's floor, z along its axis; it coincides with the world's directions before the turn.
+"""
+
+import taichi as ti
+
+from .fluid import STRIDE, Fluid, vec3
+
+INSIDE, ABOVE, OUTSIDE = 0, 1, 2  # of the source: within its walls, above its rim, past it
+
+
+@ti.data_oriented
+class PouringScene(Fluid):
+    """Fluid, turning source cup and receiver of a batch of pours."""
+
+    def __init__(self, slots, particles, spacing, numerics, cups):
+        source = cups.source
+        reach = (4.0 * source.radius**2 + source.height**2) ** 0.5
+        drop = cups.pour.lip_height - cups.receiver.height
+        side = source.radius + 2.0 * spacing
+        ahead = cups.pour.distance_range[1] + cups.receiver.radius
+        extent = [(-reach, -side, -drop), (max(reach, ahead), side, reach)]
+        super().__init__(slots, particles, spacing, numerics, extent)
+        self.cup_radius, self.cup_height = source.radius, source.height
+        self.receiver_radius, self.rim = cups.receiver.radius, -drop
+        self.margin = numerics.contact * spacing
+        self.final_angle = cups.pour.final_angle
+        self.rate_of_turn, self.distance, self.angle, self.turning = (
+            ti.field(ti.f32, slots) for _ in range(4)
+        )
+        self.region = ti.field(ti.i32, (slots, particles))
+        self.received, self.spilled, self.retained = (ti.field(ti.i32, slots) for _ in range(3))
+
+    @ti.func
+    def to_cup(self, b, p):
+        c, s = ti.cos(self.angle[b]), ti.sin(self.angle[b])
+        return vec3(
+            c * p.x - s * p.z + self.cup_radius, p.y, s * p.x + c * p.z + self.cup_height
+        )
+
+    @ti.func
+    def turn(self, b, d):
+        """A direction of the cup frame in the world."""
+        c, s = ti.cos(self.angle[b]), ti.sin(self.angle[b])
+        return vec3(c * d.x + s * d.z, d.y, c * d.z - s * d.x)
+
+    @ti.func
+    def to_world(self, b, q):
+        return self.turn(b, q - vec3(self.cup_radius, 0.0, self.cup_height))
+
+    @ti.func
+    def walls_at(self, q):
+        """Side and floor rows at a point of the cup frame; the side fades out at the rim."""
+        reach = ti.sqrt(q.x * q.x + q.y * q.y)
+        fade = ti.math.clamp((self.cup_height - q.z) / self.h + 0.5, 0.0, 1.0)
+        side = fade * self.look_up(self.half_space, self.cup_radius - reach)
+        floor = self.look_up(self.half_space, q.z)
+        outward = vec3(q.x, q.y, 0.0) / ti.max(reach, 1e-6)
+        return side, floor, outward
+
+    @ti.func
+    def boundary(self, b, i):
+        density = 0.0
+        self.wall[b, i] = vec3(0.0)
+        if self.region[b, i] == INSIDE:
+            side, floor, outward = self.walls_at(self.to_cup(b, self.predicted[b, i]))
+            gradient = (-side[1] * outward + floor[1] * vec3(0.0, 0.0, 1.0)) / self.h
+            self.wall[b, i] = self.turn(b, gradient)
+            density = side[0] + floor[0]
+        return density
+
+    @ti.func
+    def contain(self, b):
+        limit = self.cup_radius - self.margin
+        for i in range(self.alive[b]):
+            if self.region[b, i] == INSIDE:
+                q = self.to_cup(b, self.predicted[b, i])
+                reach = ti.sqrt(q.x * q.x + q.y * q.y)
+                if q.z < self.cup_height and (reach > limit or q.z < self.margin):
+                    inward = ti.min(limit / ti.max(reach, 1e-6), 1.0)
+                    q = vec3(inward * q.x, inward * q.y, ti.max(q.z, self.margin))
+                    self.predicted[b, i] = self.to_world(b, q)
+
+    @ti.func
+    def drag(self, b):
+        share = self.wall_share(b)
+        for i in range(self.alive[b]):
+            if self.region[b, i] == INSIDE:
+                p = self.position[b, i]
+                side, floor, outward = self.walls_at(self.to_cup(b, p))
+                moving = self.turning[b] * vec3(p.z, 0.0, -p.x)
+                v = self.velocity[b, i] - moving
+                v = self.rub(v, self.turn(b, outward), side, share)
+                v = self.rub(v, self.turn(b, vec3(0.0, 0.0, -1.0)), floor, share)
+                self.velocity[b, i] = v + moving
+
+    @ti.func
+    def follow(self, b):
+        """Update each particle's region; a wall is crossed only over the rim."""
+        for i in range(self.alive[b]):
+            q = self.to_cup(b, self.position[b, i])
+            if q.z >= self.cup_height:
+                self.region[b, i] = ABOVE
+            elif self.region[b, i] == ABOVE:
+                within = q.x * q.x + q.y * q.y < self.cup_radius * self.cup_radius
+                self.region[b, i] = ti.select(within, INSIDE, OUTSIDE)
+
+    @ti.func
+    def catch(self, b):
+        """Take particles that fell past the receiver's rim out of the simulation, and count."""
+        i = 0
+        while i < self.alive[b]:
+            p = self.position[b, i]
+            if p.z < self.rim and self.region[b, i] != INSIDE:
+                x = p.x - self.distance[b]
+                if x * x + p.y * p.y < self.receiver_radius * self.receiver_radius:
+                    self.received[b] = self.received[b] + 1
+                else:
+                    self.spilled[b] = self.spilled[b] + 1
+                last = self.alive[b] - 1
+                self.alive[b] = last
+                self.position[b, i] = self.position[b, last]
+                self.velocity[b, i] = self.velocity[b, last]
+                self.kick[b, i] = self.kick[b, last]
+                self.region[b, i] = self.region[b, last]
+            else:
+                i += 1
+
+    @ti.kernel
+    def pour(self, active: ti.i32, start: ti.i32, stop: ti.i32, hold: ti.f32):
+        """Substeps start..stop-1 of the first `active` pours; each ends after its own hold."""
+        for k in range(active * STRIDE):
+            if k % STRIDE == 0:
+                b = k // STRIDE
+                rate = self.rate_of_turn[b]
+                steps = ti.cast((self.final_angle / rate + hold) / self.dt, ti.i32)
+                for n in range(start, ti.min(stop, steps)):
+                    if self.alive[b] > 0:
+                        self.angle[b] = ti.min(rate * (n + 1) * self.dt, self.final_angle)
+                        self.turning[b] = ti.select(self.angle[b] < self.final_angle, rate, 0.0)
+                        self.follow(b)
+                        self.flow(b)
+                        self.relax(b)
+                        self.catch(b)
+
+    @ti.kernel
+    def count(self, active: ti.i32):
+        """Count what stayed in the source; what still flies is spilled."""
+        for b in range(active):
+            self.retained[b] = 0
+            for i in range(self.alive[b]):
+                if self.region[b, i] == INSIDE:
+                    self.retained[b] = self.retained[b] + 1
+                else:
+                    self.spilled[b] = self.spilled[b] + 1
+
+    def place_cups(self, rate, distance):
+        """Set the cups upright, to turn at `rate` [b] in rad/s, receivers at `distance` [b] m."""
+        ones = self.padded(rate)
+        ones[len(rate) :] = 1.0
+        self.rate_of_turn.from_numpy(ones)
+        self.distance.from_numpy(self.padded(distance))
+        for field in (self.angle, self.turning, self.region, self.received, self.spilled):
+            field.fill(0)

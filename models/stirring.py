@@ -1,0 +1,248 @@
+"""Stirring: a recorded gripper path in, the stick's inclination out."""
+
+import os
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from functools import cache
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import runtime
+from .liquid import Liquid
+from .numerics import MODEL_VERSION, Numerics
+from .packing import pack_cylinder
+
+SETTLING = 1.0  # s that a packing relaxes around the held stick
+SETTLING_LIQUID = Liquid(viscosity=0.05, cohesion=0.0, density=1000.0)
+DAMPING = 0.97  # of velocities each substep while settling
+CHUNK = 240  # substeps a kernel call, so that Ctrl-C and progress are prompt
+
+
+class GripperPath(Protocol):
+    """Times [T] in s and pivot positions [T, 3] in m; rows that are not finite are skipped."""
+
+    time: np.ndarray
+    position: np.ndarray
+
+
+class HasRig(Protocol):
+    """What a setup reads from a recording."""
+
+    attrs: Any
+    gripper: GripperPath
+
+
+@dataclass(frozen=True)
+class Cup:
+    """An upright cylinder on z = 0 [m]; `fill` is the liquid's depth with the stick in it."""
+
+    radius: float
+    height: float
+    fill: float
+
+
+@dataclass(frozen=True)
+class Stick:
+    """A uniform cylinder that pivots freely at its upper end [m, kg]."""
+
+    radius: float
+    length: float
+    mass: float
+
+    @property
+    def inertia(self) -> float:
+        """Moment of inertia about the pivot [kg m²]."""
+        return self.mass * (self.length**2 / 3.0 + self.radius**2 / 4.0)
+
+
+@dataclass(frozen=True)
+class StirSetup:
+    """All that fixes a stirring simulation besides liquid, path and seed.
+
+    Attributes:
+        cup: The cup.
+        stick: The stick.
+        submerged: Depth of the stick's tip below the surface at rest [m].
+        particles: Number of particles.
+        numerics: Constants of the discretisation.
+    """
+
+    cup: Cup
+    stick: Stick
+    submerged: float
+    particles: int = 1000
+    numerics: Numerics = field(default_factory=Numerics)
+
+    @classmethod
+    def from_recording(
+        cls, recording: HasRig, particles: int = 1000, numerics: Numerics | None = None
+    ) -> "StirSetup":
+        """The setup that a recording's attributes describe (the first pivot position too).
+
+        Raises:
+            ValueError: an attribute is missing, or the stick does not reach the liquid.
+        """
+        attrs = recording.attrs
+        wanted = ("cup_radius", "cup_height", "fill", "stick_radius", "stick_length")
+        missing = [name for name in wanted if name not in attrs]
+        if "stick_mass" not in attrs and "stick_density" not in attrs:
+            missing.append("stick_mass or stick_density")
+        if missing:
+            raise ValueError(f"the recording lacks the attributes {', '.join(missing)}; add them")
+        cup_radius, height, fill, radius, length = (float(attrs[name]) for name in wanted)
+        if "stick_mass" in attrs:
+            mass = float(attrs["stick_mass"])
+        else:
+            mass = float(attrs["stick_density"]) * np.pi * radius**2 * length
+        position = np.asarray(recording.gripper.position)
+        start = position[np.isfinite(position).all(axis=1)][0]
+        submerged = fill - (float(start[2]) - length)
+        if not 0.0 < submerged:
+            raise ValueError(
+                f"the stick's tip starts {-submerged:.4f} m above the liquid; check fill={fill}, "
+                f"stick_length={length} and the gripper's z={start[2]:.4f}"
+            )
+        return cls(
+            cup=Cup(cup_radius, height, fill),
+            stick=Stick(radius, length, mass),
+            submerged=min(submerged, fill),
+            particles=particles,
+            numerics=numerics or Numerics(),
+        )
+
+    @property
+    def spacing(self) -> float:
+        """Particle spacing [m], the cube root of the liquid's volume per particle."""
+        discs = self.cup.radius**2 * self.cup.fill - self.stick.radius**2 * self.submerged
+        return float((np.pi * discs / self.particles) ** (1.0 / 3.0))
+
+    def settings(self) -> dict[str, Any]:
+        """Everything that fixes the simulator, as plain numbers, with the model's version."""
+        return {"model": MODEL_VERSION, "scene": "stir", **asdict(self)}
+
+
+def stir(
+    liquid: Liquid,
+    gripper: GripperPath,
+    setup: StirSetup,
+    seeds: ArrayLike,
+    progress: Callable[[float], None] | None = None,
+) -> np.ndarray:
+    """Inclination of the stick while the gripper repeats its path in each liquid.
+
+    Args:
+        liquid: B liquids; scalars are shared.
+        gripper: Path, measured at T times; pivots move linearly between samples.
+        setup: Geometry and discretisation.
+        seeds: One integer a simulation, shape [B]; it decides the initial packing.
+        progress: Called with the fraction done.
+
+    Returns:
+        Angles [rad] from the downward vertical in the xz and yz planes at the gripper's times,
+        shape [B, T, 2]; NaN for a simulation that diverged.
+
+    Raises:
+        ValueError: liquid and seeds do not agree in length, or the path is too short.
+        RuntimeError: neighbour lists overflowed.
+    """
+    seeds = np.atleast_1d(np.asarray(seeds))
+    liquid = liquid.batch(len(seeds))
+    path = substep_path(gripper, setup.numerics.rate)
+    signals = []
+    scene = _scene(setup)
+    for low in range(0, len(seeds), scene.slots):
+        part = slice(low, low + scene.slots)
+
+        def report(done: float, low: int = low, size: int = len(seeds[part])) -> None:
+            if progress is not None:
+                progress((low + done * size) / len(seeds))
+
+        directions = _run(scene, setup, liquid[part], path, seeds[part], report)
+        signals.append(inclination(directions, gripper.time, setup.numerics.rate))
+    return np.concatenate(signals)
+
+
+def substep_path(gripper: GripperPath, rate: float) -> np.ndarray:
+    """Pivot at the start and at the end of each substep [m], shape [substeps + 1, 3].
+
+    Raises:
+        ValueError: fewer than two finite samples.
+    """
+    time, position = np.asarray(gripper.time), np.asarray(gripper.position)
+    finite = np.isfinite(position).all(axis=1)
+    if finite.sum() < 2:
+        raise ValueError(f"the gripper path has {finite.sum()} finite samples; it needs 2 or more")
+    substeps = int(np.ceil((time[-1] - time[0]) * rate))
+    grid = time[0] + np.arange(substeps + 1) / rate
+    return np.stack(
+        [np.interp(grid, time[finite], position[finite, axis]) for axis in range(3)], axis=1
+    )
+
+
+def inclination(directions: np.ndarray, time: np.ndarray, rate: float) -> np.ndarray:
+    """Angles in the xz and yz planes at `time`, from unit vectors at every substep.
+
+    Args:
+        directions: From pivot to tip, shape [B, substeps + 1, 3], the first at time[0].
+        time: Sample times [s], shape [T].
+        rate: Substeps per second.
+
+    Returns:
+        Angles [rad], shape [B, T, 2].
+    """
+    angles = np.arctan2(directions[..., :2], -directions[..., 2:])
+    grid = time[0] + np.arange(directions.shape[1]) / rate
+    return np.stack(
+        [
+            np.stack([np.interp(time, grid, trial[:, axis]) for axis in range(2)], axis=1)
+            for trial in angles
+        ]
+    )
+
+
+@cache
+def _scene(setup: StirSetup):
+    """The compiled scene of a setup; its fields live as long as the process."""
+    runtime.start()
+    from .stirring_kernel import StirringScene
+
+    return StirringScene(max(8, os.cpu_count() or 1), setup)
+
+
+def _run(scene, setup, liquid, path, seeds, report) -> np.ndarray:
+    """Directions of the sticks, shape [B, substeps + 1, 3]; NaN where a trial diverged."""
+    size = len(seeds)
+    pivot = path[0]
+    clearance = setup.stick.radius + 0.4 * setup.spacing
+    tip = pivot[2] - setup.stick.length - 0.4 * setup.spacing
+
+    def in_stick(points: np.ndarray) -> np.ndarray:
+        return (np.hypot(*(points - pivot)[:, :2].T) < clearance) & (points[:, 2] > tip)
+
+    scene.place(
+        np.stack(
+            [
+                pack_cylinder(setup.cup.radius, setup.spacing, setup.particles, int(s), in_stick)
+                for s in seeds
+            ]
+        )
+    )
+    scene.place_stick(np.tile(pivot, (size, 1)))
+    scene.pour_in(SETTLING_LIQUID.batch(size))
+    scene.settle(size, round(SETTLING * setup.numerics.rate), DAMPING)
+    scene.pour_in(liquid)
+
+    steps = len(path) - 1
+    pivots = np.broadcast_to(path[1:].astype(np.float32), (size, steps, 3)).copy()
+    directions = np.empty((size, steps, 3), np.float32)
+    for start in range(0, steps, CHUNK):
+        stop = min(start + CHUNK, steps)
+        scene.stir(size, start, stop, pivots, directions)
+        report(stop / steps)
+    scene.check_capacity()
+    diverged = ~np.isfinite(scene.position.to_numpy()[:size]).all(axis=(1, 2))
+    directions[diverged] = np.nan
+    down = np.broadcast_to(np.float32([0.0, 0.0, -1.0]), (size, 1, 3))
+    return np.concatenate([down, directions], axis=1).astype(np.float64)
