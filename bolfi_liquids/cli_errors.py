@@ -7,12 +7,16 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
+FAILED = 1
 USAGE_ERROR = 2
 INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 
 
 class OneLineErrors(TyperGroup):
-    """A command group that turns expected errors into one line on stderr and exit code 2."""
+    """A command group that turns expected errors into one line on stderr.
+
+    The exit code is 2 for what a person gave and can mend, and 1 for simulations that failed.
+    """
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -20,11 +24,11 @@ class OneLineErrors(TyperGroup):
         except KeyboardInterrupt:
             _say(_how_to_go_on(sys.argv[1:]))
             raise typer.Exit(INTERRUPTED) from None
-        except (ValueError, OSError) as err:
+        except (ValueError, OSError, RuntimeError) as err:
             if ctx.params.get("debug"):
                 raise
             _say(f"error: {' '.join(str(err).split())}")
-            raise typer.Exit(USAGE_ERROR) from None
+            raise typer.Exit(FAILED if isinstance(err, RuntimeError) else USAGE_ERROR) from None
 
 
 def _say(line: str) -> None:

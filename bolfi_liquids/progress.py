@@ -3,6 +3,11 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from numpy.typing import NDArray
+
+Simulate = Callable[[dict[str, NDArray], NDArray], NDArray]
+"""(theta, seeds) -> signals, one row for each seed."""
+
 Advance = Callable[[int], None]
 
 
@@ -33,3 +38,14 @@ def progress_bar(task: str, total: int, *, shown: bool) -> Iterator[Advance]:
     with Progress(*columns, console=console) as bar:
         handle = bar.add_task(task, total=total)
         yield lambda steps: bar.advance(handle, steps)
+
+
+def reported(simulate: Simulate, advance: Advance) -> Simulate:
+    """The same simulator, which moves a bar on after each batch."""
+
+    def simulate_and_report(theta: dict[str, NDArray], seeds: NDArray) -> NDArray:
+        signals = simulate(theta, seeds)
+        advance(len(seeds))
+        return signals
+
+    return simulate_and_report

@@ -1,0 +1,80 @@
+"""What stirring taught: the posterior of a run and what came with it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import NDArray
+
+from .draws import pick_draws
+from .errors import InputError
+from .run_directory import POSTERIOR, read_run
+from .summary import read_summary
+
+if TYPE_CHECKING:
+    from xarray import Dataset, DataTree
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A finished calibration; everything that pours and reports need, without simulating.
+
+    Attributes:
+        path: The RUN directory.
+        tree: posterior.nc, in ArviZ's schema; the groups are listed in `results`.
+        record: run.toml: settings, versions, seed and hashes.
+        summary: The section "calibrate" of summary.json.
+    """
+
+    path: Path
+    tree: "DataTree"
+    record: Mapping[str, Any]
+    summary: Mapping[str, Any]
+
+    @classmethod
+    def open(cls, run: str | Path) -> "Calibration":
+        """Read a finished calibration.
+
+        Raises:
+            InputError: There is none in the directory, or it was not finished.
+        """
+        import xarray
+
+        run = Path(run)
+        record = read_run(run)
+        if not is_calibrated(run):
+            raise InputError(
+                "the calibration in it is not finished",
+                where=str(run),
+                fix="go on with it: bolfi-liquids calibrate RECORDING... --out RUN --resume",
+            )
+        with xarray.open_datatree(run / POSTERIOR, engine="h5netcdf") as tree:
+            loaded = tree.load()
+        summary = read_summary(run)["calibrate"]
+        return cls(run, loaded, MappingProxyType(record), MappingProxyType(summary))
+
+    @property
+    def posterior(self) -> "Dataset":
+        """Draws of each parameter, shape (chain, draw)."""
+        return self.tree["posterior"].to_dataset()
+
+    @property
+    def best(self) -> dict[str, float]:
+        """The paper's theta*: the parameters at which the surrogate expects the best fit."""
+        return dict(self.summary["best"])
+
+    @property
+    def liquid_density(self) -> float:
+        """Density of the stirred liquid, as weighed [kg/m3]."""
+        return float(self.tree.attrs["liquid_density"])
+
+    def draws(self, count: int, seed: int = 0) -> dict[str, NDArray]:
+        """A stratified sample of the posterior: parameter -> values, shape (count,)."""
+        return pick_draws(self.posterior, count, seed)
+
+
+def is_calibrated(run: Path) -> bool:
+    """Whether a run's calibration was finished."""
+    return (run / POSTERIOR).is_file() and "calibrate" in read_summary(run)

@@ -1,0 +1,157 @@
+"""From recordings to a posterior over the simulator's parameters."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .calibration import Calibration, is_calibrated
+from .calibration_section import calibration_section
+from .draws import pick_draws
+from .errors import InputError
+from .prior import check_prior, default_prior
+from .progress import Simulate, progress_bar, reported
+from .provenance import run_record
+from .recordings import Recording, open_recording
+from .run_directory import POSTERIOR, SIMULATIONS, enter_run
+from .settings import CalibrationSettings
+from .stirring import Stirring, stirring_of
+from .summary import write_section
+
+if TYPE_CHECKING:
+    from .inference import Fit, Prior
+    from .kept import Keep
+
+Source = Recording | str | Path
+
+
+def calibrate(  # noqa: PLR0913  the one call that most users make
+    recordings: Source | Sequence[Source],
+    *,
+    out: str | Path,
+    prior: "Prior | None" = None,
+    budget: int = 20,
+    seed: int = 0,
+    surrogate: str = "discrepancy",
+    batch: int = 4,
+    particles: int = 1000,
+    sampler: str = "nuts",
+    chains: int = 4,
+    draws: int = 1000,
+    resume: bool = False,
+    progress: bool = True,
+) -> Calibration:
+    """Learn a liquid's parameters from recordings of it being stirred.
+
+    Everything is kept in `out` as it is finished, so an interrupted call can be repeated with
+    `resume`: it then concludes exactly what it would have concluded, and repeats no finished
+    simulation. The same call on a finished run only opens it.
+
+    Args:
+        recordings: One or several of one liquid, opened or as paths. Their discrepancies are
+            added up.
+        out: The RUN directory.
+        prior: Over `viscosity` [Pa s] and `cohesion` [1]; None is `default_prior()`.
+        budget: Simulations that the engine may learn from. A dozen more judge the result.
+        seed: Of everything random.
+        surrogate: "discrepancy", the paper's.
+        batch: Simulations run at the same time.
+        particles: Of the simulated liquid.
+        sampler: "nuts" or "emcee".
+        chains: Of the sampler.
+        draws: Kept, for each chain.
+        resume: Whether `out` may hold a run of the same settings, to go on with.
+        progress: Whether to show bars on stderr.
+
+    Raises:
+        InputError: A recording, the prior, a setting or `out` cannot be used.
+        RuntimeError: Simulations failed; the message says how.
+    """
+    settings = CalibrationSettings(
+        budget=budget,
+        batch=batch,
+        seed=seed,
+        surrogate=surrogate,
+        particles=particles,
+        sampler=sampler,
+        chains=chains,
+        draws=draws,
+    )
+    opened = _open_all(recordings)
+    prior = default_prior() if prior is None else prior
+    check_prior(prior)
+    stirring = stirring_of(opened, particles)
+    _check_budget(settings, prior, stirring)
+    run = Path(out)
+    enter_run(run, run_record(settings, prior, stirring), resume=resume)
+    if not is_calibrated(run):
+        _calibrate(run, stirring, prior, settings, progress)
+    return Calibration.open(run)
+
+
+def _calibrate(
+    run: Path, stirring: Stirring, prior: "Prior", settings: CalibrationSettings, progress: bool
+) -> None:
+    from .inference import SimulationBank
+    from .kept import Keep
+    from .predictive import PREDICTIVE_DRAWS, REPLICATES, check_by_simulation
+    from .results import results_tree, write_tree
+
+    total = settings.budget + PREDICTIVE_DRAWS + REPLICATES
+    with (
+        SimulationBank(run / SIMULATIONS) as bank,
+        progress_bar("stirring", total, shown=progress) as advance,
+    ):
+        advance(len(bank))  # finished before an interruption
+        simulate = reported(stirring.simulate, advance)
+        keep = Keep(bank, stirring.identity, settings.batch)
+        fit = _fit(simulate, stirring, prior, settings, keep)
+        sampled = fit.sample(
+            settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
+        )
+        drawn = pick_draws(sampled["posterior"].to_dataset(), PREDICTIVE_DRAWS, settings.seed)
+        check = check_by_simulation(simulate, drawn, fit.best, settings.seed, keep)
+    tree = results_tree(sampled, fit, stirring, check)
+    write_tree(tree, run / POSTERIOR)
+    write_section(run, "calibrate", calibration_section(tree, fit, stirring, check))
+
+
+def _fit(
+    simulate: Simulate,
+    stirring: Stirring,
+    prior: "Prior",
+    settings: CalibrationSettings,
+    keep: "Keep",
+) -> "Fit":
+    from . import inference
+
+    return inference.fit(
+        simulate,
+        prior,
+        stirring.observed,
+        budget=settings.budget,
+        batch=keep.batch,
+        seed=settings.seed,
+        surrogate=settings.surrogate,
+        discrepancy=stirring.discrepancy(),
+        bank=keep.bank,
+        identity=keep.identity,
+    )
+
+
+def _check_budget(settings: CalibrationSettings, prior: "Prior", stirring: Stirring) -> None:
+    from .inference import Bolfi
+
+    start = Bolfi(prior, stirring.observed, discrepancy=stirring.discrepancy()).initial
+    if settings.budget < start:
+        raise InputError(
+            f"{settings.budget} simulations, fewer than the {start} of the start design",
+            where="--budget",
+            fix=f"give at least {start}",
+        )
+
+
+def _open_all(recordings: Source | Sequence[Source]) -> list[Recording]:
+    sources = [recordings] if isinstance(recordings, Source) else list(recordings)
+    if not sources:
+        raise InputError("no recording given", where="recordings", fix="give at least one")
+    return [s if isinstance(s, Recording) else open_recording(s) for s in sources]

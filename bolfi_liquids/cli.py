@@ -1,0 +1,140 @@
+"""The command line; each command calls the function of the same name."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from . import __version__
+from .cli_errors import OneLineErrors
+from .settings import RISKS, SAMPLERS, SURROGATES, CalibrationSettings, PourSettings
+
+RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="Directory of a run.")]
+
+app = typer.Typer(
+    cls=OneLineErrors,
+    help="Learn a liquid by stirring it, then pour it without spilling.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"bolfi-liquids {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _global_options(
+    debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks of errors.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="And exit.")
+    ] = False,
+) -> None:
+    """`--debug` is read by `OneLineErrors`."""
+
+
+@app.command()
+def calibrate(  # noqa: PLR0913  one parameter for each option
+    recordings: Annotated[
+        list[Path], typer.Argument(metavar="RECORDING...", help="NetCDF files, of one liquid.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="RUN", help="Directory of the run.")],
+    budget: Annotated[
+        int, typer.Option(help="Simulations to learn from.")
+    ] = CalibrationSettings.budget,
+    surrogate: Annotated[
+        str, typer.Option(metavar="|".join(SURROGATES), help="What the engine emulates.")
+    ] = CalibrationSettings.surrogate,
+    sampler: Annotated[
+        str, typer.Option(metavar="|".join(SAMPLERS), help="Of the posterior.")
+    ] = CalibrationSettings.sampler,
+    seed: Annotated[int, typer.Option(help="Of everything random.")] = CalibrationSettings.seed,
+    particles: Annotated[
+        int, typer.Option(help="Of the simulated liquid.")
+    ] = CalibrationSettings.particles,
+    batch: Annotated[
+        int, typer.Option(help="Simulations run at the same time.")
+    ] = CalibrationSettings.batch,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the run in RUN, of the same settings.")
+    ] = False,
+) -> None:
+    """Learn a liquid's parameters from recordings of it being stirred."""
+    from .calibrator import calibrate as run_calibrate
+
+    run_calibrate(
+        recordings,
+        out=out,
+        budget=budget,
+        surrogate=surrogate,
+        sampler=sampler,
+        seed=seed,
+        particles=particles,
+        batch=batch,
+        resume=resume,
+    )
+    _print_section(out, "calibrate")
+
+
+@app.command()
+def pour(
+    run: RunArgument,
+    cups: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="cups.toml; without it, the bundled one.")
+    ] = None,
+    iterations: Annotated[int, typer.Option(help="Actions tried.")] = PourSettings.iterations,
+    risk: Annotated[
+        str,
+        typer.Option(
+            metavar="|".join(RISKS), help="Spillage to keep low: the mean, or the worst tenth's."
+        ),
+    ] = PourSettings.risk,
+) -> None:
+    """Choose the pour that spills least over all that the liquid might be."""
+    from .calibration import Calibration
+    from .cups import bundled_cups, open_cups
+    from .pouring import choose_pour
+
+    chosen_cups = bundled_cups() if cups is None else open_cups(cups)
+    choose_pour(Calibration.open(run), chosen_cups, iterations=iterations, risk=risk)
+    _print_section(run, "pour")
+
+
+@app.command()
+def report(run: RunArgument) -> None:
+    """Write RUN/report.html, one file that shows it all."""
+    from .reporting import report as write_report
+
+    typer.echo(write_report(run))
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Option(metavar="RUN", help="Directory of the run.")] = Path(
+        "runs/demo"
+    ),
+) -> None:
+    """Calibrate on the bundled glycerin, choose a pour and write the report."""
+    from .demo import run_demo
+
+    path = run_demo(out)
+    _print_section(out, "calibrate")
+    _print_section(out, "pour")
+    typer.echo(f"report: {path}")
+
+
+def _print_section(run: Path, name: str) -> None:
+    from rich.console import Console
+
+    from .summary import read_summary
+    from .tables import print_calibration, print_pour
+
+    {"calibrate": print_calibration, "pour": print_pour}[name](read_summary(run)[name], Console())
+
+
+def main() -> None:
+    """Entry point of `bolfi-liquids`."""
+    app()

@@ -1,0 +1,37 @@
+"""The cups a pour is chosen for."""
+
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .errors import InputError
+
+if TYPE_CHECKING:
+    from .models import Cups
+
+BUNDLED = "cups.toml"
+
+
+def bundled_cups() -> "Cups":
+    """The cups that come with the package."""
+    with as_file(files("bolfi_liquids.data") / BUNDLED) as path:
+        return open_cups(path)
+
+
+def open_cups(path: str | Path) -> "Cups":
+    """Read cups that a person wrote down.
+
+    Raises:
+        InputError: The file is missing or cannot be used; the message says why.
+    """
+    from .models import Cups
+
+    path = Path(path)
+    if not path.is_file():
+        raise InputError("no such file", where=str(path), fix="check the path")
+    try:
+        return Cups.from_toml(path)
+    except ValueError as err:
+        raise InputError(
+            " ".join(str(err).split()), where=str(path), fix="compare with the bundled cups.toml"
+        ) from err

@@ -1,0 +1,62 @@
+"""Figures as inline SVG: one look, no file outside the page."""
+
+import io
+import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+INK, GREY, LIGHT = "#1f2933", "#8a94a0", "#e4e7eb"
+BLUE, ORANGE = "#2463a6", "#d1591a"
+STYLE = {
+    "font.family": "sans-serif",
+    "font.size": 9.0,
+    "svg.fonttype": "none",  # text stays text: it can be searched, read aloud and copied
+    "axes.edgecolor": GREY,
+    "axes.labelcolor": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 9.0,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+}
+_OUTSIDE = re.compile(r"<metadata>.*?</metadata>|\sxmlns(?::\w+)?=\"[^\"]*\"", re.DOTALL)
+
+
+def new_figure(width: float, height: float) -> "Figure":
+    """An empty figure of this size [inch], outside pyplot's global state."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def to_svg(figure: "Figure", name: str) -> str:
+    """A figure as an SVG element for an HTML page.
+
+    Args:
+        figure: Drawn under `STYLE`.
+        name: Different for each figure of a page, as it makes the element's ids different.
+    """
+    import matplotlib
+
+    with matplotlib.rc_context({**STYLE, "svg.hashsalt": name}):
+        text = io.StringIO()
+        figure.savefig(text, format="svg", transparent=True)
+    svg = text.getvalue()
+    # HTML needs neither the XML prologue nor namespaces, and readers no links to standards
+    return _OUTSIDE.sub("", svg[svg.index("<svg") :]).strip()
+
+
+def plain_log_ticks(axes: "Axes", which: str) -> None:
+    """A logarithmic axis labelled 0.01, 0.1, 1 instead of powers; `which` is "x" or "y"."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    getattr(axes, f"set_{which}scale")("log")
+    axis = getattr(axes, f"{which}axis")
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())

@@ -1,0 +1,66 @@
+"""What a run shows, in plain sentences."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+UNITS = {"viscosity": "Pa s"}
+UNLEARNED = 0.6  # share of the prior's 90 % interval above which little was learned
+AS_GOOD_AS_NOISE = 1.5
+
+
+def with_unit(name: str, value: float) -> str:
+    """A parameter's value to three digits, with its unit."""
+    return f"{value:.3g} {UNITS.get(name, '')}".strip()
+
+
+def parameter_sentence(name: str, values: Mapping[str, float], prior: NDArray) -> str:
+    """Where a parameter probably lies, and whether the stirring told much about it.
+
+    Args:
+        name: Of the parameter.
+        values: Its entry in summary.json.
+        prior: Draws from its prior, shape (n,).
+    """
+    low, high = values["q05"], values["q95"]
+    ranks = np.searchsorted(np.sort(prior), (low, high)) / len(prior)
+    share = float(ranks[1] - ranks[0]) / 0.9
+    verdict = (
+        "the stirring says little about it"
+        if share > UNLEARNED
+        else f"{share:.0%} of the range thought possible before"
+    )
+    return (
+        f"{name.capitalize()} is probably between {with_unit(name, low)} and"
+        f" {with_unit(name, high)} (90 %), median {with_unit(name, values['q50'])}: {verdict}."
+    )
+
+
+def fit_sentence(section: Mapping[str, Any]) -> str:
+    """How well the closest hypothesis follows, measured by the noise."""
+    fit, noise = section["fit_rms_deg"], section["noise_deg"]
+    verdict = (
+        "it follows as closely as can be expected"
+        if fit <= AS_GOOD_AS_NOISE * noise
+        else "the rest is what the simulator's model of liquid, stick or cameras lacks"
+    )
+    return (
+        f"The closest of {section['n_simulations']} simulated hypotheses differs from the"
+        f" recording by {fit:.2f}° RMS. Noise alone (of the cameras, and between equal"
+        f" simulations) would leave {noise:.2f}°: {verdict}."
+    )
+
+
+def pour_sentence(section: Mapping[str, Any]) -> str:
+    """What to do, and what it is expected to spill."""
+    plug_in = section["plug_in"]
+    return (
+        f"Turn the source at {section['angular_velocity_deg_s']:.0f}°/s with its lip"
+        f" {section['distance_cm']:.1f} cm from the receiver's axis: expected to spill"
+        f" {section['expected_spillage']:.1%}, in 19 of 20 cases less than"
+        f" {section['spillage_q95']:.1%}. The best action at θ* alone"
+        f" ({plug_in['angular_velocity_deg_s']:.0f}°/s, {plug_in['distance_cm']:.1f} cm) would"
+        f" spill {plug_in['expected_spillage']:.1%} over the same liquids."
+    )

@@ -1,0 +1,122 @@
+"""The posterior over two parameters: contours, marginals and the prior."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .drawing import BLUE, GREY, INK, ORANGE, STYLE, new_figure, plain_log_ticks, to_svg
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from xarray import Dataset, DataTree
+
+LABELS = {"viscosity": "viscosity [Pa s]", "cohesion": "cohesion [dimensionless]"}
+LOGARITHMIC = ("viscosity",)
+INSIDE = (0.9, 0.5)  # probability inside each contour
+
+
+def posterior_figure(tree: "DataTree") -> str:
+    """Contours of the joint posterior with its marginals and those of the prior."""
+    import matplotlib
+
+    surface = tree["surface"].to_dataset()
+    first, second = map(str, surface["log_posterior"].dims)
+    axes_of = {name: _coordinate(surface, name) for name in (first, second)}
+    posterior, prior = (_density(surface, name) for name in ("log_posterior", "log_prior"))
+    with matplotlib.rc_context(STYLE):
+        figure = new_figure(6.2, 4.8)
+        grid = figure.subplots(
+            2,
+            2,
+            sharex="col",
+            sharey="row",
+            gridspec_kw={"width_ratios": (3, 1), "height_ratios": (1, 3)},
+        )
+        joint, top, right = grid[1, 0], grid[0, 0], grid[1, 1]
+        grid[0, 1].set_axis_off()
+        _draw_joint(joint, surface, posterior, axes_of)
+        _mark(joint, tree, (first, second))
+        for density, style in ((posterior, {"color": BLUE}), (prior, {"color": GREY, "ls": "--"})):
+            top.plot(surface[first], marginal(density, *axes_of.values()), **style)
+            right.plot(marginal(density.T, *reversed(axes_of.values())), surface[second], **style)
+        _finish(figure, joint, (first, second))
+        top.set_ylim(bottom=0)
+        top.set_yticks([])
+        right.set_xlim(left=0)
+        right.set_xticks([])
+        return to_svg(figure, "posterior")
+
+
+def _coordinate(surface: "Dataset", name: str) -> NDArray[np.float64]:
+    """The axis as it is drawn: logarithms where it is logarithmic."""
+    values = surface[name].to_numpy()
+    return np.log(values) if name in LOGARITHMIC else values
+
+
+def _density(surface: "Dataset", name: str) -> NDArray[np.float64]:
+    """Density over the drawn coordinates, up to a constant; shape of the grid."""
+    log_density = surface[name].to_numpy().copy()
+    for axis, parameter in enumerate(surface[name].dims):
+        if parameter in LOGARITHMIC:
+            # Jacobian of the logarithm
+            shape = [-1 if axis == at else 1 for at in range(log_density.ndim)]
+            log_density = log_density + np.log(surface[parameter].to_numpy()).reshape(shape)
+    return np.exp(log_density - log_density.max())
+
+
+def marginal(density: NDArray, kept: NDArray, integrated: NDArray) -> NDArray[np.float64]:
+    """Marginal density over a grid's first axis.
+
+    Args:
+        density: Up to a constant, shape (len(kept), len(integrated)).
+        kept: Coordinate of the first axis.
+        integrated: Coordinate of the second.
+    """
+    unscaled = np.trapezoid(density, integrated, axis=1)
+    return unscaled / np.trapezoid(unscaled, kept)
+
+
+def contour_levels(mass: NDArray, density: NDArray) -> list[float]:
+    """Densities above which the shares `INSIDE` of the probability lie, ascending.
+
+    Args:
+        mass: Probability of each cell of the grid, up to a constant.
+        density: At the cells, of the same shape.
+    """
+    order = np.argsort(-density, axis=None)
+    inside = np.cumsum(mass.ravel()[order]) / mass.sum()
+    ranked = density.ravel()[order]
+    return [float(ranked[np.searchsorted(inside, share)]) for share in INSIDE]
+
+
+def _draw_joint(
+    joint: "Axes", surface: "Dataset", density: NDArray, axes_of: dict[str, NDArray]
+) -> None:
+    first, second = axes_of
+    cells = np.outer(np.gradient(axes_of[first]), np.gradient(axes_of[second]))
+    levels = contour_levels(density * cells, density)
+    x, y = surface[first], surface[second]
+    joint.contourf(x, y, density.T, levels=[*levels, np.inf], colors=[BLUE, BLUE], alpha=0.25)
+    joint.contour(x, y, density.T, levels=levels, colors=BLUE, linewidths=1.0)
+
+
+def _mark(joint: "Axes", tree: "DataTree", names: tuple[str, str]) -> None:
+    simulations, closest = tree["simulations"], tree["closest"]
+    points = [simulations[name].to_numpy() for name in names]
+    joint.plot(*points, ".", color=GREY, markersize=4, label="simulated")
+    at = [float(closest[name]) for name in names]
+    joint.plot(*at, "*", color=ORANGE, markersize=10, label="closest hypothesis")
+
+
+def _finish(figure, joint: "Axes", names: tuple[str, str]) -> None:
+    first, second = names
+    for name, which in ((first, "x"), (second, "y")):
+        if name in LOGARITHMIC:
+            plain_log_ticks(joint, which)
+    joint.set_xlabel(LABELS.get(first, first))
+    joint.set_ylabel(LABELS.get(second, second))
+    joint.plot([], [], color=BLUE, label="posterior, 50 % and 90 %")
+    joint.plot([], [], color=GREY, linestyle="--", label="prior")
+    figure.legend(loc="outside upper center", ncols=4)
+    joint.tick_params(colors=INK)

@@ -1,0 +1,45 @@
+"""Simulations that judge a calibration: what the posterior predicts, and how noisy it is."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kept import Keep, fresh_seeds, simulate_kept
+from .progress import Simulate
+
+PREDICTIVE_DRAWS = 8
+REPLICATES = 4  # seeds at theta*, for the noise between seeds
+_PREDICTIVE, _REPLICATE = 1, 2  # purposes of seeds
+
+
+class Check(NamedTuple):
+    """Signals of simulations that the engine did not learn from."""
+
+    predictive: NDArray[np.float64]  # (draws, T, planes) rad, each at a posterior draw
+    replicates: NDArray[np.float64]  # (seeds, T, planes) rad, all at theta*
+    seconds: float  # spent in the simulator [s]
+
+
+def check_by_simulation(
+    simulate: Simulate,
+    draws: Mapping[str, NDArray],
+    best: Mapping[str, float],
+    seed: int,
+    keep: Keep,
+) -> Check:
+    """Simulate at `draws` and, with several seeds, at `best`; all with fresh seeds.
+
+    Args:
+        simulate: The stirring simulator.
+        draws: Posterior draws, name -> shape (n,).
+        best: theta*.
+        seed: Of the run.
+        keep: Finished simulations are taken from there and put there.
+    """
+    count = len(next(iter(draws.values())))
+    at_best = {name: np.full(REPLICATES, value) for name, value in best.items()}
+    predictive = simulate_kept(simulate, draws, fresh_seeds(seed, _PREDICTIVE, count), keep)
+    replicates = simulate_kept(simulate, at_best, fresh_seeds(seed, _REPLICATE, REPLICATES), keep)
+    return Check(predictive.signals, replicates.signals, predictive.seconds + replicates.seconds)

@@ -1,0 +1,100 @@
+"""posterior.nc: the engine's tree and what reports and pours need beside it.
+
+Groups from the engine, in ArviZ's schema: `posterior`, `sample_stats`, `prior`,
+`observed_data`, `constant_data`, `simulations`. Added here:
+
+- `recorded`: inclination over (frame, plane), with `time` and `recording` of each frame;
+- `posterior_predictive`: inclination over (chain, draw, frame, plane), fresh seeds;
+- `replicates`: inclination over (seed, frame, plane), at theta*;
+- `closest`: inclination over (frame, plane), discrepancy and parameters of the simulated
+  hypothesis that came nearest;
+- `surface`: over a grid of prior quantiles, the surrogate's mean and sd of the transformed
+  discrepancy, and the log densities of prior and posterior.
+"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .files import write_whole
+from .predictive import Check
+from .stirring import Stirring
+
+if TYPE_CHECKING:
+    from xarray import Dataset, DataTree
+
+    from .inference import Fit, Prior
+
+GRID = 61
+PLANE_NAMES = ("xz", "yz")
+
+
+def results_tree(sampled: "DataTree", fit: "Fit", stirring: Stirring, check: Check) -> "DataTree":
+    """The engine's tree with the groups of this module."""
+    from xarray import Dataset, DataTree
+
+    frames = {
+        "time": ("frame", stirring.time, {"units": "s"}),
+        "recording": ("frame", stirring.member),
+        "plane": list(PLANE_NAMES),
+    }
+
+    def inclination(values, *leading: str) -> Dataset:
+        dims = (*leading, "frame", "plane")
+        return Dataset({"inclination": (dims, values, {"units": "rad"})}, coords=frames)
+
+    tree = sampled.copy()
+    closest = inclination(fit.closest.signal).assign(
+        discrepancy=fit.closest.discrepancy, **fit.closest.theta
+    )
+    added = {
+        "recorded": inclination(stirring.observed),
+        "posterior_predictive": inclination(check.predictive[None], "chain", "draw"),
+        "replicates": inclination(check.replicates, "seed"),
+        "closest": closest,
+        "surface": surface(fit),
+    }
+    for name, dataset in added.items():
+        tree[name] = DataTree(dataset)
+    tree.attrs["liquid_density"] = stirring.recordings[0].number("liquid_density")
+    return tree
+
+
+def surface(fit: "Fit") -> "Dataset":
+    """The surrogate over a grid that is regular in prior quantiles.
+
+    Returns:
+        Over (viscosity, cohesion), or whichever two parameters: `mean` and `sd` of a new
+        transformed discrepancy, and `log_prior` and `log_posterior`, densities in natural
+        units, the latter up to a constant.
+    """
+    from xarray import Dataset
+
+    names = fit.prior.names
+    axes = _quantile_axes(fit.prior)
+    mesh = np.meshgrid(*axes.values(), indexing="ij")
+    theta = {name: values.ravel() for name, values in zip(names, mesh, strict=True)}
+    mean, sd = fit.surrogate.predict(theta)
+    columns = {
+        "mean": mean,
+        "sd": sd,
+        "log_prior": fit.prior.log_prob(theta),
+        "log_posterior": fit.log_prob(theta),
+    }
+    shape = mesh[0].shape
+    return Dataset(
+        {name: (names, np.reshape(values, shape)) for name, values in columns.items()},
+        coords=axes,
+        attrs={"transform": fit.surrogate.transform, "threshold": fit.surrogate.threshold},
+    )
+
+
+def _quantile_axes(prior: "Prior") -> dict[str, np.ndarray]:
+    quantiles = np.repeat(np.linspace(0.0, 1.0, GRID)[:, None], len(prior), axis=1)
+    return prior.from_unit(quantiles)
+
+
+def write_tree(tree: "DataTree", path: Path) -> None:
+    """Write a tree in one piece, such that `xarray.open_datatree` reads it back."""
+    write_whole(path, lambda temporary: tree.to_netcdf(temporary, engine="h5netcdf"))

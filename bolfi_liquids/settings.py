@@ -1,0 +1,76 @@
+"""Settings of a calibration and of a pour, checked before anything is simulated."""
+
+from dataclasses import dataclass
+
+from .errors import InputError
+
+SURROGATES = ("discrepancy",)
+SAMPLERS = ("nuts", "emcee")
+RISKS = ("mean", "cvar")
+
+
+@dataclass(frozen=True)
+class CalibrationSettings:
+    """What decides a calibration besides its recordings and prior.
+
+    Attributes:
+        budget: Simulations that the engine may learn from.
+        batch: Simulations run at the same time.
+        seed: Of everything random.
+        surrogate: "discrepancy", the paper's.
+        particles: Of the simulated liquid.
+        sampler: "nuts" or "emcee".
+        chains: Of the sampler; two at least, for R-hat needs them.
+        draws: Kept, for each chain.
+    """
+
+    budget: int = 20
+    batch: int = 4
+    seed: int = 0
+    surrogate: str = "discrepancy"
+    particles: int = 1000
+    sampler: str = "nuts"
+    chains: int = 4
+    draws: int = 1000
+
+    def __post_init__(self):
+        lowest = {"budget": 1, "batch": 1, "seed": 0, "particles": 1, "chains": 2, "draws": 4}
+        for name, least in lowest.items():
+            _at_least(least, name, getattr(self, name))
+        _one_of(SURROGATES, "surrogate", self.surrogate)
+        _one_of(SAMPLERS, "sampler", self.sampler)
+
+
+@dataclass(frozen=True)
+class PourSettings:
+    """What decides the choice of a pour besides the posterior and the cups.
+
+    Attributes:
+        iterations: Actions that are tried, as in the paper's 15.
+        draws: Posterior draws over which spillage is averaged.
+        risk: "mean", or "cvar": the mean over the worst tenth of the draws.
+        seed: Of everything random.
+    """
+
+    iterations: int = 15
+    draws: int = 16
+    risk: str = "mean"
+    seed: int = 0
+
+    def __post_init__(self):
+        for name in ("iterations", "draws"):
+            _at_least(1, name, getattr(self, name))
+        _at_least(0, "seed", self.seed)
+        _one_of(RISKS, "risk", self.risk)
+
+
+def _at_least(lowest: int, name: str, value: object) -> None:
+    if not isinstance(value, int) or isinstance(value, bool) or value < lowest:
+        raise InputError(
+            f"{value!r}", where=f"--{name}", fix=f"give a whole number of at least {lowest}"
+        )
+
+
+def _one_of(choices: tuple[str, ...], name: str, value: object) -> None:
+    if value not in choices:
+        raise InputError(f"{value!r}", where=f"--{name}", fix=f"choose {' or '.join(choices)}")
