@@ -61,7 +61,7 @@ def discrepancy_figure(tree: "DataTree") -> str:
     """Discrepancy of each simulation in turn, and the least so far; start design hollow."""
     import matplotlib
 
-    discrepancy = tree["simulations"]["discrepancy"].to_numpy()
+    discrepancy = np.degrees(np.degrees(tree["simulations"]["discrepancy"].to_numpy()))
     iteration = np.arange(1, len(discrepancy) + 1)
     start = iteration <= int(tree.attrs["initial"])
     with matplotlib.rc_context(STYLE):
@@ -83,7 +83,8 @@ def discrepancy_figure(tree: "DataTree") -> str:
                 label=label,
             )
         plain_log_ticks(axes, "y")
+        axes.xaxis.get_major_locator().set_params(integer=True)
         axes.set_xlabel("simulation")
-        axes.set_ylabel("discrepancy [rad² s]")
-        axes.legend(ncols=3)
+        axes.set_ylabel("discrepancy [deg² s]")
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
         return to_svg(figure, "discrepancy")

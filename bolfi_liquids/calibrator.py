@@ -80,7 +80,6 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     prior = default_prior() if prior is None else prior
     check_prior(prior)
     stirring = stirring_of(opened, particles)
-    _check_budget(settings, prior, stirring)
     run = Path(out)
     enter_run(run, run_record(settings, prior, stirring), resume=resume)
     if not is_calibrated(run):
@@ -136,18 +135,6 @@ def _fit(
         bank=keep.bank,
         identity=keep.identity,
     )
-
-
-def _check_budget(settings: CalibrationSettings, prior: "Prior", stirring: Stirring) -> None:
-    from .inference import Bolfi
-
-    start = Bolfi(prior, stirring.observed, discrepancy=stirring.discrepancy()).initial
-    if settings.budget < start:
-        raise InputError(
-            f"{settings.budget} simulations, fewer than the {start} of the start design",
-            where="--budget",
-            fix=f"give at least {start}",
-        )
 
 
 def _open_all(recordings: Source | Sequence[Source]) -> list[Recording]:

@@ -33,5 +33,7 @@ def open_cups(path: str | Path) -> "Cups":
         return Cups.from_toml(path)
     except ValueError as err:
         raise InputError(
-            " ".join(str(err).split()), where=str(path), fix="compare with the bundled cups.toml"
+            str(err).removeprefix(f"{path}: "),
+            where=str(path),
+            fix="compare with the bundled cups.toml",
         ) from err

@@ -54,9 +54,10 @@ def to_svg(figure: "Figure", name: str) -> str:
 
 def plain_log_ticks(axes: "Axes", which: str) -> None:
     """A logarithmic axis labelled 0.01, 0.1, 1 instead of powers; `which` is "x" or "y"."""
-    from matplotlib.ticker import FuncFormatter, NullFormatter
+    from matplotlib.ticker import FuncFormatter, LogFormatter
 
     getattr(axes, f"set_{which}scale")("log")
     axis = getattr(axes, f"{which}axis")
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(NullFormatter())
+    # between the decades only where fewer than two are in view
+    axis.set_minor_formatter(LogFormatter(minor_thresholds=(1.5, 0.5)))

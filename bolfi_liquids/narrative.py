@@ -16,6 +16,11 @@ def with_unit(name: str, value: float) -> str:
     return f"{value:.3g} {UNITS.get(name, '')}".strip()
 
 
+def percent(fraction: float) -> str:
+    """A fraction to two digits."""
+    return f"{100.0 * fraction:.2g} %"
+
+
 def parameter_sentence(name: str, values: Mapping[str, float], prior: NDArray) -> str:
     """Where a parameter probably lies, and whether the stirring told much about it.
 
@@ -30,7 +35,7 @@ def parameter_sentence(name: str, values: Mapping[str, float], prior: NDArray) -
     verdict = (
         "the stirring says little about it"
         if share > UNLEARNED
-        else f"{share:.0%} of the range thought possible before"
+        else f"this range is {share:.0%} as wide as before the stirring"
     )
     return (
         f"{name.capitalize()} is probably between {with_unit(name, low)} and"
@@ -59,8 +64,8 @@ def pour_sentence(section: Mapping[str, Any]) -> str:
     return (
         f"Turn the source at {section['angular_velocity_deg_s']:.0f}°/s with its lip"
         f" {section['distance_cm']:.1f} cm from the receiver's axis: expected to spill"
-        f" {section['expected_spillage']:.1%}, in 19 of 20 cases less than"
-        f" {section['spillage_q95']:.1%}. The best action at θ* alone"
+        f" {percent(section['expected_spillage'])}, in 19 of 20 cases less than"
+        f" {percent(section['spillage_q95'])}. The best action at θ* alone"
         f" ({plug_in['angular_velocity_deg_s']:.0f}°/s, {plug_in['distance_cm']:.1f} cm) would"
-        f" spill {plug_in['expected_spillage']:.1%} over the same liquids."
+        f" spill {percent(plug_in['expected_spillage'])} over the same liquids."
     )

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .drawing import BLUE, GREY, INK, ORANGE, STYLE, new_figure, to_svg
+from .drawing import BLUE, INK, ORANGE, STYLE, new_figure, to_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,8 +38,16 @@ def _draw_actions(figure: "Figure", axes: "Axes", tree: "DataTree") -> None:
     for name, (colour, marker, label) in CHOICES.items():
         action = tree[name].attrs
         at = np.degrees(action["angular_velocity"]), 100.0 * action["distance"]
+        face = colour if name == "chosen" else "none"  # hollow: both stay visible in one place
         axes.plot(
-            *at, marker, color=colour, markeredgecolor="white", markersize=9, label=label, ls=""
+            *at,
+            marker,
+            color=colour,
+            markerfacecolor=face,
+            markersize=8 if name == "chosen" else 12,
+            label=label,
+            clip_on=False,
+            zorder=5,
         )
     axes.set_xlabel("angular velocity [deg/s]")
     axes.set_ylabel("distance from lip to receiver's axis [cm]")
@@ -58,4 +66,3 @@ def _draw_outcomes(axes: "Axes", tree: "DataTree") -> None:
     axes.set_xlim(-0.5, len(CHOICES) - 0.4)
     axes.set_ylim(bottom=0)
     axes.set_ylabel("spilled [%]")
-    axes.set_title("dots: outcomes; bar: 5 to 95 %; marker: mean", loc="left", color=GREY)

@@ -5,7 +5,7 @@ Groups of pour.nc: `tried` and `tried_plug_in`, over actions, what each spilled 
 that were poured; `surface`, the expected spillage that the surrogate sees over a grid.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,14 +24,17 @@ GRID = 41
 UNITS = {"angular_velocity": "rad s-1", "distance": "m"}
 
 
-def pour_section(pour: "Pour", settings: PourSettings) -> dict[str, Any]:
-    """Numbers of a pour, in the design's form: degrees and centimetres, fractions of liquid."""
-    searched = 2 * settings.iterations * settings.draws
+def pour_section(pour: "Pour", settings: PourSettings, searches: Sequence["Fit"]) -> dict[str, Any]:
+    """Numbers of a pour, in the design's form: degrees and centimetres, fractions of liquid.
+
+    `n_simulations` counts pours of one liquid, in both searches and in judging.
+    """
+    searched = sum(fit.simulations["signal"][:, :, 0].size for fit in searches)
     judged = len(pour.chosen.fractions) + len(pour.plug_in.fractions)
     return {
         **_action(pour.chosen),
         "spillage_q95": pour.chosen.spillage_q95,
-        "n_simulations": searched + judged,
+        "n_simulations": int(searched + judged),
         "risk": settings.risk,
         "seed": settings.seed,
         "plug_in": {**_action(pour.plug_in), "spillage_q95": pour.plug_in.spillage_q95},

@@ -13,13 +13,14 @@ from .cups import bundled_cups
 from .progress import Advance, progress_bar, reported
 from .run_directory import POUR, SIMULATIONS
 from .settings import PourSettings
-from .spillage import RISK, Outcomes
+from .spillage import FRACTIONS, RISK, Outcomes
 from .summary import write_section
 
 if TYPE_CHECKING:
     from .inference import Fit, SimulationBank
     from .models import Cups
 
+PLUG_IN_SEEDS = 4  # that each action of the plug-in is tried with; the paper tries one
 JUDGE_SEEDS = 2  # fresh seeds for each draw, to judge the two actions
 _SEARCH, _JUDGE = 11, 12  # purposes of seeds
 
@@ -100,7 +101,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     settings = PourSettings(iterations=iterations, draws=draws, risk=risk, seed=seed)
     cups = bundled_cups() if cups is None else cups
     liquids = calibration.draws(draws, seed)
-    best = {name: np.full(draws, value) for name, value in calibration.best.items()}
+    best = {name: np.full(PLUG_IN_SEEDS, value) for name, value in calibration.best.items()}
     with (
         SimulationBank(calibration.path / SIMULATIONS) as bank,
         progress_bar("pouring", 2 * iterations + 2, shown=progress) as advance,
@@ -111,7 +112,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         chosen, plug_in = (search.judge(fit.best, liquids) for fit in (over_posterior, at_best))
     pour = Pour(calibration.path, chosen, plug_in)
     write_tree(pour_tree(pour, over_posterior, at_best, liquids), calibration.path / POUR)
-    write_section(calibration.path, "pour", pour_section(pour, settings))
+    write_section(calibration.path, "pour", pour_section(pour, settings, (over_posterior, at_best)))
     return pour
 
 
@@ -149,9 +150,9 @@ class _Search:
                     "distance": dist.Uniform(*self.cups.distance_range),
                 }
             ),
-            np.zeros((self.settings.draws, 3)),
+            np.zeros((len(outcomes.seeds), len(FRACTIONS))),
             budget=self.settings.iterations,
-            batch=1,  # one action already is `draws` simulations, which run in parallel
+            batch=1,  # one action already is several simulations, which run in parallel
             seed=self.settings.seed,
             discrepancy=lambda _, fractions: measure(fractions),
             transform="sqrt",

@@ -8,6 +8,9 @@ SURROGATES = ("discrepancy",)
 SAMPLERS = ("nuts", "emcee")
 RISKS = ("mean", "cvar")
 
+MIN_LEARN = 3  # simulations from which the engine learns anything at all
+MIN_PARTICLES = 100  # with fewer, the stick is thinner than the gaps between them
+
 
 @dataclass(frozen=True)
 class CalibrationSettings:
@@ -34,7 +37,14 @@ class CalibrationSettings:
     draws: int = 1000
 
     def __post_init__(self):
-        lowest = {"budget": 1, "batch": 1, "seed": 0, "particles": 1, "chains": 2, "draws": 4}
+        lowest = {
+            "budget": 1,
+            "batch": 1,
+            "seed": 0,
+            "particles": MIN_PARTICLES,
+            "chains": 2,
+            "draws": 4,
+        }
         for name, least in lowest.items():
             _at_least(least, name, getattr(self, name))
         _one_of(SURROGATES, "surrogate", self.surrogate)
@@ -58,9 +68,8 @@ class PourSettings:
     seed: int = 0
 
     def __post_init__(self):
-        for name in ("iterations", "draws"):
-            _at_least(1, name, getattr(self, name))
-        _at_least(0, "seed", self.seed)
+        for name, least in {"iterations": MIN_LEARN, "draws": 1, "seed": 0}.items():
+            _at_least(least, name, getattr(self, name))
         _one_of(RISKS, "risk", self.risk)
 
 

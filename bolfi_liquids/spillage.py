@@ -76,5 +76,6 @@ class Outcomes:
         """A text that two equal experiments share."""
         liquids = {name: np.asarray(values).tolist() for name, values in self.theta.items()}
         return json.dumps(
-            ["pour", repr(self.cups), self.density, liquids, np.asarray(self.seeds).tolist()]
+            [self.cups.settings(), self.density, liquids, np.asarray(self.seeds).tolist()],
+            sort_keys=True,
         )
