@@ -13,7 +13,9 @@ from .optimise import minimise_in_box
 from .surrogate import DiscrepancySurrogate
 
 
-class _LCBState(NamedTuple):
+class LCBState(NamedTuple):
+    """What the bound depends on."""
+
     gp: GP
     width: jax.Array  # []
 
@@ -29,7 +31,7 @@ def exploration_width(t: int, dimension: int, epsilon: float = 0.1) -> float:
     return float(np.sqrt(2.0 * np.log(t ** (dimension / 2 + 2) * np.pi**2 / (3.0 * epsilon))))
 
 
-def lower_confidence_bound(state: _LCBState, u: jax.Array) -> jax.Array:
+def lower_confidence_bound(state: LCBState, u: jax.Array) -> jax.Array:
     """mu - eta sqrt(v) at u [d], v the variance of the latent mean (without noise)."""
     mean, variance = predict(state.gp, u)
     return mean - state.width * jnp.sqrt(variance)
@@ -60,7 +62,7 @@ class LowerConfidenceBound:
             dimension = surrogate.gp.data.u.shape[1]
             width = jnp.asarray(exploration_width(surrogate.count, dimension))
             centre = minimise_in_box(
-                lower_confidence_bound, _LCBState(surrogate.gp, width), dimension
+                lower_confidence_bound, LCBState(surrogate.gp, width), dimension
             )
             points.append(truncated_normal(subkey, centre, self.jitter))
             surrogate = surrogate.believe(points[-1][None])

@@ -9,13 +9,14 @@ from scipy.optimize import minimize
 from scipy.stats import norm, qmc
 
 from .gp import Data, Hyper, log_marginal_likelihood
+from .optimise import METHOD
 
 # Normal priors of the logs: inputs are prior quantiles and targets have unit variance, so one
 # choice fits every parameter, unit and simulator.
 LENGTH = (np.log(0.5), 0.7)  # 95 %: a tenth of the box to twice the box
 AMPLITUDE = (np.log(1.0), 0.7)
 NOISE = (np.log(0.1), 1.0)  # 95 %: 1 % to 70 % of the targets' sd
-SCORED, REFINED = 16, 3  # starts that are evaluated, and of these the best to be optimised
+SCORED, REFINED = 16, 2  # starts that are evaluated, and of these the best to be optimised
 
 
 def log_prior(hyper: Hyper) -> jax.Array:
@@ -50,7 +51,7 @@ def starts(dimension: int) -> np.ndarray:
 
 
 def maximum_a_posteriori(data: Data) -> Hyper:
-    """Best of several L-BFGS runs; a pure function of the data, so that a resumed run agrees."""
+    """Best of several truncated Newton runs; a pure function of the data, so resuming agrees."""
 
     def objective(vector: np.ndarray) -> tuple[float, np.ndarray]:
         value, gradient = _value_and_grad(vector, data)
@@ -59,7 +60,7 @@ def maximum_a_posteriori(data: Data) -> Hyper:
     candidates = starts(data.u.shape[1])
     scores = np.asarray(_values(candidates, data))
     order = np.argsort(np.where(np.isfinite(scores), scores, np.inf))[:REFINED]
-    refine = partial(minimize, objective, jac=True, method="L-BFGS-B", options={"maxiter": 60})
+    refine = partial(minimize, objective, jac=True, method=METHOD, options={"maxfun": 100})
     results = [refine(candidates[i]) for i in order]
     best = min(results, key=lambda r: r.fun if np.isfinite(r.fun) else np.inf)
     return unpack(jnp.asarray(best.x))

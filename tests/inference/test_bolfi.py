@@ -1,0 +1,130 @@
+import jax
+import numpy as np
+import numpyro.distributions as dist
+import pytest
+
+from bolfi_liquids import inference
+
+
+def told(engine, simulate, rounds, n=2):
+    for _ in range(rounds):
+        theta = engine.ask(n)
+        engine.tell(theta, simulate(theta, np.arange(n)))
+    return engine
+
+
+def test_asking_depends_only_on_seed_and_history(prior, observed, simulate):
+    first = told(inference.Bolfi(prior, observed, seed=3), simulate, 6)
+    again = told(inference.Bolfi(prior, observed, seed=3), simulate, 6)
+    first.fit()  # looking must not disturb
+    left, right = first.ask(3), again.ask(3)
+    for name in prior.names:
+        np.testing.assert_array_equal(left[name], right[name])
+
+
+def test_seeds_change_what_is_asked(prior, observed):
+    a, b = (inference.Bolfi(prior, observed, seed=s).ask(2)["slope"] for s in (0, 1))
+    assert not np.allclose(a, b)
+
+
+def test_pending_points_are_not_asked_again(prior, observed, simulate):
+    engine = told(inference.Bolfi(prior, observed), simulate, 5)
+    asked = np.concatenate([prior.to_unit(engine.ask(1)) for _ in range(6)])
+    distances = np.linalg.norm(asked[:, None] - asked, axis=-1) + np.eye(6)
+    assert distances.min() > 0.02
+
+
+def test_told_in_any_order_and_from_elsewhere(prior, observed, simulate):
+    engine = inference.Bolfi(prior, observed)
+    theta = engine.ask(4)
+    signals = simulate(theta, np.arange(4))
+    for i in (2, 0, 3, 1):
+        engine.tell({name: v[i] for name, v in theta.items()}, signals[i : i + 1], [i])
+    own = {"slope": np.array([0.1, 0.2]), "offset": np.array([0.5, 0.6])}
+    engine.tell(own, simulate(own, [7, 8]))
+    runs = engine.fit().simulations
+    np.testing.assert_array_equal(runs["seed"], [2, 0, 3, 1, -1, -1])
+    np.testing.assert_array_equal(runs["round"], [0, 0, 0, 0, -1, -1])
+
+
+def test_foreign_simulations_replace_the_start_design(prior, observed, simulate):
+    engine = inference.Bolfi(prior, observed, initial=8)
+    own = prior.sample(jax.random.key(0), 12)
+    engine.tell(own, simulate(own, np.arange(12)))
+    start = inference.Bolfi(prior, observed, initial=8).ask(1)
+    assert engine.ask(1)["slope"] != start["slope"]
+
+
+def test_failed_runs_count_and_teach_nothing(prior, observed, simulate):
+    engine = inference.Bolfi(prior, observed)
+    theta = engine.ask(6)
+    signals = simulate(theta, np.arange(6))
+    signals[[1, 4]] = np.nan
+    engine.tell(theta, signals)
+    other = inference.Bolfi(prior, observed)
+    good = np.array([0, 2, 3, 5])
+    other.tell({n: v[good] for n, v in theta.items()}, signals[good])
+    assert (engine.told, engine.succeeded) == (6, 4)
+    fit = engine.fit()
+    np.testing.assert_array_equal(fit.simulations["failed"], [0, 1, 0, 0, 1, 0])
+    assert fit.best == other.fit().best
+
+
+def test_rescaling_a_parameter_changes_nothing(observed, simulate):
+    def run(scale):
+        prior = inference.Prior(
+            {"slope": dist.Uniform(-scale, scale), "offset": dist.Uniform(0.0, 1.0)}
+        )
+        engine = inference.Bolfi(prior, observed)
+        for _ in range(6):
+            theta = engine.ask(2)
+            natural = {**theta, "slope": theta["slope"] / scale}
+            engine.tell(theta, simulate(natural, np.arange(2)))
+        return prior.to_unit(engine.fit().best)
+
+    np.testing.assert_allclose(run(1e4), run(1.0), atol=1e-4)  # optimisers stop near 1e-5
+
+
+def test_a_discrepancy_may_compare_unlike_shapes(prior):
+    engine = inference.Bolfi(
+        prior, [0.5], discrepancy=lambda seen, runs: float(abs(runs.mean() - seen[0]))
+    )
+    theta = engine.ask(6)
+    engine.tell(theta, np.full((6, 1), np.nan))  # failed runs fix no shape
+    theta = engine.ask(6)
+    engine.tell(theta, theta["offset"][:, None, None] + np.zeros((6, 4, 3)))
+    assert engine.fit().closest.signal.shape == (4, 3)
+    assert engine.told == 12
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"surrogate": "forest"}, "surrogate must be one of"),
+        ({"acquisition": "guess"}, "acquisition must be one of"),
+        ({"acquisition": 3}, "must be callable"),
+        ({"transform": "cube"}, "transform must be one of"),
+        ({"initial": 1}, "initial must be an integer of at least 3"),
+        ({"seed": -1}, "seed must be an integer"),
+    ],
+)
+def test_bad_options_are_refused(prior, observed, options, message):
+    with pytest.raises(ValueError, match=message):
+        inference.Bolfi(prior, observed, **options)
+
+
+def test_bad_calls_are_refused(prior, observed):
+    engine = inference.Bolfi(prior, observed)
+    theta = engine.ask(2)
+    with pytest.raises(ValueError, match=r"shape \(2, 30\).*got \(2, 29\)"):
+        engine.tell(theta, np.zeros((2, 29)))
+    with pytest.raises(ValueError, match="support of the prior"):
+        engine.tell({"slope": [5.0], "offset": [0.5]}, np.zeros((1, 30)))
+    with pytest.raises(ValueError, match="seeds must have shape"):
+        engine.tell(theta, np.zeros((2, 30)), seeds=[1])
+    with pytest.raises(ValueError, match="n must be an integer"):
+        engine.ask(0)
+    with pytest.raises(ValueError, match="3 successful simulations, got 0 of 0"):
+        engine.fit()
+    with pytest.raises(ValueError, match="prior must be a Prior"):
+        inference.Bolfi({"a": 1}, observed)

@@ -1,0 +1,72 @@
+"""The log-space likelihood, far beyond where Phi underflows."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from bolfi_liquids.inference.design import sobol
+from bolfi_liquids.inference.likelihood import log_cdf, log_likelihood
+from bolfi_liquids.inference.surrogate import learn
+from scipy.special import erfcx
+from scipy.stats import norm
+
+from bolfi_liquids import inference
+
+U = sobol(0, 0, 12, 2)
+DELTA = 1.0 + ((U - 0.4) ** 2).sum(-1)
+
+
+def test_agrees_with_scipy_with_the_noise_in_sigma():
+    fitted = learn(U, DELTA, transform="identity")
+    u = np.array([0.8, 0.3])
+    mean, sd = fitted.predict(u[None])
+    with jax.enable_x64(True):
+        value = log_likelihood(fitted.state, jnp.asarray(u))
+    np.testing.assert_allclose(value, norm.logcdf((fitted.threshold - mean[0]) / sd[0]), rtol=1e-6)
+
+
+def test_finite_and_monotone_with_finite_gradients_over_a_hundred_decades():
+    fitted = learn(U, DELTA, transform="identity")
+    u = jnp.array([0.8, 0.3])
+    with jax.enable_x64(True):
+        thresholds = -jnp.logspace(-50.0, 50.0, 201)
+        values, gradients = jax.vmap(
+            lambda eps: jax.value_and_grad(log_likelihood, 1)(
+                fitted.state._replace(threshold=eps), jnp.asarray(u)
+            )
+        )(thresholds)
+    assert np.isfinite(values).all()
+    assert np.isfinite(gradients).all()
+    assert (np.diff(values) <= 0).all()
+    assert values[-1] < -1e90
+
+
+def test_slope_of_log_cdf_agrees_with_the_mills_ratio():
+    z = np.concatenate([-np.logspace(8.0, -3.0, 60), [0.0, 1.0, 8.0]])
+    with jax.enable_x64(True):
+        slopes = jax.vmap(jax.grad(log_cdf))(jnp.asarray(z))
+    expected = np.sqrt(2.0 / np.pi) / erfcx(-z / np.sqrt(2.0))
+    np.testing.assert_allclose(slopes, expected, rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("rule", "expected"),
+    [
+        ("min_observed", np.sqrt(DELTA.min())),
+        (inference.Quantile(0.25), np.sqrt(np.quantile(DELTA, 0.25))),
+        (1.44, 1.2),
+    ],
+)
+def test_threshold_rules(rule, expected):
+    np.testing.assert_allclose(learn(U, DELTA, "sqrt", rule).threshold, expected)
+
+
+@pytest.mark.parametrize("rule", ["nonsense", inference.Quantile(1.5), np.nan])
+def test_bad_rules_are_refused(prior, observed, rule):
+    with pytest.raises(ValueError, match="threshold must be one of"):
+        inference.Bolfi(prior, observed, threshold=rule)
+
+
+def test_a_threshold_that_the_transform_cannot_take_is_refused():
+    with pytest.raises(ValueError, match="must be positive for the transform 'log'"):
+        learn(U, DELTA, "log", -1.0)

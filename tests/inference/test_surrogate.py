@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+from bolfi_liquids.inference.design import sobol
+from bolfi_liquids.inference.surrogate import learn
+from bolfi_liquids.inference.transform import Transform, candidates
+
+
+def bowl(u, rng, power):
+    """A positive surface whose `power` is smooth with even noise."""
+    surface = 1.0 + 3.0 * ((u - 0.4) ** 2).sum(-1) + 0.05 * rng.normal(size=len(u))
+    return surface**power
+
+
+@pytest.mark.parametrize(
+    ("make", "expected"),
+    [
+        (lambda u, rng: bowl(u, rng, 1.0), "identity"),
+        (lambda u, rng: bowl(u, rng, 2.0), "sqrt"),
+        (lambda u, rng: np.exp(3.0 * bowl(u, rng, 1.0)), "log"),
+    ],
+)
+def test_the_transform_that_made_the_data_is_found(make, expected):
+    u = sobol(0, 0, 40, 2)
+    assert learn(u, make(u, np.random.default_rng(0))).transform.name == expected
+
+
+def test_jacobian_is_that_of_the_transform():
+    x = np.array([0.5, 2.0])
+    for name in ("identity", "sqrt", "log"):
+        g = Transform(name, 0.0)
+        slope = (g(x + 1e-6) - g(x - 1e-6)) / 2e-6
+        np.testing.assert_allclose(g.log_jacobian(x), np.log(slope), atol=1e-6)
+
+
+def test_a_discrepancy_of_zero_stays_finite():
+    values = np.array([0.0, 0.2, 0.4, 1.0, 3.0, 2.0])
+    for g in candidates(None, values):
+        assert np.isfinite(g(values)).all()
+        assert np.isfinite(g.log_jacobian(values)).all()
+    fitted = learn(sobol(0, 0, 6, 1), values, transform="log")
+    assert np.isfinite([fitted.threshold, fitted.score]).all()
+
+
+def test_negative_discrepancies_allow_only_the_identity():
+    values = np.array([-1.0, 0.2, 0.4])
+    assert [g.name for g in candidates(None, values)] == ["identity"]
+    with pytest.raises(ValueError, match="'log' needs discrepancies >= 0"):
+        candidates("log", values)
+
+
+def test_equal_discrepancies_are_learned_as_flat():
+    fitted = learn(sobol(0, 0, 6, 2), np.full(6, 2.0), transform="identity")
+    np.testing.assert_allclose(fitted.predict(sobol(1, 0, 4, 2))[0], 2.0, atol=1e-6)
+
+
+def test_minimum_and_threshold_agree_with_a_grid():
+    u = sobol(0, 0, 30, 2)
+    fitted = learn(u, bowl(u, np.random.default_rng(0), 1.0), transform="identity")
+    axis = np.linspace(0.0, 1.0, 101)
+    grid = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2)
+    mean = fitted.predict(grid)[0]
+    np.testing.assert_allclose(fitted.minimum(), grid[mean.argmin()], atol=0.011)
+    assert mean.min() - 1e-3 < fitted.threshold <= mean.min()
+
+
+def test_believing_keeps_the_mean_and_shrinks_the_variance():
+    u = sobol(0, 0, 10, 2)
+    fitted = learn(u, bowl(u, np.random.default_rng(0), 1.0))
+    new = np.array([[0.9, 0.1]])
+    believing = fitted.believe(new)
+    np.testing.assert_allclose(believing.predict(new)[0], fitted.predict(new)[0], rtol=1e-9)
+    assert believing.predict(new)[1] < fitted.predict(new)[1]
