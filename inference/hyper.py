@@ -21,12 +21,10 @@ SCORED, REFINED = 16, 2  # starts that are evaluated, and of these the best to b
 
 def log_prior(hyper: Hyper) -> jax.Array:
     """Log density of the hyperparameters' logs, up to a constant."""
-    terms = (
-        jnp.sum(((hyper.log_length - LENGTH[0]) / LENGTH[1]) ** 2),
-        ((hyper.log_amplitude - AMPLITUDE[0]) / AMPLITUDE[1]) ** 2,
-        ((hyper.log_noise - NOISE[0]) / NOISE[1]) ** 2,
-    )
-    return -0.5 * sum(terms)
+    length = jnp.sum(((hyper.log_length - LENGTH[0]) / LENGTH[1]) ** 2)
+    amplitude = ((hyper.log_amplitude - AMPLITUDE[0]) / AMPLITUDE[1]) ** 2
+    noise = ((hyper.log_noise - NOISE[0]) / NOISE[1]) ** 2
+    return -0.5 * (length + amplitude + noise)
 
 
 def unpack(vector: jax.Array) -> Hyper:

@@ -51,8 +51,10 @@ def log_cdf(z: jax.Array) -> jax.Array:
 def _log_cdf_jvp(
     primals: tuple[jax.Array], tangents: tuple[jax.Array]
 ) -> tuple[jax.Array, jax.Array]:
-    """Slope phi / Phi. JAX's own takes exp of a difference of two numbers near z^2 / 2, which
-    is wrong from |z| = 1e7 and NaN later; beyond TAIL the asymptotic series is exact to 1e-10.
+    """Slope phi / Phi.
+
+    JAX's own exponentiates a difference of two numbers near z^2 / 2: wrong by a third at
+    z = -1e8, by any factor beyond. From TAIL on the asymptotic series is exact to 1e-10.
     """
     (z,), (tangent,) = primals, tangents
     value = log_cdf(z)

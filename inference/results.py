@@ -6,7 +6,7 @@ from importlib.metadata import version
 import arviz_base
 import numpy as np
 import xarray as xr
-from arviz_stats.base import array_stats
+from arviz_stats.base.array import array_stats
 
 from .prior import Prior
 from .state import History
@@ -48,22 +48,23 @@ def posterior_tree(
     tree["simulations"] = xr.DataTree(simulations)
     tree.attrs.update(attributes, version=version("bolfi-liquids"))
     posterior = tree["posterior"]
-    diagnosed = {name: diagnose(np.asarray(v)) for name, v in posterior.data_vars.items()}
+    diagnosed = {name: diagnose(draws) for name, draws in groups["posterior"].items()}
     for name, measures in diagnosed.items():
         posterior[name].attrs.update(measures)
     posterior.attrs.update(
         rhat_max=max(measures["rhat"] for measures in diagnosed.values()),
         ess_bulk_min=min(measures["ess_bulk"] for measures in diagnosed.values()),
         ess_tail_min=min(measures["ess_tail"] for measures in diagnosed.values()),
-        divergences=int(tree["sample_stats"]["diverging"].sum()),
+        divergences=int(np.sum(groups["sample_stats"]["diverging"])),
     )
     return tree
 
 
 def diagnose(draws: np.ndarray) -> dict[str, float]:
     """Rank-normalised split R-hat, bulk and tail ESS (Vehtari et al. 2021) of [chain, draw]."""
-    return {
-        "rhat": float(array_stats.rhat(draws)),
-        "ess_bulk": float(array_stats.ess(draws, method="bulk")),
-        "ess_tail": float(array_stats.ess(draws, method="tail", prob=(0.05, 0.95))),
+    measures = {
+        "rhat": array_stats.rhat(draws),
+        "ess_bulk": array_stats.ess(draws, method="bulk"),
+        "ess_tail": array_stats.ess(draws, method="tail", prob=(0.05, 0.95)),
     }
+    return {name: np.asarray(value).item() for name, value in measures.items()}

@@ -46,6 +46,7 @@ def lines(path):
 
 def test_killed_and_repeated_equals_undisturbed(tmp_path):
     """SIGKILL in the sixth simulation or later; only what was running is simulated again."""
+    undisturbed = start(tmp_path, "whole", "0")
     victim = start(tmp_path, "killed", "0.5")
     deadline = time.monotonic() + 60.0
     while len(lines(tmp_path / "killed.log")) < 6 and time.monotonic() < deadline:
@@ -56,7 +57,7 @@ def test_killed_and_repeated_equals_undisturbed(tmp_path):
     with inference.SimulationBank(tmp_path / "killed.sqlite") as bank:
         assert 0 < len(bank) < finished_before < 10
         stored = len(bank)
-    runs = [start(tmp_path, "killed", "0"), start(tmp_path, "whole", "0")]
+    runs = [start(tmp_path, "killed", "0"), undisturbed]
     assert [run.wait() for run in runs] == [0, 0]
     assert len(lines(tmp_path / "killed.log")) == finished_before + 10 - stored
     killed, whole = (np.load(tmp_path / f"{name}.npz") for name in ("killed", "whole"))
