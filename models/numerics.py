@@ -29,8 +29,8 @@ class Numerics:
     sweeps: int = 3
     support: float = 2.0
     compliance: float = 1.0
-    wall_slip: float = 4.0
-    wall_normal: float = 0.3
+    wall_slip: float = 40.0
+    wall_normal: float = 1.0
     stick_drag: float = 1.0
     attraction: float = 15.0
     contact: float = 0.25
