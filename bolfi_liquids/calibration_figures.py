@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .drawing import BLUE, GREY, INK, LIGHT, ORANGE, STYLE, new_figure, plain_log_ticks, to_svg
+from .drawing import BLUE, GREY, INK, LIGHT, ORANGE, new_figure, plain_log_ticks, styled, to_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,11 +16,9 @@ def inclination_figure(tree: "DataTree") -> str:
 
     One row for each recording, one column for each plane.
     """
-    import matplotlib
-
     recorded = tree["recorded"].to_dataset()
     members = np.unique(recorded["recording"])
-    with matplotlib.rc_context(STYLE):
+    with styled():
         figure = new_figure(8.6, 2.6 * len(members) + 0.4)
         grid = figure.subplots(len(members), 2, sharex="row", sharey=True, squeeze=False)
         for row, member in zip(grid, members, strict=True):
@@ -59,12 +57,12 @@ def _draw_inclination(axes: "Axes", part: dict[str, "Dataset"]) -> None:
 
 def discrepancy_figure(tree: "DataTree") -> str:
     """Discrepancy of each simulation in turn, and the least so far; start design hollow."""
-    import matplotlib
+    from matplotlib.ticker import MaxNLocator
 
     discrepancy = np.degrees(np.degrees(tree["simulations"]["discrepancy"].to_numpy()))
     iteration = np.arange(1, len(discrepancy) + 1)
     start = iteration <= int(tree.attrs["initial"])
-    with matplotlib.rc_context(STYLE):
+    with styled():
         figure = new_figure(6.4, 2.8)
         axes = figure.subplots()
         least = np.fmin.accumulate(discrepancy)
@@ -83,7 +81,7 @@ def discrepancy_figure(tree: "DataTree") -> str:
                 label=label,
             )
         plain_log_ticks(axes, "y")
-        axes.xaxis.get_major_locator().set_params(integer=True)
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.set_xlabel("simulation")
         axes.set_ylabel("discrepancy [deg² s]")
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)

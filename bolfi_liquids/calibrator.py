@@ -98,9 +98,8 @@ def _calibrate(
     total = settings.budget + PREDICTIVE_DRAWS + REPLICATES
     with (
         SimulationBank(run / SIMULATIONS) as bank,
-        progress_bar("stirring", total, shown=progress) as advance,
+        progress_bar("stirring", total - len(bank), shown=progress) as advance,
     ):
-        advance(len(bank))  # finished before an interruption
         simulate = reported(stirring.simulate, advance)
         keep = Keep(bank, stirring.identity, settings.batch)
         fit = _fit(simulate, stirring, prior, settings, keep)

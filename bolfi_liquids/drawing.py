@@ -2,7 +2,8 @@
 
 import io
 import re
-from typing import TYPE_CHECKING
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -10,7 +11,7 @@ if TYPE_CHECKING:
 
 INK, GREY, LIGHT = "#1f2933", "#8a94a0", "#e4e7eb"
 BLUE, ORANGE = "#2463a6", "#d1591a"
-STYLE = {
+_STYLE: dict[Any, Any] = {
     "font.family": "sans-serif",
     "font.size": 9.0,
     "svg.fonttype": "none",  # text stays text: it can be searched, read aloud and copied
@@ -28,6 +29,13 @@ STYLE = {
 _OUTSIDE = re.compile(r"<metadata>.*?</metadata>|\sxmlns(?::\w+)?=\"[^\"]*\"", re.DOTALL)
 
 
+def styled(name: str = "") -> AbstractContextManager[None]:
+    """The report's look, inside `with`; `name` sets the ids of an SVG written there."""
+    import matplotlib
+
+    return matplotlib.rc_context({**_STYLE, "svg.hashsalt": name})
+
+
 def new_figure(width: float, height: float) -> "Figure":
     """An empty figure of this size [inch], outside pyplot's global state."""
     from matplotlib.figure import Figure
@@ -39,12 +47,10 @@ def to_svg(figure: "Figure", name: str) -> str:
     """A figure as an SVG element for an HTML page.
 
     Args:
-        figure: Drawn under `STYLE`.
+        figure: Drawn under `styled`.
         name: Different for each figure of a page, as it makes the element's ids different.
     """
-    import matplotlib
-
-    with matplotlib.rc_context({**STYLE, "svg.hashsalt": name}):
+    with styled(name):
         text = io.StringIO()
         figure.savefig(text, format="svg", transparent=True)
     svg = text.getvalue()

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .drawing import BLUE, GREY, INK, ORANGE, STYLE, new_figure, plain_log_ticks, to_svg
+from .drawing import BLUE, GREY, INK, ORANGE, new_figure, plain_log_ticks, styled, to_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,13 +18,11 @@ INSIDE = (0.9, 0.5)  # probability inside each contour
 
 def posterior_figure(tree: "DataTree") -> str:
     """Contours of the joint posterior with its marginals and those of the prior."""
-    import matplotlib
-
     surface = tree["surface"].to_dataset()
     first, second = map(str, surface["log_posterior"].dims)
     axes_of = {name: _coordinate(surface, name) for name in (first, second)}
     posterior, prior = (_density(surface, name) for name in ("log_posterior", "log_prior"))
-    with matplotlib.rc_context(STYLE):
+    with styled():
         figure = new_figure(6.2, 4.8)
         grid = figure.subplots(
             2,
@@ -105,7 +103,7 @@ def _mark(joint: "Axes", tree: "DataTree", names: tuple[str, str]) -> None:
     simulations, closest = tree["simulations"], tree["closest"]
     points = [simulations[name].to_numpy() for name in names]
     joint.plot(*points, ".", color=GREY, markersize=4, label="simulated")
-    at = [float(closest[name]) for name in names]
+    at = [closest[name].to_numpy() for name in names]
     joint.plot(*at, "*", color=ORANGE, markersize=10, label="closest hypothesis")
 
 

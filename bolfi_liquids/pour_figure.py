@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .drawing import BLUE, INK, ORANGE, STYLE, new_figure, to_svg
+from .drawing import BLUE, INK, ORANGE, new_figure, styled, to_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,9 +16,7 @@ CHOICES = {"chosen": (BLUE, "o", "chosen pour"), "plug_in": (ORANGE, "s", "best 
 
 def pour_figure(tree: "DataTree") -> str:
     """Spillage over the actions (left), and of the two choices over outcomes (right)."""
-    import matplotlib
-
-    with matplotlib.rc_context(STYLE):
+    with styled():
         figure = new_figure(8.6, 3.4)
         left, right = figure.subplots(1, 2, gridspec_kw={"width_ratios": (3, 2)})
         _draw_actions(figure, left, tree)

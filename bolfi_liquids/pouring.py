@@ -1,7 +1,8 @@
 """From a posterior to the pour that is expected to spill least."""
 
+import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -111,7 +112,9 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         at_best = search.minimise(best)
         chosen, plug_in = (search.judge(fit.best, liquids) for fit in (over_posterior, at_best))
     pour = Pour(calibration.path, chosen, plug_in)
-    write_tree(pour_tree(pour, over_posterior, at_best, liquids), calibration.path / POUR)
+    tree = pour_tree(pour, over_posterior, at_best, liquids)
+    tree.attrs.update(asdict(settings), cups=json.dumps(cups.settings()))
+    write_tree(tree, calibration.path / POUR)
     write_section(calibration.path, "pour", pour_section(pour, settings, (over_posterior, at_best)))
     return pour
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,6 +106,6 @@ def _frozen(values: NDArray) -> NDArray[np.float64]:
     return array
 
 
-def _plain(value) -> float | str:
+def _plain(value: Any) -> Any:
     """NumPy's scalars and one-element arrays as Python's own, so that they can be written."""
     return value.item() if isinstance(value, np.ndarray | np.generic) and value.size == 1 else value

@@ -80,9 +80,11 @@ def _pour_context(run: Path) -> dict[str, Any] | None:
 
     with xarray.open_datatree(run / POUR, engine="h5netcdf") as tree:
         figure = pour_figure(tree.load())
+        made_with = dict(tree.attrs)
     return {
         "section": section,
         "sentence": narrative.pour_sentence(section),
         "figure": figure,
+        "made_with": made_with,
         "rows": [("chosen pour", section), ("best at θ* alone", section["plug_in"])],
     }

@@ -45,9 +45,8 @@ def results_tree(sampled: "DataTree", fit: "Fit", stirring: Stirring, check: Che
         return Dataset({"inclination": (dims, values, {"units": "rad"})}, coords=frames)
 
     tree = sampled.copy()
-    closest = inclination(fit.closest.signal).assign(
-        discrepancy=fit.closest.discrepancy, **fit.closest.theta
-    )
+    numbers = {"discrepancy": fit.closest.discrepancy, **fit.closest.theta}
+    closest = inclination(fit.closest.signal).assign(numbers)
     added = {
         "recorded": inclination(stirring.observed),
         "posterior_predictive": inclination(check.predictive[None], "chain", "draw"),

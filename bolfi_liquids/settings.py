@@ -10,6 +10,14 @@ RISKS = ("mean", "cvar")
 
 MIN_LEARN = 3  # simulations from which the engine learns anything at all
 MIN_PARTICLES = 100  # with fewer, the stick is thinner than the gaps between them
+_LEAST = {
+    "budget": MIN_LEARN,
+    "batch": 1,
+    "seed": 0,
+    "particles": MIN_PARTICLES,
+    "chains": 2,
+    "draws": 4,
+}
 
 
 @dataclass(frozen=True)
@@ -37,15 +45,7 @@ class CalibrationSettings:
     draws: int = 1000
 
     def __post_init__(self):
-        lowest = {
-            "budget": 1,
-            "batch": 1,
-            "seed": 0,
-            "particles": MIN_PARTICLES,
-            "chains": 2,
-            "draws": 4,
-        }
-        for name, least in lowest.items():
+        for name, least in _LEAST.items():
             _at_least(least, name, getattr(self, name))
         _one_of(SURROGATES, "surrogate", self.surrogate)
         _one_of(SAMPLERS, "sampler", self.sampler)

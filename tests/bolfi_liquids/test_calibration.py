@@ -1,0 +1,95 @@
+"""What a calibration writes, and that it is what it says."""
+
+import json
+import tomllib
+
+import numpy as np
+import numpyro.distributions as dist
+import pytest
+import xarray as xr
+from arviz_stats.base.array import array_stats
+
+import bolfi_liquids as bl
+from bolfi_liquids import inference
+from bolfi_liquids.prior import default_prior
+from bolfi_liquids.stirring import stirring_of
+
+
+def test_summary_is_of_the_posterior(calibration, settings):
+    section = json.loads((calibration.path / "summary.json").read_text())["calibrate"]
+    tree = xr.open_datatree(calibration.path / "posterior.nc")
+    for name, values in section["parameters"].items():
+        draws = tree["posterior"][name].to_numpy()
+        assert values["mean"] == pytest.approx(draws.mean())
+        assert values["q05"] == pytest.approx(np.quantile(draws, 0.05))
+        assert values["q05"] < values["q50"] < values["q95"]
+    rhats = [float(array_stats.rhat(draws)) for draws in tree["posterior"].values()]
+    assert section["rhat_max"] == pytest.approx(max(rhats))
+    residual = tree["recorded"]["inclination"] - tree["closest"]["inclination"]
+    rms = np.degrees(np.sqrt((residual**2).mean()))
+    assert section["fit_rms_deg"] == pytest.approx(float(rms))
+    assert 0.05 < section["noise_deg"] < 2.0  # 0.1 degrees of camera noise, and the seeds'
+    assert section["n_simulations"] == tree["simulations"].sizes["simulation"]
+    assert section["n_simulations"] == settings["budget"]
+    tree.close()
+
+
+def test_closest_is_the_least_discrepancy_and_reproducible(calibration, short_recording, settings):
+    simulations = calibration.tree["simulations"].to_dataset()
+    nearest = simulations.isel(simulation=int(np.argmin(simulations["discrepancy"].data)))
+    assert float(calibration.tree["closest"]["discrepancy"]) == float(nearest["discrepancy"])
+    stirring = stirring_of([bl.open_recording(short_recording)], settings["particles"])
+    theta = {name: np.array([value]) for name, value in calibration.summary["closest"].items()}
+    again = stirring.simulate(theta, np.array([int(nearest["seed"])]))
+    np.testing.assert_array_equal(again[0], calibration.tree["closest"]["inclination"])
+
+
+def test_run_toml_says_how_it_was_made(calibration, short_recording, settings):
+    record = tomllib.loads((calibration.path / "run.toml").read_text())
+    assert record["settings"]["seed"] == settings["seed"]
+    assert record["settings"]["particles"] == settings["particles"]
+    assert record["inputs"]["sha256"] == [bl.open_recording(short_recording).hash]
+    assert record["versions"]["bolfi-liquids"] == bl.__version__
+    assert record["simulator"]["recording_1"]["particles"] == settings["particles"]
+
+
+def test_several_recordings_add_up(short_recording, dataset, tmp_path, rng, settings):
+    other = tmp_path / "other.nc"
+    dataset.isel(time=slice(0, 40)).to_netcdf(other)
+    pair = [bl.open_recording(short_recording), bl.open_recording(other)]
+    both = stirring_of(pair, settings["particles"])
+    assert both.observed.shape == (100, 2)
+    simulated = both.observed + 0.01 * rng.normal(size=both.observed.shape)
+    parts = [stirring_of([recording], settings["particles"]) for recording in pair]
+    alone = [
+        part.discrepancy()(part.observed, signal)
+        for part, signal in zip(parts, np.split(simulated, [60]), strict=True)
+    ]
+    assert both.discrepancy()(both.observed, simulated) == pytest.approx(sum(alone))
+    assert len({both.identity, *(part.identity for part in parts)}) == 3
+
+
+def test_two_liquids_are_not_one_calibration(short_recording, dataset, tmp_path):
+    water = tmp_path / "water.nc"
+    dataset.assign_attrs(liquid_density=1000.0).to_netcdf(water)
+    with pytest.raises(ValueError, match=r"water\.nc: attribute liquid_density: 1000.0 kg/m3"):
+        bl.calibrate([short_recording, water], out=tmp_path / "run", progress=False)
+    assert not (tmp_path / "run").exists()
+
+
+def test_prior_with_another_parameter_is_refused(short_recording, tmp_path):
+    prior = inference.Prior({"viscosity": dist.Uniform(0.1, 1.0), "cohesin": dist.Uniform(0, 1)})
+    with pytest.raises(ValueError, match="viscosity, cohesin, expected viscosity, cohesion"):
+        bl.calibrate(short_recording, out=tmp_path / "run", prior=prior, progress=False)
+    assert not (tmp_path / "run").exists()
+
+
+def test_default_prior_covers_water_to_gel():
+    theta = {"viscosity": np.array([1e-3, 0.1, 12.0, 30.0]), "cohesion": np.full(4, 0.5)}
+    np.testing.assert_array_equal(default_prior().contains(theta), [True, True, True, False])
+
+
+def test_a_run_that_was_not_finished_says_how_to_go_on(calibration, tmp_path):
+    (tmp_path / "run.toml").write_bytes((calibration.path / "run.toml").read_bytes())
+    with pytest.raises(ValueError, match="not finished.*--resume"):
+        bl.Calibration.open(tmp_path)

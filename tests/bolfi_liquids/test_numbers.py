@@ -1,0 +1,77 @@
+"""Noise estimates, picked draws and contour levels, against what is known of them."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from bolfi_liquids.draws import pick_draws
+from bolfi_liquids.noise import irreducible_rms, replicate_noise, sensor_noise
+from bolfi_liquids.posterior_figure import contour_levels, marginal
+from bolfi_liquids.spillage import mean_spillage, tail_spillage
+
+
+def test_sensor_noise_is_found_under_a_smooth_signal(rng):
+    time = np.arange(0.0, 200.0, 1 / 30)
+    smooth = np.stack([7.0 * np.sin(4.0 * time), 5.0 * np.cos(3.0 * time)], axis=-1)
+    noise = 0.1 * rng.normal(size=smooth.shape)
+    noise[100:110] = np.nan
+    # relative standard error of the estimate: below 2 %; five of them
+    assert sensor_noise(smooth + noise) == pytest.approx(0.1, rel=0.1)
+    assert sensor_noise(smooth) < 0.01
+
+
+def test_replicate_noise_is_the_rms_between_two_seeds(rng):
+    replicates = 0.3 * rng.normal(size=(40, 500))
+    pairs = [np.sqrt(np.mean((a - b) ** 2)) for a, b in zip(replicates, replicates[1:])]  # noqa: B905  one fewer pair
+    assert replicate_noise(replicates) == pytest.approx(np.mean(pairs), rel=0.02)
+
+
+def test_both_noises_add_in_quadrature(rng):
+    observed = 0.4 * rng.normal(size=(4000, 2))
+    replicates = 0.3 / np.sqrt(2.0) * rng.normal(size=(50, 4000, 2))
+    assert irreducible_rms([observed], replicates) == pytest.approx(0.5, rel=0.05)
+
+
+def test_picked_draws_are_stratified_and_stay_together(rng):
+    first = rng.lognormal(size=(4, 250))
+    posterior = xr.Dataset(
+        {"viscosity": (("chain", "draw"), first), "cohesion": (("chain", "draw"), -first)}
+    )
+    picked = pick_draws(posterior, 10, seed=0)
+    np.testing.assert_array_equal(picked["cohesion"], -picked["viscosity"])
+    deciles = np.searchsorted(np.quantile(first, np.arange(0.1, 1.0, 0.1)), picked["viscosity"])
+    np.testing.assert_array_equal(deciles, np.arange(10))
+    assert not np.array_equal(picked["viscosity"], pick_draws(posterior, 10, 1)["viscosity"])
+    with pytest.raises(ValueError, match="1 to 1000, got 1001"):
+        pick_draws(posterior, 1001, seed=0)
+
+
+def test_picked_means_are_unbiased(rng):
+    posterior = xr.Dataset({"viscosity": (("chain", "draw"), rng.lognormal(size=(2, 101)))})
+    means = [pick_draws(posterior, 10, seed)["viscosity"].mean() for seed in range(400)]
+    error = np.std(means) / np.sqrt(len(means))
+    # strata differ by one draw in twenty, hence the second term
+    assert abs(np.mean(means) - float(posterior["viscosity"].mean())) < 4 * error + 0.05
+
+
+def test_contours_hold_their_probability():
+    x = np.linspace(-6.0, 6.0, 241)
+    density = np.exp(-0.5 * (x[:, None] ** 2 + x[None, :] ** 2))
+    levels = contour_levels(density, density)
+    # in two dimensions a share p of a normal lies above exp(-r^2 / 2) = 1 - p
+    np.testing.assert_allclose(levels, [0.1, 0.5], rtol=0.02)
+
+
+def test_marginal_of_a_normal_has_unit_area():
+    x, y = np.linspace(-6.0, 6.0, 241), np.geomspace(0.1, 9.0, 101)
+    density = 3.0 * np.exp(-0.5 * x[:, None] ** 2) * np.sqrt(y)[None, :]
+    np.testing.assert_allclose(
+        marginal(density, x, y), np.exp(-0.5 * x**2) / np.sqrt(2 * np.pi), rtol=1e-6
+    )
+
+
+def test_risks_of_known_outcomes():
+    fractions = np.zeros((20, 3))
+    fractions[:, 0] = np.linspace(0.0, 0.95, 20)
+    assert mean_spillage(fractions) == pytest.approx(0.475)
+    assert tail_spillage(fractions) == pytest.approx(0.925)

@@ -1,0 +1,89 @@
+"""A pour is chosen over the posterior, and judged by seeds that did not choose it."""
+
+import json
+import sqlite3
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import bolfi_liquids as bl
+from bolfi_liquids import models
+from bolfi_liquids.cups import bundled_cups
+from bolfi_liquids.run_directory import SIMULATIONS
+
+
+def rows(run):
+    connection = sqlite3.connect(run / SIMULATIONS)
+    count = connection.execute("SELECT count(*) FROM simulation").fetchone()[0]
+    connection.close()
+    return count
+
+
+def test_fractions_add_up_and_the_action_is_allowed(pour):
+    cups = bundled_cups()
+    for judged in (pour.chosen, pour.plug_in):
+        np.testing.assert_allclose(judged.fractions.sum(axis=1), 1.0)
+        assert (judged.fractions >= 0).all()
+        low, high = cups.angular_velocity_range
+        assert low <= judged.angular_velocity <= high
+        low, high = cups.distance_range
+        assert low <= judged.distance <= high
+        assert judged.expected_spillage <= judged.fractions[:, 0].max()
+
+
+def test_chosen_spills_no_more_than_the_plug_in(pour):
+    difference = pour.chosen.fractions[:, 0] - pour.plug_in.fractions[:, 0]
+    error = difference.std(ddof=1) / np.sqrt(len(difference))
+    # four standard errors, and what seven actions leave between the searches
+    assert difference.mean() <= 4.0 * error + 0.02
+
+
+def test_chosen_is_among_the_better_actions(pour):
+    tried = xr.open_datatree(pour.path / "pour.nc")["tried"]["risk"].to_numpy()
+    assert pour.chosen.expected_spillage < np.median(tried)
+
+
+def test_other_seeds_agree_with_the_judgement(pour, calibration):
+    tree = xr.open_datatree(pour.path / "pour.nc")
+    liquids = {name: values.to_numpy() for name, values in tree["liquids"].data_vars.items()}
+    known = calibration.posterior["viscosity"].to_numpy()
+    assert np.isin(liquids["viscosity"], known).all()
+    fractions = pour.chosen.fractions
+    result = models.pour(
+        models.Liquid(**liquids, density=calibration.liquid_density),
+        models.PourAction(pour.chosen.angular_velocity, pour.chosen.distance),
+        bundled_cups(),
+        np.arange(len(liquids["viscosity"])),
+    )
+    # other seeds: they move the mean, but not by more than the spread between outcomes
+    spread = fractions[:, 0].std() + result.spilled.std()
+    assert abs(result.spilled.mean() - fractions[:, 0].mean()) <= spread + 0.01
+
+
+def test_section_is_of_the_pour(pour, calibration):
+    section = json.loads((pour.path / "summary.json").read_text())["pour"]
+    assert section["expected_spillage"] == pytest.approx(pour.chosen.fractions[:, 0].mean())
+    assert section["spillage_q95"] == pytest.approx(np.quantile(pour.chosen.fractions[:, 0], 0.95))
+    assert section["angular_velocity_deg_s"] == pytest.approx(
+        np.degrees(pour.chosen.angular_velocity)
+    )
+    assert section["distance_cm"] == pytest.approx(100 * pour.chosen.distance)
+    assert section["plug_in"]["expected_spillage"] == pour.plug_in.expected_spillage
+    assert section["n_simulations"] == 7 * (4 + 4) + 2 * 8
+    assert bl.Calibration.open(pour.path).summary == calibration.summary  # left as it was
+
+
+def test_choosing_again_simulates_nothing(pour, calibration):
+    before = rows(pour.path)
+    again = bl.choose_pour(calibration, iterations=7, draws=4, progress=False)
+    assert rows(pour.path) == before
+    np.testing.assert_array_equal(again.chosen.fractions, pour.chosen.fractions)
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"), [("iterations", 2), ("draws", 0), ("risk", "median"), ("seed", -1)]
+)
+def test_bad_setting_is_named(calibration, setting, value):
+    with pytest.raises(ValueError, match=f"--{setting}: {value!r}"):
+        bl.choose_pour(calibration, progress=False, **{setting: value})

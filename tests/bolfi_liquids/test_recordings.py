@@ -1,0 +1,150 @@
+"""Every bad recording is refused in one line that names file, field and value."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import bolfi_liquids as bl
+from bolfi_liquids.cli import app
+from bolfi_liquids.recording_checks import MAX_GRIPPER_GAP, longest_gap
+
+GAP = slice(60, 75)  # half a second
+
+
+def backwards(data):
+    time = data["time"].to_numpy().copy()
+    time[50] = time[48]
+    return data.assign_coords(time=("time", time, data["time"].attrs))
+
+
+def with_values(name, change):
+    def altered(data):
+        return data.assign({name: ("time", change(data[name].to_numpy().copy()), data[name].attrs)})
+
+    return altered
+
+
+def blank(part):
+    def blanked(values):
+        values[part] = np.nan
+        return values
+
+    return blanked
+
+
+def with_units(name, units):
+    def altered(data):
+        data[name].attrs["units"] = units
+        return data
+
+    return altered
+
+
+def with_attribute(name, value):
+    return lambda data: data.assign_attrs({name: value})
+
+
+def without_attribute(*names):
+    def altered(data):
+        for name in names:
+            del data.attrs[name]
+        return data
+
+    return altered
+
+
+def in_milliseconds(data):
+    return data.assign_coords(time=("time", 1000.0 * data["time"].to_numpy(), {"units": "s"}))
+
+
+BAD = {
+    "no time": (lambda d: d.drop_vars("time"), "time", "missing"),
+    "no x": (lambda d: d.drop_vars("x"), "x", "missing"),
+    "no inclination": (lambda d: d.drop_vars("inclination_yz"), "inclination_yz", "missing"),
+    "time goes back": (backwards, "time", "time[50] = 1.6"),
+    "empty": (lambda d: d.isel(time=slice(0, 0)), "time", "0 samples"),
+    "nine samples": (lambda d: d.isel(time=slice(0, 9)), "time", "9 samples"),
+    "time in ms": (in_milliseconds, "time", "looks like milliseconds"),
+    "ms by units": (with_units("time", "ms"), "time", "'ms'"),
+    "gap in x": (with_values("x", blank(GAP)), "x", "no gripper position for 0.5"),
+    "gap at the start": (with_values("z", blank(slice(0, 9))), "z", "no gripper position for 0.3"),
+    "never seen": (
+        with_values("inclination_xz", blank(slice(None))),
+        "inclination_xz",
+        "NaN in 201 of 201",
+    ),
+    "degrees": (with_values("inclination_xz", np.degrees), "inclination_xz", "looks like degrees"),
+    "degrees by units": (with_units("inclination_yz", "degree"), "inclination_yz", "'degree'"),
+    "gripper in mm": (with_values("y", lambda v: 1000 * v), "y", "looks like millimetres"),
+    "mm by units": (with_units("z", "mm"), "z", "'mm'"),
+    "infinite": (with_values("x", lambda v: np.where(v == v.max(), np.inf, v)), "x", "inf"),
+    "no cup": (without_attribute("cup_radius"), "cup_radius", "missing"),
+    "no weight": (without_attribute("stick_density"), "stick_density or stick_mass", "missing"),
+    "negative radius": (with_attribute("cup_radius", -0.04), "cup_radius", "-0.04"),
+    "radius as text": (with_attribute("stick_radius", "4.5 mm"), "stick_radius", "'4.5 mm'"),
+    "cup in mm": (with_attribute("cup_height", 75.0), "cup_height", "looks like millimetres"),
+    "g/cm3": (with_attribute("liquid_density", 1.26), "liquid_density", "1.26"),
+    "overfull": (with_attribute("fill", 0.08), "fill", "0.08"),
+    "thick stick": (with_attribute("stick_radius", 0.05), "stick_radius", "0.05"),
+    "short stick": (with_attribute("stick_length", 0.1), "stick_length", "does not reach"),
+    "long stick": (with_attribute("stick_length", 0.3), "stick_length", "through the floor"),
+    "outside": (with_values("x", lambda v: v + 0.05), "x", "leaves the cup"),
+}
+
+
+@pytest.mark.parametrize(("alter", "field", "value"), BAD.values(), ids=BAD)
+def test_bad_recording_is_refused_in_one_line(dataset, tmp_path, alter, field, value):
+    path = tmp_path / "bad.nc"
+    alter(dataset).to_netcdf(path)
+    result = CliRunner().invoke(app, ["calibrate", str(path), "--out", str(tmp_path / "run")])
+    assert result.exit_code == 2
+    lines = result.stderr.strip().splitlines()
+    assert len(lines) == 1, lines
+    assert lines[0].startswith(f"error: {path}")
+    assert field in lines[0].removeprefix(f"error: {path}")
+    assert value in lines[0]
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("content", [None, b"", b"time,x\n0,0\n"], ids=["none", "empty", "csv"])
+def test_what_is_no_recording_is_refused(tmp_path, content):
+    path = tmp_path / "stir.nc"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(ValueError, match="no such file" if content is None else "not a NetCDF"):
+        bl.open_recording(path)
+
+
+def test_recording_has_the_files_values(dataset, tmp_path):
+    path = tmp_path / "good.nc"
+    dataset.attrs["status"] = "aborted"
+    dataset["inclination_xz"][7:9] = np.nan
+    dataset["x"][30:33] = np.nan
+    dataset.to_netcdf(path)
+    recording = bl.open_recording(path)
+    np.testing.assert_array_equal(recording.inclination[:, 0], dataset["inclination_xz"])
+    np.testing.assert_array_equal(recording.gripper.position[:, 2], dataset["z"])
+    np.testing.assert_array_equal(recording.gripper.time, dataset["time"])
+    assert recording.number("cup_radius") == 0.04
+    assert recording.attrs["status"] == "aborted"
+    with pytest.raises(ValueError, match="read-only"):
+        recording.inclination[0, 0] = 1.0
+
+
+def test_hash_follows_the_bytes(dataset, tmp_path):
+    hashes = set()
+    for name, shift in (("a", 0.0), ("b", 0.0), ("c", 1e-9)):
+        path = tmp_path / f"{name}.nc"
+        (dataset + shift).assign_attrs(dataset.attrs).to_netcdf(path)
+        hashes.add(bl.open_recording(path).hash)
+    assert len(hashes) == 2
+
+
+def test_gap_counts_to_the_ends():
+    time = np.arange(10) * 0.1
+    seen = np.ones(10, bool)
+    assert longest_gap(time, seen)[0] == pytest.approx(0.1)
+    seen[7:] = False
+    duration, start = longest_gap(time, seen)
+    assert (duration, start) == (pytest.approx(0.3), pytest.approx(0.6))
+    assert duration > MAX_GRIPPER_GAP

@@ -1,0 +1,96 @@
+"""The report is one file that shows what the run holds."""
+
+import re
+import shutil
+from html.parser import HTMLParser
+
+import pytest
+
+import bolfi_liquids as bl
+from bolfi_liquids.narrative import fit_sentence, parameter_sentence
+
+FIGURES = {
+    "inclination [deg]": "inclination against time",
+    "viscosity [Pa s]": "posterior",
+    "discrepancy [deg² s]": "search",
+    "angular velocity [deg/s]": "pour",
+}
+
+
+class References(HTMLParser):
+    """Collects what a page would fetch, its ids, and its number of figures."""
+
+    def __init__(self):
+        super().__init__()
+        self.outside, self.ids, self.figures = [], [], 0
+
+    def handle_starttag(self, tag, attrs):
+        self.figures += tag == "svg"
+        for name, value in attrs:
+            fetched = name.removeprefix("xlink:") in ("src", "href", "srcset", "data")
+            if fetched and value and not value.startswith("#"):
+                self.outside.append(value)
+            if name == "id" and not re.match(r"DejaVu|m[0-9a-f]", value or ""):
+                self.ids.append(value)
+
+
+def read(path):
+    text = path.read_text(encoding="utf-8")
+    page = References()
+    page.feed(text)
+    return text, page
+
+
+def test_report_is_one_file_with_every_figure(pour):
+    path = bl.report(pour.path)
+    assert path == pour.path / "report.html"
+    text, page = read(path)
+    assert page.outside == []
+    assert not re.search(r"https?:|@import|url\((?!#)", text)
+    assert page.figures == len(FIGURES)
+    for label, figure in FIGURES.items():
+        assert label in text, figure
+
+
+def test_report_shows_the_runs_numbers(pour, calibration):
+    text, _ = read(bl.report(pour.path))
+    section = calibration.summary
+    assert f"{section['fit_rms_deg']:.2f}° RMS" in text
+    assert f"{section['parameters']['viscosity']['q50']:.3g} Pa s" in text
+    assert f"{pour.chosen.angular_velocity * 57.29578:.0f}°/s" in text
+    assert calibration.record["inputs"]["sha256"][0] in text
+
+
+def test_report_without_a_pour_says_how_to_get_one(calibration, tmp_path):
+    run = tmp_path / "run"
+    run.mkdir()
+    for name in ("run.toml", "posterior.nc"):
+        shutil.copy(calibration.path / name, run)
+    from bolfi_liquids.summary import write_section
+
+    write_section(run, "calibrate", dict(calibration.summary))
+    text, page = read(bl.report(run))
+    assert f"bolfi-liquids pour {run}" in text
+    assert page.figures == len(FIGURES) - 1
+
+
+def test_file_names_are_escaped(calibration, tmp_path):
+    run = tmp_path / "run"
+    shutil.copytree(calibration.path, run)
+    record = run / "run.toml"
+    record.write_text(record.read_text().replace("short.nc", "<script>alert(1)</script>.nc"))
+    text, _ = read(bl.report(run))
+    assert "<script>" not in text
+    assert "&lt;script&gt;" in text
+
+
+@pytest.mark.parametrize(("high", "verdict"), [(0.98, "says little"), (0.3, "as wide as")])
+def test_sentence_tells_learned_from_not_learned(rng, high, verdict):
+    values = {"q05": 0.1, "q50": 0.2, "q95": high}
+    assert verdict in parameter_sentence("cohesion", values, rng.uniform(size=2000))
+
+
+@pytest.mark.parametrize(("fit", "verdict"), [(0.4, "as can be expected"), (0.9, "lacks")])
+def test_sentence_measures_the_fit_by_the_noise(fit, verdict):
+    section = {"fit_rms_deg": fit, "noise_deg": 0.3, "n_simulations": 20}
+    assert verdict in fit_sentence(section)

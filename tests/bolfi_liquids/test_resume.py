@@ -1,0 +1,81 @@
+"""A run that is killed and resumed is the run that was not."""
+
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import bolfi_liquids as bl
+from bolfi_liquids.run_directory import SIMULATIONS
+
+PATIENCE_S = 120
+STIRRINGS = "SELECT theta, seed, created FROM simulation WHERE theta LIKE '%viscosity%'"
+
+
+def command(recording, out, settings, *more):
+    options = [part for name, value in settings.items() for part in (f"--{name}", str(value))]
+    code = "from bolfi_liquids.cli import main; main()"
+    return [sys.executable, "-c", code, "calibrate", recording, "--out", out, *options, *more]
+
+
+def finished(run):
+    """(theta, seed) -> time of creation of every stirring in a run's bank."""
+    path = run / SIMULATIONS
+    if not path.exists():
+        return {}
+    connection = sqlite3.connect(f"file:{path}?mode=ro", uri=True)
+    try:
+        rows = connection.execute(STIRRINGS).fetchall()
+    except sqlite3.OperationalError:  # the file is there, its table not yet
+        return {}
+    finally:
+        connection.close()
+    return {(theta, seed): created for theta, seed, created in rows}
+
+
+def test_killed_and_resumed_equals_undisturbed(short_recording, calibration, settings, tmp_path):
+    run = tmp_path / "killed"
+    process = subprocess.Popen(command(short_recording, run, settings), stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + PATIENCE_S
+    while len(before := finished(run)) < 2 and time.monotonic() < deadline:
+        time.sleep(0.02)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    before = finished(run)
+    whole = finished(calibration.path)
+    assert 2 <= len(before) < len(whole)
+
+    subprocess.run(
+        command(short_recording, run, settings, "--resume"), check=True, capture_output=True
+    )
+    after = finished(run)
+    assert {key: after[key] for key in before} == before  # none was simulated again
+    assert after.keys() == whole.keys()
+    resumed = bl.Calibration.open(run)
+    for name, draws in calibration.posterior.items():
+        np.testing.assert_array_equal(resumed.posterior[name], draws)
+    assert resumed.summary["n_simulations"] == settings["budget"]
+
+
+def test_finished_run_is_opened_not_repeated(short_recording, calibration, settings):
+    before = finished(calibration.path)
+    posterior = calibration.path / "posterior.nc"
+    written = posterior.stat().st_mtime_ns
+    again = bl.calibrate(
+        short_recording, out=calibration.path, resume=True, progress=False, **settings
+    )
+    assert finished(calibration.path) == before
+    assert posterior.stat().st_mtime_ns == written
+    assert again.summary == calibration.summary
+
+
+def test_another_seed_is_refused_and_changes_nothing(short_recording, calibration, settings):
+    other = settings | {"seed": 4}
+    with pytest.raises(ValueError, match=r"settings\.seed is 3 in the run, but 4"):
+        bl.calibrate(short_recording, out=calibration.path, resume=True, progress=False, **other)
+    assert bl.Calibration.open(calibration.path).summary == calibration.summary

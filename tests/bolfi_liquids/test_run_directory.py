@@ -1,0 +1,118 @@
+"""A run is never overwritten, and only resumed with the settings it was started with."""
+
+import copy
+import json
+import tomllib
+
+import pytest
+
+from bolfi_liquids.errors import InputError
+from bolfi_liquids.files import write_whole
+from bolfi_liquids.run_directory import RUN_TOML, SIMULATIONS, enter_run, read_run
+from bolfi_liquids.summary import read_summary, write_section
+from bolfi_liquids.toml_text import to_toml
+
+RECORD = {
+    "created": "2026-01-01T00:00:00+00:00",
+    "settings": {"seed": 0, "budget": 20, "prior": {"viscosity": "LogUniform(0.001, 20)"}},
+    "simulator": {"recording_1": {"particles": 1000, "cup": {"radius": 0.04}}},
+    "inputs": {"sha256": ["ab"]},
+    "versions": {"numpy": "2.0"},
+}
+
+
+def test_a_run_is_not_overwritten(tmp_path):
+    run = tmp_path / "a" / "run"
+    enter_run(run, RECORD, resume=False)
+    before = (run / RUN_TOML).read_bytes()
+    with pytest.raises(InputError, match="holds a run already.*--resume"):
+        enter_run(run, RECORD, resume=False)
+    assert (run / RUN_TOML).read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("section", "field", "value"),
+    [
+        ("settings", "seed", 1),
+        ("settings", "prior", {"viscosity": "Uniform(0, 1)"}),
+        ("simulator", "recording_1", {"particles": 500, "cup": {"radius": 0.04}}),
+        ("simulator", "recording_2", {"particles": 1000}),
+        ("inputs", "sha256", ["cd"]),
+    ],
+)
+def test_resuming_with_another_setting_names_it(tmp_path, section, field, value):
+    enter_run(tmp_path, RECORD, resume=False)
+    other = copy.deepcopy(RECORD)
+    other[section][field] = value
+    with pytest.raises(InputError, match=rf"{section}\.{field}"):
+        enter_run(tmp_path, other, resume=True)
+    assert read_run(tmp_path) == RECORD
+
+
+def test_resuming_ignores_dates_and_versions(tmp_path):
+    enter_run(tmp_path, RECORD, resume=False)
+    later = RECORD | {"created": "2027-01-01T00:00:00+00:00", "versions": {"numpy": "3.0"}}
+    enter_run(tmp_path, later, resume=True)
+    assert read_run(tmp_path) == RECORD
+
+
+def test_resuming_nothing_starts_a_run(tmp_path):
+    enter_run(tmp_path, RECORD, resume=True)
+    assert read_run(tmp_path) == RECORD
+
+
+def test_simulations_without_settings_are_left_alone(tmp_path):
+    (tmp_path / SIMULATIONS).write_bytes(b"precious")
+    with pytest.raises(InputError, match="without run.toml"):
+        enter_run(tmp_path, RECORD, resume=True)
+    assert (tmp_path / SIMULATIONS).read_bytes() == b"precious"
+
+
+def test_a_section_is_replaced_and_the_others_kept(tmp_path):
+    write_section(tmp_path, "calibrate", {"seed": 1, "rhat_max": float("nan")})
+    write_section(tmp_path, "pour", {"distance_cm": 2.0})
+    write_section(tmp_path, "calibrate", {"seed": 2})
+    assert read_summary(tmp_path) == {"calibrate": {"seed": 2}, "pour": {"distance_cm": 2.0}}
+    assert [p.name for p in tmp_path.iterdir()] == ["summary.json"]
+
+
+def test_what_is_not_a_number_becomes_null(tmp_path):
+    write_section(tmp_path, "calibrate", {"rhat_max": float("nan"), "deep": [float("inf"), 1.0]})
+    text = (tmp_path / "summary.json").read_text()
+    assert json.loads(text)["calibrate"] == {"rhat_max": None, "deep": [None, 1.0]}
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path):
+    path = tmp_path / "summary.json"
+    path.write_text("old")
+
+    def fail(temporary):
+        temporary.write_text("half")
+        raise OSError("disk full")
+
+    with pytest.raises(OSError, match="disk full"):
+        write_whole(path, fail)
+    assert path.read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["summary.json"]
+
+
+def test_broken_summary_is_named(tmp_path):
+    (tmp_path / "summary.json").write_text("{")
+    with pytest.raises(InputError, match="not JSON"):
+        write_section(tmp_path, "pour", {})
+
+
+def test_toml_is_read_back():
+    table = {
+        "text": 'quote " \\ line\nµ',
+        "on": True,
+        "count": 3,
+        "ratio": 0.1 + 0.2,
+        "large": 1e300,
+        "list": [1.5, [2, 3], {"a b": "c"}],
+        "deep": {"er": {"key with space": -1.0}},
+    }
+    assert tomllib.loads(to_toml(table)) == table
+    assert tomllib.loads(to_toml({"gone": None, "kept": 1})) == {"kept": 1}
+    with pytest.raises(TypeError, match="object"):
+        to_toml({"x": object()})
