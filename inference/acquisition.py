@@ -45,7 +45,9 @@ class LowerConfidenceBound:
     variance attracts the minimiser, and makes the points of a batch differ.
 
     Attributes:
-        jitter: Its standard deviation, in prior quantiles.
+        jitter: Its standard deviation, in prior quantiles. Of 0.03, 0.05 and 0.1 the second
+            gave the best posteriors on three toys; 0.03 puts half as many points again
+            within 2 % of a bound.
     """
 
     jitter: float = 0.05

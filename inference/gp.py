@@ -60,6 +60,8 @@ def covariance(hyper: Hyper, a: jax.Array, b: jax.Array) -> jax.Array:
     (JMLR 2016), x = 2u - 1. Its coefficients are integrated out under broad Gaussians rather
     than estimated with a_j >= 0: that keeps prediction closed-form and carries their
     uncertainty; and a discrepancy over quantiles may saturate, which a_j >= 0 forbids.
+    On three toys (Gaussian mean, two driven pendula; N = 20, 50; 3 seeds) Matern 5/2 was no
+    better on the first and had 10 to 65 % more total variation error on the other two.
     """
     length = jnp.exp(hyper.log_length)
     difference = (a[:, None, :] - b[None, :, :]) / length

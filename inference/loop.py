@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from .bank import Simulation, SimulationBank
 from .base import Acquisition, Discrepancy, Simulator
-from .bolfi import Bolfi, checked_integer
+from .bolfi import MIN_LEARN, Bolfi, checked_integer
 from .design import start_size
 from .likelihood import Threshold
 from .posterior import Fit
@@ -66,7 +66,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
         ValueError: bad argument; budget smaller than the start design; signals of wrong shape.
         RuntimeError: no run of the start design succeeded.
     """
-    budget, batch = checked_integer("budget", budget), checked_integer("batch", batch)
+    batch = checked_integer("batch", batch)
+    budget = checked_integer("budget", budget, MIN_LEARN)
     size = min(start_size(len(prior)), budget) if initial is None else initial
     engine = Bolfi(
         prior,
