@@ -111,6 +111,12 @@ class Bolfi:
         """Shape of one simulated signal: that of `observed`, or of the signals told so far."""
         return self._state.history.signals.shape[1:]
 
+    @property
+    def expected_shape(self) -> tuple[int, ...] | None:
+        """`signal_shape`; None while a user's discrepancy leaves it to the first signals."""
+        free = self._any_shape and np.isnan(self._state.history.signals).all()
+        return None if free else self.signal_shape
+
     def ask(self, n: int = 1) -> dict[str, np.ndarray]:
         """The next n different points to simulate, name -> [n].
 
@@ -189,8 +195,7 @@ class Bolfi:
         self._seconds += time.perf_counter() - started
 
     def _check_signals(self, n: int, signals: np.ndarray) -> None:
-        free = self._any_shape and np.isnan(self._state.history.signals).all()
-        shape = signals.shape[1:] if free else self.signal_shape
+        shape = signals.shape[1:] if self.expected_shape is None else self.expected_shape
         if signals.shape != (n, *shape):
             raise ValueError(
                 f"signals must have shape {(n, *shape)}, one row per theta, got {signals.shape}"

@@ -96,7 +96,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
 
 def _spend(
     engine: Bolfi,
-    runner: Callable[[list[Job]], list[Simulation]],
+    runner: Callable[[list[Job], tuple[int, ...] | None], list[Simulation]],
     budget: int,
     batch: int,
     advance: Callable[[int], None],
@@ -107,7 +107,7 @@ def _spend(
         first = engine.told
         theta = engine.ask(min(batch, budget - first))
         seeds = [simulation_seed(engine.seed, i) for i in range(first, engine.asked)]
-        results = runner(jobs(theta, seeds))
+        results = runner(jobs(theta, seeds), engine.expected_shape)
         engine.tell(theta, _signals(results, engine.signal_shape), seeds)
         seconds += sum(result.seconds for result in results)
         errors += [result.error for result in results if result.error]

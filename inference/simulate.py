@@ -31,14 +31,19 @@ def jobs(theta: Mapping[str, np.ndarray], seeds: Sequence[int]) -> list[Job]:
     ]
 
 
-def run_batch(simulate: Simulator, batch: Sequence[Job]) -> list[Simulation]:
+def run_batch(
+    simulate: Simulator, batch: Sequence[Job], shape: tuple[int, ...] | None
+) -> list[Simulation]:
     """Simulate all jobs in one call.
 
     An exception costs only the run that raised it: the batch is then repeated one by one.
     Seconds are shared out evenly.
 
+    Args:
+        shape: Of one signal; None accepts any.
+
     Raises:
-        ValueError: the simulator returned other than one row per job.
+        ValueError: the simulator returned other than one such row per job.
     """
     theta = {name: np.array([job.theta[name] for job in batch]) for name in batch[0].theta}
     seeds = np.array([job.seed for job in batch], np.int64)
@@ -47,13 +52,14 @@ def run_batch(simulate: Simulator, batch: Sequence[Job]) -> list[Simulation]:
         signals = np.asarray(simulate(theta, seeds), np.float64)
     except Exception as error:  # whatever the user's code raises is a failed run, and kept
         if len(batch) > 1:
-            return [run_batch(simulate, [job])[0] for job in batch]
+            return [run_batch(simulate, [job], shape)[0] for job in batch]
         seconds = time.perf_counter() - started
         return [Simulation(None, f"{type(error).__name__}: {error}", seconds)]
     seconds = (time.perf_counter() - started) / len(batch)
-    if signals.ndim < 1 or len(signals) != len(batch):
+    expected = (len(batch), *(signals.shape[1:] if shape is None else shape))
+    if signals.shape != expected:
         raise ValueError(
-            f"simulate must return one row per theta, shape ({len(batch)}, ...), "
+            f"simulate must return signals of shape {expected}, one row per theta, "
             f"got {signals.shape}"
         )
     return [Simulation(signal, None, seconds) for signal in signals]
@@ -62,6 +68,7 @@ def run_batch(simulate: Simulator, batch: Sequence[Job]) -> list[Simulation]:
 def run_missing(
     simulate: Simulator,
     batch: Sequence[Job],
+    shape: tuple[int, ...] | None,
     bank: SimulationBank,
     identity: str,
     executor: Executor | None,
@@ -76,9 +83,9 @@ def run_missing(
     if not missing:
         made = iter(())
     elif executor is None:
-        made = iter(run_batch(simulate, missing))
+        made = iter(run_batch(simulate, missing, shape))
     else:
-        futures = [executor.submit(run_batch, simulate, [job]) for job in missing]
+        futures = [executor.submit(run_batch, simulate, [job], shape) for job in missing]
         made = (future.result()[0] for future in futures)
     results = []
     for job, hit in zip(batch, found, strict=True):
