@@ -51,9 +51,7 @@ class Fluid:
             ti.Vector.field(3, ti.f32, shape) for _ in range(6)
         )
         self.normal = ti.Vector.field(3, ti.f32, shape)
-        self.constraint, self.multiplier, self.surface = (
-            ti.field(ti.f32, shape) for _ in range(3)
-        )
+        self.constraint, self.multiplier, self.surface = (ti.field(ti.f32, shape) for _ in range(3))
         self.order, self.cell = (ti.field(ti.i32, shape) for _ in range(2))
         self.cell_start = ti.field(ti.i32, (slots, int(np.prod(self.cells)) + 1))
         self.sorted = ti.Vector.field(3, ti.f32, shape)

@@ -37,9 +37,7 @@ class PouringScene(Fluid):
     @ti.func
     def to_cup(self, b, p):
         c, s = ti.cos(self.angle[b]), ti.sin(self.angle[b])
-        return vec3(
-            c * p.x - s * p.z + self.cup_radius, p.y, s * p.x + c * p.z + self.cup_height
-        )
+        return vec3(c * p.x - s * p.z + self.cup_radius, p.y, s * p.x + c * p.z + self.cup_height)
 
     @ti.func
     def turn(self, b, d):

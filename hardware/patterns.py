@@ -1,0 +1,89 @@
+"""Stirring patterns as timed paths of the gripper."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Path(NamedTuple):
+    """Times [s], shape [T], and gripper positions [m], shape [T, 3]."""
+
+    time: np.ndarray
+    position: np.ndarray
+
+
+def star(
+    *,
+    speed: float,
+    height: float,
+    radius: float = 0.025,
+    points: int = 9,
+    acceleration: float = 1.0,
+    rest: float = 0.5,
+    rate: float = 30.0,
+) -> Path:
+    """A star of straight strokes in a horizontal plane ("To Stir or Not to Stir": m = 9).
+
+    The gripper rests above the cup's axis, moves to the first of `points` vertices on a circle,
+    visits all of them by the longest strokes that close into one star, and rests again. Each
+    stroke starts and ends at rest, with a trapezoidal speed profile.
+
+    Args:
+        speed: Greatest speed [m/s].
+        height: Gripper above the cup's floor [m].
+        radius: Of the circle of vertices [m].
+        points: Number of vertices, odd and at least 5.
+        acceleration: Of each stroke's ends [m/s²].
+        rest: Time at rest before and after [s].
+        rate: Samples per second.
+
+    Raises:
+        ValueError: an argument is not positive and finite, or `points` is even or below 5.
+    """
+    lengths = {"speed": speed, "height": height, "radius": radius, "acceleration": acceleration}
+    for name, value in {**lengths, "rest": rest, "rate": rate}.items():
+        if not (np.isfinite(value) and value > 0):
+            raise ValueError(f"{name} must be positive and finite, got {value}")
+    if points < 5 or points % 2 == 0:
+        raise ValueError(f"points must be odd and at least 5, got {points}; the paper uses 9")
+    angles = 2.0 * np.pi * (points // 2) * np.arange(points + 1) / points
+    vertices = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    corners = np.concatenate([np.zeros((1, 2)), vertices])
+
+    strokes = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    durations = [_duration(length, speed, acceleration) for length in strokes]
+    ends = rest + np.concatenate([[0.0], np.cumsum(durations)])
+    time = np.arange(0.0, ends[-1] + rest, 1.0 / rate)
+    stroke = np.clip(np.searchsorted(ends, time, side="right") - 1, 0, len(strokes) - 1)
+    travelled = np.array(
+        [
+            _travelled(t - ends[k], strokes[k], speed, acceleration)
+            for t, k in zip(time, stroke, strict=True)
+        ]
+    )
+    share = (travelled / strokes[stroke])[:, None]
+    plane = corners[stroke] + share * (corners[stroke + 1] - corners[stroke])
+    return Path(time, np.column_stack([plane, np.full(len(time), height)]))
+
+
+def _peak(length: float, speed: float, acceleration: float) -> float:
+    """Speed reached in a stroke; a short one never reaches `speed`."""
+    return min(speed, np.sqrt(length * acceleration))
+
+
+def _duration(length: float, speed: float, acceleration: float) -> float:
+    peak = _peak(length, speed, acceleration)
+    return length / peak + peak / acceleration
+
+
+def _travelled(elapsed: float, length: float, speed: float, acceleration: float) -> float:
+    """Distance covered `elapsed` s after the start of a trapezoidal stroke."""
+    peak = _peak(length, speed, acceleration)
+    duration = length / peak + peak / acceleration
+    elapsed = min(max(elapsed, 0.0), duration)
+    ramp = peak / acceleration
+    if elapsed < ramp:
+        return 0.5 * acceleration * elapsed**2
+    if elapsed > duration - ramp:
+        return length - 0.5 * acceleration * (duration - elapsed) ** 2
+    return peak * (elapsed - 0.5 * ramp)

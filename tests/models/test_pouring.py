@@ -1,0 +1,91 @@
+import numpy as np
+import pytest
+from scipy.stats import spearmanr
+
+from bolfi_liquids import models
+
+# angular velocity [deg/s], distance [cm], spilled fraction: pours by an independent solver
+# (SPlisHSPlasH 2.19, DFSPH) in the bundled cups
+POURS = {
+    "glycerin": (1.0, 1260.0, [(30, 1.0, 0.053), (45, 6.0, 0.943), (90, 2.0, 0.036),
+                               (90, 4.5, 0.270), (180, 2.0, 0.039), (180, 6.0, 0.328)]),
+    "oil": (0.1, 900.0, [(30, 2.0, 0.008), (45, 1.0, 0.310), (90, 1.0, 0.696),
+                         (90, 3.0, 0.078), (180, 2.0, 0.649), (180, 4.5, 0.047)]),
+    "water": (0.001, 1000.0, [(30, 1.0, 0.456), (45, 4.5, 0.002), (90, 1.0, 0.920),
+                              (90, 4.5, 0.023), (180, 3.0, 0.708), (180, 6.0, 0.063)]),
+}  # fmt: skip
+
+
+def pour(liquid, rows, cups, seeds=None):
+    viscosity, density = liquid
+    rate, distance = np.array(rows, dtype=float)[:, :2].T
+    action = models.PourAction(np.radians(rate), distance / 100.0)
+    seeds = np.zeros(len(rows), int) if seeds is None else seeds
+    return models.pour(models.Liquid(viscosity, 0.0, density), action, cups, seeds)
+
+
+def test_spillage_ranks_pours_as_an_independent_solver_does(cups):
+    ours, theirs = [], []
+    for viscosity, density, rows in POURS.values():
+        ours.append(pour((viscosity, density), rows, cups).spilled)
+        theirs.append([row[2] for row in rows])
+    ours, theirs = np.concatenate(ours), np.concatenate(theirs)
+    assert spearmanr(ours, theirs).statistic > 0.8
+    assert np.sqrt(np.mean((ours - theirs) ** 2)) < 0.15
+
+
+def test_every_particle_is_somewhere(cups):
+    rows = [(30, 0.0), (60, 7.0), (180, 3.0), (120, 2.0)]
+    result = pour(([1e-3, 0.1, 1.0, 50.0], 1000.0), rows, cups)
+    counts = 664 * np.stack([result.spilled, result.received, result.retained])
+    assert counts == pytest.approx(np.round(counts), abs=1e-9)
+    assert (np.round(counts).sum(axis=0) == 664).all()
+    assert result.retained[3] > result.retained[0]
+
+
+def test_same_bits_again_and_anywhere_in_a_batch(cups):
+    rows = [(180, 1.0), (120, 2.0), (150, 3.0)]
+    seeds = np.array([1, 2, 3])
+    whole = pour((0.01, 1000.0), rows, cups, seeds)
+    again = pour((0.01, 1000.0), rows[::-1], cups, seeds[::-1])
+    alone = pour((0.01, 1000.0), rows[1:2], cups, seeds[1:2])
+    np.testing.assert_array_equal(whole.spilled, again.spilled[::-1])
+    np.testing.assert_array_equal(whole.received[1:2], alone.received)
+
+
+def test_a_tilt_short_of_the_surface_spills_nothing(cups):
+    gentle = cups.model_copy(
+        update={"pour": cups.pour.model_copy(update={"final_angle_deg": 15.0})}
+    )
+    result = pour((0.01, 1000.0), [(30, 2.0)], gentle)
+    assert result.retained == pytest.approx(1.0)
+
+
+def test_bad_actions_are_named(cups):
+    liquid = models.Liquid(1.0, 0.0, 1000.0)
+    with pytest.raises(ValueError, match="angular_velocity must be positive"):
+        models.pour(liquid, models.PourAction(0.0, 0.02), cups, [0])
+    with pytest.raises(ValueError, match="distance must be finite"):
+        models.pour(liquid, models.PourAction(1.0, np.inf), cups, [0])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("radius = 0.028", "radius = -0.028", r"source\.radius.*-0\.028"),
+        ("radius = 0.028", "diameter = 0.056", r"source\.(radius|diameter)"),
+        ("hold = 0.9 ", "hold = 'long' ", r"pour\.hold.*long"),
+        ("lip_height = 0.20", "lip_height = 0.05", "lip.*not above the receiver's rim"),
+        ("[0.0, 0.07]", "[0.07, 0.0]", "distance must ascend"),
+        ("[source]", "[source", "not a TOML file"),
+    ],
+)
+def test_bad_cups_files_are_named(tmp_path, old, new, message):
+    from importlib.resources import files
+
+    text = (files("bolfi_liquids.data") / "cups.toml").read_text()
+    assert old in text
+    path = tmp_path / "cups.toml"
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(ValueError, match=f"cups.toml.*{message}"):
+        models.Cups.from_toml(path)

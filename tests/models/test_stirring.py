@@ -1,0 +1,165 @@
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from bolfi_liquids.models import stirring
+from scipy.integrate import solve_ivp
+
+from bolfi_liquids import models
+
+
+def rms_deg(difference):
+    return np.degrees(np.sqrt(np.mean(np.square(difference), axis=(-2, -1))))
+
+
+def first_seconds(recording, seconds):
+    keep = recording.gripper.time <= seconds
+    path = SimpleNamespace(
+        time=recording.gripper.time[keep], position=recording.gripper.position[keep]
+    )
+    return SimpleNamespace(
+        attrs=recording.attrs, gripper=path, inclination=recording.inclination[keep]
+    )
+
+
+def test_same_bits_again_alone_and_anywhere_in_a_batch(glycerin):
+    short = first_seconds(glycerin, 1.5)
+    setup = models.StirSetup.from_recording(short, particles=300)
+    viscosity = np.array([0.01, 1.0, 0.1, 5.0, 0.003])
+    cohesion = np.array([0.0, 0.2, 1.0, 0.5, 0.7])
+    seeds = np.array([5, 1, 7, 1, 3])
+
+    def run(order):
+        liquid = models.Liquid(viscosity[order], cohesion[order], 1260.0)
+        return models.stir(liquid, short.gripper, setup, seeds[order])
+
+    order = np.arange(5)
+    whole = run(order)
+    assert np.ptp(whole[:, -1, 0]) > 0.0
+    np.testing.assert_array_equal(run(order), whole)
+    np.testing.assert_array_equal(run(order[::-1]), whole[::-1])
+    np.testing.assert_array_equal(run(order[2:3]), whole[2:3])
+    many = np.tile(order, 5)  # more than there are slots
+    np.testing.assert_array_equal(run(many), whole[many])
+
+
+def test_without_liquid_the_stick_is_the_driven_spherical_pendulum(glycerin):
+    """Lagrange's equation of a rod on a moving pivot, integrated by SciPy, is the truth."""
+    setup = models.StirSetup.from_recording(glycerin, particles=100)
+    gripper = glycerin.gripper
+    thin = models.Liquid(viscosity=0.0, cohesion=0.0, density=1e-3)
+    signal = models.stir(thin, gripper, setup, [0])[0]
+
+    rate = setup.numerics.rate
+    path = stirring.substep_path(gripper, rate)
+    grid = gripper.time[0] + np.arange(len(path)) / rate
+    acceleration = np.gradient(np.gradient(path, 1 / rate, axis=0), 1 / rate, axis=0)
+    stick = setup.stick
+    arm = stick.mass * stick.length / 2 / stick.inertia
+
+    def rhs(t, state):
+        u, w = state[:3], state[3:]
+        pivot = np.array([np.interp(t, grid, acceleration[:, axis]) for axis in range(3)])
+        force = arm * (np.array([0.0, 0.0, -9.81]) - pivot)
+        return np.concatenate([w, force - force.dot(u) * u - w.dot(w) * u])
+
+    start = [0.0, 0.0, -1.0, 0.0, 0.0, 0.0]
+    solved = solve_ivp(
+        rhs, (grid[0], gripper.time[-1]), start, t_eval=gripper.time, max_step=2e-3, rtol=1e-7
+    )
+    expected = np.arctan2(solved.y[:2], -solved.y[2]).T
+    swing = rms_deg(expected)
+    assert swing > 2.0
+    assert rms_deg(signal - expected) < 0.05 * swing
+
+
+def test_a_submerged_stick_is_buoyed_as_archimedes_says(glycerin):
+    """At 15 degrees, where buoyancy outweighs the packing's own push of a particle's weight."""
+    setup = models.StirSetup.from_recording(glycerin)
+    stick, tilt, packings = setup.stick, np.radians(15.0), 8
+    pivot = np.array([-0.05, 0.0, glycerin.gripper.position[0, 2]])  # the wet part near the axis
+    still = SimpleNamespace(time=np.array([0.0, 1 / 60]), position=np.tile(pivot, (2, 1)))
+    liquid = models.Liquid(0.05, 0.0, 1260.0)
+    models.stir(liquid, still, setup, np.arange(packings))
+
+    scene = stirring._scene(setup)
+    direction = np.zeros((scene.slots, 3), np.float32)
+    direction[:, 0], direction[:, 2] = np.sin(tilt), -np.cos(tilt)
+    scene.direction.from_numpy(direction)
+    scene.swing.fill(0.0)
+    scene.settle(packings, 240, 0.97)
+    pushes = []
+    for _ in range(120):
+        scene.torque.fill(0.0)
+        scene.settle(packings, 1, 1.0)
+        pushes.append(scene.torque.to_numpy()[:packings] * setup.numerics.rate)
+    across = np.mean(pushes, axis=0) @ [np.cos(tilt), 0.0, np.sin(tilt)]
+
+    tip = pivot[2] - stick.length * np.cos(tilt)
+    wet = (setup.cup.fill - tip) / np.cos(tilt)
+    weight = 1260.0 * 9.81 * np.pi * stick.radius**2 * wet
+    expected = weight * np.sin(tilt) * (stick.length - wet / 2)
+    assert np.mean(across) == pytest.approx(expected, rel=0.2)
+
+
+def test_no_particle_leaves_the_cup_and_none_is_lost(water):
+    setup = models.StirSetup.from_recording(water, particles=400)
+    scene = stirring._scene(setup)
+    models.stir(models.Liquid([1e-3, 1.0], 0.0, 1000.0), water.gripper, setup, [0, 1])
+    position = scene.position.to_numpy()[:2]
+    assert (scene.alive.to_numpy()[:2] == 400).all()
+    assert np.isfinite(position).all()
+    assert np.hypot(position[..., 0], position[..., 1]).max() < setup.cup.radius
+    assert position[..., 2].min() > 0.0
+
+
+@pytest.mark.parametrize("cohesion", [0.0, 0.5, 1.0])
+def test_liquid_at_rest_stays_at_rest(water, cohesion):
+    setup = models.StirSetup.from_recording(water)
+    time = np.linspace(0.0, 2.0, 61)
+    still = SimpleNamespace(time=time, position=np.tile(water.gripper.position[0], (61, 1)))
+    liquid = models.Liquid(1e-3, cohesion, 1000.0)
+    signal = models.stir(liquid, still, setup, [0])[0]
+    velocity = stirring._scene(setup).velocity.to_numpy()[0]
+    assert np.sqrt(np.mean(np.sum(velocity**2, axis=-1))) < 0.03
+    assert np.abs(np.degrees(signal)).max() < 1.0
+
+
+def test_the_inclination_tells_liquids_apart_as_another_solver_does(glycerin, water):
+    viscosity = np.array([1e-3, 3e-2, 1.0])
+    for recording, truth in ((glycerin, 2), (water, 0)):
+        setup = models.StirSetup.from_recording(recording)
+        density = recording.attrs["liquid_density"]
+        liquid = models.Liquid(viscosity, 0.0, density)
+        signal = models.stir(liquid, recording.gripper, setup, [0, 0, 0])
+        apart = rms_deg(signal - recording.inclination)
+        assert apart.argmin() == truth
+        assert apart[truth] < 0.9
+
+
+def test_a_setup_says_what_fixes_it(glycerin):
+    setup = models.StirSetup.from_recording(glycerin, particles=500)
+    settings = setup.settings()
+    assert settings["particles"] == 500
+    assert settings["model"] == models.MODEL_VERSION
+    assert settings["numerics"]["rate"] == setup.numerics.rate
+    volume = setup.particles * setup.spacing**3
+    displaced = np.pi * setup.stick.radius**2 * setup.submerged
+    cup = np.pi * setup.cup.radius**2 * setup.cup.fill
+    assert volume + displaced == pytest.approx(cup)
+
+
+def test_missing_geometry_and_a_short_stick_are_named(glycerin):
+    attrs = {key: value for key, value in glycerin.attrs.items() if key != "cup_radius"}
+    with pytest.raises(ValueError, match="cup_radius"):
+        models.StirSetup.from_recording(SimpleNamespace(attrs=attrs, gripper=glycerin.gripper))
+    attrs = {**glycerin.attrs, "stick_length": 0.1}
+    with pytest.raises(ValueError, match="above the liquid.*stick_length=0.1"):
+        models.StirSetup.from_recording(SimpleNamespace(attrs=attrs, gripper=glycerin.gripper))
+
+
+def test_a_path_without_samples_is_refused(glycerin):
+    setup = models.StirSetup.from_recording(glycerin, particles=100)
+    gap = SimpleNamespace(time=np.array([0.0, 1.0]), position=np.full((2, 3), np.nan))
+    with pytest.raises(ValueError, match="0 finite samples"):
+        models.stir(models.Liquid(1.0, 0.0, 1000.0), gap, setup, [0])
