@@ -98,7 +98,7 @@ def _calibrate(
     total = settings.budget + PREDICTIVE_DRAWS + REPLICATES
     with (
         SimulationBank(run / SIMULATIONS) as bank,
-        progress_bar("stirring", total - len(bank), shown=progress) as advance,
+        progress_bar("simulating stirs", total - len(bank), shown=progress) as advance,
     ):
         simulate = reported(stirring.simulate, advance)
         keep = Keep(bank, stirring.identity, settings.batch)

@@ -1,13 +1,13 @@
 """Simulations outside the engine's loop, kept in the same bank."""
 
 from collections.abc import Mapping, Sequence
+from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .inference import SimulationBank
-from .inference.simulate import jobs, run_missing
+from .inference import Simulation, SimulationBank
 from .progress import Simulate
 
 
@@ -38,20 +38,38 @@ def simulate_kept(
         keep: Finished simulations are taken from there and put there.
 
     Returns:
-        The simulations in order; failed ones are left out of the signals.
+        The simulations in order; diverged ones are left out of the signals.
 
     Raises:
-        RuntimeError: Every simulation failed.
+        RuntimeError: Every simulation diverged.
     """
-    todo = jobs(theta, seeds)
-    results = []
-    for start in range(0, len(todo), keep.batch):
-        some = todo[start : start + keep.batch]
-        results += run_missing(simulate, some, keep.bank, keep.identity, None)
-    signals = [result.signal for result in results if result.signal is not None]
-    if not signals:
-        raise RuntimeError(f"all {len(todo)} simulations failed; the first: {results[0].error}")
-    return Kept(np.stack(signals), sum(result.seconds for result in results))
+    points = [
+        {name: float(values[at]) for name, values in theta.items()} for at in range(len(seeds))
+    ]
+    wanted = list(zip(points, seeds, strict=True))
+    missing = [job for job in wanted if keep.bank.get(keep.identity, *job) is None]
+    for start in range(0, len(missing), keep.batch):
+        _simulate_and_put(simulate, missing[start : start + keep.batch], keep)
+    found = [keep.bank.get(keep.identity, *job) for job in wanted]
+    results = [result for result in found if result is not None]
+    good = [r.signal for r in results if r.signal is not None and np.isfinite(r.signal).all()]
+    if not good:
+        raise RuntimeError(
+            f"all {len(seeds)} simulations diverged, the first at {points[0]}; use more particles"
+        )
+    return Kept(np.stack(good), sum(result.seconds for result in results))
+
+
+def _simulate_and_put(
+    simulate: Simulate, batch: Sequence[tuple[dict[str, float], int]], keep: Keep
+) -> None:
+    points, seeds = zip(*batch, strict=True)
+    theta = {name: np.array([point[name] for point in points]) for name in points[0]}
+    started = perf_counter()
+    signals = simulate(theta, np.array(seeds, np.int64))
+    seconds = (perf_counter() - started) / len(batch)
+    for (point, seed), signal in zip(batch, signals, strict=True):
+        keep.bank.put(keep.identity, point, seed, Simulation(signal, None, seconds))
 
 
 def fresh_seeds(seed: int, purpose: int, count: int) -> list[int]:

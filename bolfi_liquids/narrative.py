@@ -35,7 +35,7 @@ def parameter_sentence(name: str, values: Mapping[str, float], prior: NDArray) -
     verdict = (
         "the stirring says little about it"
         if share > UNLEARNED
-        else f"this range is {share:.0%} as wide as before the stirring"
+        else f"this range is {percent(share)} as wide as before the stirring"
     )
     return (
         f"{name.capitalize()} is probably between {with_unit(name, low)} and"
@@ -67,5 +67,6 @@ def pour_sentence(section: Mapping[str, Any]) -> str:
         f" {percent(section['expected_spillage'])}, in 19 of 20 cases less than"
         f" {percent(section['spillage_q95'])}. The best action at θ* alone"
         f" ({plug_in['angular_velocity_deg_s']:.0f}°/s, {plug_in['distance_cm']:.1f} cm) would"
-        f" spill {percent(plug_in['expected_spillage'])} over the same liquids."
+        f" spill {percent(plug_in['expected_spillage'])} over the same liquids, in 19 of 20 cases"
+        f" less than {percent(plug_in['spillage_q95'])}."
     )

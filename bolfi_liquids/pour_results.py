@@ -99,8 +99,8 @@ def _surface(fit: "Fit") -> "Dataset":
     axes = fit.prior.from_unit(quantiles)
     mesh = np.meshgrid(*(axes[name] for name in ACTION), indexing="ij")
     mean, _ = fit.surrogate.predict(dict(zip(ACTION, (m.ravel() for m in mesh), strict=True)))
-    # the surrogate sees the square root of the spillage
-    spillage = np.maximum(mean, 0.0).reshape(mesh[0].shape) ** 2
+    # the surrogate sees the square root of the spillage, and no bounds to it
+    spillage = np.clip(mean, 0.0, 1.0).reshape(mesh[0].shape) ** 2
     return Dataset(
         {"spillage": (ACTION, spillage)},
         coords={name: (name, axes[name], {"units": UNITS[name]}) for name in ACTION},

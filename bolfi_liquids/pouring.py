@@ -105,7 +105,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     best = {name: np.full(PLUG_IN_SEEDS, value) for name, value in calibration.best.items()}
     with (
         SimulationBank(calibration.path / SIMULATIONS) as bank,
-        progress_bar("pouring", 2 * iterations + 2, shown=progress) as advance,
+        progress_bar("trying pours", 2 * iterations + 2, shown=progress) as advance,
     ):
         search = _Search(cups, calibration.liquid_density, settings, bank, advance)
         over_posterior = search.minimise(liquids)

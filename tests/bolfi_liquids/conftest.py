@@ -1,4 +1,3 @@
-import warnings
 from importlib.resources import files
 from pathlib import Path
 
@@ -7,11 +6,6 @@ import pytest
 import xarray as xr
 
 import bolfi_liquids as bl
-
-with warnings.catch_warnings():
-    # its import uses what Python 3.15 will remove; here a warning would fail the first simulation
-    warnings.simplefilter("ignore", DeprecationWarning)
-    import taichi  # noqa: F401
 
 BUNDLED = Path(str(files("bolfi_liquids.data"))) / "glycerin_v10.nc"
 SHORT = 60  # samples, 2 s: the pause and the first strokes

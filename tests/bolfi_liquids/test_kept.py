@@ -1,0 +1,45 @@
+"""What was simulated once is taken from the bank."""
+
+import numpy as np
+import pytest
+from bolfi_liquids.inference import SimulationBank
+
+from bolfi_liquids.kept import Keep, fresh_seeds, simulate_kept
+
+
+def test_only_what_is_missing_is_simulated():
+    asked = []
+
+    def simulate(theta, seeds):
+        asked.append(seeds.tolist())
+        return (theta["a"] + 100.0 * seeds)[:, None]
+
+    theta = {"a": np.array([0.0, 1.0, 2.0, 3.0, 4.0])}
+    with SimulationBank() as bank:
+        keep = Keep(bank, "line", 2)
+        first = simulate_kept(simulate, {"a": theta["a"][1:3]}, [6, 7], keep)
+        np.testing.assert_array_equal(first.signals[:, 0], [601.0, 702.0])
+        whole = simulate_kept(simulate, theta, [5, 6, 7, 8, 9], keep)
+        np.testing.assert_array_equal(whole.signals[:, 0], [500.0, 601.0, 702.0, 803.0, 904.0])
+        simulate_kept(simulate, theta, [5, 6, 7, 8, 9], keep._replace(identity="other"))
+    assert asked == [[6, 7], [5, 8], [9], [5, 6], [7, 8], [9]]
+
+
+def test_diverged_ones_are_left_out():
+    def simulate(theta, seeds):
+        return np.where(theta["a"] > 1.0, np.nan, theta["a"])[:, None]
+
+    with SimulationBank() as bank:
+        keep = Keep(bank, "", 8)
+        kept = simulate_kept(simulate, {"a": np.array([0.0, 2.0, 1.0])}, [1, 2, 3], keep)
+        np.testing.assert_array_equal(kept.signals, [[0.0], [1.0]])
+        with pytest.raises(RuntimeError, match="all 1 simulations diverged"):
+            simulate_kept(simulate, {"a": np.array([2.0])}, [2], keep)
+
+
+def test_seeds_differ_by_run_and_purpose():
+    seeds = [*fresh_seeds(0, 1, 50), *fresh_seeds(0, 2, 50), *fresh_seeds(1, 1, 50)]
+    assert len(set(seeds)) == 150
+    assert min(seeds) >= 0
+    assert max(seeds) < 2**31
+    assert fresh_seeds(0, 1, 50) == seeds[:50]
