@@ -11,16 +11,19 @@ import numpy as np
 import taichi as ti
 
 from . import tables
+from .liquid import Liquid
+from .neighbours import NeighbourSearch
 
 vec3 = ti.math.vec3
 GRAVITY = 9.81
 STRIDE = 512  # Taichi gives each CPU thread at least this many consecutive iterations
-MEAN_NEIGHBOURS = 40  # of a half list; settled liquid has about 17
+SETTLING_LIQUID = Liquid(viscosity=0.05, cohesion=0.0, density=1000.0)
+DAMPING = 0.97  # of velocities each substep while a packing settles
 SURFACE_NORMAL = 0.4  # |n| below this is the inside of the liquid
 
 
 @ti.data_oriented
-class Fluid:
+class Fluid(NeighbourSearch):
     """State and steps of up to `slots` liquids of at most `particles` each.
 
     A scene is a subclass that overrides `boundary`, `contain` and `drag`, and whose kernels run
@@ -36,32 +39,19 @@ class Fluid:
             numerics: `Numerics`.
             extent: Lower and upper corner of the search grid [m]; particles may leave it.
         """
-        lower, upper = np.asarray(extent, dtype=float)
-        self.slots, self.particles, self.spacing = slots, particles, spacing
-        self.numerics = numerics
+        h = numerics.support * spacing
+        super().__init__(slots, particles, h, extent)
+        self.spacing, self.numerics, self.h = spacing, numerics, h
         self.dt = 1.0 / numerics.rate
-        self.h = numerics.support * spacing
         self.volume = spacing**3
-        self.origin = tuple(lower)
-        self.cells = tuple(int(n) for n in np.ceil((upper - lower) / self.h))
-        self.capacity = MEAN_NEIGHBOURS * particles
 
-        shape = (slots, particles)
-        self.position, self.velocity, self.predicted, self.kick, self.moved, self.wall = (
+        shape, pairs = (slots, particles), (slots, self.capacity)
+        self.position, self.velocity, self.kick, self.moved, self.wall, self.normal = (
             ti.Vector.field(3, ti.f32, shape) for _ in range(6)
         )
-        self.normal = ti.Vector.field(3, ti.f32, shape)
         self.constraint, self.multiplier, self.surface = (ti.field(ti.f32, shape) for _ in range(3))
-        self.order, self.cell = (ti.field(ti.i32, shape) for _ in range(2))
-        self.cell_start = ti.field(ti.i32, (slots, int(np.prod(self.cells)) + 1))
-        self.sorted = ti.Vector.field(3, ti.f32, shape)
-        self.pair_start = ti.field(ti.i32, (slots, particles + 1))
-        self.pair_other = ti.field(ti.i32, (slots, self.capacity))
-        self.pair_gradient = ti.Vector.field(3, ti.f32, (slots, self.capacity))
-        self.pair_coupling, self.pair_impulse = (
-            ti.field(ti.f32, (slots, self.capacity)) for _ in range(2)
-        )
-        self.alive, self.overflow = (ti.field(ti.i32, slots) for _ in range(2))
+        self.pair_gradient = ti.Vector.field(3, ti.f32, pairs)
+        self.pair_coupling, self.pair_impulse = (ti.field(ti.f32, pairs) for _ in range(2))
         self.viscosity, self.cohesion, self.density = (ti.field(ti.f32, slots) for _ in range(3))
         self.half_space = self.load(tables.half_space())
 
@@ -90,67 +80,6 @@ class Fluid:
             v = self.velocity[b, i] + self.dt * gravity + self.kick[b, i]
             self.kick[b, i] = vec3(0.0)
             self.predicted[b, i] = self.position[b, i] + self.dt * v
-
-    @ti.func
-    def cell_of(self, p):
-        """Grid cell of a point; clamping keeps neighbours in neighbouring cells."""
-        nx, ny, nz = ti.static(self.cells)
-        q = ti.floor((p - vec3(*self.origin)) / self.h, ti.i32)
-        return ti.math.clamp(q, ti.Vector([0, 0, 0]), ti.Vector([nx - 1, ny - 1, nz - 1]))
-
-    @ti.func
-    def search(self, b):
-        """Half neighbour lists of the predicted positions, by counting sort."""
-        nx, ny, nz = ti.static(self.cells)
-        for c in range(nx * ny * nz + 1):
-            self.cell_start[b, c] = 0
-        for i in range(self.alive[b]):
-            q = self.cell_of(self.predicted[b, i])
-            c = (q[0] * ny + q[1]) * nz + q[2]
-            self.cell[b, i] = c
-            self.cell_start[b, c] = self.cell_start[b, c] + 1
-        total = 0
-        for c in range(nx * ny * nz + 1):
-            total += self.cell_start[b, c]
-            self.cell_start[b, c] = total
-        for k in range(self.alive[b]):
-            i = self.alive[b] - 1 - k
-            c = self.cell[b, i]
-            a = self.cell_start[b, c] - 1
-            self.cell_start[b, c] = a
-            self.order[b, a] = i
-            self.sorted[b, a] = self.predicted[b, i]
-        pairs = 0
-        for a in range(self.alive[b]):
-            self.pair_start[b, a] = pairs
-            p = self.sorted[b, a]
-            q = self.cell_of(p)
-            column = (q[0] * ny + q[1]) * nz
-            pairs = self.collect(
-                b, p, a + 1, self.cell_start[b, column + ti.min(q[2] + 1, nz - 1) + 1], pairs
-            )
-            for k in ti.static(range(4)):
-                dx, dy = ti.static(((0, 1), (1, -1), (1, 0), (1, 1))[k])
-                if q[0] + dx < nx and 0 <= q[1] + dy and q[1] + dy < ny:
-                    other = column + (dx * ny + dy) * nz
-                    low = self.cell_start[b, other + ti.max(q[2] - 1, 0)]
-                    high = self.cell_start[b, other + ti.min(q[2] + 1, nz - 1) + 1]
-                    pairs = self.collect(b, p, low, high, pairs)
-        self.pair_start[b, self.alive[b]] = pairs
-
-    @ti.func
-    def collect(self, b, p, low, high, pairs):
-        """Append the sorted particles low..high-1 that lie within h of p; the new count."""
-        count = pairs
-        for a in range(low, high):
-            d = p - self.sorted[b, a]
-            if d.dot(d) < self.h * self.h:
-                if count < self.capacity:
-                    self.pair_other[b, count] = self.order[b, a]
-                    count += 1
-                else:
-                    self.overflow[b] = 1
-        return count
 
     @ti.func
     def boundary(self, b, i):
@@ -350,19 +279,13 @@ class Fluid:
         self.cohesion.from_numpy(self.padded(liquid.cohesion))
         self.density.from_numpy(self.padded(liquid.density))
 
+    def relax_packing(self, active, seconds):
+        """Let the first `active` packings come to rest, the same for every liquid."""
+        self.pour_in(SETTLING_LIQUID.batch(active))
+        self.settle(active, round(seconds * self.numerics.rate), DAMPING)
+
     def padded(self, values):
         """`values` [b, ...] as float32 with zeros up to the number of slots."""
         full = np.zeros((self.slots, *values.shape[1:]), np.float32)
         full[: len(values)] = values
         return full
-
-    def check_capacity(self):
-        """
-        Raises:
-            RuntimeError: neighbour lists overflowed, so results are wrong.
-        """
-        if self.overflow.to_numpy().any():
-            raise RuntimeError(
-                f"a particle cluster has more than {MEAN_NEIGHBOURS} neighbours a particle; "
-                "the liquid has collapsed: raise numerics.rate or lower cohesion"
-            )

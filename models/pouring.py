@@ -19,8 +19,6 @@ from .packing import pack_cylinder
 
 PARTICLES = 664  # 5 mm apart in the bundled cups
 SETTLING = 0.6  # s
-SETTLING_LIQUID = Liquid(viscosity=0.05, cohesion=0.0, density=1000.0)
-DAMPING = 0.97
 DRIP = 1.2  # s beyond the cups' hold; viscous liquids need it, and others end earlier
 CHUNK = 240  # substeps a kernel call
 
@@ -235,8 +233,7 @@ def _run(scene, cups, liquid, action, seeds) -> np.ndarray:
         )
     )
     scene.place_cups(rate, distance)
-    scene.pour_in(SETTLING_LIQUID.batch(size))
-    scene.settle(size, round(SETTLING * scene.numerics.rate), DAMPING)
+    scene.relax_packing(size, SETTLING)
     scene.pour_in(liquid)
     hold = cups.pour.hold + DRIP
     steps = int((cups.pour.final_angle / rate.min() + hold) * scene.numerics.rate)

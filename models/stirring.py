@@ -1,7 +1,7 @@
 """Stirring: a recorded gripper path in, the stick's inclination out."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cache
 from typing import Any, Protocol
@@ -15,23 +15,25 @@ from .numerics import MODEL_VERSION, Numerics
 from .packing import pack_cylinder
 
 SETTLING = 1.0  # s that a packing relaxes around the held stick
-SETTLING_LIQUID = Liquid(viscosity=0.05, cohesion=0.0, density=1000.0)
-DAMPING = 0.97  # of velocities each substep while settling
 CHUNK = 240  # substeps a kernel call, so that Ctrl-C and progress are prompt
 
 
 class GripperPath(Protocol):
     """Times [T] in s and pivot positions [T, 3] in m; rows that are not finite are skipped."""
 
-    time: np.ndarray
-    position: np.ndarray
+    @property
+    def time(self) -> np.ndarray: ...
+    @property
+    def position(self) -> np.ndarray: ...
 
 
 class HasRig(Protocol):
     """What a setup reads from a recording."""
 
-    attrs: Any
-    gripper: GripperPath
+    @property
+    def attrs(self) -> Mapping[str, Any]: ...
+    @property
+    def gripper(self) -> GripperPath: ...
 
 
 @dataclass(frozen=True)
@@ -230,8 +232,7 @@ def _run(scene, setup, liquid, path, seeds, report) -> np.ndarray:
         )
     )
     scene.place_stick(np.tile(pivot, (size, 1)))
-    scene.pour_in(SETTLING_LIQUID.batch(size))
-    scene.settle(size, round(SETTLING * setup.numerics.rate), DAMPING)
+    scene.relax_packing(size, SETTLING)
     scene.pour_in(liquid)
 
     steps = len(path) - 1
