@@ -5,9 +5,10 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import tomli_w
+
 from .errors import InputError
 from .files import write_text
-from .toml_text import to_toml
 
 RUN_TOML = "run.toml"
 SIMULATIONS = "simulations.sqlite"
@@ -48,7 +49,7 @@ def enter_run(run: Path, record: Mapping[str, Any], *, resume: bool) -> None:
             fix="choose another --out; nothing was overwritten",
         )
     run.mkdir(parents=True, exist_ok=True)
-    write_text(path, to_toml(record))
+    write_text(path, tomli_w.dumps(record))
 
 
 def read_run(run: Path) -> dict[str, Any]:
@@ -71,8 +72,8 @@ def read_run(run: Path) -> dict[str, Any]:
 
 
 def _check_same(old: Mapping[str, Any], new: Mapping[str, Any], run: Path) -> None:
-    # through TOML, so that a tuple or a None compares as what was written
-    wanted = dict(_fields({k: tomllib.loads(to_toml(new)).get(k) for k in MUST_AGREE}))
+    # through TOML, so that a tuple compares as what was written
+    wanted = dict(_fields({k: tomllib.loads(tomli_w.dumps(new)).get(k) for k in MUST_AGREE}))
     held = dict(_fields({k: old.get(k) for k in MUST_AGREE}))
     for field in [*wanted, *(held.keys() - wanted.keys())]:
         if wanted.get(field) != held.get(field):

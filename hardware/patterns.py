@@ -12,7 +12,7 @@ class Path(NamedTuple):
     position: np.ndarray
 
 
-def star(
+def star(  # noqa: PLR0913  a pattern has that many sizes
     *,
     speed: float,
     height: float,

@@ -2,7 +2,6 @@
 
 import copy
 import json
-import tomllib
 
 import pytest
 
@@ -10,7 +9,6 @@ from bolfi_liquids.errors import InputError
 from bolfi_liquids.files import write_whole
 from bolfi_liquids.run_directory import RUN_TOML, SIMULATIONS, enter_run, read_run
 from bolfi_liquids.summary import read_summary, write_section
-from bolfi_liquids.toml_text import to_toml
 
 RECORD = {
     "created": "2026-01-01T00:00:00+00:00",
@@ -100,19 +98,3 @@ def test_broken_summary_is_named(tmp_path):
     (tmp_path / "summary.json").write_text("{")
     with pytest.raises(InputError, match="not JSON"):
         write_section(tmp_path, "pour", {})
-
-
-def test_toml_is_read_back():
-    table = {
-        "text": 'quote " \\ line\nµ',
-        "on": True,
-        "count": 3,
-        "ratio": 0.1 + 0.2,
-        "large": 1e300,
-        "list": [1.5, [2, 3], {"a b": "c"}],
-        "deep": {"er": {"key with space": -1.0}},
-    }
-    assert tomllib.loads(to_toml(table)) == table
-    assert tomllib.loads(to_toml({"gone": None, "kept": 1})) == {"kept": 1}
-    with pytest.raises(TypeError, match="object"):
-        to_toml({"x": object()})
