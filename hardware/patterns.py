@@ -51,39 +51,26 @@ def star(  # noqa: PLR0913  a pattern has that many sizes
     corners = np.concatenate([np.zeros((1, 2)), vertices])
 
     strokes = np.linalg.norm(np.diff(corners, axis=0), axis=1)
-    durations = [_duration(length, speed, acceleration) for length in strokes]
+    # a short stroke never reaches the full speed
+    peaks = np.minimum(speed, np.sqrt(strokes * acceleration))
+    ramps = peaks / acceleration
+    durations = strokes / peaks + ramps
     ends = rest + np.concatenate([[0.0], np.cumsum(durations)])
+
     time = np.arange(0.0, ends[-1] + rest, 1.0 / rate)
-    stroke = np.clip(np.searchsorted(ends, time, side="right") - 1, 0, len(strokes) - 1)
-    travelled = np.array(
-        [
-            _travelled(t - ends[k], strokes[k], speed, acceleration)
-            for t, k in zip(time, stroke, strict=True)
-        ]
-    )
-    share = (travelled / strokes[stroke])[:, None]
-    plane = corners[stroke] + share * (corners[stroke + 1] - corners[stroke])
+    k = np.clip(np.searchsorted(ends, time, side="right") - 1, 0, len(strokes) - 1)
+    elapsed = np.clip(time - ends[k], 0.0, durations[k])
+    share = _travelled(elapsed, durations[k], ramps[k], peaks[k]) / strokes[k]
+    plane = corners[k] + share[:, None] * (corners[k + 1] - corners[k])
     return Path(time, np.column_stack([plane, np.full(len(time), height)]))
 
 
-def _peak(length: float, speed: float, acceleration: float) -> float:
-    """Speed reached in a stroke; a short one never reaches `speed`."""
-    return min(speed, np.sqrt(length * acceleration))
-
-
-def _duration(length: float, speed: float, acceleration: float) -> float:
-    peak = _peak(length, speed, acceleration)
-    return length / peak + peak / acceleration
-
-
-def _travelled(elapsed: float, length: float, speed: float, acceleration: float) -> float:
-    """Distance covered `elapsed` s after the start of a trapezoidal stroke."""
-    peak = _peak(length, speed, acceleration)
-    duration = length / peak + peak / acceleration
-    elapsed = min(max(elapsed, 0.0), duration)
-    ramp = peak / acceleration
-    if elapsed < ramp:
-        return 0.5 * acceleration * elapsed**2
-    if elapsed > duration - ramp:
-        return length - 0.5 * acceleration * (duration - elapsed) ** 2
-    return peak * (elapsed - 0.5 * ramp)
+def _travelled(
+    elapsed: np.ndarray, duration: np.ndarray, ramp: np.ndarray, peak: np.ndarray
+) -> np.ndarray:
+    """Distance covered `elapsed` into strokes of trapezoidal speed; all of one shape."""
+    rising = np.minimum(elapsed, ramp)
+    falling = np.maximum(elapsed - (duration - ramp), 0.0)
+    cruising = np.clip(elapsed - ramp, 0.0, duration - 2.0 * ramp)
+    slowing = peak * falling - 0.5 * peak / ramp * falling**2
+    return 0.5 * peak / ramp * rising**2 + peak * cruising + slowing

@@ -1,8 +1,9 @@
 """Particle fluid: stirring and pouring scenes. Taichi loads with the first simulation."""
 
+from .cups import Cups
 from .liquid import Liquid
 from .numerics import MODEL_VERSION, Numerics
-from .pouring import Cups, PourAction, PourResult, pour
+from .pouring import PourAction, PourResult, pour
 from .stirring import Cup, Stick, StirSetup, stir
 
 __all__ = [

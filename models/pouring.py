@@ -1,136 +1,22 @@
 """Pouring: an action in, the fractions spilled, received and retained out."""
 
 import os
-import tomllib
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, PositiveFloat, ValidationError, model_validator
 
 from . import runtime
+from .cups import Cups
 from .liquid import Liquid
-from .numerics import MODEL_VERSION, Numerics
+from .numerics import POUR_PARTICLES, Numerics
 from .packing import pack_cylinder
 
-PARTICLES = 664  # 5 mm apart in the bundled cups
 SETTLING = 0.6  # s
 DRIP = 1.2  # s beyond the cups' hold; viscous liquids need it, and others end earlier
 CHUNK = 240  # substeps a kernel call
-
-
-class _Section(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Source(_Section):
-    """The cup that turns [m]; `fill` is the liquid's depth before the pour."""
-
-    radius: PositiveFloat
-    height: PositiveFloat
-    fill: PositiveFloat
-
-    @model_validator(mode="after")
-    def _holds_its_fill(self) -> "Source":
-        if self.fill > self.height:
-            raise ValueError(f"fill {self.fill} m is more than the height {self.height} m")
-        return self
-
-
-class Receiver(_Section):
-    """The cup below [m]."""
-
-    radius: PositiveFloat
-    height: PositiveFloat
-
-
-class PourPlan(_Section):
-    """How the source turns, and the range of the decision, in the units that people type."""
-
-    lip_height: PositiveFloat
-    final_angle_deg: PositiveFloat
-    hold: PositiveFloat
-    angular_velocity_deg_s: tuple[PositiveFloat, PositiveFloat]
-    distance: tuple[float, float]
-
-    @property
-    def final_angle(self) -> float:
-        """Angle at which the source stays [rad]."""
-        return float(np.radians(self.final_angle_deg))
-
-    @property
-    def angular_velocity_range(self) -> tuple[float, float]:
-        """Range of the decision [rad/s]."""
-        low, high = np.radians(self.angular_velocity_deg_s)
-        return float(low), float(high)
-
-    @property
-    def distance_range(self) -> tuple[float, float]:
-        """Range of the decision [m]."""
-        return self.distance
-
-    @model_validator(mode="after")
-    def _ranges_ascend(self) -> "PourPlan":
-        for name in ("angular_velocity_deg_s", "distance"):
-            low, high = getattr(self, name)
-            if not low < high:
-                raise ValueError(f"{name} must ascend, got [{low}, {high}]")
-        return self
-
-
-class Cups(_Section):
-    """Geometry of a pour; `models` of a cups.toml file."""
-
-    source: Source
-    receiver: Receiver
-    pour: PourPlan
-
-    @model_validator(mode="after")
-    def _receiver_below_lip(self) -> "Cups":
-        if self.pour.lip_height <= self.receiver.height:
-            raise ValueError(
-                f"the lip ({self.pour.lip_height} m) is not above the receiver's rim "
-                f"({self.receiver.height} m)"
-            )
-        return self
-
-    @classmethod
-    def from_toml(cls, path: str | Path) -> "Cups":
-        """Read a cups.toml.
-
-        Raises:
-            ValueError: naming file, field and value.
-            FileNotFoundError: there is no such file.
-        """
-        try:
-            return cls.model_validate(tomllib.loads(Path(path).read_text(encoding="utf-8")))
-        except tomllib.TOMLDecodeError as err:
-            raise ValueError(f"{path}: not a TOML file: {err}") from err
-        except ValidationError as err:
-            first = err.errors()[0]
-            field = ".".join(str(part) for part in first["loc"]) or "cups"
-            raise ValueError(
-                f"{path}: {field}: {first['msg']}, got {first.get('input')!r}"
-            ) from err
-
-    @property
-    def angular_velocity_range(self) -> tuple[float, float]:
-        """Range of the decision [rad/s]."""
-        return self.pour.angular_velocity_range
-
-    @property
-    def distance_range(self) -> tuple[float, float]:
-        """Range of the decision [m]."""
-        return self.pour.distance_range
-
-    def settings(self, particles: int = PARTICLES) -> dict[str, Any]:
-        """Everything that fixes the simulator, as plain numbers, with the model's version."""
-        scene = {"model": MODEL_VERSION, "scene": "pour", "particles": particles}
-        return {**scene, "numerics": asdict(Numerics()), **self.model_dump()}
 
 
 @dataclass(frozen=True)
@@ -161,7 +47,7 @@ def pour(
     action: PourAction,
     cups: Cups,
     seeds: ArrayLike,
-    particles: int = PARTICLES,
+    particles: int = POUR_PARTICLES,
     progress: Callable[[float], None] | None = None,
 ) -> PourResult:
     """Where the liquid ends when the source turns about its lip to its final angle and holds.
@@ -202,12 +88,6 @@ def _batch(name: str, value: ArrayLike, size: int) -> np.ndarray:
     return np.broadcast_to(array, (size,))
 
 
-def spacing(cups: Cups, particles: int) -> float:
-    """Particle spacing [m], the cube root of the liquid's volume per particle."""
-    volume = np.pi * cups.source.radius**2 * cups.source.fill
-    return float((volume / particles) ** (1.0 / 3.0))
-
-
 @cache
 def _scene(cups: Cups, particles: int):
     """The compiled scene; its fields live as long as the process."""
@@ -215,7 +95,8 @@ def _scene(cups: Cups, particles: int):
     from .pouring_kernel import PouringScene
 
     slots = max(8, os.cpu_count() or 1)
-    return PouringScene(slots, particles, spacing(cups, particles), Numerics(), cups)
+    spacing = (cups.liquid_volume / particles) ** (1.0 / 3.0)
+    return PouringScene(slots, particles, spacing, Numerics(), cups)
 
 
 def _run(scene, cups, liquid, action, seeds) -> np.ndarray:
@@ -223,7 +104,7 @@ def _run(scene, cups, liquid, action, seeds) -> np.ndarray:
     size = len(seeds)
     rate, distance = action
     source = cups.source
-    shift = np.float32([source.radius, 0.0, source.height])
+    shift = np.array([source.radius, 0.0, source.height], np.float32)
     scene.place(
         np.stack(
             [

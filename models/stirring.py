@@ -245,5 +245,5 @@ def _run(scene, setup, liquid, path, seeds, report) -> np.ndarray:
     scene.check_capacity()
     diverged = ~np.isfinite(scene.position.to_numpy()[:size]).all(axis=(1, 2))
     directions[diverged] = np.nan
-    down = np.broadcast_to(np.float32([0.0, 0.0, -1.0]), (size, 1, 3))
+    down = np.broadcast_to(np.array([0.0, 0.0, -1.0], np.float32), (size, 1, 3))
     return np.concatenate([down, directions], axis=1).astype(np.float64)

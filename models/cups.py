@@ -1,0 +1,131 @@
+"""The cups of a pour, as a person writes them down in a cups.toml."""
+
+import tomllib
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, PositiveFloat, ValidationError, model_validator
+
+from .numerics import MODEL_VERSION, POUR_PARTICLES, Numerics
+
+
+class _Section(BaseModel, frozen=True, extra="forbid"):
+    """Part of a file that a person writes: no unknown fields, no change after reading."""
+
+
+class Source(_Section):
+    """The cup that turns [m]; `fill` is the liquid's depth before the pour."""
+
+    radius: PositiveFloat
+    height: PositiveFloat
+    fill: PositiveFloat
+
+    @model_validator(mode="after")
+    def _holds_its_fill(self) -> "Source":
+        if self.fill > self.height:
+            raise ValueError(f"fill {self.fill} m is more than the height {self.height} m")
+        return self
+
+
+class Receiver(_Section):
+    """The cup below [m]."""
+
+    radius: PositiveFloat
+    height: PositiveFloat
+
+
+class PourPlan(_Section):
+    """How the source turns, and the range of the decision, in the units that people type."""
+
+    lip_height: PositiveFloat
+    final_angle_deg: PositiveFloat
+    hold: PositiveFloat
+    angular_velocity_deg_s: tuple[PositiveFloat, PositiveFloat]
+    distance: tuple[float, float]
+
+    @property
+    def final_angle(self) -> float:
+        """Angle at which the source stays [rad]."""
+        return float(np.radians(self.final_angle_deg))
+
+    @property
+    def angular_velocity_range(self) -> tuple[float, float]:
+        """Range of the decision [rad/s]."""
+        low, high = np.radians(self.angular_velocity_deg_s)
+        return float(low), float(high)
+
+    @property
+    def distance_range(self) -> tuple[float, float]:
+        """Range of the decision [m]."""
+        return self.distance
+
+    @model_validator(mode="after")
+    def _ranges_ascend(self) -> "PourPlan":
+        for name in ("angular_velocity_deg_s", "distance"):
+            low, high = getattr(self, name)
+            if not low < high:
+                raise ValueError(f"{name} must ascend, got [{low}, {high}]")
+        return self
+
+
+class Cups(_Section):
+    """Geometry of a pour; `models` of a cups.toml file."""
+
+    source: Source
+    receiver: Receiver
+    pour: PourPlan
+
+    @model_validator(mode="after")
+    def _receiver_below_lip(self) -> "Cups":
+        if self.pour.lip_height <= self.receiver.height:
+            raise ValueError(
+                f"the lip ({self.pour.lip_height} m) is not above the receiver's rim "
+                f"({self.receiver.height} m)"
+            )
+        return self
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> "Cups":
+        """Read a cups.toml.
+
+        Raises:
+            ValueError: naming file, field and value.
+            FileNotFoundError: there is no such file.
+        """
+        try:
+            return cls.model_validate(tomllib.loads(Path(path).read_text(encoding="utf-8")))
+        except tomllib.TOMLDecodeError as err:
+            raise ValueError(f"{path}: not a TOML file: {err}") from err
+        except ValidationError as err:
+            first = err.errors()[0]
+            field = ".".join(str(part) for part in first["loc"]) or "cups"
+            raise ValueError(
+                f"{path}: {field}: {first['msg']}, got {first.get('input')!r}"
+            ) from err
+
+    @property
+    def angular_velocity_range(self) -> tuple[float, float]:
+        """Range of the decision [rad/s]."""
+        return self.pour.angular_velocity_range
+
+    @property
+    def distance_range(self) -> tuple[float, float]:
+        """Range of the decision [m]."""
+        return self.pour.distance_range
+
+    @property
+    def liquid_volume(self) -> float:
+        """Liquid in the source before the pour [m³]."""
+        return float(np.pi * self.source.radius**2 * self.source.fill)
+
+    def settings(self, particles: int = POUR_PARTICLES) -> dict[str, Any]:
+        """Everything that fixes the simulator, as plain numbers, with the model's version."""
+        return {
+            "model": MODEL_VERSION,
+            "scene": "pour",
+            "particles": particles,
+            "numerics": asdict(Numerics()),
+            **self.model_dump(),
+        }
