@@ -15,7 +15,7 @@ class _Section(BaseModel, frozen=True, extra="forbid"):
     """Part of a file that a person writes: no unknown fields, no change after reading."""
 
 
-class Source(_Section):
+class Source(_Section, frozen=True):
     """The cup that turns [m]; `fill` is the liquid's depth before the pour."""
 
     radius: PositiveFloat
@@ -29,14 +29,14 @@ class Source(_Section):
         return self
 
 
-class Receiver(_Section):
+class Receiver(_Section, frozen=True):
     """The cup below [m]."""
 
     radius: PositiveFloat
     height: PositiveFloat
 
 
-class PourPlan(_Section):
+class PourPlan(_Section, frozen=True):
     """How the source turns, and the range of the decision, in the units that people type."""
 
     lip_height: PositiveFloat
@@ -70,7 +70,7 @@ class PourPlan(_Section):
         return self
 
 
-class Cups(_Section):
+class Cups(_Section, frozen=True):
     """Geometry of a pour; `models` of a cups.toml file."""
 
     source: Source

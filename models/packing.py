@@ -1,6 +1,7 @@
 """Where particles start: a jittered lattice in a cylinder, different for each seed."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 TIGHTNESS = 0.97  # of the lattice, so that the wanted number fits below the surface
 JITTER = 0.05  # sd of each coordinate, in spacings
@@ -39,3 +40,15 @@ def pack_cylinder(
     points = points[free]
     lowest = np.argsort(points[:, 2], kind="stable")[:particles]
     return points[lowest].astype(np.float32)
+
+
+def checked_seeds(seeds: ArrayLike) -> np.ndarray:
+    """Seeds as an array of shape [B].
+
+    Raises:
+        ValueError: there is none, or one is no integer or negative.
+    """
+    array = np.atleast_1d(np.asarray(seeds))
+    if array.size == 0 or array.ndim > 1 or array.dtype.kind not in "iu" or (array < 0).any():
+        raise ValueError(f"seeds must be integers of at least 0, one a simulation, got {seeds}")
+    return array

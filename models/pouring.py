@@ -1,7 +1,6 @@
 """Pouring: an action in, the fractions spilled, received and retained out."""
 
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -12,7 +11,7 @@ from . import runtime
 from .cups import Cups
 from .liquid import Liquid
 from .numerics import POUR_PARTICLES, Numerics
-from .packing import pack_cylinder
+from .packing import checked_seeds, pack_cylinder
 
 SETTLING = 0.6  # s
 DRIP = 1.2  # s beyond the cups' hold; viscous liquids need it, and others end earlier
@@ -48,7 +47,6 @@ def pour(
     cups: Cups,
     seeds: ArrayLike,
     particles: int = POUR_PARTICLES,
-    progress: Callable[[float], None] | None = None,
 ) -> PourResult:
     """Where the liquid ends when the source turns about its lip to its final angle and holds.
 
@@ -58,25 +56,24 @@ def pour(
         cups: Geometry.
         seeds: One integer a simulation, shape [B]; it decides the initial packing.
         particles: Number of particles.
-        progress: Called with the fraction done.
 
     Raises:
         ValueError: lengths do not agree, or an action is not finite or does not turn.
         RuntimeError: neighbour lists overflowed.
     """
-    seeds = np.atleast_1d(np.asarray(seeds))
+    seeds = checked_seeds(seeds)
     liquid = liquid.batch(len(seeds))
     rate = _batch("angular_velocity", action.angular_velocity, len(seeds))
     distance = _batch("distance", action.distance, len(seeds))
     if (rate <= 0).any():
         raise ValueError(f"angular_velocity must be positive [rad/s], got {rate.min()}")
-    scene = _scene(cups, particles)
     counts = []
-    for low in range(0, len(seeds), scene.slots):
-        part = slice(low, low + scene.slots)
-        counts.append(_run(scene, cups, liquid[part], (rate[part], distance[part]), seeds[part]))
-        if progress is not None:
-            progress(min(low + scene.slots, len(seeds)) / len(seeds))
+    with runtime.LOCK:
+        scene = _scene(cups, particles)
+        for low in range(0, len(seeds), scene.slots):
+            part = slice(low, low + scene.slots)
+            turned = rate[part], distance[part]
+            counts.append(_run(scene, cups, liquid[part], turned, seeds[part]))
     spilled, received, retained = np.concatenate(counts, axis=1) / particles
     return PourResult(spilled, received, retained)
 

@@ -3,7 +3,11 @@
 import contextlib
 import io
 import os
+import threading
 from functools import cache
+
+LOCK = threading.Lock()
+"""Held while a scene runs: Taichi's runtime and a scene's fields serve one thread at a time."""
 
 
 @cache

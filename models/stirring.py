@@ -1,7 +1,7 @@
 """Stirring: a recorded gripper path in, the stick's inclination out."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cache
 from typing import Any, Protocol
@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from . import runtime
 from .liquid import Liquid
 from .numerics import MODEL_VERSION, Numerics
-from .packing import pack_cylinder
+from .packing import checked_seeds, pack_cylinder
 
 SETTLING = 1.0  # s that a packing relaxes around the held stick
-CHUNK = 240  # substeps a kernel call, so that Ctrl-C and progress are prompt
+CHUNK = 240  # substeps a kernel call, so that Ctrl-C is prompt
 
 
 class GripperPath(Protocol):
@@ -130,7 +130,6 @@ def stir(
     gripper: GripperPath,
     setup: StirSetup,
     seeds: ArrayLike,
-    progress: Callable[[float], None] | None = None,
 ) -> np.ndarray:
     """Inclination of the stick while the gripper repeats its path in each liquid.
 
@@ -139,30 +138,26 @@ def stir(
         gripper: Path, measured at T times; pivots move linearly between samples.
         setup: Geometry and discretisation.
         seeds: One integer a simulation, shape [B]; it decides the initial packing.
-        progress: Called with the fraction done.
 
     Returns:
         Angles [rad] from the downward vertical in the xz and yz planes at the gripper's times,
         shape [B, T, 2]; NaN for a simulation that diverged.
 
     Raises:
-        ValueError: liquid and seeds do not agree in length, or the path is too short.
+        ValueError: liquid and seeds do not agree in length, seeds are no integers, or the path
+            is too short.
         RuntimeError: neighbour lists overflowed.
     """
-    seeds = np.atleast_1d(np.asarray(seeds))
+    seeds = checked_seeds(seeds)
     liquid = liquid.batch(len(seeds))
     path = substep_path(gripper, setup.numerics.rate)
     signals = []
-    scene = _scene(setup)
-    for low in range(0, len(seeds), scene.slots):
-        part = slice(low, low + scene.slots)
-
-        def report(done: float, low: int = low, size: int = len(seeds[part])) -> None:
-            if progress is not None:
-                progress((low + done * size) / len(seeds))
-
-        directions = _run(scene, setup, liquid[part], path, seeds[part], report)
-        signals.append(inclination(directions, gripper.time, setup.numerics.rate))
+    with runtime.LOCK:
+        scene = _scene(setup)
+        for low in range(0, len(seeds), scene.slots):
+            part = slice(low, low + scene.slots)
+            directions = _run(scene, setup, liquid[part], path, seeds[part])
+            signals.append(inclination(directions, gripper.time, setup.numerics.rate))
     return np.concatenate(signals)
 
 
@@ -213,7 +208,7 @@ def _scene(setup: StirSetup):
     return StirringScene(max(8, os.cpu_count() or 1), setup)
 
 
-def _run(scene, setup, liquid, path, seeds, report) -> np.ndarray:
+def _run(scene, setup, liquid, path, seeds) -> np.ndarray:
     """Directions of the sticks, shape [B, substeps + 1, 3]; NaN where a trial diverged."""
     size = len(seeds)
     pivot = path[0]
@@ -241,7 +236,6 @@ def _run(scene, setup, liquid, path, seeds, report) -> np.ndarray:
     for start in range(0, steps, CHUNK):
         stop = min(start + CHUNK, steps)
         scene.stir(size, start, stop, pivots, directions)
-        report(stop / steps)
     scene.check_capacity()
     diverged = ~np.isfinite(scene.position.to_numpy()[:size]).all(axis=(1, 2))
     directions[diverged] = np.nan

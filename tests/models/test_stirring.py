@@ -163,3 +163,10 @@ def test_a_path_without_samples_is_refused(glycerin):
     gap = SimpleNamespace(time=np.array([0.0, 1.0]), position=np.full((2, 3), np.nan))
     with pytest.raises(ValueError, match="0 finite samples"):
         models.stir(models.Liquid(1.0, 0.0, 1000.0), gap, setup, [0])
+
+
+@pytest.mark.parametrize("seeds", [[], [0.5], [-1], [[0]]])
+def test_bad_seeds_are_named(glycerin, seeds):
+    setup = models.StirSetup.from_recording(glycerin, particles=100)
+    with pytest.raises(ValueError, match="seeds must be integers"):
+        models.stir(models.Liquid(1.0, 0.0, 1000.0), glycerin.gripper, setup, seeds)
