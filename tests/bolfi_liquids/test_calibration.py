@@ -84,9 +84,9 @@ def test_prior_with_another_parameter_is_refused(short_recording, tmp_path):
     assert not (tmp_path / "run").exists()
 
 
-def test_default_prior_covers_water_to_gel():
-    theta = {"viscosity": np.array([1e-3, 0.1, 12.0, 30.0]), "cohesion": np.full(4, 0.5)}
-    np.testing.assert_array_equal(default_prior().contains(theta), [True, True, True, False])
+def test_default_prior_covers_the_fluid_s_floor_to_gel():
+    theta = {"viscosity": np.array([1e-3, 4e-3, 12.0, 30.0]), "cohesion": np.full(4, 0.5)}
+    np.testing.assert_array_equal(default_prior().contains(theta), [False, True, True, False])
 
 
 def test_a_run_that_was_not_finished_says_how_to_go_on(calibration, tmp_path):

@@ -1,5 +1,6 @@
-import multiprocessing
 import sqlite3
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -9,10 +10,16 @@ from bolfi_liquids import inference
 THETA = {"b": 0.1 + 0.2, "a": 1e-3}
 
 
-def write_many(path, first):
-    with inference.SimulationBank(path) as bank:
-        for seed in range(first, first + 50):
-            bank.put("x", THETA, seed, inference.Simulation(np.full(3, float(seed)), None, 0.1))
+WRITE_50 = """
+import sys
+import numpy as np
+from bolfi_liquids import inference
+
+path, first = sys.argv[1], int(sys.argv[2])
+with inference.SimulationBank(path) as bank:
+    for seed in range(first, first + 50):
+        bank.put("id", {"a": 1.0}, seed, inference.Simulation(np.zeros(3), None, 0.0))
+"""
 
 
 def test_keeps_signals_exactly(tmp_path):
@@ -46,13 +53,11 @@ def test_keeps_failures_and_the_first_result():
 
 def test_processes_may_share_a_file(tmp_path):
     path = tmp_path / "shared.sqlite"
-    context = multiprocessing.get_context("spawn")
-    workers = [context.Process(target=write_many, args=(path, first)) for first in (0, 25)]
-    for worker in workers:
-        worker.start()
-    for worker in workers:
-        worker.join()
-    assert [worker.exitcode for worker in workers] == [0, 0]
+    workers = [
+        subprocess.Popen([sys.executable, "-c", WRITE_50, str(path), first])
+        for first in ("0", "25")
+    ]
+    assert [worker.wait() for worker in workers] == [0, 0]
     with inference.SimulationBank(path) as bank:
         assert len(bank) == 75
 
