@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from .inference import Fit, Prior
 
-GRID = 61
+GRID = 121
 PLANE_NAMES = ("xz", "yz")
 
 

@@ -39,7 +39,7 @@ def test_seconds_a_trial(particles, record_property):
     duration = gripper.time[-1] - gripper.time[0]
     line = (
         f"{particles} particles, {duration:.1f} s of stirring, batch {BATCH}: "
-        f"{cpu:.2f} CPU s, {wall:.2f} s a trial ({platform.processor()}, {commit})"
+        f"{cpu:.2f} CPU s, {wall:.2f} s a trial ({platform.machine()}, {commit})"
     )
     record_property("seconds", line)
     print(line)
