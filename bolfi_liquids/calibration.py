@@ -40,7 +40,7 @@ class Calibration:
         Raises:
             InputError: There is none in the directory, or it was not finished.
         """
-        import xarray
+        from .results import read_tree
 
         run = Path(run)
         record = read_run(run)
@@ -50,8 +50,9 @@ class Calibration:
                 where=str(run),
                 fix="go on with it: bolfi-liquids calibrate RECORDING... --out RUN --resume",
             )
-        with xarray.open_datatree(run / POSTERIOR, engine="h5netcdf") as tree:
-            loaded = tree.load()
+        loaded = read_tree(
+            run / POSTERIOR, fix="delete it and go on with --resume: no simulation is lost"
+        )
         summary = read_summary(run)["calibrate"]
         return cls(run, loaded, MappingProxyType(record), MappingProxyType(summary))
 

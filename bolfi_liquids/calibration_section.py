@@ -47,7 +47,7 @@ def calibration_section(
         "rhat_max": float(attrs["rhat_max"]),
         "ess_min": float(min(attrs["ess_bulk_min"], attrs["ess_tail_min"])),
         "seconds": {
-            "simulator": float(tree.attrs["seconds_simulator"]) + check.seconds,
+            "simulator": float(tree.attrs["seconds_simulator"]),
             "engine": float(tree.attrs["seconds_engine"]),
             "sampling": float(tree.attrs["seconds_sampling"]),
         },

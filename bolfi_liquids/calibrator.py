@@ -12,7 +12,7 @@ from .prior import check_prior, default_prior
 from .progress import Simulate, progress_bar, reported
 from .provenance import run_record
 from .recordings import Recording, open_recording
-from .run_directory import POSTERIOR, SIMULATIONS, enter_run
+from .run_directory import POSTERIOR, enter_run, open_bank
 from .settings import CalibrationSettings
 from .stirring import Stirring, stirring_of
 from .summary import write_section
@@ -90,14 +90,13 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
 def _calibrate(
     run: Path, stirring: Stirring, prior: "Prior", settings: CalibrationSettings, progress: bool
 ) -> None:
-    from .inference import SimulationBank
     from .kept import Keep
     from .predictive import PREDICTIVE_DRAWS, REPLICATES, check_by_simulation
     from .results import results_tree, write_tree
 
     total = settings.budget + PREDICTIVE_DRAWS + REPLICATES
     with (
-        SimulationBank(run / SIMULATIONS) as bank,
+        open_bank(run) as bank,
         progress_bar("simulating stirs", total - len(bank), shown=progress) as advance,
     ):
         simulate = reported(stirring.simulate, advance)
@@ -140,4 +139,8 @@ def _open_all(recordings: Source | Sequence[Source]) -> list[Recording]:
     sources = [recordings] if isinstance(recordings, Source) else list(recordings)
     if not sources:
         raise InputError("no recording given", where="recordings", fix="give at least one")
-    return [s if isinstance(s, Recording) else open_recording(s) for s in sources]
+    opened = [s if isinstance(s, Recording) else open_recording(s) for s in sources]
+    if len({recording.hash for recording in opened}) < len(opened):
+        names = ", ".join(str(recording.path) for recording in opened)
+        raise InputError("the same recording twice", where=names, fix="give each of them once")
+    return opened

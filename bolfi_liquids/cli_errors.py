@@ -1,11 +1,13 @@
 """Errors on the command line: one line for what a person can mend, a traceback on --debug."""
 
 import shlex
+import sqlite3
 import sys
 from typing import Any
 
 import typer
 from typer.core import TyperGroup
+from typer.exceptions import TyperException
 
 FAILED = 1
 USAGE_ERROR = 2
@@ -24,11 +26,26 @@ class OneLineErrors(TyperGroup):
         except KeyboardInterrupt:
             _say(_how_to_go_on(sys.argv[1:]))
             raise typer.Exit(INTERRUPTED) from None
-        except (ValueError, OSError, RuntimeError) as err:
+        except (typer.Exit, typer.Abort):  # RuntimeErrors by descent, but no errors
+            raise
+        except TyperException as err:
+            _say(f"error: {_one_line(err.format_message())}; see --help")
+            raise typer.Exit(USAGE_ERROR) from None
+        except (ValueError, OSError, RuntimeError, sqlite3.Error) as err:
             if ctx.params.get("debug"):
                 raise
-            _say(f"error: {' '.join(str(err).split())}")
+            _say(f"error: {_explained(err)}")
             raise typer.Exit(FAILED if isinstance(err, RuntimeError) else USAGE_ERROR) from None
+
+
+def _explained(err: Exception) -> str:
+    if isinstance(err, OSError) and err.filename is not None:
+        return f"{err.filename}: {err.strerror}; choose a place that can be read and written"
+    return _one_line(str(err))
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
 
 
 def _say(line: str) -> None:

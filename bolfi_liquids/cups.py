@@ -28,7 +28,8 @@ def open_cups(path: str | Path) -> "Cups":
 
     path = Path(path)
     if not path.is_file():
-        raise InputError("no such file", where=str(path), fix="check the path")
+        what = "a directory, not a file" if path.is_dir() else "no such file"
+        raise InputError(what, where=str(path), fix="check the path")
     try:
         return Cups.from_toml(path)
     except ValueError as err:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 UNITS = {"viscosity": "Pa s"}
 UNLEARNED = 0.6  # share of the prior's 90 % interval above which little was learned
+AT_THE_END = 0.02  # quantile of the prior; an interval that reaches it is cut off there
 AS_GOOD_AS_NOISE = 1.5
 
 
@@ -17,8 +18,8 @@ def with_unit(name: str, value: float) -> str:
 
 
 def percent(fraction: float) -> str:
-    """A fraction to two digits."""
-    return f"{100.0 * fraction:.2g} %"
+    """A fraction to two digits, whole percents above ten."""
+    return f"{100.0 * fraction:.0f} %" if fraction >= 0.1 else f"{100.0 * fraction:.2g} %"
 
 
 def parameter_sentence(name: str, values: Mapping[str, float], prior: NDArray) -> str:
@@ -37,6 +38,8 @@ def parameter_sentence(name: str, values: Mapping[str, float], prior: NDArray) -
         if share > UNLEARNED
         else f"this range is {percent(share)} as wide as before the stirring"
     )
+    if share <= UNLEARNED and (ranks[0] < AT_THE_END or ranks[1] > 1.0 - AT_THE_END):
+        verdict += "; it lies at the prior's end, so the truth may be beyond"
     return (
         f"{name.capitalize()} is probably between {with_unit(name, low)} and"
         f" {with_unit(name, high)} (90 %), median {with_unit(name, values['q50'])}: {verdict}."

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .calibration import Calibration
 from .cups import bundled_cups
 from .progress import Advance, progress_bar, reported
-from .run_directory import POUR, SIMULATIONS
+from .run_directory import POUR, open_bank
 from .settings import PourSettings
 from .spillage import FRACTIONS, RISK, Outcomes
 from .summary import write_section
@@ -95,7 +95,6 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     Raises:
         InputError: A setting cannot be used.
     """
-    from .inference import SimulationBank
     from .pour_results import pour_section, pour_tree
     from .results import write_tree
 
@@ -104,8 +103,8 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     liquids = calibration.draws(draws, seed)
     best = {name: np.full(PLUG_IN_SEEDS, value) for name, value in calibration.best.items()}
     with (
-        SimulationBank(calibration.path / SIMULATIONS) as bank,
-        progress_bar("trying pours", 2 * iterations + 2, shown=progress) as advance,
+        open_bank(calibration.path) as bank,
+        progress_bar("trying actions", 2 * iterations + 2, shown=progress) as advance,
     ):
         search = _Search(cups, calibration.liquid_density, settings, bank, advance)
         over_posterior = search.minimise(liquids)

@@ -26,6 +26,14 @@ def default_prior() -> "Prior":
 
 def check_prior(prior: "Prior") -> None:
     """Raise `InputError` unless the prior is over the simulator's parameters."""
+    from .inference import Prior
+
+    if not isinstance(prior, Prior):
+        raise InputError(
+            f"{type(prior).__name__}, expected inference.Prior",
+            where="prior",
+            fix='give inference.Prior({"viscosity": ..., "cohesion": ...})',
+        )
     if set(prior.names) != set(PARAMETERS):
         raise InputError(
             f"parameters {', '.join(prior.names)}, expected {', '.join(PARAMETERS)}",

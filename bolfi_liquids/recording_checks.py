@@ -14,11 +14,15 @@ if TYPE_CHECKING:
 MIN_SAMPLES = 10
 MAX_GRIPPER_GAP = 0.2
 """Longest gap in the gripper's path that is interpolated [s]: less than half a stroke."""
+MAX_BLIND = 0.5
+"""Longest time that the stick may be out of sight [s]: a longer one hides most of a stroke."""
 MIN_SEEN = 0.5
 """Smallest share of a plane's samples in which the stick must have been seen."""
 MAX_INTERVAL = 1.0  # between samples [s]; more looks like milliseconds
 MAX_POSITION = 2.0  # of the gripper [m]; more looks like millimetres
 MAX_LENGTH = 1.0  # of cup and stick [m]; more looks like millimetres
+MAX_MASS = 2.0  # of the stick [kg]; more looks like grams
+MIN_TRAVEL = 1e-3  # of the gripper [m]; a liquid that is not stirred shows nothing
 MIN_DENSITY, MAX_DENSITY = 50.0, 20_000.0  # [kg/m3]; less looks like g/cm3
 
 
@@ -78,6 +82,12 @@ def _check_sizes(recording: "Recording") -> None:
                 where=f"{recording.path}: attribute {name}",
                 fix="convert it to m",
             )
+    if recording.attrs.get("stick_mass", 0.0) > MAX_MASS:
+        raise InputError(
+            f"{attrs['stick_mass']} kg looks like grams",
+            where=f"{recording.path}: attribute stick_mass",
+            fix="convert it to kg",
+        )
     for name in (*DENSITIES, "stick_density"):
         if name in attrs and not MIN_DENSITY <= recording.number(name) <= MAX_DENSITY:
             raise InputError(
@@ -139,7 +149,16 @@ def _check_inclination(recording: "Recording") -> None:
                 where=where,
                 fix=f"the stick must be seen in at least {MIN_SEEN:.0%} of them: record again",
             )
+        gap, start = longest_gap(recording.time, seen)
+        if gap > MAX_BLIND:
+            raise InputError(
+                f"NaN for {gap:.2f} s from {start:.2f} s on",
+                where=where,
+                fix=f"gaps up to {MAX_BLIND} s can be skipped: cut the recording before it",
+            )
         largest = np.abs(values[seen]).max()
+        if np.isinf(largest):
+            raise InputError("infinite", where=where, fix="mark missing samples by NaN")
         if largest > np.pi / 2:
             raise InputError(
                 f"reaches {largest:g} rad, which looks like degrees",
@@ -158,6 +177,12 @@ def _check_scene(recording: "Recording") -> None:
             f" (cup_radius = {cup:g} m)",
             where=f"{recording.path}: x, y",
             fix="the origin must lie on the cup's axis: shift x and y, or correct cup_radius",
+        )
+    if max(np.ptp(values[np.isfinite(values)]) for values in (x, y)) < MIN_TRAVEL:
+        raise InputError(
+            f"the gripper moves less than {MIN_TRAVEL:g} m",
+            where=f"{recording.path}: x, y",
+            fix="record a stir, or convert the positions to m",
         )
     tip = z - recording.number("stick_length")
     if np.nanmin(tip) >= fill:

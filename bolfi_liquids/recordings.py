@@ -63,7 +63,8 @@ def open_recording(path: str | Path) -> Recording:
     """
     path = Path(path)
     if not path.is_file():
-        raise InputError("no such file", where=str(path), fix="check the path")
+        what = "a directory, not a file" if path.is_dir() else "no such file"
+        raise InputError(what, where=str(path), fix="check the path")
     recording = _as_recording(_read(path), path)
     check_values(recording)
     return recording

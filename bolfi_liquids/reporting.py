@@ -74,17 +74,14 @@ def _pour_context(run: Path) -> dict[str, Any] | None:
     section = read_summary(run).get("pour")
     if section is None or not (run / POUR).is_file():
         return None
-    import xarray
-
     from .pour_figure import pour_figure
+    from .results import read_tree
 
-    with xarray.open_datatree(run / POUR, engine="h5netcdf") as tree:
-        figure = pour_figure(tree.load())
-        made_with = dict(tree.attrs)
+    tree = read_tree(run / POUR, fix=f"write it again: bolfi-liquids pour {run}")
     return {
         "section": section,
         "sentence": narrative.pour_sentence(section),
-        "figure": figure,
-        "made_with": made_with,
+        "figure": pour_figure(tree),
+        "made_with": dict(tree.attrs),
         "rows": [("chosen pour", section), ("best at θ* alone", section["plug_in"])],
     }

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .errors import InputError
 from .files import write_whole
 from .predictive import Check
 from .stirring import Stirring
@@ -56,6 +57,7 @@ def results_tree(sampled: "DataTree", fit: "Fit", stirring: Stirring, check: Che
     }
     for name, dataset in added.items():
         tree[name] = DataTree(dataset)
+    tree.attrs["seconds_simulator"] += check.seconds
     tree.attrs["liquid_density"] = stirring.recordings[0].number("liquid_density")
     return tree
 
@@ -92,6 +94,21 @@ def surface(fit: "Fit") -> "Dataset":
 def _quantile_axes(prior: "Prior") -> dict[str, np.ndarray]:
     quantiles = np.repeat(np.linspace(0.0, 1.0, GRID)[:, None], len(prior), axis=1)
     return prior.from_unit(quantiles)
+
+
+def read_tree(path: Path, *, fix: str) -> "DataTree":
+    """A tree that `write_tree` wrote.
+
+    Raises:
+        InputError: The file is damaged; the message ends with `fix`.
+    """
+    import xarray
+
+    try:
+        with xarray.open_datatree(path, engine="h5netcdf") as tree:
+            return tree.load()
+    except (OSError, ValueError, KeyError) as err:
+        raise InputError("damaged, cannot be read", where=str(path), fix=fix) from err
 
 
 def write_tree(tree: "DataTree", path: Path) -> None:

@@ -1,14 +1,19 @@
 """The RUN directory: what it holds, and when a command may go on in it."""
 
+import sqlite3
 import tomllib
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
 from .errors import InputError
 from .files import write_text
+
+if TYPE_CHECKING:
+    from .inference import SimulationBank
 
 RUN_TOML = "run.toml"
 SIMULATIONS = "simulations.sqlite"
@@ -16,7 +21,7 @@ POSTERIOR = "posterior.nc"
 POUR = "pour.nc"
 REPORT = "report.html"
 
-MUST_AGREE = ("settings", "simulator", "inputs")
+MUST_AGREE = ("settings", "inputs", "simulator")
 """Sections of run.toml that decide the results; versions and dates may differ."""
 
 
@@ -50,6 +55,35 @@ def enter_run(run: Path, record: Mapping[str, Any], *, resume: bool) -> None:
         )
     run.mkdir(parents=True, exist_ok=True)
     write_text(path, tomli_w.dumps(record))
+
+
+@contextmanager
+def open_bank(run: Path) -> "Iterator[SimulationBank]":
+    """The run's finished simulations.
+
+    Raises:
+        InputError: The file is damaged or cannot be written.
+    """
+    from .inference import SimulationBank
+
+    path = run / SIMULATIONS
+    try:
+        bank = SimulationBank(path)
+    except (ValueError, sqlite3.Error) as err:
+        raise _unusable(path, err) from err
+    with bank:
+        try:
+            yield bank
+        except sqlite3.Error as err:
+            raise _unusable(path, err) from err
+
+
+def _unusable(path: Path, err: Exception) -> InputError:
+    return InputError(
+        f"cannot be used ({err})",
+        where=str(path),
+        fix="make it writable, restore it from a copy, or start again with another --out",
+    )
 
 
 def read_run(run: Path) -> dict[str, Any]:

@@ -8,10 +8,10 @@ SURROGATES = ("discrepancy",)
 SAMPLERS = ("nuts", "emcee")
 RISKS = ("mean", "cvar")
 
-MIN_LEARN = 3  # simulations from which the engine learns anything at all
+START_DESIGN = 7  # points that the engine spreads over two parameters before it chooses
 MIN_PARTICLES = 100  # with fewer, the stick is thinner than the gaps between them
 _LEAST = {
-    "budget": MIN_LEARN,
+    "budget": START_DESIGN,
     "batch": 1,
     "seed": 0,
     "particles": MIN_PARTICLES,
@@ -68,7 +68,7 @@ class PourSettings:
     seed: int = 0
 
     def __post_init__(self):
-        for name, least in {"iterations": MIN_LEARN, "draws": 1, "seed": 0}.items():
+        for name, least in {"iterations": START_DESIGN, "draws": 1, "seed": 0}.items():
             _at_least(least, name, getattr(self, name))
         _one_of(RISKS, "risk", self.risk)
 
@@ -76,7 +76,10 @@ class PourSettings:
 def _at_least(lowest: int, name: str, value: object) -> None:
     if not isinstance(value, int) or isinstance(value, bool) or value < lowest:
         raise InputError(
-            f"{value!r}", where=f"--{name}", fix=f"give a whole number of at least {lowest}"
+            f"{value!r}",
+            where=f"--{name}",
+            fix=f"give a whole number of at least {lowest}"
+            + (", the start design" if lowest == START_DESIGN else ""),
         )
 
 

@@ -55,7 +55,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         batch: Points per round.
         seed: Fixes the whole run.
         surrogate, acquisition, discrepancy, threshold, transform: See `Bolfi`.
-        initial: Points of the start design; None is 2 d + 3, but at most `budget`.
+        initial: Points of the start design; None is 2 d + 3.
         executor: Simulates each point in a call of its own; None makes one call per round.
         bank: A path, or a bank that other runs share; it is left open then.
         identity: Names the simulator and its settings in the bank. Anything that changes
@@ -68,7 +68,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
     """
     batch = checked_integer("batch", batch)
     budget = checked_integer("budget", budget, MIN_LEARN)
-    size = min(start_size(len(prior)), budget) if initial is None else initial
+    size = start_size(len(prior)) if initial is None else initial
     engine = Bolfi(
         prior,
         observed,

@@ -3,12 +3,29 @@
 import tomllib
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, PositiveFloat, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    PositiveFloat,
+    ValidationError,
+    model_validator,
+)
 
 from .numerics import MODEL_VERSION, POUR_PARTICLES, Numerics
+
+
+def _in_metres(length: float) -> float:
+    if length > MAX_LENGTH:
+        raise ValueError(f"{length:g} m looks like millimetres; convert it to m")
+    return length
+
+
+MAX_LENGTH = 2.0  # [m]
+Metres = Annotated[PositiveFloat, AfterValidator(_in_metres)]
+Offset = Annotated[float, AfterValidator(_in_metres)]
 
 
 class _Section(BaseModel, frozen=True, extra="forbid"):
@@ -18,9 +35,9 @@ class _Section(BaseModel, frozen=True, extra="forbid"):
 class Source(_Section, frozen=True):
     """The cup that turns [m]; `fill` is the liquid's depth before the pour."""
 
-    radius: PositiveFloat
-    height: PositiveFloat
-    fill: PositiveFloat
+    radius: Metres
+    height: Metres
+    fill: Metres
 
     @model_validator(mode="after")
     def _holds_its_fill(self) -> "Source":
@@ -32,18 +49,18 @@ class Source(_Section, frozen=True):
 class Receiver(_Section, frozen=True):
     """The cup below [m]."""
 
-    radius: PositiveFloat
-    height: PositiveFloat
+    radius: Metres
+    height: Metres
 
 
 class PourPlan(_Section, frozen=True):
     """How the source turns, and the range of the decision, in the units that people type."""
 
-    lip_height: PositiveFloat
+    lip_height: Metres
     final_angle_deg: PositiveFloat
     hold: PositiveFloat
     angular_velocity_deg_s: tuple[PositiveFloat, PositiveFloat]
-    distance: tuple[float, float]
+    distance: tuple[Offset, Offset]
 
     @property
     def final_angle(self) -> float:
@@ -98,12 +115,10 @@ class Cups(_Section, frozen=True):
             return cls.model_validate(tomllib.loads(Path(path).read_text(encoding="utf-8")))
         except tomllib.TOMLDecodeError as err:
             raise ValueError(f"{path}: not a TOML file: {err}") from err
+        except UnicodeDecodeError as err:
+            raise ValueError(f"{path}: not a text file") from err
         except ValidationError as err:
-            first = err.errors()[0]
-            field = ".".join(str(part) for part in first["loc"]) or "cups"
-            raise ValueError(
-                f"{path}: {field}: {first['msg']}, got {first.get('input')!r}"
-            ) from err
+            raise ValueError(f"{path}: {_first_fault(err)}") from err
 
     @property
     def angular_velocity_range(self) -> tuple[float, float]:
@@ -129,3 +144,13 @@ class Cups(_Section, frozen=True):
             "numerics": asdict(Numerics()),
             **self.model_dump(),
         }
+
+
+def _first_fault(err: ValidationError) -> str:
+    """Field, fault and value of the first error, in one line."""
+    first = err.errors()[0]
+    field = ".".join(str(part) for part in first["loc"]) or "cups"
+    fault = first["msg"].removeprefix("Value error, ")
+    # of a missing field or a whole section the value says nothing
+    value = first.get("input")
+    return f"{field}: {fault}" + ("" if isinstance(value, dict) else f", got {value!r}")

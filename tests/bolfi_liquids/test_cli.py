@@ -1,7 +1,10 @@
 """The command line as a person meets it."""
 
+import shutil
+import sqlite3
 import subprocess
 import sys
+from importlib.resources import files
 
 import pytest
 from typer.testing import CliRunner
@@ -33,7 +36,7 @@ def test_missing_file_is_one_line_and_debug_shows_where(tmp_path):
 @pytest.mark.parametrize(
     ("option", "value"),
     [
-        ("--budget", "2"),
+        ("--budget", "6"),
         ("--batch", "0"),
         ("--particles", "9"),
         ("--seed", "-1"),
@@ -53,6 +56,64 @@ def test_bad_option_is_named_with_its_value(short_recording, tmp_path, option, v
     assert not out.exists()
 
 
+@pytest.mark.parametrize("command", [[], ["calibrate"], ["pour"], ["report"], ["demo"]])
+def test_help_is_no_error(command):
+    result = CliRunner().invoke(app, [*command, "--help"])
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert "Usage" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [(["--budget", "ten"], "--budget"), (["--frobnicate"], "--frobnicate"), ([], "--out")],
+)
+def test_misuse_is_one_line(short_recording, arguments, named):
+    result = CliRunner().invoke(app, ["calibrate", str(short_recording), *arguments])
+    assert result.exit_code == 2
+    (line,) = result.stderr.strip().splitlines()
+    assert line.startswith("error: ") and named in line
+
+
+@pytest.mark.parametrize(
+    ("file", "command", "advice"),
+    [
+        ("posterior.nc", "report", "--resume"),
+        ("posterior.nc", "pour", "--resume"),
+        ("simulations.sqlite", "pour", "another --out"),
+    ],
+)
+def test_damaged_files_are_named(calibration, tmp_path, file, command, advice):
+    run = shutil.copytree(calibration.path, tmp_path / "run")
+    whole = (run / file).read_bytes()
+    (run / file).write_bytes(whole[: len(whole) // 3])
+    result = CliRunner().invoke(app, [command, str(run)])
+    assert result.exit_code == 2
+    (line,) = result.stderr.strip().splitlines()
+    assert file in line and advice in line
+
+
+def test_a_bank_damaged_within_is_named(calibration, tmp_path):
+    run = shutil.copytree(calibration.path, tmp_path / "run")
+    connection = sqlite3.connect(run / "simulations.sqlite")
+    connection.execute("DROP TABLE simulation")
+    connection.execute("CREATE TABLE simulation (x)")
+    connection.commit()
+    connection.close()
+    result = CliRunner().invoke(app, ["pour", str(run)])
+    assert result.exit_code == 2
+    (line,) = result.stderr.strip().splitlines()
+    assert "simulations.sqlite" in line
+
+
+def test_cups_in_millimetres_are_refused(calibration, tmp_path):
+    good = (files("bolfi_liquids.data") / "cups.toml").read_text(encoding="utf-8")
+    path = tmp_path / "cups.toml"
+    path.write_text(good.replace("radius = 0.028", "radius = 28.0"), encoding="utf-8")
+    result = CliRunner().invoke(app, ["pour", str(calibration.path), "--cups", str(path)])
+    assert result.exit_code == 2
+    assert "source.radius: 28 m looks like millimetres" in result.stderr
+
+
 @pytest.mark.parametrize("command", ["pour", "report"])
 def test_directory_without_a_run_is_refused(tmp_path, command):
     result = CliRunner().invoke(app, [command, str(tmp_path)])
@@ -70,9 +131,7 @@ def test_directory_without_a_run_is_refused(tmp_path, command):
     ],
 )
 def test_bad_cups_are_refused_in_one_line(calibration, tmp_path, old, new, named):
-    from bolfi_liquids.cups import BUNDLED, files
-
-    good = (files("bolfi_liquids.data") / BUNDLED).read_text(encoding="utf-8")
+    good = (files("bolfi_liquids.data") / "cups.toml").read_text(encoding="utf-8")
     assert old in good
     path = tmp_path / "cups.toml"
     path.write_text(good.replace(old, new), encoding="utf-8")

@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 from bolfi_liquids.draws import pick_draws
+from bolfi_liquids.narrative import parameter_sentence, percent
 from bolfi_liquids.noise import irreducible_rms, replicate_noise, sensor_noise
 from bolfi_liquids.posterior_figure import contour_levels, marginal
 from bolfi_liquids.spillage import mean_spillage, tail_spillage
@@ -68,6 +69,14 @@ def test_marginal_of_a_normal_has_unit_area():
     np.testing.assert_allclose(
         marginal(density, x, y), np.exp(-0.5 * x**2) / np.sqrt(2 * np.pi), rtol=1e-6
     )
+
+
+def test_a_posterior_at_the_end_of_its_prior_says_so():
+    prior = np.geomspace(3e-3, 20.0, 2001)
+    cut, inside = {"q05": 0.0031, "q50": 0.005, "q95": 0.01}, {"q05": 0.8, "q50": 1.0, "q95": 1.5}
+    assert "may be beyond" in parameter_sentence("viscosity", cut, prior)
+    assert "may be beyond" not in parameter_sentence("viscosity", inside, prior)
+    assert percent(1.0) == "100 %" and percent(0.0034) == "0.34 %"
 
 
 def test_risks_of_known_outcomes():

@@ -73,6 +73,22 @@ BAD = {
         "inclination_xz",
         "NaN in 201 of 201",
     ),
+    "long blind": (
+        with_values("inclination_yz", blank(slice(60, 90))),
+        "inclination_yz",
+        "NaN for 1.0",
+    ),
+    "infinite angle": (
+        with_values("inclination_xz", lambda v: np.where(v == v.max(), np.inf, v)),
+        "inclination_xz",
+        "infinite",
+    ),
+    "stick in grams": (with_attribute("stick_mass", 17.0), "stick_mass", "looks like grams"),
+    "no stir": (
+        lambda d: with_values("x", np.zeros_like)(with_values("y", np.zeros_like)(d)),
+        "x, y",
+        "moves less",
+    ),
     "degrees": (with_values("inclination_xz", np.degrees), "inclination_xz", "looks like degrees"),
     "degrees by units": (with_units("inclination_yz", "degree"), "inclination_yz", "'degree'"),
     "gripper in mm": (with_values("y", lambda v: 1000 * v), "y", "looks like millimetres"),

@@ -154,6 +154,7 @@ def test_signals_of_wrong_shape_are_refused_and_not_stored(prior, observed, shap
     [
         ({"budget": 5, "initial": 6}, "budget=5 is smaller than the start design of initial=6"),
         ({"budget": 2}, "budget must be an integer of at least 3"),
+        ({"budget": 4}, "budget=4 is smaller than the start design of initial=5"),
         ({"batch": 0}, "batch must be an integer"),
     ],
 )
@@ -163,10 +164,10 @@ def test_bad_budgets_are_refused(prior, observed, simulate, options, message):
 
 
 def test_progress_is_shown_only_on_request(prior, observed, simulate, capsys):
-    inference.fit(simulate, prior, observed, budget=5)
+    inference.fit(simulate, prior, observed, budget=7)
     assert capsys.readouterr().out == ""
-    inference.fit(simulate, prior, observed, budget=5, progress=True)
-    assert "5/5" in capsys.readouterr().out
+    inference.fit(simulate, prior, observed, budget=7, progress=True)
+    assert "7/7" in capsys.readouterr().out
 
 
 def test_importing_loads_neither_simulator_nor_cameras():
