@@ -215,9 +215,10 @@ class Fluid(NeighbourSearch):
     def exchange(self, b):
         """One Gauss-Seidel sweep of the implicit viscosity over all pairs.
 
-        Impulses accumulate, so that sweeps converge to the backward Euler step, stable for any
-        viscosity; each is equal and opposite along the line of centres, so linear and angular
-        momentum are kept.
+        Impulses accumulate, so that many sweeps converge to the backward Euler step, and any
+        number of them is stable. The few of `Numerics` fall short of it in stiff liquids. Each
+        impulse is equal and opposite along the line of centres, so linear and angular momentum
+        are kept.
         """
         for a in range(self.alive[b]):
             i = self.order[b, a]
@@ -283,6 +284,10 @@ class Fluid(NeighbourSearch):
         """Let the first `active` packings come to rest, the same for every liquid."""
         self.pour_in(SETTLING_LIQUID.batch(active))
         self.settle(active, round(seconds * self.numerics.rate), DAMPING)
+
+    def diverged(self, active):
+        """Which of the first `active` liquids hold a particle that is nowhere, bool [active]."""
+        return ~np.isfinite(self.position.to_numpy()[:active]).all(axis=(1, 2))
 
     def padded(self, values):
         """`values` [b, ...] as float32 with zeros up to the number of slots."""

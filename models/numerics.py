@@ -17,8 +17,9 @@ class Numerics:
         sweeps: Gauss-Seidel sweeps of the viscosity a substep.
         support: Kernel support radius h in particle spacings.
         compliance: Relaxation of the density constraint, in 1/h² (Macklin & Müller 2013, eq. 11).
-        wall_slip: Factor on the tangential viscous coupling to walls. The bare integral takes the
-            liquid behind the wall to rest, where a mirrored flow would move against it.
+        wall_slip: Factor on the tangential viscous coupling to walls, chosen on pours by an
+            independent solver. Flow mirrored in the wall would explain 2 to 4 of it; the rest
+            makes up for a wall that one layer of particles feels.
         wall_normal: The same factor for the normal direction.
         stick_drag: The same factor for the stick, which is about one particle wide.
         attraction: Acceleration of the surface attraction at cohesion 1 [m/s²].

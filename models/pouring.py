@@ -31,7 +31,7 @@ class PourAction:
 
 @dataclass(frozen=True)
 class PourResult:
-    """Fractions of all particles, shape [B] each; they sum to 1.
+    """Fractions of all particles, shape [B] each; they sum to 1, or are NaN if a pour diverged.
 
     What still flies at the end counts as spilled.
     """
@@ -97,7 +97,7 @@ def _scene(cups: Cups, particles: int):
 
 
 def _run(scene, cups, liquid, action, seeds) -> np.ndarray:
-    """Particles spilled, received and retained, shape [3, B]."""
+    """Particles spilled, received and retained, shape [3, B]; NaN where a pour diverged."""
     size = len(seeds)
     rate, distance = action
     source = cups.source
@@ -119,6 +119,7 @@ def _run(scene, cups, liquid, action, seeds) -> np.ndarray:
         scene.pour(size, start, min(start + CHUNK, steps), hold)
     scene.count(size)
     scene.check_capacity()
-    return np.stack(
-        [field.to_numpy()[:size] for field in (scene.spilled, scene.received, scene.retained)]
-    )
+    fields = (scene.spilled, scene.received, scene.retained)
+    counts = np.stack([field.to_numpy()[:size] for field in fields]).astype(float)
+    counts[:, scene.diverged(size)] = np.nan
+    return counts

@@ -228,6 +228,7 @@ def _run(scene, setup, liquid, path, seeds) -> np.ndarray:
     )
     scene.place_stick(np.tile(pivot, (size, 1)))
     scene.relax_packing(size, SETTLING)
+    scene.place_stick(np.tile(pivot, (size, 1)))  # the liquid has pushed at what was held
     scene.pour_in(liquid)
 
     steps = len(path) - 1
@@ -237,7 +238,6 @@ def _run(scene, setup, liquid, path, seeds) -> np.ndarray:
         stop = min(start + CHUNK, steps)
         scene.stir(size, start, stop, pivots, directions)
     scene.check_capacity()
-    diverged = ~np.isfinite(scene.position.to_numpy()[:size]).all(axis=(1, 2))
-    directions[diverged] = np.nan
+    directions[scene.diverged(size)] = np.nan
     down = np.broadcast_to(np.array([0.0, 0.0, -1.0], np.float32), (size, 1, 3))
     return np.concatenate([down, directions], axis=1).astype(np.float64)

@@ -61,6 +61,22 @@ def test_a_tilt_short_of_the_surface_spills_nothing(cups):
     assert result.retained == pytest.approx(1.0)
 
 
+def test_walls_hold_a_viscous_liquid_back(cups):
+    """Free slip lets it go; walls that rub keep a film (the paper's glycerin)."""
+    retained = {}
+    for viscosity in (0.01, 30.0):
+        retained[viscosity] = pour((viscosity, 1260.0), [(180, 2.0)], cups).retained[0]
+    assert retained[0.01] == 0.0
+    assert retained[30.0] > 0.02
+
+
+def test_a_pour_that_diverged_is_no_result(cups):
+    liquid = models.Liquid([1.0, 3e38], 0.0, 1000.0)
+    result = models.pour(liquid, models.PourAction(3.0, 0.02), cups, [0, 0], particles=200)
+    assert np.isnan([result.spilled[1], result.received[1], result.retained[1]]).all()
+    assert result.spilled[0] + result.received[0] + result.retained[0] == pytest.approx(1.0)
+
+
 def test_bad_actions_are_named(cups):
     liquid = models.Liquid(1.0, 0.0, 1000.0)
     with pytest.raises(ValueError, match="angular_velocity must be positive"):

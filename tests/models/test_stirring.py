@@ -102,15 +102,38 @@ def test_a_submerged_stick_is_buoyed_as_archimedes_says(glycerin):
     assert np.mean(across) == pytest.approx(expected, rel=0.2)
 
 
-def test_no_particle_leaves_the_cup_and_none_is_lost(water):
+@pytest.mark.parametrize("speed", [0.1, 0.8])
+def test_no_particle_is_ever_outside_the_cup(water, speed, monkeypatch):
+    """Looked at after every other substep of the first strokes, also of a violent stir."""
+    monkeypatch.setattr(stirring, "CHUNK", 2)
+    x = 0.03 * np.sin(2.0 * np.pi * speed / 0.12 * np.arange(0.0, 1.5, 1 / 30))
+    position = np.column_stack([x, 0.0 * x, np.full(len(x), water.gripper.position[0, 2])])
+    path = SimpleNamespace(time=np.arange(len(x)) / 30, position=position)
     setup = models.StirSetup.from_recording(water, particles=400)
-    scene = stirring._scene(setup)
-    models.stir(models.Liquid([1e-3, 1.0], 0.0, 1000.0), water.gripper, setup, [0, 1])
-    position = scene.position.to_numpy()[:2]
-    assert (scene.alive.to_numpy()[:2] == 400).all()
-    assert np.isfinite(position).all()
-    assert np.hypot(position[..., 0], position[..., 1]).max() < setup.cup.radius
-    assert position[..., 2].min() > 0.0
+    scene, looks = stirring._scene(setup), []
+    whole_stir = scene.stir
+
+    def stir_and_look(*args):
+        whole_stir(*args)
+        looks.append(scene.position.to_numpy()[:3])
+        assert (scene.alive.to_numpy()[:3] == 400).all()
+
+    monkeypatch.setattr(scene, "stir", stir_and_look)
+    models.stir(models.Liquid([0.0, 1e-3, 10.0], [0.0, 1.0, 0.5], 1000.0), path, setup, [0, 1, 2])
+    seen = np.stack(looks)
+    assert len(seen) > 150 and np.isfinite(seen).all()
+    assert np.hypot(seen[..., 0], seen[..., 1]).max() < setup.cup.radius
+    assert seen[..., 2].min() > 0.0
+    assert seen[..., 2].max() < setup.cup.height
+
+
+def test_a_wide_stick_leaves_room_for_all_particles(glycerin):
+    attrs = {**glycerin.attrs, "stick_radius": 0.025}
+    short = first_seconds(glycerin, 0.2)
+    recording = SimpleNamespace(attrs=attrs, gripper=short.gripper)
+    setup = models.StirSetup.from_recording(recording, particles=300)
+    signal = models.stir(models.Liquid(1.0, 0.0, 1260.0), short.gripper, setup, [0])
+    assert np.isfinite(signal).all()
 
 
 @pytest.mark.parametrize("cohesion", [0.0, 0.5, 1.0])
