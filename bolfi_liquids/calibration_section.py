@@ -46,6 +46,7 @@ def calibration_section(
         ),
         "rhat_max": float(attrs["rhat_max"]),
         "ess_min": float(min(attrs["ess_bulk_min"], attrs["ess_tail_min"])),
+        "divergences": int(attrs["divergences"]),
         "seconds": {
             "simulator": float(tree.attrs["seconds_simulator"]),
             "engine": float(tree.attrs["seconds_engine"]),

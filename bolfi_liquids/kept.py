@@ -1,13 +1,12 @@
 """Simulations outside the engine's loop, kept in the same bank."""
 
 from collections.abc import Mapping, Sequence
-from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .inference import Simulation, SimulationBank
+from .inference import Job, SimulationBank, run_missing
 from .progress import Simulate
 
 
@@ -38,38 +37,26 @@ def simulate_kept(
         keep: Finished simulations are taken from there and put there.
 
     Returns:
-        The simulations in order; diverged ones are left out of the signals.
+        The simulations in order; failed ones are left out of the signals.
 
     Raises:
-        RuntimeError: Every simulation diverged.
+        RuntimeError: Every simulation failed.
     """
-    points = [
-        {name: float(values[at]) for name, values in theta.items()} for at in range(len(seeds))
+    jobs = [
+        Job({name: float(values[at]) for name, values in theta.items()}, seed)
+        for at, seed in enumerate(seeds)
     ]
-    wanted = list(zip(points, seeds, strict=True))
-    missing = [job for job in wanted if keep.bank.get(keep.identity, *job) is None]
-    for start in range(0, len(missing), keep.batch):
-        _simulate_and_put(simulate, missing[start : start + keep.batch], keep)
-    found = [keep.bank.get(keep.identity, *job) for job in wanted]
-    results = [result for result in found if result is not None]
+    results = []
+    for start in range(0, len(jobs), keep.batch):
+        part = jobs[start : start + keep.batch]
+        results += run_missing(simulate, part, None, keep.bank, keep.identity, None)
     good = [r.signal for r in results if r.signal is not None and np.isfinite(r.signal).all()]
     if not good:
         raise RuntimeError(
-            f"all {len(seeds)} simulations diverged, the first at {points[0]}; use more particles"
+            f"all {len(seeds)} simulations failed, the first at {jobs[0].theta}"
+            f" ({results[0].error or 'it diverged'}); use more particles"
         )
     return Kept(np.stack(good), sum(result.seconds for result in results))
-
-
-def _simulate_and_put(
-    simulate: Simulate, batch: Sequence[tuple[dict[str, float], int]], keep: Keep
-) -> None:
-    points, seeds = zip(*batch, strict=True)
-    theta = {name: np.array([point[name] for point in points]) for name in points[0]}
-    started = perf_counter()
-    signals = simulate(theta, np.array(seeds, np.int64))
-    seconds = (perf_counter() - started) / len(batch)
-    for (point, seed), signal in zip(batch, signals, strict=True):
-        keep.bank.put(keep.identity, point, seed, Simulation(signal, None, seconds))
 
 
 def fresh_seeds(seed: int, purpose: int, count: int) -> list[int]:

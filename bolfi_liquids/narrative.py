@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 UNITS = {"viscosity": "Pa s"}
 UNLEARNED = 0.6  # share of the prior's 90 % interval above which little was learned
+RHAT_MAX, ESS_MIN = 1.01, 400.0  # Vehtari et al. 2021
 AT_THE_END = 0.02  # quantile of the prior; an interval that reaches it is cut off there
 AS_GOOD_AS_NOISE = 1.5
 
@@ -58,6 +59,18 @@ def fit_sentence(section: Mapping[str, Any]) -> str:
         f"The closest of {section['n_simulations']} simulated hypotheses differs from the"
         f" recording by {fit:.2f}° RMS. Noise alone (of the cameras, and between equal"
         f" simulations) would leave {noise:.2f}°: {verdict}."
+    )
+
+
+def sampler_sentence(section: Mapping[str, Any]) -> str:
+    """A warning where the draws are not to be trusted; empty where they are."""
+    rhat, ess = section["rhat_max"], section["ess_min"]
+    if rhat is not None and rhat <= RHAT_MAX and ess >= ESS_MIN and not section["divergences"]:
+        return ""
+    return (
+        f"The sampler did not converge well (R-hat {rhat}, effective sample size {ess},"
+        f" {section['divergences']} divergences): calibrate again with more draws or --sampler"
+        " emcee before relying on the intervals."
     )
 
 

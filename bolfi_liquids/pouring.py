@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .models import Cups
 
 PLUG_IN_SEEDS = 4  # that each action of the plug-in is tried with; the paper tries one
-JUDGE_SEEDS = 2  # fresh seeds for each draw, to judge the two actions
+JUDGE_DRAWS = 2  # times as many draws judge the two actions as chose them
 _SEARCH, _JUDGE = 11, 12  # purposes of seeds
 
 
@@ -80,8 +80,8 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
 
     The engine that calibrated searches the actions, with the expected spillage over a fixed
     set of posterior draws and simulator seeds in the place of the discrepancy. The action at
-    which the surrogate expects least is taken and judged with seeds it was not chosen by, so
-    that the figure is not flattered by the choice. Finished simulations are kept in the run.
+    which the surrogate expects least is taken and judged on draws and seeds it was not chosen
+    by, so that the figure is not flattered by the choice. Finished simulations are kept in the run.
 
     Args:
         calibration: Whose posterior is poured.
@@ -100,7 +100,11 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
 
     settings = PourSettings(iterations=iterations, draws=draws, risk=risk, seed=seed)
     cups = bundled_cups() if cups is None else cups
-    liquids = calibration.draws(draws, seed)
+    # distinct strata: none of the draws that judge has chosen
+    drawn = calibration.draws((1 + JUDGE_DRAWS) * draws, seed)
+    chosen_by = np.arange(len(next(iter(drawn.values())))) % (1 + JUDGE_DRAWS) == JUDGE_DRAWS // 2
+    liquids = {name: values[chosen_by] for name, values in drawn.items()}
+    others = {name: values[~chosen_by] for name, values in drawn.items()}
     best = {name: np.full(PLUG_IN_SEEDS, value) for name, value in calibration.best.items()}
     with (
         open_bank(calibration.path) as bank,
@@ -109,7 +113,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         search = _Search(cups, calibration.liquid_density, settings, bank, advance)
         over_posterior = search.minimise(liquids)
         at_best = search.minimise(best)
-        chosen, plug_in = (search.judge(fit.best, liquids) for fit in (over_posterior, at_best))
+        chosen, plug_in = (search.judge(fit.best, others) for fit in (over_posterior, at_best))
     pour = Pour(calibration.path, chosen, plug_in)
     tree = pour_tree(pour, over_posterior, at_best, liquids)
     tree.attrs.update(asdict(settings), cups=json.dumps(cups.settings()))
@@ -163,11 +167,10 @@ class _Search:
         )
 
     def judge(self, action: Mapping[str, float], liquids: Mapping[str, NDArray]) -> Judged:
-        """Pour every liquid with fresh seeds."""
+        """Pour every liquid, with seeds of their own."""
         from .kept import Keep, simulate_kept
 
-        repeated = {name: np.tile(values, JUDGE_SEEDS) for name, values in liquids.items()}
-        outcomes = self.outcomes(repeated, _JUDGE)
+        outcomes = self.outcomes(liquids, _JUDGE)
         one = {name: np.array([value]) for name, value in action.items()}
         keep = Keep(self.bank, outcomes.identity, 1)
         poured = simulate_kept(reported(outcomes.simulate, self.advance), one, [0], keep)

@@ -9,6 +9,7 @@ from .errors import InputError
 from .files import write_text
 
 NAME = "summary.json"
+RESTORE = "delete it; calibrate --resume and pour write it again, from what was simulated"
 
 
 def read_summary(run: Path) -> dict[str, Any]:
@@ -21,11 +22,12 @@ def read_summary(run: Path) -> dict[str, Any]:
     if not path.exists():
         return {}
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        summary = json.loads(path.read_text(encoding="utf-8"))
     except json.JSONDecodeError as err:
-        raise InputError(
-            f"not JSON (line {err.lineno})", where=str(path), fix="delete it; commands rewrite it"
-        ) from err
+        raise InputError(f"not JSON (line {err.lineno})", where=str(path), fix=RESTORE) from err
+    if not isinstance(summary, dict) or not all(isinstance(s, dict) for s in summary.values()):
+        raise InputError("holds no sections", where=str(path), fix=RESTORE)
+    return summary
 
 
 def write_section(run: Path, name: str, section: dict[str, Any]) -> None:

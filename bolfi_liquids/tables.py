@@ -6,6 +6,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Column, Table
 
+from .narrative import sampler_sentence
+
 UNITS = {"viscosity": "Pa s", "cohesion": ""}
 
 
@@ -27,6 +29,8 @@ def print_calibration(section: Mapping[str, Any], console: Console) -> None:
         f" sampling {seconds['sampling']:.1f}",
         highlight=False,
     )
+    if warning := sampler_sentence(section):
+        console.print(f"warning: {warning}", highlight=False)
 
 
 def print_pour(section: Mapping[str, Any], console: Console) -> None:

@@ -12,6 +12,7 @@ from .likelihood import Quantile
 from .loop import fit
 from .posterior import Closest, Fit
 from .prior import Prior
+from .simulate import Job, run_missing
 
 __all__ = [
     "Acquisition",
@@ -19,6 +20,7 @@ __all__ = [
     "Closest",
     "Discrepancy",
     "Fit",
+    "Job",
     "LowerConfidenceBound",
     "Prior",
     "Quantile",
@@ -27,5 +29,6 @@ __all__ = [
     "Simulator",
     "Surrogate",
     "fit",
+    "run_missing",
     "squared_difference",
 ]

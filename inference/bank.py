@@ -104,7 +104,8 @@ class SimulationBank:
     ) -> None:
         """Store a run; on return it survives the death of the process.
 
-        A run that is already there is kept: whoever looked it up may have used it.
+        A signal that is already there is kept, for whoever looked it up may have used it; an
+        error gives way to whatever came of trying again.
         """
         blob, dtype, shape = None, None, None
         if simulation.signal is not None:
@@ -116,7 +117,11 @@ class SimulationBank:
         )
         with self._lock:
             self._connection.execute(
-                "INSERT OR IGNORE INTO simulation VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row
+                "INSERT INTO simulation VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?) "
+                "ON CONFLICT DO UPDATE SET signal = excluded.signal, dtype = excluded.dtype, "
+                "shape = excluded.shape, error = excluded.error, seconds = excluded.seconds, "
+                "created = excluded.created WHERE simulation.signal IS NULL",
+                row,
             )
 
     def __len__(self) -> int:

@@ -18,6 +18,7 @@ from .prior import Prior
 from .state import UNKNOWN, History, init, remember_asked, remember_told
 from .transform import TRANSFORMS
 
+LARGEST = 2**31 - 1  # that every random number generator takes as a seed
 MIN_LEARN = 3  # successful simulations before the surrogate may choose
 
 
@@ -247,10 +248,11 @@ def checked_integer(name: str, value: object, least: int = 1) -> int:
     """`value` as int.
 
     Raises:
-        ValueError: not an integer, or less than `least`.
+        ValueError: not an integer, or not from `least` to `LARGEST`.
     """
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise ValueError(f"{name} must be an integer of at least {least}, got {value!r}")
+    is_integer = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not is_integer or not least <= value <= LARGEST:
+        raise ValueError(f"{name} must be an integer from {least} to {LARGEST}, got {value!r}")
     return int(value)
 
 

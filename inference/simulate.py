@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, as_completed
 from typing import NamedTuple
 
 import numpy as np
@@ -75,22 +75,22 @@ def run_missing(
 ) -> list[Simulation]:
     """Results of all jobs, in order; those that the bank lacks are simulated and stored.
 
-    With an executor every missing job is a call of its own, and stored as soon as those
-    submitted before it are.
+    Stored exceptions count as lacking: their cause, such as a full disk, may have gone. With an
+    executor every missing job is a call of its own, stored as soon as it is finished.
     """
-    found = [bank.get(identity, job.theta, job.seed) for job in batch]
-    missing = [job for job, hit in zip(batch, found, strict=True) if hit is None]
-    if not missing:
-        made = iter(())
-    elif executor is None:
-        made = iter(run_batch(simulate, missing, shape))
-    else:
-        futures = [executor.submit(run_batch, simulate, [job], shape) for job in missing]
-        made = (future.result()[0] for future in futures)
-    results = []
-    for job, hit in zip(batch, found, strict=True):
-        if hit is None:
-            hit = next(made)
-            bank.put(identity, job.theta, job.seed, hit)
-        results.append(hit)
-    return results
+    results = [bank.get(identity, job.theta, job.seed) for job in batch]
+    missing = [at for at, hit in enumerate(results) if hit is None or hit.error is not None]
+
+    def store(at: int, made: Simulation) -> None:
+        bank.put(identity, batch[at].theta, batch[at].seed, made)
+        results[at] = made
+
+    if executor is not None:
+        futures = {executor.submit(run_batch, simulate, [batch[at]], shape): at for at in missing}
+        for future in as_completed(futures):
+            store(futures[future], future.result()[0])
+    elif missing:
+        made = run_batch(simulate, [batch[at] for at in missing], shape)
+        for at, simulation in zip(missing, made, strict=True):
+            store(at, simulation)
+    return [result for result in results if result is not None]

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import (
     AfterValidator,
     BaseModel,
-    PositiveFloat,
+    Field,
     ValidationError,
     model_validator,
 )
@@ -24,8 +24,11 @@ def _in_metres(length: float) -> float:
 
 
 MAX_LENGTH = 2.0  # [m]
-Metres = Annotated[PositiveFloat, AfterValidator(_in_metres)]
-Offset = Annotated[float, AfterValidator(_in_metres)]
+Metres = Annotated[float, Field(gt=0, allow_inf_nan=False), AfterValidator(_in_metres)]
+Offset = Annotated[float, Field(allow_inf_nan=False), AfterValidator(_in_metres)]
+Degrees = Annotated[float, Field(gt=0, le=180)]
+DegreesPerSecond = Annotated[float, Field(gt=0, le=3600)]
+Seconds = Annotated[float, Field(ge=0, le=60)]
 
 
 class _Section(BaseModel, frozen=True, extra="forbid"):
@@ -57,9 +60,9 @@ class PourPlan(_Section, frozen=True):
     """How the source turns, and the range of the decision, in the units that people type."""
 
     lip_height: Metres
-    final_angle_deg: PositiveFloat
-    hold: PositiveFloat
-    angular_velocity_deg_s: tuple[PositiveFloat, PositiveFloat]
+    final_angle_deg: Degrees
+    hold: Seconds
+    angular_velocity_deg_s: tuple[DegreesPerSecond, DegreesPerSecond]
     distance: tuple[Offset, Offset]
 
     @property

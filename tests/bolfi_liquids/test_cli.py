@@ -101,7 +101,7 @@ def test_a_bank_damaged_within_is_named(calibration, tmp_path):
     connection.close()
     result = CliRunner().invoke(app, ["pour", str(run)])
     assert result.exit_code == 2
-    (line,) = result.stderr.strip().splitlines()
+    *_, line = result.stderr.strip().splitlines()  # after that of the progress
     assert "simulations.sqlite" in line
 
 

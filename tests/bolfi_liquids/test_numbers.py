@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from bolfi_liquids.draws import pick_draws
-from bolfi_liquids.narrative import parameter_sentence, percent
+from bolfi_liquids.narrative import parameter_sentence, percent, sampler_sentence
 from bolfi_liquids.noise import irreducible_rms, replicate_noise, sensor_noise
 from bolfi_liquids.posterior_figure import contour_levels, marginal
 from bolfi_liquids.spillage import mean_spillage, tail_spillage
@@ -77,6 +77,13 @@ def test_a_posterior_at_the_end_of_its_prior_says_so():
     assert "may be beyond" in parameter_sentence("viscosity", cut, prior)
     assert "may be beyond" not in parameter_sentence("viscosity", inside, prior)
     assert percent(1.0) == "100 %" and percent(0.0034) == "0.34 %"
+
+
+def test_a_sampler_that_did_not_converge_is_told():
+    good = {"rhat_max": 1.003, "ess_min": 900.0, "divergences": 0}
+    assert sampler_sentence(good) == ""
+    for worse in ({"rhat_max": 1.2}, {"rhat_max": None}, {"ess_min": 40.0}, {"divergences": 3}):
+        assert "did not converge" in sampler_sentence(good | worse)
 
 
 def test_risks_of_known_outcomes():

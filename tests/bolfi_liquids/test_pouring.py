@@ -1,6 +1,7 @@
 """A pour is chosen over the posterior, and judged by seeds that did not choose it."""
 
 import json
+import shutil
 import sqlite3
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 import xarray as xr
 
 import bolfi_liquids as bl
-from bolfi_liquids import models
+from bolfi_liquids import models, spillage
 from bolfi_liquids.cups import bundled_cups
 from bolfi_liquids.run_directory import SIMULATIONS
 
@@ -40,12 +41,12 @@ def test_chosen_spills_no_more_than_the_plug_in(pour):
 
 
 def test_chosen_is_among_the_better_actions(pour):
-    tried = xr.open_datatree(pour.path / "pour.nc")["tried"]["risk"].to_numpy()
+    tried = xr.load_datatree(pour.path / "pour.nc")["tried"]["risk"].to_numpy()
     assert pour.chosen.expected_spillage < np.median(tried)
 
 
 def test_other_seeds_agree_with_the_judgement(pour, calibration):
-    tree = xr.open_datatree(pour.path / "pour.nc")
+    tree = xr.load_datatree(pour.path / "pour.nc")
     liquids = {name: values.to_numpy() for name, values in tree["liquids"].data_vars.items()}
     known = calibration.posterior["viscosity"].to_numpy()
     assert np.isin(liquids["viscosity"], known).all()
@@ -59,6 +60,25 @@ def test_other_seeds_agree_with_the_judgement(pour, calibration):
     # other seeds: they move the mean, but not by more than the spread between outcomes
     spread = fractions[:, 0].std() + result.spilled.std()
     assert abs(result.spilled.mean() - fractions[:, 0].mean()) <= spread + 0.01
+
+
+def test_no_draw_that_judges_has_chosen(calibration, monkeypatch, tmp_path):
+    run = bl.Calibration.open(shutil.copytree(calibration.path, tmp_path / "run"))
+    searched, judged = [], []
+    whole = spillage.Outcomes.simulate
+
+    def watched(self, action, seeds):
+        (searched if len(seeds) and len(judged_draws(self)) == 4 else judged).append(self)
+        return whole(self, action, seeds)
+
+    def judged_draws(outcomes):
+        return outcomes.theta["viscosity"]
+
+    monkeypatch.setattr(spillage.Outcomes, "simulate", watched)
+    bl.choose_pour(run, iterations=7, draws=4, seed=5, progress=False)
+    by_posterior, judging = searched[0], judged[-1]
+    assert not np.isin(judged_draws(judging), judged_draws(by_posterior)).any()
+    assert not np.isin(judging.seeds, by_posterior.seeds).any()
 
 
 def test_section_is_of_the_pour(pour, calibration):

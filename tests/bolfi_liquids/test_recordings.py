@@ -83,6 +83,7 @@ BAD = {
         "inclination_xz",
         "infinite",
     ),
+    "floating stick": (with_attribute("stick_density", 60.0), "stick_density", "floats up"),
     "stick in grams": (with_attribute("stick_mass", 17.0), "stick_mass", "looks like grams"),
     "no stir": (
         lambda d: with_values("x", np.zeros_like)(with_values("y", np.zeros_like)(d)),

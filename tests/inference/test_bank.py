@@ -39,16 +39,20 @@ def test_keeps_signals_exactly(tmp_path):
     [("other", THETA, 7), ("id", {"a": 1e-3, "b": 0.3}, 7), ("id", THETA, 8)],
 )
 def test_looks_up_exactly(identity, theta, seed):
-    bank = inference.SimulationBank()
-    bank.put("id", THETA, 7, inference.Simulation(np.zeros(2), None, 0.0))
-    assert bank.get(identity, theta, seed) is None
+    with inference.SimulationBank() as bank:
+        bank.put("id", THETA, 7, inference.Simulation(np.zeros(2), None, 0.0))
+        assert bank.get(identity, theta, seed) is None
 
 
-def test_keeps_failures_and_the_first_result():
-    bank = inference.SimulationBank()
-    bank.put("id", THETA, 0, inference.Simulation(None, "boom", 0.0))
-    bank.put("id", THETA, 0, inference.Simulation(np.zeros(2), None, 0.0))
-    assert bank.get("id", THETA, 0) == inference.Simulation(None, "boom", 0.0)
+def test_keeps_failures_until_a_signal_comes_and_then_that():
+    with inference.SimulationBank() as bank:
+        bank.put("id", THETA, 0, inference.Simulation(None, "boom", 0.0))
+        assert bank.get("id", THETA, 0) == inference.Simulation(None, "boom", 0.0)
+        for value in (1.0, 2.0):
+            bank.put("id", THETA, 0, inference.Simulation(np.full(2, value), None, 0.0))
+        kept = bank.get("id", THETA, 0)
+        assert kept is not None and kept.error is None
+        np.testing.assert_array_equal(kept.signal, np.full(2, 1.0))
 
 
 def test_processes_may_share_a_file(tmp_path):

@@ -104,7 +104,7 @@ def test_a_discrepancy_may_compare_unlike_shapes(prior):
         ({"acquisition": "guess"}, "acquisition must be one of"),
         ({"acquisition": 3}, "must be callable"),
         ({"transform": "cube"}, "transform must be one of"),
-        ({"initial": 1}, "initial must be an integer of at least 3"),
+        ({"initial": 1}, "initial must be an integer from 3"),
         ({"seed": -1}, "seed must be an integer"),
     ],
 )

@@ -5,12 +5,14 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
+from bolfi_liquids.inference.simulate import simulation_seed
 
 from bolfi_liquids import inference
 
@@ -19,6 +21,7 @@ import os, sys, time
 import numpy as np
 import numpyro.distributions as dist
 from bolfi_liquids import inference
+from bolfi_liquids.inference.simulate import simulation_seed
 
 log, bank, out, pause = sys.argv[1:]
 
@@ -131,6 +134,42 @@ def test_an_exception_costs_one_run(tmp_path, prior, observed, simulate):
     assert stored is not None and stored.error == "FloatingPointError: blew up"
 
 
+def test_what_raised_is_tried_again_by_the_next_call(tmp_path, prior, observed, simulate):
+    broken = [True]
+
+    def licensed(theta, seeds):
+        if broken[0]:
+            raise OSError("no licence")
+        return simulate(theta, seeds)
+
+    with inference.SimulationBank(tmp_path / "b.sqlite") as bank:
+        with pytest.raises(RuntimeError, match="no licence"):
+            inference.fit(licensed, prior, observed, budget=9, bank=bank)
+        broken[0] = False
+        mended = inference.fit(licensed, prior, observed, budget=9, bank=bank)
+    plain = inference.fit(simulate, prior, observed, budget=9)
+    np.testing.assert_array_equal(mended.history.signals, plain.history.signals)
+
+
+def test_an_executor_s_results_are_stored_as_they_come(tmp_path, prior, observed, simulate):
+    """The first run of a round waits until the second is in the bank."""
+    path = tmp_path / "b.sqlite"
+    stored = []
+
+    def slow_first(theta, seeds):
+        if not stored and int(seeds[0]) == simulation_seed(0, 0):
+            with inference.SimulationBank(path) as other:
+                deadline = time.monotonic() + 30.0
+                while len(other) < 1 and time.monotonic() < deadline:
+                    threading.Event().wait(0.01)
+                stored.append(len(other))
+        return simulate(theta, seeds)
+
+    with inference.SimulationBank(path) as bank, ThreadPoolExecutor(2) as pool:
+        inference.fit(slow_first, prior, observed, budget=7, bank=bank, executor=pool)
+    assert stored[0] >= 1
+
+
 def test_total_failure_is_an_error_with_its_cause(prior, observed):
     def broken(theta, seeds):
         raise OSError("no licence")
@@ -141,20 +180,19 @@ def test_total_failure_is_an_error_with_its_cause(prior, observed):
 
 @pytest.mark.parametrize("shape", [(2, 29), (3, 30), (30,), ()])
 def test_signals_of_wrong_shape_are_refused_and_not_stored(prior, observed, shape):
-    bank = inference.SimulationBank()
-    with pytest.raises(
-        ValueError, match=re.escape(f"shape (2, 30), one row per theta, got {shape}")
-    ):
-        inference.fit(lambda theta, seeds: np.zeros(shape), prior, observed, bank=bank)
-    assert len(bank) == 0
+    message = re.escape(f"shape (2, 30), one row per theta, got {shape}")
+    with inference.SimulationBank() as bank:
+        with pytest.raises(ValueError, match=message):
+            inference.fit(lambda theta, seeds: np.zeros(shape), prior, observed, bank=bank)
+        assert len(bank) == 0
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"budget": 5, "initial": 6}, "budget=5 is smaller than the start design of initial=6"),
-        ({"budget": 2}, "budget must be an integer of at least 3"),
-        ({"budget": 4}, "budget=4 is smaller than the start design of initial=5"),
+        ({"budget": 2}, "budget must be an integer from 3"),
+        ({"budget": 4}, "budget=4 is smaller than the start design of initial=7"),
         ({"batch": 0}, "batch must be an integer"),
     ],
 )
