@@ -46,6 +46,7 @@ def calibration_section(
         ),
         "rhat_max": float(attrs["rhat_max"]),
         "ess_min": float(min(attrs["ess_bulk_min"], attrs["ess_tail_min"])),
+        "n_draws": int(posterior.sizes["chain"] * posterior.sizes["draw"]),
         "divergences": int(attrs["divergences"]),
         "seconds": {
             "simulator": float(tree.attrs["seconds_simulator"]),

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 UNITS = {"viscosity": "Pa s"}
 UNLEARNED = 0.6  # share of the prior's 90 % interval above which little was learned
 RHAT_MAX, ESS_MIN = 1.01, 400.0  # Vehtari et al. 2021
+DIVERGENT_MAX = 0.01  # share of the draws
 AT_THE_END = 0.02  # quantile of the prior; an interval that reaches it is cut off there
 AS_GOOD_AS_NOISE = 1.5
 
@@ -64,13 +65,14 @@ def fit_sentence(section: Mapping[str, Any]) -> str:
 
 def sampler_sentence(section: Mapping[str, Any]) -> str:
     """A warning where the draws are not to be trusted; empty where they are."""
-    rhat, ess = section["rhat_max"], section["ess_min"]
-    if rhat is not None and rhat <= RHAT_MAX and ess >= ESS_MIN and not section["divergences"]:
+    rhat = float("nan") if section["rhat_max"] is None else section["rhat_max"]
+    ess, divergent = section["ess_min"], section["divergences"] / section["n_draws"]
+    if rhat <= RHAT_MAX and ess >= ESS_MIN and divergent <= DIVERGENT_MAX:
         return ""
     return (
-        f"The sampler did not converge well (R-hat {rhat}, effective sample size {ess},"
-        f" {section['divergences']} divergences): calibrate again with more draws or --sampler"
-        " emcee before relying on the intervals."
+        f"The sampler did not converge well (R-hat {rhat:.3f}, effective sample size {ess:.0f},"
+        f" {percent(divergent)} of the draws divergent): calibrate again with more draws or"
+        " --sampler emcee before relying on the intervals."
     )
 
 

@@ -14,7 +14,7 @@ def default_prior() -> "Prior":
     """Every liquid that the simulator can tell from another, before any stirring.
 
     `viscosity` [Pa s] is log-uniform from 3e-3 to a stiff gel's 20. Below, the dissipation of
-    the particle fluid itself rules: 1e-3 and 3e-3 differ by less than two seeds of either do,
+    the particle fluid itself rules: 1e-3 and 3e-3 differ by no more than two seeds of either do,
     so water is whatever lies at this end. `cohesion` is uniform over its useful range, 0 to 1.
     """
     import numpyro.distributions as dist

@@ -30,7 +30,7 @@ def print_calibration(section: Mapping[str, Any], console: Console) -> None:
         highlight=False,
     )
     if warning := sampler_sentence(section):
-        console.print(f"warning: {warning}", highlight=False)
+        console.print(f"warning: {warning}", highlight=False, soft_wrap=True)
 
 
 def print_pour(section: Mapping[str, Any], console: Console) -> None:

@@ -80,9 +80,9 @@ def test_a_posterior_at_the_end_of_its_prior_says_so():
 
 
 def test_a_sampler_that_did_not_converge_is_told():
-    good = {"rhat_max": 1.003, "ess_min": 900.0, "divergences": 0}
+    good = {"rhat_max": 1.003, "ess_min": 900.0, "divergences": 3, "n_draws": 4000}
     assert sampler_sentence(good) == ""
-    for worse in ({"rhat_max": 1.2}, {"rhat_max": None}, {"ess_min": 40.0}, {"divergences": 3}):
+    for worse in ({"rhat_max": 1.2}, {"rhat_max": None}, {"ess_min": 40.0}, {"divergences": 90}):
         assert "did not converge" in sampler_sentence(good | worse)
 
 
