@@ -82,7 +82,7 @@ def _check_sizes(recording: "Recording") -> None:
                 where=f"{recording.path}: attribute {name}",
                 fix="convert it to m",
             )
-    if recording.attrs.get("stick_mass", 0.0) > MAX_MASS:
+    if "stick_mass" in attrs and recording.number("stick_mass") > MAX_MASS:
         raise InputError(
             f"{attrs['stick_mass']} kg looks like grams",
             where=f"{recording.path}: attribute stick_mass",

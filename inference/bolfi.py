@@ -250,10 +250,11 @@ def checked_integer(name: str, value: object, least: int = 1) -> int:
     Raises:
         ValueError: not an integer, or not from `least` to `LARGEST`.
     """
-    is_integer = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not is_integer or not least <= value <= LARGEST:
-        raise ValueError(f"{name} must be an integer from {least} to {LARGEST}, got {value!r}")
-    return int(value)
+    if isinstance(value, int | np.integer) and not isinstance(value, bool):
+        number = int(value)
+        if least <= number <= LARGEST:
+            return number
+    raise ValueError(f"{name} must be an integer from {least} to {LARGEST}, got {value!r}")
 
 
 def _seeds(seeds: ArrayLike | None, n: int) -> np.ndarray:
