@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .errors import InputError
+from .files import existing_file
 
 if TYPE_CHECKING:
     from .models import Cups
@@ -26,10 +27,7 @@ def open_cups(path: str | Path) -> "Cups":
     """
     from .models import Cups
 
-    path = Path(path)
-    if not path.is_file():
-        what = "a directory, not a file" if path.is_dir() else "no such file"
-        raise InputError(what, where=str(path), fix="check the path")
+    path = existing_file(path)
     try:
         return Cups.from_toml(path)
     except ValueError as err:

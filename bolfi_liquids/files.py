@@ -1,9 +1,24 @@
-"""Writing files that are either whole or not there."""
+"""Files that are there to be read, and files that are written whole or not at all."""
 
 import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+
+from .errors import InputError
+
+
+def existing_file(path: str | Path) -> Path:
+    """`path`, which a person gave to be read.
+
+    Raises:
+        InputError: There is no such file, or it is a directory.
+    """
+    path = Path(path)
+    if not path.is_file():
+        what = "a directory, not a file" if path.is_dir() else "no such file"
+        raise InputError(what, where=str(path), fix="check the path")
+    return path
 
 
 def write_whole(path: Path, write: Callable[[Path], object]) -> Path:

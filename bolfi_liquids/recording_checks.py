@@ -34,6 +34,7 @@ def check_values(recording: "Recording") -> None:
     _check_gripper(recording)
     _check_inclination(recording)
     _check_scene(recording)
+    _check_hangs(recording)
 
 
 def _check_time(recording: "Recording") -> None:
@@ -167,16 +168,15 @@ def _check_inclination(recording: "Recording") -> None:
             )
 
 
-def _check_hangs(recording: "Recording", tip: float) -> None:
+def _check_hangs(recording: "Recording") -> None:
     """Buoyancy's moment about the pivot must stay below the weight's, or the stick floats up."""
-    length, area = recording.number("stick_length"), np.pi * recording.number("stick_radius") ** 2
-    wet = min(recording.number("fill") - tip, length)
-    lifted = recording.number("liquid_density") * area * wet * (length - wet / 2)
-    if "stick_mass" in recording.attrs:
-        mass = recording.number("stick_mass")
-    else:
-        mass = recording.number("stick_density") * area * length
-    if lifted >= mass * length / 2:
+    from .models import StirSetup
+
+    setup = StirSetup.from_recording(recording)
+    stick, wet, mass = setup.stick, setup.submerged, setup.stick.mass
+    displaced = recording.number("liquid_density") * np.pi * stick.radius**2 * wet
+    lifted = displaced * (stick.length - wet / 2)
+    if lifted >= mass * stick.length / 2:
         raise InputError(
             f"a stick of {1000 * mass:.3g} g floats up in this liquid",
             where=f"{recording.path}: attribute {' or '.join(STICK_WEIGHT)}",
@@ -209,7 +209,6 @@ def _check_scene(recording: "Recording") -> None:
             where=f"{recording.path}: z, stick_length, fill",
             fix="z counts from the cup's floor: correct z, stick_length or fill",
         )
-    _check_hangs(recording, float(tip[np.isfinite(tip)][0]))
     if np.nanmin(tip) < 0:
         raise InputError(
             f"the stick goes through the floor: its tip comes to {np.nanmin(tip):g} m",

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError
+from .files import existing_file
 from .recording_checks import check_values
 from .recording_fields import AXES, PLANES, check_fields
 
@@ -61,10 +62,7 @@ def open_recording(path: str | Path) -> Recording:
         InputError: The file is missing, is no NetCDF file, or holds something a simulator
             cannot use; the message names file, field, value and what to do.
     """
-    path = Path(path)
-    if not path.is_file():
-        what = "a directory, not a file" if path.is_dir() else "no such file"
-        raise InputError(what, where=str(path), fix="check the path")
+    path = existing_file(path)
     recording = _as_recording(_read(path), path)
     check_values(recording)
     return recording

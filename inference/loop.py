@@ -13,7 +13,6 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from .bank import Simulation, SimulationBank
 from .base import Acquisition, Discrepancy, Simulator
 from .bolfi import MIN_LEARN, Bolfi, checked_integer
-from .design import start_size
 from .likelihood import Threshold
 from .posterior import Fit
 from .prior import Prior
@@ -68,7 +67,6 @@ def fit(  # noqa: PLR0913  the one call that most users make
     """
     batch = checked_integer("batch", batch)
     budget = checked_integer("budget", budget, MIN_LEARN)
-    size = start_size(len(prior)) if initial is None else initial
     engine = Bolfi(
         prior,
         observed,
@@ -76,13 +74,13 @@ def fit(  # noqa: PLR0913  the one call that most users make
         acquisition=acquisition,
         seed=seed,
         discrepancy=discrepancy,
-        initial=size,
+        initial=initial,
         threshold=threshold,
         transform=transform,
     )
-    if budget < size:
+    if budget < engine.initial:
         raise ValueError(
-            f"budget={budget} is smaller than the start design of initial={size} points; "
+            f"budget={budget} is smaller than the start design of initial={engine.initial} points; "
             "raise budget or lower initial"
         )
     with ExitStack() as stack:

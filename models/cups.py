@@ -70,17 +70,6 @@ class PourPlan(_Section, frozen=True):
         """Angle at which the source stays [rad]."""
         return float(np.radians(self.final_angle_deg))
 
-    @property
-    def angular_velocity_range(self) -> tuple[float, float]:
-        """Range of the decision [rad/s]."""
-        low, high = np.radians(self.angular_velocity_deg_s)
-        return float(low), float(high)
-
-    @property
-    def distance_range(self) -> tuple[float, float]:
-        """Range of the decision [m]."""
-        return self.distance
-
     @model_validator(mode="after")
     def _ranges_ascend(self) -> "PourPlan":
         for name in ("angular_velocity_deg_s", "distance"):
@@ -126,12 +115,13 @@ class Cups(_Section, frozen=True):
     @property
     def angular_velocity_range(self) -> tuple[float, float]:
         """Range of the decision [rad/s]."""
-        return self.pour.angular_velocity_range
+        low, high = np.radians(self.pour.angular_velocity_deg_s)
+        return float(low), float(high)
 
     @property
     def distance_range(self) -> tuple[float, float]:
         """Range of the decision [m]."""
-        return self.pour.distance_range
+        return self.pour.distance
 
     @property
     def liquid_volume(self) -> float:

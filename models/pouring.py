@@ -1,6 +1,5 @@
 """Pouring: an action in, the fractions spilled, received and retained out."""
 
-import os
 from dataclasses import dataclass
 from functools import cache
 
@@ -12,10 +11,10 @@ from .cups import Cups
 from .liquid import Liquid
 from .numerics import POUR_PARTICLES, Numerics
 from .packing import checked_seeds, pack_cylinder
+from .runtime import CHUNK
 
 SETTLING = 0.6  # s
 DRIP = 1.2  # s beyond the cups' hold; viscous liquids need it, and others end earlier
-CHUNK = 240  # substeps a kernel call
 
 
 @dataclass(frozen=True)
@@ -91,9 +90,8 @@ def _scene(cups: Cups, particles: int):
     runtime.start()
     from .pouring_kernel import PouringScene
 
-    slots = max(8, os.cpu_count() or 1)
     spacing = (cups.liquid_volume / particles) ** (1.0 / 3.0)
-    return PouringScene(slots, particles, spacing, Numerics(), cups)
+    return PouringScene(runtime.SLOTS, particles, spacing, Numerics(), cups)
 
 
 def _run(scene, cups, liquid, action, seeds) -> np.ndarray:

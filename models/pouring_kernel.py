@@ -21,7 +21,7 @@ class PouringScene(Fluid):
         reach = (4.0 * source.radius**2 + source.height**2) ** 0.5
         drop = cups.pour.lip_height - cups.receiver.height
         side = source.radius + 2.0 * spacing
-        ahead = cups.pour.distance_range[1] + cups.receiver.radius
+        ahead = cups.distance_range[1] + cups.receiver.radius
         extent = [(-reach, -side, -drop), (max(reach, ahead), side, reach)]
         super().__init__(slots, particles, spacing, numerics, extent)
         self.cup_radius, self.cup_height = source.radius, source.height

@@ -6,6 +6,9 @@ import os
 import threading
 from functools import cache
 
+SLOTS = max(8, os.cpu_count() or 1)  # simulations of a scene side by side
+CHUNK = 240  # substeps a kernel call, so that Ctrl-C is prompt
+
 LOCK = threading.Lock()
 """Held while a scene runs: Taichi's runtime and a scene's fields serve one thread at a time."""
 

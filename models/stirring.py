@@ -1,6 +1,5 @@
 """Stirring: a recorded gripper path in, the stick's inclination out."""
 
-import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cache
@@ -13,9 +12,9 @@ from . import runtime
 from .liquid import Liquid
 from .numerics import MODEL_VERSION, Numerics
 from .packing import checked_seeds, pack_cylinder
+from .runtime import CHUNK
 
 SETTLING = 1.0  # s that a packing relaxes around the held stick
-CHUNK = 240  # substeps a kernel call, so that Ctrl-C is prompt
 
 
 class GripperPath(Protocol):
@@ -205,7 +204,7 @@ def _scene(setup: StirSetup):
     runtime.start()
     from .stirring_kernel import StirringScene
 
-    return StirringScene(max(8, os.cpu_count() or 1), setup)
+    return StirringScene(runtime.SLOTS, setup)
 
 
 def _run(scene, setup, liquid, path, seeds) -> np.ndarray:

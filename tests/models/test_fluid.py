@@ -49,10 +49,8 @@ def free_fluid():
                     self.couple(0)
                     self.relax(0)
 
-    def build(positions, viscosity, cohesion, numerics=None):
-        fluid = FreeFluid(
-            1, len(positions), SPACING, numerics or models.Numerics(), [(-0.1,) * 3, (0.1,) * 3]
-        )
+    def build(positions, viscosity, cohesion):
+        fluid = FreeFluid(1, len(positions), SPACING, models.Numerics(), [(-0.1,) * 3, (0.1,) * 3])
         fluid.place(positions[None].astype(np.float32))
         fluid.pour_in(models.Liquid(viscosity, cohesion, DENSITY).batch(1))
         return fluid
