@@ -3,12 +3,18 @@
 Public names only; what is not listed may change. Nothing here knows what is simulated.
 """
 
-from .acquisition import LowerConfidenceBound
+from .acquisition import (
+    ExpectedIntegratedVariance,
+    LowerConfidenceBound,
+    MaxVariance,
+    PosteriorDraws,
+)
 from .bank import Simulation, SimulationBank
 from .base import Acquisition, Discrepancy, Simulator, Surrogate
 from .bolfi import Bolfi
 from .discrepancy import squared_difference
-from .likelihood import Quantile
+from .families import DiscrepancyFamily, SignalFamily
+from .likelihood import Predicted, Quantile
 from .loop import fit
 from .posterior import Closest, Fit
 from .prior import Prior
@@ -19,11 +25,17 @@ __all__ = [
     "Bolfi",
     "Closest",
     "Discrepancy",
+    "DiscrepancyFamily",
+    "ExpectedIntegratedVariance",
     "Fit",
     "Job",
     "LowerConfidenceBound",
+    "MaxVariance",
+    "PosteriorDraws",
+    "Predicted",
     "Prior",
     "Quantile",
+    "SignalFamily",
     "Simulation",
     "SimulationBank",
     "Simulator",

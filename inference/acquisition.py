@@ -1,16 +1,29 @@
-"""Acquisition rules: where to simulate next."""
+"""Acquisition rules: where to simulate next.
 
+Every rule scores in logs, so that nothing underflows far from the posterior, and believes each
+point of a batch before it chooses the next (see `believe` of the surrogates).
+"""
+
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cache, partial
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from scipy.special import ndtr, ndtri
 
 from ._float64 import in_float64
-from .gp import GP, predict
+from .base import LogLikelihood, LogSecondMoment, Surrogate
+from .feasibility import Feasibility, log_feasible
+from .gp import GP, predict, predict_joint, predict_many
 from .optimise import minimise_in_box
-from .surrogate import DiscrepancySurrogate
+from .screen import ROUNDS, screen
+from .target import log_likelihoods
+
+CANDIDATES = 128  # points among which a rule chooses
+NODES = 64  # points over which a variance is integrated
 
 
 class LCBState(NamedTuple):
@@ -18,6 +31,7 @@ class LCBState(NamedTuple):
 
     gp: GP
     width: jax.Array  # []
+    feasibility: Feasibility
 
 
 def exploration_width(t: int, dimension: int, epsilon: float = 0.1) -> float:
@@ -32,9 +46,12 @@ def exploration_width(t: int, dimension: int, epsilon: float = 0.1) -> float:
 
 
 def lower_confidence_bound(state: LCBState, u: jax.Array) -> jax.Array:
-    """mu - eta sqrt(v) at u [d], v the variance of the latent mean (without noise)."""
+    """mu - eta sqrt(v) at u [d], v the variance of the latent mean (without noise).
+
+    In standard deviations of the targets, less the log chance that a run at u succeeds.
+    """
     mean, variance = predict(state.gp, u)
-    return mean - state.width * jnp.sqrt(variance)
+    return jnp.mean(mean - state.width * jnp.sqrt(variance)) - log_feasible(state.feasibility, u)
 
 
 @dataclass(frozen=True)
@@ -57,26 +74,198 @@ class LowerConfidenceBound:
             raise ValueError(f"jitter must be positive, got {self.jitter}")
 
     @in_float64
-    def __call__(self, key: jax.Array, surrogate: DiscrepancySurrogate, n: int) -> np.ndarray:
+    def __call__(
+        self, key: jax.Array, surrogate: Surrogate, n: int, feasibility: Feasibility
+    ) -> np.ndarray:
         """n points u [n, d]; each is believed before the next is chosen."""
-        points = []
-        for subkey in jax.random.split(key, n):
+        rng, points = generator(key), []
+        while len(points) < n:
             dimension = surrogate.gp.data.u.shape[1]
-            width = jnp.asarray(exploration_width(surrogate.count, dimension))
-            centre = minimise_in_box(
-                lower_confidence_bound, LCBState(surrogate.gp, width), dimension
-            )
-            points.append(truncated_normal(subkey, centre, self.jitter))
-            surrogate = surrogate.believe(points[-1][None])
+            width = jnp.asarray(exploration_width(int(surrogate.gp.data.count), dimension))
+            state = LCBState(surrogate.gp, width, feasibility)
+            centre = minimise_in_box(lower_confidence_bound, state, dimension)
+            points.append(truncated_normal(rng, centre, self.jitter))
+            if len(points) < n:
+                surrogate = surrogate.believe(points[-1][None])
         return np.stack(points)
 
 
-def truncated_normal(key: jax.Array, centre: np.ndarray, sd: float) -> np.ndarray:
+def generator(key: jax.Array) -> np.random.Generator:
+    """NumPy's random numbers for a key: a handful needs no compilation."""
+    return np.random.default_rng(np.asarray(jax.random.key_data(key)))
+
+
+def truncated_normal(rng: np.random.Generator, centre: np.ndarray, sd: float) -> np.ndarray:
     """Gaussian around `centre` [d], truncated to the unit box."""
-    low, high = -centre / sd, (1.0 - centre) / sd
-    z = jax.random.truncated_normal(key, low, high, centre.shape)
-    return np.clip(centre + sd * np.asarray(z), 1e-9, 1.0 - 1e-9)
+    low, high = ndtr(-centre / sd), ndtr((1.0 - centre) / sd)
+    z = ndtri(low + (high - low) * rng.uniform(size=centre.shape))
+    return np.clip(centre + sd * z, 1e-9, 1.0 - 1e-9)
 
 
-RULES = {"lcb": LowerConfidenceBound}
+class Candidates(NamedTuple):
+    """Points that stand for sqrt(L): for the posterior, and for where it may yet lie."""
+
+    u: np.ndarray  # [CANDIDATES, d]; the same point may appear more than once
+    log_feasible: np.ndarray  # [CANDIDATES], log chance that a run succeeds
+
+
+def candidates(
+    rng: np.random.Generator, surrogate: Surrogate, feasibility: Feasibility
+) -> Candidates:
+    """Systematic resample of a population that importance sampling found."""
+    dimension = surrogate.gp.data.u.shape[1]
+    shifts = rng.uniform(size=(ROUNDS, dimension + 1))
+    found = screen(jnp.asarray(shifts), _root(surrogate.log_likelihood), surrogate.state)
+    log_weights = np.asarray(found.log_weights)
+    total = np.cumsum(np.exp(log_weights - log_weights.max()))
+    positions = (np.arange(CANDIDATES) + rng.uniform()) / CANDIDATES
+    rows = np.minimum(np.searchsorted(total, positions * total[-1]), len(total) - 1)
+    u = np.asarray(found.u)[rows]
+    return Candidates(u, np.asarray(_feasible(feasibility, jnp.asarray(u))))
+
+
+@cache
+def _root(log_likelihood: LogLikelihood) -> LogLikelihood:
+    """log sqrt(L), half as steep; one function object for each, so that compilations last."""
+
+    def root(state: Any, u: jax.Array) -> jax.Array:
+        return 0.5 * log_likelihood(state, u)
+
+    return root
+
+
+@jax.jit
+def _feasible(feasibility: Feasibility, u: jax.Array) -> jax.Array:
+    return jax.vmap(log_feasible, (None, 0))(feasibility, u)
+
+
+@partial(jax.jit, static_argnums=(0, 1))
+def _log_moments(
+    log_likelihood: LogLikelihood, log_second_moment: LogSecondMoment, state: Any, u: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    """log E[L] and log E[L^2] at u [n, d]."""
+    first = jax.vmap(log_likelihood, (None, 0))(state, u)
+    return first, jax.vmap(log_second_moment, (None, 0, None))(state, u, None)
+
+
+def log_moments(surrogate: Surrogate, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """log E[L] and log Var[L] at u [n, d], L being known only through the surrogate."""
+    functions = surrogate.log_likelihood, surrogate.log_second_moment
+    first, second = map(np.asarray, _log_moments(*functions, surrogate.state, jnp.asarray(u)))
+    excess = np.maximum(second - 2.0 * first, 1e-12)
+    return first, 2.0 * first + excess + np.log(-np.expm1(-excess))
+
+
+Score = Callable[[np.random.Generator, Surrogate, np.ndarray], np.ndarray]
+"""(rng, surrogate, u [n, d]) -> log scores [n]."""
+
+
+def best_candidates(
+    score: Score, key: jax.Array, surrogate: Surrogate, n: int, feasibility: Feasibility
+) -> np.ndarray:
+    """The candidates of highest score, each believed before the next is scored: [n, d].
+
+    The score is lowered by the log chance that a run succeeds.
+    """
+    rng = generator(key)
+    found = candidates(rng, surrogate, feasibility)
+    points: list[np.ndarray] = []
+    while len(points) < n:
+        scores = score(rng, surrogate, found.u) + found.log_feasible
+        for point in points:
+            scores[(found.u == point).all(-1)] = -np.inf
+        points.append(found.u[np.argmax(scores)])
+        if len(points) < n:
+            surrogate = surrogate.believe(points[-1][None])
+    return np.stack(points)
+
+
+@dataclass(frozen=True)
+class MaxVariance:
+    """Maximise Var[L(u)] (MaxVar, Jarvenpaa et al. 2019)."""
+
+    @in_float64
+    def __call__(
+        self, key: jax.Array, surrogate: Surrogate, n: int, feasibility: Feasibility
+    ) -> np.ndarray:
+        """n different points u [n, d]."""
+        return best_candidates(self._score, key, surrogate, n, feasibility)
+
+    @staticmethod
+    def _score(_: np.random.Generator, surrogate: Surrogate, u: np.ndarray) -> np.ndarray:
+        return log_moments(surrogate, u)[1]
+
+
+@dataclass(frozen=True)
+class PosteriorDraws:
+    """Draws from the posterior, mixed with maximisers of Var[L(u)].
+
+    Attributes:
+        share: Of draws among the points.
+    """
+
+    share: float = 0.5
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.share <= 1.0:
+            raise ValueError(f"share must be from 0 to 1, got {self.share}")
+
+    @in_float64
+    def __call__(
+        self, key: jax.Array, surrogate: Surrogate, n: int, feasibility: Feasibility
+    ) -> np.ndarray:
+        """n different points u [n, d]."""
+        return best_candidates(self._score, key, surrogate, n, feasibility)
+
+    def _score(self, rng: np.random.Generator, surrogate: Surrogate, u: np.ndarray) -> np.ndarray:
+        first, variance = log_moments(surrogate, u)
+        if rng.uniform() >= self.share:
+            return variance
+        # the largest of these is a draw in proportion to sqrt(L), which the candidates lack
+        return 0.5 * first + rng.gumbel(size=first.shape)
+
+
+@partial(jax.jit, static_argnums=0)
+def _log_resolved(
+    log_second_moment: LogSecondMoment, state: Any, u: jax.Array, nodes: jax.Array
+) -> jax.Array:
+    """log E[E[L(node) | a run at u]^2], [m, n] for nodes [m, d] and u [n, d]."""
+    noise = jnp.exp(2.0 * state.gp.hyper.log_noise)[:, None]
+    at_u = predict_many(state.gp, u)[1] + noise
+    spread = predict_joint(state.gp, nodes, u) ** 2 / at_u[:, None, :]  # [k, m, n]
+    of_pair = jax.vmap(log_second_moment, (None, None, 1))
+    return jax.vmap(of_pair, (None, 0, 1))(state, nodes, spread)
+
+
+@dataclass(frozen=True)
+class ExpectedIntegratedVariance:
+    """Minimise Var[L] as it is expected after the run, integrated over the box.
+
+    EIV of Jarvenpaa et al. (2019), EIVAR of Surer et al. (2024). Since E[L^2] does not change
+    in expectation, that is to maximise the integral of E[E[L | run]^2].
+    """
+
+    @in_float64
+    def __call__(
+        self, key: jax.Array, surrogate: Surrogate, n: int, feasibility: Feasibility
+    ) -> np.ndarray:
+        """n different points u [n, d]."""
+        return best_candidates(self._score, key, surrogate, n, feasibility)
+
+    @staticmethod
+    def _score(rng: np.random.Generator, surrogate: Surrogate, u: np.ndarray) -> np.ndarray:
+        nodes = u[rng.permutation(len(u))[:NODES]]
+        arguments = surrogate.state, jnp.asarray(u), jnp.asarray(nodes)
+        resolved = np.asarray(_log_resolved(surrogate.log_second_moment, *arguments))
+        log_likelihood = np.asarray(log_likelihoods(surrogate.log_likelihood, *arguments[::2]))
+        # the nodes were drawn in proportion to sqrt(L)
+        return np.logaddexp.reduce(resolved - 0.5 * log_likelihood[:, None], axis=0)
+
+
+RULES = {
+    "lcb": LowerConfidenceBound,
+    "maxvar": MaxVariance,
+    "eiv": ExpectedIntegratedVariance,
+    "draws": PosteriorDraws,
+}
 """Acquisitions by the name users give."""

@@ -12,6 +12,9 @@ Theta = Mapping[str, np.ndarray]
 LogLikelihood = Callable[[Any, jax.Array], jax.Array]
 """(state, u [d]) -> scalar. A module-level function, so that what it compiles to is cached."""
 
+LogSecondMoment = Callable[[Any, jax.Array, Any], jax.Array]
+"""(state, u [d], spread [k] or None) -> scalar; see `acquisition`."""
+
 
 class Simulator(Protocol):
     """Anything that turns parameters into signals, one row per seed."""

@@ -1,22 +1,23 @@
 """Ask and tell: Bayesian optimisation for likelihood-free inference, one step at a time."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import acquisition as acquisitions
-from . import surrogate as surrogates
-from .base import Acquisition, Discrepancy, Theta
+from .base import Acquisition, Surrogate, Theta
 from .design import sobol, start_size
-from .discrepancy import evaluate, squared_difference
-from .likelihood import Threshold, check_rule
+from .families import Family, Learnable, resolve
+from .feasibility import feasibility
+from .gp import padded_rows
 from .posterior import Fit
 from .prior import Prior
-from .state import UNKNOWN, History, init, remember_asked, remember_told
-from .transform import TRANSFORMS
+from .replicates import next_replicate
+from .state import UNKNOWN, History, explain, init, remember_asked, remember_told
 
 LARGEST = 2**31 - 1  # that every random number generator takes as a seed
 MIN_LEARN = 3  # successful simulations before the surrogate may choose
@@ -30,66 +31,58 @@ class Bolfi:
 
     Args:
         prior: The parameters and their priors.
-        observed: The measured signal [*signal_shape], time first; NaN is a missing sample.
-        surrogate: "discrepancy".
-        acquisition: "lcb", an object (see `Acquisition`), or None for the surrogate's best.
+        observed: The measured output [*signal_shape], time first; NaN is a missing sample.
+        surrogate: "signal", which emulates the output; "discrepancy", the paper's; a
+            `SignalFamily` or `DiscrepancyFamily`; None is "signal" where the output is a
+            vector and no option of "discrepancy" is given.
+        acquisition: "eiv", "maxvar", "draws", "lcb" (with "discrepancy"), an object (see
+            `Acquisition`), or None for the surrogate's best.
         seed: Fixes the start design and the acquisitions.
-        discrepancy: Callable (observed, simulated) -> float; None is `squared_difference()`.
         initial: Points of the Sobol start design; None is 2 d + 3.
-        threshold: Rule for eps, see `likelihood.choose_threshold`.
-        transform: "identity", "sqrt" or "log" of the discrepancy; None chooses by
-            leave-one-out log predictive density.
+        capacity: Simulations for which arrays are reserved, rounded up to a power of two; up
+            to there nothing is compiled anew. Small ones are faster, larger runs double it.
+        options: Of the surrogate's family: `summary`, `noise`, `components`, `discrepancy` of
+            "signal"; `discrepancy`, `transform`, `threshold`, `hyper_draws` of "discrepancy".
 
     Raises:
         ValueError: an argument is not one of the above.
     """
 
-    def __init__(  # noqa: PLR0913  one flat place for what defines a run
+    def __init__(
         self,
         prior: Prior,
         observed: ArrayLike,
         *,
-        surrogate: str = "discrepancy",
+        surrogate: str | Family | None = None,
         acquisition: str | Acquisition | None = None,
         seed: int = 0,
-        discrepancy: Discrepancy | None = None,
         initial: int | None = None,
-        threshold: Threshold = None,
-        transform: str | None = None,
+        capacity: int = 256,
+        **options: Any,
     ):
         if not isinstance(prior, Prior):
             raise ValueError(f"prior must be a Prior, got {type(prior).__name__}")
-        if surrogate not in surrogates.FAMILIES:
-            raise ValueError(
-                f"surrogate must be one of {tuple(surrogates.FAMILIES)}, got {surrogate!r}"
-            )
-        if transform is not None and transform not in TRANSFORMS:
-            raise ValueError(
-                f"transform must be one of {tuple(TRANSFORMS)} or None, got {transform!r}"
-            )
-        check_rule(threshold)
         self.prior = prior
         self.observed = np.asarray(observed, np.float64)
         self.seed = checked_integer("seed", seed, 0)
         self.initial = checked_integer(
             "initial", start_size(len(prior)) if initial is None else initial, MIN_LEARN
         )
-        self._learn = surrogates.FAMILIES[surrogate]
-        self._options = {"transform": transform, "threshold": threshold}
-        self._acquire = _resolve(acquisition)
-        self._any_shape = discrepancy is not None  # a user's own may compare unlike shapes
-        self._discrepancy = squared_difference() if discrepancy is None else discrepancy
-        if discrepancy is None:
-            self._discrepancy(self.observed, self.observed)  # raises if it cannot be used
+        self.capacity = checked_integer("capacity", capacity)
+        self.family = resolve(surrogate, self.observed, options)
+        self._learner = self.family.learner(self.observed)
+        self._acquire = _resolve(acquisition, self.family)
+        # a user's own function may compare unlike shapes
+        self._any_shape = self._learner.any_shape
         self.settings: dict[str, object] = {
-            "surrogate": surrogate,
+            "surrogate": self.family.name,
+            **{name: str(value) for name, value in vars(self.family).items()},
             "acquisition": repr(self._acquire),
             "seed": self.seed,
             "initial": self.initial,
-            "threshold": str(threshold),
-            "transform": str(transform),
         }
-        self._state = init(len(prior), self.observed.shape)
+        self._state = init(len(prior), self.observed.shape, self._learner.features)
+        self._learned: Surrogate | None = None
         self._seconds = 0.0
 
     @property
@@ -149,20 +142,37 @@ class Bolfi:
 
     def _acquired(self, n: int, designed: np.ndarray) -> np.ndarray:
         history = self._state.history
-        fitted = self._learned()
-        # a failed point teaches nothing, but must not be asked for ever
-        settled = history.u[~history.succeeded]
         pending = self.prior.to_unit(self.prior.to_dict(self._state.pending))
-        fitted = fitted.believe(np.concatenate([settled, pending, designed]))
-        key = jax.random.fold_in(jax.random.key(self.seed), self._state.asked)
-        return self._acquire(key, fitted, n)
+        pending = np.concatenate([pending, designed])
+        rows = self._rows(len(pending) + n)
+        self._learned = self._learner.learn(self._known(), rows, self._learned)
+        points = []
+        if self.family.replicates:
+            repeated = next_replicate(history, pending)
+            points += [] if repeated is None else [repeated]
+        if n > len(points):
+            runs = feasibility(history.u, history.succeeded, rows)
+            key = jax.random.fold_in(jax.random.key(self.seed), self._state.asked)
+            believing = self._learned.believe(pending)
+            points += list(self._acquire(key, believing, n - len(points), runs))
+        return np.stack(points)
 
-    def _learned(self) -> surrogates.DiscrepancySurrogate:
+    def _known(self) -> Learnable:
         history = self._state.history
         good = history.succeeded
-        return self._learn(history.u[good], history.discrepancy[good], **self._options)
+        return Learnable(history.u[good], history.features[good], history.discrepancy[good])
 
-    def tell(self, theta: Theta, signals: ArrayLike, seeds: ArrayLike | None = None) -> None:
+    def _rows(self, extra: int) -> int:
+        """Rows of the arrays for what was told and `extra` more."""
+        return padded_rows(max(self.capacity, self.told + extra))
+
+    def tell(
+        self,
+        theta: Theta,
+        signals: ArrayLike,
+        seeds: ArrayLike | None = None,
+        errors: Sequence[str] | None = None,
+    ) -> None:
         """Give the engine finished simulations: any number, any order, asked for or not.
 
         A row of NaN reports a failed run. It counts as told, but nothing is learned from it.
@@ -171,6 +181,7 @@ class Bolfi:
             theta: Name -> [n], in the prior's support.
             signals: [n, *signal_shape].
             seeds: Seeds of the runs [n], to be kept with the results.
+            errors: Why a run failed [n], to be kept for rows of NaN; "" elsewhere.
 
         Raises:
             ValueError: shapes disagree, or theta lies outside the prior's support.
@@ -184,13 +195,16 @@ class Bolfi:
         if outside.size:
             first = {name: float(column[outside[0]]) for name, column in rows.items()}
             raise ValueError(f"theta must lie in the support of the prior, got {first}")
+        features, discrepancy = self._learner.measure(signals)
         told = History(
             theta=natural,
             u=self.prior.to_unit(rows),
             signals=signals,
-            discrepancy=evaluate(self._discrepancy, self.observed, signals),
+            features=features,
+            discrepancy=discrepancy,
             seeds=_seeds(seeds, len(natural)),
             rounds=np.full(len(natural), UNKNOWN),
+            errors=explain(signals, discrepancy, _errors(errors, len(natural))),
         )
         self._state = remember_told(self._state, told)
         self._seconds += time.perf_counter() - started
@@ -217,7 +231,7 @@ class Bolfi:
                 f"{self.told} told; tell more"
             )
         started = time.perf_counter()
-        fitted = self._learned()
+        fitted = self._learner.finish(self._known(), self._rows(0), self.seed)
         spent = self._seconds + time.perf_counter() - started
         return Fit(
             prior=self.prior,
@@ -229,18 +243,23 @@ class Bolfi:
         )
 
 
-def _resolve(acquisition: str | Acquisition | None) -> Acquisition:
+def _resolve(acquisition: str | Acquisition | None, family: Family) -> Acquisition:
     if acquisition is None:
-        return acquisitions.LowerConfidenceBound()
+        acquisition = family.acquisition
     if isinstance(acquisition, str):
         if acquisition not in acquisitions.RULES:
             raise ValueError(
                 f"acquisition must be one of {tuple(acquisitions.RULES)}, an object or None, "
                 f"got {acquisition!r}"
             )
-        return acquisitions.RULES[acquisition]()
+        acquisition = acquisitions.RULES[acquisition]()
     if not callable(acquisition):
         raise ValueError(f"acquisition must be callable, got {type(acquisition).__name__}")
+    if isinstance(acquisition, acquisitions.LowerConfidenceBound) and family.name != "discrepancy":
+        raise ValueError(
+            f"the acquisition 'lcb' needs surrogate='discrepancy', got {family.name!r}; use one "
+            f"of {tuple(name for name in acquisitions.RULES if name != 'lcb')}"
+        )
     return acquisition
 
 
@@ -263,4 +282,11 @@ def _seeds(seeds: ArrayLike | None, n: int) -> np.ndarray:
     array = np.asarray(seeds, np.int64)
     if array.shape != (n,):
         raise ValueError(f"seeds must have shape ({n},), one per theta, got {array.shape}")
+    return array
+
+
+def _errors(errors: Sequence[str] | None, n: int) -> np.ndarray:
+    array = np.full(n, "") if errors is None else np.asarray(errors, str)
+    if array.shape != (n,):
+        raise ValueError(f"errors must have shape ({n},), one per theta, got {array.shape}")
     return array

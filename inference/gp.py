@@ -1,7 +1,7 @@
-"""Gaussian process with ARD kernel and quadratic mean, on arrays padded to a fixed shape.
+"""Independent Gaussian processes over the same inputs, on arrays of a fixed shape.
 
-Shapes: p rows, of which `mask` marks those in use; d inputs u in [0, 1]. Padding never changes
-a result (tests), and lets one compilation serve while the data grow.
+Shapes: k processes; p rows, of which the first `count` are in use; d inputs u in [0, 1].
+What is not in use never changes a result (tests), so one compilation serves while data grow.
 """
 
 from typing import NamedTuple
@@ -19,42 +19,42 @@ JITTER = 1e-8
 
 class Data(NamedTuple):
     u: jax.Array  # [p, d]
-    y: jax.Array  # [p], standardised; 0 in padding
-    mask: jax.Array  # bool [p]
+    y: jax.Array  # [k, p], standardised; 0 where not in use
+    count: jax.Array  # int []
 
 
 class Hyper(NamedTuple):
-    log_length: jax.Array  # [d], in prior quantiles
-    log_amplitude: jax.Array  # [], in units of y
-    log_noise: jax.Array  # [], sd, in units of y
+    log_length: jax.Array  # [k, d], in prior quantiles
+    log_amplitude: jax.Array  # [k], in units of y
+    log_noise: jax.Array  # [k], sd, in units of y
 
 
 class GP(NamedTuple):
-    """A conditioned process, ready to predict."""
+    """Conditioned processes, ready to predict."""
 
     hyper: Hyper
     data: Data
-    whitener: jax.Array  # [p, p], inverse Cholesky factor of the Gram matrix
-    weights: jax.Array  # [p], inverse Gram matrix times y
+    whitener: jax.Array  # [k, p, p], inverse Cholesky factors of the Gram matrices
+    weights: jax.Array  # [k, p], inverse Gram matrices times y
 
 
 def pad(u: np.ndarray, y: np.ndarray, rows: int) -> Data:
-    """Data of n rows in arrays of `rows`."""
-    extra = rows - len(y)
+    """Data u [n, d], y [k, n] in arrays of `rows`."""
+    extra = rows - len(u)
     return Data(
         jnp.asarray(np.pad(u, ((0, extra), (0, 0)), constant_values=0.5)),
-        jnp.asarray(np.pad(y, (0, extra))),
-        jnp.arange(rows) < len(y),
+        jnp.asarray(np.pad(y, ((0, 0), (0, extra)))),
+        jnp.asarray(len(u)),
     )
 
 
 def padded_rows(n: int) -> int:
-    """Rows reserved for n points: powers of two from 64, so that growth rarely recompiles."""
+    """Rows reserved for n points: powers of two from 64."""
     return max(64, 1 << (n - 1).bit_length())
 
 
 def covariance(hyper: Hyper, a: jax.Array, b: jax.Array) -> jax.Array:
-    """Prior covariance [n, m] of the latent function at a [n, d] and b [m, d].
+    """Prior covariance [n, m] of one latent function at a [n, d] and b [m, d].
 
     Squared exponential plus the trend a_j x_j^2 + b_j x_j + c of Gutmann and Corander
     (JMLR 2016), x = 2u - 1. Its coefficients are integrated out under broad Gaussians rather
@@ -75,37 +75,83 @@ def trend(u: jax.Array) -> jax.Array:
     return jnp.concatenate([jnp.ones((x.shape[0], 1)), x, x**2], axis=1)
 
 
-def gram(hyper: Hyper, data: Data) -> jax.Array:
-    """Covariance [p, p] of the targets; rows of padding are those of the identity."""
-    both = data.mask[:, None] & data.mask[None, :]
-    noise = jnp.where(data.mask, jnp.exp(2.0 * hyper.log_noise) + JITTER, 1.0)
-    return jnp.where(both, covariance(hyper, data.u, data.u), 0.0) + jnp.diag(noise)
+def gram(hyper: Hyper, u: jax.Array, count: jax.Array) -> jax.Array:
+    """Covariance [p, p] of one process's targets; rows not in use are those of the identity."""
+    used = jnp.arange(u.shape[0]) < count
+    noise = jnp.where(used, jnp.exp(2.0 * hyper.log_noise) + JITTER, 1.0)
+    both = used[:, None] & used[None, :]
+    return jnp.where(both, covariance(hyper, u, u), 0.0) + jnp.diag(noise)
 
 
 def condition(hyper: Hyper, data: Data) -> GP:
-    """The process given the data; an explicit inverse factor makes each prediction one product."""
-    whitener = inverse_cholesky(gram(hyper, data))
-    return GP(hyper, data, whitener, (whitener @ data.y) @ whitener)
+    """The processes given the data; explicit inverse factors make prediction a product."""
+
+    def one(hyper: Hyper, y: jax.Array) -> tuple[jax.Array, jax.Array]:
+        whitener = inverse_cholesky(gram(hyper, data.u, data.count), data.count)
+        return whitener, (whitener @ y) @ whitener
+
+    return GP(hyper, data, *jax.vmap(one)(hyper, data.y))
+
+
+def append_mean(gp: GP, u: jax.Array, extra: jax.Array) -> GP:
+    """The processes after their own mean at the first `extra` rows of u [q, d] came true.
+
+    The kriging believer of Ginsbourger et al. (2010): the mean stays, the variance shrinks.
+    There must be room: count + extra <= p.
+    """
+    p, q = gp.data.u.shape[0], u.shape[0]
+    mean = predict_many(gp, u)[0]
+    source = jnp.arange(p) - gp.data.count
+    new = (source >= 0) & (source < extra)
+    at = jnp.clip(source, 0, q - 1)
+    points = jnp.where(new[:, None], u[at], gp.data.u)
+    targets = jnp.where(new, mean[:, at], gp.data.y)
+    return condition(gp.hyper, Data(points, targets, gp.data.count + extra))
+
+
+def _cross(gp: GP, u: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Covariance [k, p, m] of the latent functions at the data and at u [m, d]; the variance
+    [k, m] at u alone."""
+    used = (jnp.arange(gp.data.u.shape[0]) < gp.data.count)[:, None]
+    cross = jax.vmap(covariance, (0, None, None))(gp.hyper, gp.data.u, u) * used
+    trends = TREND_SD**2 * jnp.sum(trend(u) ** 2, -1)
+    return cross, jnp.exp(2.0 * gp.hyper.log_amplitude)[:, None] + trends
 
 
 def predict(gp: GP, u: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Mean and variance of the latent function (without noise) at u [d]."""
-    cross = covariance(gp.hyper, gp.data.u, u[None])[:, 0] * gp.data.mask
-    alone = covariance(gp.hyper, u[None], u[None])[0, 0]
-    explained = jnp.sum((gp.whitener @ cross) ** 2)
-    return cross @ gp.weights, jnp.maximum(alone - explained, JITTER)
+    """Means and variances [k] of the latent functions (without noise) at u [d]."""
+    mean, variance = predict_many(gp, u[None])
+    return mean[:, 0], variance[:, 0]
+
+
+def predict_many(gp: GP, u: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """`predict` at u [m, d]: [k, m] each."""
+    cross, alone = _cross(gp, u)
+    mean = jnp.einsum("kp,kpm->km", gp.weights, cross)
+    explained = jnp.sum((gp.whitener @ cross) ** 2, axis=1)
+    return mean, jnp.maximum(alone - explained, JITTER)
+
+
+def predict_joint(gp: GP, u: jax.Array, v: jax.Array) -> jax.Array:
+    """Posterior covariance [k, m, q] of the latent functions between u [m, d] and v [q, d]."""
+    at_u, at_v = gp.whitener @ _cross(gp, u)[0], gp.whitener @ _cross(gp, v)[0]
+    prior = jax.vmap(covariance, (0, None, None))(gp.hyper, u, v)
+    return prior - jnp.swapaxes(at_u, 1, 2) @ at_v
 
 
 def log_marginal_likelihood(hyper: Hyper, data: Data) -> jax.Array:
-    """log p(y | hyper), trend integrated out (Rasmussen and Williams 2006, eq. 2.30)."""
-    constant = -0.5 * jnp.sum(data.mask) * jnp.log(2.0 * jnp.pi)
-    return log_normal_density(gram(hyper, data), data.y) + constant
+    """log p(y | hyper) [k], trend integrated out (Rasmussen and Williams 2006, eq. 2.30)."""
+
+    def one(hyper: Hyper, y: jax.Array) -> jax.Array:
+        return log_normal_density(gram(hyper, data.u, data.count), y, data.count)
+
+    return jax.vmap(one)(hyper, data.y) - 0.5 * data.count * jnp.log(2.0 * jnp.pi)
 
 
 def leave_one_out(gp: GP) -> tuple[jax.Array, jax.Array]:
-    """Mean and variance [p] of each y given all others (Rasmussen and Williams, eq. 5.12).
+    """Mean and variance [k, p] of each y given all others (Rasmussen and Williams, eq. 5.12).
 
-    The variance includes the noise; rows of padding are meaningless.
+    The variance includes the noise; rows not in use are meaningless.
     """
-    variance = 1.0 / jnp.sum(gp.whitener**2, axis=0)
+    variance = 1.0 / jnp.sum(gp.whitener**2, axis=1)
     return gp.data.y - gp.weights * variance, variance

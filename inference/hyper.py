@@ -1,15 +1,12 @@
-"""Maximum a posteriori hyperparameters of the Gaussian process."""
-
-from functools import partial
+"""Maximum a posteriori hyperparameters of Gaussian processes."""
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from scipy.optimize import minimize
 from scipy.stats import norm, qmc
 
 from .gp import Data, Hyper, log_marginal_likelihood
-from .optimise import METHOD
+from .optimise import minimise_many
 
 # Normal priors of the logs: inputs are prior quantiles and targets have unit variance, so one
 # choice fits every parameter, unit and simulator.
@@ -20,45 +17,79 @@ SCORED, REFINED = 16, 2  # starts that are evaluated, and of these the best to b
 
 
 def log_prior(hyper: Hyper) -> jax.Array:
-    """Log density of the hyperparameters' logs, up to a constant."""
-    length = jnp.sum(((hyper.log_length - LENGTH[0]) / LENGTH[1]) ** 2)
+    """Log density [k] of the hyperparameters' logs, up to a constant."""
+    length = jnp.sum(((hyper.log_length - LENGTH[0]) / LENGTH[1]) ** 2, -1)
     amplitude = ((hyper.log_amplitude - AMPLITUDE[0]) / AMPLITUDE[1]) ** 2
     noise = ((hyper.log_noise - NOISE[0]) / NOISE[1]) ** 2
     return -0.5 * (length + amplitude + noise)
 
 
-def unpack(vector: jax.Array) -> Hyper:
-    """[d + 2] -> Hyper."""
-    return Hyper(vector[:-2], vector[-2], vector[-1])
+def unpack(vectors: jax.Array) -> Hyper:
+    """[k, d + 2] -> Hyper."""
+    return Hyper(vectors[:, :-2], vectors[:, -2], vectors[:, -1])
 
 
-def negative_log_posterior(vector: jax.Array, data: Data) -> jax.Array:
-    hyper = unpack(vector)
+def pack(hyper: Hyper) -> np.ndarray:
+    """Hyper -> [k, d + 2]."""
+    return np.column_stack([np.asarray(part) for part in hyper])
+
+
+def negative_log_posterior(vectors: jax.Array, data: Data) -> jax.Array:
+    """[k] of vectors [k, d + 2]."""
+    hyper = unpack(vectors)
     return -log_marginal_likelihood(hyper, data) - log_prior(hyper)
 
 
-_value_and_grad = jax.jit(jax.value_and_grad(negative_log_posterior))
-_values = jax.jit(jax.vmap(negative_log_posterior, in_axes=(0, None)))
+@jax.jit
+def _value_and_grad(vectors: jax.Array, data: Data) -> tuple[jax.Array, jax.Array]:
+    """[k] and [k, d + 2]; processes are independent, so the gradient of their sum serves all."""
+
+    def total(vectors: jax.Array) -> tuple[jax.Array, jax.Array]:
+        values = negative_log_posterior(vectors, data)
+        return jnp.sum(values), values
+
+    gradient, values = jax.grad(total, has_aux=True)(vectors)
+    return values, gradient
+
+
+def prior_moments(dimension: int) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and sd [dimension + 2] of the hyperparameters' logs."""
+    mean, sd = np.array([LENGTH] * dimension + [AMPLITUDE, NOISE]).T
+    return mean, sd
 
 
 def starts(dimension: int) -> np.ndarray:
     """Fixed quasi-random draws from the priors, [SCORED, dimension + 2]."""
-    mean, sd = np.array([LENGTH] * dimension + [AMPLITUDE, NOISE]).T
+    mean, sd = prior_moments(dimension)
     uniform = qmc.Halton(dimension + 2, scramble=False).random(SCORED + 1)[1:]
     return mean + sd * norm.ppf(uniform)
 
 
-def maximum_a_posteriori(data: Data) -> Hyper:
-    """Best of several truncated Newton runs; a pure function of the data, so resuming agrees."""
+def maximum_a_posteriori(data: Data, previous: Hyper | None = None) -> Hyper:
+    """The best of several quasi-Newton runs for each of the k processes.
 
-    def objective(vector: np.ndarray) -> tuple[float, np.ndarray]:
-        value, gradient = _value_and_grad(vector, data)
-        return float(value), np.asarray(gradient)
+    A pure function of its arguments, so resuming agrees.
 
+    Args:
+        previous: The optimum for less data; optimisation then starts from there alone.
+    """
+
+    def refine(start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return minimise_many(lambda vectors: _value_and_grad(vectors, data), start)
+
+    if previous is not None:
+        return unpack(jnp.asarray(refine(pack(previous))[0]))
+    k = data.y.shape[0]
     candidates = starts(data.u.shape[1])
-    scores = np.asarray(_values(candidates, data))
-    order = np.argsort(np.where(np.isfinite(scores), scores, np.inf))[:REFINED]
-    refine = partial(minimize, objective, jac=True, method=METHOD, options={"maxfun": 100})
-    results = [refine(candidates[i]) for i in order]
-    best = min(results, key=lambda r: r.fun if np.isfinite(r.fun) else np.inf)
-    return unpack(jnp.asarray(best.x))
+    scores = np.array([_value_and_grad(np.tile(c, (k, 1)), data)[0] for c in candidates])
+    order = np.argsort(np.where(np.isfinite(scores), scores, np.inf), axis=0)
+    runs = [refine(candidates[order[i]]) for i in range(REFINED)]
+    best = np.argmin([values for _, values in runs], axis=0)
+    return unpack(jnp.asarray(np.array([found for found, _ in runs])[best, np.arange(k)]))
+
+
+def reset(hyper: Hyper, empty: np.ndarray) -> Hyper:
+    """The prior's mode where `empty` [k]: targets that are all zero have no optimum."""
+    lengths = jnp.where(empty[:, None], LENGTH[0], hyper.log_length)
+    amplitude = jnp.where(empty, AMPLITUDE[0], hyper.log_amplitude)
+    return Hyper(lengths, amplitude, jnp.where(empty, NOISE[0], hyper.log_noise))

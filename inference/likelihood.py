@@ -1,12 +1,14 @@
 """The approximate likelihood of a threshold on the discrepancy."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.scipy.special import log_ndtr
+from jax.scipy.special import log_ndtr, logsumexp
 from jax.scipy.stats import norm
+from scipy.special import ndtri
 
 from .gp import GP, predict
 from .transform import Transform
@@ -15,7 +17,7 @@ from .transform import Transform
 class ThresholdState(NamedTuple):
     """What the likelihood depends on; threshold in the standardised units of the GP."""
 
-    gp: GP
+    gp: GP  # k processes, one for each draw of the hyperparameters
     threshold: jax.Array  # []
 
 
@@ -25,20 +27,55 @@ class Quantile(NamedTuple):
     q: float
 
 
-Threshold = str | float | Quantile | None
+class Predicted(NamedTuple):
+    """Threshold at the q quantile of a new discrepancy at the surrogate's minimum, 0 < q < 1."""
+
+    q: float
+
+
+Threshold = str | float | Quantile | Predicted | None
 TAIL = -30.0
 RULES = ("min_mean", "min_observed")
+DEFAULT = Predicted(0.5)
+NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(12)
 
 
 def log_likelihood(state: ThresholdState, u: jax.Array) -> jax.Array:
     """log Phi((eps - mu(u)) / sigma(u)) at u [d], sigma^2 the variance of a new discrepancy.
 
     Gutmann and Corander (2016), eq. for Gaussian-process surrogates; Lopez-Guevara et al.
-    (2018), inference.
+    (2018), inference. The mean over the processes, where there are several.
     """
+    z, _ = _standardised(state, u)
+    return logsumexp(log_cdf(z)) - jnp.log(z.shape[0])
+
+
+def _standardised(state: ThresholdState, u: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """(eps - mu) / sigma and sigma^2, [k] each."""
     mean, variance = predict(state.gp, u)
     noisy = variance + jnp.exp(2.0 * state.gp.hyper.log_noise)
-    return log_cdf((state.threshold - mean) / jnp.sqrt(noisy))
+    return (state.threshold - mean) / jnp.sqrt(noisy), noisy
+
+
+def log_second_moment(state: ThresholdState, u: jax.Array, spread: jax.Array | None) -> jax.Array:
+    """log E[L(u)^2], the expectation over a latent mean that varies with variance `spread` [k].
+
+    `spread` is the latent variance now (None), which gives the second moment of the unknown
+    likelihood (Jarvenpaa et al. 2019, MaxVar), or that part of it which further simulations
+    will resolve (their expected integrated variance). Both are the chance that two variables
+    of correlation r = spread / sigma^2 lie below z: E_w[Phi((z + sqrt(r) w) / sqrt(1 - r))^2],
+    by Gauss and Hermite about the integrand's peak, in logs.
+    """
+    z, noisy = _standardised(state, u)
+    latent = noisy - jnp.exp(2.0 * state.gp.hyper.log_noise)
+    r = jnp.clip((latent if spread is None else spread) / noisy, 1e-12, 1.0 - 1e-6)[:, None]
+    z = z[:, None]
+    peak = 2.0 * jnp.sqrt(r) / (1.0 + r) * jnp.maximum(-z, 0.0)
+    width = jnp.where(z < 0.0, jnp.sqrt((1.0 - r) / (1.0 + r) + r), 1.0)
+    w = peak + width * NODES
+    inside = 2.0 * log_cdf((z + jnp.sqrt(r) * w) / jnp.sqrt(1.0 - r)) + norm.logpdf(w)
+    log_terms = inside - norm.logpdf(NODES) + jnp.log(width * WEIGHTS / jnp.sqrt(2.0 * jnp.pi))
+    return logsumexp(log_terms) - jnp.log(z.shape[0])
 
 
 @jax.custom_jvp
@@ -69,42 +106,53 @@ def check_rule(rule: Threshold) -> None:
     """Raise ValueError unless `rule` is a documented threshold rule."""
     if isinstance(rule, Quantile):
         valid = 0.0 <= rule.q <= 1.0
+    elif isinstance(rule, Predicted):
+        valid = 0.0 < rule.q < 1.0
     elif isinstance(rule, str):
         valid = rule in RULES
     else:
         valid = rule is None or np.isfinite(rule)
     if not valid:
         raise ValueError(
-            f"threshold must be one of {RULES}, Quantile(q) with 0 <= q <= 1, a finite number "
-            f"on the discrepancy's scale or None, got {rule!r}"
+            f"threshold must be one of {RULES}, Predicted(q) with 0 < q < 1, Quantile(q) with "
+            f"0 <= q <= 1, a finite number on the discrepancy's scale or None, got {rule!r}"
         )
 
 
 def choose_threshold(
-    rule: Threshold, discrepancy: np.ndarray, transform: Transform, min_mean: float
+    rule: Threshold,
+    discrepancy: np.ndarray,
+    transform: Transform,
+    at_minimum: Callable[[], tuple[float, float]],
 ) -> float:
     """The threshold on the transformed scale.
 
     Args:
-        rule: None or "min_mean", the minimum of the surrogate's mean over the box (Gutmann
-            and Corander 2016); "min_observed", the smallest discrepancy so far; a Quantile
-            of the discrepancies so far; or a number on the discrepancy's own scale.
+        rule: None is DEFAULT; Predicted(q), the q quantile of a new discrepancy at the
+            minimum of the surrogate's mean; "min_mean", that minimum itself, the same as
+            Predicted(0.5) (Gutmann and Corander 2016); "min_observed", the smallest
+            discrepancy so far; a Quantile of the discrepancies so far; or a number on the
+            discrepancy's own scale.
         discrepancy: Finite values [n].
         transform: That of the surrogate.
-        min_mean: Minimum of its mean, on the transformed scale.
+        at_minimum: Mean and sd of a new discrepancy at the minimum of the mean, on the
+            transformed scale; called where the rule needs them.
 
     Raises:
         ValueError: the transform is undefined at the given number.
     """
-    if rule is None or rule == "min_mean":
-        return min_mean
+    rule = DEFAULT if rule is None else Predicted(0.5) if rule == "min_mean" else rule
+    if isinstance(rule, Predicted):
+        mean, sd = at_minimum()
+        return mean + sd * float(ndtri(rule.q))
     if rule == "min_observed":
         return float(transform(discrepancy.min()))
     if isinstance(rule, Quantile):
         return float(transform(np.quantile(discrepancy, rule.q)))
-    if transform.name != "identity" and float(rule) + transform.offset <= 0:
+    number = float(rule)
+    if transform.name != "identity" and number + transform.offset <= 0:
         raise ValueError(
             f"threshold {rule} must be positive for the transform {transform.name!r}; "
             "give a positive one or transform='identity'"
         )
-    return float(transform(np.asarray(float(rule))))
+    return float(transform(np.asarray(number)))

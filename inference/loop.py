@@ -5,15 +5,16 @@ from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from .bank import Simulation, SimulationBank
-from .base import Acquisition, Discrepancy, Simulator
+from .base import Acquisition, Simulator
 from .bolfi import MIN_LEARN, Bolfi, checked_integer
-from .likelihood import Threshold
+from .families import Family
 from .posterior import Fit
 from .prior import Prior
 from .simulate import Job, jobs, run_missing, simulation_seed
@@ -27,16 +28,14 @@ def fit(  # noqa: PLR0913  the one call that most users make
     budget: int = 20,
     batch: int = 2,
     seed: int = 0,
-    surrogate: str = "discrepancy",
+    surrogate: str | Family | None = None,
     acquisition: str | Acquisition | None = None,
-    discrepancy: Discrepancy | None = None,
     initial: int | None = None,
-    threshold: Threshold = None,
-    transform: str | None = None,
     executor: Executor | None = None,
     bank: str | Path | SimulationBank = ":memory:",
     identity: str = "",
     progress: bool = False,
+    **options: Any,
 ) -> Fit:
     """Infer the parameters of `simulate` from `observed` with `budget` simulations.
 
@@ -73,10 +72,9 @@ def fit(  # noqa: PLR0913  the one call that most users make
         surrogate=surrogate,
         acquisition=acquisition,
         seed=seed,
-        discrepancy=discrepancy,
         initial=initial,
-        threshold=threshold,
-        transform=transform,
+        capacity=budget,
+        **options,
     )
     if budget < engine.initial:
         raise ValueError(

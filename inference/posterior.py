@@ -13,12 +13,12 @@ from scipy.special import ndtr
 
 from ._float64 import in_float64
 from .base import Theta
+from .discrepancy_surrogate import DiscrepancySurrogate
 from .ensemble import sample_emcee
 from .nuts import Length, sample_nuts
 from .prior import Prior
 from .results import posterior_tree, simulations_dataset
 from .state import History
-from .surrogate import DiscrepancySurrogate
 from .target import log_likelihoods
 
 SAMPLERS = {"nuts": sample_nuts, "emcee": sample_emcee}

@@ -15,6 +15,13 @@ class Transform(NamedTuple):
     def __call__(self, discrepancy: np.ndarray) -> np.ndarray:
         return TRANSFORMS[self.name][0](np.asarray(discrepancy) + self.offset)
 
+    def inverse(self, value: np.ndarray) -> np.ndarray:
+        """Delta where g(Delta + offset) = value; 0 where that would be negative."""
+        if self.name == "identity":
+            return np.asarray(value)
+        raw = np.exp(value) if self.name == "log" else np.maximum(value, 0.0) ** 2
+        return np.maximum(raw - self.offset, 0.0)
+
     def log_jacobian(self, discrepancy: np.ndarray) -> np.ndarray:
         """log |dg / dDelta|."""
         return TRANSFORMS[self.name][1](np.asarray(discrepancy) + self.offset)

@@ -1,17 +1,41 @@
+"""Acquisition rules against brute force, and on targets far from everything."""
+
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from bolfi_liquids.inference.acquisition import (
+    RULES,
     LCBState,
+    best_candidates,
     exploration_width,
+    log_moments,
     lower_confidence_bound,
     truncated_normal,
 )
 from bolfi_liquids.inference.design import sobol
-from bolfi_liquids.inference.surrogate import learn
-from scipy.stats import kstest, qmc, truncnorm
+from bolfi_liquids.inference.discrepancy_surrogate import learn
+from bolfi_liquids.inference.feasibility import feasibility, log_feasible
+from bolfi_liquids.inference.gp import predict
+from scipy.stats import kstest, multivariate_normal, norm, qmc, truncnorm
 
 from bolfi_liquids import inference
+
+ROWS = 64
+KEY = jax.random.key(0)
+AXIS = np.linspace(0.0, 1.0, 41)
+GRID = np.stack(np.meshgrid(AXIS, AXIS), -1).reshape(-1, 2)
+
+
+def fitted(n=12, noise=0.0, rule=None):
+    u = sobol(0, 0, n, 2)
+    values = 1.0 + ((u - 0.4) ** 2).sum(-1) + noise * np.random.default_rng(0).normal(size=n)
+    return learn(u, values, ROWS, "identity", rule)
+
+
+def all_succeed(surrogate):
+    n = int(surrogate.gp.data.count)
+    return feasibility(np.asarray(surrogate.gp.data.u)[:n], np.ones(n, bool), ROWS)
 
 
 def test_start_design_fills_the_box_and_continues():
@@ -27,44 +51,122 @@ def test_width_follows_the_papers_schedule():
     np.testing.assert_allclose(exploration_width(20, 2), expected)
 
 
-def test_minimises_mean_less_width_times_latent_sd():
-    u = sobol(0, 0, 12, 2)
-    fitted = learn(u, 1.0 + ((u - 0.4) ** 2).sum(-1), transform="identity")
-    chosen = inference.LowerConfidenceBound(jitter=1e-6)(jax.random.key(0), fitted, 1)
-    axis = np.linspace(0.0, 1.0, 41)
-    grid = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2)
+def test_lcb_minimises_mean_less_width_times_latent_sd():
+    surrogate = fitted()
+    runs = all_succeed(surrogate)
+    chosen = inference.LowerConfidenceBound(jitter=1e-6)(KEY, surrogate, 1, runs)
     with jax.enable_x64(True):
-        state = LCBState(fitted.gp, jax.numpy.asarray(exploration_width(12, 2)))
+        state = LCBState(surrogate.gp, jnp.asarray(exploration_width(12, 2)), runs)
         bound = jax.vmap(lower_confidence_bound, (None, 0))
-        assert bound(state, chosen)[0] <= bound(state, grid).min() + 1e-4
+        assert bound(state, chosen)[0] <= bound(state, GRID).min() + 1e-4
 
 
 def test_jitter_is_a_truncated_normal():
-    with jax.enable_x64(True):
-        keys = jax.random.split(jax.random.key(0), 500)
-        points = np.array([truncated_normal(k, np.array([0.02]), 0.05)[0] for k in keys])
+    rng = np.random.default_rng(0)
+    points = np.array([truncated_normal(rng, np.array([0.02]), 0.05)[0] for _ in range(500)])
     expected = truncnorm(-0.4, 19.6, loc=0.02, scale=0.05)
     assert kstest(points, expected.cdf).pvalue > 1e-4
     assert kstest(points, truncnorm(-0.2, 9.8, loc=0.02, scale=0.1).cdf).pvalue < 1e-4
 
 
-def test_belief_alone_separates_the_points_of_a_batch():
-    u = sobol(0, 0, 9, 2)
-    rng = np.random.default_rng(0)
-    fitted = learn(u, 1.0 + ((u - 0.4) ** 2).sum(-1) + 0.1 * rng.normal(size=9))
-    batch = inference.LowerConfidenceBound(jitter=1e-6)(jax.random.key(0), fitted, 4)
-    distances = np.linalg.norm(batch[:, None] - batch, axis=-1) + np.eye(4)
-    assert distances.min() > 0.02
-
-
 def test_jitter_keeps_points_off_the_bounds():
     """The least discrepancy lies in a corner, where every minimiser ends."""
     u = sobol(0, 0, 9, 2)
-    fitted = learn(u, 1.0 + u.sum(-1))
-    batch = inference.LowerConfidenceBound()(jax.random.key(0), fitted, 8)
+    surrogate = learn(u, 1.0 + u.sum(-1), ROWS)
+    batch = inference.LowerConfidenceBound()(KEY, surrogate, 8, all_succeed(surrogate))
     assert np.median(np.minimum(batch, 1.0 - batch).min(-1)) > 1e-3
 
 
-def test_jitter_must_be_positive():
+def test_jitter_and_share_are_checked():
     with pytest.raises(ValueError, match="jitter must be positive"):
         inference.LowerConfidenceBound(jitter=0.0)
+    with pytest.raises(ValueError, match="share must be from 0 to 1"):
+        inference.PosteriorDraws(share=1.5)
+
+
+def test_second_moment_agrees_with_the_bivariate_normal():
+    """E[Phi(..)^2] is the chance that two draws with a common latent mean both pass."""
+    surrogate = fitted(noise=0.1)
+    points = GRID[::97]
+    first, log_variance = log_moments(surrogate, points)
+    with jax.enable_x64(True):
+        mean, variance = jax.vmap(predict, (None, 0))(surrogate.gp, jnp.asarray(points))
+    total = np.asarray(variance)[:, 0] + np.exp(2.0 * float(surrogate.gp.hyper.log_noise[0]))
+    z = (float(surrogate.state.threshold) - np.asarray(mean)[:, 0]) / np.sqrt(total)
+    r = np.asarray(variance)[:, 0] / total
+    both = np.array(
+        [
+            multivariate_normal([0.0, 0.0], [[1.0, b], [b, 1.0]]).cdf([a, a])
+            for a, b in zip(z, r, strict=True)
+        ]
+    )
+    near = z > -4.0
+    assert near.sum() > 5
+    np.testing.assert_allclose(first, norm.logcdf(z), rtol=1e-6)
+    expected = both - norm.cdf(z) ** 2
+    np.testing.assert_allclose(np.exp(log_variance)[near], expected[near], rtol=0.03, atol=1e-7)
+
+
+def test_moments_are_finite_however_far_the_threshold():
+    for threshold in (-1e3, -1e8, -1e30, 1e30):
+        first, variance = log_moments(fitted(noise=0.1, rule=threshold), GRID[::40])
+        assert np.isfinite(first).all()
+        assert np.isfinite(variance).all()
+
+
+@pytest.mark.parametrize("name", RULES)
+def test_batches_differ_stay_in_the_box_and_repeat_with_the_key(name):
+    surrogate = fitted(noise=0.05)
+    runs = all_succeed(surrogate)
+    batch = RULES[name]()(KEY, surrogate, 4, runs)
+    distances = np.linalg.norm(batch[:, None] - batch, axis=-1) + np.eye(4)
+    assert distances.min() > 1e-4
+    assert ((batch > 0.0) & (batch < 1.0)).all()
+    np.testing.assert_array_equal(batch, RULES[name]()(KEY, surrogate, 4, runs))
+    assert not np.allclose(batch, RULES[name]()(jax.random.key(1), surrogate, 4, runs))
+
+
+def test_draws_follow_the_posterior():
+    """All-draws rule against the likelihood on a grid: means within 5 standard errors."""
+    surrogate = fitted(40, noise=0.1)
+    runs, rule = all_succeed(surrogate), inference.PosteriorDraws(share=1.0)
+    drawn = np.concatenate([rule(jax.random.key(i), surrogate, 1, runs) for i in range(60)])
+    log_likelihood = log_moments(surrogate, GRID)[0]
+    weight = np.exp(log_likelihood - log_likelihood.max())
+    mean = weight @ GRID / weight.sum()
+    sd = np.sqrt(weight @ (GRID - mean) ** 2 / weight.sum())
+    assert (np.abs(drawn.mean(0) - mean) < 5.0 * sd / np.sqrt(60.0)).all()
+
+
+def test_expected_variance_prefers_where_a_run_teaches():
+    """Beside many runs at one point, another there resolves next to nothing."""
+    centre = np.array([0.4, 0.4])
+    u = np.concatenate([sobol(0, 0, 9, 2), np.tile(centre, (12, 1))])
+    rng = np.random.default_rng(0)
+    values = 1.0 + ((u - 0.4) ** 2).sum(-1) + 0.02 * rng.normal(size=len(u))
+    surrogate = learn(u, values, ROWS, "identity")
+    chosen = RULES["eiv"]()(KEY, surrogate, 1, all_succeed(surrogate))[0]
+    assert np.linalg.norm(chosen - centre) > 0.05
+
+
+def test_regions_where_runs_fail_are_avoided():
+    surrogate = fitted(24, noise=0.05)
+    good = np.asarray(surrogate.gp.data.u)[:24]
+    bad = np.random.default_rng(0).normal([0.4, 0.4], 0.05, (24, 2))
+    u, succeeded = np.concatenate([good, bad]), np.arange(48) < 24
+    runs = feasibility(u, succeeded, ROWS)
+    with jax.enable_x64(True):
+        assert log_feasible(runs, jnp.array([0.4, 0.4])) < -1.5
+        assert log_feasible(runs, jnp.array([0.95, 0.95])) > -0.1
+    for name in RULES:
+        batch = RULES[name]()(KEY, surrogate, 4, runs)
+        plain = RULES[name]()(KEY, surrogate, 4, all_succeed(surrogate))
+        away, towards = (np.linalg.norm(p - 0.4, axis=1).mean() for p in (batch, plain))
+        assert away > towards, name
+
+
+def test_scores_of_the_user_choose_among_candidates():
+    surrogate = fitted()
+    best = best_candidates(lambda _, __, u: -u[:, 0], KEY, surrogate, 2, all_succeed(surrogate))
+    assert (best[0] != best[1]).any()
+    assert best[:, 0].max() < 0.3

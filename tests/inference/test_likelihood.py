@@ -5,19 +5,20 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from bolfi_liquids.inference.design import sobol
+from bolfi_liquids.inference.discrepancy_surrogate import learn
 from bolfi_liquids.inference.likelihood import log_cdf, log_likelihood
-from bolfi_liquids.inference.surrogate import learn
 from scipy.special import erfcx
 from scipy.stats import norm
 
 from bolfi_liquids import inference
 
+ROWS = 64
 U = sobol(0, 0, 12, 2)
 DELTA = 1.0 + ((U - 0.4) ** 2).sum(-1)
 
 
 def test_agrees_with_scipy_with_the_noise_in_sigma():
-    fitted = learn(U, DELTA, transform="identity")
+    fitted = learn(U, DELTA, ROWS, "identity")
     u = np.array([0.8, 0.3])
     mean, sd = fitted.predict(u[None])
     with jax.enable_x64(True):
@@ -26,7 +27,7 @@ def test_agrees_with_scipy_with_the_noise_in_sigma():
 
 
 def test_finite_and_monotone_with_finite_gradients_over_a_hundred_decades():
-    fitted = learn(U, DELTA, transform="identity")
+    fitted = learn(U, DELTA, ROWS, "identity")
     with jax.enable_x64(True):
         u = jnp.array([0.8, 0.3])
         thresholds = -jnp.logspace(-50.0, 50.0, 201)
@@ -59,7 +60,7 @@ def test_slope_of_log_cdf_agrees_with_the_mills_ratio():
     ],
 )
 def test_threshold_rules(rule, expected):
-    np.testing.assert_allclose(learn(U, DELTA, "sqrt", rule).threshold, expected)
+    np.testing.assert_allclose(learn(U, DELTA, ROWS, "sqrt", rule).threshold, expected)
 
 
 @pytest.mark.parametrize("rule", ["nonsense", inference.Quantile(1.5), np.nan])
@@ -70,4 +71,4 @@ def test_bad_rules_are_refused(prior, observed, rule):
 
 def test_a_threshold_that_the_transform_cannot_take_is_refused():
     with pytest.raises(ValueError, match="must be positive for the transform 'log'"):
-        learn(U, DELTA, "log", -1.0)
+        learn(U, DELTA, ROWS, "log", -1.0)

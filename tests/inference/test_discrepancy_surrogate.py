@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
 from bolfi_liquids.inference.design import sobol
-from bolfi_liquids.inference.surrogate import learn
+from bolfi_liquids.inference.discrepancy_surrogate import learn, marginalised
 from bolfi_liquids.inference.transform import Transform, candidates
+
+ROWS = 64
 
 
 def bowl(u, rng, power):
@@ -21,15 +23,16 @@ def bowl(u, rng, power):
 )
 def test_the_transform_that_made_the_data_is_found(make, expected):
     u = sobol(0, 0, 40, 2)
-    assert learn(u, make(u, np.random.default_rng(0))).transform.name == expected
+    assert learn(u, make(u, np.random.default_rng(0)), ROWS).transform.name == expected
 
 
-def test_jacobian_is_that_of_the_transform():
+def test_jacobian_and_inverse_are_that_of_the_transform():
     x = np.array([0.5, 2.0])
     for name in ("identity", "sqrt", "log"):
         g = Transform(name, 0.0)
         slope = (g(x + 1e-6) - g(x - 1e-6)) / 2e-6
         np.testing.assert_allclose(g.log_jacobian(x), np.log(slope), atol=1e-6)
+        np.testing.assert_allclose(g.inverse(g(x)), x)
 
 
 def test_a_discrepancy_of_zero_stays_finite():
@@ -37,8 +40,8 @@ def test_a_discrepancy_of_zero_stays_finite():
     for g in candidates(None, values):
         assert np.isfinite(g(values)).all()
         assert np.isfinite(g.log_jacobian(values)).all()
-    fitted = learn(sobol(0, 0, 6, 1), values, transform="log")
-    assert np.isfinite([fitted.threshold, fitted.score]).all()
+    fitted = learn(sobol(0, 0, 6, 1), values, ROWS, "log")
+    assert np.isfinite(fitted.threshold)
 
 
 def test_negative_discrepancies_allow_only_the_identity():
@@ -49,13 +52,14 @@ def test_negative_discrepancies_allow_only_the_identity():
 
 
 def test_equal_discrepancies_are_learned_as_flat():
-    fitted = learn(sobol(0, 0, 6, 2), np.full(6, 2.0), transform="identity")
+    fitted = learn(sobol(0, 0, 6, 2), np.full(6, 2.0), ROWS, "identity")
     np.testing.assert_allclose(fitted.predict(sobol(1, 0, 4, 2))[0], 2.0, atol=1e-6)
 
 
 def test_minimum_and_threshold_agree_with_a_grid():
     u = sobol(0, 0, 30, 2)
-    fitted = learn(u, bowl(u, np.random.default_rng(0), 1.0), transform="identity")
+    values = bowl(u, np.random.default_rng(0), 1.0)
+    fitted = learn(u, values, ROWS, "identity", "min_mean")
     axis = np.linspace(0.0, 1.0, 101)
     grid = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2)
     mean = fitted.predict(grid)[0]
@@ -65,8 +69,39 @@ def test_minimum_and_threshold_agree_with_a_grid():
 
 def test_believing_keeps_the_mean_and_shrinks_the_variance():
     u = sobol(0, 0, 10, 2)
-    fitted = learn(u, bowl(u, np.random.default_rng(0), 1.0))
+    fitted = learn(u, bowl(u, np.random.default_rng(0), 1.0), ROWS)
     new = np.array([[0.9, 0.1]])
     believing = fitted.believe(new)
     np.testing.assert_allclose(believing.predict(new)[0], fitted.predict(new)[0], rtol=1e-9)
     assert believing.predict(new)[1] < fitted.predict(new)[1]
+
+
+def test_hyperparameters_wait_until_the_data_have_grown_by_a_fifth():
+    u = sobol(0, 0, 26, 2)
+    values = bowl(u, np.random.default_rng(0), 1.0)
+    first = learn(u[:20], values[:20], ROWS)
+    soon = learn(u[:23], values[:23], ROWS, previous=first)
+    later = learn(u, values, ROWS, previous=first)
+    assert (soon.learned_at, later.learned_at) == (20, 26)
+    np.testing.assert_array_equal(soon.gp.hyper.log_length, first.gp.hyper.log_length)
+    # the three that came since were learned all the same
+    assert soon.predict(u[20:23])[1].mean() < first.predict(u[20:23])[1].mean()
+
+
+def test_a_run_that_blew_up_does_not_drown_the_others():
+    u = sobol(0, 0, 30, 2)
+    values = bowl(u, np.random.default_rng(0), 1.0)
+    values[np.argmax(np.abs(u - 0.4).sum(1))] = 1e100
+    fitted = learn(u, values, ROWS)
+    assert np.abs(fitted.minimum() - 0.4).max() < 0.15
+
+
+def test_marginalised_hyperparameters_widen_what_few_points_leave_open():
+    u = sobol(0, 0, 7, 1)
+    values = 1.0 + 3.0 * (u[:, 0] - 0.4) ** 2 + 0.2 * np.random.default_rng(1).normal(size=7)
+    one = learn(u, values, ROWS, "identity")
+    many = marginalised(one, None, 32, seed=0)
+    grid = np.linspace(0.05, 0.95, 10)[:, None]
+    assert np.log(many.predict(grid)[1] / one.predict(grid)[1]).mean() > 0.0
+    assert np.isfinite(many.threshold)
+    assert many.gp.hyper.log_noise.shape == (32,)

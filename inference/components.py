@@ -1,0 +1,60 @@
+"""Principal components of simulated outputs."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Basis(NamedTuple):
+    """Output = centre + scale * (vectors @ scores), scores of unit variance.
+
+    Shapes: m values of an output; k components, of which the last `k - used` are empty.
+    """
+
+    centre: np.ndarray  # [m]
+    scale: np.ndarray  # [m], what makes values of different kind comparable
+    vectors: np.ndarray  # [m, k], orthogonal; each as long as its score's sd
+    used: int
+    explained: float  # share of the variance
+
+    def standardise(self, outputs: np.ndarray) -> np.ndarray:
+        """[n, m] -> [n, m]."""
+        return (outputs - self.centre) / self.scale
+
+    def scores(self, outputs: np.ndarray) -> np.ndarray:
+        """[n, m] -> [n, k]; 0 for empty components."""
+        squared = np.sum(self.vectors**2, 0)
+        return self.standardise(outputs) @ self.vectors / np.where(squared > 0, squared, 1.0)
+
+    def residuals(self, outputs: np.ndarray) -> np.ndarray:
+        """What the components leave of the standardised outputs, [n, m]."""
+        return self.standardise(outputs) - self.scores(outputs) @ self.vectors.T
+
+
+def principal_components(
+    outputs: np.ndarray, scale: np.ndarray, capacity: int, share: float
+) -> Basis:
+    """The fewest components that explain a share of the outputs' variance.
+
+    Args:
+        outputs: [n, m], n >= 2.
+        scale: [m], positive.
+        capacity: Components at most; the arrays hold as many, and min(capacity, m) at most.
+        share: Of the variance, to be explained.
+    """
+    centre = outputs.mean(0)
+    standard = (outputs - centre) / scale
+    n, m = standard.shape
+    # from the smaller side: n simulations of m >> n values
+    values, left = np.linalg.eigh(standard @ standard.T / n)
+    values, left = np.maximum(values[::-1], 0.0), left[:, ::-1]
+    total = values.sum()
+    capacity = min(capacity, m)
+    tail = total - np.cumsum(values)
+    enough = int(np.argmax(tail <= (1.0 - share) * total)) + 1
+    # directions of no more than rounding error are none
+    used = int(min(enough, capacity, np.sum(values > 1e-12 * total)))
+    vectors = np.zeros((m, capacity))
+    vectors[:, :used] = standard.T @ left[:, :used] / np.sqrt(n)
+    explained = float(1.0 - tail[used - 1] / total) if used else 1.0
+    return Basis(centre, scale, vectors, used, explained)

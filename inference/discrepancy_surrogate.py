@@ -1,0 +1,234 @@
+"""The paper's surrogate: a Gaussian process on the (transformed) discrepancy."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ._float64 import in_float64
+from .base import LogLikelihood, LogSecondMoment
+from .emulator_checks import complaints
+from .gp import GP, Data, append_mean, condition, leave_one_out, pad, predict_many
+from .hyper import maximum_a_posteriori
+from .likelihood import (
+    Threshold,
+    ThresholdState,
+    choose_threshold,
+    log_likelihood,
+    log_second_moment,
+)
+from .marginal import posterior_draws
+from .optimise import minimise_in_box
+from .transform import Transform, candidates
+
+LARGEST = 1e6
+"""Discrepancies beyond so many medians are learned as the largest of the others: the process
+need not follow a simulation that blew up, but shall know that it is bad there."""
+GROWTH = 1.2  # hyperparameters are found anew when data have grown by this factor
+
+_condition = jax.jit(condition)
+_leave_one_out = jax.jit(leave_one_out)
+_predict = jax.jit(predict_many)
+_append_mean = jax.jit(append_mean)
+
+
+class Scale(NamedTuple):
+    """From the discrepancy to the process's targets: (g(Delta) - location) / spread."""
+
+    transform: Transform
+    location: float
+    spread: float
+
+    def __call__(self, discrepancy: np.ndarray) -> np.ndarray:
+        return (self.transform(discrepancy) - self.location) / self.spread
+
+
+@dataclass(frozen=True)
+class DiscrepancySurrogate:
+    """GP of g(Delta) over prior quantiles; see `learn`.
+
+    Attributes:
+        gp: The conditioned process; one for each draw of the hyperparameters, or one.
+        scale: g, and the standardisation of g(Delta).
+        discrepancy: What was learned from [n].
+        threshold: eps on the scale of g(Delta).
+        learned_at: Simulations known when the hyperparameters were found.
+    """
+
+    gp: GP
+    scale: Scale
+    discrepancy: np.ndarray
+    threshold: float
+    learned_at: int
+
+    @property
+    def transform(self) -> Transform:
+        return self.scale.transform
+
+    @property
+    def state(self) -> ThresholdState:
+        return ThresholdState(
+            self.gp, jnp.asarray((self.threshold - self.scale.location) / self.scale.spread)
+        )
+
+    @property
+    def log_likelihood(self) -> LogLikelihood:
+        return log_likelihood
+
+    @property
+    def log_second_moment(self) -> LogSecondMoment:
+        return log_second_moment
+
+    @in_float64
+    def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd of a new g(Delta), its noise included, at quantiles u [n, d]: [n], [n]."""
+        mean, variance = (np.asarray(part) for part in _predict(self.gp, jnp.asarray(u, float)))
+        noisy = variance + np.exp(2.0 * np.asarray(self.gp.hyper.log_noise))[:, None]
+        centre = mean.mean(0)
+        sd = np.sqrt(noisy.mean(0) + mean.var(0))
+        return self.scale.location + self.scale.spread * centre, self.scale.spread * sd
+
+    @in_float64
+    def minimum(self) -> np.ndarray:
+        """Minimiser of the mean over the box, u [d]."""
+        return minimise_in_box(_mean, self.gp, self.gp.data.u.shape[1])
+
+    @in_float64
+    def believe(self, u: np.ndarray) -> "DiscrepancySurrogate":
+        """Condition on the predicted means at u [n, d], for points still being simulated."""
+        return replace(self, gp=believe(self.gp, u)) if len(u) else self
+
+    def constants(self) -> dict[str, np.ndarray]:
+        """What a reader of the posterior must know of the likelihood."""
+        return {"threshold": np.asarray(self.threshold)}
+
+    @in_float64
+    def checks(self) -> dict[str, np.ndarray]:
+        """Studentised leave-one-out errors `loo_z` [n, 1]."""
+        mean, variance = (np.asarray(part) for part in _leave_one_out(self.gp))
+        n = len(self.discrepancy)
+        z = (np.asarray(self.gp.data.y) - mean)[:, :n] / np.sqrt(variance[:, :n])
+        return {"loo_z": z.mean(0)[:, None]}
+
+    def warnings(self) -> list[str]:
+        """What the leave-one-out errors complain of."""
+        return complaints(self.checks()["loo_z"], 0.0, "discrepancy")
+
+    @in_float64
+    def predictive(self, key: jax.Array, u: np.ndarray) -> dict[str, np.ndarray]:
+        """One new discrepancy for each row of u [n, d]."""
+        mean, sd = self.predict(u)
+        drawn = mean + sd * np.asarray(jax.random.normal(key, mean.shape))
+        return {"discrepancy": self.transform.inverse(drawn)}
+
+
+def _mean(gp: GP, u: jax.Array) -> jax.Array:
+    return jnp.mean(predict_many(gp, u[None])[0])
+
+
+def believe(gp: GP, u: np.ndarray) -> GP:
+    """The processes after their own predictions at u [n, d] came true.
+
+    Raises:
+        ValueError: more rows than are reserved.
+    """
+    n, (rows, dimension) = int(gp.data.count), gp.data.u.shape
+    if n + len(u) > rows:
+        raise ValueError(f"{n} simulations and {len(u)} pending ones exceed the {rows} reserved")
+    # one shape, whatever the number of points
+    padded = np.concatenate([u, np.full((rows - len(u), dimension), 0.5)])
+    return _append_mean(gp, jnp.asarray(padded), jnp.asarray(len(u)))
+
+
+@in_float64
+def learn(
+    u: np.ndarray,
+    discrepancy: np.ndarray,
+    rows: int,
+    transform: str | None = None,
+    rule: Threshold = None,
+    previous: DiscrepancySurrogate | None = None,
+) -> DiscrepancySurrogate:
+    """Fit the surrogate.
+
+    Of the transforms identity, sqrt and log the one with the highest leave-one-out log
+    predictive density of the discrepancy itself (Jacobian included) is taken, unless given.
+
+    Args:
+        u: Prior quantiles [n, d].
+        discrepancy: Finite values [n], n >= 2.
+        rows: Reserved for data, at least n.
+        transform: A name, or None to choose.
+        rule: For the threshold, see `likelihood.choose_threshold`.
+        previous: Learned from the first of these data; its transform and hyperparameters are
+            kept until the data have grown by a fifth.
+
+    Raises:
+        ValueError: bad transform or threshold.
+    """
+    sane = discrepancy <= LARGEST * np.median(np.abs(discrepancy))
+    values = np.minimum(discrepancy, discrepancy[sane].max(initial=-np.inf))
+    if previous is not None and len(u) < GROWTH * previous.learned_at:
+        data = pad(u, previous.scale(values)[None], rows)
+        gp = _condition(previous.gp.hyper, data)
+        return _with_threshold(gp, previous.scale, values, rule, previous.learned_at)
+    scales = [_standardise(option, values) for option in candidates(transform, values)]
+    data = pad(u, np.array([scale(values) for scale in scales]), rows)
+    gp = _condition(maximum_a_posteriori(data), data)
+    best = int(np.argmax(_scores(gp, scales, values)))
+    return _with_threshold(_only(gp, best), scales[best], values, rule, len(u))
+
+
+def _only(gp: GP, i: int) -> GP:
+    """The i-th process."""
+    hyper, y, whitener, weights = jax.tree.map(
+        lambda part: jnp.asarray(np.asarray(part)[i : i + 1]),
+        (gp.hyper, gp.data.y, gp.whitener, gp.weights),
+    )
+    return GP(hyper, gp.data._replace(y=y), whitener, weights)
+
+
+def _with_threshold(
+    gp: GP, scale: Scale, values: np.ndarray, rule: Threshold, learned_at: int
+) -> DiscrepancySurrogate:
+    learned = DiscrepancySurrogate(gp, scale, values, np.nan, learned_at)
+
+    def at_minimum() -> tuple[float, float]:
+        mean, sd = learned.predict(learned.minimum()[None])
+        return float(mean[0]), float(sd[0])
+
+    threshold = choose_threshold(rule, values, scale.transform, at_minimum)
+    return replace(learned, threshold=threshold)
+
+
+@in_float64
+def marginalised(
+    surrogate: DiscrepancySurrogate, rule: Threshold, draws: int, seed: int
+) -> DiscrepancySurrogate:
+    """The surrogate with one process for each of `draws` posterior draws of the hyperparameters."""
+    hyper = posterior_draws(surrogate.gp.data, draws, seed)
+    data = surrogate.gp.data
+    spread = Data(data.u, jnp.tile(data.y, (draws, 1)), data.count)
+    return _with_threshold(
+        _condition(hyper, spread), surrogate.scale, surrogate.discrepancy, rule, len(spread.u)
+    )
+
+
+def _standardise(transform: Transform, values: np.ndarray) -> Scale:
+    transformed = transform(values)
+    spread = float(transformed.std())
+    # all equal: nothing to standardise
+    return Scale(transform, float(transformed.mean()), spread if spread > 0 else 1.0)
+
+
+def _scores(gp: GP, scales: Sequence[Scale], values: np.ndarray) -> np.ndarray:
+    """Leave-one-out log predictive density of the discrepancy under each scale, summed."""
+    n = len(values)
+    mean, variance = (np.asarray(moment)[:, :n] for moment in _leave_one_out(gp))
+    residual = np.asarray(gp.data.y)[:, :n] - mean
+    density = -0.5 * np.sum(residual**2 / variance + np.log(2.0 * np.pi * variance), 1)
+    jacobian = [np.sum(s.transform.log_jacobian(values) - np.log(s.spread)) for s in scales]
+    return density + np.array(jacobian)

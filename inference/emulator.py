@@ -1,0 +1,138 @@
+"""An emulator of vectors: principal components, a Gaussian process for each score."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from .components import Basis, principal_components
+from .gp import GP, condition, leave_one_out, pad, predict_many
+from .hyper import maximum_a_posteriori, reset
+from .noise import Remainder, shrunk_covariance
+
+SHARE = 0.9995  # of the variance, to be explained by components
+PRIOR_RUNS = 5.0  # runs that speak for uncorrelated scores
+GROWTH = 1.2  # hyperparameters are found anew when data have grown by this factor
+
+_condition = jax.jit(condition)
+_leave_one_out = jax.jit(leave_one_out)
+_predict = jax.jit(predict_many)
+
+
+class Emulator(NamedTuple):
+    """What simulations teach of the output, whatever was observed.
+
+    Attributes:
+        gp: One process for each of k scores; the empty ones are flat.
+        basis: Of the outputs.
+        remainder: Covariance of what the components leave.
+        noise: Covariance [k, k] of the scores' run-to-run noise, beyond the remainder's.
+        outputs: What was learned from [n, m].
+        learned_at: Simulations known when components and hyperparameters were found.
+    """
+
+    gp: GP
+    basis: Basis
+    remainder: Remainder
+    noise: np.ndarray
+    outputs: np.ndarray
+    learned_at: int
+
+
+def emulate(
+    u: np.ndarray,
+    outputs: np.ndarray,
+    scale: np.ndarray,
+    components: int,
+    rows: int,
+    previous: Emulator | None = None,
+) -> Emulator:
+    """Learn outputs [n, m] at u [n, d].
+
+    Args:
+        scale: [m], what makes values comparable.
+        components: At most.
+        rows: Reserved for data, at least n.
+        previous: Learned from the first of these data; its components and hyperparameters are
+            kept until the data have grown by a fifth.
+    """
+    n = len(u)
+    if previous is not None and n < GROWTH * previous.learned_at:
+        basis, hyper, learned_at = previous.basis, previous.gp.hyper, previous.learned_at
+        data = pad(u, basis.scores(outputs).T, rows)
+    else:
+        basis = principal_components(outputs, scale, components, SHARE)
+        data, learned_at = pad(u, basis.scores(outputs).T, rows), n
+        hyper = maximum_a_posteriori(data, None if previous is None else previous.gp.hyper)
+        hyper = reset(hyper, np.arange(len(data.y)) >= basis.used)
+    gp = _condition(hyper, data)
+    remainder = shrunk_covariance(basis.residuals(outputs), basis.used + 1)
+    noise = run_to_run(gp, basis, remainder.white, n)
+    return Emulator(gp, basis, remainder, noise, outputs, learned_at)
+
+
+def run_to_run(gp: GP, basis: Basis, white: float, n: int) -> np.ndarray:
+    """Covariance [k, k] of the scores' run-to-run noise, less the white noise's part in it.
+
+    Sizes are the processes' own noise, to which replicates testify; correlations are those of
+    what the processes count as noise, shrunk.
+    """
+    squared = np.sum(basis.vectors**2, 0)
+    full = squared > 0
+    variance = np.exp(2.0 * np.asarray(gp.hyper.log_noise)) * full
+    variance = np.maximum(variance - white / np.where(full, squared, np.inf), 0.0)
+    residual = np.where(full[:, None], np.asarray(gp.weights)[:, :n], 0.0)
+    length = np.sqrt(np.sum(residual**2, 1, keepdims=True))
+    residual = residual / np.where(length > 0, length, 1.0)
+    correlation = residual @ residual.T * n / (n + PRIOR_RUNS)
+    np.fill_diagonal(correlation, 1.0)
+    sd = np.sqrt(variance)
+    return correlation * np.outer(sd, sd)
+
+
+def loo_errors(emulator: Emulator) -> np.ndarray:
+    """Studentised leave-one-out errors of the scores [n, used]."""
+    n, used = len(emulator.outputs), emulator.basis.used
+    mean, variance = (np.asarray(part)[:used, :n] for part in _leave_one_out(emulator.gp))
+    return ((np.asarray(emulator.gp.data.y)[:used, :n] - mean) / np.sqrt(variance)).T
+
+
+def noise_share(emulator: Emulator) -> float:
+    """Share of run-to-run noise in the variance of the emulated components."""
+    used = emulator.basis.used
+    weight = np.sum(emulator.basis.vectors[:, :used] ** 2, 0)  # their scores have unit variance
+    noise = np.exp(2.0 * np.asarray(emulator.gp.hyper.log_noise)[:used])
+    return float(weight @ np.minimum(noise, 1.0) / weight.sum()) if used else 0.0
+
+
+def predict(emulator: Emulator, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and sd, run-to-run noise included, of the outputs at u [n, d]: [n, m] each."""
+    basis, remainder = emulator.basis, emulator.remainder
+    mean, variance = (np.asarray(part).T for part in _predict(emulator.gp, jnp.asarray(u, float)))
+    constant = np.sum(remainder.factors**2, 1) + remainder.white
+    constant = constant + np.sum((basis.vectors @ emulator.noise) * basis.vectors, 1)
+    sd = np.sqrt(variance @ basis.vectors.T**2 + constant)
+    return basis.centre + basis.scale * (mean @ basis.vectors.T), basis.scale * sd
+
+
+def predictive_draws(key: jax.Array, emulator: Emulator, u: np.ndarray) -> np.ndarray:
+    """A new simulated output, run-to-run noise included, for each row of u [n, d]: [n, m]."""
+    basis, remainder = emulator.basis, emulator.remainder
+    mean, variance = (np.asarray(part).T for part in _predict(emulator.gp, jnp.asarray(u)))
+    full = np.any(basis.vectors, 0)
+    keys = jax.random.split(key, 4)
+    shapes = (
+        mean.shape,
+        mean.shape,
+        (len(u), remainder.factors.shape[1]),
+        (len(u), len(basis.scale)),
+    )
+    latent, noisy, factor, white = (
+        np.asarray(jax.random.normal(k, shape)) for k, shape in zip(keys, shapes, strict=True)
+    )
+    values, vectors = np.linalg.eigh(emulator.noise)
+    noisy = noisy @ (vectors * np.sqrt(np.maximum(values, 0.0))).T
+    scores = (mean + np.sqrt(variance) * latent + noisy) * full
+    standard = scores @ basis.vectors.T + factor @ remainder.factors.T
+    return basis.centre + basis.scale * (standard + np.sqrt(remainder.white) * white)

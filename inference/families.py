@@ -1,0 +1,258 @@
+"""The families of surrogates: what a user may choose of each, and how it learns."""
+
+from dataclasses import dataclass, fields
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .base import Discrepancy, Surrogate
+from .discrepancy import evaluate, squared_difference
+from .discrepancy_surrogate import DiscrepancySurrogate, learn, marginalised
+from .emulator import emulate
+from .likelihood import Threshold, check_rule
+from .output import Output, Summary, describe
+from .signal_surrogate import SignalSurrogate, observe
+from .transform import TRANSFORMS
+
+COMPONENTS = 8
+LARGEST = 1e6  # an output farther than so many median discrepancies blew up, and is not learned
+
+
+class Learnable(NamedTuple):
+    """Successful simulations, as a family measured them."""
+
+    u: np.ndarray  # [n, d]
+    features: np.ndarray  # [n, m]
+    discrepancy: np.ndarray  # [n]
+
+
+@dataclass(frozen=True)
+class DiscrepancyFamily:
+    """A Gaussian process on the discrepancy, and a threshold on it: the paper's.
+
+    Attributes:
+        discrepancy: Callable (observed, simulated) -> float; None is `squared_difference()`.
+        transform: "identity", "sqrt" or "log" of the discrepancy; None chooses by
+            leave-one-out log predictive density.
+        threshold: Rule for eps, see `likelihood.choose_threshold`.
+        hyper_draws: Posterior draws of the hyperparameters over which the likelihood of a fit
+            is averaged; 0 takes the best hyperparameters alone.
+    """
+
+    name: ClassVar[str] = "discrepancy"
+    acquisition: ClassVar[str] = "eiv"
+    replicates: ClassVar[bool] = False
+
+    discrepancy: Discrepancy | None = None
+    transform: str | None = None
+    threshold: Threshold = None
+    hyper_draws: int = 0
+
+    def __post_init__(self) -> None:
+        check_rule(self.threshold)
+        if self.transform is not None and self.transform not in TRANSFORMS:
+            raise ValueError(
+                f"transform must be one of {tuple(TRANSFORMS)} or None, got {self.transform!r}"
+            )
+        if not self.hyper_draws >= 0:
+            raise ValueError(f"hyper_draws must be 0 or more, got {self.hyper_draws}")
+
+    def learner(self, observed: np.ndarray) -> "DiscrepancyLearner":
+        return DiscrepancyLearner(self, _distance(self.discrepancy, observed), observed)
+
+
+@dataclass(frozen=True)
+class DiscrepancyLearner:
+    """`DiscrepancyFamily` in view of what was observed."""
+
+    family: DiscrepancyFamily
+    distance: Discrepancy
+    observed: np.ndarray
+    features: ClassVar[int] = 0
+
+    @property
+    def any_shape(self) -> bool:
+        """Whether signals may have another shape than what was observed."""
+        return self.family.discrepancy is not None
+
+    def measure(self, signals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Features [n, 0] and discrepancies [n] of signals [n, ...]; NaN where failed."""
+        return np.zeros((len(signals), 0)), evaluate(self.distance, self.observed, signals)
+
+    def learn(
+        self, known: Learnable, rows: int, previous: DiscrepancySurrogate | None
+    ) -> DiscrepancySurrogate:
+        transform, rule = self.family.transform, self.family.threshold
+        return learn(known.u, known.discrepancy, rows, transform, rule, previous)
+
+    def finish(self, known: Learnable, rows: int, seed: int) -> Surrogate:
+        """The surrogate on which a fit rests."""
+        learned = self.learn(known, rows, None)
+        draws = self.family.hyper_draws
+        if not draws:
+            return learned
+        return marginalised(learned, self.family.threshold, draws, seed)
+
+
+@dataclass(frozen=True)
+class SignalFamily:
+    """Principal components of the output, a Gaussian process for each score.
+
+    Attributes:
+        summary: Callable output -> vector, of the observed and of each simulated output; None
+            takes the output as it is.
+        noise: Measurement noise that the simulator does not make: its sd (a number, or one for
+            each value), or its covariance over the flattened finite values of the observed
+            (summarised) output; 0 for none. None estimates it, as an AR(1) process, where the
+            output is a series of at least 16 samples without a summary, and takes none
+            elsewhere.
+        components: At most.
+        discrepancy: As in `DiscrepancyFamily`; it only ranks simulations and finds outputs that
+            blew up.
+    """
+
+    name: ClassVar[str] = "signal"
+    acquisition: ClassVar[str] = "draws"
+    replicates: ClassVar[bool] = True
+
+    summary: Summary | None = None
+    noise: ArrayLike | None = None
+    components: int = COMPONENTS
+    discrepancy: Discrepancy | None = None
+
+    def __post_init__(self) -> None:
+        if not self.components >= 1:
+            raise ValueError(f"components must be at least 1, got {self.components}")
+
+    def learner(self, observed: np.ndarray) -> "SignalLearner":
+        output = describe(observed, self.summary)
+        values = output.values(observed)
+        distance = self.discrepancy or _of_summaries(self.summary)
+        return SignalLearner(self, output, distance, observed, values, self._covariance(output))
+
+    def _covariance(self, output: Output) -> np.ndarray | None:
+        if self.noise is None:
+            return None
+        given, samples = np.asarray(self.noise, np.float64), len(output.present)
+        if given.ndim < 2 and given.size in (1, samples):
+            full = np.diag(np.broadcast_to(given, samples) ** 2)
+        elif given.shape == (samples, samples):
+            full = given
+        else:
+            raise ValueError(
+                f"noise must be a number, [{samples}] sds or a [{samples}, {samples}] covariance "
+                f"of the finite observed values, got shape {given.shape}"
+            )
+        if not (np.isfinite(full).all() and (np.diag(full) >= 0).all()):
+            raise ValueError("noise must be finite and not negative")
+        # rows and columns in the order of the values, then averaged as they are
+        order = np.argsort(np.argsort(output.present))
+        return output.average(output.average(full[np.ix_(order, order)]).T)
+
+
+@dataclass(frozen=True)
+class SignalLearner:
+    """`SignalFamily` in view of what was observed."""
+
+    family: SignalFamily
+    output: Output
+    distance: Discrepancy
+    observed: np.ndarray
+    values: np.ndarray
+    noise: np.ndarray | None
+
+    @property
+    def features(self) -> int:
+        return len(self.values)
+
+    @property
+    def any_shape(self) -> bool:
+        """Whether signals may have another shape than what was observed."""
+        return self.family.summary is not None
+
+    def measure(self, signals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Features [n, m] and discrepancies [n] of signals [n, ...]; NaN where failed."""
+        discrepancy = evaluate(self.distance, self.observed, signals)
+        features = np.full((len(signals), len(self.values)), np.nan)
+        for i in np.flatnonzero(np.isfinite(discrepancy)):
+            features[i] = self.output.values(signals[i])
+        failed = ~np.isfinite(features).all(1)
+        return features, np.where(failed, np.nan, discrepancy)
+
+    def learn(
+        self, known: Learnable, rows: int, previous: SignalSurrogate | None
+    ) -> SignalSurrogate:
+        largest = LARGEST * np.median(known.discrepancy)
+        sane = known.discrepancy <= largest
+        features = known.features[sane]
+        old = None if previous is None else previous.emulator
+        scale = self.output.scale(features) if old is None else old.basis.scale
+        emulator = emulate(known.u[sane], features, scale, self.family.components, rows, old)
+        kept = previous if old is not None and emulator.learned_at == old.learned_at else None
+        return observe(emulator, self.output, self.values, self.noise, kept)
+
+    def finish(self, known: Learnable, rows: int, seed: int) -> Surrogate:
+        """The surrogate on which a fit rests."""
+        return self.learn(known, rows, None)
+
+
+Family = DiscrepancyFamily | SignalFamily
+Learner = DiscrepancyLearner | SignalLearner
+FAMILIES: dict[str, type[Family]] = {
+    family.name: family for family in (DiscrepancyFamily, SignalFamily)
+}
+"""Surrogates by the name users give."""
+
+
+def resolve(surrogate: str | Family | None, observed: np.ndarray, options: dict) -> Family:
+    """The family that `fit`'s arguments `surrogate` and `options` name.
+
+    None is "signal" where the output is a vector, and "discrepancy" where it is a number or an
+    option of that family alone is given.
+
+    Raises:
+        ValueError: unknown name, or an option that the family has not.
+    """
+    if isinstance(surrogate, DiscrepancyFamily | SignalFamily):
+        if options:
+            raise ValueError(f"give {tuple(options)} to {surrogate!r} itself")
+        return surrogate
+    if surrogate is None:
+        scalar = observed.size == 1 and "summary" not in options
+        alone = _options("discrepancy") - _options("signal") | {"discrepancy"}
+        surrogate = "discrepancy" if scalar or alone & options.keys() else "signal"
+    if surrogate not in FAMILIES:
+        raise ValueError(f"surrogate must be one of {tuple(FAMILIES)} or None, got {surrogate!r}")
+    unknown = options.keys() - _options(surrogate)
+    if unknown:
+        raise ValueError(
+            f"surrogate {surrogate!r} has the options {tuple(sorted(_options(surrogate)))}, "
+            f"got {tuple(sorted(unknown))}"
+        )
+    return FAMILIES[surrogate](**options)
+
+
+def _options(name: str) -> set[str]:
+    return {field.name for field in fields(FAMILIES[name])}
+
+
+def _distance(discrepancy: Discrepancy | None, observed: np.ndarray) -> Discrepancy:
+    if discrepancy is not None:
+        return discrepancy
+    distance = squared_difference()
+    distance(observed, observed)  # raises if it cannot be used
+    return distance
+
+
+def _of_summaries(summary: Summary | None) -> Discrepancy:
+    """Sum of squared differences of (summarised) outputs, missing samples left out."""
+
+    def distance(observed: np.ndarray, simulated: np.ndarray) -> float:
+        a, b = (np.asarray(x if summary is None else summary(x)) for x in (observed, simulated))
+        if a.shape != b.shape:
+            raise ValueError(f"expected an output of shape {a.shape}, as observed, got {b.shape}")
+        there = np.isfinite(a)
+        return float(np.sum((a[there] - b[there]) ** 2))
+
+    return distance

@@ -1,0 +1,78 @@
+"""The Gaussian likelihood of an emulated signal."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax.scipy.special import logsumexp
+
+from .gp import GP, predict
+from .linalg import small_inverse_cholesky
+
+
+class SignalState(NamedTuple):
+    """What the likelihood depends on: k scores, g nodes of the measurement noise.
+
+    Scores that are not in use have `used` 0 and count as known.
+    """
+
+    gp: GP
+    used: jax.Array  # [k], 1 or 0
+    estimate: jax.Array  # [g, k], the observed scores
+    covariance: jax.Array  # [g, k, k], their error, the simulator's noise included
+    log_weight: jax.Array  # [g]
+
+
+def log_likelihood(state: SignalState, u: jax.Array) -> jax.Array:
+    """log sum_g w_g N(estimate_g; mu(u), covariance_g + V(u)), V the emulator's variance.
+
+    Bayarri et al. (2009) and Higdon et al. (2008) with the discrepancy's covariance integrated
+    out over nodes.
+    """
+    mean, variance = predict(state.gp, u)
+    return _mixture(state, mean * state.used, variance * state.used)
+
+
+def log_second_moment(state: SignalState, u: jax.Array, spread: jax.Array | None) -> jax.Array:
+    """log E[L(u)^2], the expectation over means that vary with variance `spread` [k].
+
+    `spread` is the emulator's variance V (None), or that part of it which further simulations
+    will resolve: N(z; m, S)^2 integrates over m ~ N(mu, T), S = C + V - T, to
+    |4 pi S|^(-1/2) N(z; mu, S / 2 + T) (Surer et al. 2024). The first node, that of most
+    evidence, stands for all.
+    """
+    mean, variance = predict(state.gp, u)
+    total = variance * state.used
+    varying = total if spread is None else spread * state.used
+    rest = state.covariance[0] + jnp.diag(total - varying)
+    half = 0.5 * rest.shape[0] * jnp.log(4.0 * jnp.pi) + 0.5 * _log_det(rest)
+    density = _log_density(state.estimate[0], mean * state.used, rest / 2.0 + jnp.diag(varying))
+    return 2.0 * state.log_weight[0] - half + density
+
+
+def node_log_densities(state: SignalState, u: jax.Array) -> jax.Array:
+    """The terms [g] of `log_likelihood`'s sum."""
+    mean, variance = predict(state.gp, u)
+    return _terms(state, mean * state.used, variance * state.used)
+
+
+def _mixture(state: SignalState, mean: jax.Array, variance: jax.Array) -> jax.Array:
+    return logsumexp(_terms(state, mean, variance))
+
+
+def _terms(state: SignalState, mean: jax.Array, variance: jax.Array) -> jax.Array:
+    covariance = state.covariance + jnp.diag(variance)
+    density = jax.vmap(_log_density, (0, None, 0))(state.estimate, mean, covariance)
+    return state.log_weight + density
+
+
+def _log_density(z: jax.Array, mean: jax.Array, covariance: jax.Array) -> jax.Array:
+    """log N(z; mean, covariance)."""
+    inverse = small_inverse_cholesky(covariance)
+    white = inverse @ (z - mean)
+    constant = -0.5 * z.shape[0] * jnp.log(2.0 * jnp.pi)
+    return jnp.sum(jnp.log(jnp.diag(inverse))) - 0.5 * white @ white + constant
+
+
+def _log_det(matrix: jax.Array) -> jax.Array:
+    return -2.0 * jnp.sum(jnp.log(jnp.diag(small_inverse_cholesky(matrix))))

@@ -1,0 +1,28 @@
+"""Posterior draws of a Gaussian process's hyperparameters."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.scipy.special import ndtri
+
+from .gp import Data, Hyper, log_marginal_likelihood
+from .hyper import prior_moments, unpack
+from .nuts import Length, sample_nuts
+
+CHAINS, WARMUP = 2, 300
+
+
+def log_evidence(data: Data, v: jax.Array) -> jax.Array:
+    """log p(y | hyper) of one process, at prior quantiles v [d + 2] of its hyperparameters."""
+    mean, sd = prior_moments(data.u.shape[1])
+    return log_marginal_likelihood(unpack((mean + sd * ndtri(v))[None]), data)[0]
+
+
+def posterior_draws(data: Data, draws: int, seed: int) -> Hyper:
+    """Hyperparameters [draws] by NUTS, for the one process of `data`."""
+    dimension = data.u.shape[1] + 2
+    length = Length(CHAINS, WARMUP, -(-draws // CHAINS))
+    chains = sample_nuts(jax.random.key(seed), log_evidence, data, dimension, length)
+    mean, sd = prior_moments(data.u.shape[1])
+    x = np.asarray(chains.x).reshape(-1, dimension)[:draws]
+    return unpack(jnp.asarray(mean + sd * x))

@@ -1,0 +1,184 @@
+"""The noise between an observed output and the simulator's mean output.
+
+In standardised values its covariance is F F^T + D + sigma^2 R(rho): what the emulator's components
+leave of the simulations (truncation, and the simulator's run-to-run noise outside them), white
+noise D, and measurement noise, an AR(1) process in each channel, of unknown sigma and rho.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+FACTORS = 16
+CORRELATIONS = np.tanh([0.0, 0.3, 0.6, 0.9, 1.2, 1.6, 2.0, 2.5])  # of neighbouring samples
+SIZES = 2.0 ** np.arange(-3.0, 1.4, 1.0 / 3.0)  # sigma over the sd of the residual
+
+
+class Remainder(NamedTuple):
+    """Covariance F F^T + white 1 of what the components leave of the simulations."""
+
+    factors: np.ndarray  # [m, FACTORS]
+    white: float
+
+
+class Layout(NamedTuple):
+    """Where the m values lie: in channel `channel`, at sample `index`; sorted by both."""
+
+    channel: np.ndarray  # int [m]
+    index: np.ndarray  # int [m]
+
+
+class Nodes(NamedTuple):
+    """Pairs (sigma, rho); sigma 0 is no measurement noise."""
+
+    sigma: np.ndarray  # [g]
+    rho: np.ndarray  # [g]
+
+
+NO_MEASUREMENT_NOISE = Nodes(np.zeros(1), np.zeros(1))
+
+
+class Reduced(NamedTuple):
+    """What an observed output says of the k scores at each of g nodes.
+
+    Up to a factor that no score enters, the likelihood is N(estimate; scores, covariance).
+    """
+
+    estimate: np.ndarray  # [g, k]
+    covariance: np.ndarray  # [g, k, k]
+    log_weight: np.ndarray  # [g]
+
+
+def shrunk_covariance(residuals: np.ndarray, lost: int) -> Remainder:
+    """Covariance of residuals [n, m] with mean zero, shrunk towards the white one.
+
+    Ledoit and Wolf (2004): smooth residuals keep their shape, white ones become white. Of the
+    eigenvectors the largest are kept, the others are counted as white.
+
+    Args:
+        lost: Degrees of freedom that the components took from the n.
+    """
+    n, m = residuals.shape
+    factors = np.zeros((m, FACTORS))
+    freedom = n - lost
+    values, left = np.linalg.eigh(residuals @ residuals.T)
+    values = np.maximum(values, 0.0)
+    if freedom < 1 or not values.any():
+        return Remainder(factors, 0.0)
+    mean = values.sum() / freedom / m
+    spread = np.sum((values / freedom) ** 2) / m - mean**2
+    lengths = np.sum(residuals**2, 1)
+    error = (np.sum(lengths**2) / n - np.sum((values / n) ** 2)) / n / m
+    intensity = float(np.clip(error / spread, 0.0, 1.0)) if spread > 0 else 1.0
+    top = np.argsort(values)[::-1][:FACTORS]
+    factors[:, : len(top)] = residuals.T @ left[:, top] * np.sqrt((1.0 - intensity) / freedom)
+    return Remainder(factors, max(mean - np.sum(factors**2) / m, 0.0))
+
+
+def candidates(size: float) -> Nodes:
+    """The grid of nodes for a residual of sd `size`."""
+    sigma, rho = np.meshgrid(size * SIZES, CORRELATIONS, indexing="ij")
+    return Nodes(sigma.ravel(), rho.ravel())
+
+
+def residual_size(target: np.ndarray, vectors: np.ndarray) -> float:
+    """Sd of what no combination of `vectors` [m, k] can make of `target` [m]."""
+    left = target - vectors @ np.linalg.lstsq(vectors, target)[0]
+    return float(np.sqrt(np.sum(left**2) / max(len(target) - vectors.shape[1], 1)))
+
+
+def reduce(
+    columns: tuple[np.ndarray, np.ndarray, np.ndarray],
+    white: np.ndarray,
+    layout: Layout,
+    nodes: Nodes,
+) -> Reduced:
+    """Generalised least squares of the scores in use at each node.
+
+    Args:
+        columns: The components' vectors [m, k], of which the last may be zero; the observed
+            values [m]; the factors F [m, q].
+        white: Diagonal of D [m].
+    """
+    vectors, observed, factors = columns
+    k, used = vectors.shape[1], int(np.any(vectors, 0).sum())
+    floor = 1e-12 * float(np.mean(vectors**2))  # where nothing at all is noisy
+    fresh = np.diff(layout.channel, prepend=-1) != 0
+    gap = np.where(fresh, 0, np.diff(layout.index, prepend=0))
+    result, log_det = whiten(
+        jnp.asarray(np.column_stack([vectors, observed, factors])),
+        jnp.asarray(white + floor),
+        jnp.asarray(fresh),
+        jnp.asarray(gap),
+        nodes,
+    )
+    whitened = np.moveaxis(np.asarray(result), 1, 0)
+    basis, target = whitened[:, :, :used], whitened[:, :, k : k + 1]
+    factors = whitened[:, :, k + 1 :]
+    inner = np.eye(factors.shape[2]) + np.swapaxes(factors, 1, 2) @ factors
+
+    def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """a^T Sigma^-1 b, by Woodbury's identity."""
+        a_factors, b_factors = (np.swapaxes(factors, 1, 2) @ x for x in (a, b))
+        direct = np.swapaxes(a, 1, 2) @ b
+        return direct - np.swapaxes(a_factors, 1, 2) @ np.linalg.solve(inner, b_factors)
+
+    covariance = np.linalg.inv(product(basis, basis))
+    right = product(basis, target)
+    estimate = (covariance @ right)[:, :, 0]
+    unexplained = product(target, target)[:, 0, 0] - np.sum(estimate * right[:, :, 0], 1)
+    log_det = np.asarray(log_det) + np.linalg.slogdet(inner)[1]
+    # the estimate's own normalisation belongs to N(estimate; scores, covariance)
+    log_weight = -0.5 * (log_det + unexplained - np.linalg.slogdet(covariance)[1])
+    return Reduced(estimate, covariance, log_weight)
+
+
+def correlated(white: np.ndarray, layout: Layout, nodes: Nodes) -> np.ndarray:
+    """Measurement noise [n, m] from standard normal numbers, a node of `nodes` for each row."""
+    noise = np.empty_like(white)
+    sigma, rho = nodes
+    for i in range(white.shape[1]):
+        fresh = i == 0 or layout.channel[i] != layout.channel[i - 1]
+        decay = 0.0 if fresh else rho ** (layout.index[i] - layout.index[i - 1])
+        before = 0.0 if fresh else noise[:, i - 1]
+        noise[:, i] = decay * before + sigma * np.sqrt(1.0 - decay**2) * white[:, i]
+    return noise
+
+
+@jax.jit
+def whiten(
+    columns: jax.Array, white: jax.Array, fresh: jax.Array, gap: jax.Array, nodes: Nodes
+) -> tuple[jax.Array, jax.Array]:
+    """Multiply by an inverse factor of D + sigma^2 R(rho), node by node.
+
+    Kalman's filter for an AR(1) process seen in white noise: its standardised innovations are
+    the whitened values. It costs one pass over the samples; a gap only weakens a correlation.
+
+    Args:
+        columns: [m, c].
+        white: Diagonal of D [m].
+        fresh: bool [m], whether a channel begins.
+        gap: Samples since the value before [m].
+
+    Returns:
+        [m, g, c] and the log determinants [g].
+    """
+    variance = jnp.asarray(nodes.sigma) ** 2
+
+    def step(carried: tuple[jax.Array, jax.Array], row: tuple[jax.Array, ...]) -> Any:
+        state, uncertain = carried
+        value, white, fresh, gap = row
+        decay = jnp.where(fresh, 0.0, jnp.asarray(nodes.rho) ** gap)
+        state = decay[:, None] * state
+        uncertain = decay**2 * uncertain + (1.0 - decay**2) * variance
+        total = uncertain + white
+        innovation = value - state
+        gain = uncertain / total
+        after = state + gain[:, None] * innovation, gain * white
+        return after, (innovation / jnp.sqrt(total)[:, None], jnp.log(total))
+
+    start = jnp.zeros((len(variance), columns.shape[1])), variance
+    _, (result, logs) = jax.lax.scan(step, start, (columns, white, fresh, gap))
+    return result, jnp.sum(logs, 0)

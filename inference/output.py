@@ -1,0 +1,114 @@
+"""Outputs of any shape as vectors that an emulator can learn."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .noise import Layout
+
+SERIES = 16  # samples from which an output counts as a series, whose noise can be estimated
+LONGEST = 2000  # values; neighbouring samples of longer series are averaged
+
+Summary = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Output:
+    """How an output [*signal_shape] becomes values [m], channel after channel, time inside.
+
+    Attributes:
+        summary: The user's function of one output, or None.
+        shape: Of the summarised output.
+        present: Flat indices of what was observed, in the order of the values before averaging.
+        layout: Where the values lie.
+        starts: Rows of `present` at which the values begin; several samples of one value are
+            averaged.
+        series: Whether the first axis is time.
+    """
+
+    summary: Summary | None
+    shape: tuple[int, ...]
+    present: np.ndarray
+    layout: Layout
+    starts: np.ndarray
+    series: bool
+
+    def values(self, output: np.ndarray) -> np.ndarray:
+        """[m] of one output.
+
+        Raises:
+            ValueError: the (summarised) output has another shape than the observed one.
+        """
+        summarised = summarise(self.summary, output)
+        if summarised.shape != self.shape:
+            raise ValueError(
+                f"expected {'a summary' if self.summary else 'an output'} of shape {self.shape}, "
+                f"as observed, got {summarised.shape}"
+            )
+        return self.average(summarised.ravel()[self.present])
+
+    def average(self, samples: np.ndarray) -> np.ndarray:
+        """Samples [len(present), ...] in the order of the values -> [m, ...]."""
+        counts = np.diff(np.append(self.starts, len(samples)))
+        sums = np.add.reduceat(samples, self.starts, axis=0)
+        return sums / counts.reshape(-1, *[1] * (samples.ndim - 1))
+
+    def restore(self, values: np.ndarray) -> np.ndarray:
+        """Values [n, m] at their places in the (summarised) output: [n, *shape]; NaN elsewhere."""
+        counts = np.diff(np.append(self.starts, len(self.present)))
+        full = np.full((len(values), int(np.prod(self.shape))), np.nan)
+        full[:, self.present] = np.repeat(values, counts, axis=1)
+        return full.reshape(len(values), *self.shape)
+
+    def scale(self, values: np.ndarray) -> np.ndarray:
+        """What makes values [n, m] comparable, [m]: the sd of a series' channel, or of a value."""
+        variance = values.var(0)
+        if self.series:
+            channel = self.layout.channel
+            mean = np.bincount(channel, variance) / np.bincount(channel)
+            variance = mean[channel]
+        return np.where(variance > 0, np.sqrt(variance), 1.0)
+
+
+def summarise(summary: Summary | None, output: np.ndarray) -> np.ndarray:
+    """float64, at least one-dimensional."""
+    raw = output if summary is None else summary(output)
+    return np.atleast_1d(np.asarray(raw, np.float64))
+
+
+def describe(observed: np.ndarray, summary: Summary | None) -> Output:
+    """How outputs like `observed` become values; NaN is a missing sample.
+
+    Raises:
+        ValueError: nothing is finite.
+    """
+    summarised = summarise(summary, observed)
+    finite = np.isfinite(summarised)
+    if not finite.any():
+        raise ValueError("observed must have a finite value, got none")
+    series = summary is None and summarised.shape[0] >= SERIES
+    # channel after channel, time inside
+    index = np.arange(summarised.size).reshape(summarised.shape)
+    index = np.moveaxis(index, 0, -1).ravel() if series else index.ravel()
+    present = index[finite.ravel()[index]]
+    layout = _positions(summarised.shape, present, series)
+    block = -(-len(present) // LONGEST) if series else 1
+    starts = _block_starts(layout, block)
+    layout = Layout(layout.channel[starts], layout.index[starts] // block)
+    return Output(summary, summarised.shape, present, layout, starts, series)
+
+
+def _positions(shape: tuple[int, ...], present: np.ndarray, series: bool) -> Layout:
+    if not series:
+        return Layout(np.zeros(len(present), int), np.arange(len(present)))
+    channels = int(np.prod(shape[1:]))
+    channel, used = present % channels, present // channels
+    return Layout(np.unique(channel, return_inverse=True)[1], used)
+
+
+def _block_starts(layout: Layout, block: int) -> np.ndarray:
+    """First rows of runs of samples of one channel and one block of time."""
+    key = layout.index // block
+    new = (np.diff(layout.channel, prepend=-1) != 0) | (np.diff(key, prepend=-1) != 0)
+    return np.flatnonzero(new)

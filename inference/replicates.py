@@ -1,0 +1,42 @@
+"""When to simulate the same parameters again: the only direct word on run-to-run noise."""
+
+import numpy as np
+
+from .state import History
+
+FIRST = 2  # replicates to begin with, which tell a deterministic simulator
+SHARE = 0.1  # of the simulations, where runs differ
+SAME = 1e-9  # relative difference up to which two runs count as equal
+
+
+def next_replicate(history: History, pending: np.ndarray) -> np.ndarray | None:
+    """The point u [d] to be simulated again now, or None.
+
+    It is the best point so far that has no replicate: there the noise matters most.
+
+    Args:
+        history: What was told.
+        pending: Points asked and not yet told, u [m, d].
+    """
+    good = history.succeeded
+    u, features = history.u[good], history.features[good]
+    known = np.concatenate([u, pending])
+    points, count = np.unique(known, axis=0, return_counts=True)
+    repeated = points[count > 1]
+    replicates = len(known) - len(points)
+    wanted = max(FIRST, int(SHARE * len(known)))
+    if replicates >= wanted or _deterministic(u, features, repeated):
+        return None
+    for i in np.argsort(history.discrepancy[good], kind="stable"):
+        if not (repeated == u[i]).all(1).any():
+            return u[i]
+    return None
+
+
+def _deterministic(u: np.ndarray, features: np.ndarray, repeated: np.ndarray) -> bool:
+    """Whether the runs at FIRST or more repeated points are equal."""
+    spread = features.std(0)
+    groups = [features[(u == point).all(1)] for point in repeated]
+    told = [group for group in groups if len(group) > 1]
+    differences = [np.abs(group - group[0]).max() for group in told]
+    return len(told) >= FIRST and max(differences) <= SAME * spread.max()

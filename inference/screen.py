@@ -1,0 +1,133 @@
+"""A quick population of candidate points: importance sampling that zooms in.
+
+Cheaper and coarser than `population`, for choosing where to simulate rather than for sampling:
+an even screen of the prior, then rounds of a Gaussian kernel around resampled points, tempered
+while the target is too narrow for it (population Monte Carlo, Cappe et al. 2004).
+"""
+
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax.scipy.special import logsumexp, ndtr, ndtri
+from jax.scipy.stats import norm
+
+from .base import LogLikelihood
+from .design import sobol
+from .linalg import small_inverse_cholesky
+
+ROUND = 128
+EVEN, ROUNDS = 4, 8  # rounds that fill the prior evenly, and rounds in all
+CENTRES = 32
+EFFECTIVE = 24.0  # points to which the target is tempered
+WIDTH = 0.5  # of the kernel, in the population's sds
+SHARE_OF_PRIOR = 0.1
+EDGE = 1e-9
+COLDEST, GRID = -20.0, 21  # logs of the inverse temperatures tried
+
+
+class Screen(NamedTuple):
+    """Points u [n, d], log target and log weights [n]."""
+
+    u: jax.Array
+    log_target: jax.Array
+    log_weights: jax.Array
+
+
+class _Kernel(NamedTuple):
+    centres: jax.Array  # [CENTRES, d]
+    whitener: jax.Array  # [d, d]
+
+
+@partial(jax.jit, static_argnums=1)
+def screen(shifts: jax.Array, log_target: LogLikelihood, state: Any) -> Screen:
+    """Weighted points for exp(log_target(state, u)) over the unit box, fixed in number.
+
+    Args:
+        shifts: Uniform random numbers [ROUNDS, d + 1] that shift the Sobol points.
+    """
+    dimension = shifts.shape[1] - 1
+    n = ROUND * ROUNDS
+    even = jnp.asarray(sobol(0, 0, ROUND * EVEN, dimension)).reshape(EVEN, ROUND, dimension)
+    cloud = jnp.asarray(sobol(1, 0, ROUND, dimension + 1))
+
+    def one(i: jax.Array, now: tuple[jax.Array, jax.Array, jax.Array]):
+        x, values, mass = now
+        uniforms = jnp.clip((cloud + shifts[i]) % 1.0, EDGE, 1.0 - EDGE)
+        kernel = _fit(x, values, mass)
+        spread = even[jnp.minimum(i, EVEN - 1)] + shifts[0, :dimension]
+        spread = ndtri(jnp.clip(spread % 1.0, EDGE, 1.0 - EDGE))
+        new = jnp.where(i < EVEN, spread, _propose(kernel, uniforms))
+        x = jax.lax.dynamic_update_slice(x, new, (i * ROUND, 0))
+        found = jax.vmap(log_target, (None, 0))(state, ndtr(new))
+        found = jnp.where(jnp.isfinite(found), found, -jnp.inf)
+        values = jax.lax.dynamic_update_slice(values, found, (i * ROUND,))
+        return x, values, jnp.logaddexp(mass, _log_density(kernel, x, i < EVEN))
+
+    # the mass of later kernels at earlier points counts, and of earlier ones at later points is
+    # bounded by the prior's share: cheap, and enough for choosing
+    start = jnp.zeros((n, dimension)), jnp.full(n, -jnp.inf), jnp.full(n, -jnp.inf)
+    x, values, mass = jax.lax.fori_loop(0, ROUNDS, one, start)
+    return Screen(ndtr(x), values, _log_weights(x, values, mass, 1.0))
+
+
+def _log_prior(x: jax.Array) -> jax.Array:
+    return jnp.sum(norm.logpdf(x), -1)
+
+
+def _log_weights(x: jax.Array, values: jax.Array, mass: jax.Array, power: jax.Array | float):
+    tempered = jnp.where(jnp.isfinite(values), power * values, -jnp.inf)
+    return jnp.where(jnp.isfinite(values), tempered + _log_prior(x) - mass, -jnp.inf)
+
+
+def _fit(x: jax.Array, values: jax.Array, mass: jax.Array) -> _Kernel:
+    def effective(log_power: jax.Array) -> jax.Array:
+        w = _log_weights(x, values, mass, jnp.exp(log_power))
+        return jnp.exp(2.0 * logsumexp(w) - logsumexp(2.0 * w))
+
+    grid = jnp.linspace(COLDEST, 0.0, GRID)
+    enough = jax.vmap(effective)(grid) >= EFFECTIVE
+    power = jnp.exp(grid[jnp.max(jnp.where(enough, jnp.arange(GRID), 0))])
+    log_weights = _log_weights(x, values, mass, power)
+    weights = jnp.exp(log_weights - jnp.max(log_weights))
+    weights = jnp.where(jnp.isfinite(weights), weights, 0.0)
+    total = jnp.cumsum(weights)
+    positions = (jnp.arange(CENTRES) + 0.5) / CENTRES * total[-1]
+    centres = x[jnp.clip(jnp.searchsorted(total, positions), 0, len(x) - 1)]
+    share = weights / total[-1]
+    mean = share @ x
+    centred = x - mean
+    covariance = (centred * share[:, None]).T @ centred
+    covariance = covariance + jnp.diag(1e-4 * jnp.diag(covariance) + 1e-12)
+    return _Kernel(centres, small_inverse_cholesky(WIDTH**2 * covariance))
+
+
+def _propose(kernel: _Kernel, uniforms: jax.Array) -> jax.Array:
+    d = kernel.centres.shape[1]
+    z = ndtri(uniforms[:, :d])
+    choice = uniforms[:, d]
+    within = (choice - SHARE_OF_PRIOR) / (1.0 - SHARE_OF_PRIOR)
+    centre = kernel.centres[jnp.clip((within * CENTRES).astype(int), 0, CENTRES - 1)]
+    factor = jax.vmap(lambda row: _back_substitute(kernel.whitener, row))(z)
+    return jnp.where(choice[:, None] < SHARE_OF_PRIOR, z, centre + factor)
+
+
+def _back_substitute(whitener: jax.Array, z: jax.Array) -> jax.Array:
+    """L z for the inverse `whitener` of L, d rows."""
+    result = []
+    for i in range(len(z)):
+        done = sum((whitener[i, j] * result[j] for j in range(i)), jnp.asarray(0.0))
+        result.append((z[i] - done) / whitener[i, i])
+    return jnp.stack(result)
+
+
+def _log_density(kernel: _Kernel, x: jax.Array, even: jax.Array) -> jax.Array:
+    """Log of ROUND times the density of a round's proposals at x [n, d]."""
+    prior = _log_prior(x)
+    white = (x[:, None, :] - kernel.centres) @ kernel.whitener.T
+    log_det = jnp.sum(jnp.log(jnp.diag(kernel.whitener)))
+    each = jnp.sum(norm.logpdf(white), -1) + log_det
+    fitted = logsumexp(each, 1) - jnp.log(CENTRES)
+    both = jnp.logaddexp(jnp.log1p(-SHARE_OF_PRIOR) + fitted, jnp.log(SHARE_OF_PRIOR) + prior)
+    return jnp.log(ROUND) + jnp.where(even, prior, both)

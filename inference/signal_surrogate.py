@@ -1,0 +1,229 @@
+"""The surrogate that emulates the output itself, and compares it with what was observed."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ._float64 import in_float64
+from .base import LogLikelihood, LogSecondMoment
+from .design import sobol
+from .discrepancy_surrogate import believe
+from .emulator import Emulator, loo_errors, noise_share, predict, predictive_draws
+from .emulator_checks import complaints
+from .gaussian import SignalState, log_likelihood, log_second_moment, node_log_densities
+from .noise import (
+    NO_MEASUREMENT_NOISE,
+    Nodes,
+    Reduced,
+    candidates,
+    correlated,
+    reduce,
+    residual_size,
+)
+from .optimise import minimise_in_box
+from .output import Output
+
+KEPT = 12  # nodes of the measurement noise that enter the likelihood
+SCREENED = 128
+NEVER = -1e6  # log weight of a node that fills the arrays
+
+
+@dataclass(frozen=True)
+class SignalSurrogate:
+    """An emulator, and what the observed output says of its scores.
+
+    Attributes:
+        emulator: Of the outputs.
+        output: How outputs become values.
+        observed: The observed values [m].
+        nodes: Sizes and correlations of the measurement noise, KEPT of them.
+        reduced: The observed scores at each, with the scores' run-to-run noise.
+    """
+
+    emulator: Emulator
+    output: Output
+    observed: np.ndarray
+    nodes: Nodes
+    reduced: Reduced
+
+    @property
+    def gp(self):
+        return self.emulator.gp
+
+    @cached_property
+    def state(self) -> SignalState:
+        return state_of(self.emulator, self.reduced)
+
+    @property
+    def log_likelihood(self) -> LogLikelihood:
+        return log_likelihood
+
+    @property
+    def log_second_moment(self) -> LogSecondMoment:
+        return log_second_moment
+
+    @in_float64
+    def minimum(self) -> np.ndarray:
+        """Maximiser of the likelihood over the box, u [d]."""
+        return minimise_in_box(_negative, self.state, self.gp.data.u.shape[1])
+
+    @in_float64
+    def believe(self, u: np.ndarray) -> "SignalSurrogate":
+        """Condition on the predicted means at u [n, d], for points still being simulated."""
+        if len(u) == 0:
+            return self
+        return replace(self, emulator=self.emulator._replace(gp=believe(self.gp, u)))
+
+    @property
+    def node_weights(self) -> np.ndarray:
+        """Posterior weights [KEPT] of the nodes, given the best parameters."""
+        terms = _node_log_densities(self.state, jnp.asarray(self.minimum()[None]))
+        log_weights = np.asarray(terms)[0]
+        weights = np.exp(log_weights - log_weights.max())
+        return weights / weights.sum()
+
+    @in_float64
+    def constants(self) -> dict[str, np.ndarray]:
+        """What a reader of the posterior must know of the likelihood."""
+        weights = self.node_weights
+        return {
+            "components": np.asarray(self.emulator.basis.used),
+            "explained_variance": np.asarray(self.emulator.basis.explained),
+            "run_to_run_noise_share": np.asarray(noise_share(self.emulator)),
+            # of the output's first channel; a channel's noise is in proportion to its scale
+            "measurement_noise_sd": weights @ self.nodes.sigma * self.emulator.basis.scale[0],
+            "measurement_noise_correlation": weights @ self.nodes.rho,
+        }
+
+    @in_float64
+    def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd of a new simulated output's values at u [n, d]: [n, m], [n, m].
+
+        The sd holds the emulator's and the run-to-run variance, not measurement noise.
+        """
+        return predict(self.emulator, u)
+
+    @in_float64
+    def checks(self) -> dict[str, np.ndarray]:
+        """Studentised leave-one-out errors `loo_z` [n, components in use]."""
+        return {"loo_z": loo_errors(self.emulator)}
+
+    @in_float64
+    def warnings(self) -> list[str]:
+        """What the emulator's own checks complain of."""
+        if self.emulator.basis.used == 0:
+            return ["all simulated outputs are equal: the data cannot tell parameters apart"]
+        return complaints(loo_errors(self.emulator), noise_share(self.emulator), "output")
+
+    @in_float64
+    def predictive(self, key: jax.Array, u: np.ndarray) -> dict[str, np.ndarray]:
+        """One new observation, measurement noise included, for each row of u [n, d]: [n, ...].
+
+        NaN where nothing was observed; averaged values are repeated over their samples.
+        """
+        simulated_key, node_key, noise_key = jax.random.split(key, 3)
+        values = predictive_draws(simulated_key, self.emulator, u)
+        which = jax.random.choice(node_key, KEPT, (len(u),), p=jnp.asarray(self.node_weights))
+        nodes = Nodes(*(part[np.asarray(which)] for part in self.nodes))
+        white = np.asarray(jax.random.normal(noise_key, values.shape))
+        noise = correlated(white, self.output.layout, nodes)
+        values = values + self.emulator.basis.scale * noise
+        return {"signal": self.output.restore(values)}
+
+
+def _negative(state: SignalState, u: jax.Array) -> jax.Array:
+    return -log_likelihood(state, u)
+
+
+@jax.jit
+def _node_log_densities(state: SignalState, u: jax.Array) -> jax.Array:
+    return jax.vmap(node_log_densities, (None, 0))(state, u)
+
+
+def state_of(emulator: Emulator, reduced: Reduced) -> SignalState:
+    """What the likelihood depends on; empty components count as known."""
+    full = np.any(emulator.basis.vectors, 0).astype(float)
+    parts = full, reduced.estimate, reduced.covariance, reduced.log_weight
+    return SignalState(emulator.gp, *(jnp.asarray(part) for part in parts))
+
+
+@in_float64
+def observe(
+    emulator: Emulator,
+    output: Output,
+    observed: np.ndarray,
+    noise: np.ndarray | None,
+    previous: SignalSurrogate | None = None,
+) -> SignalSurrogate:
+    """Compare with the observed values [m].
+
+    The measurement noise is unknown unless given: its size and correlation are integrated out
+    over nodes, under a prior even in the logarithm of the size, centred on what no
+    combination of the components explains.
+
+    Args:
+        noise: Known covariance [m, m] of the measurement noise; None to estimate it where the
+            output is a series, and for none where it is not.
+        previous: Its nodes are kept.
+    """
+    basis, remainder = emulator.basis, emulator.remainder
+    target, used = basis.standardise(observed), emulator.basis.used
+    vectors, factors = basis.vectors, remainder.factors
+    if noise is not None:
+        factors = np.column_stack([factors, _root(noise / np.outer(basis.scale, basis.scale))])
+    if previous is not None:
+        nodes = previous.nodes
+    elif noise is not None or not output.series or used == 0:
+        nodes = NO_MEASUREMENT_NOISE
+    else:
+        nodes = candidates(residual_size(target, vectors[:, :used]))
+    if used == 0:  # every output is the same: nothing to compare
+        reduced = Reduced(np.zeros((1, 0)), np.zeros((1, 0, 0)), np.zeros(1))
+    else:
+        white = np.full(len(target), remainder.white)
+        reduced = reduce((vectors, target, factors), white, output.layout, nodes)
+    reduced = _widen(reduced, emulator)
+    kept = _keep(emulator, reduced)
+    reduced = _pad(Reduced(*(part[kept] for part in reduced)))
+    nodes = Nodes(*(np.resize(part[kept], KEPT) for part in nodes))
+    return SignalSurrogate(emulator, output, observed, nodes, reduced)
+
+
+def _root(covariance: np.ndarray) -> np.ndarray:
+    values, vectors = np.linalg.eigh(covariance)
+    return vectors * np.sqrt(np.maximum(values, 0.0))
+
+
+def _widen(reduced: Reduced, emulator: Emulator) -> Reduced:
+    """To all components, with the scores' run-to-run noise in the covariance."""
+    used, k = emulator.basis.used, emulator.basis.vectors.shape[1]
+    nodes = len(reduced.log_weight)
+    estimate = np.zeros((nodes, k))
+    estimate[:, :used] = reduced.estimate
+    covariance = np.tile(np.eye(k), (nodes, 1, 1))
+    covariance[:, :used, :used] = reduced.covariance + emulator.noise[:used, :used]
+    return Reduced(estimate, covariance, reduced.log_weight)
+
+
+def _keep(emulator: Emulator, reduced: Reduced) -> np.ndarray:
+    """The nodes of most evidence, best first, on an even screen of the prior and at the data."""
+    if len(reduced.log_weight) == 1:
+        return np.zeros(1, int)
+    data = emulator.gp.data.u
+    points = np.concatenate([sobol(0, 0, SCREENED, data.shape[1]), np.asarray(data)])
+    terms = _node_log_densities(state_of(emulator, reduced), jnp.asarray(points))
+    return np.argsort(-np.logaddexp.reduce(np.asarray(terms), 0))[:KEPT]
+
+
+def _pad(reduced: Reduced) -> Reduced:
+    """To KEPT nodes; the largest weight becomes 1."""
+    extra = KEPT - len(reduced.log_weight)
+    k = reduced.estimate.shape[1]
+    return Reduced(
+        np.concatenate([reduced.estimate, np.zeros((extra, k))]),
+        np.concatenate([reduced.covariance, np.tile(np.eye(k), (extra, 1, 1))]),
+        np.append(reduced.log_weight - reduced.log_weight.max(), np.full(extra, NEVER)),
+    )
