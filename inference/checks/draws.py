@@ -59,8 +59,9 @@ def effective_size(draws: np.ndarray) -> float:
     for column in np.moveaxis(draws, -1, 0):
         if np.ptp(column) == 0.0:
             return 1.0
-        sizes.append(float(array_stats.ess(column, method="bulk")))
-        sizes.append(float(array_stats.ess(column, method="tail", prob=(0.1, 0.9))))
+        bulk = array_stats.ess(column, method="bulk")
+        tail = array_stats.ess(column, method="tail", prob=(0.1, 0.9))
+        sizes += [np.asarray(bulk).item(), np.asarray(tail).item()]
     return max(1.0, float(np.nanmin(sizes)))
 
 

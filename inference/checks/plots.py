@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 INK, GREY, BAND = "#1f2933", "#8a94a0", "#e4e7eb"
 COLOURS = ("#2463a6", "#d1591a", "#2d8659", "#8a4fa3", "#b8860b", "#5b6770", "#c2185b", "#00838f")
-SIZE = (5.2, 3.6)  # inch
+SIZE = (5.2, 3.9)  # inch
+BELOW: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16), "ncols": 3}
+PERCENT = 100  # levels at which a coverage curve is drawn
 
 
 def plot_ecdf_difference(result: "SBC", ax: "Axes | None", level: float) -> "Axes":
@@ -28,7 +30,8 @@ def plot_ecdf_difference(result: "SBC", ax: "Axes | None", level: float) -> "Axe
     limits = bands.band(n, draws, level)
     z = _closed(limits.z, 1.0)
     lower, upper = (_closed(edge / n - limits.z, 0.0) for edge in (limits.lower, limits.upper))
-    ax.fill_between(z, lower, upper, color=BAND, lw=0, label=f"{level:.0%} band, simultaneous")
+    label = f"{100 * level:g} % band of the whole curve"
+    ax.fill_between(z, lower, upper, color=BAND, lw=0, label=label)
     ax.axhline(0.0, color=GREY, lw=0.8)
     for j, name in enumerate(result.names):
         below = bands.counts_below(result.ranks[:, j], draws) / n - limits.z
@@ -39,7 +42,7 @@ def plot_ecdf_difference(result: "SBC", ax: "Axes | None", level: float) -> "Axe
     ax.set_xlabel("rank of the truth among the draws, as a fraction")
     ax.set_ylabel("ECDF − uniform")
     ax.set_title(f"{n} replicates", loc="right", color=GREY)
-    return _finish(ax)
+    return _finish(ax, **BELOW)
 
 
 def plot_histograms(result: "SBC", axes: Any, level: float) -> "list[Axes]":
@@ -70,9 +73,10 @@ def plot_histograms(result: "SBC", axes: Any, level: float) -> "list[Axes]":
 def plot_coverage(result: "Coverage", ax: "Axes | None") -> "Axes":
     ax = _axes(ax)
     n, q = len(result.replicates), len(result.names)
-    level = np.linspace(0.0, 1.0, 201)
-    low, high = (binom.ppf(tail, n, level) / n - level for tail in (0.025, 0.975))
-    ax.fill_between(level, low, high, color=BAND, lw=0, label="95 % of chance, at each level")
+    limits = bands.band(n, PERCENT - 1, 0.95)  # |2 u - 1| is uniform like u
+    level = _closed(limits.z, 1.0)
+    low, high = (_closed(edge / n - limits.z, 0.0) for edge in (limits.lower, limits.upper))
+    ax.fill_between(level, low, high, color=BAND, lw=0, label="95 % band of the whole curve")
     ax.axhline(0.0, color=GREY, lw=0.8)
     for j, name in enumerate(result.names):
         within = np.sort(2 * np.abs(result.quantiles[:, j] - 0.5))
@@ -84,21 +88,21 @@ def plot_coverage(result: "Coverage", ax: "Axes | None") -> "Axes":
         style = {"fmt": "o", "ms": 4.5, "capsize": 2.5, "lw": 1.2}
         ax.errorbar(shifted, excess, error, color=_colour(j), label=name, **style)
     ax.set_xlim(0.0, 1.0)
-    ax.xaxis.set_major_formatter(PercentFormatter(1.0))
-    ax.yaxis.set_major_formatter(PercentFormatter(1.0))
+    ax.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+    ax.yaxis.set_major_formatter(PercentFormatter(1.0, symbol=" %"))
     ax.set_xlabel("nominal level of the central interval")
     ax.set_ylabel("truths held − nominal")
     ax.set_title(f"{n} replicates", loc="right", color=GREY)
-    return _finish(ax)
+    return _finish(ax, **BELOW)
 
 
 def plot_tarp(result: "Tarp", ax: "Axes | None") -> "Axes":
-    ax = _axes(ax, (4.2, 4.0))
+    ax = _axes(ax, (4.4, 4.2))
     n = len(result.replicates)
     limits = bands.band(n, result.replicates.most, 0.95)
     z = _closed(limits.z, 1.0)
     lower, upper = (_closed(edge / n, 1.0) for edge in (limits.lower, limits.upper))
-    ax.fill_between(z, lower, upper, color=BAND, lw=0, label="95 % band if right, simultaneous")
+    ax.fill_between(z, lower, upper, color=BAND, lw=0, label="95 % band of the whole curve")
     ax.plot([0, 1], [0, 1], color=GREY, lw=0.8)
     c = result.credibility
     ax.fill_between(c, result.low, result.high, color=COLOURS[0], alpha=0.25, lw=0)
@@ -107,7 +111,7 @@ def plot_tarp(result: "Tarp", ax: "Axes | None") -> "Axes":
         result.expected_coverage,
         color=COLOURS[0],
         lw=1.6,
-        label="joint posterior, bootstrap 95 %",
+        label="joint posterior, 95 % by bootstrap",
     )
     ax.set_xlim(0.0, 1.0)
     ax.set_ylim(0.0, 1.0)
@@ -115,7 +119,7 @@ def plot_tarp(result: "Tarp", ax: "Axes | None") -> "Axes":
     ax.set_xlabel("credibility")
     ax.set_ylabel("expected coverage")
     ax.set_title(f"{n} replicates", loc="right", color=GREY)
-    return _finish(ax)
+    return _finish(ax, loc="upper left")
 
 
 def _axes(ax: "Axes | None", size: tuple[float, float] = SIZE) -> "Axes":
@@ -131,8 +135,8 @@ def _closed(values: np.ndarray, last: float) -> np.ndarray:
     return np.concatenate([[0.0], values, [last]])
 
 
-def _finish(ax: "Axes") -> "Axes":
-    ax.legend(frameon=False, fontsize="small", labelcolor=INK)
+def _finish(ax: "Axes", **place: Any) -> "Axes":
+    ax.legend(**place, frameon=False, fontsize="small", labelcolor=INK)
     return _bare(ax)
 
 

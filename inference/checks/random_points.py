@@ -164,7 +164,7 @@ def _stacked(made: Replicates) -> tuple[np.ndarray, np.ndarray]:
 def _distances(made: Replicates, rows: np.ndarray) -> np.ndarray:
     """Distance of rows [R, m, d] from each replicate's random point, [R, m]; NaN stays NaN."""
     flat = rows.reshape(-1, rows.shape[-1])
-    missing = np.isnan(flat).any(-1)
+    missing = np.any(np.isnan(flat), axis=-1)
     full = np.where(missing[:, None], flat[0], flat)  # any numbers, so that shapes stay the same
     u = made.prior.to_unit(made.prior.to_dict(full))
     u[missing] = np.nan

@@ -65,13 +65,13 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
         ValueError: bad argument; a store made with other settings; a simulator or pipeline
             that returns something of the wrong form.
     """
-    simulate = _own(pipeline, "simulate", simulate)
+    simulator = _own(pipeline, "simulate", simulate)
     prior = _own(pipeline, "prior", prior)
     if not isinstance(prior, Prior):
         raise ValueError(f"prior must be a Prior, got {type(prior).__name__}")
     n, seed = checked_integer("n", n), checked_integer("seed", seed, 0)
     draws = checked_integer("draws", draws)
-    plan = Plan(pipeline, simulate, observe, prior.names, seed, draws, independent)
+    plan = Plan(pipeline, simulator, observe, prior.names, seed, draws, independent)
     settings = {field: describe(value) for field, value in plan._asdict().items()}
     settings |= {"prior": describe(prior), "identity": identity}
     truths = _truths(prior, n, seed)
@@ -87,7 +87,7 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
         missing = [number for number in range(n) if number not in done]
         for replicate in _run(plan, missing, truths, executor):
             kept.put(replicate)
-            done[replicate.index] = replicate
+            done[replicate.number] = replicate
             bar.advance(task)
     ordered = [done[number] for number in range(n)]
     finished = tuple(r for r in ordered if r.error is None)

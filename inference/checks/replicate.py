@@ -45,9 +45,9 @@ class Plan(NamedTuple):
 class Replicate(NamedTuple):
     """One replicate, finished or failed; `error` says why, and at which of the two stages."""
 
-    index: int
+    number: int
     truth: np.ndarray  # [d]
-    observed: np.ndarray | None
+    observed: np.ndarray  # empty where there was none
     draws: np.ndarray  # [m, d], independent; m = 0 where failed
     log_density: np.ndarray | None  # [1 + m], the truth's first
     effective: float  # sample size of all draws that the pipeline made
@@ -55,16 +55,16 @@ class Replicate(NamedTuple):
     error: str | None
 
 
-def stream(seed: int, index: int, part: int) -> np.random.SeedSequence:
+def stream(seed: int, number: int, part: int) -> np.random.SeedSequence:
     """Random numbers of one part of one replicate, unlike those of any other."""
-    return np.random.SeedSequence(seed, spawn_key=(index, part))
+    return np.random.SeedSequence(seed, spawn_key=(number, part))
 
 
-def _seed(seed: int, index: int, part: int) -> int:
-    return int(stream(seed, index, part).generate_state(1)[0] >> 1)
+def _seed(seed: int, number: int, part: int) -> int:
+    return int(stream(seed, number, part).generate_state(1)[0] >> 1)
 
 
-def run_replicate(plan: Plan, index: int, truth: np.ndarray) -> Replicate:
+def run_replicate(plan: Plan, number: int, truth: np.ndarray) -> Replicate:
     """Simulate at `truth` [d], run the pipeline, thin its draws.
 
     An exception of the simulator, of `observe` or of the pipeline is kept, and so are draws
@@ -75,14 +75,14 @@ def run_replicate(plan: Plan, index: int, truth: np.ndarray) -> Replicate:
             is a mistake that every replicate would repeat.
     """
     started = time.perf_counter()
-    empty = Replicate(index, truth, None, truth[None][:0], None, np.nan, np.nan, None)
+    empty = Replicate(number, truth, np.zeros(0), truth[None][:0], None, np.nan, np.nan, None)
 
-    def failed(stage: str, error: object, observed: np.ndarray | None = None) -> Replicate:
+    def failed(stage: str, error: object, observed: np.ndarray = empty.observed) -> Replicate:
         seconds = time.perf_counter() - started
         return empty._replace(observed=observed, seconds=seconds, error=f"{stage}: {error}")
 
     try:
-        signals = _simulated(plan, index, truth)
+        signals = _simulated(plan, number, truth)
     except Exception as error:  # whatever the user's code raises costs this replicate only
         return failed("simulator", f"{type(error).__name__}: {error}")
     if signals.shape[:1] != (1,):
@@ -90,13 +90,13 @@ def run_replicate(plan: Plan, index: int, truth: np.ndarray) -> Replicate:
             f"simulate must return one signal for one theta, shape [1, ...], got {signals.shape}"
         )
     try:
-        observed = _observed(plan, index, signals[0])
+        observed = _observed(plan, number, signals[0])
     except Exception as error:
         return failed("observe", f"{type(error).__name__}: {error}")
     if not np.isfinite(observed).any():
         return failed("simulator", "no value of the signal is finite", observed)
     try:
-        made = plan.pipeline(observed.copy(), _seed(plan.seed, index, PIPELINE))
+        made = plan.pipeline(observed.copy(), _seed(plan.seed, number, PIPELINE))
     except Exception as error:
         return failed("pipeline", f"{type(error).__name__}: {error}", observed)
     drawn, log_density = made if isinstance(made, tuple) else (made, None)
@@ -110,19 +110,19 @@ def run_replicate(plan: Plan, index: int, truth: np.ndarray) -> Replicate:
     except Exception as error:
         return failed("log density", f"{type(error).__name__}: {error}", observed)
     seconds = time.perf_counter() - started
-    return Replicate(index, truth, observed, kept, densities, effective, seconds, None)
+    return Replicate(number, truth, observed, kept, densities, effective, seconds, None)
 
 
-def _simulated(plan: Plan, index: int, truth: np.ndarray) -> np.ndarray:
+def _simulated(plan: Plan, number: int, truth: np.ndarray) -> np.ndarray:
     theta = {name: truth[j : j + 1] for j, name in enumerate(plan.names)}
-    seeds = np.array([_seed(plan.seed, index, SIMULATOR)], np.int64)
+    seeds = np.array([_seed(plan.seed, number, SIMULATOR)], np.int64)
     return np.asarray(plan.simulate(theta, seeds), np.float64)
 
 
-def _observed(plan: Plan, index: int, signal: np.ndarray) -> np.ndarray:
+def _observed(plan: Plan, number: int, signal: np.ndarray) -> np.ndarray:
     if plan.observe is None:
         return signal
-    rng = np.random.default_rng(stream(plan.seed, index, NOISE))
+    rng = np.random.default_rng(stream(plan.seed, number, NOISE))
     return np.asarray(plan.observe(signal, rng), np.float64)
 
 

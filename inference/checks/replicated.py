@@ -17,8 +17,8 @@ Quantity = Callable[[Mapping[str, np.ndarray], np.ndarray], np.ndarray]
 """(theta: name -> [n], observed) -> [n]: a number that is checked like a parameter."""
 
 
-class Values(dict[str, tuple[np.ndarray, np.ndarray]]):
-    """Quantity -> (its value at the truths [R], at the draws [R, L] with NaN after the last)."""
+Values = dict[str, tuple[np.ndarray, np.ndarray]]
+"""Quantity -> (its value at the truths [R], at the draws [R, L] with NaN after the last)."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Replicates:
     @property
     def index(self) -> np.ndarray:
         """Numbers of the finished replicates, [R]."""
-        return np.array([r.index for r in self.finished], np.int64)
+        return np.array([r.number for r in self.finished], np.int64)
 
     @property
     def truth(self) -> np.ndarray:
@@ -65,7 +65,7 @@ class Replicates:
     @property
     def errors(self) -> dict[int, str]:
         """Number -> error of the failed replicates."""
-        return {r.index: str(r.error) for r in self.failed}
+        return {r.number: str(r.error) for r in self.failed}
 
     def values(self, quantities: Mapping[str, Quantity] | None = None) -> Values:
         """Parameters and further quantities at truths and draws.
@@ -79,7 +79,7 @@ class Replicates:
             raise ValueError(f"no replicate finished, so nothing can be checked: {first}")
         truth, draws = self.truth, self.draws
         names = self.prior.names
-        found = Values({n: (truth[:, j], draws[..., j]) for j, n in enumerate(names)})
+        found = {name: (truth[:, j], draws[..., j]) for j, name in enumerate(names)}
         for name, quantity in (quantities or {}).items():
             if name in (*names, LOG_DENSITY):
                 raise ValueError(f"quantity {name!r} has the name of another; choose a new one")
@@ -92,8 +92,8 @@ class Replicates:
         """The pipeline's own log density at truths and draws; empty if it gives none."""
         rows = [r.log_density for r in self.finished if r.log_density is not None]
         if not rows or len(rows) < len(self.finished):
-            return Values()
-        return Values({LOG_DENSITY: _split(rows, self)})
+            return {}
+        return {LOG_DENSITY: _split(rows, self)}
 
     def quantiles(self, values: Values) -> np.ndarray:
         """Where each truth lies among its draws, [R, q] in [0, 1); see `ranks.quantiles`."""

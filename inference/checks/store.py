@@ -93,7 +93,7 @@ class ReplicateStore:
             "INSERT INTO replicate VALUES (?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET "
             "arrays = excluded.arrays, effective = excluded.effective, "
             "seconds = excluded.seconds, error = excluded.error WHERE error IS NOT NULL",
-            (replicate.index, file.getvalue(), effective, replicate.seconds, replicate.error),
+            (replicate.number, file.getvalue(), effective, replicate.seconds, replicate.error),
         )
 
     def close(self) -> None:
@@ -110,9 +110,10 @@ def _from_row(
     number: int, arrays: bytes, effective: float | None, seconds: float, error: str | None
 ) -> Replicate:
     with np.load(io.BytesIO(arrays), allow_pickle=False) as file:
-        held = {name: file[name] if name in file else None for name in ARRAYS}
+        held = dict(file)
+    held.setdefault("log_density", None)
     size = np.nan if effective is None else effective
-    return Replicate(index=number, effective=size, seconds=seconds, error=error, **held)
+    return Replicate(number=number, effective=size, seconds=seconds, error=error, **held)
 
 
 def _difference(path: str, stored: Mapping[str, str], settings: Mapping[str, str]) -> str:

@@ -14,7 +14,7 @@ from . import bands
 from .ranks import bin_count, to_ranks
 from .repeat import made_or_given
 from .replicate import Pipeline
-from .replicated import Quantity, Replicates
+from .replicated import LOG_DENSITY, Quantity, Replicates
 from .table import table
 
 if TYPE_CHECKING:
@@ -54,8 +54,8 @@ class SBC:
         limit = self.alpha / (2 * len(self.names))
         least = np.minimum(self.chi_square, self.ecdf)
         return self.replicates.warnings + [
-            f"{name}: ranks are not uniform (p = {p:.1g}){_shape(self.ranks[:, j], self.draws)}"
-            for j, (name, p) in enumerate(zip(self.names, least, strict=True))
+            f"{name}: ranks are not uniform (p = {p:.1g}){_shape(name, ranks, self.draws)}"
+            for name, p, ranks in zip(self.names, least, self.ranks.T, strict=True)
             if p < limit
         ]
 
@@ -100,7 +100,7 @@ class SBC:
         return plot_histograms(self, axes, level)
 
 
-def _shape(ranks: np.ndarray, draws: int) -> str:
+def _shape(name: str, ranks: np.ndarray, draws: int) -> str:
     """What a departure from uniform ranks means, where it has one of the plain shapes."""
     u = (ranks + 0.5) / (draws + 1) - 0.5
     n = len(u)
@@ -108,6 +108,8 @@ def _shape(ranks: np.ndarray, draws: int) -> str:
     spread = (12 * u**2 - 1).mean() * np.sqrt(n / 0.8)  # var of 12 u^2 is 4/5
     if max(abs(shift), abs(spread)) < NOTICED:
         return ""
+    if name == LOG_DENSITY and abs(shift) > NOTICED:
+        return ": draws too wide" if shift > 0 else ": draws too narrow, or in the wrong place"
     if abs(shift) > abs(spread):
         return ": draws too low" if shift > 0 else ": draws too high"
     return ": draws too narrow" if spread > 0 else ": draws too wide"
