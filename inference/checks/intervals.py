@@ -128,7 +128,8 @@ def coverage(  # noqa: PLR0913  operands of `replicates`, then what is asked of 
 
     Counts are exactly binomial where the posterior is right, whatever the number of draws: an
     end that falls between two draws is drawn at random. With 256 replicates the standard error
-    of a rate near 0.9 is 0.019.
+    of a rate near 0.9 is 0.019, and draws 20 % too narrow are always found, 10 % in one of
+    three trials.
 
     Args:
         of: Replicates, or a pipeline for which `replicates` makes them.

@@ -9,6 +9,7 @@ import numpy as np
 from ..base import Simulator
 from .draws import effective_size, posterior_array, thin
 
+FAILURES = (Exception, SystemExit)  # many programs end by the latter
 SIMULATOR, PIPELINE, NOISE = range(3)  # streams of random numbers within a replicate
 
 LogDensity = Callable[[dict[str, np.ndarray]], np.ndarray]
@@ -83,7 +84,7 @@ def run_replicate(plan: Plan, number: int, truth: np.ndarray) -> Replicate:
 
     try:
         signals = _simulated(plan, number, truth)
-    except Exception as error:  # whatever the user's code raises costs this replicate only
+    except FAILURES as error:  # whatever the user's code raises costs this replicate only
         return failed("simulator", f"{type(error).__name__}: {error}")
     if signals.shape[:1] != (1,):
         raise ValueError(
@@ -91,13 +92,13 @@ def run_replicate(plan: Plan, number: int, truth: np.ndarray) -> Replicate:
         )
     try:
         observed = _observed(plan, number, signals[0])
-    except Exception as error:
+    except FAILURES as error:
         return failed("observe", f"{type(error).__name__}: {error}")
     if not np.isfinite(observed).any():
         return failed("simulator", "no value of the signal is finite", observed)
     try:
         made = plan.pipeline(observed.copy(), _seed(plan.seed, number, PIPELINE))
-    except Exception as error:
+    except FAILURES as error:
         return failed("pipeline", f"{type(error).__name__}: {error}", observed)
     drawn, log_density = made if isinstance(made, tuple) else (made, None)
     array = posterior_array(drawn, plan.names)
@@ -107,7 +108,7 @@ def run_replicate(plan: Plan, number: int, truth: np.ndarray) -> Replicate:
     kept = thin(array, plan.draws, np.inf if plan.independent else effective)
     try:
         densities = _densities(plan, log_density, truth, kept)
-    except Exception as error:
+    except FAILURES as error:
         return failed("log density", f"{type(error).__name__}: {error}", observed)
     seconds = time.perf_counter() - started
     return Replicate(number, truth, observed, kept, densities, effective, seconds, None)

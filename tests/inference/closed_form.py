@@ -62,7 +62,7 @@ DECAY_PRIOR = inference.Prior(
 BIMODAL_PRIOR = inference.Prior({"fold": dist.Uniform(-1.0, 1.0), "level": dist.Uniform(0.0, 1.0)})
 
 TASKS = {
-    "line": (LINE, LINE_PRIOR),
+    "line": (Gaussian("line", sd=0.3), LINE_PRIOR),
     "decay": (DECAY, DECAY_PRIOR),
     "bimodal": (BIMODAL, BIMODAL_PRIOR),
 }
