@@ -128,8 +128,9 @@ def sbc(
 
     256 replicates of two parameters find draws 30 % too narrow always, 20 % eight times in ten
     and 10 % once (60 trials each, at the default alpha; `coverage` has more power against
-    draws that are only too narrow or too wide). Ranks of parameters cannot see a posterior that ignores the data and returns the prior; the
-    rank of a log density can, so let the pipeline return one, or give it as a quantity.
+    draws that are only too narrow or too wide). Ranks of parameters cannot see a posterior
+    that ignores the data and returns the prior; the rank of a log density can, so let the
+    pipeline return one, or give it as a quantity.
 
     Args:
         of: Replicates, or a pipeline for which `replicates` makes them.

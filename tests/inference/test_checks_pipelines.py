@@ -13,6 +13,7 @@ from bolfi_liquids import inference
 SHORT = {"sampler": "emcee", "chains": 2, "draws": 64, "warmup": 20}
 
 
+@pytest.mark.slow
 def test_fit_pipeline_is_fit_and_sample(simulate, prior, observed):
     pipeline = inference.FitPipeline(simulate, prior, 8, {"surrogate": "discrepancy"}, SHORT)
     drawn, log_density = pipeline(observed, 3)
