@@ -1,0 +1,81 @@
+"""A pipeline's draws, whatever they come in, and how many of them are independent."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from arviz_stats.base.array import array_stats
+
+SPACING = 2  # autocorrelation times between kept draws; an AR(1) chain then keeps exp(-4) = 0.02
+LEAST = 4  # draws per chain that an effective sample size can be estimated from
+
+
+def posterior_array(drawn: Any, names: Sequence[str]) -> np.ndarray:
+    """Stack posterior draws.
+
+    Args:
+        drawn: Mapping of name -> [chain, draw] or [draw], or an object with such a mapping as
+            `.posterior` (DataTree, InferenceData). Other names are ignored.
+        names: The parameters wanted.
+
+    Returns:
+        float64 [chain, draw, d], in the order of `names`.
+
+    Raises:
+        ValueError: a parameter is missing, or shapes are not as above and equal.
+    """
+    posterior = getattr(drawn, "posterior", drawn)
+    if not isinstance(posterior, Mapping):
+        raise ValueError(
+            "a pipeline must return name -> draws or a tree with a posterior group, "
+            f"got {type(drawn).__name__}"
+        )
+    missing = [name for name in names if name not in posterior]
+    if missing:
+        raise ValueError(
+            f"the pipeline's draws must hold the parameters {tuple(names)}, "
+            f"got {tuple(map(str, posterior))}"
+        )
+    columns = [np.asarray(posterior[name], np.float64) for name in names]
+    shapes = {name: column.shape for name, column in zip(names, columns, strict=True)}
+    if len(set(shapes.values())) > 1 or columns[0].ndim not in (1, 2) or columns[0].size == 0:
+        raise ValueError(
+            f"draws must all have one shape, [chain, draw] or [draw], not empty, got {shapes}"
+        )
+    stacked = np.stack(columns, -1)
+    return stacked if stacked.ndim == 3 else stacked[None]
+
+
+def effective_size(draws: np.ndarray) -> float:
+    """The least effective sample size of draws [chain, draw, d], over bulk, tails and parameters.
+
+    Rank-normalised, split chains (Vehtari et al. 2021). A parameter that never moves counts as
+    one draw; chains shorter than `LEAST` show no autocorrelation and count in full.
+    """
+    total = draws.shape[0] * draws.shape[1]
+    if draws.shape[1] < LEAST:
+        return float(total)
+    sizes = [float(total)]
+    for column in np.moveaxis(draws, -1, 0):
+        if np.ptp(column) == 0.0:
+            return 1.0
+        bulk = array_stats.ess(column, method="bulk")
+        tail = array_stats.ess(column, method="tail", prob=(0.1, 0.9))
+        sizes += [np.asarray(bulk).item(), np.asarray(tail).item()]
+    return max(1.0, float(np.nanmin(sizes)))
+
+
+def thin(draws: np.ndarray, most: int, effective: float) -> np.ndarray:
+    """At most `most` draws, evenly spaced and `SPACING` autocorrelation times apart.
+
+    Args:
+        draws: [chain, draw, d].
+        most: Upper limit of what is kept.
+        effective: Independent draws that these are worth; infinite keeps any spacing.
+
+    Returns:
+        [m, d], m >= 1.
+    """
+    joined = draws.reshape(-1, draws.shape[-1])
+    n = int(max(1.0, min(most, len(joined), effective / SPACING)))
+    return joined[((np.arange(n) + 0.5) * len(joined) / n).astype(int)]

@@ -1,0 +1,156 @@
+"""Do central intervals hold their truths as often as they say?"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+from scipy.stats import beta, binom
+
+from ..base import Simulator
+from ..prior import Prior
+from .repeat import made_or_given
+from .replicate import Pipeline
+from .replicated import Quantity, Replicates
+from .table import table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+CONFIDENCE = 0.95  # of the intervals shown for each rate
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """How many of R central intervals held the truth.
+
+    Attributes:
+        replicates: What was counted.
+        names: q quantities.
+        levels: k nominal levels, in (0, 1).
+        covered: Intervals that held the truth, [k, q].
+        quantiles: Where each truth lies among its draws, [R, q].
+        p_values: Binomial, [k, q]; two-sided, or of too few if `conservative`.
+        conservative: Only too little coverage counts against the pipeline.
+        alpha: False alarms of `ok` when all is right, all levels and quantities together.
+    """
+
+    replicates: Replicates
+    names: tuple[str, ...]
+    levels: np.ndarray
+    covered: np.ndarray
+    quantiles: np.ndarray
+    p_values: np.ndarray
+    conservative: bool
+    alpha: float
+
+    @property
+    def rate(self) -> np.ndarray:
+        """Share of intervals that held the truth, [k, q]."""
+        return self.covered / len(self.replicates)
+
+    @property
+    def low(self) -> np.ndarray:
+        """Lower end of the 95 % interval of the rate (Clopper and Pearson 1934), [k, q]."""
+        n, tail = len(self.replicates), (1 - CONFIDENCE) / 2
+        some = beta.ppf(tail, np.maximum(self.covered, 1), n - self.covered + 1)
+        return np.where(self.covered > 0, some, 0.0)
+
+    @property
+    def high(self) -> np.ndarray:
+        """Upper end, [k, q]."""
+        n, tail = len(self.replicates), (1 - CONFIDENCE) / 2
+        some = beta.ppf(1 - tail, self.covered + 1, np.maximum(n - self.covered, 1))
+        return np.where(self.covered < n, some, 1.0)
+
+    @property
+    def warnings(self) -> list[str]:
+        """All that speaks against the pipeline, in sentences."""
+        limit = self.alpha / self.p_values.size
+        return self.replicates.warnings + [
+            f"{name}: {level:.0%} intervals hold the truth in {self.rate[i, j]:.1%} (p = {p:.1g})"
+            for j, name in enumerate(self.names)
+            for i, (level, p) in enumerate(zip(self.levels, self.p_values[:, j], strict=True))
+            if p < limit
+        ]
+
+    @property
+    def ok(self) -> bool:
+        """No warning."""
+        return not self.warnings
+
+    def __str__(self) -> str:
+        rows = [
+            [name]
+            + [
+                f"{self.rate[i, j]:.3f} [{self.low[i, j]:.3f}, {self.high[i, j]:.3f}]"
+                for i in range(len(self.levels))
+            ]
+            for j, name in enumerate(self.names)
+        ]
+        heading = f"Coverage of central intervals: {self.replicates}"
+        return table(heading, ["", *(f"{level:g}" for level in self.levels)], rows, self.warnings)
+
+    def to_dataset(self) -> xr.Dataset:
+        """Rates, their 95 % intervals and p-values by level and quantity."""
+        two = ["level", "quantity"]
+        return xr.Dataset(
+            {
+                "rate": (two, self.rate),
+                "low": (two, self.low),
+                "high": (two, self.high),
+                "p_value": (two, self.p_values),
+            },
+            {"level": self.levels, "quantity": list(self.names)},
+            {"replicates": len(self.replicates), "alpha": self.alpha, "ok": int(self.ok)},
+        )
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Coverage minus its nominal level, with 95 % intervals at the levels."""
+        from .plots import plot_coverage
+
+        return plot_coverage(self, ax)
+
+
+def coverage(  # noqa: PLR0913  operands of `replicates`, then what is asked of them
+    of: Replicates | Pipeline,
+    simulate: Simulator | None = None,
+    prior: Prior | None = None,
+    *,
+    levels: Sequence[float] = (0.5, 0.8, 0.9, 0.95),
+    conservative: bool = False,
+    quantities: Mapping[str, Quantity] | None = None,
+    alpha: float = 0.01,
+    **run: Any,
+) -> Coverage:
+    """Empirical coverage of central posterior intervals.
+
+    Counts are exactly binomial where the posterior is right, whatever the number of draws: an
+    end that falls between two draws is drawn at random. With 256 replicates the standard error
+    of a rate near 0.9 is 0.019, and draws 20 % too narrow are always found, 10 % in one of
+    three trials.
+
+    Args:
+        of: Replicates, or a pipeline for which `replicates` makes them.
+        simulate, prior, run: Arguments of `replicates`; only with a pipeline.
+        levels: Nominal levels.
+        conservative: Only too little coverage is a fault, as for a posterior that is wide by
+            construction.
+        quantities: Further functions (theta: name -> [n], observed) -> [n].
+        alpha: False alarms of `ok`.
+
+    Raises:
+        ValueError: as `replicates`; none finished; a level outside (0, 1).
+    """
+    nominal = np.array(levels, np.float64)
+    if nominal.ndim != 1 or nominal.size == 0 or not ((nominal > 0) & (nominal < 1)).all():
+        raise ValueError(f"levels must lie between 0 and 1, got {levels}")
+    made = made_or_given(of, simulate, prior, run)
+    values = made.values(quantities)
+    quantiles = made.quantiles(values)
+    covered = np.sum(2 * np.abs(quantiles - 0.5) <= nominal[:, None, None], axis=1)
+    few = binom.cdf(covered, len(made), nominal[:, None])
+    many = binom.sf(covered - 1, len(made), nominal[:, None])
+    p_values = few if conservative else np.minimum(1.0, 2 * np.minimum(few, many))
+    return Coverage(made, tuple(values), nominal, covered, quantiles, p_values, conservative, alpha)

@@ -1,0 +1,127 @@
+"""The engine as a pipeline, with simulations of its own or with a design that is shared."""
+
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..bank import SimulationBank
+from ..base import Simulator
+from ..bolfi import MIN_LEARN, Bolfi, checked_integer
+from ..design import sobol
+from ..loop import fit
+from ..prior import Prior
+from ..simulate import jobs, run_missing, simulation_seed
+from .replicate import LogDensity
+
+Options = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class FitPipeline:
+    """`fit` and `Fit.sample` on each set of data, with new simulations each time.
+
+    Attributes:
+        simulate, prior: See `fit`.
+        budget: Simulations per set of data.
+        options: Other options of `fit`, such as {"surrogate": "signal"}.
+        sampling: Options of `Fit.sample`, such as {"chains": 2, "draws": 250}.
+    """
+
+    simulate: Simulator
+    prior: Prior
+    budget: int = 40
+    options: Options = field(default_factory=dict)
+    sampling: Options = field(default_factory=dict)
+
+    def __call__(self, observed: np.ndarray, seed: int) -> tuple[xr.DataTree, LogDensity]:
+        made = fit(
+            self.simulate, self.prior, observed, budget=self.budget, seed=seed, **self.options
+        )
+        return made.sample(seed=seed, **self.sampling), made.log_prob
+
+
+@dataclass(frozen=True)
+class SharedDesign:
+    """One set of simulations that serves every set of data; see `shared_design`.
+
+    Attributes:
+        simulate: Makes the data of the replicates; the design is made already.
+        prior: The parameters and their priors.
+        theta: Parameters of the simulations [n, d], natural units.
+        signals: [n, *signal_shape]; rows of NaN where a simulation failed.
+        seeds: [n].
+        options: Options of `Bolfi`, such as {"surrogate": "signal"}.
+        sampling: Options of `Fit.sample`.
+    """
+
+    simulate: Simulator
+    prior: Prior
+    theta: np.ndarray
+    signals: np.ndarray
+    seeds: np.ndarray
+    options: Options = field(default_factory=dict)
+    sampling: Options = field(default_factory=dict)
+
+    def __call__(self, observed: np.ndarray, seed: int) -> tuple[xr.DataTree, LogDensity]:
+        engine = Bolfi(self.prior, observed, seed=seed, **self.options)
+        engine.tell(self.prior.to_dict(self.theta), self.signals, self.seeds)
+        made = engine.fit()
+        return made.sample(seed=seed, **self.sampling), made.log_prob
+
+
+def shared_design(  # noqa: PLR0913  one flat place for what defines a design
+    simulate: Simulator,
+    prior: Prior,
+    n: int = 40,
+    *,
+    seed: int = 0,
+    options: Options | None = None,
+    sampling: Options | None = None,
+    executor: Executor | None = None,
+    bank: str | Path = ":memory:",
+    identity: str = "",
+) -> SharedDesign:
+    """A pipeline whose n simulations are made here, once, for all replicates.
+
+    The points fill the prior (scrambled Sobol) instead of following an acquisition, which
+    depends on the data. What is checked is then this one emulator, averaged over data: many
+    replicates cost n simulations and one for each set of data.
+
+    Args:
+        simulate, prior, executor, bank, identity: See `fit`.
+        n: Simulations, at least three.
+        seed: Fixes the points and the simulations' seeds.
+        options: Of `Bolfi`, such as {"surrogate": "signal"}.
+        sampling: Of `Fit.sample`, such as {"chains": 2, "draws": 250}.
+
+    Raises:
+        RuntimeError: fewer than three simulations succeeded.
+    """
+    n, seed = checked_integer("n", n, MIN_LEARN), checked_integer("seed", seed, 0)
+    theta = prior.from_unit(sobol(seed, 0, n, len(prior)))
+    seeds = [simulation_seed(seed, i) for i in range(n)]
+    with SimulationBank(bank) as kept:
+        made = run_missing(simulate, jobs(theta, seeds), None, kept, identity, executor)
+    good = [result.signal for result in made if result.signal is not None]
+    if len(good) < MIN_LEARN:
+        first = next((result.error for result in made if result.error), "none")
+        raise RuntimeError(
+            f"{len(good)} of {n} simulations succeeded, {MIN_LEARN} are needed; "
+            f"the first error: {first}"
+        )
+    empty = np.full(good[0].shape, np.nan)
+    signals = np.stack([empty if result.signal is None else result.signal for result in made])
+    return SharedDesign(
+        simulate,
+        prior,
+        prior.to_array(theta),
+        signals,
+        np.array(seeds),
+        options or {},
+        sampling or {},
+    )

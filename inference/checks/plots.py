@@ -1,0 +1,147 @@
+"""Figures of the checks. Matplotlib is imported by whoever asks for one."""
+
+from typing import TYPE_CHECKING, Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.ticker import PercentFormatter
+from scipy.stats import binom
+
+from . import bands
+from .ranks import bin_count
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from .intervals import Coverage
+    from .random_points import Tarp
+    from .uniformity import SBC
+
+INK, GREY, BAND = "#1f2933", "#8a94a0", "#e4e7eb"
+COLOURS = ("#2463a6", "#d1591a", "#2d8659", "#8a4fa3", "#b8860b", "#5b6770", "#c2185b", "#00838f")
+SIZE = (5.2, 3.9)  # inch
+BELOW: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16), "ncols": 3}
+PERCENT = 100  # levels at which a coverage curve is drawn
+
+
+def plot_ecdf_difference(result: "SBC", ax: "Axes | None", level: float) -> "Axes":
+    ax = _axes(ax)
+    n, draws = len(result.replicates), result.draws
+    limits = bands.band(n, draws, level)
+    z = _closed(limits.z, 1.0)
+    lower, upper = (_closed(edge / n - limits.z, 0.0) for edge in (limits.lower, limits.upper))
+    label = f"{100 * level:g} % band of the whole curve"
+    ax.fill_between(z, lower, upper, color=BAND, lw=0, label=label)
+    ax.axhline(0.0, color=GREY, lw=0.8)
+    for j, name in enumerate(result.names):
+        below = bands.counts_below(result.ranks[:, j], draws) / n - limits.z
+        ax.plot(z, _closed(below, 0.0), color=_colour(j), lw=1.6, label=name)
+    ax.set_xlim(0.0, 1.0)
+    reach = 1.15 * np.abs(ax.dataLim.intervaly).max()
+    ax.set_ylim(-reach, reach)
+    ax.set_xlabel("rank of the truth among the draws, as a fraction")
+    ax.set_ylabel("ECDF − uniform")
+    ax.set_title(f"{n} replicates", loc="right", color=GREY)
+    return _finish(ax, **BELOW)
+
+
+def plot_histograms(result: "SBC", axes: Any, level: float) -> "list[Axes]":
+    q, n, draws = len(result.names), len(result.replicates), result.draws
+    if axes is None:
+        size = (max(2.6 * q, 3.2), 2.6)
+        axes = plt.subplots(1, q, figsize=size, sharey=True, layout="constrained")[1]
+    panels = list(np.atleast_1d(axes).ravel())
+    if len(panels) < q:
+        raise ValueError(f"axes must hold one for each of {q} quantities, got {len(panels)}")
+    bins = bin_count(n, draws)
+    low, high = binom.interval(level, n, 1 / bins)
+    for j, (name, ax) in enumerate(zip(result.names, panels, strict=False)):
+        counts = np.bincount(result.ranks[:, j] * bins // (draws + 1), minlength=bins)
+        ax.axhspan(low, high, color=BAND, lw=0)
+        ax.axhline(n / bins, color=GREY, lw=0.8)
+        ax.stairs(counts, np.linspace(0.0, 1.0, bins + 1), color=_colour(j), fill=True, alpha=0.35)
+        ax.stairs(counts, np.linspace(0.0, 1.0, bins + 1), color=_colour(j), lw=1.2)
+        ax.set_xlim(0.0, 1.0)
+        ax.set_ylim(0.0, 1.15 * max(counts.max(), high))
+        ax.set_title(name, color=INK)
+        ax.set_xlabel("rank, as a fraction")
+        _bare(ax)
+    panels[0].set_ylabel(f"replicates of {n}")
+    return panels[:q]
+
+
+def plot_coverage(result: "Coverage", ax: "Axes | None") -> "Axes":
+    ax = _axes(ax)
+    n, q = len(result.replicates), len(result.names)
+    limits = bands.band(n, PERCENT - 1, 0.95)  # |2 u - 1| is uniform like u
+    level = _closed(limits.z, 1.0)
+    low, high = (_closed(edge / n - limits.z, 0.0) for edge in (limits.lower, limits.upper))
+    ax.fill_between(level, low, high, color=BAND, lw=0, label="95 % band of the whole curve")
+    ax.axhline(0.0, color=GREY, lw=0.8)
+    for j, name in enumerate(result.names):
+        within = np.sort(2 * np.abs(result.quantiles[:, j] - 0.5))
+        curve = np.searchsorted(within, level, side="right") / n - level
+        ax.plot(level, curve, color=_colour(j), lw=1.2, alpha=0.6)
+        shifted = result.levels + 0.008 * (j - (q - 1) / 2)  # so that bars do not hide each other
+        error = np.stack([result.rate - result.low, result.high - result.rate])[:, :, j]
+        excess = result.rate[:, j] - result.levels
+        style = {"fmt": "o", "ms": 4.5, "capsize": 2.5, "lw": 1.2}
+        ax.errorbar(shifted, excess, error, color=_colour(j), label=name, **style)
+    ax.set_xlim(0.0, 1.0)
+    ax.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+    ax.yaxis.set_major_formatter(PercentFormatter(1.0, symbol=" %"))
+    ax.set_xlabel("nominal level of the central interval")
+    ax.set_ylabel("truths held − nominal")
+    ax.set_title(f"{n} replicates", loc="right", color=GREY)
+    return _finish(ax, **BELOW)
+
+
+def plot_tarp(result: "Tarp", ax: "Axes | None") -> "Axes":
+    ax = _axes(ax, (4.4, 4.2))
+    n = len(result.replicates)
+    limits = bands.band(n, result.replicates.most, 0.95)
+    z = _closed(limits.z, 1.0)
+    lower, upper = (_closed(edge / n, 1.0) for edge in (limits.lower, limits.upper))
+    ax.fill_between(z, lower, upper, color=BAND, lw=0, label="95 % band of the whole curve")
+    ax.plot([0, 1], [0, 1], color=GREY, lw=0.8)
+    c = result.credibility
+    ax.fill_between(c, result.low, result.high, color=COLOURS[0], alpha=0.25, lw=0)
+    ax.plot(
+        c,
+        result.expected_coverage,
+        color=COLOURS[0],
+        lw=1.6,
+        label="joint posterior, 95 % by bootstrap",
+    )
+    ax.set_xlim(0.0, 1.0)
+    ax.set_ylim(0.0, 1.0)
+    ax.set_aspect("equal")
+    ax.set_xlabel("credibility")
+    ax.set_ylabel("expected coverage")
+    ax.set_title(f"{n} replicates", loc="right", color=GREY)
+    return _finish(ax, loc="upper left")
+
+
+def _axes(ax: "Axes | None", size: tuple[float, float] = SIZE) -> "Axes":
+    return plt.subplots(figsize=size, layout="constrained")[1] if ax is None else ax
+
+
+def _colour(j: int) -> str:
+    return COLOURS[j % len(COLOURS)]
+
+
+def _closed(values: np.ndarray, last: float) -> np.ndarray:
+    """A curve that starts at 0 and ends at `last`."""
+    return np.concatenate([[0.0], values, [last]])
+
+
+def _finish(ax: "Axes", **place: Any) -> "Axes":
+    ax.legend(**place, frameon=False, fontsize="small", labelcolor=INK)
+    return _bare(ax)
+
+
+def _bare(ax: "Axes") -> "Axes":
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.spines[["left", "bottom"]].set_color(GREY)
+    ax.tick_params(colors=INK, labelsize="small")
+    return ax

@@ -1,0 +1,150 @@
+"""Running a pipeline many times on data whose truth is known."""
+
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Executor, as_completed
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from ..base import Simulator
+from ..bolfi import checked_integer
+from ..prior import Prior
+from .describe import describe
+from .replicate import Observe, Pipeline, Plan, Replicate, run_replicate
+from .replicated import Replicates
+from .store import ReplicateStore
+
+BLOCK = 256  # truths are made in blocks of one shape, so that JAX seldom compiles
+
+
+def replicates(  # noqa: PLR0913  one flat place for what defines a check
+    pipeline: Pipeline,
+    simulate: Simulator | None = None,
+    prior: Prior | None = None,
+    n: int = 256,
+    *,
+    seed: int = 0,
+    draws: int = 63,
+    independent: bool = False,
+    observe: Observe | None = None,
+    executor: Executor | None = None,
+    store: str | Path = ":memory:",
+    identity: str = "",
+    retry: bool = False,
+    progress: bool = False,
+) -> Replicates:
+    """Draw parameters from the prior, simulate data, run the pipeline on them; n times.
+
+    Over such replicates the truth is one more draw of the right posterior, which `sbc`,
+    `coverage` and `tarp` test in different ways; all three can use one set of replicates.
+
+    Args:
+        pipeline: Callable (observed, seed) -> draws, see `Pipeline`; for example a
+            `FitPipeline`. Picklable where the executor uses processes.
+        simulate: Makes the data, see `fit`; None takes the pipeline's own `simulate`.
+        prior: Of the truths; None takes the pipeline's own `prior`.
+        n: Replicates. More can be added to a store later.
+        seed: Fixes truths, data and the pipeline's seeds.
+        draws: L, kept of each replicate once thinned to near independence by its effective
+            sample size, which must be about 2 L. Choose 2^k - 1: bins then divide L + 1.
+        independent: The pipeline's draws are independent: do not thin by autocorrelation.
+        observe: Callable (signal, rng) -> observed that adds measurement noise; None adds none.
+        executor: Runs each replicate as a call of its own; None runs them here, one by one.
+            Processes must be spawned, not forked, since JAX runs threads.
+        store: File that keeps every finished replicate. The same call on the same file goes
+            on where the last one ended, also after a crash.
+        identity: Names what the store cannot see: anything in the code that would change the
+            draws must change it.
+        retry: Run again what failed before and is in the store with its error.
+        progress: Show a bar.
+
+    Raises:
+        ValueError: bad argument; a store made with other settings; a simulator or pipeline
+            that returns something of the wrong form.
+    """
+    simulator = _own(pipeline, "simulate", simulate)
+    prior = _own(pipeline, "prior", prior)
+    if not isinstance(prior, Prior):
+        raise ValueError(f"prior must be a Prior, got {type(prior).__name__}")
+    n, seed = checked_integer("n", n), checked_integer("seed", seed, 0)
+    draws = checked_integer("draws", draws)
+    plan = Plan(pipeline, simulator, observe, prior.names, seed, draws, independent)
+    settings = {field: describe(value) for field, value in plan._asdict().items()}
+    settings |= {"prior": describe(prior), "identity": identity}
+    truths = _truths(prior, n, seed)
+    with ExitStack() as stack:
+        kept = stack.enter_context(ReplicateStore(store, settings))
+        done = {
+            number: replicate
+            for number, replicate in kept.load().items()
+            if number < n and not (retry and replicate.error)
+        }
+        bar = stack.enter_context(_bar(progress))
+        task = bar.add_task("", total=n, completed=len(done))
+        missing = [number for number in range(n) if number not in done]
+        for replicate in _run(plan, missing, truths, executor):
+            kept.put(replicate)
+            done[replicate.number] = replicate
+            bar.advance(task)
+    ordered = [done[number] for number in range(n)]
+    finished = tuple(r for r in ordered if r.error is None)
+    return Replicates(prior, seed, draws, finished, tuple(r for r in ordered if r.error))
+
+
+def made_or_given(
+    of: Replicates | Pipeline,
+    simulate: Simulator | None,
+    prior: Prior | None,
+    run: Mapping[str, Any],
+) -> Replicates:
+    """Replicates as given, or made by the pipeline that was given.
+
+    Raises:
+        ValueError: replicates together with what would make them.
+    """
+    if not isinstance(of, Replicates):
+        return replicates(of, simulate, prior, **run)
+    if simulate is not None or prior is not None or run:
+        raise ValueError(
+            "replicates are made already: give no simulator, prior or option of `replicates`, "
+            f"got {[*run] or 'simulate or prior'}"
+        )
+    return of
+
+
+def _truths(prior: Prior, n: int, seed: int) -> np.ndarray:
+    """Draws of the prior [n, d]; the first ones do not depend on n."""
+    rows = BLOCK * -(-n // BLOCK)
+    u = np.random.default_rng(seed).random((rows, len(prior)))
+    return prior.to_array(prior.from_unit(u))[:n]
+
+
+def _own(pipeline: Pipeline, name: str, given: Any) -> Any:
+    found = getattr(pipeline, name, None) if given is None else given
+    if found is None:
+        raise ValueError(f"{name} is needed, for the pipeline has none of its own")
+    return found
+
+
+def _run(
+    plan: Plan, numbers: list[int], truths: np.ndarray, executor: Executor | None
+) -> Iterator[Replicate]:
+    """Replicates as they finish."""
+    if executor is None:
+        yield from (run_replicate(plan, number, truths[number]) for number in numbers)
+        return
+    futures = [executor.submit(run_replicate, plan, number, truths[number]) for number in numbers]
+    try:
+        for future in as_completed(futures):
+            yield future.result()
+    finally:
+        for future in futures:
+            future.cancel()  # after a mistake or Ctrl-C there is no use in the rest
+
+
+def _bar(show: bool) -> Progress:
+    columns = TextColumn("replicates"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
+    return Progress(*columns, disable=not show)

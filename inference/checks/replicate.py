@@ -1,0 +1,148 @@
+"""One replicate: data simulated from a draw of the prior, and what the pipeline makes of them."""
+
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from ..base import Simulator
+from .draws import effective_size, posterior_array, thin
+
+FAILURES = (Exception, SystemExit)  # many programs end by the latter
+SIMULATOR, PIPELINE, NOISE = range(3)  # streams of random numbers within a replicate
+
+LogDensity = Callable[[dict[str, np.ndarray]], np.ndarray]
+"""theta: name -> [n]  ->  [n]: log density of a posterior, up to a constant."""
+
+Observe = Callable[[np.ndarray, np.random.Generator], np.ndarray]
+"""(signal, rng) -> observed: what measuring adds to what is simulated."""
+
+
+class Pipeline(Protocol):
+    """Anything that draws from a posterior. It must be picklable to run in other processes."""
+
+    def __call__(self, observed: np.ndarray, seed: int, /) -> Any:
+        """Posterior draws: name -> [chain, draw] or [draw], or a tree with a posterior group.
+
+        May return (draws, log_density) instead, see `LogDensity`: the rank of the truth's
+        density is then checked too, the only check that sees a posterior that ignores the data.
+        """
+        ...
+
+
+class Plan(NamedTuple):
+    """What all replicates have in common."""
+
+    pipeline: Pipeline
+    simulate: Simulator
+    observe: Observe | None
+    names: tuple[str, ...]
+    seed: int
+    draws: int
+    independent: bool
+
+
+class Replicate(NamedTuple):
+    """One replicate, finished or failed; `error` says why, and at which of the two stages."""
+
+    number: int
+    truth: np.ndarray  # [d]
+    observed: np.ndarray  # empty where there was none
+    draws: np.ndarray  # [m, d], independent; m = 0 where failed
+    log_density: np.ndarray | None  # [1 + m], the truth's first
+    effective: float  # sample size of all draws that the pipeline made
+    seconds: float
+    error: str | None
+
+
+def stream(seed: int, number: int, part: int) -> np.random.SeedSequence:
+    """Random numbers of one part of one replicate, unlike those of any other."""
+    return np.random.SeedSequence(seed, spawn_key=(number, part))
+
+
+def _seed(seed: int, number: int, part: int) -> int:
+    return int(stream(seed, number, part).generate_state(1)[0] >> 1)
+
+
+def run_replicate(plan: Plan, number: int, truth: np.ndarray) -> Replicate:
+    """Simulate at `truth` [d], run the pipeline, thin its draws.
+
+    An exception of the simulator, of `observe` or of the pipeline is kept, and so are draws
+    that are not finite.
+
+    Raises:
+        ValueError: the simulator or the pipeline returned something of the wrong form, which
+            is a mistake that every replicate would repeat.
+    """
+    started = time.perf_counter()
+    empty = Replicate(number, truth, np.zeros(0), truth[None][:0], None, np.nan, np.nan, None)
+
+    def failed(stage: str, error: object, observed: np.ndarray = empty.observed) -> Replicate:
+        seconds = time.perf_counter() - started
+        return empty._replace(observed=observed, seconds=seconds, error=f"{stage}: {error}")
+
+    try:
+        signals = _simulated(plan, number, truth)
+    except FAILURES as error:  # whatever the user's code raises costs this replicate only
+        return failed("simulator", f"{type(error).__name__}: {error}")
+    if signals.shape[:1] != (1,):
+        raise ValueError(
+            f"simulate must return one signal for one theta, shape [1, ...], got {signals.shape}"
+        )
+    try:
+        observed = _observed(plan, number, signals[0])
+    except FAILURES as error:
+        return failed("observe", f"{type(error).__name__}: {error}")
+    if not np.isfinite(observed).any():
+        return failed("simulator", "no value of the signal is finite", observed)
+    try:
+        made = plan.pipeline(observed.copy(), _seed(plan.seed, number, PIPELINE))
+    except FAILURES as error:
+        return failed("pipeline", f"{type(error).__name__}: {error}", observed)
+    drawn, log_density = made if isinstance(made, tuple) else (made, None)
+    array = posterior_array(drawn, plan.names)
+    if not np.isfinite(array).all():
+        return failed("pipeline", "draws are not finite", observed)
+    effective = float(array[..., 0].size) if plan.independent else effective_size(array)
+    kept = thin(array, plan.draws, np.inf if plan.independent else effective)
+    try:
+        densities = _densities(plan, log_density, truth, kept)
+    except FAILURES as error:
+        return failed("log density", f"{type(error).__name__}: {error}", observed)
+    seconds = time.perf_counter() - started
+    return Replicate(number, truth, observed, kept, densities, effective, seconds, None)
+
+
+def _simulated(plan: Plan, number: int, truth: np.ndarray) -> np.ndarray:
+    theta = {name: truth[j : j + 1] for j, name in enumerate(plan.names)}
+    seeds = np.array([_seed(plan.seed, number, SIMULATOR)], np.int64)
+    return np.asarray(plan.simulate(theta, seeds), np.float64)
+
+
+def _observed(plan: Plan, number: int, signal: np.ndarray) -> np.ndarray:
+    if plan.observe is None:
+        return signal
+    rng = np.random.default_rng(stream(plan.seed, number, NOISE))
+    return np.asarray(plan.observe(signal, rng), np.float64)
+
+
+def _densities(
+    plan: Plan, log_density: LogDensity | None, truth: np.ndarray, draws: np.ndarray
+) -> np.ndarray | None:
+    if log_density is None:
+        return None
+    # always as many rows, so that a compiled density is compiled once
+    filler = np.repeat(truth[None], plan.draws - len(draws), axis=0)
+    rows = np.concatenate([truth[None], draws, filler])
+    values = np.asarray(log_density(as_theta(rows, plan.names)), np.float64)
+    if values.shape != (len(rows),):
+        raise ValueError(f"log_density must return shape {(len(rows),)}, got {values.shape}")
+    if np.isnan(values).any():
+        raise ValueError("log_density must not be NaN at the truth or at a draw")
+    return values[: 1 + len(draws)]
+
+
+def as_theta(rows: np.ndarray, names: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """[n, d] -> name -> [n]."""
+    return {name: rows[:, j] for j, name in enumerate(names)}

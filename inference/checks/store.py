@@ -1,0 +1,128 @@
+"""Every finished replicate, kept on disk, so that a check that died goes on."""
+
+import io
+import json
+import sqlite3
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from .replicate import Replicate
+
+APPLICATION_ID = 0x424C4652  # marks the file; "BLFR"
+BUSY_MS = 60_000  # wait this long for another process's write
+SCHEMA = """
+CREATE TABLE IF NOT EXISTS settings (name TEXT PRIMARY KEY, value TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS replicate (
+    number    INTEGER PRIMARY KEY,
+    arrays    BLOB NOT NULL,
+    effective REAL,
+    seconds   REAL NOT NULL,
+    error     TEXT
+);
+"""
+ARRAYS = ("truth", "observed", "draws", "log_density")
+
+
+class ReplicateStore:
+    """Replicates of one pipeline under one set of settings, in one SQLite file.
+
+    A write is one committed transaction in WAL mode: what `put` has returned from survives
+    the death of the process.
+
+    Args:
+        path: File, created if missing; ":memory:" keeps nothing.
+        settings: All that a replicate depends on, as text. A file keeps the settings of its
+            first use.
+
+    Raises:
+        ValueError: the file is no such store, or holds replicates made with other settings.
+    """
+
+    def __init__(self, path: str | Path, settings: Mapping[str, str]):
+        self.path = str(path)
+        self._connection = sqlite3.connect(self.path, timeout=BUSY_MS / 1000, isolation_level=None)
+        try:
+            self._open(dict(settings))
+        except BaseException:
+            self._connection.close()
+            raise
+
+    def _open(self, settings: dict[str, str]) -> None:
+        execute = self._connection.execute
+        try:
+            execute("BEGIN IMMEDIATE")  # two processes may create the file together
+            application = execute("PRAGMA application_id").fetchone()[0]
+            tables = execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
+        except sqlite3.OperationalError:
+            raise
+        except sqlite3.DatabaseError as error:
+            raise ValueError(
+                f"{self.path} is not a replicate store; choose another file"
+            ) from error
+        if application != APPLICATION_ID and tables:
+            raise ValueError(
+                f"{self.path} is an SQLite file but not a replicate store; choose another file"
+            )
+        execute(f"PRAGMA application_id = {APPLICATION_ID}")
+        for statement in SCHEMA.split(";")[:-1]:
+            execute(statement)
+        stored = dict(execute("SELECT name, value FROM settings").fetchall())
+        if not stored:
+            self._connection.executemany("INSERT INTO settings VALUES (?, ?)", settings.items())
+        execute("COMMIT")
+        execute("PRAGMA journal_mode = WAL")
+        if stored and stored != settings:
+            raise ValueError(_difference(self.path, stored, settings))
+
+    def load(self) -> dict[int, Replicate]:
+        """All replicates kept, by number."""
+        rows = self._connection.execute(
+            "SELECT number, arrays, effective, seconds, error FROM replicate ORDER BY number"
+        )
+        return {row[0]: _from_row(*row) for row in rows}
+
+    def put(self, replicate: Replicate) -> None:
+        """Keep a replicate; a finished one is never replaced, a failed one is."""
+        held = {name: getattr(replicate, name) for name in ARRAYS}
+        file = io.BytesIO()
+        np.savez_compressed(file, **{k: v for k, v in held.items() if v is not None})
+        effective = None if np.isnan(replicate.effective) else replicate.effective
+        self._connection.execute(
+            "INSERT INTO replicate VALUES (?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET "
+            "arrays = excluded.arrays, effective = excluded.effective, "
+            "seconds = excluded.seconds, error = excluded.error WHERE error IS NOT NULL",
+            (replicate.number, file.getvalue(), effective, replicate.seconds, replicate.error),
+        )
+
+    def close(self) -> None:
+        self._connection.close()
+
+    def __enter__(self) -> "ReplicateStore":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _from_row(
+    number: int, arrays: bytes, effective: float | None, seconds: float, error: str | None
+) -> Replicate:
+    with np.load(io.BytesIO(arrays), allow_pickle=False) as file:
+        held = dict(file)
+    held.setdefault("log_density", None)
+    size = np.nan if effective is None else effective
+    return Replicate(number=number, effective=size, seconds=seconds, error=error, **held)
+
+
+def _difference(path: str, stored: Mapping[str, str], settings: Mapping[str, str]) -> str:
+    unlike = [
+        f"{name}: stored {json.dumps(stored.get(name))}, now {json.dumps(settings.get(name))}"
+        for name in sorted(set(stored) | set(settings))
+        if stored.get(name) != settings.get(name)
+    ]
+    return (
+        f"{path} holds replicates made with other settings ({'; '.join(unlike)}); "
+        "restore these, or choose another file"
+    )

@@ -1,0 +1,152 @@
+"""What the checks hand back: numbers against formulas, text, xarray, figures."""
+
+import subprocess
+import sys
+
+import numpy as np
+import numpyro.distributions as dist
+import pytest
+import xarray as xr
+from scipy.stats import binomtest
+
+from bolfi_liquids import inference
+
+PRIOR = inference.Prior({"a": dist.Normal(0.0, 1.0), "b": dist.Uniform(0.0, 1.0)})
+
+
+def prior_as_posterior(observed, seed):
+    """Right when the data say nothing, and they do not."""
+    rng = np.random.default_rng(seed)
+    return {"a": rng.normal(size=31), "b": rng.random(31)}, lambda theta: theta["a"]
+
+
+def silent(theta, seeds):
+    return np.ones((1, 3))
+
+
+@pytest.fixture(scope="module")
+def made():
+    return inference.replicates(prior_as_posterior, silent, PRIOR, 80, draws=31, independent=True)
+
+
+def test_coverage_is_a_count_with_its_binomial_interval(made):
+    """Against a count of the intervals themselves; ends between two draws may differ."""
+    result = inference.coverage(made, levels=(0.5, 0.9))
+    ends = np.quantile(made.draws, [0.25, 0.75], axis=1, method="weibull")
+    held = np.sum((ends[0] < made.truth) & (made.truth < ends[1]), axis=0)
+    assert np.abs(result.covered[0] - held).max() <= 4
+    for at in np.ndindex(result.covered.shape):
+        reference = binomtest(int(result.covered[at]), 80, result.levels[at[0]])
+        interval = reference.proportion_ci(0.95, "exact")
+        np.testing.assert_allclose((result.low[at], result.high[at]), interval)
+        assert result.p_values[at] == pytest.approx(reference.pvalue, abs=0.15)
+
+
+def test_coverage_of_all_and_none_has_an_interval():
+    def certain(observed, seed):
+        return {"a": np.linspace(-99.0, 99.0, 31), "b": np.full(31, -1.0)}
+
+    made = inference.replicates(certain, silent, PRIOR, 20, draws=31, independent=True)
+    result = inference.coverage(made, levels=(0.8,))
+    np.testing.assert_array_equal(result.rate, [[1.0, 0.0]])
+    assert result.high[0, 0] == 1.0 and 0.8 < result.low[0, 0] < 0.9
+    assert result.low[0, 1] == 0.0 and 0.1 < result.high[0, 1] < 0.2
+
+
+def test_tarp_follows_the_scale_of_no_parameter(made):
+    """`a` in thousandths: the same curve."""
+
+    def scaled(observed, seed):
+        drawn, _ = prior_as_posterior(observed, seed)
+        return {"a": 1e-3 * drawn["a"], "b": drawn["b"]}
+
+    prior = inference.Prior({"a": dist.Normal(0.0, 1e-3), "b": dist.Uniform(0.0, 1.0)})
+    other = inference.replicates(scaled, silent, prior, 80, draws=31, independent=True)
+    np.testing.assert_array_equal(inference.tarp(made).ranks, inference.tarp(other).ranks)
+
+
+def test_the_tarp_curve_is_a_distribution_within_its_band(made):
+    result = inference.tarp(made)
+    assert result.expected_coverage[0] == 0.0 and result.expected_coverage[-1] == 1.0
+    assert (np.diff(result.expected_coverage) >= 0).all()
+    assert (result.low <= result.expected_coverage).all()
+    assert (result.expected_coverage <= result.high).all()
+    for c, share in zip(result.credibility, result.expected_coverage, strict=True):
+        assert share == pytest.approx(np.mean(result.ranks < c * 32 - 1e-9))
+
+
+def test_ranks_are_those_of_the_draws(made):
+    result = inference.sbc(made, quantities={"sum": lambda theta, _: theta["a"] + theta["b"]})
+    assert result.names == ("a", "b", "sum", "log_density")
+    below = np.sum(made.draws < made.truth[:, None], axis=1)
+    np.testing.assert_array_equal(result.ranks[:, :2], below)
+    together = np.sum(made.draws.sum(-1) < made.truth.sum(-1, keepdims=True), axis=1)
+    np.testing.assert_array_equal(result.ranks[:, 2], together)
+    np.testing.assert_array_equal(result.ranks[:, 3], below[:, 0])  # its density is `a`
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "said"),
+    [
+        ("a", lambda theta, _: theta["a"], "name of another"),
+        ("log_density", lambda theta, _: theta["a"], "name of another"),
+        ("c", lambda theta, _: 1.0, "one number for each"),
+        ("c", lambda theta, _: np.log(-np.abs(theta["a"])), "32 NaN"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:invalid value")
+def test_quantities_are_checked(made, name, quantity, said):
+    with pytest.raises(ValueError, match=said):
+        inference.sbc(made, quantities={name: quantity})
+
+
+def test_levels_are_checked(made):
+    for levels in ((), (0.5, 1.0), (0.0,)):
+        with pytest.raises(ValueError, match="levels must lie between"):
+            inference.coverage(made, levels=levels)
+
+
+@pytest.mark.parametrize("check", [inference.sbc, inference.coverage, inference.tarp])
+def test_a_check_may_run_the_pipeline_itself(made, check):
+    own = check(prior_as_posterior, silent, PRIOR, n=80, draws=31, independent=True)
+    xr.testing.assert_identical(own.to_dataset(), check(made).to_dataset())
+
+
+@pytest.mark.parametrize("check", [inference.sbc, inference.coverage, inference.tarp])
+def test_results_read_and_write(made, check, tmp_path):
+    result = check(made)
+    assert "80 replicates" in str(result) and str(result).endswith("ok") and result.ok
+    for data in (result.to_dataset(), made.to_dataset()):
+        data.to_netcdf(tmp_path / "r.nc")
+        with xr.open_dataset(tmp_path / "r.nc") as back:
+            xr.testing.assert_equal(back.load(), data)
+
+
+def test_figures_show_every_quantity(made, tmp_path):
+    import matplotlib.pyplot as plt
+
+    checks = inference.sbc(made), inference.coverage(made), inference.tarp(made)
+    figure, axes = plt.subplots(1, 3)
+    for result, ax in zip(checks, axes, strict=True):
+        assert result.plot(ax) is ax
+        assert result.plot().get_xlabel()
+        words = [text.get_text() for text in ax.get_legend().get_texts()]
+        assert set(getattr(result, "names", ())) <= set(words)
+    panels = checks[0].histogram()
+    assert [panel.get_title() for panel in panels] == ["a", "b", "log_density"]
+    counts = sum(patch.get_data().values.sum() for patch in panels[0].patches[-1:])
+    assert counts == 80
+    with pytest.raises(ValueError, match="one for each of 3"):
+        checks[0].histogram(axes[:2])
+    figure.savefig(tmp_path / "f.png")
+    plt.close("all")
+
+
+def test_matplotlib_waits_until_a_figure_is_wanted():
+    code = """
+import sys
+from bolfi_liquids import inference
+assert "matplotlib.pyplot" not in sys.modules
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

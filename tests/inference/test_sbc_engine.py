@@ -1,0 +1,89 @@
+"""The engine's calibration: 256 data sets whose truth is known, 40 simulations for each.
+
+Three simulators with a closed form, chosen for what they ask of the engine: a linear one, one
+whose noise is correlated in time, one whose posterior has two modes. Two processes, a minute or
+two for each surrogate and simulator. 256 ranks find draws 30 % too narrow always and 20 % eight
+times in ten; the standard error of a rate of 0.9 is 0.019.
+"""
+
+import importlib
+import multiprocessing
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from bolfi_liquids import inference
+
+ALPHA = 1e-3  # false alarms per test; seeds are fixed, so it is met once and not each time
+REPLICATES = 256
+BUDGET = 40
+DRAWS = 31  # independent ones, for which a sampler must give 62
+SAMPLING = {"chains": 2, "draws": 250, "warmup": 250}
+TASKS = ("line", "decay", "bimodal")
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def toys():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(Path(__file__).parent))  # which spawned workers inherit
+        yield importlib.import_module("closed_form")
+
+
+@pytest.fixture(scope="module")
+def pool():
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+        yield pool
+
+
+@pytest.fixture(scope="module")
+def run(toys, pool):
+    def run(task, surrogate):
+        simulate, prior = toys.TASKS[task]
+        options = {"surrogate": surrogate, "batch": 4}
+        pipeline = inference.FitPipeline(simulate, prior, BUDGET, options, SAMPLING)
+        made = inference.replicates(pipeline, n=REPLICATES, draws=DRAWS, executor=pool)
+        for result in (inference.sbc(made), inference.coverage(made), inference.tarp(made)):
+            print(f"\n{task}, {surrogate}\n{result}")
+        seconds = sum(r.seconds for r in made.finished)
+        print(f"{seconds:.0f} s of process time, {np.median(made.count)} draws")
+        assert len(made.failed) <= REPLICATES // 50, made.errors
+        return made
+
+    return run
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_signal_surrogate_is_calibrated(run, task):
+    made = run(task, "signal")
+    uniform = inference.sbc(made)
+    parameters = [uniform.names.index(name) for name in made.prior.names]
+    assert (uniform.chi_square[parameters] > ALPHA).all()
+    rate = inference.coverage(made, levels=(0.9,)).rate
+    assert ((rate >= 0.85) & (rate <= 0.95)).all()
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_signal_surrogate_of_a_shared_design_is_calibrated(toys, pool, task):
+    """One emulator for all data sets: only these and the draws are made anew."""
+    simulate, prior = toys.TASKS[task]
+    options = {"surrogate": "signal"}
+    pipeline = inference.shared_design(simulate, prior, BUDGET, options=options, sampling=SAMPLING)
+    made = inference.replicates(pipeline, n=REPLICATES, draws=DRAWS, executor=pool)
+    result = inference.coverage(made, levels=(0.9,))
+    print(f"\n{task}\n{inference.sbc(made)}\n{result}")
+    assert not made.failed, made.errors
+    assert ((result.rate >= 0.85) & (result.rate <= 0.95)).all()
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_discrepancy_surrogate_covers_at_least_as_it_says(run, task):
+    """It is wide by construction: a threshold posterior, whose ranks need not be uniform."""
+    made = run(task, "discrepancy")
+    result = inference.coverage(made, conservative=True)
+    least = binom.ppf(ALPHA, len(made), result.levels)[:, None]
+    assert (result.covered >= least).all()
