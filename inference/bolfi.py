@@ -1,7 +1,7 @@
 """Ask and tell: Bayesian optimisation for likelihood-free inference, one step at a time."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import jax
 import numpy as np
@@ -15,7 +15,7 @@ from .discrepancy import evaluate, squared_difference
 from .likelihood import Threshold, check_rule
 from .posterior import Fit
 from .prior import Prior
-from .state import UNKNOWN, History, init, remember_asked, remember_told
+from .state import UNKNOWN, History, explain, init, remember_asked, remember_told
 from .transform import TRANSFORMS
 
 LARGEST = 2**31 - 1  # that every random number generator takes as a seed
@@ -162,7 +162,13 @@ class Bolfi:
         good = history.succeeded
         return self._learn(history.u[good], history.discrepancy[good], **self._options)
 
-    def tell(self, theta: Theta, signals: ArrayLike, seeds: ArrayLike | None = None) -> None:
+    def tell(
+        self,
+        theta: Theta,
+        signals: ArrayLike,
+        seeds: ArrayLike | None = None,
+        errors: Sequence[str] | None = None,
+    ) -> None:
         """Give the engine finished simulations: any number, any order, asked for or not.
 
         A row of NaN reports a failed run. It counts as told, but nothing is learned from it.
@@ -171,6 +177,7 @@ class Bolfi:
             theta: Name -> [n], in the prior's support.
             signals: [n, *signal_shape].
             seeds: Seeds of the runs [n], to be kept with the results.
+            errors: Why a run failed [n], to be kept for rows of NaN; "" elsewhere.
 
         Raises:
             ValueError: shapes disagree, or theta lies outside the prior's support.
@@ -184,13 +191,15 @@ class Bolfi:
         if outside.size:
             first = {name: float(column[outside[0]]) for name, column in rows.items()}
             raise ValueError(f"theta must lie in the support of the prior, got {first}")
+        discrepancy = evaluate(self._discrepancy, self.observed, signals)
         told = History(
             theta=natural,
             u=self.prior.to_unit(rows),
             signals=signals,
-            discrepancy=evaluate(self._discrepancy, self.observed, signals),
+            discrepancy=discrepancy,
             seeds=_seeds(seeds, len(natural)),
             rounds=np.full(len(natural), UNKNOWN),
+            errors=explain(signals, discrepancy, _errors(errors, len(natural))),
         )
         self._state = remember_told(self._state, told)
         self._seconds += time.perf_counter() - started
@@ -263,4 +272,11 @@ def _seeds(seeds: ArrayLike | None, n: int) -> np.ndarray:
     array = np.asarray(seeds, np.int64)
     if array.shape != (n,):
         raise ValueError(f"seeds must have shape ({n},), one per theta, got {array.shape}")
+    return array
+
+
+def _errors(errors: Sequence[str] | None, n: int) -> np.ndarray:
+    array = np.full(n, "") if errors is None else np.asarray(errors, str)
+    if array.shape != (n,):
+        raise ValueError(f"errors must have shape ({n},), one per theta, got {array.shape}")
     return array

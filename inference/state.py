@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .failures import count, not_finite
+
 UNKNOWN = -1  # seed or round of a simulation made elsewhere
 
 
@@ -16,10 +18,16 @@ class History(NamedTuple):
     discrepancy: np.ndarray  # [n], NaN where failed
     seeds: np.ndarray  # int64 [n]
     rounds: np.ndarray  # int64 [n]
+    errors: np.ndarray  # str [n], why a run failed; "" where it succeeded
 
     @property
     def succeeded(self) -> np.ndarray:
         return np.isfinite(self.discrepancy)
+
+    @property
+    def failures(self) -> dict[str, int]:
+        """Failed runs by kind: "raised", "not finite", "timeout"."""
+        return count(self.errors)
 
 
 class State(NamedTuple):
@@ -33,8 +41,8 @@ class State(NamedTuple):
 
 def init(dimension: int, signal_shape: tuple[int, ...]) -> State:
     """Nothing asked, nothing told."""
-    rows, none = np.zeros((0, dimension)), np.zeros(0, np.int64)
-    history = History(rows, rows, np.zeros((0, *signal_shape)), np.zeros(0), none, none)
+    rows, none, errors = np.zeros((0, dimension)), np.zeros(0, np.int64), np.zeros(0, str)
+    history = History(rows, rows, np.zeros((0, *signal_shape)), np.zeros(0), none, none, errors)
     return State(history, rows, none, designed=0, asked=0, rounds=0)
 
 
@@ -69,3 +77,10 @@ def remember_told(state: State, told: History) -> State:
         old = old._replace(signals=np.full((len(old.theta), *new.signals.shape[1:]), np.nan))
     merged = History(*(np.concatenate(pair) for pair in zip(old, new, strict=True)))
     return state._replace(history=merged, pending=pending, pending_rounds=pending_rounds)
+
+
+def explain(signals: np.ndarray, discrepancy: np.ndarray, errors: np.ndarray) -> np.ndarray:
+    """Why each run failed, str [n]: `errors` [n] where it says so, else what is not finite."""
+    finite = np.isfinite(signals.reshape(len(signals), -1)).all(1)
+    found = np.where(finite, not_finite("the discrepancy"), not_finite("the signal"))
+    return np.where(np.isfinite(discrepancy), "", np.where(errors == "", found, errors))
