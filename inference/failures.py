@@ -18,7 +18,7 @@ def timed_out(timeout: float) -> str:
 
 
 def not_finite(what: str) -> str:
-    return f"{NOT_FINITE}: {what} holds NaN or infinity"
+    return f"{NOT_FINITE}: {what}"
 
 
 def kind(error: str) -> str:
