@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Iterator
-from concurrent.futures import Executor
+from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 
 
@@ -11,7 +11,7 @@ def opened(executor: Executor | str | None) -> Iterator[Executor | None]:
     """The executor itself, left open; or one at a Dask scheduler's address, closed afterwards.
 
     Raises:
-        ValueError: neither of them.
+        ValueError: neither of them, or a process pool that forks.
         ImportError: an address, but Dask is not installed.
         ConnectionError: no scheduler answers there.
     """
@@ -24,7 +24,18 @@ def opened(executor: Executor | str | None) -> Iterator[Executor | None]:
             "executor must be a concurrent.futures.Executor, the address of a Dask scheduler or "
             f"None, got {type(executor).__name__}; a Dask client has get_executor()"
         )
+    if isinstance(executor, ProcessPoolExecutor) and _forks(executor):
+        raise ValueError(
+            "executor starts its workers by fork, which JAX's threads do not survive; give "
+            "ProcessPoolExecutor(n, mp_context=multiprocessing.get_context('spawn'))"
+        )
     yield executor
+
+
+def _forks(pool: ProcessPoolExecutor) -> bool:
+    # there is no public way to ask, and the default on Linux, up to Python 3.13, hangs at times
+    context = getattr(pool, "_mp_context", None)
+    return context is not None and context.get_start_method() == "fork"
 
 
 @contextmanager

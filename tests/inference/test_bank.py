@@ -188,3 +188,34 @@ def test_two_processes_never_simulate_the_same_at_the_same_time(tmp_path):
     ]
     assert [run.wait(60.0) for run in runs] == [0, 0, 0, 0]
     assert sorted(int(seed) for seed in log.read_text().split()) == list(range(40))
+
+
+def test_what_was_finished_just_before_the_claim_is_not_simulated():
+    class Busy(inference.SimulationBank):
+        """Somebody else stores and releases between the look and the claim."""
+
+        def claim(self, identity, theta, seed):
+            self.put(identity, theta, seed, inference.Simulation(np.array([7.0]), None, 0.0))
+            return super().claim(identity, theta, seed)
+
+    def simulate(theta, seeds):
+        raise AssertionError("it was there")
+
+    with Busy() as bank:
+        for _ in range(2):
+            (found,) = inference.run_missing(simulate, [inference.Job(THETA, 0)], (1,), bank, "")
+            np.testing.assert_array_equal(found.signal, [7.0])
+        assert bank.claim("", THETA, 0)  # nobody holds it any more
+
+
+def test_the_same_job_twice_in_a_batch_is_simulated_once():
+    calls = []
+
+    def simulate(theta, seeds):
+        calls.extend(seeds)
+        return theta["a"][:, None]
+
+    with inference.SimulationBank() as bank:
+        batch = [inference.Job(THETA, seed) for seed in (0, 1, 0)]
+        found = inference.run_missing(simulate, batch, (1,), bank, "")
+    assert calls == [0, 1] and [result.signal[0] for result in found] == [THETA["a"]] * 3

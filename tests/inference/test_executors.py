@@ -212,6 +212,36 @@ def test_after_an_error_the_bank_is_free_for_the_next_call(prior, observed, simu
     assert fit.failures == {}
 
 
+def test_runs_at_the_same_time_share_what_they_simulate(prior, observed, simulate):
+    """Two observations, one bank and one pool: the start designs coincide and run once."""
+    calls = []
+
+    def counted(theta, seeds):
+        time.sleep(0.02)
+        calls.append((theta["slope"][0], theta["offset"][0], seeds[0]))
+        return simulate(theta, seeds)
+
+    def run(shift):
+        given = {**options(pool), "bank": bank}
+        return inference.fit(counted, prior, observed + shift, **given)
+
+    with (
+        inference.SimulationBank() as bank,
+        ThreadPoolExecutor(3) as pool,
+        ThreadPoolExecutor(2) as runs,
+    ):
+        low, high = runs.map(run, [0.0, 0.3])
+        assert len(calls) == len(set(calls)) == len(bank)
+    np.testing.assert_array_equal(low.history.signals[:INITIAL], high.history.signals[:INITIAL])
+    assert low.best != high.best
+
+
+def test_a_pool_that_forks_is_refused(prior, observed, simulate):
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("fork")) as pool:
+        with pytest.raises(ValueError, match=r"starts its workers by fork, .*get_context\('spawn"):
+            inference.fit(simulate, prior, observed, executor=pool)
+
+
 @pytest.mark.parametrize("executor", [42, ThreadPoolExecutor])
 def test_other_things_are_refused(prior, observed, simulate, executor):
     with pytest.raises(ValueError, match="executor must be a concurrent.futures.Executor"):

@@ -10,6 +10,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import jax
 import numpy as np
 import pytest
 from bolfi_liquids.inference.simulate import simulation_seed
@@ -98,20 +99,25 @@ def test_rounds_seeds_and_seconds_are_reported(line_fit):
 def test_a_larger_budget_goes_on_where_the_smaller_ended(
     tmp_path, prior, observed, simulate, workers
 ):
-    """Also from within a round: 9 is no multiple of 2."""
+    """Also from within a round, 9 being no multiple of 2, whose points are chosen jointly."""
     calls = []
+
+    def jointly(key, surrogate, n):
+        steps = (np.arange(n)[:, None] + 0.5) / n
+        return (steps + np.asarray(jax.random.uniform(key, (1, 2)))) % 1.0
 
     def counted(theta, seeds):
         calls.extend(seeds)
         return simulate(theta, seeds)
 
     with ThreadPoolExecutor(2) as pool:
-        options = {"bank": tmp_path / "b.sqlite", "executor": pool if workers else None}
-        small = inference.fit(counted, prior, observed, budget=9, **options)
+        options = {"acquisition": jointly, "executor": pool if workers else None}
+        kept = {**options, "bank": tmp_path / "b.sqlite"}
+        small = inference.fit(counted, prior, observed, budget=9, **kept)
         assert len(calls) == 9
-        large = inference.fit(counted, prior, observed, budget=12, **options)
+        large = inference.fit(counted, prior, observed, budget=12, **kept)
         assert len(calls) == len(set(calls)) == 12
-        at_once = inference.fit(simulate, prior, observed, budget=12, executor=options["executor"])
+        at_once = inference.fit(simulate, prior, observed, budget=12, **options)
     np.testing.assert_array_equal(small.history.theta, large.history.theta[:9])
     np.testing.assert_array_equal(large.history.theta, at_once.history.theta)
     np.testing.assert_array_equal(large.history.signals, at_once.history.signals)
@@ -223,12 +229,14 @@ def test_total_failure_is_an_error_with_its_cause(prior, observed):
 
 
 @pytest.mark.parametrize("shape", [(2, 29), (3, 30), (30,), ()])
-def test_signals_of_wrong_shape_are_refused_and_not_stored(prior, observed, shape):
+def test_signals_of_wrong_shape_are_refused_and_not_stored(prior, observed, simulate, shape):
     message = re.escape(f"shape (2, 30), one row per theta, got {shape}")
     with inference.SimulationBank() as bank:
         with pytest.raises(ValueError, match=message):
             inference.fit(lambda theta, seeds: np.zeros(shape), prior, observed, bank=bank)
         assert len(bank) == 0
+        # and nothing is claimed any more, for which this call would wait
+        assert inference.fit(simulate, prior, observed, budget=7, bank=bank).failures == {}
 
 
 @pytest.mark.parametrize(
