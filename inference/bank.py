@@ -5,10 +5,13 @@ import sqlite3
 import threading
 import time
 from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+
+from .claims import Claims
 
 APPLICATION_ID = 0x424C4651  # marks the file; "BLFQ"
 BUSY_MS = 60_000  # wait this long for another process's write
@@ -36,11 +39,21 @@ class Simulation(NamedTuple):
     seconds: float
 
 
+class Simulations(NamedTuple):
+    """n finished simulations, as `Bolfi.tell` takes them."""
+
+    theta: dict[str, np.ndarray]  # name -> [n]
+    signals: np.ndarray  # [n, *signal_shape]
+    seeds: np.ndarray  # int64 [n]
+
+
 class SimulationBank:
     """Finished simulations by simulator identity, theta and seed, in one SQLite file.
 
     What was simulated depends on no observation, so runs and observations may share a bank,
-    also at the same time: a write is one committed transaction in WAL mode.
+    also at the same time: a write is one committed transaction in WAL mode, and who claims a
+    simulation before making it keeps the threads and processes of one machine from making it
+    twice. Claims are locks on the file `<path>-claims`, which stays behind empty.
 
     Args:
         path: File, created if missing; ":memory:" keeps nothing.
@@ -56,18 +69,27 @@ class SimulationBank:
         self._connection = sqlite3.connect(
             self.path, timeout=BUSY_MS / 1000, isolation_level=None, check_same_thread=False
         )
+        self._resources = ExitStack()
+        self._resources.callback(self._connection.close)
+        self._claims = Claims.share(None if self.in_memory else f"{self.path}-claims")
+        self._resources.callback(self._claims.close)
         try:
             self._open()
         except sqlite3.DatabaseError as error:
-            self._connection.close()
+            self.close()
             if isinstance(error, sqlite3.OperationalError):
                 raise
             raise ValueError(
                 f"{self.path} is not a simulation bank; choose another file"
             ) from error
         except ValueError:
-            self._connection.close()
+            self.close()
             raise
+
+    @property
+    def in_memory(self) -> bool:
+        """Whether everything is forgotten when the bank is closed."""
+        return self.path == ":memory:"
 
     def _open(self) -> None:
         execute = self._connection.execute
@@ -96,8 +118,7 @@ class SimulationBank:
         blob, dtype, shape, error, seconds = row
         if blob is None:
             return Simulation(None, error, seconds)
-        signal = np.frombuffer(blob, np.dtype(dtype)).reshape(json.loads(shape)).copy()
-        return Simulation(signal, error, seconds)
+        return Simulation(_signal(blob, dtype, shape), error, seconds)
 
     def put(
         self, identity: str, theta: Mapping[str, float], seed: int, simulation: Simulation
@@ -124,12 +145,55 @@ class SimulationBank:
                 row,
             )
 
+    def simulations(self, identity: str) -> Simulations:
+        """All signals of one simulator, those of NaN included, those that raised left out.
+
+        They are ordered by theta and seed: in which order they were finished is chance, and
+        what is learned from them must not depend on it.
+
+        Raises:
+            ValueError: there are none, or their signals or parameters are not alike.
+        """
+        with self._lock:
+            rows = self._connection.execute(
+                "SELECT theta, seed, signal, dtype, shape FROM simulation "
+                "WHERE identity = ? AND signal IS NOT NULL ORDER BY theta, seed",
+                (identity,),
+            ).fetchall()
+        theta = [json.loads(row[0]) for row in rows]
+        kinds = {(tuple(names), row[4]) for names, row in zip(theta, rows, strict=True)}
+        if len(kinds) != 1:
+            found = "; ".join(f"{', '.join(n)} -> {shape}" for n, shape in sorted(kinds))
+            raise ValueError(
+                f"{self.path} must hold simulations of one kind for identity={identity!r}, "
+                f"got {found or 'none'}"
+            )
+        return Simulations(
+            {name: np.array([row[name] for row in theta]) for name in theta[0]},
+            np.stack([_signal(*row[2:]) for row in rows]),
+            np.array([row[1] for row in rows], np.int64),
+        )
+
+    def claim(self, identity: str, theta: Mapping[str, float], seed: int) -> bool:
+        """Whether the caller may simulate this now; False while somebody else does.
+
+        A claim lasts until `release`, or until the process ends. Look into the bank again after
+        taking one: the last claimant may just have finished.
+        """
+        return self._claims.take(_claim_key(identity, theta, seed))
+
+    def release(self, identity: str, theta: Mapping[str, float], seed: int) -> None:
+        """End a claim; nothing happens if there is none."""
+        self._claims.give_back(_claim_key(identity, theta, seed))
+
     def __len__(self) -> int:
         with self._lock:
             return self._connection.execute("SELECT count(*) FROM simulation").fetchone()[0]
 
     def close(self) -> None:
-        self._connection.close()
+        """Close the file and end this bank's claims; closing twice does no harm."""
+        with self._lock:  # another thread may be storing what it just finished
+            self._resources.close()
 
     def __enter__(self) -> "SimulationBank":
         return self
@@ -141,3 +205,11 @@ class SimulationBank:
 def theta_key(theta: Mapping[str, float]) -> str:
     """Canonical text of theta; `repr` of a float64 round-trips exactly."""
     return json.dumps({name: float(theta[name]) for name in sorted(theta)})
+
+
+def _signal(blob: bytes, dtype: str, shape: str) -> np.ndarray:
+    return np.frombuffer(blob, np.dtype(dtype)).reshape(json.loads(shape)).copy()
+
+
+def _claim_key(identity: str, theta: Mapping[str, float], seed: int) -> str:
+    return json.dumps([identity, theta_key(theta), int(seed)])

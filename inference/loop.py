@@ -1,9 +1,10 @@
 """The usual loop: ask, simulate, store, tell."""
 
+import math
+from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
 from contextlib import ExitStack, contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +13,14 @@ from numpy.typing import ArrayLike
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from .bank import Simulation, SimulationBank
-from .base import Acquisition, Simulator
+from .base import Acquisition, Simulator, Theta
 from .bolfi import MIN_LEARN, Bolfi, checked_integer
+from .executors import opened
 from .families import Family
 from .posterior import Fit
 from .prior import Prior
-from .simulate import Job, jobs, run_missing, simulation_seed
+from .runner import Runner
+from .simulate import Job, columns, jobs, simulation_seed
 
 
 def fit(  # noqa: PLR0913  the one call that most users make
@@ -31,41 +34,65 @@ def fit(  # noqa: PLR0913  the one call that most users make
     surrogate: str | Family | None = None,
     acquisition: str | Acquisition | None = None,
     initial: int | None = None,
-    executor: Executor | None = None,
+    executor: Executor | str | None = None,
     bank: str | Path | SimulationBank = ":memory:",
     identity: str = "",
+    timeout: float | None = None,
+    earlier: tuple[Theta, ArrayLike] | tuple[Theta, ArrayLike, ArrayLike] | None = None,
     progress: bool = False,
     **options: Any,
 ) -> Fit:
     """Infer the parameters of `simulate` from `observed` with `budget` simulations.
 
-    A shell over `Bolfi`. Each round asks `batch` points, takes from the bank those that were
-    simulated before, simulates the others, stores them, and tells. Seeds derive from `seed`
-    and the simulation's index, so the same call with the same bank repeats nothing that was
-    finished and concludes the same, also after a crash.
+    A shell over `Bolfi`: it asks for points, takes from the bank those that were simulated
+    before, simulates and stores the others, and tells them in the order asked. Seeds derive from
+    `seed` and the simulation's index. So the same call with the same bank repeats nothing that
+    was finished and concludes the same, bit for bit, also after a crash; with a larger budget it
+    goes on where it ended.
+
+    Without an executor, rounds of `batch` points are simulated in one call each. With one, every
+    simulation is a call of its own and `batch` of them are kept in flight: point i is asked as
+    soon as all up to i - batch have been told, while the others still run. Which points these
+    are depends on `batch`, but neither on the kind of executor nor on who finishes first.
 
     Args:
         simulate: Callable (theta: name -> [b], seeds: [b]) -> signals [b, *signal_shape].
-            An exception costs one run; a row of NaN reports a failed one.
+            A run that raises, returns NaN or takes too long costs that run only, see
+            `Fit.failures`.
         prior: The parameters and their priors.
         observed: The measured signal [*signal_shape], time first; NaN is a missing sample.
         budget: Simulations in all, failed ones and those found in the bank included.
-        batch: Points per round.
+        batch: Points per round, or in flight: as many as the executor has workers.
         seed: Fixes the whole run.
-        surrogate, acquisition, discrepancy, threshold, transform: See `Bolfi`.
+        surrogate, acquisition: See `Bolfi`.
         initial: Points of the start design; None is 2 d + 3.
-        executor: Simulates each point in a call of its own; None makes one call per round.
-        bank: A path, or a bank that other runs share; it is left open then.
+        executor: A thread or process pool, a Dask client's `get_executor()` or any other
+            `concurrent.futures.Executor`, left open; or a Dask scheduler's address such as
+            "tcp://host:8786". Start processes by "spawn" or "forkserver": JAX does not survive
+            a fork. Workers import `simulate`, but not JAX.
+        bank: A path, or a bank that other runs share; it is left open then. Every simulation
+            is stored when it is finished, and what another run is simulating for the same bank
+            at the same time is waited for.
         identity: Names the simulator and its settings in the bank. Anything that changes
             the signals for equal theta and seed must change it.
+        timeout: Seconds that one simulation may take; a round in one call `batch` times as
+            long, and if it fails its runs are tried one by one. `simulate` then runs in a
+            thread, which is abandoned, not stopped, when it is overdue: see `simulate.within`.
+        earlier: Your own simulations (theta, signals) or (theta, signals, seeds), as
+            `SimulationBank.simulations` returns them. They are learned from like the others,
+            take the place of the start design's points, and count beside the budget, which may
+            then be 0.
         progress: Show a bar.
+        options: Of the surrogate's family, see `Bolfi`.
 
     Raises:
         ValueError: bad argument; budget smaller than the start design; signals of wrong shape.
-        RuntimeError: no run of the start design succeeded.
+        RuntimeError: no run of the start design succeeded; the executor lost its workers.
+        ImportError, ConnectionError: Dask is not installed, or does not answer.
     """
     batch = checked_integer("batch", batch)
-    budget = checked_integer("budget", budget, MIN_LEARN)
+    budget = checked_integer("budget", budget, MIN_LEARN if earlier is None else 0)
+    _check_timeout(timeout)
     engine = Bolfi(
         prior,
         observed,
@@ -73,10 +100,12 @@ def fit(  # noqa: PLR0913  the one call that most users make
         acquisition=acquisition,
         seed=seed,
         initial=initial,
-        capacity=budget,
+        capacity=max(1, budget + (0 if earlier is None else len(earlier[1]))),
         **options,
     )
-    if budget < engine.initial:
+    if earlier is not None:
+        engine.tell(earlier[0], earlier[1], earlier[2] if len(earlier) == 3 else None)
+    if budget + engine.told < engine.initial:
         raise ValueError(
             f"budget={budget} is smaller than the start design of initial={engine.initial} points; "
             "raise budget or lower initial"
@@ -85,35 +114,59 @@ def fit(  # noqa: PLR0913  the one call that most users make
         if not isinstance(bank, SimulationBank):
             bank = stack.enter_context(SimulationBank(bank))
         advance = stack.enter_context(_bar(budget)) if progress else _no_bar
-        runner = partial(run_missing, simulate, bank=bank, identity=identity, executor=executor)
-        seconds = _spend(engine, runner, budget, batch, advance)
+        workers = stack.enter_context(opened(executor))
+        runner = stack.enter_context(Runner(simulate, bank, identity, workers, timeout))
+        finished = (_in_rounds if workers is None else _in_flight)(engine, runner, budget, batch)
+        seconds = 0.0
+        for simulation in finished:
+            seconds += simulation.seconds
+            advance(1)
     return engine.fit({"simulator": seconds})
 
 
-def _spend(
-    engine: Bolfi,
-    runner: Callable[[list[Job], tuple[int, ...] | None], list[Simulation]],
-    budget: int,
-    batch: int,
-    advance: Callable[[int], None],
-) -> float:
-    """Tell the engine `budget` simulations; returns the seconds they took."""
-    seconds, errors = 0.0, []
-    while engine.told < budget:
-        first = engine.told
-        theta = engine.ask(min(batch, budget - first))
-        seeds = [simulation_seed(engine.seed, i) for i in range(first, engine.asked)]
-        results = runner(jobs(theta, seeds), engine.expected_shape)
-        engine.tell(theta, _signals(results, engine.signal_shape), seeds)
-        seconds += sum(result.seconds for result in results)
-        errors += [result.error for result in results if result.error]
-        if engine.told >= engine.initial and engine.succeeded == 0:
-            raise RuntimeError(
-                f"all {engine.told} simulations of the start design failed; the first error: "
-                f"{errors[0] if errors else 'the discrepancy was not finite'}"
-            )
-        advance(len(results))
-    return seconds
+def _in_rounds(engine: Bolfi, runner: Runner, budget: int, batch: int) -> Iterator[Simulation]:
+    """Simulate `batch` points at a time; yields what the engine was told."""
+    for first in range(0, budget, batch):
+        indices = range(first, min(first + batch, budget))
+        # whole rounds are asked even if the budget ends before, so that a larger one goes on
+        # from the same points
+        asked = jobs(engine.ask(batch), [simulation_seed(engine.seed, i) for i in indices])
+        yield from _tell(engine, asked, runner.run(asked, engine.expected_shape))
+
+
+def _in_flight(engine: Bolfi, runner: Runner, budget: int, batch: int) -> Iterator[Simulation]:
+    """Keep `batch` simulations going; yields what the engine was told, in the order asked."""
+    flying: deque[tuple[Job, Future[Simulation]]] = deque()
+
+    def land() -> list[Simulation]:
+        job, outcome = flying.popleft()
+        return _tell(engine, [job], [runner.result(outcome)])
+
+    for index in range(budget):
+        if len(flying) == batch:
+            yield from land()
+        (job,) = jobs(engine.ask(1), [simulation_seed(engine.seed, index)])
+        (outcome,) = runner.start([job], engine.expected_shape)
+        flying.append((job, outcome))
+    while flying:
+        yield from land()
+
+
+def _tell(engine: Bolfi, asked: list[Job], results: list[Simulation]) -> list[Simulation]:
+    """Tell the engine; returns the results.
+
+    Raises:
+        RuntimeError: the start design is over, and nothing succeeded.
+    """
+    theta, seeds = columns(asked)
+    errors = [result.error or "" for result in results]
+    engine.tell(theta, _signals(results, engine.signal_shape), seeds, errors)
+    if engine.told >= engine.initial and engine.succeeded == 0:
+        raise RuntimeError(
+            f"all {engine.told} simulations of the start design failed; the last error: "
+            f"{errors[-1] or 'the signal or its discrepancy was not finite'}"
+        )
+    return results
 
 
 def _signals(results: list[Simulation], shape: tuple[int, ...]) -> np.ndarray:
@@ -125,6 +178,11 @@ def _signals(results: list[Simulation], shape: tuple[int, ...]) -> np.ndarray:
         )
     empty = np.full(good[0].shape if good else shape, np.nan)
     return np.stack([empty if r.signal is None else r.signal for r in results])
+
+
+def _check_timeout(timeout: float | None) -> None:
+    if timeout is not None and not 0 < timeout < math.inf:
+        raise ValueError(f"timeout must be positive and finite [s], or None, got {timeout!r}")
 
 
 @contextmanager

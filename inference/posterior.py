@@ -92,8 +92,14 @@ class Fit:
 
     @property
     def simulations(self) -> xr.Dataset:
-        """Every simulation in the order told: theta, seed, round, discrepancy, failed, signal."""
+        """Every simulation in the order told: theta, seed, round, discrepancy, failed, error,
+        signal."""
         return simulations_dataset(self.prior, self.history)
+
+    @property
+    def failures(self) -> dict[str, int]:
+        """How many simulations failed, by kind: "raised", "not finite", "timeout"."""
+        return self.history.failures
 
     @in_float64
     def log_prob(self, theta: Theta) -> np.ndarray:

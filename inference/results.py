@@ -23,6 +23,7 @@ def simulations_dataset(prior: Prior, history: History) -> xr.Dataset:
             "round": ("simulation", history.rounds),
             "discrepancy": ("simulation", history.discrepancy),
             "failed": ("simulation", ~history.succeeded),
+            "error": ("simulation", history.errors),
             "signal": (["simulation", *axes], history.signals),
         }
     )

@@ -1,14 +1,23 @@
-"""Running a user's simulator: in batches or on an executor, and only where the bank is empty."""
+"""Running a user's simulator, in this process or in a worker.
 
+Workers import this module to run a simulation: it must load nothing but NumPy and the standard
+library (tested), so that they start quickly and stay small.
+"""
+
+import threading
 import time
-from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor, as_completed
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
-from .bank import Simulation, SimulationBank
-from .base import Simulator
+from .bank import Simulation
+from .failures import raised, timed_out
+
+if TYPE_CHECKING:
+    from .base import Simulator
+
+R = TypeVar("R")
 
 
 class Job(NamedTuple):
@@ -18,43 +27,61 @@ class Job(NamedTuple):
     seed: int
 
 
+class Overdue(Exception):
+    """A call that was given up; not a TimeoutError, for a simulator may raise one itself."""
+
+
 def simulation_seed(seed: int, index: int) -> int:
     """Seed of the index-th simulation of a run, in [0, 2^31)."""
     return int(np.random.SeedSequence([seed, index]).generate_state(1)[0] >> 1)
 
 
 def jobs(theta: Mapping[str, np.ndarray], seeds: Sequence[int]) -> list[Job]:
-    """One job per row of theta (name -> [n])."""
+    """One job per seed, with the rows of theta (name -> [n or more]) in order."""
     return [
         Job({name: float(column[i]) for name, column in theta.items()}, int(seed))
         for i, seed in enumerate(seeds)
     ]
 
 
+def columns(batch: Sequence[Job]) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """theta (name -> [n]) and seeds (int64 [n]) of n jobs."""
+    theta = {name: np.array([job.theta[name] for job in batch]) for name in batch[0].theta}
+    return theta, np.array([job.seed for job in batch], np.int64)
+
+
 def run_batch(
-    simulate: Simulator, batch: Sequence[Job], shape: tuple[int, ...] | None
+    simulate: "Simulator",
+    batch: Sequence[Job],
+    shape: tuple[int, ...] | None,
+    timeout: float | None = None,
 ) -> list[Simulation]:
     """Simulate all jobs in one call.
 
-    An exception costs only the run that raised it: the batch is then repeated one by one.
-    Seconds are shared out evenly.
+    An exception, or taking too long, costs only the run to blame: the batch is then repeated one
+    by one. Seconds are shared out evenly.
 
     Args:
         shape: Of one signal; None accepts any.
+        timeout: Seconds per job that the call may take, see `within`.
 
     Raises:
         ValueError: the simulator returned other than one such row per job.
     """
-    theta = {name: np.array([job.theta[name] for job in batch]) for name in batch[0].theta}
-    seeds = np.array([job.seed for job in batch], np.int64)
+    theta, seeds = columns(batch)
     started = time.perf_counter()
     try:
-        signals = np.asarray(simulate(theta, seeds), np.float64)
-    except Exception as error:  # whatever the user's code raises is a failed run, and kept
+        signals = within(
+            None if timeout is None else timeout * len(batch),
+            lambda: np.asarray(simulate(theta, seeds), np.float64),
+        )
+    # whatever the user's code raises is a failed run, and kept; many programs end by SystemExit
+    except (Exception, SystemExit) as error:
         if len(batch) > 1:
-            return [run_batch(simulate, [job], shape)[0] for job in batch]
-        seconds = time.perf_counter() - started
-        return [Simulation(None, f"{type(error).__name__}: {error}", seconds)]
+            return [run_batch(simulate, [job], shape, timeout)[0] for job in batch]
+        if isinstance(error, Overdue) and timeout is not None:
+            return [Simulation(None, timed_out(timeout), timeout)]
+        return [Simulation(None, raised(error), time.perf_counter() - started)]
     seconds = (time.perf_counter() - started) / len(batch)
     expected = (len(batch), *(signals.shape[1:] if shape is None else shape))
     if signals.shape != expected:
@@ -65,32 +92,33 @@ def run_batch(
     return [Simulation(signal, None, seconds) for signal in signals]
 
 
-def run_missing(
-    simulate: Simulator,
-    batch: Sequence[Job],
-    shape: tuple[int, ...] | None,
-    bank: SimulationBank,
-    identity: str,
-    executor: Executor | None,
-) -> list[Simulation]:
-    """Results of all jobs, in order; those that the bank lacks are simulated and stored.
+def within(timeout: float | None, call: Callable[[], R]) -> R:
+    """What `call` returns or raises, if it does so in `timeout` seconds.
 
-    Stored exceptions count as lacking: their cause, such as a full disk, may have gone. With an
-    executor every missing job is a call of its own, stored as soon as it is finished.
+    The call then runs in a thread of its own. Python cannot stop a thread: one that is overdue
+    is abandoned, and goes on, unheard, until it returns or the process ends. Code that never
+    releases the interpreter's lock cannot be timed out.
+
+    Raises:
+        Overdue: it did not.
     """
-    results = [bank.get(identity, job.theta, job.seed) for job in batch]
-    missing = [at for at, hit in enumerate(results) if hit is None or hit.error is not None]
+    if timeout is None:
+        return call()
+    returned: list[R] = []
+    failed: list[BaseException] = []
 
-    def store(at: int, made: Simulation) -> None:
-        bank.put(identity, batch[at].theta, batch[at].seed, made)
-        results[at] = made
+    def run() -> None:
+        try:
+            returned.append(call())
+        except BaseException as error:  # for the caller to judge
+            failed.append(error)
 
-    if executor is not None:
-        futures = {executor.submit(run_batch, simulate, [batch[at]], shape): at for at in missing}
-        for future in as_completed(futures):
-            store(futures[future], future.result()[0])
-    elif missing:
-        made = run_batch(simulate, [batch[at] for at in missing], shape)
-        for at, simulation in zip(missing, made, strict=True):
-            store(at, simulation)
-    return [result for result in results if result is not None]
+    # a daemon does not keep the process from ending
+    thread = threading.Thread(target=run, name="simulate", daemon=True)
+    thread.start()
+    thread.join(min(timeout, threading.TIMEOUT_MAX))
+    if failed:
+        raise failed[0]
+    if returned:
+        return returned[0]
+    raise Overdue

@@ -15,7 +15,8 @@ from ..bolfi import MIN_LEARN, Bolfi, checked_integer
 from ..design import sobol
 from ..loop import fit
 from ..prior import Prior
-from ..simulate import jobs, run_missing, simulation_seed
+from ..runner import run_missing
+from ..simulate import jobs, simulation_seed
 from .replicate import LogDensity
 
 Options = Mapping[str, Any]

@@ -78,3 +78,144 @@ def test_other_files_are_refused_and_left_alone(tmp_path):
         with pytest.raises(ValueError, match="not a simulation bank"):
             inference.SimulationBank(path)
     assert (foreign.read_bytes(), text.read_bytes()) == before
+
+
+def test_all_simulations_of_one_identity(tmp_path):
+    """In an order that does not depend on who finished first; other identities stay out."""
+    rows = [("id", 0.1, 5), ("id", 0.3, 1), ("id", 0.1, 2), ("other", 0.2, 0)]
+    found = []
+    for order in (rows, rows[::-1]):
+        with inference.SimulationBank() as bank:
+            for identity, a, seed in order:
+                signal = np.array([[a, np.nan], [seed, 1.0]])
+                bank.put(
+                    identity, {"b": 1.0, "a": a}, seed, inference.Simulation(signal, None, 0.0)
+                )
+            bank.put("id", {"b": 2.0, "a": 0.0}, 7, inference.Simulation(None, "boom", 0.0))
+            found.append(bank.simulations("id"))
+    for kept in found:
+        np.testing.assert_array_equal(kept.theta["a"], [0.1, 0.1, 0.3])
+        np.testing.assert_array_equal(kept.theta["b"], [1.0, 1.0, 1.0])
+        np.testing.assert_array_equal(kept.seeds, [2, 5, 1])
+        np.testing.assert_array_equal(kept.signals[:, 1, 0], kept.seeds)
+        np.testing.assert_array_equal(kept.signals[:, 0, 0], kept.theta["a"])
+
+
+def test_simulations_that_are_not_alike_are_refused():
+    with inference.SimulationBank() as bank:
+        with pytest.raises(ValueError, match="identity='id', got none"):
+            bank.simulations("id")
+        for a in (2, 3):
+            bank.put("id", {"a": a}, 0, inference.Simulation(np.zeros(a), None, 0.0))
+        with pytest.raises(ValueError, match=r"got a -> \[2\]; a -> \[3\]"):
+            bank.simulations("id")
+
+
+def test_a_claim_excludes_all_others_until_released(tmp_path):
+    path = tmp_path / "b.sqlite"
+    with inference.SimulationBank(path) as one, inference.SimulationBank(path) as two:
+        assert one.claim("id", THETA, 0)
+        assert not one.claim("id", THETA, 0) and not two.claim("id", THETA, 0)
+        assert two.claim("id", THETA, 1) and two.claim("id2", THETA, 0)
+        one.release("id", THETA, 0)
+        one.release("id", THETA, 0)
+        assert two.claim("id", THETA, 0)
+    with inference.SimulationBank(path) as bank:
+        assert bank.claim("id", THETA, 0)
+
+
+HOLD = """
+import sys, time
+from bolfi_liquids import inference
+
+bank = inference.SimulationBank(sys.argv[1])
+print(bank.claim("id", {"a": 1.0}, 0), flush=True)
+time.sleep(60.0)
+"""
+
+
+def test_a_claim_of_a_process_ends_with_it(tmp_path):
+    """By SIGKILL, too; and opening or closing the bank elsewhere leaves it as it is."""
+    path = tmp_path / "b.sqlite"
+    command = [sys.executable, "-c", HOLD, str(path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as holder:
+        assert holder.stdout.readline().strip() == "True"
+        with inference.SimulationBank(path) as bank:
+            with inference.SimulationBank(path) as other:
+                assert not other.claim("id", {"a": 1.0}, 0)
+            assert not bank.claim("id", {"a": 1.0}, 0)
+            holder.kill()
+            holder.wait()
+            assert bank.claim("id", {"a": 1.0}, 0)
+            with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as late:
+                assert late.stdout.readline().strip() == "False"
+                late.kill()
+
+
+TOGETHER = """
+import sys, time
+from concurrent.futures import ThreadPoolExecutor
+import numpy as np
+from bolfi_liquids import inference
+
+def simulate(theta, seeds):
+    time.sleep(0.02)
+    with open(sys.argv[2], "a") as log:
+        log.writelines(f"{seed}\\n" for seed in seeds)
+    return np.array([[seed + 0.5] for seed in seeds])
+
+jobs = [inference.Job({"a": 1.0}, seed) for seed in range(40)]
+if sys.argv[3] == "backwards":
+    jobs = jobs[::-1]
+with inference.SimulationBank(sys.argv[1]) as bank, ThreadPoolExecutor(3) as pool:
+    if sys.argv[4] == "alone":
+        made = []
+        for first in range(0, 40, 4):
+            made += inference.run_missing(simulate, jobs[first : first + 4], (1,), bank, "", None)
+    else:
+        made = inference.run_missing(simulate, jobs, (1,), bank, "", pool)
+assert [m.signal[0] for m in made] == [job.seed + 0.5 for job in jobs]
+"""
+
+
+def test_two_processes_never_simulate_the_same_at_the_same_time(tmp_path):
+    """Four runs of the same 40 jobs: two go forwards, two backwards; two with threads, two not."""
+    path, log = tmp_path / "b.sqlite", tmp_path / "log"
+    runs = [
+        subprocess.Popen([sys.executable, "-c", TOGETHER, str(path), str(log), order, how])
+        for order in ("forwards", "backwards")
+        for how in ("alone", "spread")
+    ]
+    assert [run.wait(60.0) for run in runs] == [0, 0, 0, 0]
+    assert sorted(int(seed) for seed in log.read_text().split()) == list(range(40))
+
+
+def test_what_was_finished_just_before_the_claim_is_not_simulated():
+    class Busy(inference.SimulationBank):
+        """Somebody else stores and releases between the look and the claim."""
+
+        def claim(self, identity, theta, seed):
+            self.put(identity, theta, seed, inference.Simulation(np.array([7.0]), None, 0.0))
+            return super().claim(identity, theta, seed)
+
+    def simulate(theta, seeds):
+        raise AssertionError("it was there")
+
+    with Busy() as bank:
+        for _ in range(2):
+            (found,) = inference.run_missing(simulate, [inference.Job(THETA, 0)], (1,), bank, "")
+            np.testing.assert_array_equal(found.signal, [7.0])
+        assert bank.claim("", THETA, 0)  # nobody holds it any more
+
+
+def test_the_same_job_twice_in_a_batch_is_simulated_once():
+    calls = []
+
+    def simulate(theta, seeds):
+        calls.extend(seeds)
+        return theta["a"][:, None]
+
+    with inference.SimulationBank() as bank:
+        batch = [inference.Job(THETA, seed) for seed in (0, 1, 0)]
+        found = inference.run_missing(simulate, batch, (1,), bank, "")
+    assert calls == [0, 1] and [result.signal[0] for result in found] == [THETA["a"]] * 3

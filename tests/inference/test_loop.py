@@ -10,6 +10,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import jax
 import numpy as np
 import pytest
 from bolfi_liquids.inference.simulate import simulation_seed
@@ -94,12 +95,61 @@ def test_rounds_seeds_and_seconds_are_reported(line_fit):
     assert closest.signal.shape == (30,)
 
 
-def test_an_executor_changes_nothing(prior, observed, simulate):
-    plain = inference.fit(simulate, prior, observed, budget=9)
+@pytest.mark.parametrize("workers", [0, 2])
+def test_a_larger_budget_goes_on_where_the_smaller_ended(
+    tmp_path, prior, observed, simulate, workers
+):
+    """Also from within a round, 9 being no multiple of 2, whose points are chosen jointly."""
+    calls = []
+
+    def jointly(key, surrogate, n):
+        steps = (np.arange(n)[:, None] + 0.5) / n
+        return (steps + np.asarray(jax.random.uniform(key, (1, 2)))) % 1.0
+
+    def counted(theta, seeds):
+        calls.extend(seeds)
+        return simulate(theta, seeds)
+
     with ThreadPoolExecutor(2) as pool:
-        spread = inference.fit(simulate, prior, observed, budget=9, executor=pool)
-    np.testing.assert_array_equal(plain.history.theta, spread.history.theta)
-    np.testing.assert_array_equal(plain.history.signals, spread.history.signals)
+        options = {"acquisition": jointly, "executor": pool if workers else None}
+        kept = {**options, "bank": tmp_path / "b.sqlite"}
+        small = inference.fit(counted, prior, observed, budget=9, **kept)
+        assert len(calls) == 9
+        large = inference.fit(counted, prior, observed, budget=12, **kept)
+        assert len(calls) == len(set(calls)) == 12
+        at_once = inference.fit(simulate, prior, observed, budget=12, **options)
+    np.testing.assert_array_equal(small.history.theta, large.history.theta[:9])
+    np.testing.assert_array_equal(large.history.theta, at_once.history.theta)
+    np.testing.assert_array_equal(large.history.signals, at_once.history.signals)
+    assert large.best == at_once.best
+
+
+def test_earlier_simulations_count_beside_the_budget(prior, observed, simulate):
+    """Ten of one's own make a start design superfluous, and alone are enough."""
+    theta = prior.from_unit(np.random.default_rng(3).uniform(size=(10, 2)))
+    signals = simulate(theta, range(10))
+    fit = inference.fit(simulate, prior, observed, budget=4, earlier=(theta, signals))
+    np.testing.assert_array_equal(fit.history.signals[:10], signals)
+    np.testing.assert_array_equal(fit.simulations["seed"][:10], np.full(10, -1))
+    np.testing.assert_array_equal(fit.simulations["round"], [-1] * 10 + [0, 0, 1, 1])
+    engine = inference.Bolfi(prior, observed)
+    engine.tell(theta, signals)
+    first = prior.to_array(engine.ask(2))  # the acquisition's, not the design's
+    np.testing.assert_array_equal(fit.history.theta[10:12], first)
+    alone = inference.fit(simulate, prior, observed, budget=0, earlier=(theta, signals))
+    assert alone.best == engine.fit().best
+
+
+def test_a_bank_s_simulations_serve_as_earlier_ones(prior, observed, simulate):
+    with inference.SimulationBank() as bank:
+        first = inference.fit(simulate, prior, observed, budget=8, bank=bank, identity="line")
+        kept = bank.simulations("line")
+    again = inference.fit(None, prior, observed, budget=0, earlier=kept)
+    order = np.argsort(first.history.seeds), np.argsort(again.history.seeds)
+    for name in ("theta", "signals", "seeds"):
+        both = (getattr(fit.history, name) for fit in (first, again))
+        left, right = (rows[rank] for rows, rank in zip(both, order, strict=True))
+        np.testing.assert_array_equal(left, right)
 
 
 def test_a_shared_bank_serves_a_second_observation(tmp_path, prior, observed, simulate):
@@ -179,12 +229,14 @@ def test_total_failure_is_an_error_with_its_cause(prior, observed):
 
 
 @pytest.mark.parametrize("shape", [(2, 29), (3, 30), (30,), ()])
-def test_signals_of_wrong_shape_are_refused_and_not_stored(prior, observed, shape):
+def test_signals_of_wrong_shape_are_refused_and_not_stored(prior, observed, simulate, shape):
     message = re.escape(f"shape (2, 30), one row per theta, got {shape}")
     with inference.SimulationBank() as bank:
         with pytest.raises(ValueError, match=message):
             inference.fit(lambda theta, seeds: np.zeros(shape), prior, observed, bank=bank)
         assert len(bank) == 0
+        # and nothing is claimed any more, for which this call would wait
+        assert inference.fit(simulate, prior, observed, budget=7, bank=bank).failures == {}
 
 
 @pytest.mark.parametrize(
@@ -194,6 +246,7 @@ def test_signals_of_wrong_shape_are_refused_and_not_stored(prior, observed, shap
         ({"budget": 2}, "budget must be an integer from 3"),
         ({"budget": 4}, "budget=4 is smaller than the start design of initial=7"),
         ({"batch": 0}, "batch must be an integer"),
+        ({"budget": 0, "earlier": ({"slope": [0], "offset": [0]}, np.zeros((1, 30)))}, "budget=0"),
     ],
 )
 def test_bad_budgets_are_refused(prior, observed, simulate, options, message):
@@ -208,12 +261,24 @@ def test_progress_is_shown_only_on_request(prior, observed, simulate, capsys):
     assert "7/7" in capsys.readouterr().out
 
 
-def test_importing_loads_neither_simulator_nor_cameras():
+def test_importing_loads_neither_simulator_nor_cameras_and_jax_only_on_use():
     code = (
-        "import sys, bolfi_liquids.inference; "
-        "print([m for m in ('taichi', 'cv2', 'rtde_control') if m in sys.modules])"
+        "import sys; from bolfi_liquids import inference; before = 'jax' in sys.modules; "
+        "[getattr(inference, name) for name in dir(inference)]; "
+        "print(before, [m for m in ('taichi', 'cv2', 'rtde_control') if m in sys.modules])"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=Path("/"), check=True
     )
-    assert done.stdout.strip() == "[]"
+    assert done.stdout.strip() == "False []"
+
+
+def test_every_public_name_is_there_and_hides_no_module():
+    """Importing a submodule sets it as an attribute, which would shadow a name of its own."""
+    folder = Path(inference.__file__).parent
+    assert set(inference.__all__) == set(inference._HOME)
+    for name in inference.__all__:
+        assert getattr(inference, name) is not None
+        assert not (folder / f"{name}.py").exists()
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        inference.nothing  # noqa: B018

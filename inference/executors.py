@@ -1,0 +1,65 @@
+"""Where simulations run: any `concurrent.futures.Executor`, or a Dask cluster by its address."""
+
+import sys
+from collections.abc import Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+
+
+@contextmanager
+def opened(executor: Executor | str | None) -> Iterator[Executor | None]:
+    """The executor itself, left open; or one at a Dask scheduler's address, closed afterwards.
+
+    Raises:
+        ValueError: neither of them, or a process pool that forks.
+        ImportError: an address, but Dask is not installed.
+        ConnectionError: no scheduler answers there.
+    """
+    if isinstance(executor, str):
+        with _dask(executor) as found:
+            yield found
+        return
+    if executor is not None and not isinstance(executor, Executor):
+        raise ValueError(
+            "executor must be a concurrent.futures.Executor, the address of a Dask scheduler or "
+            f"None, got {type(executor).__name__}; a Dask client has get_executor()"
+        )
+    if isinstance(executor, ProcessPoolExecutor) and _forks(executor):
+        raise ValueError(
+            "executor starts its workers by fork, which JAX's threads do not survive; give "
+            "ProcessPoolExecutor(n, mp_context=multiprocessing.get_context('spawn'))"
+        )
+    yield executor
+
+
+def _forks(pool: ProcessPoolExecutor) -> bool:
+    # there is no public way to ask, and the default on Linux, up to Python 3.13, hangs at times
+    context = getattr(pool, "_mp_context", None)
+    return context is not None and context.get_start_method() == "fork"
+
+
+@contextmanager
+def _dask(address: str) -> Iterator[Executor]:
+    try:
+        from distributed import Client  # pyright: ignore[reportMissingImports]
+    except ModuleNotFoundError as err:
+        raise ImportError(
+            f"executor={address!r} is a Dask scheduler, which needs: "
+            "pip install 'bolfi-liquids[dask]'"
+        ) from err
+    try:
+        client = Client(address)
+    except (OSError, ValueError) as err:
+        raise ConnectionError(
+            f"executor={address!r} must be the address of a running Dask scheduler, such as "
+            f"tcp://host:8786: {err}"
+        ) from err
+    with client:
+        # impure: a simulation that is asked for again failed before, and is to be tried again
+        yield client.get_executor(pure=False)
+
+
+def killed_its_worker(error: BaseException) -> bool:
+    """Whether Dask gave a simulation up, because each worker that tried it died."""
+    distributed = sys.modules.get("distributed")
+    return distributed is not None and isinstance(error, distributed.KilledWorker)

@@ -1,0 +1,230 @@
+"""Simulating what the bank lacks: a batch in one call, or one by one on an executor."""
+
+from collections.abc import Sequence
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, wait
+from functools import partial
+from pickle import PicklingError
+from typing import TYPE_CHECKING, NamedTuple
+
+from .bank import Simulation, SimulationBank
+from .executors import killed_its_worker
+from .failures import TIMEOUT, kind, raised
+from .simulate import Job, run_batch
+
+if TYPE_CHECKING:
+    from .base import Simulator
+
+POLL = 0.2  # seconds between looks at what somebody else is simulating
+
+Shape = tuple[int, ...] | None
+"""Of one signal; None accepts any."""
+
+
+class Order(NamedTuple):
+    """A simulation that is wanted; `outcome` is done once the bank holds it."""
+
+    job: Job
+    shape: Shape
+    outcome: "Future[Simulation]"
+
+
+class Runner:
+    """A simulator with the bank that keeps what it returns; close it, or use it in a `with`.
+
+    Nothing that the bank holds is simulated again but what raised, whose cause, such as a full
+    disk, may have gone, and what was given up after less time than is allowed now. What another
+    thread or process is simulating for the same bank is waited for.
+
+    Args:
+        simulate: The user's simulator.
+        bank: Where finished simulations are kept.
+        identity: The simulator's name in the bank.
+        executor: Simulates each job in a call of its own; None simulates here, in one call.
+        timeout: Seconds that a simulation may take; None sets no limit.
+    """
+
+    def __init__(
+        self,
+        simulate: "Simulator",
+        bank: SimulationBank,
+        identity: str,
+        executor: Executor | None = None,
+        timeout: float | None = None,
+    ):
+        self.simulate = simulate
+        self.bank = bank
+        self.identity = identity
+        self.executor = executor
+        self.timeout = timeout
+        self._elsewhere: list[Order] = []  # claimed by somebody else
+        self._mine: dict[Future[Simulation], Job] = {}  # claimed here, by outcome
+        self._submitted: set[Future[list[Simulation]]] = set()
+
+    def __enter__(self) -> "Runner":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Cancel what has not begun and claim nothing any more.
+
+        What is running is not waited for; it is stored when finished, if the bank is open then.
+        """
+        self._elsewhere.clear()
+        for future in list(self._submitted):
+            future.cancel()
+        for outcome in list(self._mine):
+            self._release(outcome)
+
+    def run(self, batch: Sequence[Job], shape: Shape) -> list[Simulation]:
+        """Results of all jobs, in order, once all are finished.
+
+        Raises:
+            ValueError: signals not of this shape.
+            RuntimeError: the executor lost a simulation.
+        """
+        return [self.result(outcome) for outcome in self.start(batch, shape)]
+
+    def start(self, batch: Sequence[Job], shape: Shape) -> "list[Future[Simulation]]":
+        """Begin all jobs that the bank lacks; without an executor this also ends them.
+
+        Returns:
+            An outcome per job, for `result`. With an executor each is stored the moment it is
+            finished, in whatever order.
+        """
+        orders = [Order(job, shape, Future()) for job in batch]
+        self._elsewhere += orders
+        self._begin()
+        return [order.outcome for order in orders]
+
+    def result(self, outcome: "Future[Simulation]") -> Simulation:
+        """The simulation, once it is finished, here or by whoever else is making it.
+
+        Raises: see `run`.
+        """
+        while self._elsewhere and not outcome.done():
+            wait([outcome], timeout=POLL)
+            self._begin()
+        return outcome.result()
+
+    def _begin(self) -> None:
+        """Take from the bank or simulate whatever nobody else is simulating."""
+        waiting, self._elsewhere = self._elsewhere, []
+        mine: list[Order] = []
+        for order in waiting:
+            if self._found(order):
+                continue
+            if not self.bank.claim(self.identity, *order.job):
+                self._elsewhere.append(order)
+                continue
+            self._mine[order.outcome] = order.job
+            if self._found(order):  # finished by the last claimant after the first look
+                self._release(order.outcome)
+            else:
+                mine.append(order)
+        if self.executor is not None:
+            for order in mine:
+                self._submit(self.executor, order)
+        elif mine:
+            self._simulate_here(mine)
+
+    def _found(self, order: Order) -> bool:
+        found = self.bank.get(self.identity, *order.job)
+        if found is None or not is_final(found, self.timeout):
+            return False
+        order.outcome.set_result(found)
+        return True
+
+    def _simulate_here(self, orders: list[Order]) -> None:
+        batch = [order.job for order in orders]
+        made = run_batch(self.simulate, batch, orders[0].shape, self.timeout)
+        for order, simulation in zip(orders, made, strict=True):
+            self._keep(order, simulation)
+
+    def _submit(self, executor: Executor, order: Order) -> None:
+        work = partial(run_batch, self.simulate, [order.job], order.shape, self.timeout)
+        try:
+            future = executor.submit(work)
+        except Exception as error:
+            self._fail(order, self._explained(error))
+            return
+        self._submitted.add(future)
+        future.add_done_callback(partial(self._receive, order))
+
+    def _receive(self, order: Order, future: "Future[list[Simulation]]") -> None:
+        """Store what an executor finished; called by one of its threads."""
+        self._submitted.discard(future)
+        try:
+            made = future.result()[0]
+        except BaseException as error:
+            if not killed_its_worker(error):
+                self._fail(order, self._explained(error))
+                return
+            made = Simulation(None, raised(error), 0.0)
+        try:
+            self._keep(order, made)
+        except BaseException as error:  # for `result` to raise: nobody hears this thread
+            self._fail(order, error)
+
+    def _keep(self, order: Order, made: Simulation) -> None:
+        self.bank.put(self.identity, *order.job, made)
+        self._release(order.outcome)
+        order.outcome.set_result(made)
+
+    def _fail(self, order: Order, error: BaseException) -> None:
+        self._release(order.outcome)
+        order.outcome.set_exception(error)
+
+    def _release(self, outcome: "Future[Simulation]") -> None:
+        job = self._mine.pop(outcome, None)
+        if job is not None:
+            self.bank.release(self.identity, *job)
+
+    def _explained(self, error: BaseException) -> BaseException:
+        """What to tell the user of an executor's own error."""
+        if isinstance(error, PicklingError | AttributeError | TypeError):
+            told = TypeError(
+                "simulate must be picklable to reach the executor's workers "
+                f"({error}); define it at the top level of a module"
+            )
+        elif isinstance(error, BrokenExecutor | CancelledError):
+            where = "nothing, for bank is in memory" if self.bank.in_memory else self.bank.path
+            jobs = "; ".join(f"{job.theta}, seed {job.seed}" for job in list(self._mine.values()))
+            told = RuntimeError(
+                f"the executor lost its workers ({raised(error)}): one was killed, ran out of "
+                "memory, crashed in the simulator or could not import it. "
+                f"In flight: {jobs}. Finished simulations are kept in {where}; "
+                "mend the cause and repeat the call with a new executor to go on from there"
+            )
+        else:
+            return error
+        told.__cause__ = error
+        return told
+
+
+def is_final(found: Simulation, timeout: float | None) -> bool:
+    """Whether a stored simulation need not be tried again.
+
+    A signal is final, also one of NaN, and so is a timeout unless more time is allowed now; what
+    raised is not.
+    """
+    if found.error is None:
+        return True
+    if kind(found.error) != TIMEOUT:
+        return False
+    return timeout is not None and timeout <= found.seconds
+
+
+def run_missing(  # noqa: PLR0913  the runner's arguments and the call's
+    simulate: "Simulator",
+    batch: Sequence[Job],
+    shape: Shape,
+    bank: SimulationBank,
+    identity: str,
+    executor: Executor | None = None,
+    timeout: float | None = None,
+) -> list[Simulation]:
+    """Results of all jobs, in order; those that the bank lacks are simulated, see `Runner`."""
+    with Runner(simulate, bank, identity, executor, timeout) as runner:
+        return runner.run(batch, shape)
