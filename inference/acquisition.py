@@ -20,10 +20,11 @@ from .feasibility import Feasibility, log_feasible
 from .gp import GP, predict, predict_joint, predict_many
 from .optimise import minimise_in_box
 from .screen import ROUNDS, screen
-from .target import log_likelihoods
 
 CANDIDATES = 128  # points among which a rule chooses
 NODES = 64  # points over which a variance is integrated
+ENOUGH = 32.0  # candidates that count, effectively
+LEAST_POWER = 1e-6
 
 
 class LCBState(NamedTuple):
@@ -103,25 +104,39 @@ def truncated_normal(rng: np.random.Generator, centre: np.ndarray, sd: float) ->
 
 
 class Candidates(NamedTuple):
-    """Points that stand for sqrt(L): for the posterior, and for where it may yet lie."""
+    """Points that stand for the posterior, and for where it may yet lie."""
 
     u: np.ndarray  # [CANDIDATES, d]; the same point may appear more than once
+    log_density: np.ndarray  # [CANDIDATES], of their distribution, up to a constant
     log_feasible: np.ndarray  # [CANDIDATES], log chance that a run succeeds
 
 
 def candidates(
     rng: np.random.Generator, surrogate: Surrogate, feasibility: Feasibility
 ) -> Candidates:
-    """Systematic resample of a population that importance sampling found."""
+    """Systematic resample, in proportion to sqrt(L) or a smaller power, of a quick screen.
+
+    The power is halved until at least ENOUGH points count, however narrow the posterior.
+    """
     dimension = surrogate.gp.data.u.shape[1]
     shifts = rng.uniform(size=(ROUNDS, dimension + 1))
     found = screen(jnp.asarray(shifts), _root(surrogate.log_likelihood), surrogate.state)
-    log_weights = np.asarray(found.log_weights)
-    total = np.cumsum(np.exp(log_weights - log_weights.max()))
+    log_target, log_weights = np.asarray(found.log_target), np.asarray(found.log_weights)
+    log_base = log_weights - np.where(np.isfinite(log_target), log_target, 0.0)
+    power, weights = 1.0, _normalised(log_weights)
+    while np.sum(weights**2) > 1.0 / ENOUGH and power > LEAST_POWER:
+        power = power / 2.0
+        weights = _normalised(power * log_target + log_base)
     positions = (np.arange(CANDIDATES) + rng.uniform()) / CANDIDATES
-    rows = np.minimum(np.searchsorted(total, positions * total[-1]), len(total) - 1)
+    rows = np.minimum(np.searchsorted(np.cumsum(weights), positions), len(weights) - 1)
     u = np.asarray(found.u)[rows]
-    return Candidates(u, np.asarray(_feasible(feasibility, jnp.asarray(u))))
+    feasible = np.asarray(_feasible(feasibility, jnp.asarray(u)))
+    return Candidates(u, power * log_target[rows], feasible)
+
+
+def _normalised(log_weights: np.ndarray) -> np.ndarray:
+    weights = np.exp(log_weights - log_weights.max())
+    return weights / weights.sum()
 
 
 @cache
@@ -148,6 +163,7 @@ def _log_moments(
     return first, jax.vmap(log_second_moment, (None, 0, None))(state, u, None)
 
 
+@in_float64
 def log_moments(surrogate: Surrogate, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """log E[L] and log Var[L] at u [n, d], L being known only through the surrogate."""
     functions = surrogate.log_likelihood, surrogate.log_second_moment
@@ -156,10 +172,11 @@ def log_moments(surrogate: Surrogate, u: np.ndarray) -> tuple[np.ndarray, np.nda
     return first, 2.0 * first + excess + np.log(-np.expm1(-excess))
 
 
-Score = Callable[[np.random.Generator, Surrogate, np.ndarray], np.ndarray]
-"""(rng, surrogate, u [n, d]) -> log scores [n]."""
+Score = Callable[[np.random.Generator, Surrogate, Candidates], np.ndarray]
+"""(rng, surrogate, candidates) -> log scores [CANDIDATES]."""
 
 
+@in_float64
 def best_candidates(
     score: Score, key: jax.Array, surrogate: Surrogate, n: int, feasibility: Feasibility
 ) -> np.ndarray:
@@ -171,7 +188,7 @@ def best_candidates(
     found = candidates(rng, surrogate, feasibility)
     points: list[np.ndarray] = []
     while len(points) < n:
-        scores = score(rng, surrogate, found.u) + found.log_feasible
+        scores = score(rng, surrogate, found) + found.log_feasible
         for point in points:
             scores[(found.u == point).all(-1)] = -np.inf
         points.append(found.u[np.argmax(scores)])
@@ -184,7 +201,6 @@ def best_candidates(
 class MaxVariance:
     """Maximise Var[L(u)] (MaxVar, Jarvenpaa et al. 2019)."""
 
-    @in_float64
     def __call__(
         self, key: jax.Array, surrogate: Surrogate, n: int, feasibility: Feasibility
     ) -> np.ndarray:
@@ -192,8 +208,8 @@ class MaxVariance:
         return best_candidates(self._score, key, surrogate, n, feasibility)
 
     @staticmethod
-    def _score(_: np.random.Generator, surrogate: Surrogate, u: np.ndarray) -> np.ndarray:
-        return log_moments(surrogate, u)[1]
+    def _score(_: np.random.Generator, surrogate: Surrogate, found: Candidates) -> np.ndarray:
+        return log_moments(surrogate, found.u)[1]
 
 
 @dataclass(frozen=True)
@@ -210,19 +226,20 @@ class PosteriorDraws:
         if not 0.0 <= self.share <= 1.0:
             raise ValueError(f"share must be from 0 to 1, got {self.share}")
 
-    @in_float64
     def __call__(
         self, key: jax.Array, surrogate: Surrogate, n: int, feasibility: Feasibility
     ) -> np.ndarray:
         """n different points u [n, d]."""
         return best_candidates(self._score, key, surrogate, n, feasibility)
 
-    def _score(self, rng: np.random.Generator, surrogate: Surrogate, u: np.ndarray) -> np.ndarray:
-        first, variance = log_moments(surrogate, u)
+    def _score(
+        self, rng: np.random.Generator, surrogate: Surrogate, found: Candidates
+    ) -> np.ndarray:
+        log_likelihood, log_variance = log_moments(surrogate, found.u)
         if rng.uniform() >= self.share:
-            return variance
-        # the largest of these is a draw in proportion to sqrt(L), which the candidates lack
-        return 0.5 * first + rng.gumbel(size=first.shape)
+            return log_variance
+        # the largest of these is a draw in proportion to exp(log_likelihood - log_density)
+        return log_likelihood - found.log_density + rng.gumbel(size=len(found.u))
 
 
 @partial(jax.jit, static_argnums=0)
@@ -245,7 +262,6 @@ class ExpectedIntegratedVariance:
     in expectation, that is to maximise the integral of E[E[L | run]^2].
     """
 
-    @in_float64
     def __call__(
         self, key: jax.Array, surrogate: Surrogate, n: int, feasibility: Feasibility
     ) -> np.ndarray:
@@ -253,13 +269,12 @@ class ExpectedIntegratedVariance:
         return best_candidates(self._score, key, surrogate, n, feasibility)
 
     @staticmethod
-    def _score(rng: np.random.Generator, surrogate: Surrogate, u: np.ndarray) -> np.ndarray:
-        nodes = u[rng.permutation(len(u))[:NODES]]
-        arguments = surrogate.state, jnp.asarray(u), jnp.asarray(nodes)
-        resolved = np.asarray(_log_resolved(surrogate.log_second_moment, *arguments))
-        log_likelihood = np.asarray(log_likelihoods(surrogate.log_likelihood, *arguments[::2]))
-        # the nodes were drawn in proportion to sqrt(L)
-        return np.logaddexp.reduce(resolved - 0.5 * log_likelihood[:, None], axis=0)
+    def _score(rng: np.random.Generator, surrogate: Surrogate, found: Candidates) -> np.ndarray:
+        rows = rng.permutation(len(found.u))[:NODES]
+        u, nodes = jnp.asarray(found.u), jnp.asarray(found.u[rows])
+        resolved = _log_resolved(surrogate.log_second_moment, surrogate.state, u, nodes)
+        weighted = np.asarray(resolved) - found.log_density[rows, None]
+        return np.logaddexp.reduce(weighted, axis=0)
 
 
 RULES = {

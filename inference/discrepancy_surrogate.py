@@ -69,6 +69,7 @@ class DiscrepancySurrogate:
         return self.scale.transform
 
     @property
+    @in_float64
     def state(self) -> ThresholdState:
         return ThresholdState(
             self.gp, jnp.asarray((self.threshold - self.scale.location) / self.scale.spread)

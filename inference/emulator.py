@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ._float64 import in_float64
 from .components import Basis, principal_components
 from .gp import GP, condition, leave_one_out, pad, predict_many
 from .hyper import maximum_a_posteriori, reset
@@ -40,6 +41,7 @@ class Emulator(NamedTuple):
     learned_at: int
 
 
+@in_float64
 def emulate(
     u: np.ndarray,
     outputs: np.ndarray,

@@ -14,7 +14,9 @@ from .linalg import inverse_cholesky, log_normal_density
 
 TREND_SD = 3.0
 """Prior sd of each trend coefficient, in units of the targets' sd: broad, yet proper."""
-JITTER = 1e-8
+JITTER = 1e-7
+"""Variance added to every target, in units of the targets': below it rounding would rule."""
+LEAST = 1e-10  # latent variance, which rounding may make negative
 
 
 class Data(NamedTuple):
@@ -129,7 +131,7 @@ def predict_many(gp: GP, u: jax.Array) -> tuple[jax.Array, jax.Array]:
     cross, alone = _cross(gp, u)
     mean = jnp.einsum("kp,kpm->km", gp.weights, cross)
     explained = jnp.sum((gp.whitener @ cross) ** 2, axis=1)
-    return mean, jnp.maximum(alone - explained, JITTER)
+    return mean, jnp.maximum(alone - explained, LEAST)
 
 
 def predict_joint(gp: GP, u: jax.Array, v: jax.Array) -> jax.Array:

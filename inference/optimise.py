@@ -53,7 +53,7 @@ def minimise_many(
             value_and_grad, x, value, gradient, step, slope, active
         )
         change, turn = moved - x, new_gradient - gradient
-        gain = value - new_value
+        gain = np.subtract(value, new_value, where=active, out=np.zeros(k))
         inverse = _update(inverse, change, turn)
         x, value, gradient = moved, new_value, new_gradient
         active &= gain > tolerance

@@ -54,6 +54,7 @@ class SignalSurrogate:
         return self.emulator.gp
 
     @cached_property
+    @in_float64
     def state(self) -> SignalState:
         return state_of(self.emulator, self.reduced)
 
@@ -78,6 +79,7 @@ class SignalSurrogate:
         return replace(self, emulator=self.emulator._replace(gp=believe(self.gp, u)))
 
     @property
+    @in_float64
     def node_weights(self) -> np.ndarray:
         """Posterior weights [KEPT] of the nodes, given the best parameters."""
         terms = _node_log_densities(self.state, jnp.asarray(self.minimum()[None]))

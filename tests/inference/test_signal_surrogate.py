@@ -1,0 +1,218 @@
+"""The emulated output against exact posteriors."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import numpyro.distributions as dist
+import pytest
+from bolfi_liquids.inference.design import sobol
+from bolfi_liquids.inference.emulator import noise_share
+from bolfi_liquids.inference.families import Learnable, SignalFamily
+from bolfi_liquids.inference.gaussian import log_likelihood, log_second_moment
+from bolfi_liquids.inference.gp import predict
+from bolfi_liquids.inference.replicates import next_replicate
+from scipy.stats import multivariate_normal
+
+from bolfi_liquids import inference
+
+TIME = np.linspace(0.0, 1.0, 40)
+DESIGN = np.stack([TIME, np.ones_like(TIME), np.sin(9.0 * TIME)], axis=1)
+SD = 0.1
+ROWS = 64
+AXIS = np.linspace(0.005, 0.995, 100)
+GRID = np.stack(np.meshgrid(AXIS, AXIS), -1).reshape(-1, 2)
+
+
+def outputs(u, seeds=None):
+    """Two parameters, one of them nonlinear; noise of sd SD where seeds are given."""
+    mean = np.stack([u[:, 0], u[:, 1], u[:, 0] * u[:, 1]], axis=1) @ DESIGN.T
+    if seeds is None:
+        return mean
+    return mean + np.stack([np.random.default_rng(s).normal(0.0, SD, TIME.size) for s in seeds])
+
+
+def learned(u, signals, observed, **options):
+    learner = SignalFamily(**options).learner(observed)
+    features, discrepancy = learner.measure(signals)
+    return learner.learn(Learnable(u, features, discrepancy), ROWS, None)
+
+
+def posterior(surrogate):
+    with jax.enable_x64(True):
+        values = np.asarray(jax.vmap(log_likelihood, (None, 0))(surrogate.state, jnp.asarray(GRID)))
+    weight = np.exp(values - values.max())
+    return weight / weight.sum()
+
+
+def exact(observed, covariance):
+    values = multivariate_normal(np.zeros(40), covariance).logpdf(observed - outputs(GRID))
+    weight = np.exp(values - values.max())
+    return weight / weight.sum()
+
+
+def total_variation(a, b):
+    return 0.5 * np.abs(a - b).sum()
+
+
+@pytest.fixture(scope="module")
+def design():
+    return sobol(0, 0, 30, 2)
+
+
+@pytest.fixture(scope="module")
+def noise():
+    return np.random.default_rng(9).normal(0.0, SD, TIME.size)
+
+
+@pytest.mark.parametrize("given", [SD, np.full(40, SD), SD**2 * np.eye(40)])
+def test_known_measurement_noise_gives_the_exact_posterior(design, noise, given):
+    observed = outputs(np.array([[0.4, 0.6]]))[0] + noise
+    found = learned(design, outputs(design), observed, noise=given)
+    assert total_variation(posterior(found), exact(observed, SD**2 * np.eye(40))) < 0.05
+
+
+def test_estimated_measurement_noise_comes_near_it(design, noise):
+    observed = outputs(np.array([[0.4, 0.6]]))[0] + noise
+    found = learned(design, outputs(design), observed)
+    assert total_variation(posterior(found), exact(observed, SD**2 * np.eye(40))) < 0.2
+    assert abs(np.log(found.constants()["measurement_noise_sd"] / SD)) < 0.4
+    # the same data taken as iid of a tenth of the noise are far off
+    bold = learned(design, outputs(design), observed, noise=SD / 10)
+    assert total_variation(posterior(bold), exact(observed, SD**2 * np.eye(40))) > 0.5
+
+
+def test_correlated_noise_widens_the_posterior(design):
+    """AR(1) noise of correlation 0.9: on eight data sets far wider than if taken as white."""
+    widths, correlations = [], []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        noise = [rng.normal(0.0, SD)]
+        for fresh in rng.normal(0.0, SD * np.sqrt(1.0 - 0.9**2), 39):
+            noise.append(0.9 * noise[-1] + fresh)
+        observed = outputs(np.array([[0.5, 0.5]]))[0] + noise
+        found, white = (
+            learned(design, outputs(design), observed, **options) for options in ({}, {"noise": SD})
+        )
+        sd = [np.sqrt(p @ (GRID - p @ GRID) ** 2) for p in (posterior(found), posterior(white))]
+        widths.append(sd[0] / sd[1])
+        correlations.append(found.constants()["measurement_noise_correlation"])
+    assert np.mean(np.log(widths)) > 0.25
+    assert np.mean(correlations) > 0.5
+
+
+def test_the_simulators_own_noise_is_learned_and_not_counted_twice(design, noise):
+    """Observed is one output of a noisy simulator: exact with SD once, not sqrt(2) SD."""
+    u = np.concatenate([design, design[:4]])
+    observed = outputs(np.array([[0.4, 0.6]]))[0] + noise
+    found = learned(u, outputs(u, np.arange(len(u))), observed)
+    reference = exact(observed, SD**2 * np.eye(40))
+    mine = posterior(found)
+    assert total_variation(mine, reference) < 0.25
+    sd, expected = (np.sqrt(p @ (GRID - p @ GRID) ** 2) for p in (mine, reference))
+    assert (np.abs(np.log(sd / expected)) < 0.25).all()
+
+
+def test_second_moment_agrees_with_sampling():
+    u = sobol(0, 0, 6, 2)
+    found = learned(u, outputs(u), outputs(np.array([[0.5, 0.5]]))[0], noise=0.5)
+    point = jnp.array([0.9, 0.2])
+    with jax.enable_x64(True):
+        mean, variance = (np.asarray(part) for part in predict(found.gp, point))
+        k = found.emulator.basis.used
+        rng = np.random.default_rng(0)
+        draws = mean[:k] + np.sqrt(variance[:k]) * rng.normal(size=(200_000, k))
+        node = found.reduced.estimate[0][:k], found.reduced.covariance[0][:k, :k]
+        values = np.exp(multivariate_normal(*node).logpdf(draws))
+        # the empty components' factor: N(0; 0, 1) each, as in the state
+        empty = (2.0 * np.pi) ** (-0.5 * (len(mean) - k))
+        scale = empty * np.exp(found.reduced.log_weight[0])
+        second = np.exp(log_second_moment(found.state, point, None))
+    sample = (values * scale) ** 2
+    assert abs(second - sample.mean()) < 5.0 * sample.std() / np.sqrt(len(sample))
+
+
+def test_likelihood_and_gradient_are_finite_everywhere(design, noise):
+    observed = outputs(np.array([[0.4, 0.6]]))[0] + noise
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0], [1.0, 1.0], [1e-12, 0.3]])
+    for shift in (0.0, 1e3, 1e8):  # data that no parameter explains
+        found = learned(design, outputs(design), observed + shift * TIME, noise=SD)
+        with jax.enable_x64(True):
+            value = jax.vmap(jax.value_and_grad(log_likelihood, 1), (None, 0))
+            parts = value(found.state, jnp.asarray(corners))
+        assert all(np.isfinite(part).all() for part in parts)
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_the_outputs_unit_changes_nothing(design, noise, factor):
+    observed = outputs(np.array([[0.4, 0.6]]))[0] + noise
+    plain = posterior(learned(design, outputs(design), observed))
+    scaled = posterior(learned(design, factor * outputs(design), factor * observed))
+    np.testing.assert_allclose(scaled, plain, atol=1e-6)
+
+
+def test_equal_outputs_leave_the_prior():
+    found = learned(sobol(0, 0, 6, 2), np.ones((6, 40)), np.ones(40))
+    np.testing.assert_allclose(posterior(found), 1e-4, rtol=1e-9)
+    assert "all simulated outputs are equal" in found.warnings()[0]
+
+
+def test_a_missing_stretch_and_missing_runs_do_no_harm(design, noise):
+    observed = outputs(np.array([[0.4, 0.6]]))[0] + noise
+    observed[10:20] = np.nan
+    there = np.isfinite(observed)
+    found = learned(design, outputs(design), observed, noise=SD)
+    values = multivariate_normal(np.zeros(30), SD**2 * np.eye(30)).logpdf(
+        (observed - outputs(GRID))[:, there]
+    )
+    weight = np.exp(values - values.max())
+    assert total_variation(posterior(found), weight / weight.sum()) < 0.05
+
+
+def test_the_check_speaks_up_where_noise_rules(design):
+    loud = outputs(design, range(30)) + 10.0 * np.random.default_rng(0).normal(size=(30, 1))
+    found = learned(design, loud, loud[0])
+    assert noise_share(found.emulator) > 0.5
+    assert any("run-to-run noise" in said for said in found.warnings())
+    quiet = learned(design, outputs(design), outputs(design)[0])
+    assert quiet.warnings() == []
+
+
+def test_predictions_cover_new_runs(design):
+    """90 % intervals over 40 new points and all samples; binomial over points, 1e-4."""
+    u = sobol(1, 0, 40, 2)
+    found = learned(design, outputs(design, range(30)), outputs(design)[0])
+    mean, sd = found.predict(u)
+    inside = np.abs(outputs(u, range(100, 140)) - mean) < 1.645 * sd
+    assert 0.84 < inside.mean() < 0.96
+    drawn = found.predictive(jax.random.key(0), np.tile(u[:1], (400, 1)))["signal"]
+    assert drawn.shape == (400, 40)
+    np.testing.assert_allclose(drawn.mean(0), mean[0], atol=5.0 * sd[0].max() / 20.0)
+
+
+def test_the_engine_repeats_points_until_it_knows_the_noise():
+    prior = inference.Prior({"a": dist.Uniform(0.0, 1.0), "b": dist.Uniform(0.0, 1.0)})
+
+    def run(seeds):
+        engine = inference.Bolfi(prior, outputs(np.array([[0.4, 0.6]]))[0], capacity=64)
+        for step in range(13):
+            theta = engine.ask(2)
+            u = prior.to_unit(theta)
+            engine.tell(theta, outputs(u, [2 * step, 2 * step + 1] if seeds else None))
+        u = engine.fit().history.u
+        return len(u) - len(np.unique(u, axis=0))
+
+    assert run(seeds=False) == 2  # equal: no more than it takes to see that
+    assert run(seeds=True) == 2  # of 26, as a tenth
+
+
+def test_no_point_is_repeated_while_its_replicate_is_pending():
+    prior = inference.Prior({"a": dist.Uniform(0.0, 1.0), "b": dist.Uniform(0.0, 1.0)})
+    engine = inference.Bolfi(prior, outputs(np.array([[0.4, 0.6]]))[0], capacity=64)
+    theta = engine.ask(7)
+    engine.tell(theta, outputs(prior.to_unit(theta)))
+    asked = np.concatenate([prior.to_unit(engine.ask(1)) for _ in range(5)])
+    told = prior.to_unit(theta)
+    repeats = [point for point in asked if (told == point).all(1).any()]
+    assert len(repeats) == 2
+    assert len(np.unique(asked, axis=0)) == 5
+    assert next_replicate(engine.fit().history, asked) is None
