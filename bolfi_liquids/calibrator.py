@@ -53,7 +53,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         prior: Over `viscosity` [Pa s] and `cohesion` [1]; None is `default_prior()`.
         budget: Simulations that the engine may learn from. A dozen more judge the result.
         seed: Of everything random.
-        surrogate: "discrepancy", the paper's.
+        surrogate: "discrepancy", the paper's, or "signal", which emulates the inclination itself.
         batch: Simulations run at the same time.
         particles: Of the simulated liquid.
         sampler: "nuts" or "emcee".

@@ -161,6 +161,7 @@ class _Search:
             batch=1,  # one action already is several simulations, which run in parallel
             seed=self.settings.seed,
             discrepancy=lambda _, fractions: measure(fractions),
+            acquisition="lcb",  # a minimum is sought, not a posterior
             transform="sqrt",
             bank=self.bank,
             identity=outcomes.identity,

@@ -8,8 +8,7 @@ Groups from the engine, in ArviZ's schema: `posterior`, `sample_stats`, `prior`,
 - `replicates`: inclination over (seed, frame, plane), at theta*;
 - `closest`: inclination over (frame, plane), discrepancy and parameters of the simulated
   hypothesis that came nearest;
-- `surface`: over a grid of prior quantiles, the surrogate's mean and sd of the transformed
-  discrepancy, and the log densities of prior and posterior.
+- `surface`: over a grid of prior quantiles, the log densities of prior and posterior.
 """
 
 from pathlib import Path
@@ -63,12 +62,11 @@ def results_tree(sampled: "DataTree", fit: "Fit", stirring: Stirring, check: Che
 
 
 def surface(fit: "Fit") -> "Dataset":
-    """The surrogate over a grid that is regular in prior quantiles.
+    """Prior and posterior over a grid that is regular in prior quantiles.
 
     Returns:
-        Over (viscosity, cohesion), or whichever two parameters: `mean` and `sd` of a new
-        transformed discrepancy, and `log_prior` and `log_posterior`, densities in natural
-        units, the latter up to a constant.
+        Over (viscosity, cohesion), or whichever two parameters: `log_prior` and
+        `log_posterior`, densities in natural units, the latter up to a constant.
     """
     from xarray import Dataset
 
@@ -76,10 +74,7 @@ def surface(fit: "Fit") -> "Dataset":
     axes = _quantile_axes(fit.prior)
     mesh = np.meshgrid(*axes.values(), indexing="ij")
     theta = {name: values.ravel() for name, values in zip(names, mesh, strict=True)}
-    mean, sd = fit.surrogate.predict(theta)
     columns = {
-        "mean": mean,
-        "sd": sd,
         "log_prior": fit.prior.log_prob(theta),
         "log_posterior": fit.log_prob(theta),
     }
@@ -87,7 +82,6 @@ def surface(fit: "Fit") -> "Dataset":
     return Dataset(
         {name: (names, np.reshape(values, shape)) for name, values in columns.items()},
         coords=axes,
-        attrs={"transform": fit.surrogate.transform, "threshold": fit.surrogate.threshold},
     )
 
 

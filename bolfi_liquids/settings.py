@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from .errors import InputError
 
-SURROGATES = ("discrepancy",)
+SURROGATES = ("signal", "discrepancy")
 SAMPLERS = ("nuts", "emcee")
 RISKS = ("mean", "cvar")
 
@@ -28,7 +28,7 @@ class CalibrationSettings:
         budget: Simulations that the engine may learn from.
         batch: Simulations run at the same time.
         seed: Of everything random.
-        surrogate: "discrepancy", the paper's.
+        surrogate: "discrepancy", the paper's, or "signal", which emulates the inclination itself.
         particles: Of the simulated liquid.
         sampler: "nuts" or "emcee".
         chains: Of the sampler; two at least, for R-hat needs them.

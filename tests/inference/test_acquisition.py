@@ -86,7 +86,7 @@ def test_jitter_and_share_are_checked():
 
 def test_second_moment_agrees_with_the_bivariate_normal():
     """E[Phi(..)^2] is the chance that two draws with a common latent mean both pass."""
-    surrogate = fitted(noise=0.1)
+    surrogate = fitted(noise=0.1, rule=1.2)
     points = GRID[::97]
     first, log_variance = log_moments(surrogate, points)
     with jax.enable_x64(True):
@@ -169,4 +169,4 @@ def test_scores_of_the_user_choose_among_candidates():
     surrogate = fitted()
     best = best_candidates(lambda _, __, found: -found.u[:, 0], KEY, surrogate, 2, all_succeed(surrogate))
     assert (best[0] != best[1]).any()
-    assert best[:, 0].max() < 0.3
+    assert best[:, 0].max() < 0.4  # of candidates about 0.4 to 0.6
