@@ -36,7 +36,7 @@ class Predicted(NamedTuple):
 Threshold = str | float | Quantile | Predicted | None
 TAIL = -30.0
 RULES = ("min_mean", "min_observed")
-DEFAULT = Predicted(0.5)
+DEFAULT = Predicted(0.25)
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(12)
 
 
