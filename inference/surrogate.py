@@ -78,6 +78,34 @@ class DiscrepancySurrogate:
         gp = _condition(self.gp.hyper, pad(points, targets, rows))
         return replace(self, gp=gp, count=len(targets))
 
+    def constants(self) -> dict[str, np.ndarray]:
+        """What was fixed before sampling."""
+        return {
+            "threshold": np.asarray(self.threshold),
+            "transform": np.asarray(self.transform.name),
+        }
+
+    @in_float64
+    def checks(self) -> dict[str, np.ndarray]:
+        """`loo_z` [n, 1]: leave-one-out errors over their predicted sd."""
+        mean, variance = (np.asarray(m)[: self.count] for m in _leave_one_out(self.gp))
+        residual = np.asarray(self.gp.data.y)[: self.count] - mean
+        return {"loo_z": (residual / np.sqrt(variance))[:, None]}
+
+    def warnings(self) -> list[str]:
+        return []
+
+    def predictive(self, key: jax.Array, u: np.ndarray) -> dict[str, np.ndarray]:
+        """A new discrepancy at each u [n, d]: `discrepancy` [n]."""
+        mean, sd = self.predict(u)
+        drawn = mean + sd * np.asarray(jax.random.normal(key, mean.shape))
+        inverse = {
+            "identity": lambda x: x,
+            "sqrt": lambda x: np.maximum(x, 0.0) ** 2,
+            "log": np.exp,
+        }
+        return {"discrepancy": inverse[self.transform.name](drawn) - self.transform.offset}
+
 
 def _mean(gp: GP, u: jax.Array) -> jax.Array:
     return predict(gp, u)[0]
