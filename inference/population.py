@@ -6,17 +6,27 @@ All points of all rounds count, weighted by the mixture of everything that propo
 al. 2012, adaptive multiple importance sampling; Veach and Guibas 1995, balance heuristic).
 """
 
+import math
 from functools import partial
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jax.scipy.special import logsumexp, ndtr, ndtri
-from jax.scipy.stats import norm
+import numpy as np
+from jax.scipy.special import ndtr, ndtri
 
 from .base import LogLikelihood
 from .design import sobol
-from .mixture import COMPONENTS, Mixture, fit_mixture, log_density, propose, uniforms_needed
+from .mixture import (
+    COMPONENTS,
+    UNIFORMS,
+    Mixture,
+    fit_mixture,
+    log_density,
+    log_prior,
+    log_sum_exp,
+    propose,
+)
 
 ROUND = 256  # points of each round
 SCREENS = 4  # rounds that fill the prior evenly
@@ -37,6 +47,7 @@ class Population(NamedTuple):
     log_likelihood: jax.Array  # [n]
     log_weights: jax.Array  # [n]; their logsumexp estimates the log evidence; -inf: not used
     mixture: Mixture
+    log_proposal: jax.Array  # [n], log density of the mixture
     effective: jax.Array  # [], effective number of points, (sum w)^2 / sum w^2
     evaluations: jax.Array  # [], points at which the likelihood was evaluated
 
@@ -45,8 +56,9 @@ class _Progress(NamedTuple):
     round: jax.Array
     x: jax.Array  # [n, d]; zeros where not yet proposed
     log_likelihood: jax.Array  # [n]; -inf where not yet proposed
-    log_mass: jax.Array  # [n], log of sum_r n_r q_r(x) over the rounds so far
-    history: Mixture  # of each round, stacked
+    log_mass: jax.Array  # [n], log of sum_r n_r q_r(x) over the screen and the rounds so far
+    log_proposal: jax.Array  # [n], log density of the last round's mixture
+    history: Mixture  # of each round after the screen, stacked
     before: jax.Array  # effective points before the last round
     effective: jax.Array
 
@@ -81,70 +93,120 @@ def explore(
     key: jax.Array, log_likelihood: LogLikelihood, state: Any, dimension: int
 ) -> Population:
     """`population`, with what samplers need besides."""
-    # all randomness in one call, for each costs a quarter of a second to compile: the same
-    # Sobol points in every round, each time under another shift
-    columns = uniforms_needed(dimension)
-    shifts = jax.random.uniform(key, (ROUNDS, columns))
-    cloud = jnp.asarray(sobol(1, 0, ROUND, columns))
-    # the screen under one shift, so that its rounds continue one sequence
-    screen = jnp.asarray(sobol(0, 0, ROUND * SCREENS, dimension)) + shifts[0, :dimension]
-    screen = ndtri(_into_box(screen)).reshape(SCREENS, ROUND, dimension)
+    shifts = _shifts(key, dimension + UNIFORMS)
+    points = jnp.asarray(_quasi_random(dimension))
 
     def unfinished(now: _Progress) -> jax.Array:
         return (now.round <= SCREENS) | ((now.round < ROUNDS) & (now.before < ENOUGH))
 
     def advance(now: _Progress) -> _Progress:
-        mixture = fit_mixture(now.x, *_bearable(now))
         screening = now.round < SCREENS
-        proposed = propose(mixture, _into_box(cloud + shifts[now.round]))
-        new = jnp.where(screening, screen[jnp.minimum(now.round, SCREENS - 1)], proposed)
-        values = jax.vmap(log_likelihood, in_axes=(None, 0))(state, ndtr(new))
-        return _weighed(now, mixture, new, jnp.where(jnp.isfinite(values), values, -jnp.inf))
+        # the screen under one shift, so that its rounds continue one sequence
+        shift = shifts[jnp.where(screening, 0, now.round)]
+        uniforms = jnp.clip((points[jnp.minimum(now.round, SCREENS)] + shift) % 1.0, EDGE, 1 - EDGE)
+        z = ndtri(uniforms[:, :dimension])
+        fresh = jax.lax.cond(screening, _screened, _proposed, now, z, uniforms[:, dimension:])
+        values = jax.vmap(log_likelihood, in_axes=(None, 0))(state, ndtr(fresh.x))
+        return _weighed(now, fresh, jnp.where(jnp.isfinite(values), values, -jnp.inf))
 
     last = jax.lax.while_loop(unfinished, advance, _nothing(dimension))
     return Population(
         x=last.x,
         log_likelihood=last.log_likelihood,
         log_weights=_log_weights(last, 1.0),
-        mixture=jax.tree.map(lambda leaf: leaf[last.round - 1], last.history),
+        mixture=jax.tree.map(lambda leaf: leaf[last.round - SCREENS - 1], last.history),
+        log_proposal=last.log_proposal,
         effective=last.effective,
         evaluations=ROUND * last.round,
     )
 
 
 def _nothing(dimension: int) -> _Progress:
-    n = ROUND * ROUNDS
-    square = jnp.zeros((ROUNDS, COMPONENTS, dimension, dimension))
-    history = Mixture(square[..., 0, 0], square[..., 0], square, square, jnp.ones(ROUNDS))
-    none = jnp.full(n, -jnp.inf)
-    zero = jnp.asarray(0.0)
-    return _Progress(jnp.asarray(0), jnp.zeros((n, dimension)), none, none, history, zero, zero)
+    rows, later = ROUND * ROUNDS, ROUNDS - SCREENS
+    square = jnp.zeros((later, COMPONENTS, dimension, dimension))
+    history = Mixture(square[..., 0, 0], square[..., 0], square, square, jnp.ones(later))
+    none, zero = jnp.full(rows, -jnp.inf), jnp.asarray(0.0)
+    x = jnp.zeros((rows, dimension))
+    mass = math.log(ROUND * SCREENS) + log_prior(x)  # finite, though these rows are never used
+    return _Progress(jnp.asarray(0), x, none, mass, none, history, zero, zero)
 
 
-def _into_box(u: jax.Array) -> jax.Array:
-    return jnp.clip(u % 1.0, EDGE, 1.0 - EDGE)
+def _shifts(key: jax.Array, columns: int) -> jax.Array:
+    """Numbers [ROUNDS, columns] in [0, 1), each uniform over the keys.
+
+    Fixed odd multiples of the key's words, modulo 2^32: jax.random takes a quarter of a
+    second to compile, for a few dozen numbers that only move quasi-random points.
+    """
+    words = jax.random.key_data(key).astype(jnp.uint32).reshape(-1)
+    shape = (len(words), ROUNDS, columns)
+    odd = 2 * np.random.default_rng(0).integers(2**31, size=shape, dtype=np.uint32) + 1
+    mixed = jnp.sum(words[:, None, None] * odd, axis=0, dtype=jnp.uint32)
+    return mixed / 2.0**32
 
 
-def _weighed(now: _Progress, mixture: Mixture, new: jax.Array, values: jax.Array) -> _Progress:
-    """Add points `new` [ROUND, d] that `mixture`, or a screen, proposed; weigh all anew."""
-    history = jax.tree.map(lambda kept, leaf: kept.at[now.round].set(leaf), now.history, mixture)
-    each = jnp.log(float(ROUND))
-    screening = now.round < SCREENS
-    of_old = jnp.where(screening, _log_prior(now.x), log_density(mixture, now.x))
-    rounds = jax.vmap(log_density, in_axes=(0, None))(history, new)
-    index = jnp.arange(ROUNDS)[:, None]
-    rounds = jnp.where(index < SCREENS, _log_prior(new), rounds)
-    of_new = logsumexp(jnp.where(index <= now.round, rounds, -jnp.inf), axis=0)
+def _quasi_random(dimension: int) -> np.ndarray:
+    """Sobol points in (0, 1), [SCREENS + 1, ROUND, dimension + UNIFORMS].
+
+    Those of the screen continue each other over its first `dimension` columns; the last are
+    shifted anew in each later round.
+    """
+    columns = dimension + UNIFORMS
+    points = np.full((SCREENS + 1, ROUND, columns), 0.5)
+    screen = sobol(0, 0, ROUND * SCREENS, dimension)
+    points[:SCREENS, :, :dimension] = screen.reshape(SCREENS, ROUND, dimension)
+    points[SCREENS] = sobol(1, 0, ROUND, columns)
+    return points
+
+
+class _Fresh(NamedTuple):
+    """Points to evaluate, and what proposing them changed."""
+
+    x: jax.Array  # [ROUND, d]
+    log_mass: jax.Array  # [n], of the points so far
+    log_proposal: jax.Array  # [n]
+    history: Mixture
+
+
+def _screened(now: _Progress, z: jax.Array, uniforms: jax.Array) -> _Fresh:
+    """Points of the prior itself."""
+    return _Fresh(z, now.log_mass, now.log_proposal, now.history)
+
+
+def _proposed(now: _Progress, z: jax.Array, uniforms: jax.Array) -> _Fresh:
+    """Points of a mixture fitted to those so far."""
+    mixture = fit_mixture(now.x, *_bearable(now))
+    density = log_density(mixture, now.x)
+    row = now.round - SCREENS
+    return _Fresh(
+        propose(mixture, z, uniforms),
+        jnp.logaddexp(now.log_mass, math.log(ROUND) + density),
+        density,
+        jax.tree.map(lambda kept, leaf: kept.at[row].set(leaf), now.history, mixture),
+    )
+
+
+def _weighed(now: _Progress, fresh: _Fresh, values: jax.Array) -> _Progress:
+    """Add points and their log likelihoods, and weigh all anew."""
+    rounds = jax.vmap(log_density, in_axes=(0, None))(fresh.history, fresh.x)
+    done = jnp.arange(ROUNDS - SCREENS)[:, None] <= now.round - SCREENS
+    rounds = math.log(ROUND) + jnp.where(done, rounds, -jnp.inf)
+    screen = math.log(ROUND * SCREENS) + log_prior(fresh.x)
+    mass = log_sum_exp(jnp.concatenate([screen[:, None], rounds.T], axis=1))
+    last = rounds[jnp.maximum(now.round - SCREENS, 0)] - math.log(ROUND)
     row = ROUND * now.round
-    after = now._replace(
+
+    def added(old: jax.Array, new: jax.Array) -> jax.Array:
+        return jax.lax.dynamic_update_slice(old, new, (row, 0)[: old.ndim])
+
+    after = _Progress(
         round=now.round + 1,
-        x=jax.lax.dynamic_update_slice(now.x, new, (row, 0)),
-        log_likelihood=jax.lax.dynamic_update_slice(now.log_likelihood, values, (row,)),
-        log_mass=jax.lax.dynamic_update_slice(
-            jnp.logaddexp(now.log_mass, each + of_old), each + of_new, (row,)
-        ),
-        history=history,
+        x=added(now.x, fresh.x),
+        log_likelihood=added(now.log_likelihood, values),
+        log_mass=added(fresh.log_mass, mass),
+        log_proposal=added(fresh.log_proposal, last),
+        history=fresh.history,
         before=now.effective,
+        effective=now.effective,
     )
     return after._replace(effective=_effective(_log_weights(after, 1.0)))
 
@@ -160,8 +222,9 @@ def _bearable(now: _Progress) -> tuple[jax.Array, jax.Array]:
         fits = _effective(_log_weights(now, jnp.exp(middle))) >= enough
         return jnp.where(fits, middle, low), jnp.where(fits, high, middle)
 
-    low, _ = jax.lax.fori_loop(0, 30, halve, (jnp.asarray(COLDEST), jnp.asarray(0.0)))
     cold = now.effective >= enough
+    steps = jnp.where(cold, 0, 30)
+    low, _ = jax.lax.fori_loop(0, steps, halve, (jnp.asarray(COLDEST), jnp.asarray(0.0)))
     return _log_weights(now, jnp.where(cold, 1.0, jnp.exp(low))), jnp.where(cold, 1.0, SHARPENED)
 
 
@@ -171,15 +234,12 @@ def _log_weights(now: _Progress, power: jax.Array | float) -> jax.Array:
     tempered = jnp.where(finite, power * now.log_likelihood, -jnp.inf)
     return jnp.where(
         finite.any(),
-        tempered + _log_prior(now.x) - now.log_mass,
-        jnp.where(jnp.arange(len(now.x)) < ROUND * SCREENS, -jnp.log(ROUND * SCREENS), -jnp.inf),
+        tempered + log_prior(now.x) - now.log_mass,
+        jnp.where(jnp.arange(len(now.x)) < ROUND * SCREENS, -math.log(ROUND * SCREENS), -jnp.inf),
     )
 
 
 def _effective(log_weights: jax.Array) -> jax.Array:
     """Kish's effective number of points."""
-    return jnp.exp(2.0 * logsumexp(log_weights) - logsumexp(2.0 * log_weights))
-
-
-def _log_prior(x: jax.Array) -> jax.Array:
-    return jnp.sum(norm.logpdf(x), axis=-1)
+    weights = jnp.exp(log_weights - jnp.max(log_weights))
+    return jnp.sum(weights) ** 2 / jnp.sum(weights**2)
