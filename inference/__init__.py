@@ -7,6 +7,7 @@ from .acquisition import LowerConfidenceBound
 from .bank import Simulation, SimulationBank
 from .base import Acquisition, Discrepancy, Simulator, Surrogate
 from .bolfi import Bolfi
+from .convergence import SamplingWarning
 from .discrepancy import squared_difference
 from .likelihood import Quantile
 from .loop import fit
@@ -24,6 +25,7 @@ __all__ = [
     "LowerConfidenceBound",
     "Prior",
     "Quantile",
+    "SamplingWarning",
     "Simulation",
     "SimulationBank",
     "Simulator",

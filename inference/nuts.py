@@ -1,70 +1,162 @@
-"""NUTS through numpyro, compiled once per shape instead of once per fit."""
+"""No-U-turn sampling with jumps between modes, compiled once per shape instead of per fit."""
 
+from collections.abc import Iterator
 from functools import partial
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
-from numpyro.infer.hmc import hmc
+from scipy.special import ndtr
 
 from .base import LogLikelihood
-from .target import dispersed_starts, log_density
+from .mixture import fit_mixture
+from .starts import local_factor, look_around, resampled, spread_factor
+from .target import Chains, Length, Target, log_density
+from .trajectory import (
+    STATISTICS,
+    Chain,
+    Noise,
+    Settings,
+    StepSize,
+    begin,
+    draw_noise,
+    first_step_size,
+    step,
+)
 
-FIELDS = {
-    "lp": lambda s: -s.potential_energy,
-    "diverging": lambda s: s.diverging,
-    "acceptance_rate": lambda s: s.accept_prob,
-    "n_steps": lambda s: s.num_steps,
-    "energy": lambda s: s.energy,
-    "step_size": lambda s: s.adapt_state.step_size,
-}
-"""ArviZ's name of each sampler statistic, and where numpyro keeps it."""
+STEPS = 2048  # of one call of the compiled program, for which noise is made
+BLOCK = 250  # draws that it can hold, whatever number is asked for
+FIRST_STEP = 0.7  # in whitened coordinates
+TARGET = 0.8  # acceptance rate
+POOR = 60.0  # effective points below which a population is mended by the warm-up
+REFITTED = 512  # draws to which the mixture is fitted then
 
-
-class Chains(NamedTuple):
-    """What a sampler returns."""
-
-    x: np.ndarray  # [chain, draw, d], unconstrained
-    stats: dict[str, np.ndarray]  # name -> [chain, draw]
-
-
-class Length(NamedTuple):
-    """How long to sample; hashable, for it is part of what is compiled."""
-
-    chains: int
-    warmup: int
-    draws: int
+INTEGERS = ("n_steps",)
+FLAGS = ("diverging", "jumped")
 
 
-@partial(jax.jit, static_argnames=("log_likelihood", "length"))
+_refit = jax.jit(fit_mixture)
+
+
+class Progress(NamedTuple):
+    """Of a block of draws, for n chains."""
+
+    chains: Chain
+    done: jax.Array  # [n], draws so far
+    records: jax.Array  # [n, BLOCK, d + 7]
+
+
+@partial(jax.jit, static_argnames="log_likelihood")
 def _run(
-    key: jax.Array, start: jax.Array, state: Any, *, log_likelihood: LogLikelihood, length: Length
-) -> tuple[jax.Array, dict[str, jax.Array]]:
-    """All chains at once. `state` is an argument, so a new fit reuses the compiled program."""
+    noise: Noise,
+    progress: Progress,
+    count: jax.Array,
+    state: Any,
+    settings: Settings,
+    *,
+    log_likelihood: LogLikelihood,
+) -> Progress:
+    """Towards `count` draws of each chain, at most BLOCK, for as long as there is noise.
 
-    def chain(key: jax.Array, start: jax.Array) -> tuple[jax.Array, dict[str, jax.Array]]:
-        # numpyro's functional interface: MCMC objects hold model and data in their cache
-        init, step = hmc(
-            potential_fn_gen=lambda s: lambda x: -log_density(log_likelihood, s, x), algo="NUTS"
-        )
-        first = init(start, length.warmup, rng_key=key, model_args=(state,), target_accept_prob=0.9)
+    All but the likelihood are arguments, so that warm-up, sampling, its continuation and
+    another fit use one compiled program.
+    """
+    n = len(progress.done)
+    evaluate = jax.value_and_grad(partial(log_density, log_likelihood, state))
 
-        def draw(sampler: Any, _: None) -> tuple[Any, tuple[jax.Array, dict[str, jax.Array]]]:
-            sampler = step(sampler, (state,))
-            return sampler, (sampler.z, {name: read(sampler) for name, read in FIELDS.items()})
+    def unfinished(carried: tuple[jax.Array, Progress]) -> jax.Array:
+        time, progress = carried
+        return (time < STEPS) & (progress.done < count).any()
 
-        # one loop for warm-up and draws: the tree doubling is costly to compile twice
-        draws = jax.lax.scan(draw, first, None, length=length.warmup + length.draws)[1]
-        return jax.tree.map(lambda values: values[length.warmup :], draws)
+    def advance(carried: tuple[jax.Array, Progress]) -> tuple[jax.Array, Progress]:
+        time, progress = carried
+        now = jax.tree.map(lambda of_steps: of_steps[time], noise)
+        # a chain that has its draws waits, so that when the others end decides nothing
+        waiting = progress.done >= count
+        chains, ended, records = step(progress.chains, waiting, now, settings, evaluate)
+        row = jnp.where(ended, progress.done, BLOCK)
+        kept = progress.records.at[jnp.arange(n), row].set(records, mode="drop")
+        return time + 1, Progress(chains, progress.done + ended, kept)
 
-    return jax.vmap(chain)(jax.random.split(key, length.chains), start)
+    return jax.lax.while_loop(unfinished, advance, (jnp.asarray(0), progress))[1]
 
 
-def sample_nuts(
-    key: jax.Array, log_likelihood: LogLikelihood, state: Any, dimension: int, length: Length
-) -> Chains:
-    """No-U-turn sampling (Hoffman and Gelman 2014) from dispersed starts."""
-    start_key, run_key = jax.random.split(key)
-    start = dispersed_starts(start_key, log_likelihood, state, (length.chains, dimension))
-    x, stats = _run(run_key, start, state, log_likelihood=log_likelihood, length=length)
-    return Chains(np.asarray(x), {name: np.asarray(value) for name, value in stats.items()})
+def sample_nuts(rng: np.random.Generator, target: Target, length: Length) -> Iterator[Chains]:
+    """No-U-turn sampling from starts drawn from a weighted population of the posterior.
+
+    Each draw begins with a proposed jump to wherever the population's mixture points; see
+    `trajectory`. The metric comes from the population too: the posterior's covariance, or
+    the modes' average one where they are separate. Where the population is poor, both come
+    from the first half of the warm-up, which otherwise only tunes the step size.
+
+    Yields:
+        `length.draws` more draws of each chain, without end.
+    """
+    found = look_around(rng, target)
+    poor = float(found.effective) < POOR
+    factor = local_factor(found) if poor else spread_factor(found)
+    settings = Settings(factor, found.mixture, TARGET, True)
+    chains = begin(resampled(rng, found, length.chains), FIRST_STEP)
+    first = length.warmup // 2
+    if first:
+        chains, records = _draws(rng, chains, target, settings, first)
+        if poor:
+            settings = _mended(settings, records[:, first // 4 :, : target.dimension])
+            chains = chains._replace(step_size=first_step_size(length.chains, FIRST_STEP))
+    chains, _ = _draws(rng, chains, target, settings, length.warmup - first)
+    chains = chains._replace(step_size=_pooled(chains))
+    settings = settings._replace(adapting=False)
+    while True:
+        chains, records = _draws(rng, chains, target, settings, length.draws)
+        yield _as_chains(records, target.dimension)
+
+
+def _draws(
+    rng: np.random.Generator, chains: Chain, target: Target, settings: Settings, count: int
+) -> tuple[Chain, np.ndarray]:
+    """`count` draws of each chain: records [n, count, d + 7]."""
+    n, d = chains.now.x.shape
+    blocks = []
+    for start in range(0, count, BLOCK):
+        wanted = min(BLOCK, count - start)
+        empty = np.zeros((n, BLOCK, d + len(STATISTICS)))
+        progress = Progress(chains, np.zeros(n, int), empty)
+        while (np.asarray(progress.done) < wanted).any():
+            progress = _run(
+                draw_noise(rng, (STEPS, n), d),
+                progress,
+                wanted,
+                target.state,
+                settings,
+                log_likelihood=target.log_likelihood,
+            )
+        chains = progress.chains
+        blocks.append(np.asarray(progress.records)[:, :wanted])
+    return chains, np.concatenate(blocks, axis=1)
+
+
+def _pooled(chains: Chain) -> StepSize:
+    """The step size that warm-up found, averaged over the chains."""
+    average = np.asarray(chains.step_size.average)
+    return chains.step_size._replace(average=np.full_like(average, average.mean()))
+
+
+def _mended(settings: Settings, x: np.ndarray) -> Settings:
+    """Metric and mixture from warm-up draws x [chain, draw, d]."""
+    flat = x.reshape(-1, x.shape[-1])
+    rows = np.linspace(0, len(flat) - 1, REFITTED).astype(int)
+    mixture = _refit(flat[rows], np.zeros(REFITTED), 1.0)
+    within = (x - x.mean(1, keepdims=True)).reshape(flat.shape)
+    covariance = within.T @ within / len(within)
+    floor = 1e-3 * settings.factor @ settings.factor.T
+    return settings._replace(factor=np.linalg.cholesky(covariance + floor), mixture=mixture)
+
+
+def _as_chains(records: np.ndarray, d: int) -> Chains:
+    stats: dict[str, np.ndarray] = {}
+    for j, name in enumerate(STATISTICS):
+        column = records[..., d + j]
+        kind = int if name in INTEGERS else bool if name in FLAGS else float
+        stats[name] = column.astype(kind)
+    return Chains(ndtr(records[..., :d]), stats)
