@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         shared_design,
         tarp,
     )
+    from .convergence import SamplingWarning
     from .discrepancy import squared_difference
     from .families import DiscrepancyFamily, SignalFamily
     from .likelihood import Predicted, Quantile
@@ -61,6 +62,7 @@ __all__ = [
     "Quantity",
     "Replicates",
     "SBC",
+    "SamplingWarning",
     "SharedDesign",
     "SignalFamily",
     "Simulation",
@@ -101,6 +103,7 @@ _HOME = {
     "Quantity": ".checks",
     "Replicates": ".checks",
     "SBC": ".checks",
+    "SamplingWarning": ".convergence",
     "SharedDesign": ".checks",
     "SignalFamily": ".families",
     "Simulation": ".bank",

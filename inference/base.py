@@ -49,6 +49,23 @@ class Surrogate(Protocol):
         """The surrogate after its own predictions at u [n, d] came true (pending points)."""
         ...
 
+    def constants(self) -> dict[str, np.ndarray]:
+        """What was fixed before sampling; kept with the results."""
+        ...
+
+    def checks(self) -> dict[str, np.ndarray]:
+        """The emulator's checks, the first axis of each the simulation; `loo_z` [n, k] are
+        studentised leave-one-out errors."""
+        ...
+
+    def warnings(self) -> list[str]:
+        """What the checks complain of, in sentences."""
+        ...
+
+    def predictive(self, key: jax.Array, u: np.ndarray) -> dict[str, np.ndarray]:
+        """One draw of what a simulation gives for each row of u [n, d]: name -> [n, ...]."""
+        ...
+
 
 class Acquisition(Protocol):
     """Where to simulate next."""

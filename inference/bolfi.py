@@ -48,7 +48,7 @@ class Bolfi:
         ValueError: an argument is not one of the above.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913  one flat place for what defines a run
         self,
         prior: Prior,
         observed: ArrayLike,

@@ -1,18 +1,22 @@
 """Affine-invariant ensemble sampling through emcee."""
 
+from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
 import emcee
 import jax
 import numpy as np
+from scipy.special import ndtr
 
 from .base import LogLikelihood
-from .nuts import Chains, Length
-from .target import dispersed_starts, log_density
+from .mixture import UNIFORMS, Mixture, propose
+from .mixture import log_density as log_mixture
+from .starts import look_around, resampled
+from .target import Chains, Length, Target, log_density
 
 WALKERS = 32
-THIN = 25  # steps between kept ensembles, near the autocorrelation time in few dimensions
+LONGEST_THIN = 64  # steps; beyond, R-hat and ESS judge instead
 
 
 @partial(jax.jit, static_argnums=0)
@@ -20,33 +24,81 @@ def _log_densities(log_likelihood: LogLikelihood, state: Any, x: jax.Array) -> j
     return jax.vmap(log_density, in_axes=(None, None, 0))(log_likelihood, state, x)
 
 
-def sample_emcee(
-    key: jax.Array, log_likelihood: LogLikelihood, state: Any, dimension: int, length: Length
-) -> Chains:
-    """The stretch move (Goodman and Weare 2010); one independent ensemble per chain.
+@jax.jit
+def _jumps(
+    mixture: Mixture, x: jax.Array, z: jax.Array, uniforms: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    """Independent proposals [n, d], and log q(x) - log q(proposal)."""
+    new = propose(mixture, z, uniforms)
+    return new, log_mixture(mixture, x) - log_mixture(mixture, new)
 
-    Walkers of one ensemble depend on each other, so they do not count as chains. A chain
-    joins its walkers end to end, which shows slow mixing to R-hat and ESS.
+
+def sample_emcee(rng: np.random.Generator, target: Target, length: Length) -> Iterator[Chains]:
+    """Stretch, differential-evolution and independence moves; an ensemble of its own per chain.
+
+    Goodman and Weare (2010), ter Braak (2006), and proposals from the mixture of a
+    weighted population, by which walkers change between separated modes. Walkers start from
+    the population. Of the steps every k-th is kept, k the autocorrelation time of the warm-up.
+    Walkers of one ensemble depend on each other, so they do not count as chains. A chain joins
+    its walkers end to end, which shows slow mixing to R-hat and ESS.
+
+    Yields:
+        `length.draws` more draws of each chain, without end.
     """
+    found = look_around(rng, target)
+    walkers = max(WALKERS, 4 * target.dimension)
+    samplers = [_sampler(target, found.mixture, walkers, rng) for _ in range(length.chains)]
+    warm = [
+        sampler.run_mcmc(
+            resampled(rng, found, walkers), length.warmup, skip_initial_state_check=True
+        )
+        for sampler in samplers
+    ]
+    thin = max(_autocorrelation_time(sampler.get_chain()) for sampler in samplers)
+    kept = -(-length.draws // walkers)
+    while True:
+        runs = []
+        for i, sampler in enumerate(samplers):
+            sampler.reset()
+            warm[i] = sampler.run_mcmc(warm[i], kept, thin_by=thin, skip_initial_state_check=True)
+            joined = (_join(v, length.draws) for v in (sampler.get_chain(), sampler.get_log_prob()))
+            runs.append(tuple(joined))
+        x, lp = (np.stack(part) for part in zip(*runs, strict=True))
+        yield Chains(ndtr(x), {"lp": lp})
+
+
+def _sampler(
+    target: Target, mixture: Mixture, walkers: int, rng: np.random.Generator
+) -> emcee.EnsembleSampler:
+    d = target.dimension
 
     def log_prob(x: np.ndarray) -> np.ndarray:
-        return np.asarray(_log_densities(log_likelihood, state, x))
+        padded = np.zeros((walkers, d))  # moves ask for half the walkers or all: one shape
+        padded[: len(x)] = x
+        values = _log_densities(target.log_likelihood, target.state, padded)
+        return np.nan_to_num(np.asarray(values)[: len(x)], nan=-np.inf, posinf=-np.inf)
 
-    walkers = max(WALKERS, 4 * dimension)
-    kept = -(-length.draws // walkers)
-    runs = []
-    for chain in jax.random.split(key, length.chains):
-        start_key, run_key = jax.random.split(chain)
-        start = dispersed_starts(start_key, log_likelihood, state, (walkers, dimension))
-        sampler = emcee.EnsembleSampler(walkers, dimension, log_prob, vectorize=True)
-        legacy_seed = int(jax.random.randint(run_key, (), 0, 2**31 - 1))
-        sampler.random_state = np.random.RandomState(legacy_seed).get_state()  # noqa: NPY002  emcee's own
-        warm = sampler.run_mcmc(start, length.warmup, store=False)
-        sampler.run_mcmc(warm, kept, thin_by=THIN)
-        runs.append((sampler.get_chain(), sampler.get_log_prob()))
-    x = np.stack([_join(chain, length.draws) for chain, _ in runs])
-    lp = np.stack([_join(log_probs, length.draws) for _, log_probs in runs])
-    return Chains(x, {"lp": lp, "diverging": np.zeros(lp.shape, bool)})
+    def jump(x: np.ndarray, random: Any) -> tuple[np.ndarray, np.ndarray]:
+        uniforms = 1.0 - random.random_sample((len(x), UNIFORMS))
+        new, factors = _jumps(mixture, x, random.standard_normal(x.shape), uniforms)
+        return np.asarray(new), np.asarray(factors)
+
+    moves = [
+        (emcee.moves.DEMove(), 0.4),
+        (emcee.moves.StretchMove(), 0.2),
+        (emcee.moves.MHMove(jump), 0.4),
+    ]
+    sampler = emcee.EnsembleSampler(walkers, d, log_prob, moves=moves, vectorize=True)
+    seed = int(rng.integers(2**31))
+    sampler.random_state = np.random.RandomState(seed).get_state()  # noqa: NPY002  emcee's own
+    return sampler
+
+
+def _autocorrelation_time(x: np.ndarray) -> int:
+    """In steps, of the slowest coordinate of x [step, walker, d]; from 1 to LONGEST_THIN."""
+    times = emcee.autocorr.integrated_time(x, tol=0)
+    slowest = float(np.max(times)) if np.isfinite(times).all() else LONGEST_THIN
+    return int(np.clip(np.ceil(slowest), 1, LONGEST_THIN))
 
 
 def _join(values: np.ndarray, draws: int) -> np.ndarray:

@@ -4,10 +4,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.scipy.special import ndtri
+from scipy.special import ndtri as scipy_ndtri
 
 from .gp import Data, Hyper, log_marginal_likelihood
 from .hyper import prior_moments, unpack
-from .nuts import Length, sample_nuts
+from .nuts import sample_nuts
+from .target import Length, Target
 
 CHAINS, WARMUP = 2, 300
 
@@ -22,7 +24,8 @@ def posterior_draws(data: Data, draws: int, seed: int) -> Hyper:
     """Hyperparameters [draws] by NUTS, for the one process of `data`."""
     dimension = data.u.shape[1] + 2
     length = Length(CHAINS, WARMUP, -(-draws // CHAINS))
-    chains = sample_nuts(jax.random.key(seed), log_evidence, data, dimension, length)
+    target = Target(log_evidence, data, dimension)
+    chains = next(sample_nuts(np.random.default_rng(seed), target, length))
     mean, sd = prior_moments(data.u.shape[1])
-    x = np.asarray(chains.x).reshape(-1, dimension)[:draws]
+    x = scipy_ndtri(chains.u).reshape(-1, dimension)[:draws]
     return unpack(jnp.asarray(mean + sd * x))

@@ -1,16 +1,28 @@
-"""NUTS through numpyro, compiled once per shape instead of once per fit."""
+"""numpyro's NUTS with jumps between modes, compiled once per shape instead of once per fit."""
 
+from collections.abc import Iterator
 from functools import partial
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
-from numpyro.infer.hmc import hmc
+from jax.scipy.special import ndtr
+from numpyro.infer.hmc import HMCState, hmc
 
 from .base import LogLikelihood
-from .target import dispersed_starts, log_density
+from .mixture import UNIFORMS, Mixture, fit_mixture, propose
+from .mixture import log_density as log_mixture
+from .starts import local_factor, look_around, resampled, spread_factor
+from .target import Chains, Length, Target, log_density
 
-FIELDS = {
+BLOCK = 250  # draws of one call of the compiled program, whatever number is asked for
+FIRST_STEP = 0.7  # in whitened coordinates
+ACCEPTED = 0.8  # share that the step size aims at
+POOR = 60.0  # effective points below which a population is mended by a first warm-up
+REFITTED = 512  # draws to which the mixture is fitted then
+
+STATISTICS = {
     "lp": lambda s: -s.potential_energy,
     "diverging": lambda s: s.diverging,
     "acceptance_rate": lambda s: s.accept_prob,
@@ -21,50 +33,162 @@ FIELDS = {
 """ArviZ's name of each sampler statistic, and where numpyro keeps it."""
 
 
-class Chains(NamedTuple):
-    """What a sampler returns."""
+class Guide(NamedTuple):
+    """What the population tells the sampler."""
 
-    x: np.ndarray  # [chain, draw, d], unconstrained
-    stats: dict[str, np.ndarray]  # name -> [chain, draw]
-
-
-class Length(NamedTuple):
-    """How long to sample; hashable, for it is part of what is compiled."""
-
-    chains: int
-    warmup: int
-    draws: int
+    factor: jax.Array  # [d, d], x = factor y: the posterior is about as wide in every y
+    mixture: Mixture  # over x, proposes jumps
 
 
-@partial(jax.jit, static_argnames=("log_likelihood", "length"))
+class Block(NamedTuple):
+    """Draws of all chains."""
+
+    last: HMCState
+    u: jax.Array  # [chain, BLOCK, d], prior quantiles
+    stats: dict[str, jax.Array]  # name -> [chain, BLOCK]
+
+
+def _sampler(log_likelihood: LogLikelihood) -> tuple[Any, Any]:
+    """numpyro's functional interface: its MCMC objects hold model and data in their cache."""
+
+    def potential(state: Any, factor: jax.Array) -> Any:
+        return lambda y: -log_density(log_likelihood, state, factor @ y)
+
+    return potential, hmc(potential_fn_gen=potential, algo="NUTS")
+
+
+def _begin_one(
+    y: jax.Array, key: jax.Array, kernel: Any, arguments: tuple[Any, jax.Array], warmup: int
+) -> HMCState:
+    return kernel(
+        y,
+        warmup,
+        step_size=FIRST_STEP,
+        adapt_mass_matrix=False,
+        target_accept_prob=ACCEPTED,
+        model_args=arguments,
+        rng_key=key,
+    )
+
+
+@partial(jax.jit, static_argnames=("log_likelihood", "warmup"))
+def _begin(
+    y: jax.Array, keys: jax.Array, state: Any, guide: Guide, *, log_likelihood: Any, warmup: int
+) -> HMCState:
+    """Chains at y [chain, d], about to adapt their step size for `warmup` draws."""
+    _, (kernel, _) = _sampler(log_likelihood)
+    arguments = state, guide.factor
+    return jax.vmap(lambda y, key: _begin_one(y, key, kernel, arguments, warmup))(y, keys)
+
+
+@partial(jax.jit, static_argnames=("log_likelihood", "warmup"))
 def _run(
-    key: jax.Array, start: jax.Array, state: Any, *, log_likelihood: LogLikelihood, length: Length
-) -> tuple[jax.Array, dict[str, jax.Array]]:
-    """All chains at once. `state` is an argument, so a new fit reuses the compiled program."""
+    last: HMCState, keys: jax.Array, state: Any, guide: Guide, *, log_likelihood: Any, warmup: int
+) -> Block:
+    """BLOCK more draws of each chain.
 
-    def chain(key: jax.Array, start: jax.Array) -> tuple[jax.Array, dict[str, jax.Array]]:
-        # numpyro's functional interface: MCMC objects hold model and data in their cache
-        init, step = hmc(
-            potential_fn_gen=lambda s: lambda x: -log_density(log_likelihood, s, x), algo="NUTS"
-        )
-        first = init(start, length.warmup, rng_key=key, model_args=(state,), target_accept_prob=0.9)
+    Likelihood state and guide are arguments, so that another fit reuses the compiled program.
+    """
+    potential, (kernel, step) = _sampler(log_likelihood)
+    arguments = state, guide.factor
 
-        def draw(sampler: Any, _: None) -> tuple[Any, tuple[jax.Array, dict[str, jax.Array]]]:
-            sampler = step(sampler, (state,))
-            return sampler, (sampler.z, {name: read(sampler) for name, read in FIELDS.items()})
+    def chain(last: HMCState, key: jax.Array) -> Block:
+        # numpyro's step knows its settings from the kernel that began; this one is not run
+        _begin_one(last.z, key, kernel, arguments, warmup)
 
-        # one loop for warm-up and draws: the tree doubling is costly to compile twice
-        draws = jax.lax.scan(draw, first, None, length=length.warmup + length.draws)[1]
-        return jax.tree.map(lambda values: values[length.warmup :], draws)
+        def draw(now: HMCState, key: jax.Array) -> tuple[HMCState, tuple[Any, Any]]:
+            now = step(_jumped(key, now, potential(*arguments), guide), arguments)
+            stats = {name: read(now) for name, read in STATISTICS.items()}
+            return now, (ndtr(guide.factor @ now.z), stats)
 
-    return jax.vmap(chain)(jax.random.split(key, length.chains), start)
+        end, (u, stats) = jax.lax.scan(draw, last, jax.random.split(key, BLOCK))
+        return Block(end, u, stats)
+
+    return jax.vmap(chain)(last, keys)
 
 
-def sample_nuts(
-    key: jax.Array, log_likelihood: LogLikelihood, state: Any, dimension: int, length: Length
-) -> Chains:
-    """No-U-turn sampling (Hoffman and Gelman 2014) from dispersed starts."""
-    start_key, run_key = jax.random.split(key)
-    start = dispersed_starts(start_key, log_likelihood, state, (length.chains, dimension))
-    x, stats = _run(run_key, start, state, log_likelihood=log_likelihood, length=length)
-    return Chains(np.asarray(x), {name: np.asarray(value) for name, value in stats.items()})
+def _jumped(key: jax.Array, now: HMCState, potential: Any, guide: Guide) -> HMCState:
+    """An independence step of Metropolis and Hastings, proposed by the mixture.
+
+    It keeps the posterior, as the trajectory after it does, and moves chains between modes
+    that no path connects.
+    """
+    normal, uniform, accept = jax.random.split(key, 3)
+    d = len(now.z)
+    z = jax.random.normal(normal, (1, d))
+    target = propose(guide.mixture, z, jax.random.uniform(uniform, (1, UNIFORMS)))[0]
+    y = jax.scipy.linalg.solve_triangular(guide.factor, target, lower=True)
+    energy, gradient = jax.value_and_grad(potential)(y)
+    old, new = log_mixture(guide.mixture, jnp.stack([guide.factor @ now.z, target]))
+    log_ratio = now.potential_energy - energy + old - new
+    moved = now._replace(z=y, z_grad=gradient, potential_energy=energy)
+    accepted = jnp.log(jax.random.uniform(accept)) < log_ratio
+    return jax.tree.map(lambda new, old: jnp.where(accepted, new, old), moved, now)
+
+
+def sample_nuts(rng: np.random.Generator, target: Target, length: Length) -> Iterator[Chains]:
+    """No-U-turn sampling (Hoffman and Gelman 2014), each draw after a proposed jump.
+
+    Chains start from a weighted population of the posterior, whose mixture proposes the jumps.
+    The metric comes from it too: the posterior's covariance, or the modes' average one where
+    they are separate. Where the population is poor, both come from a first warm-up.
+
+    Yields:
+        `length.draws` more draws of each chain, without end.
+    """
+    found = look_around(rng, target)
+    start = resampled(rng, found, length.chains)
+    poor = float(found.effective) < POOR
+    guide = Guide(local_factor(found) if poor else spread_factor(found), found.mixture)
+    blocks = _blocks(rng, target, guide, start, length.warmup)
+    if poor:
+        first = _take(blocks, length.warmup, [])
+        x = np.asarray(jax.scipy.special.ndtri(first.u[:, length.warmup // 2 :]))
+        guide = _mended(guide, x)
+        blocks = _blocks(rng, target, guide, x[:, -1], length.warmup)
+    left: list[Chains] = []
+    _take(blocks, length.warmup, left)
+    while True:
+        yield _take(blocks, length.draws, left)
+
+
+def _blocks(
+    rng: np.random.Generator, target: Target, guide: Guide, start: np.ndarray, warmup: int
+) -> Iterator[Chains]:
+    """Blocks of draws from x [chain, d], the warm-up's among them, without end."""
+    y = np.linalg.solve(np.asarray(guide.factor), start.T).T
+    fixed = {"log_likelihood": target.log_likelihood, "warmup": warmup}
+
+    def keys() -> jax.Array:
+        return jax.random.split(jax.random.key(int(rng.integers(2**31))), len(y))
+
+    last = _begin(y, keys(), target.state, guide, **fixed)
+    while True:
+        block = _run(last, keys(), target.state, guide, **fixed)
+        last = block.last
+        yield Chains(np.asarray(block.u), {n: np.asarray(s) for n, s in block.stats.items()})
+
+
+def _take(blocks: Iterator[Chains], count: int, left: list[Chains]) -> Chains:
+    """The next `count` draws; what remains of the last block goes to `left`."""
+    parts, have = left[:], sum(part.u.shape[1] for part in left)
+    while have < count:
+        parts.append(next(blocks))
+        have += parts[-1].u.shape[1]
+    whole = jax.tree.map(lambda *arrays: np.concatenate(arrays, axis=1), *parts)
+    left[:] = [jax.tree.map(lambda array: array[:, count:], whole)]
+    return jax.tree.map(lambda array: array[:, :count], whole)
+
+
+def _mended(guide: Guide, x: np.ndarray) -> Guide:
+    """Metric and mixture from warm-up draws x [chain, draw, d]."""
+    flat = x.reshape(-1, x.shape[-1])
+    rows = np.linspace(0, len(flat) - 1, REFITTED).astype(int)
+    mixture = _refit(flat[rows], np.zeros(REFITTED), 1.0)
+    within = (x - x.mean(1, keepdims=True)).reshape(flat.shape)
+    covariance = within.T @ within / len(within)
+    floor = 1e-3 * guide.factor @ guide.factor.T
+    return Guide(np.linalg.cholesky(covariance + floor), mixture)
+
+
+_refit = jax.jit(fit_mixture)

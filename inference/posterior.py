@@ -3,25 +3,19 @@
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import xarray as xr
-from scipy.special import ndtr
 
 from ._float64 import in_float64
-from .base import Theta
-from .discrepancy_surrogate import DiscrepancySurrogate
-from .ensemble import sample_emcee
-from .nuts import Length, sample_nuts
+from .base import Surrogate, Theta
 from .prior import Prior
-from .results import posterior_tree, simulations_dataset
+from .results import add_surrogate, finished, results_tree, simulations_dataset
+from .sampling import SAMPLERS, draw_posterior
 from .state import History
-from .target import log_likelihoods
-
-SAMPLERS = {"nuts": sample_nuts, "emcee": sample_emcee}
+from .target import Length, Target, log_likelihood
 
 
 class Closest(NamedTuple):
@@ -32,27 +26,23 @@ class Closest(NamedTuple):
     discrepancy: float
 
 
-class SurrogateView(NamedTuple):
-    """The surrogate in the prior's natural units."""
+class SurrogateView:
+    """The surrogate in the prior's natural units; other attributes are the surrogate's own."""
 
-    prior: Prior
-    learned: DiscrepancySurrogate
+    def __init__(self, prior: Prior, learned: Surrogate):
+        self.prior = prior
+        self.learned = learned
 
-    @property
-    def transform(self) -> str:
-        """Name of g."""
-        return self.learned.transform.name
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__") or name in ("prior", "learned"):  # while copied or unpickled
+            raise AttributeError(name)
+        return getattr(self.learned, name)
 
-    @property
-    def threshold(self) -> float:
-        """eps, on the scale of g(Delta)."""
-        return self.learned.threshold
-
-    def predict(self, theta: Theta) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and sd, noise included, of a new g(Delta) at theta: each [...]."""
+    def predict(self, theta: Theta) -> Any:
+        """What the surrogate's `predict` says at theta, each array [..., *its own axes]."""
         u = self.prior.to_unit(theta)
-        mean, sd = self.learned.predict(u.reshape(-1, u.shape[-1]))
-        return mean.reshape(u.shape[:-1]), sd.reshape(u.shape[:-1])
+        made = self.learned.predict(u.reshape(-1, u.shape[-1]))  # type: ignore[attr-defined]
+        return jax.tree.map(lambda a: np.asarray(a).reshape(*u.shape[:-1], *a.shape[1:]), made)
 
 
 @dataclass(frozen=True)
@@ -70,7 +60,7 @@ class Fit:
     prior: Prior
     observed: np.ndarray
     history: History
-    learned: DiscrepancySurrogate
+    learned: Surrogate
     settings: Mapping[str, object]
     seconds: Mapping[str, float]
 
@@ -80,7 +70,7 @@ class Fit:
 
     @property
     def best(self) -> dict[str, float]:
-        """Minimiser of the surrogate's mean over the prior's box (paper's theta*)."""
+        """The surrogate's best point in the prior's box; theta* of the paper."""
         return {n: float(v) for n, v in self.prior.from_unit(self.learned.minimum()).items()}
 
     @property
@@ -101,16 +91,19 @@ class Fit:
         """How many simulations failed, by kind: "raised", "not finite", "timeout"."""
         return self.history.failures
 
+    @property
+    def _target(self) -> Target:
+        return Target(self.learned.log_likelihood, self.learned.state, len(self.prior))
+
     @in_float64
     def log_prob(self, theta: Theta) -> np.ndarray:
         """Unnormalised log posterior density in natural units, [...]; -inf off the support."""
         u = self.prior.to_unit(theta)
-        flat = jnp.asarray(u.reshape(-1, u.shape[-1]))
-        log_l = log_likelihoods(self.learned.log_likelihood, self.learned.state, flat)
-        return self.prior.log_prob(theta) + np.asarray(log_l).reshape(u.shape[:-1])
+        values = log_likelihood(self._target, u.reshape(-1, u.shape[-1]))
+        return self.prior.log_prob(theta) + values.reshape(u.shape[:-1])
 
     @in_float64
-    def sample(
+    def sample(  # noqa: PLR0913  each of them is a plain choice of the user's
         self,
         sampler: str = "nuts",
         *,
@@ -118,48 +111,84 @@ class Fit:
         draws: int = 1000,
         warmup: int = 500,
         seed: int = 0,
+        extend: int = 8,
     ) -> xr.DataTree:
-        """Draw from the posterior.
+        """Draw from the posterior, and say whether the draws can be trusted.
+
+        "nuts" and "emcee" first look for the posterior all over the prior: some two thousand
+        evaluations of the surrogate give a weighted population of points, every mode with its
+        weight. Chains start from it, and propose jumps to wherever a mixture fitted to it
+        points, accepted or not by the rule of Metropolis and Hastings. So they change between
+        modes that no path connects, and the modes' shares are right, whatever the number of
+        chains. Between jumps, "nuts" follows no-U-turn trajectories, with a metric from the
+        population and a step size tuned to 80 % acceptance; "emcee" moves an ensemble of
+        walkers for each chain by stretch and differential-evolution moves, of which it keeps
+        every k-th, k the autocorrelation time. "quadrature", for one or two parameters, cuts
+        the box of prior quantiles into cells until they are even, and draws independently.
+
+        The sampler goes on from where it stopped, doubling what it made, while a parameter
+        has R-hat above 1.01, or bulk or tail effective sample size below 100 per chain
+        (Vehtari et al. 2021; with less than 400 draws per chain, R-hat above 1 + 4 / draws
+        and a quarter of the draws), up to `extend` times `draws`. The whole is thinned to the
+        `draws` asked for. If that does not suffice, if more than 1 % of the transitions
+        diverge, or if (one or two parameters) draws and quadrature differ by more than chance
+        explains, a `SamplingWarning` says so, and so does `status`.
+
+        A second fit whose arrays have equal shapes compiles nothing anew.
 
         Args:
-            sampler: "nuts" or "emcee".
+            sampler: "nuts", "emcee" or "quadrature".
             chains: Independent chains, at least 2, for R-hat needs them.
             draws: Kept per chain, at least 4.
             warmup: Discarded steps per chain that adapt the sampler.
             seed: Fixes the draws.
+            extend: Largest multiple of `draws` to make; 1 never goes on.
 
         Returns:
-            DataTree in ArviZ's schema: posterior, sample_stats, prior, observed_data,
-            constant_data, and `simulations`. Attributes of the posterior hold R-hat, ESS and
-            divergences, those of the root how the run was made.
+            DataTree in ArviZ's schema; opens in ArviZ 0.23 and 1.x, also from `to_netcdf`.
+            posterior: draws [chain, draw] in the parameters' own units. Attributes of each:
+            `prior`, `units` (where the prior has them), `rhat`, `ess_bulk`, `ess_tail`, and
+            Monte Carlo standard errors of mean and 5 and 95 % quantiles, `mcse_mean`,
+            `mcse_q05`, `mcse_q95`. Of the group: `status` ("converged", or what is wrong),
+            `rhat_max`, `ess_bulk_min`, `ess_tail_min`, `divergences`, `draws_made` (per
+            chain, before thinning); for one or two parameters `quadrature_total_variation`
+            (of 16 equally probable bins; independent draws as many as the effective ones stay
+            below `quadrature_total_variation_limit`) and `log_evidence` of the surrogate's
+            likelihood.
+            sample_stats: `lp`, log density over Phi^-1(u) of the prior quantiles u, and
+            what the sampler records. prior: `draws` draws. observed_data: `signal`.
+            posterior_predictive: what the surrogate predicts at some draws, whose indices are
+            its coordinate `draw`. constant_data: the surrogate's constants. emulator_checks:
+            the surrogate's own checks for each simulation, what it complains of in the
+            attribute `warnings`. simulations: as `Fit.simulations`. The root's attributes
+            hold how the run was made, and the seconds it took.
 
         Raises:
-            ValueError: unknown sampler, or a length too small.
+            ValueError: unknown sampler, a length too small, or quadrature of more than two
+                parameters.
+
+        Warns:
+            SamplingWarning: the draws are not to be trusted; see `status`.
         """
         if sampler not in SAMPLERS:
             raise ValueError(f"sampler must be one of {tuple(SAMPLERS)}, got {sampler!r}")
-        if chains < 2 or draws < 4 or warmup < 1:
+        if chains < 2 or draws < 4 or warmup < 1 or extend < 1:
             raise ValueError(
-                "sampling needs chains >= 2, draws >= 4 and warmup >= 1, "
-                f"got chains={chains}, draws={draws}, warmup={warmup}"
+                "sampling needs chains >= 2, draws >= 4, warmup >= 1 and extend >= 1, "
+                f"got chains={chains}, draws={draws}, warmup={warmup}, extend={extend}"
             )
         started = time.perf_counter()
-        key, prior_key = jax.random.split(jax.random.key(seed))
         length = Length(chains, warmup, draws)
-        made = SAMPLERS[sampler](
-            key, self.learned.log_likelihood, self.learned.state, len(self.prior), length
-        )
-        groups = {
-            "posterior": self.prior.from_unit(ndtr(made.x)),
-            "sample_stats": made.stats,
-            "prior": {n: v[None] for n, v in self.prior.sample(prior_key, draws).items()},
-            "observed_data": {"signal": self.observed},
-            "constant_data": {"threshold": np.asarray(self.learned.threshold)},
-        }
+        made = draw_posterior(sampler, self._target, self.prior.names, length, seed, extend)
         seconds = {**self.seconds, "sampling": time.perf_counter() - started}
+        rng = np.random.default_rng([seed, 1])
+        drawn = self.prior.from_unit(rng.random((draws, len(self.prior))))
+        tree = results_tree(self.prior, made.chains, drawn, self.observed, self.simulations)
+        tree["posterior"].attrs.update(status=made.status, draws_made=made.steps, **made.checks)
+        add_surrogate(tree, self.learned, made.chains.u, jax.random.key(seed))
         attributes = {
             **self.settings,
-            **{"sampler": sampler, **length._asdict(), "sampling_seed": seed},
+            **{"sampler": sampler, **length._asdict(), "extend": extend, "sampling_seed": seed},
             **{f"seconds_{part}": spent for part, spent in seconds.items()},
         }
-        return posterior_tree(groups, self.simulations, attributes)
+        return finished(tree, attributes)

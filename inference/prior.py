@@ -1,7 +1,6 @@
 """Independent priors, and the map between parameters and their prior quantiles."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import jax
 import numpy as np
@@ -9,6 +8,7 @@ import numpyro.distributions as dist
 
 from ._float64 import in_float64
 from .base import Theta
+from .distributions import Univariate, describe
 
 RESERVED = frozenset(
     {"chain", "draw", "simulation", "seed", "discrepancy", "failed", "round", "signal"}
@@ -23,19 +23,31 @@ class Prior:
     [0, 1]^d, and whatever is learned depends on no parameter's unit or scale.
 
     Args:
-        distributions: Name -> scalar numpyro distribution with `cdf` and `icdf`.
+        distributions: Name -> scalar continuous numpyro distribution.
+        units: Name -> unit, such as "Pa s", of those that have one; kept with the results.
 
     Raises:
-        ValueError: no parameter, a reserved name, or an unusable distribution.
+        ValueError: no parameter, a reserved name, an unusable distribution, or the unit of
+            an unknown parameter.
     """
 
-    def __init__(self, distributions: Mapping[str, dist.Distribution]):
+    def __init__(
+        self,
+        distributions: Mapping[str, dist.Distribution],
+        units: Mapping[str, str] | None = None,
+    ):
         if not distributions:
             raise ValueError("a prior needs at least one parameter, got an empty mapping")
-        for name, distribution in distributions.items():
-            _check(name, distribution)
+        self._univariate = {name: _checked(name, d) for name, d in distributions.items()}
         self.distributions = dict(distributions)
-        self._bounds = {name: _bounds(d) for name, d in self.distributions.items()}
+        self.units = dict(units or {})
+        unknown = set(self.units) - set(distributions)
+        if unknown or not all(isinstance(unit, str) for unit in self.units.values()):
+            raise ValueError(
+                f"units must map some of the parameters {tuple(distributions)} to strings, "
+                f"got {self.units}"
+            )
+        self._bounds = {name: u.bounds for name, u in self._univariate.items()}
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -47,6 +59,16 @@ class Prior:
     def __repr__(self) -> str:
         inside = ", ".join(f"{n!r}: {type(d).__name__}" for n, d in self.distributions.items())
         return f"Prior({{{inside}}})"
+
+    def describe(self) -> dict[str, dict[str, str]]:
+        """Name -> `prior`, such as "LogUniform(low=0.003, high=20)", and `units` where given."""
+        return {
+            name: {
+                "prior": describe(distribution),
+                **({"units": self.units[name]} if name in self.units else {}),
+            }
+            for name, distribution in self.distributions.items()
+        }
 
     def to_array(self, theta: Theta) -> np.ndarray:
         """Stack parameters in the prior's order.
@@ -80,7 +102,7 @@ class Prior:
         """Prior quantiles u [..., d] in [0, 1] of theta; outside the support 0 or 1."""
         natural = self.to_array(theta)
         columns = [
-            np.asarray(self.distributions[name].cdf(np.clip(natural[..., j], *self._bounds[name])))
+            self._univariate[name].cdf(np.clip(natural[..., j], *self._bounds[name]))
             for j, name in enumerate(self.names)
         ]
         return np.clip(np.stack(columns, -1), 0.0, 1.0)
@@ -89,12 +111,12 @@ class Prior:
     def from_unit(self, u: np.ndarray) -> dict[str, np.ndarray]:
         """Parameters at prior quantiles u [..., d].
 
-        0 and 1 give exactly the bounds of a bounded prior, and a far but finite quantile of
-        an unbounded one.
+        0 and 1 give exactly the bounds of a prior that ends abruptly, as the uniform does,
+        and a far but finite quantile of one that fades out, as the log-normal does at zero:
+        so the prior's density is positive and finite there.
         """
         return {
-            name: _quantile(self.distributions[name], self._bounds[name], u[..., j])
-            for j, name in enumerate(self.names)
+            name: _quantile(self._univariate[name], u[..., j]) for j, name in enumerate(self.names)
         }
 
     def contains(self, theta: Theta) -> np.ndarray:
@@ -112,7 +134,7 @@ class Prior:
         for j, name in enumerate(self.names):
             # clip before the density: outside its support a distribution may answer anything
             clipped = np.clip(natural[..., j], *self._bounds[name])
-            total = total + np.asarray(self.distributions[name].log_prob(clipped))
+            total = total + self._univariate[name].log_prob(clipped)
         return np.where(inside, total, -np.inf)
 
     @in_float64
@@ -121,26 +143,17 @@ class Prior:
         return self.from_unit(np.asarray(jax.random.uniform(key, (n, len(self)))))
 
 
-def _bounds(distribution: dist.Distribution) -> tuple[float, float]:
-    support: Any = distribution.support
-    return (
-        float(getattr(support, "lower_bound", -np.inf)),
-        float(getattr(support, "upper_bound", np.inf)),
-    )
-
-
-def _quantile(
-    distribution: dist.Distribution, bounds: tuple[float, float], u: np.ndarray
-) -> np.ndarray:
-    low, high = bounds
-    inner = np.asarray(distribution.icdf(np.clip(u, TAIL, 1.0 - TAIL)), np.float64)
-    value = np.clip(inner, low, high)
-    value = np.where((u <= 0.0) & np.isfinite(low), low, value)
-    return np.where((u >= 1.0) & np.isfinite(high), high, value)
+def _quantile(univariate: Univariate, u: np.ndarray) -> np.ndarray:
+    inner = univariate.icdf(np.clip(u, TAIL, 1.0 - TAIL))
+    value = np.clip(inner, *univariate.bounds)
+    for bound, there in zip(univariate.bounds, (u <= 0.0, u >= 1.0), strict=True):
+        if np.isfinite(bound) and np.isfinite(univariate.log_prob(np.asarray(bound))):
+            value = np.where(there, bound, value)
+    return value
 
 
 @in_float64
-def _check(name: str, distribution: object) -> None:
+def _checked(name: str, distribution: object) -> Univariate:
     if name in RESERVED:
         raise ValueError(f"parameter name {name!r} is reserved for results; choose another")
     if not isinstance(distribution, dist.Distribution):
@@ -155,14 +168,16 @@ def _check(name: str, distribution: object) -> None:
             "give one distribution per parameter"
         )
     try:
-        middle = np.asarray(distribution.cdf(distribution.icdf(np.array(0.5))))
+        univariate = Univariate(distribution)
+        middle = univariate.cdf(univariate.icdf(np.array(0.5)))
     except (NotImplementedError, ImportError) as error:  # numpyro asks for TFP in some icdf
         raise ValueError(
             f"prior of {name!r} needs cdf and icdf, which {type(distribution).__name__} lacks; "
-            "use for example Uniform, LogUniform, Normal, LogNormal or TruncatedNormal"
+            "use for example Uniform, LogUniform, Normal, LogNormal, TruncatedNormal, Gamma or Beta"
         ) from error
     if not np.isclose(middle, 0.5):
         raise ValueError(
             f"prior of {name!r} must be continuous: cdf(icdf(0.5)) gave {middle}; "
             "check its arguments"
         )
+    return univariate

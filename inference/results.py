@@ -4,12 +4,17 @@ from collections.abc import Mapping
 from importlib.metadata import version
 
 import arviz_base
+import jax
 import numpy as np
 import xarray as xr
-from arviz_stats.base.array import array_stats
 
+from .base import Surrogate
+from .convergence import diagnose
 from .prior import Prior
 from .state import History
+from .target import Chains
+
+PREDICTED = 50  # draws of each chain for which the surrogate predicts
 
 
 def simulations_dataset(prior: Prior, history: History) -> xr.Dataset:
@@ -29,43 +34,89 @@ def simulations_dataset(prior: Prior, history: History) -> xr.Dataset:
     )
 
 
-def posterior_tree(
-    groups: Mapping[str, Mapping[str, np.ndarray]],
+def results_tree(
+    prior: Prior,
+    chains: Chains,
+    prior_draws: Mapping[str, np.ndarray],
+    observed: np.ndarray,
     simulations: xr.Dataset,
-    attributes: Mapping[str, object],
 ) -> xr.DataTree:
-    """Assemble and diagnose.
+    """What every result has: posterior, prior, sample_stats, observed_data, simulations.
 
     Args:
-        groups: ArviZ group -> variable -> array; draws are [chain, draw].
+        prior: Gives names, units and descriptions to the parameters.
+        chains: The draws.
+        prior_draws: Name -> [n], in natural units.
+        observed: The measured signal.
         simulations: Becomes a group of its own.
-        attributes: How the result was made; kept at the root.
 
     Returns:
-        Tree that `to_netcdf` can write. Each posterior variable carries `rhat`, `ess_bulk`
-        and `ess_tail`; the posterior group their worst values and `divergences`.
+        Tree that `to_netcdf` can write. Each parameter carries its `prior` and, where known,
+        its `units`; in the posterior also R-hat, ESS and Monte Carlo standard errors (in its
+        own units) as from `convergence.diagnose`. The posterior's attributes hold the worst
+        of these and the number of `divergences`.
     """
-    tree = arviz_base.from_dict(groups)
+    posterior = prior.from_unit(chains.u)
+    tree = arviz_base.from_dict(
+        {
+            "posterior": posterior,
+            "sample_stats": dict(chains.stats),
+            "prior": {name: values[None] for name, values in prior_draws.items()},
+            "observed_data": {"signal": observed},
+        }
+    )
     tree["simulations"] = xr.DataTree(simulations)
-    tree.attrs.update(attributes, version=version("bolfi-liquids"))
-    posterior = tree["posterior"]
-    diagnosed = {name: diagnose(draws) for name, draws in groups["posterior"].items()}
+    for group in ("posterior", "prior", "simulations"):
+        for name, attributes in prior.describe().items():
+            tree[group][name].attrs.update(attributes)
+    diagnosed = {name: diagnose(draws) for name, draws in posterior.items()}
     for name, measures in diagnosed.items():
-        posterior[name].attrs.update(measures)
-    posterior.attrs.update(
+        tree["posterior"][name].attrs.update(measures)
+    tree["posterior"].attrs.update(
         rhat_max=max(measures["rhat"] for measures in diagnosed.values()),
         ess_bulk_min=min(measures["ess_bulk"] for measures in diagnosed.values()),
         ess_tail_min=min(measures["ess_tail"] for measures in diagnosed.values()),
-        divergences=int(np.sum(groups["sample_stats"]["diverging"])),
+        divergences=int(np.sum(chains.stats.get("diverging", 0))),
     )
     return tree
 
 
-def diagnose(draws: np.ndarray) -> dict[str, float]:
-    """Rank-normalised split R-hat, bulk and tail ESS (Vehtari et al. 2021) of [chain, draw]."""
-    measures = {
-        "rhat": array_stats.rhat(draws),
-        "ess_bulk": array_stats.ess(draws, method="bulk"),
-        "ess_tail": array_stats.ess(draws, method="tail", prob=(0.05, 0.95)),
+def add_surrogate(tree: xr.DataTree, surrogate: Surrogate, u: np.ndarray, key: jax.Array) -> None:
+    """Add what the surrogate says of itself: constant_data, posterior_predictive (at evenly
+    spaced draws u [chain, draw, d], whose indices are its coordinate `draw`), emulator_checks.
+
+    The checks' first axis is the simulation; their group's attribute `warnings` joins what the
+    surrogate complains of, one per line, and is empty where there is nothing.
+    """
+    constants = {name: np.asarray(value) for name, value in surrogate.constants().items()}
+    if constants:
+        tree["constant_data"] = arviz_base.from_dict({"constant_data": constants})["constant_data"]
+    chains, draws, d = u.shape
+    rows = np.linspace(0, draws - 1, min(draws, PREDICTED)).round().astype(int)
+    predicted = surrogate.predictive(key, u[:, rows].reshape(-1, d))
+    groups = {
+        name: np.asarray(values).reshape(chains, len(rows), *np.shape(values)[1:])
+        for name, values in predicted.items()
     }
-    return {name: np.asarray(value).item() for name, value in measures.items()}
+    if groups:
+        made = arviz_base.from_dict({"posterior_predictive": groups}, coords={"draw": rows})
+        tree["posterior_predictive"] = made["posterior_predictive"]
+    checks = {
+        name: (_axes(name, np.asarray(values)), np.asarray(values))
+        for name, values in surrogate.checks().items()
+    }
+    attributes = {"warnings": "\n".join(surrogate.warnings())}
+    tree["emulator_checks"] = xr.DataTree(xr.Dataset(checks, attrs=attributes))
+
+
+def finished(tree: xr.DataTree, attributes: Mapping[str, object]) -> xr.DataTree:
+    """The tree with how it was made at its root."""
+    tree.attrs.update(attributes, version=version("bolfi-liquids"))
+    return tree
+
+
+def _axes(name: str, values: np.ndarray) -> list[str]:
+    """Dimension names of one of the emulator's checks."""
+    if values.ndim == 0:
+        return []
+    return ["simulation", *(f"{name}_dim_{i}" for i in range(values.ndim - 1))]

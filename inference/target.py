@@ -1,18 +1,39 @@
-"""The posterior as samplers see it: a log density over unconstrained coordinates."""
+"""The posterior as samplers see it, and what they have in common."""
 
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
-from jax.scipy.stats import norm
-from scipy.special import ndtri
+from jax.scipy.special import ndtr
 
 from .base import LogLikelihood
-from .design import sobol
+from .mixture import log_prior
 
-SCREENED = 4096
+BATCH = 1024  # evaluations in one call, at most
+
+
+class Target(NamedTuple):
+    """A log likelihood over prior quantiles u [dimension]."""
+
+    log_likelihood: LogLikelihood
+    state: Any
+    dimension: int
+
+
+class Length(NamedTuple):
+    """How long to sample."""
+
+    chains: int
+    warmup: int
+    draws: int
+
+
+class Chains(NamedTuple):
+    """What a sampler yields."""
+
+    u: np.ndarray  # [chain, draw, d], prior quantiles
+    stats: dict[str, np.ndarray]  # name -> [chain, draw]
 
 
 def log_density(log_likelihood: LogLikelihood, state: Any, x: jax.Array) -> jax.Array:
@@ -21,25 +42,22 @@ def log_density(log_likelihood: LogLikelihood, state: Any, x: jax.Array) -> jax.
     The prior is uniform in u, so the Jacobian is a standard normal density: directions that
     the data leave open become standard normal, the easiest shape for a sampler.
     """
-    return log_likelihood(state, norm.cdf(x)) + jnp.sum(norm.logpdf(x))
+    return log_likelihood(state, ndtr(x)) + log_prior(x[None])[0]
 
 
 @partial(jax.jit, static_argnums=0)
-def log_likelihoods(log_likelihood: LogLikelihood, state: Any, u: jax.Array) -> jax.Array:
-    """[n, d] -> [n]."""
-    return jax.vmap(log_likelihood, in_axes=(None, 0))(state, u)
+def _log_likelihoods(function: LogLikelihood, state: Any, u: jax.Array) -> jax.Array:
+    return jax.vmap(function, in_axes=(None, 0))(state, u)
 
 
-def dispersed_starts(
-    key: jax.Array, log_likelihood: LogLikelihood, state: Any, shape: tuple[int, int]
-) -> np.ndarray:
-    """Starts x [n, d], drawn from the posterior restricted to points that fill the prior.
-
-    Importance resampling without replacement (Gumbel top-n): every mode of some weight
-    attracts chains, wherever in the prior it lies.
-    """
-    n, dimension = shape
-    u = sobol(0, 0, max(SCREENED, 4 * n), dimension)
-    scores = log_likelihoods(log_likelihood, state, u)
-    noisy = np.asarray(scores + jax.random.gumbel(key, scores.shape))
-    return ndtri(u[np.argsort(-noisy)[:n]])
+def log_likelihood(target: Target, u: np.ndarray) -> np.ndarray:
+    """Log likelihood [n] at u [n, d], in batches padded to powers of two up to BATCH, so that
+    few shapes are compiled."""
+    values = np.empty(len(u))
+    for start in range(0, len(u), BATCH):
+        rows = u[start : start + BATCH]
+        padded = np.full((1 << (len(rows) - 1).bit_length(), u.shape[1]), 0.5)
+        padded[: len(rows)] = rows
+        batch = _log_likelihoods(target.log_likelihood, target.state, padded)
+        values[start : start + BATCH] = np.asarray(batch)[: len(rows)]
+    return values

@@ -167,6 +167,8 @@ def test_regions_where_runs_fail_are_avoided():
 
 def test_scores_of_the_user_choose_among_candidates():
     surrogate = fitted()
-    best = best_candidates(lambda _, __, found: -found.u[:, 0], KEY, surrogate, 2, all_succeed(surrogate))
+    best = best_candidates(
+        lambda _, __, found: -found.u[:, 0], KEY, surrogate, 2, all_succeed(surrogate)
+    )
     assert (best[0] != best[1]).any()
     assert best[:, 0].max() < 0.4  # of candidates about 0.4 to 0.6

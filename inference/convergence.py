@@ -1,0 +1,105 @@
+"""Have the chains converged, and if not, what is wrong and what to do."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from arviz_stats.base import array_stats
+
+RHAT_LIMIT = 1.01
+ESS_PER_CHAIN = 100.0
+DIVERGENT_SHARE = 0.01
+CONVERGED = "converged"
+
+
+class SamplingWarning(UserWarning):
+    """The draws do not fulfil what the sampler promises; the message says which and why."""
+
+
+class Shortfall(NamedTuple):
+    """A measure that missed its limit."""
+
+    parameter: str
+    measure: str  # as in `diagnose`
+    value: float
+    limit: float
+
+
+MEASURES = {
+    "rhat": "rank-normalised split R-hat",
+    "ess_bulk": "bulk effective sample size",
+    "ess_tail": "tail effective sample size",
+}
+
+
+def diagnose(draws: np.ndarray) -> dict[str, float]:
+    """Rank-normalised split R-hat, bulk and tail ESS and Monte Carlo standard errors of draws
+    [chain, draw] (Vehtari et al. 2021); errors in the units of the draws.
+
+    Draws that do not vary at all have an infinite R-hat and no effective draws.
+    """
+    if np.ptp(draws) == 0.0:
+        constant = {"rhat": np.inf, "ess_bulk": 0.0, "ess_tail": 0.0}
+        return {**constant, "mcse_mean": 0.0, "mcse_q05": 0.0, "mcse_q95": 0.0}
+    measures = {
+        "rhat": array_stats.rhat(draws),
+        "ess_bulk": array_stats.ess(draws, method="bulk"),
+        "ess_tail": array_stats.ess(draws, method="tail", prob=(0.05, 0.95)),
+        "mcse_mean": array_stats.mcse(draws, method="mean"),
+        "mcse_q05": array_stats.mcse(draws, method="quantile", prob=0.05),
+        "mcse_q95": array_stats.mcse(draws, method="quantile", prob=0.95),
+    }
+    return {name: np.asarray(value).item() for name, value in measures.items()}
+
+
+def limits(chains: int, draws: int) -> tuple[float, float]:
+    """Largest R-hat and smallest effective sample size that pass.
+
+    1.01 and 100 per chain (Vehtari et al. 2021) from 400 draws per chain on. With fewer,
+    1 + 4 / draws, since even independent draws scatter by a quarter of that, and a quarter
+    of the draws.
+    """
+    return max(RHAT_LIMIT, 1.0 + 4.0 / draws), chains * min(ESS_PER_CHAIN, draws / 4.0)
+
+
+def shortfalls(
+    measures: Mapping[str, Mapping[str, float]], chains: int, draws: int
+) -> list[Shortfall]:
+    """What of `measures` (parameter -> as from `diagnose`) misses its limit, NaN included."""
+    rhat, ess = limits(chains, draws)
+    found = []
+    for parameter, values in measures.items():
+        if not values["rhat"] <= rhat:
+            found.append(Shortfall(parameter, "rhat", values["rhat"], rhat))
+        for measure in ("ess_bulk", "ess_tail"):
+            if not values[measure] >= ess:
+                found.append(Shortfall(parameter, measure, values[measure], ess))
+    return found
+
+
+def describe(short: Sequence[Shortfall], steps: int) -> str:
+    """A sentence that says what is wrong where it is worst, by how much, and what to do."""
+    parts = []
+    for measure, meaning in MEASURES.items():
+        missed = [s for s in short if s.measure == measure]
+        if missed:
+            rank = max if measure == "rhat" else min
+            worst = rank(missed, key=lambda s: s.value)
+            bound, digits = ("above", ".3f") if measure == "rhat" else ("below", ".0f")
+            parts.append(
+                f"{meaning} of {worst.parameter!r} is {worst.value:{digits}}, "
+                f"{bound} {worst.limit:{digits}}"
+            )
+    return (
+        f"not converged after {steps} draws per chain: {'; '.join(parts)}. Raise `draws` or "
+        "`extend`, and look at the chains, for example with az.plot_trace."
+    )
+
+
+def describe_divergences(share: float) -> str:
+    """The same for a share of divergent transitions."""
+    return (
+        f"not converged: {share:.1%} of the transitions diverged, above {DIVERGENT_SHARE:.0%}. "
+        "The log likelihood is too steep somewhere: compare with sample('emcee'), and look where "
+        "sample_stats.diverging is true, for example with az.plot_pair."
+    )

@@ -1,0 +1,71 @@
+"""What the engine needs of a numpyro distribution, where numpyro itself lacks it too."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpyro.distributions as dist
+from scipy import stats
+
+SCIPY: dict[type, Callable[[Any], Any]] = {
+    dist.Beta: lambda d: stats.beta(d.concentration1, d.concentration0),
+    dist.Gamma: lambda d: stats.gamma(d.concentration, scale=1.0 / d.rate),
+    dist.InverseGamma: lambda d: stats.invgamma(d.concentration, scale=d.rate),
+    dist.StudentT: lambda d: stats.t(d.df, d.loc, d.scale),
+    dist.Weibull: lambda d: stats.weibull_min(d.concentration, scale=d.scale),
+    dist.Chi2: lambda d: stats.chi2(d.df),
+}
+"""Distributions whose quantiles numpyro leaves to TensorFlow Probability, or lacks; the engine
+works in quantiles, so that SciPy's, which JAX cannot differentiate, serve as well."""
+
+
+class Univariate:
+    """cdf, icdf, log density and bounds of a scalar distribution, on NumPy arrays.
+
+    Args:
+        distribution: Of numpyro, with batch and event shape ().
+    """
+
+    def __init__(self, distribution: dist.Distribution):
+        self.distribution = distribution
+        frozen = SCIPY.get(type(distribution))
+        self._scipy = None if frozen is None else frozen(distribution)
+        support: Any = distribution.support
+        self.bounds = (
+            float(getattr(support, "lower_bound", -np.inf)),
+            float(getattr(support, "upper_bound", np.inf)),
+        )
+
+    def cdf(self, value: np.ndarray) -> np.ndarray:
+        made = self.distribution.cdf(value) if self._scipy is None else self._scipy.cdf(value)
+        return np.asarray(made, np.float64)
+
+    def icdf(self, q: np.ndarray) -> np.ndarray:
+        made = self.distribution.icdf(q) if self._scipy is None else self._scipy.ppf(q)
+        return np.asarray(made, np.float64)
+
+    def log_prob(self, value: np.ndarray) -> np.ndarray:
+        """Log density of values within the bounds; -inf where it vanishes."""
+        if self._scipy is None:
+            made = np.asarray(self.distribution.log_prob(value), np.float64)
+        else:
+            made = np.asarray(self._scipy.logpdf(value), np.float64)
+        return np.where(np.isnan(made), -np.inf, made)
+
+
+def describe(distribution: dist.Distribution) -> str:
+    """Such as "LogUniform(low=0.003, high=20)"."""
+    name = type(distribution).__name__
+    parts = [f"{key}={_number(distribution, key)}" for key in distribution.arg_constraints]
+    base = getattr(distribution, "base_dist", None)
+    if "Truncated" in name and base is not None:
+        inner = [f"{key}={_number(base, key)}" for key in base.arg_constraints]
+        return f"Truncated{type(base).__name__}({', '.join(inner + parts)})"
+    if not parts and base is not None:
+        parts = [describe(base)]
+    return f"{name}({', '.join(parts)})"
+
+
+def _number(distribution: dist.Distribution, key: str) -> str:
+    value = getattr(distribution, key, None)
+    return "?" if value is None else f"{float(np.asarray(value)):.7g}"

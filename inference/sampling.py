@@ -1,0 +1,115 @@
+"""Draws from a posterior: one call for all samplers, which goes on until they suffice."""
+
+import warnings
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from . import quadrature
+from .convergence import (
+    CONVERGED,
+    DIVERGENT_SHARE,
+    SamplingWarning,
+    describe,
+    describe_divergences,
+    diagnose,
+    shortfalls,
+)
+from .ensemble import sample_emcee
+from .nuts import sample_nuts
+from .quadrature import sample_quadrature
+from .target import Chains, Length, Target
+
+Sampler = Callable[[np.random.Generator, Target, Length], Iterator[Chains]]
+"""Yields `length.draws` more draws of each chain at each turn, without end."""
+
+SAMPLERS: dict[str, Sampler] = {
+    "nuts": sample_nuts,
+    "emcee": sample_emcee,
+    "quadrature": sample_quadrature,
+}
+
+
+class Sampled(NamedTuple):
+    """Draws and what can be said of their quality."""
+
+    chains: Chains
+    steps: int  # draws per chain that were made; those kept are evenly spaced among them
+    status: str  # "converged", or what is wrong
+    checks: dict[str, float]  # results of the comparison with quadrature, where there was one
+
+
+def draw_posterior(
+    sampler: str, target: Target, names: tuple[str, ...], length: Length, seed: int, extend: int
+) -> Sampled:
+    """Sample, go on while R-hat or ESS fall short, compare with quadrature, and say what came
+    of it; see `Fit.sample`, whose arguments these are.
+
+    Args:
+        sampler: One of SAMPLERS.
+        target: What to sample.
+        names: Of its parameters, for messages.
+        length: As asked for.
+        seed: Fixes everything.
+        extend: Largest multiple of `length.draws` to make.
+
+    Warns:
+        SamplingWarning: something is wrong; the message is the status.
+    """
+    source = SAMPLERS[sampler](np.random.default_rng(seed), target, length)
+    parts = [next(source)]
+    while True:
+        chains = thinned(parts)
+        measures = {n: diagnose(chains.u[..., j]) for j, n in enumerate(names)}
+        short = shortfalls(measures, length.chains, length.draws)
+        if not short or 2 * len(parts) > extend:
+            break
+        parts += [next(source) for _ in range(len(parts))]
+    steps = len(parts) * length.draws
+    complaints = [describe(short, steps)] if short else []
+    divergent = float(np.mean([part.stats.get("diverging", 0.0) for part in parts]))
+    if divergent > DIVERGENT_SHARE:
+        complaints.append(describe_divergences(divergent))
+    checks: dict[str, float] = {}
+    if target.dimension in quadrature.BASE and sampler != "quadrature":
+        effective = min(min(m["ess_bulk"], m["ess_tail"]) for m in measures.values())
+        checks, disagreement = _cross_checked(chains.u, target, effective)
+        complaints += disagreement
+    status = " ".join(complaints) or CONVERGED
+    if complaints:
+        warnings.warn(status, SamplingWarning, stacklevel=4)  # at the caller of Fit.sample
+    return Sampled(chains, steps, status, checks)
+
+
+def thinned(parts: list[Chains]) -> Chains:
+    """All draws, thinned to as many as one part has."""
+    every = len(parts)
+
+    def together(arrays: list[np.ndarray]) -> np.ndarray:
+        return np.concatenate(arrays, axis=1)[:, every - 1 :: every]
+
+    stats = {name: together([part.stats[name] for part in parts]) for name in parts[0].stats}
+    return Chains(together([part.u for part in parts]), stats)
+
+
+def _cross_checked(
+    u: np.ndarray, target: Target, effective: float
+) -> tuple[dict[str, float], list[str]]:
+    cells = quadrature.integrate(target)
+    flat = u.reshape(-1, u.shape[-1])
+    distance = quadrature.total_variation(flat, cells)
+    limit = quadrature.largest_expected(min(effective, len(flat)))
+    checks = {
+        "quadrature_total_variation": distance,
+        "quadrature_total_variation_limit": limit,
+        "log_evidence": cells.log_evidence,
+    }
+    if distance <= limit:
+        return checks, []
+    complaint = (
+        f"disagrees with quadrature: total variation {distance:.3f} over {quadrature.BINS} bins, "
+        f"above {limit:.3f}. A mode may be missed, or the posterior too narrow for the grid: "
+        "compare with sample('quadrature')."
+    )
+    return checks, [complaint]
