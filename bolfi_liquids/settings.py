@@ -8,10 +8,10 @@ SURROGATES = ("signal", "discrepancy")
 SAMPLERS = ("nuts", "emcee")
 RISKS = ("mean", "cvar")
 
-START_DESIGN = 7  # points that the engine spreads over two parameters before it chooses
+MIN_SIMULATIONS = 7  # fewer say next to nothing of two parameters
 MIN_PARTICLES = 100  # with fewer, the stick is thinner than the gaps between them
 _LEAST = {
-    "budget": START_DESIGN,
+    "budget": MIN_SIMULATIONS,
     "batch": 1,
     "seed": 0,
     "particles": MIN_PARTICLES,
@@ -68,7 +68,7 @@ class PourSettings:
     seed: int = 0
 
     def __post_init__(self):
-        for name, least in {"iterations": START_DESIGN, "draws": 1, "seed": 0}.items():
+        for name, least in {"iterations": MIN_SIMULATIONS, "draws": 1, "seed": 0}.items():
             _at_least(least, name, getattr(self, name))
         _one_of(RISKS, "risk", self.risk)
 
@@ -78,8 +78,7 @@ def _at_least(lowest: int, name: str, value: object) -> None:
         raise InputError(
             f"{value!r}",
             where=f"--{name}",
-            fix=f"give a whole number of at least {lowest}"
-            + (", the start design" if lowest == START_DESIGN else ""),
+            fix=f"give a whole number of at least {lowest}",
         )
 
 

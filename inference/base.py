@@ -6,6 +6,9 @@ from typing import Any, Protocol
 import jax
 import numpy as np
 
+from .feasibility import Feasibility
+from .gp import GP
+
 Theta = Mapping[str, np.ndarray]
 """Parameter name -> values in natural units; all of shape [n], or all scalars."""
 
@@ -34,12 +37,21 @@ class Surrogate(Protocol):
     """What was learned from the simulations, over prior quantiles u in [0, 1]^d."""
 
     @property
+    def gp(self) -> GP:
+        """The processes on which it rests."""
+        ...
+
+    @property
     def state(self) -> Any:
-        """Pytree of arrays on which `log_likelihood` depends; data, never a closure."""
+        """Pytree of arrays on which the likelihood depends, `gp` among them; data, never a
+        closure, and of one shape over a run."""
         ...
 
     @property
     def log_likelihood(self) -> LogLikelihood: ...
+
+    @property
+    def log_second_moment(self) -> LogSecondMoment: ...
 
     def minimum(self) -> np.ndarray:
         """The u [d] that fits best."""
@@ -49,27 +61,39 @@ class Surrogate(Protocol):
         """The surrogate after its own predictions at u [n, d] came true (pending points)."""
         ...
 
+    def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd of a new simulation at u [n, d], each [n, ...]."""
+        ...
+
     def constants(self) -> dict[str, np.ndarray]:
-        """What was fixed before sampling; kept with the results."""
+        """What a reader of the posterior must know of the likelihood."""
         ...
 
     def checks(self) -> dict[str, np.ndarray]:
-        """The emulator's checks, the first axis of each the simulation; `loo_z` [n, k] are
-        studentised leave-one-out errors."""
+        """Of the emulator: `loo_z`, studentised leave-one-out errors [simulation, ...]."""
         ...
 
     def warnings(self) -> list[str]:
-        """What the checks complain of, in sentences."""
+        """What these checks complain of, in sentences."""
         ...
 
     def predictive(self, key: jax.Array, u: np.ndarray) -> dict[str, np.ndarray]:
-        """One draw of what a simulation gives for each row of u [n, d]: name -> [n, ...]."""
+        """One new observation for each row of u [n, d]: name -> [n, ...]."""
         ...
 
 
 class Acquisition(Protocol):
     """Where to simulate next."""
 
-    def __call__(self, key: jax.Array, surrogate: Any, n: int, /) -> np.ndarray:
-        """n different points u [n, d]; `surrogate` already believes what is pending."""
+    def __call__(
+        self, key: jax.Array, surrogate: Any, n: int, feasibility: Feasibility, /
+    ) -> np.ndarray:
+        """n different points u [n, d].
+
+        Args:
+            key: Fixes the choice.
+            surrogate: A `Surrogate` that already believes what is pending.
+            n: Points wanted.
+            feasibility: Where runs succeeded and failed; see `feasibility.log_feasible`.
+        """
         ...

@@ -16,10 +16,11 @@ from .feasibility import feasibility
 from .gp import padded_rows
 from .posterior import Fit
 from .prior import Prior
-from .replicates import next_replicate
+from .repetition import next_replicate
 from .state import UNKNOWN, History, explain, init, remember_asked, remember_told
 
 LARGEST = 2**31 - 1  # that every random number generator takes as a seed
+DIGITS, EDGE = 7, 1e-7  # of the prior quantiles that are asked, and how near the bounds
 MIN_LEARN = 3  # successful simulations before the surrogate may choose
 
 
@@ -38,7 +39,7 @@ class Bolfi:
         acquisition: "eiv", "maxvar", "draws", "lcb" (with "discrepancy"), an object (see
             `Acquisition`), or None for the surrogate's best.
         seed: Fixes the start design and the acquisitions.
-        initial: Points of the Sobol start design; None is 2 d + 3.
+        initial: Points of the Sobol start design; None is 2 d + 6.
         capacity: Simulations for which arrays are reserved, rounded up to a power of two; up
             to there nothing is compiled anew. Small ones are faster, larger runs double it.
         options: Of the surrogate's family: `summary`, `noise`, `components`, `discrepancy` of
@@ -155,7 +156,8 @@ class Bolfi:
             key = jax.random.fold_in(jax.random.key(self.seed), self._state.asked)
             believing = self._learned.believe(pending)
             points += list(self._acquire(key, believing, n - len(points), runs))
-        return np.stack(points)
+        # coarser than rounding errors, so that arrays of another size ask the same
+        return np.clip(np.round(np.stack(points), DIGITS), EDGE, 1.0 - EDGE)
 
     def _known(self) -> Learnable:
         history = self._state.history

@@ -5,11 +5,12 @@ from scipy.stats import qmc
 
 
 def start_size(dimension: int) -> int:
-    """Default number of start points: two per coefficient of a separable quadratic, plus one.
+    """Default number of start points: 8, 10, 12 for one, two, three parameters.
 
-    5, 7, 9 for one, two, three parameters.
+    Of 7, 10 and 14 points in two dimensions 10 gave the best posteriors after 20 and 50
+    simulations of a noisy pendulum (10 seeds); the quieter toys hardly cared.
     """
-    return 2 * dimension + 3
+    return 2 * dimension + 6
 
 
 def sobol(seed: int, start: int, stop: int, dimension: int) -> np.ndarray:

@@ -15,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from .bank import Simulation, SimulationBank
 from .base import Acquisition, Simulator, Theta
 from .bolfi import MIN_LEARN, Bolfi, checked_integer
+from .design import start_size
 from .executors import opened
 from .families import Family
 from .posterior import Fit
@@ -65,7 +66,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         batch: Points per round, or in flight: as many as the executor has workers.
         seed: Fixes the whole run.
         surrogate, acquisition: See `Bolfi`.
-        initial: Points of the start design; None is 2 d + 3.
+        initial: Points of the start design; None is 2 d + 6, or the budget if that is less.
         executor: A thread or process pool, a Dask client's `get_executor()` or any other
             `concurrent.futures.Executor`, left open; or a Dask scheduler's address such as
             "tcp://host:8786". Start processes by "spawn" or "forkserver": JAX does not survive
@@ -93,6 +94,9 @@ def fit(  # noqa: PLR0913  the one call that most users make
     batch = checked_integer("batch", batch)
     budget = checked_integer("budget", budget, MIN_LEARN if earlier is None else 0)
     _check_timeout(timeout)
+    told = 0 if earlier is None else len(earlier[1])
+    if initial is None:
+        initial = max(MIN_LEARN, min(start_size(len(prior)), budget + told))
     engine = Bolfi(
         prior,
         observed,
@@ -100,7 +104,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         acquisition=acquisition,
         seed=seed,
         initial=initial,
-        capacity=max(1, budget + (0 if earlier is None else len(earlier[1]))),
+        capacity=max(1, budget + told),
         **options,
     )
     if earlier is not None:

@@ -252,6 +252,7 @@ def test_finds_separated_modes_of_a_fit(prior):
         prior,
         np.full(2, 0.5),
         budget=30,
+        noise=0.05,
     )
     slope = fit.sample()["posterior"]["slope"]
     share = (slope > 0).mean("draw")

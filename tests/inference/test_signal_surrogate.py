@@ -10,7 +10,7 @@ from bolfi_liquids.inference.emulator import noise_share
 from bolfi_liquids.inference.families import Learnable, SignalFamily
 from bolfi_liquids.inference.gaussian import log_likelihood, log_second_moment
 from bolfi_liquids.inference.gp import predict
-from bolfi_liquids.inference.replicates import next_replicate
+from bolfi_liquids.inference.repetition import next_replicate
 from scipy.stats import multivariate_normal
 
 from bolfi_liquids import inference
