@@ -1,11 +1,16 @@
 # Two commands on a fresh machine: `make demo` and `make test`. Both set up .venv first.
+# `make peers` is for tests/benchmarks/compare.py alone.
 
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
 
-.PHONY: setup demo test test-slow lint clean
+PEERS := .venv-peers
+PEERS_SUPPORTED := import sys, ensurepip; sys.exit(not (3, 9) <= sys.version_info[:2] <= (3, 10))
+PYENV_VERSIONS := $(or $(PYENV_ROOT),$(HOME)/.pyenv)/versions
+
+.PHONY: setup demo test test-slow lint peers clean
 
 setup: $(INSTALLED)
 
@@ -36,5 +41,25 @@ lint: setup
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 
+# ELFI and sbi cannot be installed beside us, nor beside each other: each has its own old Python.
+peers: $(PEERS)/elfi/.installed $(PEERS)/sbi/.installed
+
+$(PEERS)/%/.installed: tests/benchmarks/peers/%.txt
+	@python=; \
+	for candidate in $(PEERS_PYTHON) python3.9 python3.10 \
+		"$(PYENV_VERSIONS)"/3.9.*/bin/python "$(PYENV_VERSIONS)"/3.10.*/bin/python; do \
+		if "$$candidate" -c "$(PEERS_SUPPORTED)" >/dev/null 2>&1; then python=$$candidate; break; fi; \
+	done; \
+	if [ -z "$$python" ]; then \
+		echo "make: $* needs Python 3.9 or 3.10, found neither on the path nor with pyenv;" \
+			"install one, or name it: make peers PEERS_PYTHON=/path/to/python" >&2; \
+		exit 1; \
+	fi; \
+	echo "Setting up $(PEERS)/$* with $$("$$python" --version)"; \
+	"$$python" -m venv --clear $(PEERS)/$*
+	$(PEERS)/$*/bin/python -m pip install --quiet --disable-pip-version-check --use-pep517 \
+		-c $< $*
+	@touch $@
+
 clean:
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache
+	rm -rf $(VENV) $(PEERS) build dist *.egg-info .pytest_cache .ruff_cache

@@ -1,0 +1,67 @@
+"""The engines that can be compared: where they run, and what decides their results."""
+
+import hashlib
+import os
+import sys
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+SHARED = (HERE / "tasks", HERE / "peers" / "job.py")
+ONE_THREAD = {
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1",
+    "JAX_PLATFORMS": "cpu",
+}
+
+
+class Engine(NamedTuple):
+    """Who runs it and as which module.
+
+    Attributes:
+        python: Interpreter of its environment.
+        module: What that runs.
+        sources: Files and directories that decide its results, besides `SHARED`.
+    """
+
+    python: Path
+    module: str
+    sources: tuple[Path, ...]
+
+
+def _ours() -> Engine:
+    return Engine(Path(sys.executable), "peers.run_ours", (ROOT / "inference",))
+
+
+def _peer(name: str) -> Engine:
+    python = ROOT / ".venv-peers" / name / "bin" / "python"
+    return Engine(python, f"peers.run_{name}", (HERE / "peers" / f"{name}.txt",))
+
+
+ENGINES = {"discrepancy": _ours(), "signal": _ours(), "elfi": _peer("elfi"), "sbi": _peer("sbi")}
+OURS = tuple(name for name, engine in ENGINES.items() if engine.module == "peers.run_ours")
+
+
+def command(name: str, job: str) -> tuple[list[str], dict[str, str]]:
+    """Arguments and environment of the process that does `job`."""
+    engine = ENGINES[name]
+    environment = {**os.environ, **ONE_THREAD, "PYTHONPATH": str(HERE)}
+    return [str(engine.python), "-m", engine.module, job], environment
+
+
+@cache
+def digest(name: str | None) -> str:
+    """Of all sources that decide an engine's results, or the tasks'; new ones make those stale."""
+    places = [*SHARED]
+    if name is not None:
+        engine = ENGINES[name]
+        places += [HERE / f"{engine.module.replace('.', '/')}.py", *engine.sources]
+    content = hashlib.sha256()
+    for place in places:
+        for file in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
+            content.update(file.read_bytes())
+    return content.hexdigest()[:12]
