@@ -22,7 +22,7 @@ from .optimise import minimise_in_box
 from .screen import ROUNDS, screen
 
 CANDIDATES = 128  # points among which a rule chooses
-NODES = 64  # points over which a variance is integrated
+NODES = 32  # points over which a variance is integrated
 ENOUGH = 32.0  # candidates that count, effectively
 LEAST_POWER = 1e-6
 

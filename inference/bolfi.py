@@ -124,13 +124,14 @@ class Bolfi:
         n = checked_integer("n", n)
         started = time.perf_counter()
         designed = self._designed_now(n)
-        parts = [
-            sobol(self.seed, self._state.designed, self._state.designed + designed, len(self.prior))
-        ]
+        start = self._state.designed
+        u = sobol(self.seed, start, start + designed, len(self.prior))
+        parts = [self.prior.to_array(self.prior.from_unit(u))]
         if n > designed:
             parts.append(self._acquired(n - designed, parts[0]))
-        theta = self.prior.from_unit(np.concatenate(parts))
-        self._state = remember_asked(self._state, self.prior.to_array(theta), designed)
+        asked = np.concatenate(parts)
+        self._state = remember_asked(self._state, asked, designed)
+        theta = self.prior.to_dict(asked)
         self._seconds += time.perf_counter() - started
         return theta
 
@@ -142,22 +143,22 @@ class Bolfi:
         return min(n, max(0, self.initial - covered))
 
     def _acquired(self, n: int, designed: np.ndarray) -> np.ndarray:
+        """theta [n, d] of the engine's choice, `designed` [m, d] being asked with them."""
         history = self._state.history
-        pending = self.prior.to_unit(self.prior.to_dict(self._state.pending))
-        pending = np.concatenate([pending, designed])
+        pending = np.concatenate([self._state.pending, designed])
         rows = self._rows(len(pending) + n)
         self._learned = self._learner.learn(self._known(), rows, self._learned)
-        points = []
-        if self.family.replicates:
-            repeated = next_replicate(history, pending)
-            points += [] if repeated is None else [repeated]
-        if n > len(points):
+        repeated = next_replicate(history, pending) if self.family.replicates else None
+        parts = [] if repeated is None else [repeated[None]]
+        if n > len(parts):
             runs = feasibility(history.u, history.succeeded, rows)
             key = jax.random.fold_in(jax.random.key(self.seed), self._state.asked)
-            believing = self._learned.believe(pending)
-            points += list(self._acquire(key, believing, n - len(points), runs))
-        # coarser than rounding errors, so that arrays of another size ask the same
-        return np.clip(np.round(np.stack(points), DIGITS), EDGE, 1.0 - EDGE)
+            believing = self._learned.believe(self.prior.to_unit(self.prior.to_dict(pending)))
+            u = np.asarray(self._acquire(key, believing, n - len(parts), runs))
+            # coarser than rounding errors, so that arrays of another size ask the same
+            u = np.clip(np.round(u, DIGITS), EDGE, 1.0 - EDGE)
+            parts.append(self.prior.to_array(self.prior.from_unit(u)))
+        return np.concatenate(parts)
 
     def _known(self) -> Learnable:
         history = self._state.history

@@ -175,7 +175,8 @@ def learn(
     if previous is not None and len(u) < GROWTH * previous.learned_at:
         data = pad(u, previous.scale(values)[None], rows)
         gp = _condition(previous.gp.hyper, data)
-        return _with_threshold(gp, previous.scale, values, rule, previous.learned_at)
+        # to choose where to simulate next, the best point so far will do
+        return _with_threshold(gp, previous.scale, values, rule, previous.learned_at, u)
     scales = [_standardise(option, values) for option in candidates(transform, values)]
     data = pad(u, np.array([scale(values) for scale in scales]), rows)
     gp = _condition(maximum_a_posteriori(data), data)
@@ -192,14 +193,22 @@ def _only(gp: GP, i: int) -> GP:
     return GP(hyper, gp.data._replace(y=y), whitener, weights)
 
 
-def _with_threshold(
-    gp: GP, scale: Scale, values: np.ndarray, rule: Threshold, learned_at: int
+def _with_threshold(  # noqa: PLR0913  the fields, and where to look
+    gp: GP,
+    scale: Scale,
+    values: np.ndarray,
+    rule: Threshold,
+    learned_at: int,
+    points: np.ndarray | None = None,
 ) -> DiscrepancySurrogate:
+    """With the rule's threshold; the minimum is sought over the box, or among `points` [n, d]."""
     learned = DiscrepancySurrogate(gp, scale, values, np.nan, learned_at)
 
     def at_minimum() -> tuple[float, float]:
-        mean, sd = learned.predict(learned.minimum()[None])
-        return float(mean[0]), float(sd[0])
+        where = learned.minimum()[None] if points is None else np.asarray(gp.data.u)
+        mean, sd = learned.predict(where)
+        best = np.argmin(mean if points is None else mean[: len(points)])
+        return float(mean[best]), float(sd[best])
 
     threshold = choose_threshold(rule, values, scale.transform, at_minimum)
     return replace(learned, threshold=threshold)

@@ -13,7 +13,7 @@ from .optimise import minimise_many
 LENGTH = (np.log(0.5), 0.7)  # 95 %: a tenth of the box to twice the box
 AMPLITUDE = (np.log(1.0), 0.7)
 NOISE = (np.log(0.1), 1.0)  # 95 %: 1 % to 70 % of the targets' sd
-SCORED, REFINED = 16, 2  # starts that are evaluated, and of these the best to be optimised
+SCORED, REFINED = 8, 2  # starts that are evaluated, and of these the best to be optimised
 
 
 def log_prior(hyper: Hyper) -> jax.Array:

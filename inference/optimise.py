@@ -10,7 +10,7 @@ import numpy as np
 
 from .design import sobol
 
-SCREENED, REFINED = 512, 4
+SCREENED, REFINED = 512, 3
 EDGE = 1e-6  # the box is [EDGE, 1 - EDGE]: beyond lie only tails of unbounded priors
 ITERATIONS, BACKTRACKS = 40, 8
 LONGEST = 1.0  # of a step, in every coordinate

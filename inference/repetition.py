@@ -10,33 +10,31 @@ SAME = 1e-9  # relative difference up to which two runs count as equal
 
 
 def next_replicate(history: History, pending: np.ndarray) -> np.ndarray | None:
-    """The point u [d] to be simulated again now, or None.
+    """The parameters theta [d] to be simulated again now, or None.
 
-    It is the best point so far that has no replicate: there the noise matters most.
+    They are the best so far that have no replicate: there the noise matters most.
 
     Args:
         history: What was told.
-        pending: Points asked and not yet told, u [m, d].
+        pending: Asked and not yet told, theta [m, d].
     """
     good = history.succeeded
-    u, features = history.u[good], history.features[good]
-    known = np.concatenate([u, pending])
+    theta, features = history.theta[good], history.features[good]
+    known = np.concatenate([theta, pending])
     points, count = np.unique(known, axis=0, return_counts=True)
     repeated = points[count > 1]
-    replicates = len(known) - len(points)
     wanted = max(FIRST, int(SHARE * len(known)))
-    if replicates >= wanted or _deterministic(u, features, repeated):
+    if len(known) - len(points) >= wanted or _deterministic(theta, features, repeated):
         return None
     for i in np.argsort(history.discrepancy[good], kind="stable"):
-        if not (repeated == u[i]).all(1).any():
-            return u[i]
+        if not (repeated == theta[i]).all(1).any():
+            return theta[i]
     return None
 
 
-def _deterministic(u: np.ndarray, features: np.ndarray, repeated: np.ndarray) -> bool:
+def _deterministic(theta: np.ndarray, features: np.ndarray, repeated: np.ndarray) -> bool:
     """Whether the runs at FIRST or more repeated points are equal."""
-    spread = features.std(0)
-    groups = [features[(u == point).all(1)] for point in repeated]
+    groups = [features[(theta == point).all(1)] for point in repeated]
     told = [group for group in groups if len(group) > 1]
     differences = [np.abs(group - group[0]).max() for group in told]
-    return len(told) >= FIRST and max(differences) <= SAME * spread.max()
+    return len(told) >= FIRST and max(differences) <= SAME * features.std(0).max()

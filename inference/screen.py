@@ -17,7 +17,7 @@ from .base import LogLikelihood
 from .design import sobol
 from .linalg import small_inverse_cholesky
 
-ROUND = 128
+ROUND = 64
 EVEN, ROUNDS = 4, 8  # rounds that fill the prior evenly, and rounds in all
 CENTRES = 32
 EFFECTIVE = 24.0  # points to which the target is tempered

@@ -198,8 +198,8 @@ def test_the_engine_repeats_points_until_it_knows_the_noise():
             theta = engine.ask(2)
             u = prior.to_unit(theta)
             engine.tell(theta, outputs(u, [2 * step, 2 * step + 1] if seeds else None))
-        u = engine.fit().history.u
-        return len(u) - len(np.unique(u, axis=0))
+        theta = engine.fit().history.theta
+        return len(theta) - len(np.unique(theta, axis=0))
 
     assert run(seeds=False) == 2  # equal: no more than it takes to see that
     assert run(seeds=True) == 2  # of 26, as a tenth
@@ -208,10 +208,10 @@ def test_the_engine_repeats_points_until_it_knows_the_noise():
 def test_no_point_is_repeated_while_its_replicate_is_pending():
     prior = inference.Prior({"a": dist.Uniform(0.0, 1.0), "b": dist.Uniform(0.0, 1.0)})
     engine = inference.Bolfi(prior, outputs(np.array([[0.4, 0.6]]))[0], capacity=64)
-    theta = engine.ask(7)
+    theta = engine.ask(10)
     engine.tell(theta, outputs(prior.to_unit(theta)))
-    asked = np.concatenate([prior.to_unit(engine.ask(1)) for _ in range(5)])
-    told = prior.to_unit(theta)
+    asked = np.concatenate([prior.to_array(engine.ask(1)) for _ in range(5)])
+    told = prior.to_array(theta)
     repeats = [point for point in asked if (told == point).all(1).any()]
     assert len(repeats) == 2
     assert len(np.unique(asked, axis=0)) == 5
