@@ -27,7 +27,8 @@ from .transform import Transform, candidates
 LARGEST = 1e6
 """Discrepancies beyond so many medians are learned as the largest of the others: the process
 need not follow a simulation that blew up, but shall know that it is bad there."""
-GROWTH = 1.2  # hyperparameters are found anew when data have grown by this factor
+GROWTH = 1.3  # hyperparameters are found anew when data have grown by this factor,
+RETHINK = 3.0  # and the transform is chosen anew when they have by this one
 
 _condition = jax.jit(condition)
 _leave_one_out = jax.jit(leave_one_out)
@@ -56,6 +57,7 @@ class DiscrepancySurrogate:
         discrepancy: What was learned from [n].
         threshold: eps on the scale of g(Delta).
         learned_at: Simulations known when the hyperparameters were found.
+        chosen_at: Simulations known when the transform was chosen.
     """
 
     gp: GP
@@ -63,6 +65,7 @@ class DiscrepancySurrogate:
     discrepancy: np.ndarray
     threshold: float
     learned_at: int
+    chosen_at: int
 
     @property
     def transform(self) -> Transform:
@@ -164,24 +167,32 @@ def learn(
         rows: Reserved for data, at least n.
         transform: A name, or None to choose.
         rule: For the threshold, see `likelihood.choose_threshold`.
-        previous: Learned from the first of these data; its transform and hyperparameters are
-            kept until the data have grown by a fifth.
+        previous: Learned from the first of these data; its hyperparameters are kept until the
+            data have grown by a third, its transform until they are three times as many.
 
     Raises:
         ValueError: bad transform or threshold.
     """
     sane = discrepancy <= LARGEST * np.median(np.abs(discrepancy))
     values = np.minimum(discrepancy, discrepancy[sane].max(initial=-np.inf))
-    if previous is not None and len(u) < GROWTH * previous.learned_at:
+    n = len(u)
+    if previous is not None and n < RETHINK * previous.chosen_at:
         data = pad(u, previous.scale(values)[None], rows)
-        gp = _condition(previous.gp.hyper, data)
-        # to choose where to simulate next, the best point so far will do
-        return _with_threshold(gp, previous.scale, values, rule, previous.learned_at, u)
+        hyper, learned_at = previous.gp.hyper, previous.learned_at
+        if n >= GROWTH * learned_at:
+            hyper, learned_at = maximum_a_posteriori(data, hyper), n
+        gp = _condition(hyper, data)
+        learned = DiscrepancySurrogate(
+            gp, previous.scale, values, np.nan, learned_at, previous.chosen_at
+        )
+        # to choose where to simulate next, the best point so far will do for a minimum
+        return _with_threshold(learned, rule, among_data=True)
     scales = [_standardise(option, values) for option in candidates(transform, values)]
     data = pad(u, np.array([scale(values) for scale in scales]), rows)
     gp = _condition(maximum_a_posteriori(data), data)
     best = int(np.argmax(_scores(gp, scales, values)))
-    return _with_threshold(_only(gp, best), scales[best], values, rule, len(u))
+    chosen = DiscrepancySurrogate(_only(gp, best), scales[best], values, np.nan, n, n)
+    return _with_threshold(chosen, rule)
 
 
 def _only(gp: GP, i: int) -> GP:
@@ -193,24 +204,18 @@ def _only(gp: GP, i: int) -> GP:
     return GP(hyper, gp.data._replace(y=y), whitener, weights)
 
 
-def _with_threshold(  # noqa: PLR0913  the fields, and where to look
-    gp: GP,
-    scale: Scale,
-    values: np.ndarray,
-    rule: Threshold,
-    learned_at: int,
-    points: np.ndarray | None = None,
+def _with_threshold(
+    learned: DiscrepancySurrogate, rule: Threshold, among_data: bool = False
 ) -> DiscrepancySurrogate:
-    """With the rule's threshold; the minimum is sought over the box, or among `points` [n, d]."""
-    learned = DiscrepancySurrogate(gp, scale, values, np.nan, learned_at)
+    """With the rule's threshold; the minimum is sought over the box, or among the data."""
 
     def at_minimum() -> tuple[float, float]:
-        where = learned.minimum()[None] if points is None else np.asarray(gp.data.u)
-        mean, sd = learned.predict(where)
-        best = np.argmin(mean if points is None else mean[: len(points)])
+        data = learned.gp.data
+        mean, sd = learned.predict(np.asarray(data.u) if among_data else learned.minimum()[None])
+        best = np.argmin(mean[: int(data.count)])
         return float(mean[best]), float(sd[best])
 
-    threshold = choose_threshold(rule, values, scale.transform, at_minimum)
+    threshold = choose_threshold(rule, learned.discrepancy, learned.transform, at_minimum)
     return replace(learned, threshold=threshold)
 
 
@@ -222,9 +227,7 @@ def marginalised(
     hyper = posterior_draws(surrogate.gp.data, draws, seed)
     data = surrogate.gp.data
     spread = Data(data.u, jnp.tile(data.y, (draws, 1)), data.count)
-    return _with_threshold(
-        _condition(hyper, spread), surrogate.scale, surrogate.discrepancy, rule, len(spread.u)
-    )
+    return _with_threshold(replace(surrogate, gp=_condition(hyper, spread)), rule)
 
 
 def _standardise(transform: Transform, values: np.ndarray) -> Scale:

@@ -14,7 +14,7 @@ from .noise import Remainder, shrunk_covariance
 
 SHARE = 0.9995  # of the variance, to be explained by components
 PRIOR_RUNS = 5.0  # runs that speak for uncorrelated scores
-GROWTH = 1.2  # hyperparameters are found anew when data have grown by this factor
+GROWTH = 1.3  # hyperparameters are found anew when data have grown by this factor
 
 _condition = jax.jit(condition)
 _leave_one_out = jax.jit(leave_one_out)
@@ -57,7 +57,7 @@ def emulate(
         components: At most.
         rows: Reserved for data, at least n.
         previous: Learned from the first of these data; its components and hyperparameters are
-            kept until the data have grown by a fifth.
+            kept until the data have grown by a third.
     """
     n = len(u)
     if previous is not None and n < GROWTH * previous.learned_at:

@@ -76,7 +76,7 @@ def test_believing_keeps_the_mean_and_shrinks_the_variance():
     assert believing.predict(new)[1] < fitted.predict(new)[1]
 
 
-def test_hyperparameters_wait_until_the_data_have_grown_by_a_fifth():
+def test_hyperparameters_wait_until_the_data_have_grown_by_a_third():
     u = sobol(0, 0, 26, 2)
     values = bowl(u, np.random.default_rng(0), 1.0)
     first = learn(u[:20], values[:20], ROWS)
