@@ -122,11 +122,11 @@ class Fit:
 
         The sampler goes on from where it stopped, doubling what it made, while a parameter
         has R-hat above 1.01, or bulk or tail effective sample size below 100 per chain
-        (Vehtari et al. 2021; with less than 400 draws per chain, R-hat above 1 + 4 / draws
-        and a quarter of the draws), up to `extend` times `draws`. The whole is thinned to the
-        `draws` asked for. If that does not suffice, if more than 1 % of the transitions
-        diverge, or if (one or two parameters) draws and quadrature differ by more than chance
-        explains, a `SamplingWarning` says so, and so does `status`.
+        (Vehtari et al. 2021; with few draws what `convergence.limits` says), up to `extend`
+        times `draws`. The whole is thinned to the `draws` asked for. If that does not suffice,
+        if more than 1 % of the transitions diverge, or if (one or two parameters) draws and
+        quadrature differ by more than chance explains, a `SamplingWarning` says so, and so
+        does `status`.
 
         A second fit whose arrays have equal shapes compiles nothing anew.
 
