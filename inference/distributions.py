@@ -50,7 +50,8 @@ class Univariate:
         if self._scipy is not None:
             return np.asarray(self._scipy.logpdf(value), np.float64)
         # numpyro warns of values outside, among which it counts the zero of positive ones
-        inside = np.asarray(self.distribution.support(value))
+        support: Any = self.distribution.support
+        inside = np.asarray(support(value))
         made = self.distribution.log_prob(np.where(inside, value, self._inner))
         return np.where(inside, np.asarray(made, np.float64), -np.inf)
 

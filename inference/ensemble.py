@@ -54,15 +54,15 @@ def sample_emcee(rng: np.random.Generator, target: Target, length: Length) -> It
         )
         for sampler in samplers
     ]
-    thin = max(_autocorrelation_time(sampler.get_chain()) for sampler in samplers)
+    thin = max(_autocorrelation_time(np.asarray(s.get_chain())) for s in samplers)
     kept = -(-length.draws // walkers)
     while True:
         runs = []
         for i, sampler in enumerate(samplers):
             sampler.reset()
             warm[i] = sampler.run_mcmc(warm[i], kept, thin_by=thin, skip_initial_state_check=True)
-            joined = (_join(v, length.draws) for v in (sampler.get_chain(), sampler.get_log_prob()))
-            runs.append(tuple(joined))
+            made = (sampler.get_chain(), sampler.get_log_prob())
+            runs.append([_join(np.asarray(values), length.draws) for values in made])
         x, lp = (np.stack(part) for part in zip(*runs, strict=True))
         yield Chains(ndtr(x), {"lp": lp})
 

@@ -120,8 +120,9 @@ def _draws(
     blocks = []
     for start in range(0, count, BLOCK):
         wanted = min(BLOCK, count - start)
-        empty = np.zeros((n, BLOCK, d + len(STATISTICS)))
-        progress = Progress(chains, np.zeros(n, int), empty)
+        done: Any = np.zeros(n, int)
+        empty: Any = np.zeros((n, BLOCK, d + len(STATISTICS)))
+        progress = Progress(chains, done, empty)
         while (np.asarray(progress.done) < wanted).any():
             progress = _run(
                 draw_noise(rng, (STEPS, n), d),

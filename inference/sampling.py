@@ -68,7 +68,8 @@ def draw_posterior(
         parts += [next(source) for _ in range(len(parts))]
     steps = len(parts) * length.draws
     complaints = [describe(short, steps)] if short else []
-    divergent = float(np.mean([part.stats.get("diverging", 0.0) for part in parts]))
+    flags = [part.stats["diverging"] for part in parts if "diverging" in part.stats]
+    divergent = float(np.mean(flags)) if flags else 0.0
     if divergent > DIVERGENT_SHARE:
         complaints.append(describe_divergences(divergent))
     checks: dict[str, float] = {}

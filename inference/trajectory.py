@@ -53,7 +53,7 @@ class StepSize(NamedTuple):
     log: jax.Array
     average: jax.Array
     error: jax.Array
-    count: jax.Array
+    updates: jax.Array
     centre: jax.Array
 
 
@@ -81,10 +81,10 @@ class Chain(NamedTuple):
 class Settings(NamedTuple):
     """Common to all chains."""
 
-    factor: jax.Array  # [d, d], L of the inverse mass matrix L L^T
+    factor: np.ndarray  # [d, d], L of the inverse mass matrix L L^T
     mixture: Mixture
-    target_acceptance: jax.Array  # []
-    adapting: jax.Array  # bool
+    target_acceptance: float
+    adapting: bool
 
 
 STATISTICS = ("lp", "diverging", "acceptance_rate", "n_steps", "energy", "step_size", "jumped")
@@ -95,12 +95,14 @@ def begin(x: np.ndarray, step_size: float) -> Chain:
     """Chains about to evaluate their first points x [n, d]; in NumPy, whose arrays, unlike
     JAX's, need no program of their own to be compiled."""
     n, d = x.shape
-    zero, vectors, none = np.zeros(n), np.zeros((n, d)), np.zeros(n, int)
-    yes = np.ones(n, bool)
-    nowhere: Any = Point(x, np.full(n, -np.inf), vectors)
-    tree: Any = Tree(nowhere, zero, vectors)
-    edge: Any = Edge(nowhere, vectors)
-    marks = np.zeros((n, MAX_DEPTH, 2, d))
+    start: Any = x
+    zero: Any = np.zeros(n)
+    vectors: Any = np.zeros((n, d))
+    none: Any = np.zeros(n, int)
+    yes: Any = np.ones(n, bool)
+    marks: Any = np.zeros((n, MAX_DEPTH, 2, d))
+    nowhere = Point(start, zero - np.inf, vectors)
+    tree, edge = Tree(nowhere, zero, vectors), Edge(nowhere, vectors)
     return Chain(
         *(nowhere, yes, yes, tree, edge, edge, none, tree, edge, yes, none, marks),
         *(zero, zero, none, first_step_size(n, step_size)),
@@ -109,8 +111,9 @@ def begin(x: np.ndarray, step_size: float) -> Chain:
 
 def first_step_size(n: int, value: float) -> StepSize:
     """Dual averaging before its first update, for n chains."""
-    log, zero = np.full(n, np.log(value)), np.zeros(n)
-    return StepSize(log, log, zero, zero, np.log(10.0) + log)  # type: ignore[arg-type]
+    zero: Any = np.zeros(n)
+    log = zero + np.log(value)
+    return StepSize(log, log, zero, zero, log + np.log(10.0))
 
 
 class Noise(NamedTuple):
@@ -124,12 +127,11 @@ class Noise(NamedTuple):
 
 def draw_noise(rng: np.random.Generator, shape: tuple[int, int], dimension: int) -> Noise:
     """For shape = (steps, chains); by NumPy, since JAX's takes a second to compile."""
-    return Noise(
-        rng.standard_normal((*shape, dimension)),
-        1.0 - rng.random((*shape, 3)),  # in (0, 1]: their logs are finite
-        rng.standard_normal((*shape, dimension)),
-        1.0 - rng.random((*shape, UNIFORMS)),
-    )
+    momentum: Any = rng.standard_normal((*shape, dimension))
+    choices: Any = 1.0 - rng.random((*shape, 3))  # in (0, 1]: their logs are finite
+    jump_normals: Any = rng.standard_normal((*shape, dimension))
+    jump_uniforms: Any = 1.0 - rng.random((*shape, UNIFORMS))
+    return Noise(momentum, choices, jump_normals, jump_uniforms)
 
 
 def step(
@@ -235,7 +237,7 @@ def _half_step(chain: Chain, settings: Settings) -> tuple[jax.Array, jax.Array]:
     signed = _signed_step(chain, settings)
     point, momentum = chain.edge
     half = momentum + 0.5 * signed * (point.gradient @ settings.factor)
-    return half, point.x + signed * (settings.factor @ half)
+    return half, point.x + signed * (half @ settings.factor.T)
 
 
 def _jump(
@@ -364,11 +366,11 @@ def _is_turning(first: jax.Array, last: jax.Array, summed: jax.Array) -> jax.Arr
 
 def _adapted(size: StepSize, error: jax.Array) -> StepSize:
     """One update of dual averaging; `error` is wanted minus seen acceptance."""
-    count = size.count + 1.0
-    share = 1.0 / (count + DELAY)
+    updates = size.updates + 1.0
+    share = 1.0 / (updates + DELAY)
     mean_error = (1.0 - share) * size.error + share * error
-    log = size.centre - jnp.sqrt(count) / SHRINK * mean_error
-    weight = count**-DECAY
+    log = size.centre - jnp.sqrt(updates) / SHRINK * mean_error
+    weight = updates**-DECAY
     return StepSize(
-        log, weight * log + (1.0 - weight) * size.average, mean_error, count, size.centre
+        log, weight * log + (1.0 - weight) * size.average, mean_error, updates, size.centre
     )
