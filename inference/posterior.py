@@ -158,8 +158,8 @@ class Fit:
             hold how the run was made, and the seconds it took.
 
         Raises:
-            ValueError: unknown sampler, a length too small, or quadrature of more than two
-                parameters.
+            ValueError: unknown sampler, a length too small, quadrature of more than two
+                parameters, or a log likelihood that is finite nowhere.
 
         Warns:
             SamplingWarning: the draws are not to be trusted; see `status`.

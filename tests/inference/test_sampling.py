@@ -241,6 +241,27 @@ def test_divergences_are_not_silent(monkeypatch):
         sample("divergent", uncorrelated())
 
 
+@pytest.mark.parametrize("sampler", ["nuts", "emcee", "quadrature"])
+def test_a_likelihood_that_is_nowhere_finite_is_an_error(sampler):
+    with pytest.raises(ValueError, match="finite nowhere"):
+        sample(sampler, one(np.full(2, 0.5), np.full((2, 2), np.nan)), SMALL)
+
+
+def test_a_hole_in_the_likelihood_is_avoided_or_told():
+    """NaN wherever u_1 < 0.45: half of the Gaussian remains, which emcee samples; trajectories
+    break off at the edge, which NUTS must say."""
+    target = Target(right_half, uncorrelated().state, 2)
+    made = sample("emcee", target)
+    assert made.status == CONVERGED
+    assert_means(made.chains.u, [0.45 + 0.03 * np.sqrt(2.0 / np.pi), 0.45])
+    with pytest.warns(inference.SamplingWarning, match="of the transitions diverged"):
+        sample("nuts", target)
+
+
+def right_half(state, u):
+    return jnp.where(u[0] < 0.45, jnp.nan, peaks(state, u))
+
+
 @pytest.mark.parametrize(("chains", "draws"), [(2, 8), (2, 50), (4, 400), (4, 1000)])
 def test_independent_draws_pass_the_limits(chains, draws):
     """At most one false alarm per 400 would fail with probability 0.01; chains half a standard
