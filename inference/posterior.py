@@ -115,10 +115,11 @@ class Fit:
         points, accepted or not by the rule of Metropolis and Hastings. So they change between
         modes that no path connects, and the modes' shares are right, whatever the number of
         chains. Between jumps, "nuts" follows no-U-turn trajectories, with a metric from the
-        population and a step size tuned to 80 % acceptance; "emcee" moves an ensemble of
-        walkers for each chain by stretch and differential-evolution moves, of which it keeps
-        every k-th, k the autocorrelation time. "quadrature", for one or two parameters, cuts
-        the box of prior quantiles into cells until they are even, and draws independently.
+        population and a step size tuned to 90 % acceptance, more where trajectories diverge;
+        "emcee" moves an ensemble of walkers for each chain by stretch and differential-evolution
+        moves, of which it keeps every k-th, k the autocorrelation time. "quadrature", for one
+        or two parameters, cuts the box of prior quantiles into cells until they are even, and
+        draws independently.
 
         The sampler goes on from where it stopped, doubling what it made, while a parameter
         has R-hat above 1.01, or bulk or tail effective sample size below 100 per chain
