@@ -35,6 +35,7 @@ class Univariate:
             float(getattr(support, "lower_bound", -np.inf)),
             float(getattr(support, "upper_bound", np.inf)),
         )
+        self._inner = self.icdf(np.asarray(0.5))
 
     def cdf(self, value: np.ndarray) -> np.ndarray:
         made = self.distribution.cdf(value) if self._scipy is None else self._scipy.cdf(value)
@@ -45,12 +46,14 @@ class Univariate:
         return np.asarray(made, np.float64)
 
     def log_prob(self, value: np.ndarray) -> np.ndarray:
-        """Log density of values within the bounds; -inf where it vanishes."""
-        if self._scipy is None:
-            made = np.asarray(self.distribution.log_prob(value), np.float64)
-        else:
-            made = np.asarray(self._scipy.logpdf(value), np.float64)
-        return np.where(np.isnan(made), -np.inf, made)
+        """Log density; -inf where it vanishes or the value is outside the support."""
+        if self._scipy is not None:
+            return np.asarray(self._scipy.logpdf(value), np.float64)
+        # numpyro warns of values outside, among which it counts the zero of positive ones
+        support: Any = self.distribution.support
+        inside = np.asarray(support(value))
+        made = self.distribution.log_prob(np.where(inside, value, self._inner))
+        return np.where(inside, np.asarray(made, np.float64), -np.inf)
 
 
 def describe(distribution: dist.Distribution) -> str:

@@ -13,7 +13,7 @@ from .base import LogLikelihood
 from .mixture import UNIFORMS, Mixture, propose
 from .mixture import log_density as log_mixture
 from .starts import look_around, resampled
-from .target import Chains, Length, Target, log_density
+from .target import NOWHERE, Chains, Length, Target, log_density
 
 WALKERS = 32
 LONGEST_THIN = 64  # steps; beyond, R-hat and ESS judge instead
@@ -54,15 +54,15 @@ def sample_emcee(rng: np.random.Generator, target: Target, length: Length) -> It
         )
         for sampler in samplers
     ]
-    thin = max(_autocorrelation_time(sampler.get_chain()) for sampler in samplers)
+    thin = max(_autocorrelation_time(np.asarray(s.get_chain())) for s in samplers)
     kept = -(-length.draws // walkers)
     while True:
         runs = []
         for i, sampler in enumerate(samplers):
             sampler.reset()
             warm[i] = sampler.run_mcmc(warm[i], kept, thin_by=thin, skip_initial_state_check=True)
-            joined = (_join(v, length.draws) for v in (sampler.get_chain(), sampler.get_log_prob()))
-            runs.append(tuple(joined))
+            made = (sampler.get_chain(), sampler.get_log_prob())
+            runs.append([_join(np.asarray(values), length.draws) for values in made])
         x, lp = (np.stack(part) for part in zip(*runs, strict=True))
         yield Chains(ndtr(x), {"lp": lp})
 
@@ -76,7 +76,8 @@ def _sampler(
         padded = np.zeros((walkers, d))  # moves ask for half the walkers or all: one shape
         padded[: len(x)] = x
         values = _log_densities(target.log_likelihood, target.state, padded)
-        return np.nan_to_num(np.asarray(values)[: len(x)], nan=-np.inf, posinf=-np.inf)
+        values = np.asarray(values)[: len(x)]
+        return np.where(np.isfinite(values), values, NOWHERE)
 
     def jump(x: np.ndarray, random: Any) -> tuple[np.ndarray, np.ndarray]:
         uniforms = 1.0 - random.random_sample((len(x), UNIFORMS))

@@ -44,6 +44,12 @@ def log_density(mixture: Mixture, x: jax.Array) -> jax.Array:
     return log_sum_exp(jnp.concatenate([shares, prior], axis=-1))
 
 
+def to_unit(x: jax.Array) -> jax.Array:
+    """Prior quantiles u = Phi(x), to an absolute 1e-16; jax's ndtr, exact in the tails to a
+    relative one, compiles into many times as many instructions."""
+    return 0.5 * (1.0 + jax.lax.erf(x * math.sqrt(0.5)))
+
+
 def log_prior(x: jax.Array) -> jax.Array:
     """Standard normal log density at x [n, d]: [n]."""
     return -0.5 * jnp.sum(x**2, axis=-1) - 0.5 * x.shape[-1] * math.log(2.0 * math.pi)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.scipy.special import ndtr, ndtri
+from jax.scipy.special import ndtri
 
 from .base import LogLikelihood
 from .design import sobol
@@ -26,6 +26,7 @@ from .mixture import (
     log_prior,
     log_sum_exp,
     propose,
+    to_unit,
 )
 
 ROUND = 256  # points of each round
@@ -85,7 +86,7 @@ def population(
         rows have log weight -inf.
     """
     found = explore(key, log_likelihood, state, dimension)
-    return ndtr(found.x), found.log_weights
+    return to_unit(found.x), found.log_weights
 
 
 @partial(jax.jit, static_argnames=("log_likelihood", "dimension"))
@@ -106,7 +107,7 @@ def explore(
         uniforms = jnp.clip((points[jnp.minimum(now.round, SCREENS)] + shift) % 1.0, EDGE, 1 - EDGE)
         z = ndtri(uniforms[:, :dimension])
         fresh = jax.lax.cond(screening, _screened, _proposed, now, z, uniforms[:, dimension:])
-        values = jax.vmap(log_likelihood, in_axes=(None, 0))(state, ndtr(fresh.x))
+        values = jax.vmap(log_likelihood, in_axes=(None, 0))(state, to_unit(fresh.x))
         return _weighed(now, fresh, jnp.where(jnp.isfinite(values), values, -jnp.inf))
 
     last = jax.lax.while_loop(unfinished, advance, _nothing(dimension))

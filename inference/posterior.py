@@ -121,18 +121,19 @@ class Fit:
         points, accepted or not by the rule of Metropolis and Hastings. So they change between
         modes that no path connects, and the modes' shares are right, whatever the number of
         chains. Between jumps, "nuts" follows no-U-turn trajectories, with a metric from the
-        population and a step size tuned to 80 % acceptance; "emcee" moves an ensemble of
-        walkers for each chain by stretch and differential-evolution moves, of which it keeps
-        every k-th, k the autocorrelation time. "quadrature", for one or two parameters, cuts
-        the box of prior quantiles into cells until they are even, and draws independently.
+        population and a step size tuned to 90 % acceptance, more where trajectories diverge;
+        "emcee" moves an ensemble of walkers for each chain by stretch and differential-evolution
+        moves, of which it keeps every k-th, k the autocorrelation time. "quadrature", for one
+        or two parameters, cuts the box of prior quantiles into cells until they are even, and
+        draws independently.
 
         The sampler goes on from where it stopped, doubling what it made, while a parameter
         has R-hat above 1.01, or bulk or tail effective sample size below 100 per chain
-        (Vehtari et al. 2021; with less than 400 draws per chain, R-hat above 1 + 4 / draws
-        and a quarter of the draws), up to `extend` times `draws`. The whole is thinned to the
-        `draws` asked for. If that does not suffice, if more than 1 % of the transitions
-        diverge, or if (one or two parameters) draws and quadrature differ by more than chance
-        explains, a `SamplingWarning` says so, and so does `status`.
+        (Vehtari et al. 2021; with few draws what `convergence.limits` says), up to `extend`
+        times `draws`. The whole is thinned to the `draws` asked for. If that does not suffice,
+        if more than 1 % of the transitions diverge, or if (one or two parameters) draws and
+        quadrature differ by more than chance explains, a `SamplingWarning` says so, and so
+        does `status`.
 
         A second fit whose arrays have equal shapes compiles nothing anew.
 
@@ -164,8 +165,8 @@ class Fit:
             hold how the run was made, and the seconds it took.
 
         Raises:
-            ValueError: unknown sampler, a length too small, or quadrature of more than two
-                parameters.
+            ValueError: unknown sampler, a length too small, quadrature of more than two
+                parameters, or a log likelihood that is finite nowhere.
 
         Warns:
             SamplingWarning: the draws are not to be trusted; see `status`.

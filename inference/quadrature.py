@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .target import Chains, Length, Target, log_likelihood
+from .target import NOWHERE, NOWHERE_FINITE, Chains, Length, Target, log_likelihood
 
 BASE = {1: 256, 2: 32}  # cells along each axis at first
 TOLERANCE = 2e-5  # of a cell's error: its share of the mass, at most, times its unevenness^2
@@ -59,8 +59,8 @@ def integrate(target: Target, budget: int = QUICK) -> Quadrature:
     """Cut the box.
 
     Modes need not be known, but to be found they must show on the first grid: as a slope of
-    the log likelihood, however small the likelihood itself. Finite log likelihoods are
-    expected; others count as zero likelihood.
+    the log likelihood, however small the likelihood itself. Where it is not finite it counts
+    as zero; the edge of such a hole takes most of the budget.
 
     Args:
         target: Of one or two parameters.
@@ -68,7 +68,7 @@ def integrate(target: Target, budget: int = QUICK) -> Quadrature:
             1024); finished earlier where all is even.
 
     Raises:
-        ValueError: more than two parameters.
+        ValueError: more than two parameters, or a log likelihood that is finite nowhere.
     """
     d = target.dimension
     if d not in BASE:
@@ -89,6 +89,8 @@ def integrate(target: Target, budget: int = QUICK) -> Quadrature:
         )
     log_mass = cells.value + d * np.log(cells.width)
     top = log_mass.max()
+    if top <= 0.5 * NOWHERE:
+        raise ValueError(NOWHERE_FINITE)
     mass = np.exp(log_mass - top)
     evidence = float(top + np.log(mass.sum()))
     return Quadrature(cells.low, cells.width, mass / mass.sum(), evidence, cells.value, spent)
@@ -139,9 +141,9 @@ def _divided(target: Target, parents: _Cells) -> _Cells:
 
 
 def _finite(target: Target, u: np.ndarray) -> np.ndarray:
-    """Log likelihood [n] at u [n, d]; a very low one where it is not finite."""
+    """Log likelihood [n] at u [n, d]; NOWHERE where it is not finite."""
     values = log_likelihood(target, u)
-    return np.where(np.isfinite(values), values, -1e300)
+    return np.where(np.isfinite(values), values, NOWHERE)
 
 
 def draw(rng: np.random.Generator, cells: Quadrature, n: int) -> tuple[np.ndarray, np.ndarray]:

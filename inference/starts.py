@@ -4,14 +4,21 @@ import jax
 import numpy as np
 
 from .population import Population, explore
-from .target import Target
+from .target import NOWHERE_FINITE, Target
 
 SEPARATE = 0.5  # gain in mean log density over one Gaussian from which on modes count as separate
 
 
 def look_around(rng: np.random.Generator, target: Target) -> Population:
-    """The population of the posterior."""
-    return explore(jax.random.key(int(rng.integers(2**31))), *target)
+    """The population of the posterior.
+
+    Raises:
+        ValueError: the log likelihood was finite nowhere.
+    """
+    found = explore(jax.random.key(int(rng.integers(2**31))), *target)
+    if not np.isfinite(found.log_likelihood).any():
+        raise ValueError(NOWHERE_FINITE)
+    return found
 
 
 def resampled(rng: np.random.Generator, found: Population, n: int) -> np.ndarray:

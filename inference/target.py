@@ -5,11 +5,16 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
-from jax.scipy.special import ndtr
 
 from .base import LogLikelihood
-from .mixture import log_prior
+from .mixture import log_prior, to_unit
 
+NOWHERE = -1e300
+"""Log density in place of none: finite, so that differences of two are numbers."""
+NOWHERE_FINITE = (
+    "the log likelihood is finite nowhere in the prior's box; nothing can be sampled. "
+    "Look at the surrogate's checks, and at the simulations that it learned from"
+)
 BATCH = 1024  # evaluations in one call, at most
 
 
@@ -42,7 +47,7 @@ def log_density(log_likelihood: LogLikelihood, state: Any, x: jax.Array) -> jax.
     The prior is uniform in u, so the Jacobian is a standard normal density: directions that
     the data leave open become standard normal, the easiest shape for a sampler.
     """
-    return log_likelihood(state, ndtr(x)) + log_prior(x[None])[0]
+    return log_likelihood(state, to_unit(x)) + log_prior(x[None])[0]
 
 
 @partial(jax.jit, static_argnums=0)
@@ -52,7 +57,7 @@ def _log_likelihoods(function: LogLikelihood, state: Any, u: jax.Array) -> jax.A
 
 def log_likelihood(target: Target, u: np.ndarray) -> np.ndarray:
     """Log likelihood [n] at u [n, d], in batches padded to powers of two up to BATCH, so that
-    few shapes are compiled."""
+    few shapes are compiled; as it is, finite or not."""
     values = np.empty(len(u))
     for start in range(0, len(u), BATCH):
         rows = u[start : start + BATCH]

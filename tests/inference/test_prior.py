@@ -49,12 +49,70 @@ def test_samples_follow_the_prior(mixed):
 
 
 @pytest.mark.parametrize(
+    ("distribution", "reference"),
+    [
+        (dist.Gamma(2.0, 3.0), stats.gamma(2.0, scale=1 / 3.0)),
+        (dist.Gamma(0.5, 3.0), stats.gamma(0.5, scale=1 / 3.0)),
+        (dist.InverseGamma(2.0, 3.0), stats.invgamma(2.0, scale=3.0)),
+        (dist.Beta(2.0, 5.0), stats.beta(2.0, 5.0)),
+        (dist.StudentT(3.0, 1.0, 2.0), stats.t(3.0, 1.0, 2.0)),
+        (dist.Weibull(2.0, 1.5), stats.weibull_min(1.5, scale=2.0)),
+        (dist.Chi2(3.0), stats.chi2(3.0)),
+        (dist.LogNormal(0.5, 1.2), stats.lognorm(1.2, scale=np.exp(0.5))),
+        (dist.HalfNormal(2.0), stats.halfnorm(scale=2.0)),
+        (dist.Exponential(2.0), stats.expon(scale=0.5)),
+        (dist.TruncatedNormal(0.0, 1.0, low=-1.0, high=2.0), stats.truncnorm(-1.0, 2.0)),
+    ],
+)
+def test_distributions_agree_with_scipy_and_their_ends_are_finite(distribution, reference):
+    prior = inference.Prior({"a": distribution})
+    u = np.array([0.0, 1e-6, 0.1, 0.5, 0.9, 1.0 - 1e-6, 1.0])[:, None]
+    theta = prior.from_unit(u)
+    np.testing.assert_allclose(theta["a"][2:5], reference.ppf(u[2:5, 0]), rtol=2e-5)
+    np.testing.assert_allclose(prior.to_unit(theta)[2:5], u[2:5], rtol=2e-5)
+    np.testing.assert_allclose(
+        prior.log_prob(theta)[1:6], reference.logpdf(theta["a"][1:6]), rtol=1e-4, atol=1e-4
+    )
+    # at quantiles 0 and 1 too: a surface over the prior must not end in infinities
+    assert np.isfinite(theta["a"]).all() and np.isfinite(prior.log_prob(theta)).all()
+
+
+def test_outside_the_support_the_density_vanishes():
+    prior = inference.Prior({"a": dist.LogNormal(0.0, 1.0), "b": dist.Gamma(2.0, 1.0)})
+    theta = {"a": [0.0, -1.0, 1.0], "b": [1.0, 1.0, 0.0]}
+    np.testing.assert_array_equal(prior.log_prob(theta), -np.inf)
+
+
+def test_units_and_descriptions_are_kept():
+    prior = inference.Prior(
+        {
+            "viscosity": dist.LogUniform(0.003, 20),
+            "tilt": dist.TruncatedNormal(0.0, 0.1, low=-0.5, high=0.5),
+            "share": dist.Beta(2.0, 2.0),
+        },
+        units={"viscosity": "Pa s", "tilt": "rad"},
+    )
+    assert prior.units == {"viscosity": "Pa s", "tilt": "rad"}
+    described = prior.describe()
+    assert described["viscosity"] == {"prior": "LogUniform(low=0.003, high=20)", "units": "Pa s"}
+    assert described["tilt"]["prior"] == "TruncatedNormal(loc=0, scale=0.1, low=-0.5, high=0.5)"
+    assert described["share"] == {"prior": "Beta(concentration1=2, concentration0=2)"}
+
+
+@pytest.mark.parametrize("units", [{"b": "m"}, {"a": 1.0}])
+def test_bad_units_are_refused(units):
+    with pytest.raises(ValueError, match="units must map some of the parameters"):
+        inference.Prior({"a": dist.Uniform(0.0, 1.0)}, units=units)
+
+
+@pytest.mark.parametrize(
     ("distributions", "message"),
     [
         ({}, "at least one parameter"),
         ({"a": 1.0}, "numpyro distribution, got float"),
         ({"a": dist.Normal(np.zeros(2), 1.0)}, r"univariate with shape \(\), got \(2,\)"),
         ({"a": dist.MultivariateNormal(np.zeros(2), np.eye(2))}, "univariate"),
+        ({"a": dist.VonMises(0.0, 1.0)}, "needs cdf and icdf, which VonMises lacks"),
         ({"seed": dist.Normal(0.0, 1.0)}, "reserved"),
     ],
 )

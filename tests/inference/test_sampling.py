@@ -10,6 +10,7 @@ from arviz_stats.base import array_stats
 from bolfi_liquids.inference import nuts, quadrature, sampling
 from bolfi_liquids.inference._float64 import in_float64
 from bolfi_liquids.inference.convergence import CONVERGED, limits
+from bolfi_liquids.inference.mixture import Mixture
 from bolfi_liquids.inference.target import Chains, Length, Target
 from scipy.stats import norm
 
@@ -120,6 +121,26 @@ def test_a_posterior_at_the_border_and_an_open_direction():
     assert_means(made.chains.u**2, [0.02**2, 1 / 3])
 
 
+@in_float64
+def test_trajectories_alone_keep_the_posterior():
+    """Jumps are proposed where the posterior is not, so that they cannot help or hide."""
+    target = gaussian(2)
+    rng = np.random.default_rng(3)
+    away = Mixture(
+        *(np.full(8, -np.log(8.0)), np.full((8, 2), 40.0)),
+        *(np.stack([np.eye(2)] * 8), np.stack([np.eye(2)] * 8), np.asarray(1.0)),
+    )
+    settings = nuts.Settings(0.08 * np.eye(2), away, 0.8, True)
+    chains = nuts.begin(norm.ppf(rng.uniform(0.44, 0.46, (4, 2))), 0.5)
+    chains, _ = nuts._draws(rng, chains, target, settings, 250)
+    _, records = nuts._draws(rng, chains, target, settings._replace(adapting=False), 1000)
+    made = nuts._as_chains(records, 2)
+    assert made.stats["jumped"].mean() < 0.01
+    assert made.stats["n_steps"].mean() > 3.0  # correlation 0.95 in a round metric
+    assert 0.7 < made.stats["acceptance_rate"].mean() < 0.95
+    assert_means(np.concatenate([made.u, (made.u - 0.45) ** 2], -1), [0.45, 0.45, 9e-4, 9e-4])
+
+
 def test_compiles_once_for_all_fits_and_lengths(line_fit, prior, observed, simulate):
     traces = []
 
@@ -220,16 +241,41 @@ def test_divergences_are_not_silent(monkeypatch):
         sample("divergent", uncorrelated())
 
 
-@pytest.mark.parametrize("draws", [50, 400, 1000])
-def test_independent_draws_pass_the_limits(draws):
-    """A thousand parameters: hardly one in a thousand is complained of for nothing."""
+@pytest.mark.parametrize("sampler", ["nuts", "emcee", "quadrature"])
+def test_a_likelihood_that_is_nowhere_finite_is_an_error(sampler):
+    with pytest.raises(ValueError, match="finite nowhere"):
+        sample(sampler, one(np.full(2, 0.5), np.full((2, 2), np.nan)), SMALL)
+
+
+def test_a_hole_in_the_likelihood_is_avoided_or_told():
+    """NaN wherever u_1 < 0.45: half of the Gaussian remains, which emcee samples; trajectories
+    break off at the edge, which NUTS must say."""
+    target = Target(right_half, uncorrelated().state, 2)
+    made = sample("emcee", target)
+    assert made.status == CONVERGED
+    assert_means(made.chains.u, [0.45 + 0.03 * np.sqrt(2.0 / np.pi), 0.45])
+    with pytest.warns(inference.SamplingWarning, match="of the transitions diverged"):
+        sample("nuts", target)
+
+
+def right_half(state, u):
+    return jnp.where(u[0] < 0.45, jnp.nan, peaks(state, u))
+
+
+@pytest.mark.parametrize(("chains", "draws"), [(2, 8), (2, 50), (4, 400), (4, 1000)])
+def test_independent_draws_pass_the_limits(chains, draws):
+    """At most one false alarm per 400 would fail with probability 0.01; chains half a standard
+    deviation apart are caught from 400 draws on."""
     rng = np.random.default_rng(0)
-    rhat, ess = limits(4, draws)
-    failed = 0
-    for _ in range(200):
-        x = rng.normal(size=(4, draws))
-        failed += array_stats.rhat(x) > rhat or array_stats.ess(x, method="bulk") < ess
-    assert failed <= 2
+    rhat, ess = limits(chains, draws)
+
+    def short(x):
+        return array_stats.rhat(x) > rhat or array_stats.ess(x, method="bulk") < ess
+
+    assert sum(short(rng.normal(size=(chains, draws))) for _ in range(200)) <= 3
+    if draws >= 400:
+        apart = 0.5 * np.arange(chains)[:, None]
+        assert all(short(apart + rng.normal(size=(chains, draws))) for _ in range(20))
 
 
 @pytest.mark.parametrize("sampler", ["nuts", "emcee", "quadrature"])
