@@ -27,7 +27,7 @@ def fit(simulate, observed):
         {"slope": dist.Uniform(-1.0, 1.0), "offset": dist.LogUniform(0.1, 2.0)},
         units={"slope": "rad/s"},
     )
-    return inference.fit(simulate, prior, observed, budget=12)
+    return inference.fit(simulate, prior, observed, budget=12, surrogate="discrepancy")
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,6 @@ from arviz_stats.base import array_stats
 from bolfi_liquids.inference import nuts, quadrature, sampling
 from bolfi_liquids.inference._float64 import in_float64
 from bolfi_liquids.inference.convergence import CONVERGED, limits
-from bolfi_liquids.inference.mixture import Mixture
 from bolfi_liquids.inference.target import Chains, Length, Target
 from scipy.stats import norm
 
@@ -119,26 +118,6 @@ def test_a_posterior_at_the_border_and_an_open_direction():
     made = sample("nuts", one(np.array([0.0, 0.5]), np.diag([1 / 0.02, 1e-3])))
     assert_means(made.chains.u, [0.02 * np.sqrt(2.0 / np.pi), 0.5])
     assert_means(made.chains.u**2, [0.02**2, 1 / 3])
-
-
-@in_float64
-def test_trajectories_alone_keep_the_posterior():
-    """Jumps are proposed where the posterior is not, so that they cannot help or hide."""
-    target = gaussian(2)
-    rng = np.random.default_rng(3)
-    away = Mixture(
-        *(np.full(8, -np.log(8.0)), np.full((8, 2), 40.0)),
-        *(np.stack([np.eye(2)] * 8), np.stack([np.eye(2)] * 8), np.asarray(1.0)),
-    )
-    settings = nuts.Settings(0.08 * np.eye(2), away, 0.8, True)
-    chains = nuts.begin(norm.ppf(rng.uniform(0.44, 0.46, (4, 2))), 0.5)
-    chains, _ = nuts._draws(rng, chains, target, settings, 250)
-    _, records = nuts._draws(rng, chains, target, settings._replace(adapting=False), 1000)
-    made = nuts._as_chains(records, 2)
-    assert made.stats["jumped"].mean() < 0.01
-    assert made.stats["n_steps"].mean() > 3.0  # correlation 0.95 in a round metric
-    assert 0.7 < made.stats["acceptance_rate"].mean() < 0.95
-    assert_means(np.concatenate([made.u, (made.u - 0.45) ** 2], -1), [0.45, 0.45, 9e-4, 9e-4])
 
 
 def test_compiles_once_for_all_fits_and_lengths(line_fit, prior, observed, simulate):
