@@ -1,13 +1,16 @@
-"""The engine's calibration: 256 data sets whose truth is known, 40 simulations for each.
+"""The engine's calibration: data sets whose truth is known, 40 simulations for each.
 
 Three simulators with a closed form, chosen for what they ask of the engine: a linear one, one
-whose noise is correlated in time, one whose posterior has two modes. Two processes, a minute or
-two for each surrogate and simulator. 256 ranks find draws 30 % too narrow always and 20 % eight
-times in ten; the standard error of a rate of 0.9 is 0.019.
+whose noise is correlated in time, one whose posterior has two modes. The draws are quadrature's,
+so that the posterior is judged and not a sampler, which has tests of its own. 256 ranks find
+draws 30 % too narrow always and 20 % eight times in ten; the standard error of a rate of 0.9 is
+0.019. `REPLICATES=256 pytest -m slow tests/inference/test_sbc_engine.py -s` is the whole of it;
+continuous integration makes do with fewer.
 """
 
 import importlib
 import multiprocessing
+import os
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -18,10 +21,10 @@ from scipy.stats import binom
 from bolfi_liquids import inference
 
 ALPHA = 1e-3  # false alarms per test; seeds are fixed, so it is met once and not each time
-REPLICATES = 256
+REPLICATES = int(os.environ.get("REPLICATES", "48"))
 BUDGET = 40
-DRAWS = 31  # independent ones, for which a sampler must give 62
-SAMPLING = {"chains": 2, "draws": 250, "warmup": 250}
+DRAWS = 31
+SAMPLING = {"sampler": "quadrature", "chains": 2, "draws": 64}
 TASKS = ("line", "decay", "bimodal")
 
 pytestmark = pytest.mark.slow
@@ -57,14 +60,22 @@ def run(toys, pool):
     return run
 
 
+def covers(made):
+    """90 % intervals cover 85 to 95 % of the truths; of few replicates, but for chance."""
+    covered, n = inference.coverage(made, levels=(0.9,)).covered, len(made)
+    low, high = 0.85 * n, 0.95 * n
+    if n < 256:
+        low, high = binom.ppf(ALPHA, n, 0.85), binom.ppf(1.0 - ALPHA, n, 0.95)
+    return ((covered >= low) & (covered <= high)).all()
+
+
 @pytest.mark.parametrize("task", TASKS)
 def test_signal_surrogate_is_calibrated(run, task):
     made = run(task, "signal")
     uniform = inference.sbc(made)
     parameters = [uniform.names.index(name) for name in made.prior.names]
     assert (uniform.chi_square[parameters] > ALPHA).all()
-    rate = inference.coverage(made, levels=(0.9,)).rate
-    assert ((rate >= 0.85) & (rate <= 0.95)).all()
+    assert covers(made)
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -74,10 +85,9 @@ def test_signal_surrogate_of_a_shared_design_is_calibrated(toys, pool, task):
     options = {"surrogate": "signal"}
     pipeline = inference.shared_design(simulate, prior, BUDGET, options=options, sampling=SAMPLING)
     made = inference.replicates(pipeline, n=REPLICATES, draws=DRAWS, executor=pool)
-    result = inference.coverage(made, levels=(0.9,))
-    print(f"\n{task}\n{inference.sbc(made)}\n{result}")
+    print(f"\n{task}\n{inference.sbc(made)}\n{inference.coverage(made)}")
     assert not made.failed, made.errors
-    assert ((result.rate >= 0.85) & (result.rate <= 0.95)).all()
+    assert covers(made)
 
 
 @pytest.mark.parametrize("task", TASKS)
