@@ -82,7 +82,7 @@ class LowerConfidenceBound:
         rng, points = generator(key), []
         while len(points) < n:
             dimension = surrogate.gp.data.u.shape[1]
-            width = jnp.asarray(exploration_width(int(surrogate.gp.data.count), dimension))
+            width = jnp.asarray(exploration_width(int(surrogate.gp.data.used), dimension))
             state = LCBState(surrogate.gp, width, feasibility)
             centre = minimise_in_box(lower_confidence_bound, state, dimension)
             points.append(truncated_normal(rng, centre, self.jitter))

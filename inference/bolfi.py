@@ -2,14 +2,14 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import acquisition as acquisitions
-from .base import Acquisition, Surrogate, Theta
+from .base import Acquisition, Theta
 from .design import sobol, start_size
 from .families import Family, Learnable, resolve
 from .feasibility import feasibility
@@ -83,7 +83,7 @@ class Bolfi:
             "initial": self.initial,
         }
         self._state = init(len(prior), self.observed.shape, self._learner.features)
-        self._learned: Surrogate | None = None
+        self._learned: Any = None  # the family's surrogate, once there is one
         self._seconds = 0.0
 
     @property
@@ -246,9 +246,8 @@ class Bolfi:
         )
 
 
-def _resolve(acquisition: str | Acquisition | None, family: Family) -> Acquisition:
-    if acquisition is None:
-        acquisition = family.acquisition
+def _resolve(given: str | Acquisition | None, family: Family) -> Acquisition:
+    acquisition: Any = family.acquisition if given is None else given
     if isinstance(acquisition, str):
         if acquisition not in acquisitions.RULES:
             raise ValueError(
@@ -258,12 +257,13 @@ def _resolve(acquisition: str | Acquisition | None, family: Family) -> Acquisiti
         acquisition = acquisitions.RULES[acquisition]()
     if not callable(acquisition):
         raise ValueError(f"acquisition must be callable, got {type(acquisition).__name__}")
-    if isinstance(acquisition, acquisitions.LowerConfidenceBound) and family.name != "discrepancy":
+    bound = isinstance(acquisition, acquisitions.LowerConfidenceBound)
+    if bound and family.name != "discrepancy":
         raise ValueError(
             f"the acquisition 'lcb' needs surrogate='discrepancy', got {family.name!r}; use one "
             f"of {tuple(name for name in acquisitions.RULES if name != 'lcb')}"
         )
-    return acquisition
+    return cast(Acquisition, acquisition)
 
 
 def checked_integer(name: str, value: object, least: int = 1) -> int:

@@ -139,7 +139,7 @@ def believe(gp: GP, u: np.ndarray) -> GP:
     Raises:
         ValueError: more rows than are reserved.
     """
-    n, (rows, dimension) = int(gp.data.count), gp.data.u.shape
+    n, (rows, dimension) = int(gp.data.used), gp.data.u.shape
     if n + len(u) > rows:
         raise ValueError(f"{n} simulations and {len(u)} pending ones exceed the {rows} reserved")
     # one shape, whatever the number of points
@@ -212,7 +212,7 @@ def _with_threshold(
     def at_minimum() -> tuple[float, float]:
         data = learned.gp.data
         mean, sd = learned.predict(np.asarray(data.u) if among_data else learned.minimum()[None])
-        best = np.argmin(mean[: int(data.count)])
+        best = np.argmin(mean[: int(data.used)])
         return float(mean[best]), float(sd[best])
 
     threshold = choose_threshold(rule, learned.discrepancy, learned.transform, at_minimum)
@@ -226,7 +226,7 @@ def marginalised(
     """The surrogate with one process for each of `draws` posterior draws of the hyperparameters."""
     hyper = posterior_draws(surrogate.gp.data, draws, seed)
     data = surrogate.gp.data
-    spread = Data(data.u, jnp.tile(data.y, (draws, 1)), data.count)
+    spread = Data(data.u, jnp.tile(data.y, (draws, 1)), data.used)
     return _with_threshold(replace(surrogate, gp=_condition(hyper, spread)), rule)
 
 

@@ -1,6 +1,6 @@
 """Independent Gaussian processes over the same inputs, on arrays of a fixed shape.
 
-Shapes: k processes; p rows, of which the first `count` are in use; d inputs u in [0, 1].
+Shapes: k processes; p rows, of which the first `used` are in use; d inputs u in [0, 1].
 What is not in use never changes a result (tests), so one compilation serves while data grow.
 """
 
@@ -22,7 +22,7 @@ LEAST = 1e-10  # latent variance, which rounding may make negative
 class Data(NamedTuple):
     u: jax.Array  # [p, d]
     y: jax.Array  # [k, p], standardised; 0 where not in use
-    count: jax.Array  # int []
+    used: jax.Array  # int []
 
 
 class Hyper(NamedTuple):
@@ -89,7 +89,7 @@ def condition(hyper: Hyper, data: Data) -> GP:
     """The processes given the data; explicit inverse factors make prediction a product."""
 
     def one(hyper: Hyper, y: jax.Array) -> tuple[jax.Array, jax.Array]:
-        whitener = inverse_cholesky(gram(hyper, data.u, data.count), data.count)
+        whitener = inverse_cholesky(gram(hyper, data.u, data.used), data.used)
         return whitener, (whitener @ y) @ whitener
 
     return GP(hyper, data, *jax.vmap(one)(hyper, data.y))
@@ -99,22 +99,22 @@ def append_mean(gp: GP, u: jax.Array, extra: jax.Array) -> GP:
     """The processes after their own mean at the first `extra` rows of u [q, d] came true.
 
     The kriging believer of Ginsbourger et al. (2010): the mean stays, the variance shrinks.
-    There must be room: count + extra <= p.
+    There must be room: used + extra <= p.
     """
     p, q = gp.data.u.shape[0], u.shape[0]
     mean = predict_many(gp, u)[0]
-    source = jnp.arange(p) - gp.data.count
+    source = jnp.arange(p) - gp.data.used
     new = (source >= 0) & (source < extra)
     at = jnp.clip(source, 0, q - 1)
     points = jnp.where(new[:, None], u[at], gp.data.u)
     targets = jnp.where(new, mean[:, at], gp.data.y)
-    return condition(gp.hyper, Data(points, targets, gp.data.count + extra))
+    return condition(gp.hyper, Data(points, targets, gp.data.used + extra))
 
 
 def _cross(gp: GP, u: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Covariance [k, p, m] of the latent functions at the data and at u [m, d]; the variance
     [k, m] at u alone."""
-    used = (jnp.arange(gp.data.u.shape[0]) < gp.data.count)[:, None]
+    used = (jnp.arange(gp.data.u.shape[0]) < gp.data.used)[:, None]
     cross = jax.vmap(covariance, (0, None, None))(gp.hyper, gp.data.u, u) * used
     trends = TREND_SD**2 * jnp.sum(trend(u) ** 2, -1)
     return cross, jnp.exp(2.0 * gp.hyper.log_amplitude)[:, None] + trends
@@ -145,9 +145,9 @@ def log_marginal_likelihood(hyper: Hyper, data: Data) -> jax.Array:
     """log p(y | hyper) [k], trend integrated out (Rasmussen and Williams 2006, eq. 2.30)."""
 
     def one(hyper: Hyper, y: jax.Array) -> jax.Array:
-        return log_normal_density(gram(hyper, data.u, data.count), y, data.count)
+        return log_normal_density(gram(hyper, data.u, data.used), y, data.used)
 
-    return jax.vmap(one)(hyper, data.y) - 0.5 * data.count * jnp.log(2.0 * jnp.pi)
+    return jax.vmap(one)(hyper, data.y) - 0.5 * data.used * jnp.log(2.0 * jnp.pi)
 
 
 def leave_one_out(gp: GP) -> tuple[jax.Array, jax.Array]:

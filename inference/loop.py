@@ -94,7 +94,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
     batch = checked_integer("batch", batch)
     budget = checked_integer("budget", budget, MIN_LEARN if earlier is None else 0)
     _check_timeout(timeout)
-    told = 0 if earlier is None else len(earlier[1])
+    told = 0 if earlier is None else len(np.atleast_1d(np.asarray(earlier[1])))
     if initial is None:
         initial = max(MIN_LEARN, min(start_size(len(prior)), budget + told))
     engine = Bolfi(

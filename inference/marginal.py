@@ -17,7 +17,7 @@ CHAINS, WARMUP = 2, 300
 def log_evidence(data: Data, v: jax.Array) -> jax.Array:
     """log p(y | hyper) of one process, at prior quantiles v [d + 2] of its hyperparameters."""
     mean, sd = prior_moments(data.u.shape[1])
-    return log_marginal_likelihood(unpack((mean + sd * ndtri(v))[None]), data)[0]
+    return log_marginal_likelihood(unpack(jnp.asarray(mean + sd * ndtri(v))[None]), data)[0]
 
 
 def posterior_draws(data: Data, draws: int, seed: int) -> Hyper:

@@ -26,10 +26,10 @@ class Remainder(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """Where the m values lie: in channel `channel`, at sample `index`; sorted by both."""
+    """Where the m values lie: in channel `channel`, at `sample`; sorted by both."""
 
     channel: np.ndarray  # int [m]
-    index: np.ndarray  # int [m]
+    sample: np.ndarray  # int [m]
 
 
 class Nodes(NamedTuple):
@@ -109,7 +109,7 @@ def reduce(
     k, used = vectors.shape[1], int(np.any(vectors, 0).sum())
     floor = 1e-12 * float(np.mean(vectors**2))  # where nothing at all is noisy
     fresh = np.diff(layout.channel, prepend=-1) != 0
-    gap = np.where(fresh, 0, np.diff(layout.index, prepend=0))
+    gap = np.where(fresh, 0, np.diff(layout.sample, prepend=0))
     result, log_det = whiten(
         jnp.asarray(np.column_stack([vectors, observed, factors])),
         jnp.asarray(white + floor),
@@ -144,7 +144,7 @@ def correlated(white: np.ndarray, layout: Layout, nodes: Nodes) -> np.ndarray:
     sigma, rho = nodes
     for i in range(white.shape[1]):
         fresh = i == 0 or layout.channel[i] != layout.channel[i - 1]
-        decay = 0.0 if fresh else rho ** (layout.index[i] - layout.index[i - 1])
+        decay = 0.0 if fresh else rho ** (layout.sample[i] - layout.sample[i - 1])
         before = 0.0 if fresh else noise[:, i - 1]
         noise[:, i] = decay * before + sigma * np.sqrt(1.0 - decay**2) * white[:, i]
     return noise

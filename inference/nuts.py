@@ -138,7 +138,8 @@ def sample_nuts(rng: np.random.Generator, target: Target, length: Length) -> Ite
     found = look_around(rng, target)
     start = resampled(rng, found, length.chains)
     poor = float(found.effective) < POOR
-    guide = Guide(local_factor(found) if poor else spread_factor(found), found.mixture)
+    factor = local_factor(found) if poor else spread_factor(found)
+    guide = Guide(jnp.asarray(factor), found.mixture)
     blocks = _blocks(rng, target, guide, start, length.warmup)
     if poor:
         first = _take(blocks, length.warmup, [])
@@ -187,7 +188,7 @@ def _mended(guide: Guide, x: np.ndarray) -> Guide:
     within = (x - x.mean(1, keepdims=True)).reshape(flat.shape)
     covariance = within.T @ within / len(within)
     floor = 1e-3 * guide.factor @ guide.factor.T
-    return Guide(np.linalg.cholesky(covariance + floor), mixture)
+    return Guide(jnp.asarray(np.linalg.cholesky(covariance + floor)), mixture)
 
 
 _refit = jax.jit(fit_mixture)

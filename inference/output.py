@@ -95,7 +95,7 @@ def describe(observed: np.ndarray, summary: Summary | None) -> Output:
     layout = _positions(summarised.shape, present, series)
     block = -(-len(present) // LONGEST) if series else 1
     starts = _block_starts(layout, block)
-    layout = Layout(layout.channel[starts], layout.index[starts] // block)
+    layout = Layout(layout.channel[starts], layout.sample[starts] // block)
     return Output(summary, summarised.shape, present, layout, starts, series)
 
 
@@ -109,6 +109,6 @@ def _positions(shape: tuple[int, ...], present: np.ndarray, series: bool) -> Lay
 
 def _block_starts(layout: Layout, block: int) -> np.ndarray:
     """First rows of runs of samples of one channel and one block of time."""
-    key = layout.index // block
+    key = layout.sample // block
     new = (np.diff(layout.channel, prepend=-1) != 0) | (np.diff(key, prepend=-1) != 0)
     return np.flatnonzero(new)

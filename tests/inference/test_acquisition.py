@@ -34,7 +34,7 @@ def fitted(n=12, noise=0.0, rule=None):
 
 
 def all_succeed(surrogate):
-    n = int(surrogate.gp.data.count)
+    n = int(surrogate.gp.data.used)
     return feasibility(np.asarray(surrogate.gp.data.u)[:n], np.ones(n, bool), ROWS)
 
 

@@ -25,7 +25,7 @@ def float64():
 
 def dense(layout, sigma, rho):
     """sigma^2 rho^|gap| within a channel, by definition."""
-    gap = np.abs(layout.index[:, None] - layout.index)
+    gap = np.abs(layout.sample[:, None] - layout.sample)
     return sigma**2 * np.where(layout.channel[:, None] == layout.channel, rho**gap, 0.0)
 
 

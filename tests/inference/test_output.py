@@ -12,7 +12,7 @@ def test_channels_follow_each_other_and_missing_samples_are_left_out():
     np.testing.assert_array_equal(values[:20], np.arange(0.0, 40.0, 2.0))
     np.testing.assert_array_equal(values[20:24], [1.0, 3.0, 5.0, 9.0])
     assert (output.layout.channel == np.repeat([0, 1], [20, 18])).all()
-    assert list(output.layout.index[20:24]) == [0, 1, 2, 4]
+    assert list(output.layout.sample[20:24]) == [0, 1, 2, 4]
     restored = output.restore(values[None])[0]
     np.testing.assert_array_equal(np.isnan(restored), np.isnan(observed))
     np.testing.assert_array_equal(restored[np.isfinite(observed)], observed[np.isfinite(observed)])
