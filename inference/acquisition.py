@@ -189,12 +189,19 @@ def best_candidates(
     points: list[np.ndarray] = []
     while len(points) < n:
         scores = score(rng, surrogate, found) + found.log_feasible
-        for point in points:
-            scores[(found.u == point).all(-1)] = -np.inf
+        scores = np.where(np.isnan(scores) | _taken(found.u, points), -np.inf, scores)
+        if not np.isfinite(scores).any():  # all chosen: look for others
+            found = candidates(rng, surrogate, feasibility)
+            scores = np.where(_taken(found.u, points), -np.inf, rng.uniform(size=len(found.u)))
         points.append(found.u[np.argmax(scores)])
         if len(points) < n:
             surrogate = surrogate.believe(points[-1][None])
     return np.stack(points)
+
+
+def _taken(u: np.ndarray, points: list[np.ndarray]) -> np.ndarray:
+    """Which rows of u [n, d] are among `points`."""
+    return np.any([(u == point).all(-1) for point in points] or [np.zeros(len(u), bool)], axis=0)
 
 
 @dataclass(frozen=True)

@@ -34,8 +34,8 @@ class Bolfi:
         prior: The parameters and their priors.
         observed: The measured output [*signal_shape], time first; NaN is a missing sample.
         surrogate: "signal", which emulates the output; "discrepancy", the paper's; a
-            `SignalFamily` or `DiscrepancyFamily`; None is "signal" where the output is a
-            vector and no option of "discrepancy" is given.
+            `SignalFamily` or `DiscrepancyFamily`; None is "signal", unless a discrepancy, or
+            another option of that family alone, is given.
         acquisition: "eiv", "maxvar", "draws", "lcb" (with "discrepancy"), an object (see
             `Acquisition`), or None for the surrogate's best.
         seed: Fixes the start design and the acquisitions.

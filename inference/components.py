@@ -44,6 +44,8 @@ def principal_components(
     """
     centre = outputs.mean(0)
     standard = (outputs - centre) / scale
+    # what varies by rounding error alone does not vary
+    standard = np.where(np.abs(outputs - centre) > 1e-12 * np.abs(outputs), standard, 0.0)
     n, m = standard.shape
     # from the smaller side: n simulations of m >> n values
     values, left = np.linalg.eigh(standard @ standard.T / n)

@@ -22,11 +22,9 @@ from .likelihood import (
 )
 from .marginal import posterior_draws
 from .optimise import minimise_in_box
+from .sane import sane
 from .transform import Transform, candidates
 
-LARGEST = 1e6
-"""Discrepancies beyond so many medians are learned as the largest of the others: the process
-need not follow a simulation that blew up, but shall know that it is bad there."""
 GROWTH = 1.3  # hyperparameters are found anew when data have grown by this factor,
 RETHINK = 3.0  # and the transform is chosen anew when they have by this one
 
@@ -158,8 +156,10 @@ def learn(
 ) -> DiscrepancySurrogate:
     """Fit the surrogate.
 
-    Of the transforms identity, sqrt and log the one with the highest leave-one-out log
-    predictive density of the discrepancy itself (Jacobian included) is taken, unless given.
+    A run that blew up is learned as the worst of the others: the process need not follow it, but
+    shall know that it is bad there. Of the transforms identity, sqrt and log the one with the
+    highest leave-one-out log predictive density of the discrepancy itself (Jacobian included)
+    is taken, unless given.
 
     Args:
         u: Prior quantiles [n, d].
@@ -173,10 +173,10 @@ def learn(
     Raises:
         ValueError: bad transform or threshold.
     """
-    sane = discrepancy <= LARGEST * np.median(np.abs(discrepancy))
-    values = np.minimum(discrepancy, discrepancy[sane].max(initial=-np.inf))
+    values = np.minimum(discrepancy, discrepancy[sane(discrepancy)].max())
     n = len(u)
-    if previous is not None and n < RETHINK * previous.chosen_at:
+    old = previous is not None and np.isfinite(previous.scale(values)).all()
+    if previous is not None and old and n < RETHINK * previous.chosen_at:
         data = pad(u, previous.scale(values)[None], rows)
         hyper, learned_at = previous.gp.hyper, previous.learned_at
         if n >= GROWTH * learned_at:

@@ -12,11 +12,11 @@ from .discrepancy_surrogate import DiscrepancySurrogate, learn, marginalised
 from .emulator import emulate
 from .likelihood import Threshold, check_rule
 from .output import Output, Summary, describe
+from .sane import sane
 from .signal_surrogate import SignalSurrogate, observe
 from .transform import TRANSFORMS
 
 COMPONENTS = 8
-LARGEST = 1e6  # an output farther than so many median discrepancies blew up, and is not learned
 
 
 class Learnable(NamedTuple):
@@ -136,6 +136,8 @@ class SignalFamily:
             return None
         given, samples = np.asarray(self.noise, np.float64), len(output.present)
         if given.ndim < 2 and given.size in (1, samples):
+            if not (np.isfinite(given) & (given >= 0.0)).all():
+                raise ValueError("noise must be finite and not negative")
             full = np.diag(np.broadcast_to(given, samples) ** 2)
         elif given.shape == (samples, samples):
             full = given
@@ -144,8 +146,9 @@ class SignalFamily:
                 f"noise must be a number, [{samples}] sds or a [{samples}, {samples}] covariance "
                 f"of the finite observed values, got shape {given.shape}"
             )
-        if not (np.isfinite(full).all() and (np.diag(full) >= 0).all()):
-            raise ValueError("noise must be finite and not negative")
+        symmetric = np.isfinite(full).all() and np.allclose(full, full.T)
+        if not (symmetric and np.linalg.eigvalsh(full)[0] >= -1e-9 * np.abs(full).max()):
+            raise ValueError("noise must be a finite, symmetric, positive semidefinite covariance")
         # rows and columns in the order of the values, then averaged as they are
         order = np.argsort(np.argsort(output.present))
         return output.average(output.average(full[np.ix_(order, order)]).T)
@@ -183,12 +186,11 @@ class SignalLearner:
     def learn(
         self, known: Learnable, rows: int, previous: SignalSurrogate | None
     ) -> SignalSurrogate:
-        largest = LARGEST * np.median(known.discrepancy)
-        sane = known.discrepancy <= largest
-        features = known.features[sane]
+        learnable = sane(known.discrepancy)
+        features = known.features[learnable]
         old = None if previous is None else previous.emulator
         scale = self.output.scale(features) if old is None else old.basis.scale
-        emulator = emulate(known.u[sane], features, scale, self.family.components, rows, old)
+        emulator = emulate(known.u[learnable], features, scale, self.family.components, rows, old)
         kept = previous if old is not None and emulator.learned_at == old.learned_at else None
         return observe(emulator, self.output, self.values, self.noise, kept)
 
@@ -208,8 +210,7 @@ FAMILIES: dict[str, type[Family]] = {
 def resolve(surrogate: str | Family | None, observed: np.ndarray, options: dict) -> Family:
     """The family that `fit`'s arguments `surrogate` and `options` name.
 
-    None is "signal" where the output is a vector, and "discrepancy" where it is a number or an
-    option of that family alone is given.
+    None is "signal", unless a discrepancy, or another option of that family alone, is given.
 
     Raises:
         ValueError: unknown name, or an option that the family has not.
@@ -219,9 +220,10 @@ def resolve(surrogate: str | Family | None, observed: np.ndarray, options: dict)
             raise ValueError(f"give {tuple(options)} to {surrogate!r} itself")
         return surrogate
     if surrogate is None:
-        scalar = observed.size == 1 and "summary" not in options
-        alone = _options("discrepancy") - _options("signal") | {"discrepancy"}
-        surrogate = "discrepancy" if scalar or alone & options.keys() else "signal"
+        for_discrepancy = (_options("discrepancy") - _options("signal")) | {"discrepancy"}
+        for_signal = _options("signal") - _options("discrepancy")
+        paper = bool(for_discrepancy & options.keys()) and not for_signal & options.keys()
+        surrogate = "discrepancy" if paper else "signal"
     if surrogate not in FAMILIES:
         raise ValueError(f"surrogate must be one of {tuple(FAMILIES)} or None, got {surrogate!r}")
     unknown = options.keys() - _options(surrogate)

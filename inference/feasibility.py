@@ -6,6 +6,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ._float64 import in_float64
+
 WIDTH = 0.1  # in prior quantiles
 HOPE = 0.05  # successes that are assumed everywhere
 
@@ -18,6 +20,7 @@ class Feasibility(NamedTuple):
     failed: jax.Array  # [p], 1 or 0; 0 where not in use
 
 
+@in_float64
 def feasibility(u: np.ndarray, succeeded: np.ndarray, rows: int) -> Feasibility:
     """u [n, d], succeeded bool [n]."""
     extra = rows - len(u)

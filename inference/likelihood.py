@@ -38,6 +38,8 @@ TAIL = -30.0
 RULES = ("min_mean", "min_observed")
 DEFAULT = Predicted(0.25)
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(12)
+LEGENDRE = np.polynomial.legendre.leggauss(12)
+NEAR = -4.0
 
 
 def log_likelihood(state: ThresholdState, u: jax.Array) -> jax.Array:
@@ -63,8 +65,9 @@ def log_second_moment(state: ThresholdState, u: jax.Array, spread: jax.Array | N
     `spread` is the latent variance now (None), which gives the second moment of the unknown
     likelihood (Jarvenpaa et al. 2019, MaxVar), or that part of it which further simulations
     will resolve (their expected integrated variance). Both are the chance that two variables
-    of correlation r = spread / sigma^2 lie below z: E_w[Phi((z + sqrt(r) w) / sqrt(1 - r))^2],
-    by Gauss and Hermite about the integrand's peak, in logs.
+    of correlation r = spread / sigma^2 lie below z: Phi(z) - 2 T(z, sqrt((1 - r) / (1 + r))),
+    Owen's T by Gauss and Legendre; below NEAR, where that cancels,
+    E_w[Phi((z + sqrt(r) w) / sqrt(1 - r))^2] by Gauss and Hermite about the integrand's peak.
     """
     z, noisy = _standardised(state, u)
     latent = noisy - jnp.exp(2.0 * state.gp.hyper.log_noise)
@@ -75,7 +78,19 @@ def log_second_moment(state: ThresholdState, u: jax.Array, spread: jax.Array | N
     w = peak + width * NODES
     inside = 2.0 * log_cdf((z + jnp.sqrt(r) * w) / jnp.sqrt(1.0 - r)) + norm.logpdf(w)
     log_terms = inside - norm.logpdf(NODES) + jnp.log(width * WEIGHTS / jnp.sqrt(2.0 * jnp.pi))
-    return logsumexp(log_terms) - jnp.log(z.shape[0])
+    tail = logsumexp(log_terms, axis=1)
+    both = jnp.where(z[:, 0] > NEAR, _log_both(z[:, 0], r[:, 0]), tail)
+    return logsumexp(both) - jnp.log(z.shape[0])
+
+
+def _log_both(z: jax.Array, r: jax.Array) -> jax.Array:
+    """Log chance that two standard normals of correlation r lie below z, for z > NEAR."""
+    a = jnp.sqrt((1.0 - r) / (1.0 + r))[:, None]
+    x = a * (LEGENDRE[0] + 1.0) / 2.0
+    near = jnp.maximum(z, NEAR)[:, None]
+    integrand = jnp.exp(-0.5 * near**2 * (1.0 + x**2)) / (1.0 + x**2)
+    owen = jnp.sum(LEGENDRE[1] * integrand * a / 2.0, axis=1) / (2.0 * jnp.pi)
+    return jnp.log(jnp.maximum(norm.cdf(near[:, 0]) - 2.0 * owen, 1e-30))
 
 
 @jax.custom_jvp

@@ -63,7 +63,9 @@ class Output:
 
     def scale(self, values: np.ndarray) -> np.ndarray:
         """What makes values [n, m] comparable, [m]: the sd of a series' channel, or of a value."""
-        variance = values.var(0)
+        variance = (values - values[0]).var(0)
+        rounding = 1e-12 * np.abs(values).max(0)
+        variance = np.where(variance > rounding**2, variance, 0.0)
         if self.series:
             channel = self.layout.channel
             mean = np.bincount(channel, variance) / np.bincount(channel)
@@ -87,7 +89,8 @@ def describe(observed: np.ndarray, summary: Summary | None) -> Output:
     finite = np.isfinite(summarised)
     if not finite.any():
         raise ValueError("observed must have a finite value, got none")
-    series = summary is None and summarised.shape[0] >= SERIES
+    filled = finite.reshape(len(finite), -1).any(1).sum()
+    series = summary is None and filled >= SERIES
     # channel after channel, time inside
     index = np.arange(summarised.size).reshape(summarised.shape)
     index = np.moveaxis(index, 0, -1).ravel() if series else index.ravel()

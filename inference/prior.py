@@ -154,6 +154,8 @@ def _quantile(univariate: Univariate, u: np.ndarray) -> np.ndarray:
 
 @in_float64
 def _checked(name: str, distribution: object) -> Univariate:
+    if not isinstance(name, str) or not name or "/" in name:
+        raise ValueError(f"a parameter's name must be text without '/', got {name!r}")
     if name in RESERVED:
         raise ValueError(f"parameter name {name!r} is reserved for results; choose another")
     if not isinstance(distribution, dist.Distribution):

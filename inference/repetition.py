@@ -20,7 +20,7 @@ def next_replicate(history: History, pending: np.ndarray) -> np.ndarray | None:
     """
     good = history.succeeded
     theta, features = history.theta[good], history.features[good]
-    known = np.concatenate([theta, pending])
+    known = np.concatenate([history.theta, pending])  # a replicate that failed was tried
     points, count = np.unique(known, axis=0, return_counts=True)
     repeated = points[count > 1]
     wanted = max(FIRST, int(SHARE * len(known)))
@@ -36,5 +36,6 @@ def _deterministic(theta: np.ndarray, features: np.ndarray, repeated: np.ndarray
     """Whether the runs at FIRST or more repeated points are equal."""
     groups = [features[(theta == point).all(1)] for point in repeated]
     told = [group for group in groups if len(group) > 1]
-    differences = [np.abs(group - group[0]).max() for group in told]
-    return len(told) >= FIRST and max(differences) <= SAME * features.std(0).max()
+    tolerance = SAME * features.std(0)
+    equal = [(np.abs(group - group[0]).max(0) <= tolerance).all() for group in told]
+    return len(told) >= FIRST and all(equal)

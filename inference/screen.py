@@ -63,7 +63,9 @@ def screen(shifts: jax.Array, log_target: LogLikelihood, state: Any) -> Screen:
         found = jax.vmap(log_target, (None, 0))(state, ndtr(new))
         found = jnp.where(jnp.isfinite(found), found, -jnp.inf)
         values = jax.lax.dynamic_update_slice(values, found, (i * ROUND,))
-        return x, values, jnp.logaddexp(mass, _log_density(kernel, x, i < EVEN))
+        filled = jnp.arange(n) < (i + 1) * ROUND
+        density = _log_density(kernel, x, i < EVEN)
+        return x, values, jnp.where(filled, jnp.logaddexp(mass, density), -jnp.inf)
 
     # the mass of later kernels at earlier points counts, and of earlier ones at later points is
     # bounded by the prior's share: cheap, and enough for choosing

@@ -39,6 +39,7 @@ class SignalSurrogate:
         emulator: Of the outputs.
         output: How outputs become values.
         observed: The observed values [m].
+        known: Covariance [m, m] of the measurement noise, where the user gave it.
         nodes: Sizes and correlations of the measurement noise, KEPT of them.
         reduced: The observed scores at each, with the scores' run-to-run noise.
     """
@@ -46,6 +47,7 @@ class SignalSurrogate:
     emulator: Emulator
     output: Output
     observed: np.ndarray
+    known: np.ndarray | None
     nodes: Nodes
     reduced: Reduced
 
@@ -91,12 +93,15 @@ class SignalSurrogate:
     def constants(self) -> dict[str, np.ndarray]:
         """What a reader of the posterior must know of the likelihood."""
         weights = self.node_weights
+        sd = weights @ self.nodes.sigma * self.emulator.basis.scale[0]
+        if self.known is not None:
+            sd = np.sqrt(self.known[0, 0])
         return {
             "components": np.asarray(self.emulator.basis.used),
             "explained_variance": np.asarray(self.emulator.basis.explained),
             "run_to_run_noise_share": np.asarray(noise_share(self.emulator)),
-            # of the output's first channel; a channel's noise is in proportion to its scale
-            "measurement_noise_sd": weights @ self.nodes.sigma * self.emulator.basis.scale[0],
+            # of the output's first value; a channel's noise is in proportion to its scale
+            "measurement_noise_sd": np.asarray(sd),
             "measurement_noise_correlation": weights @ self.nodes.rho,
         }
 
@@ -133,6 +138,8 @@ class SignalSurrogate:
         white = np.asarray(jax.random.normal(noise_key, values.shape))
         noise = correlated(white, self.output.layout, nodes)
         values = values + self.emulator.basis.scale * noise
+        if self.known is not None:
+            values = values + white @ _root(self.known).T
         return {"signal": self.output.restore(values)}
 
 
@@ -174,8 +181,16 @@ def observe(
     basis, remainder = emulator.basis, emulator.remainder
     target, used = basis.standardise(observed), emulator.basis.used
     vectors, factors = basis.vectors, remainder.factors
+    white = np.full(len(target), remainder.white)
     if noise is not None:
-        factors = np.column_stack([factors, _root(noise / np.outer(basis.scale, basis.scale))])
+        standard = noise / np.outer(basis.scale, basis.scale)
+        diagonal = np.diag(standard)
+        if np.array_equal(standard, np.diag(diagonal)):
+            white = white + diagonal
+        else:  # much of it as white noise, lest rounding rule where factors alone are noisy
+            least = 0.9 * max(float(np.linalg.eigvalsh(standard)[0]), 0.0)
+            white = white + least
+            factors = np.column_stack([factors, _root(standard - least * np.eye(len(target)))])
     if previous is not None:
         nodes = previous.nodes
     elif noise is not None or not output.series or used == 0:
@@ -185,13 +200,12 @@ def observe(
     if used == 0:  # every output is the same: nothing to compare
         reduced = Reduced(np.zeros((1, 0)), np.zeros((1, 0, 0)), np.zeros(1))
     else:
-        white = np.full(len(target), remainder.white)
         reduced = reduce((vectors, target, factors), white, output.layout, nodes)
     reduced = _widen(reduced, emulator)
     kept = _keep(emulator, reduced)
     reduced = _pad(Reduced(*(part[kept] for part in reduced)))
     nodes = Nodes(*(np.resize(part[kept], KEPT) for part in nodes))
-    return SignalSurrogate(emulator, output, observed, nodes, reduced)
+    return SignalSurrogate(emulator, output, observed, noise, nodes, reduced)
 
 
 def _root(covariance: np.ndarray) -> np.ndarray:

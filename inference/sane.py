@@ -1,0 +1,13 @@
+"""Runs that ended, but blew up."""
+
+import numpy as np
+
+FARTHEST = 1e6  # median deviations
+
+
+def sane(discrepancy: np.ndarray) -> np.ndarray:
+    """Which of the discrepancies [n] are not absurdly larger than the others, bool [n]."""
+    centre = np.median(discrepancy)
+    deviation = np.abs(discrepancy - centre)
+    spread = np.median(deviation)
+    return (discrepancy <= centre + FARTHEST * spread) | (spread == 0.0)
