@@ -66,7 +66,8 @@ def test_measures_are_kept_where_they_belong(tree):
     attrs = posterior["slope"].attrs
     assert attrs["rhat"] == pytest.approx(float(array_stats.rhat(slope)))
     assert attrs["mcse_mean"] == pytest.approx(slope.std() / np.sqrt(attrs["ess_bulk"]), rel=0.3)
-    assert attrs["mcse_q05"] > attrs["mcse_mean"]  # a tail quantile is harder than a mean
+    # a tail quantile is harder than a mean, on one side at least
+    assert max(attrs["mcse_q05"], attrs["mcse_q95"]) > attrs["mcse_mean"]
     assert posterior.attrs["rhat_max"] == max(v.attrs["rhat"] for v in posterior.values())
     assert posterior.attrs["ess_tail_min"] == min(v.attrs["ess_tail"] for v in posterior.values())
     assert posterior.attrs["divergences"] == int(tree["sample_stats"].diverging.sum())
