@@ -13,7 +13,7 @@ from .progress import Simulate, progress_bar, reported
 from .provenance import run_record
 from .recordings import Recording, open_recording
 from .run_directory import POSTERIOR, enter_run, open_bank
-from .settings import CalibrationSettings
+from .settings import MIN_SIMULATIONS, CalibrationSettings
 from .stirring import Stirring, stirring_of
 from .summary import write_section
 
@@ -121,6 +121,8 @@ def _fit(
 ) -> "Fit":
     from . import inference
 
+    # with the paper's surrogate go its acquisition and threshold, on which results were measured
+    paper = {"acquisition": "lcb", "threshold": "min_mean", "initial": MIN_SIMULATIONS}
     return inference.fit(
         simulate,
         prior,
@@ -132,6 +134,7 @@ def _fit(
         discrepancy=stirring.discrepancy(),
         bank=keep.bank,
         identity=keep.identity,
+        **(paper if settings.surrogate == "discrepancy" else {}),
     )
 
 
