@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .calibration import Calibration, is_calibrated
 from .calibration_section import calibration_section
@@ -122,7 +122,11 @@ def _fit(
     from . import inference
 
     # with the paper's surrogate go its acquisition and threshold, on which results were measured
-    paper = {"acquisition": "lcb", "threshold": "min_mean", "initial": MIN_SIMULATIONS}
+    paper: dict[str, Any] = {
+        "acquisition": "lcb",
+        "threshold": "min_mean",
+        "initial": MIN_SIMULATIONS,
+    }
     return inference.fit(
         simulate,
         prior,
