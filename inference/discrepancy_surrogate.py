@@ -10,8 +10,9 @@ import numpy as np
 
 from ._float64 import in_float64
 from .base import LogLikelihood, LogSecondMoment
+from .compiled import GROWTH, believe, condition, leave_one_out, predict
 from .emulator_checks import complaints
-from .gp import GP, Data, append_mean, condition, leave_one_out, pad, predict_many
+from .gp import GP, Data, pad, predict_many
 from .hyper import maximum_a_posteriori
 from .likelihood import (
     Threshold,
@@ -25,13 +26,7 @@ from .optimise import minimise_in_box
 from .sane import sane
 from .transform import Transform, candidates
 
-GROWTH = 1.3  # hyperparameters are found anew when data have grown by this factor,
-RETHINK = 3.0  # and the transform is chosen anew when they have by this one
-
-_condition = jax.jit(condition)
-_leave_one_out = jax.jit(leave_one_out)
-_predict = jax.jit(predict_many)
-_append_mean = jax.jit(append_mean)
+RETHINK = 3.0  # the transform is chosen anew when data have grown by this factor
 
 
 class Scale(NamedTuple):
@@ -87,7 +82,7 @@ class DiscrepancySurrogate:
     @in_float64
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new g(Delta), its noise included, at quantiles u [n, d]: [n], [n]."""
-        mean, variance = (np.asarray(part) for part in _predict(self.gp, jnp.asarray(u, float)))
+        mean, variance = (np.asarray(part) for part in predict(self.gp, jnp.asarray(u, float)))
         noisy = variance + np.exp(2.0 * np.asarray(self.gp.hyper.log_noise))[:, None]
         centre = mean.mean(0)
         sd = np.sqrt(noisy.mean(0) + mean.var(0))
@@ -110,7 +105,7 @@ class DiscrepancySurrogate:
     @in_float64
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised leave-one-out errors `loo_z` [n, 1]."""
-        mean, variance = (np.asarray(part) for part in _leave_one_out(self.gp))
+        mean, variance = (np.asarray(part) for part in leave_one_out(self.gp))
         n = len(self.discrepancy)
         z = (np.asarray(self.gp.data.y) - mean)[:, :n] / np.sqrt(variance[:, :n])
         return {"loo_z": z.mean(0)[:, None]}
@@ -129,20 +124,6 @@ class DiscrepancySurrogate:
 
 def _mean(gp: GP, u: jax.Array) -> jax.Array:
     return jnp.mean(predict_many(gp, u[None])[0])
-
-
-def believe(gp: GP, u: np.ndarray) -> GP:
-    """The processes after their own predictions at u [n, d] came true.
-
-    Raises:
-        ValueError: more rows than are reserved.
-    """
-    n, (rows, dimension) = int(gp.data.used), gp.data.u.shape
-    if n + len(u) > rows:
-        raise ValueError(f"{n} simulations and {len(u)} pending ones exceed the {rows} reserved")
-    # one shape, whatever the number of points
-    padded = np.concatenate([u, np.full((rows - len(u), dimension), 0.5)])
-    return _append_mean(gp, jnp.asarray(padded), jnp.asarray(len(u)))
 
 
 @in_float64
@@ -168,7 +149,7 @@ def learn(
         transform: A name, or None to choose.
         rule: For the threshold, see `likelihood.choose_threshold`.
         previous: Learned from the first of these data; its hyperparameters are kept until the
-            data have grown by a third, its transform until they are three times as many.
+            data have grown by GROWTH, its transform until they have by RETHINK.
 
     Raises:
         ValueError: bad transform or threshold.
@@ -181,7 +162,7 @@ def learn(
         hyper, learned_at = previous.gp.hyper, previous.learned_at
         if n >= GROWTH * learned_at:
             hyper, learned_at = maximum_a_posteriori(data, hyper), n
-        gp = _condition(hyper, data)
+        gp = condition(hyper, data)
         learned = DiscrepancySurrogate(
             gp, previous.scale, values, np.nan, learned_at, previous.chosen_at
         )
@@ -189,7 +170,7 @@ def learn(
         return _with_threshold(learned, rule, among_data=True)
     scales = [_standardise(option, values) for option in candidates(transform, values)]
     data = pad(u, np.array([scale(values) for scale in scales]), rows)
-    gp = _condition(maximum_a_posteriori(data), data)
+    gp = condition(maximum_a_posteriori(data), data)
     best = int(np.argmax(_scores(gp, scales, values)))
     chosen = DiscrepancySurrogate(_only(gp, best), scales[best], values, np.nan, n, n)
     return _with_threshold(chosen, rule)
@@ -227,7 +208,7 @@ def marginalised(
     hyper = posterior_draws(surrogate.gp.data, draws, seed)
     data = surrogate.gp.data
     spread = Data(data.u, jnp.tile(data.y, (draws, 1)), data.used)
-    return _with_threshold(replace(surrogate, gp=_condition(hyper, spread)), rule)
+    return _with_threshold(replace(surrogate, gp=condition(hyper, spread)), rule)
 
 
 def _standardise(transform: Transform, values: np.ndarray) -> Scale:
@@ -240,7 +221,7 @@ def _standardise(transform: Transform, values: np.ndarray) -> Scale:
 def _scores(gp: GP, scales: Sequence[Scale], values: np.ndarray) -> np.ndarray:
     """Leave-one-out log predictive density of the discrepancy under each scale, summed."""
     n = len(values)
-    mean, variance = (np.asarray(moment)[:, :n] for moment in _leave_one_out(gp))
+    mean, variance = (np.asarray(moment)[:, :n] for moment in leave_one_out(gp))
     residual = np.asarray(gp.data.y)[:, :n] - mean
     density = -0.5 * np.sum(residual**2 / variance + np.log(2.0 * np.pi * variance), 1)
     jacobian = [np.sum(s.transform.log_jacobian(values) - np.log(s.spread)) for s in scales]

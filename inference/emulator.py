@@ -7,18 +7,15 @@ import jax.numpy as jnp
 import numpy as np
 
 from ._float64 import in_float64
+from .compiled import GROWTH, condition, leave_one_out
+from .compiled import predict as predict_scores
 from .components import Basis, principal_components
-from .gp import GP, condition, leave_one_out, pad, predict_many
+from .gp import GP, pad
 from .hyper import maximum_a_posteriori, reset
 from .noise import Remainder, shrunk_covariance
 
 SHARE = 0.9995  # of the variance, to be explained by components
 PRIOR_RUNS = 5.0  # runs that speak for uncorrelated scores
-GROWTH = 1.3  # hyperparameters are found anew when data have grown by this factor
-
-_condition = jax.jit(condition)
-_leave_one_out = jax.jit(leave_one_out)
-_predict = jax.jit(predict_many)
 
 
 class Emulator(NamedTuple):
@@ -57,7 +54,7 @@ def emulate(
         components: At most.
         rows: Reserved for data, at least n.
         previous: Learned from the first of these data; its components and hyperparameters are
-            kept until the data have grown by a third.
+            kept until the data have grown by GROWTH.
     """
     n = len(u)
     if previous is not None and n < GROWTH * previous.learned_at:
@@ -68,7 +65,7 @@ def emulate(
         data, learned_at = pad(u, basis.scores(outputs).T, rows), n
         hyper = maximum_a_posteriori(data, None if previous is None else previous.gp.hyper)
         hyper = reset(hyper, np.arange(len(data.y)) >= basis.used)
-    gp = _condition(hyper, data)
+    gp = condition(hyper, data)
     remainder = shrunk_covariance(basis.residuals(outputs), basis.used + 1)
     noise = run_to_run(gp, basis, remainder.white, n)
     return Emulator(gp, basis, remainder, noise, outputs, learned_at)
@@ -96,7 +93,7 @@ def run_to_run(gp: GP, basis: Basis, white: float, n: int) -> np.ndarray:
 def loo_errors(emulator: Emulator) -> np.ndarray:
     """Studentised leave-one-out errors of the scores [n, used]."""
     n, used = len(emulator.outputs), emulator.basis.used
-    mean, variance = (np.asarray(part)[:used, :n] for part in _leave_one_out(emulator.gp))
+    mean, variance = (np.asarray(part)[:used, :n] for part in leave_one_out(emulator.gp))
     return ((np.asarray(emulator.gp.data.y)[:used, :n] - mean) / np.sqrt(variance)).T
 
 
@@ -111,7 +108,9 @@ def noise_share(emulator: Emulator) -> float:
 def predict(emulator: Emulator, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean and sd, run-to-run noise included, of the outputs at u [n, d]: [n, m] each."""
     basis, remainder = emulator.basis, emulator.remainder
-    mean, variance = (np.asarray(part).T for part in _predict(emulator.gp, jnp.asarray(u, float)))
+    mean, variance = (
+        np.asarray(part).T for part in predict_scores(emulator.gp, jnp.asarray(u, float))
+    )
     constant = np.sum(remainder.factors**2, 1) + remainder.white
     constant = constant + np.sum((basis.vectors @ emulator.noise) * basis.vectors, 1)
     sd = np.sqrt(variance @ basis.vectors.T**2 + constant)
@@ -121,7 +120,7 @@ def predict(emulator: Emulator, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def predictive_draws(key: jax.Array, emulator: Emulator, u: np.ndarray) -> np.ndarray:
     """A new simulated output, run-to-run noise included, for each row of u [n, d]: [n, m]."""
     basis, remainder = emulator.basis, emulator.remainder
-    mean, variance = (np.asarray(part).T for part in _predict(emulator.gp, jnp.asarray(u)))
+    mean, variance = (np.asarray(part).T for part in predict_scores(emulator.gp, jnp.asarray(u)))
     full = np.any(basis.vectors, 0)
     keys = jax.random.split(key, 4)
     shapes = (

@@ -67,8 +67,8 @@ def screen(shifts: jax.Array, log_target: LogLikelihood, state: Any) -> Screen:
         density = _log_density(kernel, x, i < EVEN)
         return x, values, jnp.where(filled, jnp.logaddexp(mass, density), -jnp.inf)
 
-    # the mass of later kernels at earlier points counts, and of earlier ones at later points is
-    # bounded by the prior's share: cheap, and enough for choosing
+    # points are charged with the kernel that proposed them and with later ones, not with earlier
+    # ones: cheap, and enough for choosing
     start = jnp.zeros((n, dimension)), jnp.full(n, -jnp.inf), jnp.full(n, -jnp.inf)
     x, values, mass = jax.lax.fori_loop(0, ROUNDS, one, start)
     return Screen(ndtr(x), values, _log_weights(x, values, mass, 1.0))

@@ -9,8 +9,8 @@ import numpy as np
 
 from ._float64 import in_float64
 from .base import LogLikelihood, LogSecondMoment
+from .compiled import believe
 from .design import sobol
-from .discrepancy_surrogate import believe
 from .emulator import Emulator, loo_errors, noise_share, predict, predictive_draws
 from .emulator_checks import complaints
 from .gaussian import SignalState, log_likelihood, log_second_moment, node_log_densities
