@@ -70,7 +70,7 @@ class Bolfi:
             "initial", start_size(len(prior)) if initial is None else initial, MIN_LEARN
         )
         self.capacity = checked_integer("capacity", capacity)
-        self.family = resolve(surrogate, self.observed, options)
+        self.family = resolve(surrogate, options)
         self._learner = self.family.learner(self.observed)
         self._acquire = _resolve(acquisition, self.family)
         # a user's own function may compare unlike shapes

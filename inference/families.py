@@ -207,7 +207,7 @@ FAMILIES: dict[str, type[Family]] = {
 """Surrogates by the name users give."""
 
 
-def resolve(surrogate: str | Family | None, observed: np.ndarray, options: dict) -> Family:
+def resolve(surrogate: str | Family | None, options: dict) -> Family:
     """The family that `fit`'s arguments `surrogate` and `options` name.
 
     None is "signal", unless a discrepancy, or another option of that family alone, is given.
