@@ -163,7 +163,8 @@ class Bolfi:
     def _known(self) -> Learnable:
         history = self._state.history
         good = history.succeeded
-        return Learnable(history.u[good], history.features[good], history.discrepancy[good])
+        known = history.u[good], history.features[good], history.discrepancy[good]
+        return Learnable(*known, self.prior.normal)
 
     def _rows(self, extra: int) -> int:
         """Rows of the arrays for what was told and `extra` more."""

@@ -12,7 +12,7 @@ from ._float64 import in_float64
 from .base import LogLikelihood, LogSecondMoment
 from .compiled import GROWTH, believe, condition, leave_one_out, predict
 from .emulator_checks import complaints
-from .gp import GP, Data, pad, predict_many
+from .gp import GP, pad, predict_many
 from .hyper import maximum_a_posteriori
 from .likelihood import (
     Threshold,
@@ -127,13 +127,14 @@ def _mean(gp: GP, u: jax.Array) -> jax.Array:
 
 
 @in_float64
-def learn(
+def learn(  # noqa: PLR0913  what is known, and how to learn from it
     u: np.ndarray,
     discrepancy: np.ndarray,
     rows: int,
     transform: str | None = None,
     rule: Threshold = None,
     previous: DiscrepancySurrogate | None = None,
+    normal: np.ndarray | None = None,
 ) -> DiscrepancySurrogate:
     """Fit the surrogate.
 
@@ -150,6 +151,7 @@ def learn(
         rule: For the threshold, see `likelihood.choose_threshold`.
         previous: Learned from the first of these data; its hyperparameters are kept until the
             data have grown by GROWTH, its transform until they have by RETHINK.
+        normal: Which parameters the kernel sees as normal scores [d], see `gp.coordinates`.
 
     Raises:
         ValueError: bad transform or threshold.
@@ -158,7 +160,7 @@ def learn(
     n = len(u)
     old = previous is not None and np.isfinite(previous.scale(values)).all()
     if previous is not None and old and n < RETHINK * previous.chosen_at:
-        data = pad(u, previous.scale(values)[None], rows)
+        data = pad(u, previous.scale(values)[None], rows, normal)
         hyper, learned_at = previous.gp.hyper, previous.learned_at
         if n >= GROWTH * learned_at:
             hyper, learned_at = maximum_a_posteriori(data, hyper), n
@@ -169,7 +171,7 @@ def learn(
         # to choose where to simulate next, the best point so far will do for a minimum
         return _with_threshold(learned, rule, among_data=True)
     scales = [_standardise(option, values) for option in candidates(transform, values)]
-    data = pad(u, np.array([scale(values) for scale in scales]), rows)
+    data = pad(u, np.array([scale(values) for scale in scales]), rows, normal)
     gp = condition(maximum_a_posteriori(data), data)
     best = int(np.argmax(_scores(gp, scales, values)))
     chosen = DiscrepancySurrogate(_only(gp, best), scales[best], values, np.nan, n, n)
@@ -207,7 +209,7 @@ def marginalised(
     """The surrogate with one process for each of `draws` posterior draws of the hyperparameters."""
     hyper = posterior_draws(surrogate.gp.data, draws, seed)
     data = surrogate.gp.data
-    spread = Data(data.u, jnp.tile(data.y, (draws, 1)), data.used)
+    spread = data._replace(y=jnp.tile(data.y, (draws, 1)))
     return _with_threshold(replace(surrogate, gp=condition(hyper, spread)), rule)
 
 

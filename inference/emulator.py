@@ -39,13 +39,14 @@ class Emulator(NamedTuple):
 
 
 @in_float64
-def emulate(
+def emulate(  # noqa: PLR0913  what is known, and how to learn from it
     u: np.ndarray,
     outputs: np.ndarray,
     scale: np.ndarray,
     components: int,
     rows: int,
     previous: Emulator | None = None,
+    normal: np.ndarray | None = None,
 ) -> Emulator:
     """Learn outputs [n, m] at u [n, d].
 
@@ -55,14 +56,15 @@ def emulate(
         rows: Reserved for data, at least n.
         previous: Learned from the first of these data; its components and hyperparameters are
             kept until the data have grown by GROWTH.
+        normal: Which parameters the kernels see as normal scores [d], see `gp.coordinates`.
     """
     n = len(u)
     if previous is not None and n < GROWTH * previous.learned_at:
         basis, hyper, learned_at = previous.basis, previous.gp.hyper, previous.learned_at
-        data = pad(u, basis.scores(outputs).T, rows)
+        data = pad(u, basis.scores(outputs).T, rows, normal)
     else:
         basis = principal_components(outputs, scale, components, SHARE)
-        data, learned_at = pad(u, basis.scores(outputs).T, rows), n
+        data, learned_at = pad(u, basis.scores(outputs).T, rows, normal), n
         hyper = maximum_a_posteriori(data, None if previous is None else previous.gp.hyper)
         hyper = reset(hyper, np.arange(len(data.y)) >= basis.used)
     gp = condition(hyper, data)

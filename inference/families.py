@@ -25,6 +25,7 @@ class Learnable(NamedTuple):
     u: np.ndarray  # [n, d]
     features: np.ndarray  # [n, m]
     discrepancy: np.ndarray  # [n]
+    normal: np.ndarray | None = None  # bool [d], see `Prior.normal`; None for none
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ class DiscrepancyLearner:
         self, known: Learnable, rows: int, previous: DiscrepancySurrogate | None
     ) -> DiscrepancySurrogate:
         transform, rule = self.family.transform, self.family.threshold
-        return learn(known.u, known.discrepancy, rows, transform, rule, previous)
+        return learn(known.u, known.discrepancy, rows, transform, rule, previous, known.normal)
 
     def finish(self, known: Learnable, rows: int, seed: int) -> Surrogate:
         """The surrogate on which a fit rests."""
@@ -190,7 +191,8 @@ class SignalLearner:
         features = known.features[learnable]
         old = None if previous is None else previous.emulator
         scale = self.output.scale(features) if old is None else old.basis.scale
-        emulator = emulate(known.u[learnable], features, scale, self.family.components, rows, old)
+        limits = self.family.components, rows
+        emulator = emulate(known.u[learnable], features, scale, *limits, old, known.normal)
         kept = previous if old is not None and emulator.learned_at == old.learned_at else None
         return observe(emulator, self.output, self.values, self.noise, kept)
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.scipy.special import ndtri
 
 from .linalg import inverse_cholesky, log_normal_density
 
@@ -16,6 +17,7 @@ TREND_SD = 3.0
 """Prior sd of each trend coefficient, in units of the targets' sd: broad, yet proper."""
 JITTER = 1e-7
 """Variance added to every target, in units of the targets': below it rounding would rule."""
+FAR = 1e-9  # quantile beyond which normal scores end
 LEAST = 1e-10  # latent variance, which rounding may make negative
 
 
@@ -23,10 +25,11 @@ class Data(NamedTuple):
     u: jax.Array  # [p, d]
     y: jax.Array  # [k, p], standardised; 0 where not in use
     used: jax.Array  # int []
+    normal: jax.Array  # bool [d], see `coordinates`
 
 
 class Hyper(NamedTuple):
-    log_length: jax.Array  # [k, d], in prior quantiles
+    log_length: jax.Array  # [k, d], in units of `coordinates`
     log_amplitude: jax.Array  # [k], in units of y
     log_noise: jax.Array  # [k], sd, in units of y
 
@@ -40,13 +43,14 @@ class GP(NamedTuple):
     weights: jax.Array  # [k, p], inverse Gram matrices times y
 
 
-def pad(u: np.ndarray, y: np.ndarray, rows: int) -> Data:
-    """Data u [n, d], y [k, n] in arrays of `rows`."""
+def pad(u: np.ndarray, y: np.ndarray, rows: int, normal: np.ndarray | None = None) -> Data:
+    """Data u [n, d], y [k, n] in arrays of `rows`; `normal` as in `coordinates`, None for none."""
     extra = rows - len(u)
     return Data(
         jnp.asarray(np.pad(u, ((0, extra), (0, 0)), constant_values=0.5)),
         jnp.asarray(np.pad(y, ((0, 0), (0, extra)))),
         jnp.asarray(len(u)),
+        jnp.zeros(u.shape[1], bool) if normal is None else jnp.asarray(normal),
     )
 
 
@@ -55,11 +59,22 @@ def padded_rows(n: int) -> int:
     return max(64, 1 << (n - 1).bit_length())
 
 
+def coordinates(u: jax.Array, normal: jax.Array) -> jax.Array:
+    """What the kernel sees of prior quantiles u [n, d]: normal scores where `normal` [d].
+
+    A prior that fades out crowds its tails into the edges of the box: what is smooth in the
+    parameter is steep in its quantile there, and no stationary kernel follows. Scores are
+    scaled to the quantiles' mean and sd, so that one prior of the length scales serves both.
+    """
+    scores = 0.5 + ndtri(jnp.clip(u, FAR, 1.0 - FAR)) / jnp.sqrt(12.0)
+    return jnp.where(normal, scores, u)
+
+
 def covariance(hyper: Hyper, a: jax.Array, b: jax.Array) -> jax.Array:
-    """Prior covariance [n, m] of one latent function at a [n, d] and b [m, d].
+    """Prior covariance [n, m] of one latent function at coordinates a [n, d] and b [m, d].
 
     Squared exponential plus the trend a_j x_j^2 + b_j x_j + c of Gutmann and Corander
-    (JMLR 2016), x = 2u - 1. Its coefficients are integrated out under broad Gaussians rather
+    (JMLR 2016), x = 2a - 1. Its coefficients are integrated out under broad Gaussians rather
     than estimated with a_j >= 0: that keeps prediction closed-form and carries their
     uncertainty; and a discrepancy over quantiles may saturate, which a_j >= 0 forbids.
     On three toys (Gaussian mean, two driven pendula; N = 20, 50; 3 seeds) Matern 5/2 was no
@@ -71,25 +86,26 @@ def covariance(hyper: Hyper, a: jax.Array, b: jax.Array) -> jax.Array:
     return smooth + TREND_SD**2 * trend(a) @ trend(b).T
 
 
-def trend(u: jax.Array) -> jax.Array:
-    """Basis 1, x_j, x_j^2 at x = 2u - 1: [n, d] -> [n, 1 + 2d]."""
-    x = 2.0 * u - 1.0
+def trend(a: jax.Array) -> jax.Array:
+    """Basis 1, x_j, x_j^2 at x = 2a - 1: [n, d] -> [n, 1 + 2d]."""
+    x = 2.0 * a - 1.0
     return jnp.concatenate([jnp.ones((x.shape[0], 1)), x, x**2], axis=1)
 
 
-def gram(hyper: Hyper, u: jax.Array, count: jax.Array) -> jax.Array:
+def gram(hyper: Hyper, data: Data) -> jax.Array:
     """Covariance [p, p] of one process's targets; rows not in use are those of the identity."""
-    used = jnp.arange(u.shape[0]) < count
+    used = jnp.arange(data.u.shape[0]) < data.used
     noise = jnp.where(used, jnp.exp(2.0 * hyper.log_noise) + JITTER, 1.0)
     both = used[:, None] & used[None, :]
-    return jnp.where(both, covariance(hyper, u, u), 0.0) + jnp.diag(noise)
+    at = coordinates(data.u, data.normal)
+    return jnp.where(both, covariance(hyper, at, at), 0.0) + jnp.diag(noise)
 
 
 def condition(hyper: Hyper, data: Data) -> GP:
     """The processes given the data; explicit inverse factors make prediction a product."""
 
     def one(hyper: Hyper, y: jax.Array) -> tuple[jax.Array, jax.Array]:
-        whitener = inverse_cholesky(gram(hyper, data.u, data.used), data.used)
+        whitener = inverse_cholesky(gram(hyper, data), data.used)
         return whitener, (whitener @ y) @ whitener
 
     return GP(hyper, data, *jax.vmap(one)(hyper, data.y))
@@ -108,15 +124,16 @@ def append_mean(gp: GP, u: jax.Array, extra: jax.Array) -> GP:
     at = jnp.clip(source, 0, q - 1)
     points = jnp.where(new[:, None], u[at], gp.data.u)
     targets = jnp.where(new, mean[:, at], gp.data.y)
-    return condition(gp.hyper, Data(points, targets, gp.data.used + extra))
+    return condition(gp.hyper, Data(points, targets, gp.data.used + extra, gp.data.normal))
 
 
 def _cross(gp: GP, u: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Covariance [k, p, m] of the latent functions at the data and at u [m, d]; the variance
     [k, m] at u alone."""
     used = (jnp.arange(gp.data.u.shape[0]) < gp.data.used)[:, None]
-    cross = jax.vmap(covariance, (0, None, None))(gp.hyper, gp.data.u, u) * used
-    trends = TREND_SD**2 * jnp.sum(trend(u) ** 2, -1)
+    at, there = (coordinates(points, gp.data.normal) for points in (u, gp.data.u))
+    cross = jax.vmap(covariance, (0, None, None))(gp.hyper, there, at) * used
+    trends = TREND_SD**2 * jnp.sum(trend(at) ** 2, -1)
     return cross, jnp.exp(2.0 * gp.hyper.log_amplitude)[:, None] + trends
 
 
@@ -137,7 +154,8 @@ def predict_many(gp: GP, u: jax.Array) -> tuple[jax.Array, jax.Array]:
 def predict_joint(gp: GP, u: jax.Array, v: jax.Array) -> jax.Array:
     """Posterior covariance [k, m, q] of the latent functions between u [m, d] and v [q, d]."""
     at_u, at_v = gp.whitener @ _cross(gp, u)[0], gp.whitener @ _cross(gp, v)[0]
-    prior = jax.vmap(covariance, (0, None, None))(gp.hyper, u, v)
+    at, there = (coordinates(points, gp.data.normal) for points in (u, v))
+    prior = jax.vmap(covariance, (0, None, None))(gp.hyper, at, there)
     return prior - jnp.swapaxes(at_u, 1, 2) @ at_v
 
 
@@ -145,7 +163,7 @@ def log_marginal_likelihood(hyper: Hyper, data: Data) -> jax.Array:
     """log p(y | hyper) [k], trend integrated out (Rasmussen and Williams 2006, eq. 2.30)."""
 
     def one(hyper: Hyper, y: jax.Array) -> jax.Array:
-        return log_normal_density(gram(hyper, data.u, data.used), y, data.used)
+        return log_normal_density(gram(hyper, data), y, data.used)
 
     return jax.vmap(one)(hyper, data.y) - 0.5 * data.used * jnp.log(2.0 * jnp.pi)
 

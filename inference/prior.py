@@ -1,10 +1,12 @@
 """Independent priors, and the map between parameters and their prior quantiles."""
 
 from collections.abc import Mapping
+from functools import cached_property
 
 import jax
 import numpy as np
 import numpyro.distributions as dist
+from scipy.special import ndtri
 
 from ._float64 import in_float64
 from .base import Theta
@@ -119,6 +121,12 @@ class Prior:
             name: _quantile(self._univariate[name], u[..., j]) for j, name in enumerate(self.names)
         }
 
+    @cached_property
+    @in_float64
+    def normal(self) -> np.ndarray:
+        """Which parameters, or their logs, are rather normal than uniform, bool [d]."""
+        return np.array([_rather_normal(u) for u in self._univariate.values()])
+
     def contains(self, theta: Theta) -> np.ndarray:
         """Whether theta lies in the support, bool [...]."""
         natural = self.to_array(theta)
@@ -141,6 +149,17 @@ class Prior:
     def sample(self, key: jax.Array, n: int) -> dict[str, np.ndarray]:
         """Draw n parameters, name -> [n]."""
         return self.from_unit(np.asarray(jax.random.uniform(key, (n, len(self)))))
+
+
+def _rather_normal(univariate: Univariate) -> bool:
+    q = np.linspace(0.01, 0.99, 99)
+    value = univariate.icdf(q)
+    forms = [value, np.log(value)] if value.min() > 0 else [value]
+
+    def linear(score: np.ndarray) -> float:
+        return max(np.corrcoef(form, score)[0, 1] for form in forms)
+
+    return bool(linear(ndtri(q)) > linear(q))
 
 
 def _quantile(univariate: Univariate, u: np.ndarray) -> np.ndarray:
