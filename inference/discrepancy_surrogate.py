@@ -1,6 +1,5 @@
 """The paper's surrogate: a Gaussian process on the (transformed) discrepancy."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -10,9 +9,9 @@ import numpy as np
 
 from ._float64 import in_float64
 from .base import LogLikelihood, LogSecondMoment
-from .compiled import GROWTH, believe, condition, leave_one_out, predict
+from .compiled import GROWTH, believe, condition, extend, leave_one_out, predict
 from .emulator_checks import complaints
-from .gp import GP, pad, predict_many
+from .gp import GP, Data, pad, predict_many
 from .hyper import maximum_a_posteriori
 from .likelihood import (
     Threshold,
@@ -82,7 +81,7 @@ class DiscrepancySurrogate:
     @in_float64
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new g(Delta), its noise included, at quantiles u [n, d]: [n], [n]."""
-        mean, variance = (np.asarray(part) for part in predict(self.gp, jnp.asarray(u, float)))
+        mean, variance = predict(self.gp, u)
         noisy = variance + np.exp(2.0 * np.asarray(self.gp.hyper.log_noise))[:, None]
         centre = mean.mean(0)
         sd = np.sqrt(noisy.mean(0) + mean.var(0))
@@ -161,30 +160,25 @@ def learn(  # noqa: PLR0913  what is known, and how to learn from it
     old = previous is not None and np.isfinite(previous.scale(values)).all()
     if previous is not None and old and n < RETHINK * previous.chosen_at:
         data = pad(u, previous.scale(values)[None], rows, normal)
-        hyper, learned_at = previous.gp.hyper, previous.learned_at
-        if n >= GROWTH * learned_at:
-            hyper, learned_at = maximum_a_posteriori(data, hyper), n
-        gp = condition(hyper, data)
+        if n >= GROWTH * previous.learned_at:
+            gp, learned_at = condition(maximum_a_posteriori(data, previous.gp.hyper), data), n
+        else:
+            gp, learned_at = extend(previous.gp, data), previous.learned_at
         learned = DiscrepancySurrogate(
             gp, previous.scale, values, np.nan, learned_at, previous.chosen_at
         )
         # to choose where to simulate next, the best point so far will do for a minimum
         return _with_threshold(learned, rule, among_data=True)
-    scales = [_standardise(option, values) for option in candidates(transform, values)]
-    data = pad(u, np.array([scale(values) for scale in scales]), rows, normal)
-    gp = condition(maximum_a_posteriori(data), data)
-    best = int(np.argmax(_scores(gp, scales, values)))
-    chosen = DiscrepancySurrogate(_only(gp, best), scales[best], values, np.nan, n, n)
+    options = [_standardise(option, values) for option in candidates(transform, values)]
+    fitted = [_fit(pad(u, scale(values)[None], rows, normal)) for scale in options]
+    scores = [_score(gp, scale, values) for gp, scale in zip(fitted, options, strict=True)]
+    best = int(np.argmax(scores))
+    chosen = DiscrepancySurrogate(fitted[best], options[best], values, np.nan, n, n)
     return _with_threshold(chosen, rule)
 
 
-def _only(gp: GP, i: int) -> GP:
-    """The i-th process."""
-    hyper, y, whitener, weights = jax.tree.map(
-        lambda part: jnp.asarray(np.asarray(part)[i : i + 1]),
-        (gp.hyper, gp.data.y, gp.whitener, gp.weights),
-    )
-    return GP(hyper, gp.data._replace(y=y), whitener, weights)
+def _fit(data: Data) -> GP:
+    return condition(maximum_a_posteriori(data), data)
 
 
 def _with_threshold(
@@ -220,11 +214,11 @@ def _standardise(transform: Transform, values: np.ndarray) -> Scale:
     return Scale(transform, float(transformed.mean()), spread if spread > 0 else 1.0)
 
 
-def _scores(gp: GP, scales: Sequence[Scale], values: np.ndarray) -> np.ndarray:
-    """Leave-one-out log predictive density of the discrepancy under each scale, summed."""
+def _score(gp: GP, scale: Scale, values: np.ndarray) -> float:
+    """Leave-one-out log predictive density of the discrepancy under the scale, summed."""
     n = len(values)
-    mean, variance = (np.asarray(moment)[:, :n] for moment in leave_one_out(gp))
-    residual = np.asarray(gp.data.y)[:, :n] - mean
-    density = -0.5 * np.sum(residual**2 / variance + np.log(2.0 * np.pi * variance), 1)
-    jacobian = [np.sum(s.transform.log_jacobian(values) - np.log(s.spread)) for s in scales]
-    return density + np.array(jacobian)
+    mean, variance = (np.asarray(moment)[0, :n] for moment in leave_one_out(gp))
+    residual = np.asarray(gp.data.y)[0, :n] - mean
+    density = -0.5 * np.sum(residual**2 / variance + np.log(2.0 * np.pi * variance))
+    jacobian = scale.transform.log_jacobian(values) - np.log(scale.spread)
+    return float(density + np.sum(jacobian))

@@ -3,15 +3,14 @@
 from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from ._float64 import in_float64
-from .compiled import GROWTH, condition, leave_one_out
+from .compiled import GROWTH, condition, extend, leave_one_out
 from .compiled import predict as predict_scores
 from .components import Basis, principal_components
 from .gp import GP, pad
-from .hyper import maximum_a_posteriori, reset
+from .hyper import maximum_a_posteriori
 from .noise import Remainder, shrunk_covariance
 
 SHARE = 0.9995  # of the variance, to be explained by components
@@ -60,14 +59,13 @@ def emulate(  # noqa: PLR0913  what is known, and how to learn from it
     """
     n = len(u)
     if previous is not None and n < GROWTH * previous.learned_at:
-        basis, hyper, learned_at = previous.basis, previous.gp.hyper, previous.learned_at
-        data = pad(u, basis.scores(outputs).T, rows, normal)
+        basis, learned_at = previous.basis, previous.learned_at
+        gp = extend(previous.gp, pad(u, basis.scores(outputs).T, rows, normal))
     else:
         basis = principal_components(outputs, scale, components, SHARE)
         data, learned_at = pad(u, basis.scores(outputs).T, rows, normal), n
         hyper = maximum_a_posteriori(data, None if previous is None else previous.gp.hyper)
-        hyper = reset(hyper, np.arange(len(data.y)) >= basis.used)
-    gp = condition(hyper, data)
+        gp = condition(hyper, data)
     remainder = shrunk_covariance(basis.residuals(outputs), basis.used + 1)
     noise = run_to_run(gp, basis, remainder.white, n)
     return Emulator(gp, basis, remainder, noise, outputs, learned_at)
@@ -110,9 +108,7 @@ def noise_share(emulator: Emulator) -> float:
 def predict(emulator: Emulator, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean and sd, run-to-run noise included, of the outputs at u [n, d]: [n, m] each."""
     basis, remainder = emulator.basis, emulator.remainder
-    mean, variance = (
-        np.asarray(part).T for part in predict_scores(emulator.gp, jnp.asarray(u, float))
-    )
+    mean, variance = (part.T for part in predict_scores(emulator.gp, u))
     constant = np.sum(remainder.factors**2, 1) + remainder.white
     constant = constant + np.sum((basis.vectors @ emulator.noise) * basis.vectors, 1)
     sd = np.sqrt(variance @ basis.vectors.T**2 + constant)
@@ -122,7 +118,7 @@ def predict(emulator: Emulator, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def predictive_draws(key: jax.Array, emulator: Emulator, u: np.ndarray) -> np.ndarray:
     """A new simulated output, run-to-run noise included, for each row of u [n, d]: [n, m]."""
     basis, remainder = emulator.basis, emulator.remainder
-    mean, variance = (np.asarray(part).T for part in predict_scores(emulator.gp, jnp.asarray(u)))
+    mean, variance = (part.T for part in predict_scores(emulator.gp, u))
     full = np.any(basis.vectors, 0)
     keys = jax.random.split(key, 4)
     shapes = (

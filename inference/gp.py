@@ -4,6 +4,7 @@ Shapes: k processes; p rows, of which the first `used` are in use; d inputs u in
 What is not in use never changes a result (tests), so one compilation serves while data grow.
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -11,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.scipy.special import ndtri
 
-from .linalg import inverse_cholesky, log_normal_density
+from .linalg import BLOCK, inverse_cholesky, log_normal_density
 
 TREND_SD = 3.0
 """Prior sd of each trend coefficient, in units of the targets' sd: broad, yet proper."""
@@ -80,10 +81,11 @@ def covariance(hyper: Hyper, a: jax.Array, b: jax.Array) -> jax.Array:
     On three toys (Gaussian mean, two driven pendula; N = 20, 50; 3 seeds) Matern 5/2 was no
     better on the first and had 10 to 65 % more total variation error on the other two.
     """
-    length = jnp.exp(hyper.log_length)
-    difference = (a[:, None, :] - b[None, :, :]) / length
-    smooth = jnp.exp(2.0 * hyper.log_amplitude - 0.5 * jnp.sum(difference**2, -1))
-    return smooth + TREND_SD**2 * trend(a) @ trend(b).T
+    rate = jnp.exp(-hyper.log_length)
+    exponent = 2.0 * hyper.log_amplitude
+    for j in range(a.shape[1]):  # a loop, so that the last axis is long and vectorised
+        exponent = exponent - 0.5 * (rate[j] * (a[:, j, None] - b[None, :, j])) ** 2
+    return jnp.exp(exponent) + TREND_SD**2 * trend(a) @ trend(b).T
 
 
 def trend(a: jax.Array) -> jax.Array:
@@ -92,47 +94,45 @@ def trend(a: jax.Array) -> jax.Array:
     return jnp.concatenate([jnp.ones((x.shape[0], 1)), x, x**2], axis=1)
 
 
-def gram(hyper: Hyper, data: Data) -> jax.Array:
-    """Covariance [p, p] of one process's targets; rows not in use are those of the identity."""
-    used = jnp.arange(data.u.shape[0]) < data.used
-    noise = jnp.where(used, jnp.exp(2.0 * hyper.log_noise) + JITTER, 1.0)
-    both = used[:, None] & used[None, :]
+def gram_rows(hyper: Hyper, data: Data, start: jax.Array) -> jax.Array:
+    """Covariance [BLOCK, p] of one process's targets from row `start` on; rows not in use are
+    those of the identity."""
+    rows = jnp.arange(data.u.shape[0])
+    here = start + rows[:BLOCK]
     at = coordinates(data.u, data.normal)
-    return jnp.where(both, covariance(hyper, at, at), 0.0) + jnp.diag(noise)
+    smooth = covariance(hyper, jax.lax.dynamic_slice_in_dim(at, start, BLOCK), at)
+    both = (here < data.used)[:, None] & (rows < data.used)
+    noise = jnp.where(here < data.used, jnp.exp(2.0 * hyper.log_noise) + JITTER, 1.0)
+    return jnp.where(both, smooth, 0.0) + jnp.where(here[:, None] == rows, noise[:, None], 0.0)
 
 
-def condition(hyper: Hyper, data: Data) -> GP:
-    """The processes given the data; explicit inverse factors make prediction a product."""
+def untaught(hyper: Hyper, data: Data) -> GP:
+    """Processes that have seen none of the data yet."""
+    k, p = data.y.shape
+    return GP(hyper, data, jnp.tile(jnp.eye(p), (k, 1, 1)), jnp.zeros((k, p)))
 
-    def one(hyper: Hyper, y: jax.Array) -> tuple[jax.Array, jax.Array]:
-        whitener = inverse_cholesky(gram(hyper, data), data.used)
+
+def grow(gp: GP, data: Data, known: jax.Array | int) -> GP:
+    """`gp` given data of which it has seen the first `known` rows already.
+
+    Explicit inverse factors make prediction a product.
+    """
+
+    def one(process: tuple[Hyper, jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
+        hyper, whitener, y = process
+        rows = partial(gram_rows, hyper, data)
+        whitener = inverse_cholesky(rows, data.used, whitener, known)
         return whitener, (whitener @ y) @ whitener
 
-    return GP(hyper, data, *jax.vmap(one)(hyper, data.y))
-
-
-def append_mean(gp: GP, u: jax.Array, extra: jax.Array) -> GP:
-    """The processes after their own mean at the first `extra` rows of u [q, d] came true.
-
-    The kriging believer of Ginsbourger et al. (2010): the mean stays, the variance shrinks.
-    There must be room: used + extra <= p.
-    """
-    p, q = gp.data.u.shape[0], u.shape[0]
-    mean = predict_many(gp, u)[0]
-    source = jnp.arange(p) - gp.data.used
-    new = (source >= 0) & (source < extra)
-    at = jnp.clip(source, 0, q - 1)
-    points = jnp.where(new[:, None], u[at], gp.data.u)
-    targets = jnp.where(new, mean[:, at], gp.data.y)
-    return condition(gp.hyper, Data(points, targets, gp.data.used + extra, gp.data.normal))
+    return GP(gp.hyper, data, *jax.lax.map(one, (gp.hyper, gp.whitener, data.y)))
 
 
 def _cross(gp: GP, u: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Covariance [k, p, m] of the latent functions at the data and at u [m, d]; the variance
+    """Covariance [k, m, p] of the latent functions at u [m, d] and at the data; the variance
     [k, m] at u alone."""
-    used = (jnp.arange(gp.data.u.shape[0]) < gp.data.used)[:, None]
+    used = jnp.arange(gp.data.u.shape[0]) < gp.data.used
     at, there = (coordinates(points, gp.data.normal) for points in (u, gp.data.u))
-    cross = jax.vmap(covariance, (0, None, None))(gp.hyper, there, at) * used
+    cross = jax.vmap(covariance, (0, None, None))(gp.hyper, at, there) * used
     trends = TREND_SD**2 * jnp.sum(trend(at) ** 2, -1)
     return cross, jnp.exp(2.0 * gp.hyper.log_amplitude)[:, None] + trends
 
@@ -146,26 +146,42 @@ def predict(gp: GP, u: jax.Array) -> tuple[jax.Array, jax.Array]:
 def predict_many(gp: GP, u: jax.Array) -> tuple[jax.Array, jax.Array]:
     """`predict` at u [m, d]: [k, m] each."""
     cross, alone = _cross(gp, u)
-    mean = jnp.einsum("kp,kpm->km", gp.weights, cross)
-    explained = jnp.sum((gp.whitener @ cross) ** 2, axis=1)
+    mean = jnp.einsum("kp,kmp->km", gp.weights, cross)
+    explained = jnp.sum(_whitened(gp, cross) ** 2, axis=2)
     return mean, jnp.maximum(alone - explained, LEAST)
+
+
+def _whitened(gp: GP, cross: jax.Array) -> jax.Array:
+    return cross @ jnp.swapaxes(gp.whitener, 1, 2)
 
 
 def predict_joint(gp: GP, u: jax.Array, v: jax.Array) -> jax.Array:
     """Posterior covariance [k, m, q] of the latent functions between u [m, d] and v [q, d]."""
-    at_u, at_v = gp.whitener @ _cross(gp, u)[0], gp.whitener @ _cross(gp, v)[0]
+    at_u, at_v = _whitened(gp, _cross(gp, u)[0]), _whitened(gp, _cross(gp, v)[0])
     at, there = (coordinates(points, gp.data.normal) for points in (u, v))
     prior = jax.vmap(covariance, (0, None, None))(gp.hyper, at, there)
-    return prior - jnp.swapaxes(at_u, 1, 2) @ at_v
+    return prior - at_u @ jnp.swapaxes(at_v, 1, 2)
 
 
-def log_marginal_likelihood(hyper: Hyper, data: Data) -> jax.Array:
-    """log p(y | hyper) [k], trend integrated out (Rasmussen and Williams 2006, eq. 2.30)."""
+def log_marginal_likelihood(hyper: Hyper, data: Data, wanted: jax.Array | None = None) -> jax.Array:
+    """log p(y | hyper) [k], trend integrated out (Rasmussen and Williams 2006, eq. 2.30).
 
-    def one(hyper: Hyper, y: jax.Array) -> jax.Array:
-        return log_normal_density(gram(hyper, data), y, data.used)
+    Args:
+        wanted: bool [k]; of the others, which cost nothing, a constant is returned.
+    """
+    wanted = jnp.ones(len(data.y), bool) if wanted is None else wanted
 
-    return jax.vmap(one)(hyper, data.y) - 0.5 * data.used * jnp.log(2.0 * jnp.pi)
+    def one(process: tuple[Hyper, jax.Array, jax.Array]) -> jax.Array:
+        hyper, y, wanted = process
+        constants = data._replace(y=y)
+
+        def density(hyper: Hyper) -> jax.Array:
+            return log_normal_density(gram_rows, hyper, constants, y, data.used)
+
+        return jax.lax.cond(wanted, density, lambda _: jnp.zeros(()), hyper)
+
+    values = jax.lax.map(one, (hyper, data.y, wanted))
+    return values - 0.5 * data.used * jnp.log(2.0 * jnp.pi)
 
 
 def leave_one_out(gp: GP) -> tuple[jax.Array, jax.Array]:

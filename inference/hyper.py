@@ -34,18 +34,18 @@ def pack(hyper: Hyper) -> np.ndarray:
     return np.column_stack([np.asarray(part) for part in hyper])
 
 
-def negative_log_posterior(vectors: jax.Array, data: Data) -> jax.Array:
-    """[k] of vectors [k, d + 2]."""
-    hyper = unpack(vectors)
-    return -log_marginal_likelihood(hyper, data) - log_prior(hyper)
-
-
 @jax.jit
-def _value_and_grad(vectors: jax.Array, data: Data) -> tuple[jax.Array, jax.Array]:
-    """[k] and [k, d + 2]; processes are independent, so the gradient of their sum serves all."""
+def _value_and_grad(
+    vectors: jax.Array, data: Data, wanted: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    """Negative log posterior density [k] of vectors [k, d + 2], and its gradients, where `wanted`.
+
+    Processes are independent, so the gradient of their sum serves all.
+    """
 
     def total(vectors: jax.Array) -> tuple[jax.Array, jax.Array]:
-        values = negative_log_posterior(vectors, data)
+        hyper = unpack(vectors)
+        values = -log_marginal_likelihood(hyper, data, wanted) - log_prior(hyper)
         return jnp.sum(values), values
 
     gradient, values = jax.grad(total, has_aux=True)(vectors)
@@ -68,28 +68,28 @@ def starts(dimension: int) -> np.ndarray:
 def maximum_a_posteriori(data: Data, previous: Hyper | None = None) -> Hyper:
     """The best of several quasi-Newton runs for each of the k processes.
 
-    A pure function of its arguments, so resuming agrees.
+    Targets that are all zero teach nothing: there the prior's mode. A pure function of its
+    arguments, so resuming agrees.
 
     Args:
         previous: The optimum for less data; optimisation then starts from there alone.
     """
+    k, d = data.y.shape[0], data.u.shape[1]
+    taught = np.asarray(data.y).any(1)
+
+    def evaluate(vectors: np.ndarray, wanted: np.ndarray) -> tuple[jax.Array, jax.Array]:
+        return _value_and_grad(vectors, data, wanted)
 
     def refine(start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return minimise_many(lambda vectors: _value_and_grad(vectors, data), start)
+        return minimise_many(evaluate, start, taught)
 
     if previous is not None:
-        return unpack(jnp.asarray(refine(pack(previous))[0]))
-    k = data.y.shape[0]
-    candidates = starts(data.u.shape[1])
-    scores = np.array([_value_and_grad(np.tile(c, (k, 1)), data)[0] for c in candidates])
-    order = np.argsort(np.where(np.isfinite(scores), scores, np.inf), axis=0)
-    runs = [refine(candidates[order[i]]) for i in range(REFINED)]
-    best = np.argmin([values for _, values in runs], axis=0)
-    return unpack(jnp.asarray(np.array([found for found, _ in runs])[best, np.arange(k)]))
-
-
-def reset(hyper: Hyper, empty: np.ndarray) -> Hyper:
-    """The prior's mode where `empty` [k]: targets that are all zero have no optimum."""
-    lengths = jnp.where(empty[:, None], LENGTH[0], hyper.log_length)
-    amplitude = jnp.where(empty, AMPLITUDE[0], hyper.log_amplitude)
-    return Hyper(lengths, amplitude, jnp.where(empty, NOISE[0], hyper.log_noise))
+        found = refine(pack(previous))[0]
+    else:
+        candidates = starts(d)
+        scores = np.array([evaluate(np.tile(c, (k, 1)), taught)[0] for c in candidates])
+        order = np.argsort(np.where(np.isfinite(scores), scores, np.inf), axis=0)
+        runs = [refine(candidates[order[i]]) for i in range(REFINED)]
+        best = np.argmin([values for _, values in runs], axis=0)
+        found = np.array([found for found, _ in runs])[best, np.arange(k)]
+    return unpack(jnp.asarray(np.where(taught[:, None], found, prior_moments(d)[0])))

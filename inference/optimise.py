@@ -18,12 +18,11 @@ ARMIJO = 1e-4
 
 Objective = Callable[[Any, jax.Array], jax.Array]
 """(state, u [d]) -> scalar; a module-level function."""
+ValueAndGrad = Callable[[np.ndarray, np.ndarray], tuple[Any, Any]]
 
 
 def minimise_many(
-    value_and_grad: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
-    start: np.ndarray,
-    tolerance: float = 1e-3,
+    value_and_grad: ValueAndGrad, start: np.ndarray, wanted: np.ndarray, tolerance: float = 1e-3
 ) -> tuple[np.ndarray, np.ndarray]:
     """BFGS on k independent problems in step, so that each evaluation is one compiled call.
 
@@ -31,8 +30,9 @@ def minimise_many(
     `linalg`). Nocedal and Wright (2006), eq. 6.17, with backtracking.
 
     Args:
-        value_and_grad: x [k, d] -> values [k] and gradients [k, d].
+        value_and_grad: x [k, d] and which are wanted, bool [k] -> values [k], gradients [k, d].
         start: [k, d].
+        wanted: Which problems to solve, bool [k]; the others stay.
         tolerance: A problem is done when an iteration gains less.
 
     Returns:
@@ -40,9 +40,9 @@ def minimise_many(
     """
     x = np.array(start, np.float64)
     k, d = x.shape
-    value, gradient = _evaluate(value_and_grad, x)
+    value, gradient = _evaluate(value_and_grad, x, wanted)
     inverse = np.tile(np.eye(d), (k, 1, 1)) / np.maximum(1.0, _norm(gradient))[:, None, None]
-    active = np.isfinite(value)
+    active = wanted & np.isfinite(value)
     for _ in range(ITERATIONS):
         if not active.any():
             break
@@ -60,8 +60,10 @@ def minimise_many(
     return x, value
 
 
-def _evaluate(value_and_grad: Any, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    value, gradient = (np.asarray(part) for part in value_and_grad(x))
+def _evaluate(
+    value_and_grad: ValueAndGrad, x: np.ndarray, wanted: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    value, gradient = (np.asarray(part) for part in value_and_grad(x, wanted))
     bad = ~(np.isfinite(value) & np.isfinite(gradient).all(1))
     return np.where(bad, np.inf, value), np.where(bad[:, None], 0.0, gradient)
 
@@ -71,7 +73,7 @@ def _norm(gradient: np.ndarray) -> np.ndarray:
 
 
 def _search(  # noqa: PLR0913  the state of a line search
-    value_and_grad: Any,
+    value_and_grad: ValueAndGrad,
     x: np.ndarray,
     value: np.ndarray,
     gradient: np.ndarray,
@@ -85,7 +87,7 @@ def _search(  # noqa: PLR0913  the state of a line search
     best = x.copy(), value.copy(), gradient.copy()
     for _ in range(BACKTRACKS):
         trial = x + length[:, None] * step
-        new_value, new_gradient = _evaluate(value_and_grad, trial)
+        new_value, new_gradient = _evaluate(value_and_grad, trial, ~done)
         enough = ~done & (new_value <= value + ARMIJO * length * slope)
         for kept, new in zip(best, (trial, new_value, new_gradient), strict=True):
             kept[enough] = new[enough]
@@ -130,7 +132,10 @@ def minimise_in_box(objective: Objective, state: Any, dimension: int) -> np.ndar
     screen = sobol(0, 0, SCREENED, dimension)
     order = np.argsort(np.asarray(_values(objective, state, screen)))[:REFINED]
     x, value = minimise_many(
-        lambda x: _value_and_grad(objective, state, x), _logit(screen[order]), tolerance=1e-6
+        lambda x, _: _value_and_grad(objective, state, x),
+        _logit(screen[order]),
+        np.ones(REFINED, bool),
+        tolerance=1e-6,
     )
     best = x[np.argmin(value)]
     return np.clip(np.asarray(jax.nn.sigmoid(jnp.asarray(best))), EDGE, 1.0 - EDGE)

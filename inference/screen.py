@@ -54,21 +54,29 @@ def screen(shifts: jax.Array, log_target: LogLikelihood, state: Any) -> Screen:
 
     def one(i: jax.Array, now: tuple[jax.Array, jax.Array, jax.Array]):
         x, values, mass = now
-        uniforms = jnp.clip((cloud + shifts[i]) % 1.0, EDGE, 1.0 - EDGE)
-        kernel = _fit(x, values, mass)
-        spread = even[jnp.minimum(i, EVEN - 1)] + shifts[0, :dimension]
-        spread = ndtri(jnp.clip(spread % 1.0, EDGE, 1.0 - EDGE))
-        new = jnp.where(i < EVEN, spread, _propose(kernel, uniforms))
+
+        def spread() -> tuple[jax.Array, _Kernel]:
+            u = (even[i] + shifts[0, :dimension]) % 1.0
+            return ndtri(jnp.clip(u, EDGE, 1.0 - EDGE)), unused
+
+        def zoomed() -> tuple[jax.Array, _Kernel]:
+            kernel = _fit(x, values, mass)
+            uniforms = jnp.clip((cloud + shifts[i]) % 1.0, EDGE, 1.0 - EDGE)
+            return _propose(kernel, uniforms), kernel
+
+        new, kernel = jax.lax.cond(i < EVEN, spread, zoomed)
         x = jax.lax.dynamic_update_slice(x, new, (i * ROUND, 0))
         found = jax.vmap(log_target, (None, 0))(state, ndtr(new))
         found = jnp.where(jnp.isfinite(found), found, -jnp.inf)
         values = jax.lax.dynamic_update_slice(values, found, (i * ROUND,))
+        density = jax.lax.cond(i < EVEN, lambda: _log_prior(x), lambda: _log_density(kernel, x))
         filled = jnp.arange(n) < (i + 1) * ROUND
-        density = _log_density(kernel, x, i < EVEN)
-        return x, values, jnp.where(filled, jnp.logaddexp(mass, density), -jnp.inf)
+        together = jnp.logaddexp(mass, jnp.log(ROUND) + density)
+        return x, values, jnp.where(filled, together, -jnp.inf)
 
     # points are charged with the kernel that proposed them and with later ones, not with earlier
     # ones: cheap, and enough for choosing
+    unused = _Kernel(jnp.zeros((CENTRES, dimension)), jnp.eye(dimension))
     start = jnp.zeros((n, dimension)), jnp.full(n, -jnp.inf), jnp.full(n, -jnp.inf)
     x, values, mass = jax.lax.fori_loop(0, ROUNDS, one, start)
     return Screen(ndtr(x), values, _log_weights(x, values, mass, 1.0))
@@ -124,12 +132,12 @@ def _back_substitute(whitener: jax.Array, z: jax.Array) -> jax.Array:
     return jnp.stack(result)
 
 
-def _log_density(kernel: _Kernel, x: jax.Array, even: jax.Array) -> jax.Array:
-    """Log of ROUND times the density of a round's proposals at x [n, d]."""
-    prior = _log_prior(x)
+def _log_density(kernel: _Kernel, x: jax.Array) -> jax.Array:
+    """Of a round's proposals at x [n, d]."""
     white = (x[:, None, :] - kernel.centres) @ kernel.whitener.T
     log_det = jnp.sum(jnp.log(jnp.diag(kernel.whitener)))
     each = jnp.sum(norm.logpdf(white), -1) + log_det
     fitted = logsumexp(each, 1) - jnp.log(CENTRES)
-    both = jnp.logaddexp(jnp.log1p(-SHARE_OF_PRIOR) + fitted, jnp.log(SHARE_OF_PRIOR) + prior)
-    return jnp.log(ROUND) + jnp.where(even, prior, both)
+    return jnp.logaddexp(
+        jnp.log1p(-SHARE_OF_PRIOR) + fitted, jnp.log(SHARE_OF_PRIOR) + _log_prior(x)
+    )

@@ -26,9 +26,8 @@ from .noise import (
 from .optimise import minimise_in_box
 from .output import Output
 
-KEPT = 12  # nodes of the measurement noise that enter the likelihood
+KEPT = 12  # nodes of unknown measurement noise that enter the likelihood
 SCREENED = 128
-NEVER = -1e6  # log weight of a node that fills the arrays
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,8 @@ class SignalSurrogate:
         output: How outputs become values.
         observed: The observed values [m].
         known: Covariance [m, m] of the measurement noise, where the user gave it.
-        nodes: Sizes and correlations of the measurement noise, KEPT of them.
+        nodes: Sizes and correlations of the measurement noise, KEPT of them; one where there is
+            none, or it is known.
         reduced: The observed scores at each, with the scores' run-to-run noise.
     """
 
@@ -83,7 +83,7 @@ class SignalSurrogate:
     @property
     @in_float64
     def node_weights(self) -> np.ndarray:
-        """Posterior weights [KEPT] of the nodes, given the best parameters."""
+        """Posterior weights of the nodes, given the best parameters."""
         terms = _node_log_densities(self.state, jnp.asarray(self.minimum()[None]))
         log_weights = np.asarray(terms)[0]
         weights = np.exp(log_weights - log_weights.max())
@@ -133,7 +133,8 @@ class SignalSurrogate:
         """
         simulated_key, node_key, noise_key = jax.random.split(key, 3)
         values = predictive_draws(simulated_key, self.emulator, u)
-        which = jax.random.choice(node_key, KEPT, (len(u),), p=jnp.asarray(self.node_weights))
+        weights = jnp.asarray(self.node_weights)
+        which = jax.random.choice(node_key, len(weights), (len(u),), p=weights)
         nodes = Nodes(*(part[np.asarray(which)] for part in self.nodes))
         white = np.asarray(jax.random.normal(noise_key, values.shape))
         noise = correlated(white, self.output.layout, nodes)
@@ -202,9 +203,9 @@ def observe(
     else:
         reduced = reduce((vectors, target, factors), white, output.layout, nodes)
     reduced = _widen(reduced, emulator)
-    kept = _keep(emulator, reduced)
-    reduced = _pad(Reduced(*(part[kept] for part in reduced)))
-    nodes = Nodes(*(np.resize(part[kept], KEPT) for part in nodes))
+    if len(reduced.log_weight) > KEPT:
+        kept = _keep(emulator, reduced)
+        reduced, nodes = (type(x)(*(part[kept] for part in x)) for x in (reduced, nodes))
     return SignalSurrogate(emulator, output, observed, noise, nodes, reduced)
 
 
@@ -214,32 +215,20 @@ def _root(covariance: np.ndarray) -> np.ndarray:
 
 
 def _widen(reduced: Reduced, emulator: Emulator) -> Reduced:
-    """To all components, with the scores' run-to-run noise in the covariance."""
+    """To all components, with the scores' run-to-run noise in the covariance; the largest weight
+    becomes 1."""
     used, k = emulator.basis.used, emulator.basis.vectors.shape[1]
     nodes = len(reduced.log_weight)
     estimate = np.zeros((nodes, k))
     estimate[:, :used] = reduced.estimate
     covariance = np.tile(np.eye(k), (nodes, 1, 1))
     covariance[:, :used, :used] = reduced.covariance + emulator.noise[:used, :used]
-    return Reduced(estimate, covariance, reduced.log_weight)
+    return Reduced(estimate, covariance, reduced.log_weight - reduced.log_weight.max())
 
 
 def _keep(emulator: Emulator, reduced: Reduced) -> np.ndarray:
     """The nodes of most evidence, best first, on an even screen of the prior and at the data."""
-    if len(reduced.log_weight) == 1:
-        return np.zeros(1, int)
     data = emulator.gp.data.u
     points = np.concatenate([sobol(0, 0, SCREENED, data.shape[1]), np.asarray(data)])
     terms = _node_log_densities(state_of(emulator, reduced), jnp.asarray(points))
     return np.argsort(-np.logaddexp.reduce(np.asarray(terms), 0))[:KEPT]
-
-
-def _pad(reduced: Reduced) -> Reduced:
-    """To KEPT nodes; the largest weight becomes 1."""
-    extra = KEPT - len(reduced.log_weight)
-    k = reduced.estimate.shape[1]
-    return Reduced(
-        np.concatenate([reduced.estimate, np.zeros((extra, k))]),
-        np.concatenate([reduced.covariance, np.tile(np.eye(k), (extra, 1, 1))]),
-        np.append(reduced.log_weight - reduced.log_weight.max(), np.full(extra, NEVER)),
-    )

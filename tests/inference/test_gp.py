@@ -6,22 +6,19 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference import gp as gaussian
 from bolfi_liquids.inference import hyper as hyperparameters
+from bolfi_liquids.inference.compiled import believe, condition, extend
 from bolfi_liquids.inference.linalg import (
+    BLOCK,
     inverse_cholesky,
     log_normal_density,
     small_inverse_cholesky,
 )
-from scipy.stats import multivariate_normal
+from scipy.stats import multivariate_normal, norm
 
 N = 12
-condition, predict, leave_one_out, log_marginal_likelihood = map(
+predict, leave_one_out, log_marginal_likelihood = map(
     jax.jit,
-    (
-        gaussian.condition,
-        gaussian.predict,
-        gaussian.leave_one_out,
-        gaussian.log_marginal_likelihood,
-    ),
+    (gaussian.predict, gaussian.leave_one_out, gaussian.log_marginal_likelihood),
 )
 
 
@@ -125,19 +122,49 @@ def test_joint_prediction_agrees_with_dense_algebra(rows, hyper):
     np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-10)
 
 
-def test_appending_the_mean_agrees_with_conditioning_on_it(rows, hyper):
+def test_believing_agrees_with_conditioning_on_the_mean(rows, hyper):
     u, y = rows
     fitted = condition(hyper, gaussian.pad(u, y, 32))
-    new = np.array([[0.4, 0.7], [0.1, 0.2], [0.5, 0.5]])  # of which two are appended
-    mean = np.stack([predict(fitted, jnp.asarray(point))[0] for point in new[:2]], axis=1)
+    new = np.array([[0.4, 0.7], [0.1, 0.2]])
+    mean = np.stack([predict(fitted, jnp.asarray(point))[0] for point in new], axis=1)
     again = condition(
-        hyper,
-        gaussian.pad(np.concatenate([u, new[:2]]), np.concatenate([y, mean], axis=1), 32),
+        hyper, gaussian.pad(np.concatenate([u, new]), np.concatenate([y, mean], axis=1), 32)
     )
-    appended = jax.jit(gaussian.append_mean)(fitted, jnp.asarray(new), jnp.asarray(2))
+    believing = believe(fitted, new)
     at = jnp.array([0.3, 0.3])
-    for one, other in zip(predict(appended, at), predict(again, at), strict=True):
+    for one, other in zip(predict(believing, at), predict(again, at), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-9)
+    with pytest.raises(ValueError, match="32 reserved"):
+        believe(fitted, np.full((21, 2), 0.5))
+
+
+@pytest.mark.parametrize("first", [20, 32, 50])
+def test_growing_agrees_with_conditioning_on_all(first, hyper):
+    """Within a block, at the end of one and over one; also where the first data changed."""
+    rng = np.random.default_rng(5)
+    u, y = rng.uniform(size=(70, 2)), rng.normal(size=(1, 70))
+    data = gaussian.pad(u, y, 96)
+    expected = condition(hyper, data)
+    changed = np.concatenate([u[1 : first + 1], u[:1]])[:first]
+    for before in (u[:first], changed):
+        grown = extend(condition(hyper, gaussian.pad(before, y[:, :first], 96)), data)
+        np.testing.assert_allclose(grown.whitener, expected.whitener, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(grown.weights, expected.weights, rtol=1e-7, atol=1e-9)
+
+
+def test_coordinates_of_a_prior_that_fades_out_are_its_normal_scores(rows, hyper):
+    """A process over normal scores is one over quantiles that lie where the scores do."""
+    u, y = rows
+    scores = 0.5 + norm.ppf(u[:, 0]) / np.sqrt(12.0)
+    moved = np.column_stack([scores, u[:, 1]])
+    there = condition(hyper, gaussian.pad(u, y, 32, np.array([True, False])))
+    same = condition(hyper, gaussian.pad(moved, y, 32))
+    for one, other in zip(
+        predict(there, jnp.asarray(u[0])), predict(same, jnp.asarray(moved[0])), strict=True
+    ):
+        np.testing.assert_allclose(one, other, rtol=1e-9)
+    for part in (*predict(there, jnp.zeros(2)), *predict(there, jnp.ones(2))):
+        assert np.isfinite(part).all()
 
 
 @pytest.mark.parametrize("used", [12, 40, 64])
@@ -150,30 +177,36 @@ def test_density_and_its_gradient_agree_with_jax(used):
     gram = jnp.asarray(np.where(inside[:, None] & inside, full, np.eye(size)))
     y = jnp.asarray(rng.normal(size=size) * inside)
 
-    def reference(matrix, y):
-        some = matrix[:used, :used], y[:used]
+    def rows_of(matrix, _, start):
+        return jax.lax.dynamic_slice(matrix, (start, 0), (BLOCK, size))
+
+    def reference(matrix):
+        density = jax.scipy.stats.multivariate_normal.logpdf
         constant = used / 2 * jnp.log(2 * jnp.pi)
-        return (
-            jax.scipy.stats.multivariate_normal.logpdf(some[1], jnp.zeros(used), some[0]) + constant
-        )
+        return density(y[:used], jnp.zeros(used), matrix[:used, :used]) + constant
 
-    def ours(matrix, y):
-        return log_normal_density(matrix, y, used)
+    def ours(matrix):
+        return log_normal_density(rows_of, matrix, (), y, used)
 
-    np.testing.assert_allclose(ours(gram, y), reference(gram, y), rtol=1e-9)
-    for one, other in zip(
-        jax.grad(ours, (0, 1))(gram, y), jax.grad(reference, (0, 1))(gram, y), strict=True
-    ):
-        one = np.where(inside[:, None] & inside, one, 0.0) if one.ndim == 2 else one * inside
-        np.testing.assert_allclose(one + one.T, other + other.T, rtol=1e-6, atol=1e-8)
+    np.testing.assert_allclose(ours(gram), reference(gram), rtol=1e-9)
+    one, other = jax.grad(ours)(gram), jax.grad(reference)(gram)
+    one = np.where(inside[:, None] & inside, one, 0.0)
+    np.testing.assert_allclose(one + one.T, other + other.T, rtol=1e-6, atol=1e-8)
 
 
 def test_inverse_cholesky_of_an_ill_conditioned_matrix():
     points = np.linspace(0.0, 1.0, 64)
     matrix = np.exp(-0.5 * (points[:, None] - points) ** 2 / 0.09) + 1e-6 * np.eye(64)
-    inverse = np.asarray(inverse_cholesky(jnp.asarray(matrix), 64))
+
+    def inverted(matrix, n):
+        def rows(start):
+            return jax.lax.dynamic_slice(matrix, (start, 0), (BLOCK, len(matrix)))
+
+        return np.asarray(inverse_cholesky(rows, n, jnp.eye(len(matrix))))
+
+    inverse = inverted(jnp.asarray(matrix), 64)
     np.testing.assert_allclose(inverse @ matrix @ inverse.T, np.eye(64), atol=1e-7)
-    assert np.isnan(inverse_cholesky(jnp.asarray(-np.eye(32)), 3)).any()
+    assert np.isnan(inverted(jnp.asarray(-np.eye(32)), 3)).any()
     small = np.asarray(small_inverse_cholesky(jnp.asarray(matrix[:5, :5])))
     np.testing.assert_allclose(small @ matrix[:5, :5] @ small.T, np.eye(5), atol=1e-7)
 
@@ -187,7 +220,9 @@ def test_hyperparameters_are_a_stationary_point_that_tells_inputs_apart():
     found = hyperparameters.maximum_a_posteriori(data)
 
     def total(vectors):
-        return jnp.sum(hyperparameters.negative_log_posterior(vectors, data))
+        hyper = hyperparameters.unpack(jnp.asarray(vectors))
+        evidence = log_marginal_likelihood(hyper, data)
+        return -jnp.sum(evidence + hyperparameters.log_prior(hyper))
 
     gradient = jax.grad(total)(jnp.asarray(hyperparameters.pack(found)))
     np.testing.assert_allclose(gradient, 0.0, atol=0.1)  # optimisers stop at gains of 1e-3

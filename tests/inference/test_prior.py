@@ -132,3 +132,19 @@ def test_bad_distributions_are_refused(distributions, message):
 def test_bad_theta_is_refused(mixed, theta, message):
     with pytest.raises(ValueError, match=message):
         mixed.to_array(theta)
+
+
+def test_which_priors_are_seen_as_normal_scores():
+    """Those that fade out, or whose logs do; not those that end abruptly."""
+    prior = inference.Prior(
+        {
+            "box": dist.Uniform(-1.0, 2.0),
+            "decades": dist.LogUniform(1e-3, 20.0),
+            "bell": dist.Normal(3.0, 2.0),
+            "log_bell": dist.LogNormal(0.0, 2.0),
+            "rate": dist.Gamma(2.0, 1.0),
+            "arcsine": dist.Beta(0.5, 0.5),
+            "middle": dist.TruncatedNormal(0.0, 1.0, low=-0.5, high=0.5),
+        }
+    )
+    assert prior.normal.tolist() == [False, False, True, True, True, False, False]
