@@ -10,6 +10,7 @@ from .base import Discrepancy, Surrogate
 from .discrepancy import evaluate, squared_difference
 from .discrepancy_surrogate import DiscrepancySurrogate, learn, marginalised
 from .emulator import emulate
+from .given_noise import given_noise
 from .likelihood import Threshold, check_rule
 from .output import Output, Summary, describe
 from .sane import sane
@@ -102,11 +103,11 @@ class SignalFamily:
     Attributes:
         summary: Callable output -> vector, of the observed and of each simulated output; None
             takes the output as it is.
-        noise: Measurement noise that the simulator does not make: its sd (a number, or one for
-            each value), or its covariance over the flattened finite values of the observed
-            (summarised) output; 0 for none. None estimates it, as an AR(1) process, where the
-            output is a series of at least 16 samples without a summary, and takes none
-            elsewhere.
+        noise: Measurement noise that the simulator does not make: its sd, a number or an array
+            shaped like the observed (summarised) output; or sds [n], or a covariance [n, n], of
+            that output's n finite values, flattened; 0 for none. None estimates it, as an AR(1)
+            process, where the output is a series of at least 16 samples without a summary, and
+            takes none elsewhere.
         components: At most.
         discrepancy: As in `DiscrepancyFamily`; it only ranks simulations and finds outputs that
             blew up.
@@ -129,29 +130,8 @@ class SignalFamily:
         output = describe(observed, self.summary)
         values = output.values(observed)
         distance = self.discrepancy or _of_summaries(self.summary)
-        return SignalLearner(self, output, distance, observed, values, self._covariance(output))
-
-    def _covariance(self, output: Output) -> np.ndarray | None:
-        if self.noise is None:
-            return None
-        given, samples = np.asarray(self.noise, np.float64), len(output.present)
-        if given.ndim < 2 and given.size in (1, samples):
-            if not (np.isfinite(given) & (given >= 0.0)).all():
-                raise ValueError("noise must be finite and not negative")
-            full = np.diag(np.broadcast_to(given, samples) ** 2)
-        elif given.shape == (samples, samples):
-            full = given
-        else:
-            raise ValueError(
-                f"noise must be a number, [{samples}] sds or a [{samples}, {samples}] covariance "
-                f"of the finite observed values, got shape {given.shape}"
-            )
-        symmetric = np.isfinite(full).all() and np.allclose(full, full.T)
-        if not (symmetric and np.linalg.eigvalsh(full)[0] >= -1e-9 * np.abs(full).max()):
-            raise ValueError("noise must be a finite, symmetric, positive semidefinite covariance")
-        # rows and columns in the order of the values, then averaged as they are
-        order = np.argsort(np.argsort(output.present))
-        return output.average(output.average(full[np.ix_(order, order)]).T)
+        noise = None if self.noise is None else given_noise(self.noise, output)
+        return SignalLearner(self, output, distance, observed, values, noise)
 
 
 @dataclass(frozen=True)
@@ -163,7 +143,7 @@ class SignalLearner:
     distance: Discrepancy
     observed: np.ndarray
     values: np.ndarray
-    noise: np.ndarray | None
+    noise: np.ndarray | None  # as from `given_noise`
 
     @property
     def features(self) -> int:

@@ -34,6 +34,11 @@ class Output:
     starts: np.ndarray
     series: bool
 
+    @property
+    def counts(self) -> np.ndarray:
+        """Samples that are averaged for each value [m]."""
+        return np.diff(np.append(self.starts, len(self.present)))
+
     def values(self, output: np.ndarray) -> np.ndarray:
         """[m] of one output.
 
@@ -50,15 +55,13 @@ class Output:
 
     def average(self, samples: np.ndarray) -> np.ndarray:
         """Samples [len(present), ...] in the order of the values -> [m, ...]."""
-        counts = np.diff(np.append(self.starts, len(samples)))
         sums = np.add.reduceat(samples, self.starts, axis=0)
-        return sums / counts.reshape(-1, *[1] * (samples.ndim - 1))
+        return sums / self.counts.reshape(-1, *[1] * (samples.ndim - 1))
 
     def restore(self, values: np.ndarray) -> np.ndarray:
         """Values [n, m] at their places in the (summarised) output: [n, *shape]; NaN elsewhere."""
-        counts = np.diff(np.append(self.starts, len(self.present)))
         full = np.full((len(values), int(np.prod(self.shape))), np.nan)
-        full[:, self.present] = np.repeat(values, counts, axis=1)
+        full[:, self.present] = np.repeat(values, self.counts, axis=1)
         return full.reshape(len(values), *self.shape)
 
     def scale(self, values: np.ndarray) -> np.ndarray:

@@ -39,7 +39,8 @@ class SignalSurrogate:
         emulator: Of the outputs.
         output: How outputs become values.
         observed: The observed values [m].
-        known: Covariance [m, m] of the measurement noise, where the user gave it.
+        known: Variances [m] or covariance [m, m] of the measurement noise, where the user gave
+            it.
         nodes: Sizes and correlations of the measurement noise, KEPT of them.
         reduced: The observed scores at each, with the scores' run-to-run noise.
     """
@@ -95,7 +96,7 @@ class SignalSurrogate:
         weights = self.node_weights
         sd = weights @ self.nodes.sigma * self.emulator.basis.scale[0]
         if self.known is not None:
-            sd = np.sqrt(self.known[0, 0])
+            sd = np.sqrt(self.known.flat[0])
         return {
             "components": np.asarray(self.emulator.basis.used),
             "explained_variance": np.asarray(self.emulator.basis.explained),
@@ -138,7 +139,9 @@ class SignalSurrogate:
         white = np.asarray(jax.random.normal(noise_key, values.shape))
         noise = correlated(white, self.output.layout, nodes)
         values = values + self.emulator.basis.scale * noise
-        if self.known is not None:
+        if self.known is not None and self.known.ndim == 1:
+            values = values + white * np.sqrt(self.known)
+        elif self.known is not None:
             values = values + white @ _root(self.known).T
         return {"signal": self.output.restore(values)}
 
@@ -174,23 +177,22 @@ def observe(
     combination of the components explains.
 
     Args:
-        noise: Known covariance [m, m] of the measurement noise; None to estimate it where the
-            output is a series, and for none where it is not.
+        noise: Known variances [m] or covariance [m, m] of the measurement noise; None to
+            estimate it where the output is a series, and for none where it is not.
         previous: Its nodes are kept.
     """
     basis, remainder = emulator.basis, emulator.remainder
     target, used = basis.standardise(observed), emulator.basis.used
     vectors, factors = basis.vectors, remainder.factors
     white = np.full(len(target), remainder.white)
-    if noise is not None:
+    if noise is not None and noise.ndim == 1:
+        white = white + noise / basis.scale**2
+    elif noise is not None:
         standard = noise / np.outer(basis.scale, basis.scale)
-        diagonal = np.diag(standard)
-        if np.array_equal(standard, np.diag(diagonal)):
-            white = white + diagonal
-        else:  # much of it as white noise, lest rounding rule where factors alone are noisy
-            least = 0.9 * max(float(np.linalg.eigvalsh(standard)[0]), 0.0)
-            white = white + least
-            factors = np.column_stack([factors, _root(standard - least * np.eye(len(target)))])
+        # much of it as white noise, lest rounding rule where factors alone are noisy
+        least = 0.9 * max(float(np.linalg.eigvalsh(standard)[0]), 0.0)
+        white = white + least
+        factors = np.column_stack([factors, _root(standard - least * np.eye(len(target)))])
     if previous is not None:
         nodes = previous.nodes
     elif noise is not None or not output.series or used == 0:
