@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from . import acquisition as acquisitions
 from .base import Acquisition, Theta
+from .describe import describe
 from .design import sobol, start_size
 from .families import Family, Learnable, resolve
 from .feasibility import feasibility
@@ -77,8 +78,8 @@ class Bolfi:
         self._any_shape = self._learner.any_shape
         self.settings: dict[str, object] = {
             "surrogate": self.family.name,
-            **{name: str(value) for name, value in vars(self.family).items()},
-            "acquisition": repr(self._acquire),
+            **{name: describe(value) for name, value in vars(self.family).items()},
+            "acquisition": describe(self._acquire),
             "seed": self.seed,
             "initial": self.initial,
         }

@@ -11,8 +11,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from ..base import Simulator
 from ..bolfi import checked_integer
+from ..describe import describe
 from ..prior import Prior
-from .describe import describe
 from .replicate import Observe, Pipeline, Plan, Replicate, run_replicate
 from .replicated import Replicates
 from .store import ReplicateStore
