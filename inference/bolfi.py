@@ -235,13 +235,17 @@ class Bolfi:
                 f"{self.told} told; tell more"
             )
         started = time.perf_counter()
-        fitted = self._learner.finish(self._known(), self._rows(0), self.seed)
+        known, history = self._known(), self._state.history
+        fitted = self._learner.finish(known, self._rows(0), self.seed)
+        learned_from = history.succeeded
+        learned_from[learned_from] = self._learner.learnable(known.discrepancy)
         spent = self._seconds + time.perf_counter() - started
         return Fit(
             prior=self.prior,
             observed=self.observed,
-            history=self._state.history,
+            history=history,
             learned=fitted,
+            learned_from=learned_from,
             settings=self.settings,
             seconds={"simulator": 0.0, **(seconds or {}), "engine": spent},
         )

@@ -81,6 +81,10 @@ class DiscrepancyLearner:
         """Features [n, 0] and discrepancies [n] of signals [n, ...]; NaN where failed."""
         return np.zeros((len(signals), 0)), evaluate(self.distance, self.observed, signals)
 
+    def learnable(self, discrepancy: np.ndarray) -> np.ndarray:
+        """Which of the successful simulations are learned from, bool [n]: all."""
+        return np.ones(len(discrepancy), bool)
+
     def learn(
         self, known: Learnable, rows: int, previous: DiscrepancySurrogate | None
     ) -> DiscrepancySurrogate:
@@ -163,10 +167,14 @@ class SignalLearner:
         failed = ~np.isfinite(features).all(1)
         return features, np.where(failed, np.nan, discrepancy)
 
+    def learnable(self, discrepancy: np.ndarray) -> np.ndarray:
+        """Which of the successful simulations are learned from, bool [n]: what blew up is not."""
+        return sane(discrepancy)
+
     def learn(
         self, known: Learnable, rows: int, previous: SignalSurrogate | None
     ) -> SignalSurrogate:
-        learnable = sane(known.discrepancy)
+        learnable = self.learnable(known.discrepancy)
         features = known.features[learnable]
         old = None if previous is None else previous.emulator
         scale = self.output.scale(features) if old is None else old.basis.scale

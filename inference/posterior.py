@@ -53,6 +53,7 @@ class Fit:
         prior, observed: As given.
         history: Every simulation, in the order told.
         learned: The surrogate over prior quantiles.
+        learned_from: Which simulations it knows, bool [n].
         settings: How the run was made.
         seconds: Time in the "simulator" and in the "engine" [s].
     """
@@ -61,6 +62,7 @@ class Fit:
     observed: np.ndarray
     history: History
     learned: Surrogate
+    learned_from: np.ndarray
     settings: Mapping[str, object]
     seconds: Mapping[str, float]
 
@@ -160,9 +162,10 @@ class Fit:
             what the sampler records. prior: `draws` draws. observed_data: `signal`.
             posterior_predictive: what the surrogate predicts at some draws, whose indices are
             its coordinate `draw`. constant_data: the surrogate's constants. emulator_checks:
-            the surrogate's own checks for each simulation, what it complains of in the
-            attribute `warnings`. simulations: as `Fit.simulations`. The root's attributes
-            hold how the run was made, and the seconds it took.
+            the surrogate's own checks for each simulation, NaN where it learned nothing from
+            one, and what it complains of in the attribute `warnings`. simulations: as
+            `Fit.simulations`. The root's attributes hold how the run was made, and the seconds
+            it took.
 
         Raises:
             ValueError: unknown sampler, a length too small, quadrature of more than two
@@ -186,7 +189,8 @@ class Fit:
         drawn = self.prior.from_unit(rng.random((draws, len(self.prior))))
         tree = results_tree(self.prior, made.chains, drawn, self.observed, self.simulations)
         tree["posterior"].attrs.update(status=made.status, draws_made=made.steps, **made.checks)
-        add_surrogate(tree, self.learned, made.chains.u, jax.random.key(seed))
+        key = jax.random.key(seed)
+        add_surrogate(tree, self.learned, self.learned_from, made.chains.u, key)
         attributes = {
             **self.settings,
             **{"sampler": sampler, **length._asdict(), "extend": extend, "sampling_seed": seed},
