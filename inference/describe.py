@@ -35,12 +35,12 @@ def describe(value: Any) -> str:
         return f"{_name(type(value))}({describe(held)})"
     if callable(value) and hasattr(value, "__qualname__"):
         return _name(value)
-    if isinstance(value, tuple) and hasattr(value, "_asdict"):
-        return f"{_name(type(value))}({describe(value._asdict())})"
     return _plain(value)
 
 
 def _plain(value: Any) -> str:
+    if hasattr(value, "_asdict"):  # a named tuple
+        return f"{_name(type(value))}({describe(value._asdict())})"
     if isinstance(value, Mapping):
         return ", ".join(f"{key}={describe(value[key])}" for key in value)
     if isinstance(value, list | tuple):
