@@ -91,6 +91,11 @@ class SimulationBank:
         """Whether everything is forgotten when the bank is closed."""
         return self.path == ":memory:"
 
+    @property
+    def where(self) -> str:
+        """Where finished simulations are kept, for messages."""
+        return "nothing, for bank is in memory" if self.in_memory else self.path
+
     def _open(self) -> None:
         execute = self._connection.execute
         execute("BEGIN IMMEDIATE")  # two processes may create the file together

@@ -103,6 +103,11 @@ class Bolfi:
         return int(self._state.history.succeeded.sum())
 
     @property
+    def errors(self) -> list[str]:
+        """Why simulations failed, in the order told."""
+        return [str(error) for error in self._state.history.errors if error]
+
+    @property
     def signal_shape(self) -> tuple[int, ...]:
         """Shape of one simulated signal: that of `observed`, or of the signals told so far."""
         return self._state.history.signals.shape[1:]

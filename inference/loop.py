@@ -88,7 +88,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
 
     Raises:
         ValueError: bad argument; budget smaller than the start design; signals of wrong shape.
-        RuntimeError: no run of the start design succeeded; the executor lost its workers.
+        RuntimeError: no run of the start design succeeded, or fewer than three in all, of which
+            the bank keeps those that did; the executor lost its workers.
         ImportError, ConnectionError: Dask is not installed, or does not answer.
     """
     batch = checked_integer("batch", batch)
@@ -125,6 +126,13 @@ def fit(  # noqa: PLR0913  the one call that most users make
         for simulation in finished:
             seconds += simulation.seconds
             advance(1)
+        if engine.succeeded < MIN_LEARN:
+            raise RuntimeError(
+                f"{engine.succeeded} of {engine.told} simulations succeeded, {MIN_LEARN} are "
+                f"needed; the last error: {engine.errors[-1]}. Finished simulations are kept in "
+                f"{bank.where}; mend the cause, or raise budget, and repeat the call to go on "
+                "from there"
+            )
     return engine.fit({"simulator": seconds})
 
 
@@ -168,7 +176,7 @@ def _tell(engine: Bolfi, asked: list[Job], results: list[Simulation]) -> list[Si
     if engine.told >= engine.initial and engine.succeeded == 0:
         raise RuntimeError(
             f"all {engine.told} simulations of the start design failed; the last error: "
-            f"{errors[-1] or 'the signal or its discrepancy was not finite'}"
+            f"{engine.errors[-1]}"
         )
     return results
 

@@ -189,12 +189,11 @@ class Runner:
                 f"({error}); define it at the top level of a module"
             )
         elif isinstance(error, BrokenExecutor | CancelledError):
-            where = "nothing, for bank is in memory" if self.bank.in_memory else self.bank.path
             jobs = "; ".join(f"{job.theta}, seed {job.seed}" for job in list(self._mine.values()))
             told = RuntimeError(
                 f"the executor lost its workers ({raised(error)}): one was killed, ran out of "
                 "memory, crashed in the simulator or could not import it. "
-                f"In flight: {jobs}. Finished simulations are kept in {where}; "
+                f"In flight: {jobs}. Finished simulations are kept in {self.bank.where}; "
                 "mend the cause and repeat the call with a new executor to go on from there"
             )
         else:

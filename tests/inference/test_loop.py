@@ -228,6 +228,32 @@ def test_total_failure_is_an_error_with_its_cause(prior, observed):
         inference.fit(broken, prior, observed)
 
 
+@pytest.mark.parametrize("successes", [1, 2])
+def test_too_few_successes_are_an_error_that_loses_nothing(
+    tmp_path, prior, observed, simulate, successes
+):
+    calls = []
+
+    def fragile(theta, seeds):
+        calls.extend(seeds)
+        if len(calls) > successes:
+            raise OSError("no licence")
+        return simulate(theta, seeds)
+
+    path = tmp_path / "b.sqlite"
+    message = (
+        f"{successes} of 7 simulations succeeded, 3 are needed; the last error: OSError: "
+        f"no licence. Finished simulations are kept in {re.escape(str(path))}; mend the cause"
+    )
+    with pytest.raises(RuntimeError, match=message):
+        inference.fit(fragile, prior, observed, budget=7, batch=1, bank=path)
+    with inference.SimulationBank(path) as bank:
+        assert len(bank.simulations("").seeds) == successes
+    calls.clear()
+    with pytest.raises(RuntimeError, match="kept in nothing, for bank is in memory"):
+        inference.fit(fragile, prior, observed, budget=7, batch=1)
+
+
 @pytest.mark.parametrize("shape", [(2, 29), (3, 30), (30,), ()])
 def test_signals_of_wrong_shape_are_refused_and_not_stored(prior, observed, simulate, shape):
     message = re.escape(f"shape (2, 30), one row per theta, got {shape}")
