@@ -99,8 +99,8 @@ class Bolfi:
 
     @property
     def succeeded(self) -> int:
-        """Simulations told so far that gave a finite discrepancy."""
-        return int(self._state.history.succeeded.sum())
+        """Simulations told so far that gave a finite discrepancy, copies counted once."""
+        return int(self._state.history.distinct.sum())
 
     @property
     def errors(self) -> list[str]:
@@ -168,7 +168,7 @@ class Bolfi:
 
     def _known(self) -> Learnable:
         history = self._state.history
-        good = history.succeeded
+        good = history.distinct
         return Learnable(history.u[good], history.features[good], history.discrepancy[good])
 
     def _rows(self, extra: int) -> int:
@@ -189,7 +189,8 @@ class Bolfi:
         Args:
             theta: Name -> [n], in the prior's support.
             signals: [n, *signal_shape].
-            seeds: Seeds of the runs [n], to be kept with the results.
+            seeds: Seeds of the runs [n], to be kept with the results. Of runs with equal theta
+                and seed one is learned from.
             errors: Why a run failed [n], to be kept for rows of NaN; "" elsewhere.
 
         Raises:
@@ -242,7 +243,7 @@ class Bolfi:
         started = time.perf_counter()
         known, history = self._known(), self._state.history
         fitted = self._learner.finish(known, self._rows(0), self.seed)
-        learned_from = history.succeeded
+        learned_from = history.distinct
         learned_from[learned_from] = self._learner.learnable(known.discrepancy)
         spent = self._seconds + time.perf_counter() - started
         return Fit(

@@ -55,6 +55,23 @@ def test_foreign_simulations_replace_the_start_design(prior, observed, simulate)
     assert engine.ask(1)["slope"] != start["slope"]
 
 
+def test_a_copy_teaches_nothing(prior, observed, simulate):
+    """Copies have equal theta and seed; a replicate, or a run of unknown seed, is none."""
+    engine, plain = inference.Bolfi(prior, observed), inference.Bolfi(prior, observed)
+    theta = engine.ask(6)
+    signals = simulate(theta, np.arange(6))
+    for each in (engine, plain):
+        each.tell(theta, signals, np.arange(6))
+    engine.tell(theta, signals, np.arange(6))
+    assert (engine.told, engine.succeeded) == (12, 6)
+    fit = engine.fit()
+    assert fit.best == plain.fit().best
+    np.testing.assert_array_equal(fit.learned_from, np.arange(12) < 6)
+    engine.tell(theta, simulate(theta, np.arange(6, 12)), np.arange(6, 12))
+    engine.tell(theta, signals)
+    assert engine.succeeded == 18
+
+
 def test_failed_runs_count_and_teach_nothing(prior, observed, simulate):
     engine = inference.Bolfi(prior, observed)
     theta = engine.ask(6)
