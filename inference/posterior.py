@@ -3,6 +3,7 @@
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import jax
@@ -65,6 +66,22 @@ class Fit:
     learned_from: np.ndarray
     settings: Mapping[str, object]
     seconds: Mapping[str, float]
+
+    def __repr__(self) -> str:
+        parameters = [f"{name} ~ {of['prior']}" for name, of in self.prior.describe().items()]
+        failed = ", ".join(f"{n} {kind}" for kind, n in self.failures.items())
+        lines = [
+            f"parameters: {', '.join(parameters)}",
+            f"simulations: {len(self.history.theta)}, failed: {failed or 'none'}",
+            f"surrogate: {self.settings['surrogate']!r}, of {self.learned_from.sum()} simulations",
+            f"warnings: {'; '.join(self.warnings) or 'none'}",
+        ]
+        return "\n  ".join(["Fit", *lines])
+
+    @cached_property
+    def warnings(self) -> list[str]:
+        """What the surrogate's own checks complain of."""
+        return self.learned.warnings()
 
     @property
     def surrogate(self) -> SurrogateView:

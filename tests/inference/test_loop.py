@@ -279,6 +279,24 @@ def test_bad_budgets_are_refused(prior, observed, simulate, options, message):
         inference.fit(simulate, prior, observed, **options)
 
 
+def test_a_fit_says_what_it_is_in_a_few_lines(line_fit, prior, observed, simulate):
+    assert repr(line_fit).splitlines() == [
+        "Fit",
+        "  parameters: slope ~ Uniform(low=-1, high=1), offset ~ Uniform(low=0, high=1)",
+        "  simulations: 20, failed: none",
+        "  surrogate: 'discrepancy', of 20 simulations",
+        "  warnings: none",
+    ]
+    engine = inference.Bolfi(prior, observed)
+    theta = engine.ask(8)
+    signals = np.ones((8, 30))
+    signals[:2] = np.nan
+    engine.tell(theta, signals, errors=["OSError: no licence", *[""] * 7])
+    lines = str(engine.fit()).splitlines()
+    assert lines[2] == "  simulations: 8, failed: 1 raised, 1 not finite"
+    assert lines[4].startswith("  warnings: all simulated outputs are equal")
+
+
 def test_progress_is_shown_only_on_request(prior, observed, simulate, capsys):
     inference.fit(simulate, prior, observed, budget=7)
     assert capsys.readouterr().out == ""
