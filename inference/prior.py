@@ -36,17 +36,20 @@ class Prior:
         distributions: Mapping[str, dist.Distribution],
         units: Mapping[str, str] | None = None,
     ):
-        if not distributions:
-            raise ValueError("a prior needs at least one parameter, got an empty mapping")
+        if not (isinstance(distributions, Mapping) and distributions):
+            raise ValueError(
+                "distributions must map at least one parameter to its prior, such as "
+                f"{{'a': dist.Uniform(0, 1)}}, got {distributions!r}"
+            )
         self._univariate = {name: _checked(name, d) for name, d in distributions.items()}
         self.distributions = dict(distributions)
-        self.units = dict(units or {})
-        unknown = set(self.units) - set(distributions)
-        if unknown or not all(isinstance(unit, str) for unit in self.units.values()):
+        named = isinstance(units, Mapping) and set(units) <= set(distributions)
+        if units is not None and not (named and all(isinstance(u, str) for u in units.values())):
             raise ValueError(
                 f"units must map some of the parameters {tuple(distributions)} to strings, "
-                f"got {self.units}"
+                f"got {units!r}"
             )
+        self.units = dict(units or {})
         self._bounds = {name: u.bounds for name, u in self._univariate.items()}
 
     @property
@@ -170,16 +173,23 @@ def _checked(name: str, distribution: object) -> Univariate:
             "give one distribution per parameter"
         )
     try:
-        univariate = Univariate(distribution)
-        middle = univariate.cdf(univariate.icdf(np.array(0.5)))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            univariate = Univariate(distribution)
+            middle = univariate.cdf(univariate.icdf(np.array(0.5)))
     except (NotImplementedError, ImportError) as error:  # numpyro asks for TFP in some icdf
         raise ValueError(
             f"prior of {name!r} needs cdf and icdf, which {type(distribution).__name__} lacks; "
             "use for example Uniform, LogUniform, Normal, LogNormal, TruncatedNormal, Gamma or Beta"
         ) from error
+    low, high = univariate.bounds
+    if low >= high:
+        raise ValueError(
+            f"prior of {name!r} must begin below its end, got {describe(distribution)}; "
+            "exchange its bounds, or leave a fixed parameter out"
+        )
     if not np.isclose(middle, 0.5):
         raise ValueError(
-            f"prior of {name!r} must be continuous: cdf(icdf(0.5)) gave {middle}; "
-            "check its arguments"
+            f"prior of {name!r} must be continuous, with finite arguments, got "
+            f"{describe(distribution)}, whose cdf(icdf(0.5)) is {middle}"
         )
     return univariate
