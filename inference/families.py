@@ -36,7 +36,9 @@ class DiscrepancyFamily:
         discrepancy: Callable (observed, simulated) -> float; None is `squared_difference()`.
         transform: "identity", "sqrt" or "log" of the discrepancy; None chooses by
             leave-one-out log predictive density.
-        threshold: Rule for eps, see `likelihood.choose_threshold`.
+        threshold: Rule for eps, or a number on the discrepancy's own scale, which may be
+            negative where a user's discrepancy is, as a logarithm; see
+            `likelihood.choose_threshold`.
         hyper_draws: Posterior draws of the hyperparameters over which the likelihood of a fit
             is averaged; 0 takes the best hyperparameters alone.
     """
