@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import acquisition as acquisitions
+from .arguments import checked_array, checked_integer
 from .base import Acquisition, Theta
 from .describe import describe
 from .design import sobol, start_size
@@ -20,7 +21,6 @@ from .prior import Prior
 from .repetition import next_replicate
 from .state import UNKNOWN, History, explain, init, remember_asked, remember_told
 
-LARGEST = 2**31 - 1  # that every random number generator takes as a seed
 DIGITS, EDGE = 7, 1e-7  # of the prior quantiles that are asked, and how near the bounds
 MIN_LEARN = 3  # successful simulations before the surrogate may choose
 
@@ -65,7 +65,7 @@ class Bolfi:
         if not isinstance(prior, Prior):
             raise ValueError(f"prior must be a Prior, got {type(prior).__name__}")
         self.prior = prior
-        self.observed = np.asarray(observed, np.float64)
+        self.observed = checked_array("observed", observed)
         self.seed = checked_integer("seed", seed, 0)
         self.initial = checked_integer(
             "initial", start_size(len(prior)) if initial is None else initial, MIN_LEARN
@@ -199,7 +199,7 @@ class Bolfi:
         started = time.perf_counter()
         natural = np.atleast_2d(self.prior.to_array(theta))
         rows = self.prior.to_dict(natural)
-        signals = np.asarray(signals, np.float64)
+        signals = checked_array("signals", signals)
         self._check_signals(len(natural), signals)
         outside = np.flatnonzero(~self.prior.contains(rows))
         if outside.size:
@@ -275,19 +275,6 @@ def _resolve(given: str | Acquisition | None, family: Family) -> Acquisition:
             f"of {tuple(name for name in acquisitions.RULES if name != 'lcb')}"
         )
     return cast(Acquisition, acquisition)
-
-
-def checked_integer(name: str, value: object, least: int = 1) -> int:
-    """`value` as int.
-
-    Raises:
-        ValueError: not an integer, or not from `least` to `LARGEST`.
-    """
-    if isinstance(value, int | np.integer) and not isinstance(value, bool):
-        number = int(value)
-        if least <= number <= LARGEST:
-            return number
-    raise ValueError(f"{name} must be an integer from {least} to {LARGEST}, got {value!r}")
 
 
 def _seeds(seeds: ArrayLike | None, n: int) -> np.ndarray:

@@ -6,6 +6,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .arguments import check_callable, checked_integer
 from .base import Discrepancy, Surrogate
 from .discrepancy import evaluate, squared_difference
 from .discrepancy_surrogate import DiscrepancySurrogate, learn, marginalised
@@ -54,12 +55,12 @@ class DiscrepancyFamily:
 
     def __post_init__(self) -> None:
         check_rule(self.threshold)
-        if self.transform is not None and self.transform not in TRANSFORMS:
+        check_callable("discrepancy", self.discrepancy)
+        if self.transform is not None and self.transform not in tuple(TRANSFORMS):
             raise ValueError(
                 f"transform must be one of {tuple(TRANSFORMS)} or None, got {self.transform!r}"
             )
-        if not self.hyper_draws >= 0:
-            raise ValueError(f"hyper_draws must be 0 or more, got {self.hyper_draws}")
+        checked_integer("hyper_draws", self.hyper_draws, 0)
 
     def learner(self, observed: np.ndarray) -> "DiscrepancyLearner":
         return DiscrepancyLearner(self, _distance(self.discrepancy, observed), observed)
@@ -129,8 +130,9 @@ class SignalFamily:
     discrepancy: Discrepancy | None = None
 
     def __post_init__(self) -> None:
-        if not self.components >= 1:
-            raise ValueError(f"components must be at least 1, got {self.components}")
+        check_callable("summary", self.summary)
+        check_callable("discrepancy", self.discrepancy)
+        checked_integer("components", self.components)
 
     def learner(self, observed: np.ndarray) -> "SignalLearner":
         output = describe(observed, self.summary)
@@ -214,7 +216,7 @@ def resolve(surrogate: str | Family | None, options: dict) -> Family:
         for_signal = _options("signal") - _options("discrepancy")
         paper = bool(for_discrepancy & options.keys()) and not for_signal & options.keys()
         surrogate = "discrepancy" if paper else "signal"
-    if surrogate not in FAMILIES:
+    if surrogate not in tuple(FAMILIES):
         raise ValueError(f"surrogate must be one of {tuple(FAMILIES)} or None, got {surrogate!r}")
     unknown = options.keys() - _options(surrogate)
     if unknown:

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .arguments import checked_array
 from .output import Output
 
 
@@ -17,7 +18,7 @@ def given_noise(noise: ArrayLike, output: Output) -> np.ndarray:
         ValueError: noise is none of these.
     """
     samples = len(output.present)
-    given = _numbers(noise)
+    given = checked_array("noise", noise)
     # from the order of the observed output to that of the values
     rank = np.argsort(np.argsort(output.present))
     if given.shape == (samples, samples):
@@ -40,13 +41,6 @@ def given_noise(noise: ArrayLike, output: Output) -> np.ndarray:
             f"noise must be finite and not negative where observed is finite, got {wrong[0]}"
         )
     return output.average(sds**2) / output.counts
-
-
-def _numbers(noise: ArrayLike) -> np.ndarray:
-    try:
-        return np.asarray(noise, np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"noise must be a number, sds or a covariance, got {noise!r}") from error
 
 
 def _covariance(given: np.ndarray, rank: np.ndarray, output: Output) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, Future
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from .arguments import checked_array, checked_integer
 from .bank import Simulation, SimulationBank
 from .base import Acquisition, Simulator, Theta
-from .bolfi import MIN_LEARN, Bolfi, checked_integer
+from .bolfi import MIN_LEARN, Bolfi
 from .design import start_size
 from .executors import opened
 from .families import Family
@@ -95,8 +96,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
     batch = checked_integer("batch", batch)
     budget = checked_integer("budget", budget, MIN_LEARN if earlier is None else 0)
     _check_timeout(timeout)
-    told = 0 if earlier is None else len(np.atleast_1d(np.asarray(earlier[1])))
-    if initial is None:
+    told = _length(earlier)
+    if initial is None and isinstance(prior, Prior):  # `Bolfi` refuses what is none
         initial = max(MIN_LEARN, min(start_size(len(prior)), budget + told))
     engine = Bolfi(
         prior,
@@ -190,6 +191,19 @@ def _signals(results: list[Simulation], shape: tuple[int, ...]) -> np.ndarray:
         )
     empty = np.full(good[0].shape if good else shape, np.nan)
     return np.stack([empty if r.signal is None else r.signal for r in results])
+
+
+def _length(earlier: Any) -> int:
+    """Simulations in `fit`'s argument `earlier`."""
+    if earlier is None:
+        return 0
+    pair = isinstance(earlier, tuple | list) and len(earlier) in (2, 3)
+    if not (pair and isinstance(earlier[0], Mapping)):
+        raise ValueError(
+            "earlier must be (theta, signals) or (theta, signals, seeds), theta a mapping of "
+            f"names to values, or None, got {earlier!r:.100}"
+        )
+    return len(np.atleast_1d(checked_array("earlier's signals", earlier[1])))
 
 
 def _check_timeout(timeout: float | None) -> None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .arguments import checked_array
 from .noise import Layout
 
 SERIES = 16  # samples from which an output counts as a series, whose noise can be estimated
@@ -79,7 +80,8 @@ class Output:
 def summarise(summary: Summary | None, output: np.ndarray) -> np.ndarray:
     """float64, at least one-dimensional."""
     raw = output if summary is None else summary(output)
-    return np.atleast_1d(np.asarray(raw, np.float64))
+    name = "an output" if summary is None else "what summary returns"
+    return np.atleast_1d(checked_array(name, raw))
 
 
 def describe(observed: np.ndarray, summary: Summary | None) -> Output:

@@ -43,7 +43,7 @@ class SurrogateView:
         """What the surrogate's `predict` says at theta, each array [..., *its own axes]."""
         u = self.prior.to_unit(theta)
         made = self.learned.predict(u.reshape(-1, u.shape[-1]))  # type: ignore[attr-defined]
-        return jax.tree.map(lambda a: np.asarray(a).reshape(*u.shape[:-1], *a.shape[1:]), made)
+        return jax.tree.map(lambda a: np.asarray(a).reshape((*u.shape[:-1], *a.shape[1:])), made)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import numpy as np
 import numpyro.distributions as dist
 
 from ._float64 import in_float64
+from .arguments import checked_array
 from .base import Theta
 from .distributions import Univariate, describe
 
@@ -85,9 +86,10 @@ class Prior:
         Raises:
             ValueError: names or shapes differ from the prior's, or a value is not finite.
         """
-        if set(theta) != set(self.names):
-            raise ValueError(f"theta must have the parameters {self.names}, got {tuple(theta)}")
-        columns = [np.asarray(theta[name], np.float64) for name in self.names]
+        if not isinstance(theta, Mapping) or set(theta) != set(self.names):
+            got = tuple(theta) if isinstance(theta, Mapping) else repr(theta)[:100]
+            raise ValueError(f"theta must map the parameters {self.names} to values, got {got}")
+        columns = [checked_array(f"theta[{name!r}]", theta[name]) for name in self.names]
         if len({c.shape for c in columns}) > 1 or columns[0].ndim > 1:
             shapes = {name: c.shape for name, c in zip(self.names, columns, strict=True)}
             raise ValueError(f"theta must hold scalars or [n] arrays of one length, got {shapes}")
@@ -117,7 +119,16 @@ class Prior:
         0 and 1 give exactly the bounds of a prior that ends abruptly, as the uniform does,
         and a far but finite quantile of one that fades out, as the log-normal does at zero:
         so the prior's density is positive and finite there.
+
+        Raises:
+            ValueError: u is of another shape.
         """
+        u = checked_array("u", u)
+        if u.shape[-1:] != (len(self),):
+            raise ValueError(
+                f"u must have shape [..., {len(self)}], one quantile for each of the parameters "
+                f"{self.names}, got {u.shape}"
+            )
         return {
             name: _quantile(self._univariate[name], u[..., j]) for j, name in enumerate(self.names)
         }

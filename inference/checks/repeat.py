@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from ..arguments import checked_integer
 from ..base import Simulator
-from ..bolfi import checked_integer
 from ..describe import describe
 from ..prior import Prior
 from .replicate import Observe, Pipeline, Plan, Replicate, run_replicate

@@ -68,8 +68,8 @@ def test_a_long_series_needs_no_matrix():
 @pytest.mark.parametrize(
     ("noise", "message"),
     [
-        ("loud", "noise must be a number, sds or a covariance, got 'loud'"),
-        ({"sd": 1.0}, "noise must be a number, sds or a covariance, got {'sd'"),
+        ("loud", "noise must be an array of numbers, got 'loud'"),
+        ({"sd": 1.0}, "noise must be an array of numbers, got {'sd'"),
         (-0.5, "not negative where observed is finite, got -0.5"),
         (np.full((20, 2), np.nan), "finite and not negative where observed is finite, got nan"),
         (np.ones(40), r"shape \(20, 2\) as observed or \[38\].*got shape \(40,\)"),

@@ -54,6 +54,14 @@ def lines(path):
     return path.read_text().split() if path.exists() else []
 
 
+@pytest.fixture(scope="module")
+def signal_fit(simulate, prior, observed):
+    engine = inference.Bolfi(prior, observed)
+    theta = engine.ask(10)
+    engine.tell(theta, simulate(theta, range(10)))
+    return engine.fit()
+
+
 def test_killed_and_repeated_equals_undisturbed(tmp_path):
     """SIGKILL in the sixth simulation or later; only what was running is simulated again."""
     undisturbed = start(tmp_path, "whole", "0")
@@ -295,6 +303,29 @@ def test_a_fit_says_what_it_is_in_a_few_lines(line_fit, prior, observed, simulat
     lines = str(engine.fit()).splitlines()
     assert lines[2] == "  simulations: 8, failed: 1 raised, 1 not finite"
     assert lines[4].startswith("  warnings: all simulated outputs are equal")
+
+
+@pytest.mark.parametrize(
+    "earlier", [5, "runs.npz", {"theta": {}, "signals": []}, (np.zeros((4, 2)), np.zeros((4, 30)))]
+)
+def test_earlier_simulations_of_another_form_are_refused(prior, observed, simulate, earlier):
+    with pytest.raises(ValueError, match=r"earlier must be \(theta, signals\) or .*, got "):
+        inference.fit(simulate, prior, observed, earlier=earlier)
+    with pytest.raises(ValueError, match="earlier's signals must be an array of numbers"):
+        inference.fit(simulate, prior, observed, earlier=({"slope": [0]}, "loud"))
+
+
+@pytest.mark.parametrize("fixture", ["line_fit", "signal_fit"])
+def test_predictions_at_points_of_another_shape_are_refused(fixture, request, prior):
+    fit = request.getfixturevalue(fixture)
+    for theta in (0.5, {"slope": 0.5}, {"slope": np.zeros((2, 2)), "offset": np.zeros((2, 2))}):
+        for use in (fit.surrogate.predict, fit.log_prob):
+            with pytest.raises(ValueError, match="theta must"):
+                use(theta)
+    for u in (0.5, np.full(2, 0.5), np.full((4, 3), 0.5)):
+        with pytest.raises(ValueError, match=r"u must have shape \[n, 2\].*got \("):
+            fit.learned.predict(u)
+    assert np.shape(fit.surrogate.predict({"slope": 0.5, "offset": 0.5})[0]) in ((), (30,))
 
 
 def test_progress_is_shown_only_on_request(prior, observed, simulate, capsys):

@@ -136,7 +136,12 @@ def test_bad_distributions_are_refused(distributions, message):
 @pytest.mark.parametrize(
     ("theta", "message"),
     [
-        ({"viscosity": 1.0}, "must have the parameters"),
+        ({"viscosity": 1.0}, "must map the parameters .* got \\('viscosity',\\)"),
+        (0.5, "must map the parameters .* to values, got 0.5"),
+        (
+            {"viscosity": "thick", "cohesion": 0.5, "shift": 0.0},
+            "theta\\['viscosity'\\] must be an array",
+        ),
         ({"viscosity": [1.0, 2.0], "cohesion": 0.5, "shift": 0.0}, "one length"),
         ({"viscosity": np.nan, "cohesion": 0.5, "shift": 0.0}, "must be finite"),
     ],
@@ -144,3 +149,9 @@ def test_bad_distributions_are_refused(distributions, message):
 def test_bad_theta_is_refused(mixed, theta, message):
     with pytest.raises(ValueError, match=message):
         mixed.to_array(theta)
+
+
+@pytest.mark.parametrize("u", [0.5, np.zeros(2), np.zeros((4, 2)), "middle"])
+def test_bad_quantiles_are_refused(mixed, u):
+    with pytest.raises(ValueError, match=r"u must (have shape \[\.\.\., 3\]|be an array)"):
+        mixed.from_unit(u)
