@@ -133,6 +133,12 @@ class Runner:
         found = self.bank.get(self.identity, *order.job)
         if found is None or not is_final(found, self.timeout):
             return False
+        if found.signal is not None and order.shape not in (None, found.signal.shape):
+            raise ValueError(
+                f"the bank {self.bank.path} holds a signal of shape {found.signal.shape} under "
+                f"identity={self.identity!r}, where {order.shape} is expected; it is another "
+                "simulator's: give each its own identity=, or choose another bank"
+            )
         order.outcome.set_result(found)
         return True
 

@@ -175,6 +175,28 @@ def test_a_shared_bank_serves_a_second_observation(tmp_path, prior, observed, si
         assert len(calls) == 14
 
 
+@pytest.mark.parametrize("workers", [0, 2])
+def test_another_simulators_signals_in_a_bank_are_refused(
+    tmp_path, prior, observed, simulate, workers
+):
+    path = tmp_path / "b.sqlite"
+    inference.fit(simulate, prior, observed, budget=7, bank=path)
+
+    def shorter(theta, seeds):
+        return simulate(theta, seeds)[:, :20]
+
+    message = (
+        rf"{re.escape(str(path))} holds a signal of shape \(30,\) under identity='', where "
+        r"\(20,\) is expected"
+    )
+    with ThreadPoolExecutor(2) as pool:
+        options = {"bank": path, "executor": pool if workers else None}
+        with pytest.raises(ValueError, match=message):
+            inference.fit(shorter, prior, observed[:20], budget=7, **options)
+        named = inference.fit(shorter, prior, observed[:20], budget=7, identity="20", **options)
+    assert named.failures == {}
+
+
 def test_an_exception_costs_one_run(tmp_path, prior, observed, simulate):
     def fragile(theta, seeds):
         if (theta["slope"] > 0.5).any():
