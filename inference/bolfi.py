@@ -1,6 +1,7 @@
 """Ask and tell: Bayesian optimisation for likelihood-free inference, one step at a time."""
 
 import time
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
@@ -13,6 +14,7 @@ from .arguments import checked_array, checked_integer
 from .base import Acquisition, Theta
 from .describe import describe
 from .design import sobol, start_size
+from .emulator_checks import EmulatorWarning
 from .families import Family, Learnable, resolve
 from .feasibility import feasibility
 from .gp import padded_rows
@@ -234,6 +236,9 @@ class Bolfi:
 
         Raises:
             ValueError: fewer than three simulations succeeded.
+
+        Warns:
+            EmulatorWarning: for each of the surrogate's complaints, see `Fit.warnings`.
         """
         if self.succeeded < MIN_LEARN:
             raise ValueError(
@@ -246,7 +251,7 @@ class Bolfi:
         learned_from = history.distinct
         learned_from[learned_from] = self._learner.learnable(known.discrepancy)
         spent = self._seconds + time.perf_counter() - started
-        return Fit(
+        made = Fit(
             prior=self.prior,
             observed=self.observed,
             history=history,
@@ -255,6 +260,9 @@ class Bolfi:
             settings=self.settings,
             seconds={"simulator": 0.0, **(seconds or {}), "engine": spent},
         )
+        for complaint in made.warnings:
+            warnings.warn(complaint, EmulatorWarning, stacklevel=2)
+        return made
 
 
 def _resolve(given: str | Acquisition | None, family: Family) -> Acquisition:

@@ -92,6 +92,9 @@ def fit(  # noqa: PLR0913  the one call that most users make
         RuntimeError: no run of the start design succeeded, or fewer than three in all, of which
             the bank keeps those that did; the executor lost its workers.
         ImportError, ConnectionError: Dask is not installed, or does not answer.
+
+    Warns:
+        EmulatorWarning: for each of the surrogate's complaints, see `Fit.warnings`.
     """
     batch = checked_integer("batch", batch)
     budget = checked_integer("budget", budget, MIN_LEARN if earlier is None else 0)
