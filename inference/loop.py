@@ -2,15 +2,14 @@
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor, Future
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from .arguments import checked_array, checked_integer
 from .bank import Simulation, SimulationBank
@@ -21,6 +20,7 @@ from .executors import opened
 from .families import Family
 from .posterior import Fit
 from .prior import Prior
+from .progress import progress_bar
 from .runner import Runner
 from .simulate import Job, columns, jobs, simulation_seed
 
@@ -122,7 +122,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
     with ExitStack() as stack:
         if not isinstance(bank, SimulationBank):
             bank = stack.enter_context(SimulationBank(bank))
-        advance = stack.enter_context(_bar(budget)) if progress else _no_bar
+        advance = stack.enter_context(progress_bar("simulations", budget, shown=progress))
         workers = stack.enter_context(opened(executor))
         runner = stack.enter_context(Runner(simulate, bank, identity, workers, timeout))
         finished = (_in_rounds if workers is None else _in_flight)(engine, runner, budget, batch)
@@ -212,14 +212,3 @@ def _length(earlier: Any) -> int:
 def _check_timeout(timeout: float | None) -> None:
     if timeout is not None and not 0 < timeout < math.inf:
         raise ValueError(f"timeout must be positive and finite [s], or None, got {timeout!r}")
-
-
-@contextmanager
-def _bar(total: int) -> Iterator[Callable[[int], None]]:
-    columns = TextColumn("simulations"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
-    with Progress(*columns) as bar:
-        task = bar.add_task("", total=total)
-        yield lambda n: bar.advance(task, n)
-
-
-def _no_bar(_: int) -> None: ...
