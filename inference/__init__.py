@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     )
     from .convergence import SamplingWarning
     from .discrepancy import squared_difference
+    from .emulator_checks import EmulatorWarning
     from .families import DiscrepancyFamily, SignalFamily
     from .likelihood import Predicted, Quantile
     from .loop import fit
@@ -48,6 +49,7 @@ __all__ = [
     "Coverage",
     "Discrepancy",
     "DiscrepancyFamily",
+    "EmulatorWarning",
     "ExpectedIntegratedVariance",
     "Fit",
     "FitPipeline",
@@ -89,6 +91,7 @@ _HOME = {
     "Coverage": ".checks",
     "Discrepancy": ".base",
     "DiscrepancyFamily": ".families",
+    "EmulatorWarning": ".emulator_checks",
     "ExpectedIntegratedVariance": ".acquisition",
     "Fit": ".posterior",
     "FitPipeline": ".checks",

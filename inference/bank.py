@@ -1,7 +1,6 @@
 """Every finished simulation, kept on disk and reused."""
 
 import json
-import sqlite3
 import threading
 import time
 from collections.abc import Mapping
@@ -12,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from .claims import Claims
+from .database import opened_database
 
-APPLICATION_ID = 0x424C4651  # marks the file; "BLFQ"
-BUSY_MS = 60_000  # wait this long for another process's write
+MARK = 0x424C4651  # "BLFQ"
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS simulation (
     identity TEXT NOT NULL,
@@ -27,7 +26,7 @@ CREATE TABLE IF NOT EXISTS simulation (
     seconds  REAL NOT NULL,
     created  REAL NOT NULL,
     PRIMARY KEY (identity, theta, seed)
-)
+);
 """
 
 
@@ -59,51 +58,28 @@ class SimulationBank:
         path: File, created if missing; ":memory:" keeps nothing.
 
     Raises:
-        ValueError: the file exists and is not a simulation bank.
+        ValueError: the file is not a simulation bank, or cannot be read and written.
     """
 
     def __init__(self, path: str | Path = ":memory:"):
         self.path = str(path)
         # one connection for all threads of the process, guarded by a lock
         self._lock = threading.Lock()
-        self._connection = sqlite3.connect(
-            self.path, timeout=BUSY_MS / 1000, isolation_level=None, check_same_thread=False
-        )
+        self._connection = opened_database(path, MARK, SCHEMA, "simulation bank")
         self._resources = ExitStack()
         self._resources.callback(self._connection.close)
         self._claims = Claims.share(None if self.in_memory else f"{self.path}-claims")
         self._resources.callback(self._claims.close)
-        try:
-            self._open()
-        except sqlite3.DatabaseError as error:
-            self.close()
-            if isinstance(error, sqlite3.OperationalError):
-                raise
-            raise ValueError(
-                f"{self.path} is not a simulation bank; choose another file"
-            ) from error
-        except ValueError:
-            self.close()
-            raise
 
     @property
     def in_memory(self) -> bool:
         """Whether everything is forgotten when the bank is closed."""
         return self.path == ":memory:"
 
-    def _open(self) -> None:
-        execute = self._connection.execute
-        execute("BEGIN IMMEDIATE")  # two processes may create the file together
-        application = execute("PRAGMA application_id").fetchone()[0]
-        tables = execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
-        if application != APPLICATION_ID and tables:
-            raise ValueError(
-                f"{self.path} is an SQLite file but not a simulation bank; choose another file"
-            )
-        execute(f"PRAGMA application_id = {APPLICATION_ID}")
-        execute(SCHEMA)
-        execute("COMMIT")
-        execute("PRAGMA journal_mode = WAL")
+    @property
+    def where(self) -> str:
+        """Where finished simulations are kept, for messages."""
+        return "nothing, for bank is in memory" if self.in_memory else self.path
 
     def get(self, identity: str, theta: Mapping[str, float], seed: int) -> Simulation | None:
         """The run of exactly this simulator, theta and seed, or None."""

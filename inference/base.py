@@ -70,7 +70,8 @@ class Surrogate(Protocol):
         ...
 
     def checks(self) -> dict[str, np.ndarray]:
-        """Of the emulator: `loo_z`, studentised leave-one-out errors [simulation, ...]."""
+        """Of the emulator: `loo_z`, studentised leave-one-out errors [n, ...], a row for each
+        simulation that was learned from."""
         ...
 
     def warnings(self) -> list[str]:

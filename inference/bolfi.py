@@ -1,6 +1,7 @@
 """Ask and tell: Bayesian optimisation for likelihood-free inference, one step at a time."""
 
 import time
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
@@ -9,8 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import acquisition as acquisitions
+from .arguments import checked_array, checked_integer
 from .base import Acquisition, Theta
+from .describe import describe
 from .design import sobol, start_size
+from .emulator_checks import EmulatorWarning
 from .families import Family, Learnable, resolve
 from .feasibility import feasibility
 from .gp import padded_rows
@@ -19,7 +23,6 @@ from .prior import Prior
 from .repetition import next_replicate
 from .state import UNKNOWN, History, explain, init, remember_asked, remember_told
 
-LARGEST = 2**31 - 1  # that every random number generator takes as a seed
 DIGITS, EDGE = 7, 1e-7  # of the prior quantiles that are asked, and how near the bounds
 MIN_LEARN = 3  # successful simulations before the surrogate may choose
 
@@ -64,7 +67,7 @@ class Bolfi:
         if not isinstance(prior, Prior):
             raise ValueError(f"prior must be a Prior, got {type(prior).__name__}")
         self.prior = prior
-        self.observed = np.asarray(observed, np.float64)
+        self.observed = checked_array("observed", observed)
         self.seed = checked_integer("seed", seed, 0)
         self.initial = checked_integer(
             "initial", start_size(len(prior)) if initial is None else initial, MIN_LEARN
@@ -77,8 +80,8 @@ class Bolfi:
         self._any_shape = self._learner.any_shape
         self.settings: dict[str, object] = {
             "surrogate": self.family.name,
-            **{name: str(value) for name, value in vars(self.family).items()},
-            "acquisition": repr(self._acquire),
+            **{name: describe(value) for name, value in vars(self.family).items()},
+            "acquisition": describe(self._acquire),
             "seed": self.seed,
             "initial": self.initial,
         }
@@ -98,8 +101,13 @@ class Bolfi:
 
     @property
     def succeeded(self) -> int:
-        """Simulations told so far that gave a finite discrepancy."""
-        return int(self._state.history.succeeded.sum())
+        """Simulations told so far that gave a finite discrepancy, copies counted once."""
+        return int(self._state.history.distinct.sum())
+
+    @property
+    def errors(self) -> list[str]:
+        """Why simulations failed, in the order told."""
+        return [str(error) for error in self._state.history.errors if error]
 
     @property
     def signal_shape(self) -> tuple[int, ...]:
@@ -162,7 +170,7 @@ class Bolfi:
 
     def _known(self) -> Learnable:
         history = self._state.history
-        good = history.succeeded
+        good = history.distinct
         known = history.u[good], history.features[good], history.discrepancy[good]
         return Learnable(*known, self.prior.normal)
 
@@ -184,7 +192,8 @@ class Bolfi:
         Args:
             theta: Name -> [n], in the prior's support.
             signals: [n, *signal_shape].
-            seeds: Seeds of the runs [n], to be kept with the results.
+            seeds: Seeds of the runs [n], to be kept with the results. Of runs with equal theta
+                and seed one is learned from.
             errors: Why a run failed [n], to be kept for rows of NaN; "" elsewhere.
 
         Raises:
@@ -193,7 +202,7 @@ class Bolfi:
         started = time.perf_counter()
         natural = np.atleast_2d(self.prior.to_array(theta))
         rows = self.prior.to_dict(natural)
-        signals = np.asarray(signals, np.float64)
+        signals = checked_array("signals", signals)
         self._check_signals(len(natural), signals)
         outside = np.flatnonzero(~self.prior.contains(rows))
         if outside.size:
@@ -228,6 +237,9 @@ class Bolfi:
 
         Raises:
             ValueError: fewer than three simulations succeeded.
+
+        Warns:
+            EmulatorWarning: for each of the surrogate's complaints, see `Fit.warnings`.
         """
         if self.succeeded < MIN_LEARN:
             raise ValueError(
@@ -235,16 +247,23 @@ class Bolfi:
                 f"{self.told} told; tell more"
             )
         started = time.perf_counter()
-        fitted = self._learner.finish(self._known(), self._rows(0), self.seed)
+        known, history = self._known(), self._state.history
+        fitted = self._learner.finish(known, self._rows(0), self.seed)
+        learned_from = history.distinct
+        learned_from[learned_from] = self._learner.learnable(known.discrepancy)
         spent = self._seconds + time.perf_counter() - started
-        return Fit(
+        made = Fit(
             prior=self.prior,
             observed=self.observed,
-            history=self._state.history,
+            history=history,
             learned=fitted,
+            learned_from=learned_from,
             settings=self.settings,
             seconds={"simulator": 0.0, **(seconds or {}), "engine": spent},
         )
+        for complaint in made.warnings:
+            warnings.warn(complaint, EmulatorWarning, stacklevel=2)
+        return made
 
 
 def _resolve(given: str | Acquisition | None, family: Family) -> Acquisition:
@@ -265,19 +284,6 @@ def _resolve(given: str | Acquisition | None, family: Family) -> Acquisition:
             f"of {tuple(name for name in acquisitions.RULES if name != 'lcb')}"
         )
     return cast(Acquisition, acquisition)
-
-
-def checked_integer(name: str, value: object, least: int = 1) -> int:
-    """`value` as int.
-
-    Raises:
-        ValueError: not an integer, or not from `least` to `LARGEST`.
-    """
-    if isinstance(value, int | np.integer) and not isinstance(value, bool):
-        number = int(value)
-        if least <= number <= LARGEST:
-            return number
-    raise ValueError(f"{name} must be an integer from {least} to {LARGEST}, got {value!r}")
 
 
 def _seeds(seeds: ArrayLike | None, n: int) -> np.ndarray:

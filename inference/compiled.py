@@ -3,8 +3,10 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import ArrayLike
 
 from . import gp as processes
+from .arguments import checked_points
 from .gp import GP, Data, Hyper
 
 GROWTH = 1.3  # hyperparameters are found anew when data have grown by this factor
@@ -28,15 +30,18 @@ def extend(gp: GP, data: Data) -> GP:
     return condition(gp.hyper, data)
 
 
-def predict(gp: GP, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def predict(gp: GP, u: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """Means and variances [k, n] of the latent functions at u [n, d].
 
     In batches as long as the data's arrays, so that one shape is compiled.
+
+    Raises:
+        ValueError: u is of another shape.
     """
     rows, d = gp.data.u.shape
-    parts = []
-    for start in range(0, max(len(u), 1), rows):
-        batch = np.asarray(u[start : start + rows], np.float64)
+    points, parts = checked_points(u, d), []
+    for start in range(0, max(len(points), 1), rows):
+        batch = points[start : start + rows]
         padded = np.concatenate([batch, np.full((rows - len(batch), d), 0.5)])
         mean, variance = _predict(gp, jnp.asarray(padded))
         parts.append(np.asarray([mean, variance])[:, :, : len(batch)])

@@ -9,6 +9,10 @@ TOO_SURE = 1.5  # mean square of the studentised errors that matters
 NOISY = 0.1  # share of run-to-run noise in the variance that deserves a word
 
 
+class EmulatorWarning(UserWarning):
+    """The surrogate does not follow the simulations as it believes; the message says how."""
+
+
 def complaints(loo_z: np.ndarray, noise_share: float, what: str) -> list[str]:
     """Sentences, none where all is well.
 

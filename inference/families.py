@@ -6,10 +6,12 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .arguments import check_callable, checked_integer
 from .base import Discrepancy, Surrogate
 from .discrepancy import evaluate, squared_difference
 from .discrepancy_surrogate import DiscrepancySurrogate, learn, marginalised
 from .emulator import emulate
+from .given_noise import GivenNoise, given_noise
 from .likelihood import Threshold, check_rule
 from .output import Output, Summary, describe
 from .sane import sane
@@ -36,7 +38,9 @@ class DiscrepancyFamily:
         discrepancy: Callable (observed, simulated) -> float; None is `squared_difference()`.
         transform: "identity", "sqrt" or "log" of the discrepancy; None chooses by
             leave-one-out log predictive density.
-        threshold: Rule for eps, see `likelihood.choose_threshold`.
+        threshold: Rule for eps, or a number on the discrepancy's own scale, which may be
+            negative where a user's discrepancy is, as a logarithm; see
+            `likelihood.choose_threshold`.
         hyper_draws: Posterior draws of the hyperparameters over which the likelihood of a fit
             is averaged; 0 takes the best hyperparameters alone.
     """
@@ -52,12 +56,12 @@ class DiscrepancyFamily:
 
     def __post_init__(self) -> None:
         check_rule(self.threshold)
-        if self.transform is not None and self.transform not in TRANSFORMS:
+        check_callable("discrepancy", self.discrepancy)
+        if self.transform is not None and self.transform not in tuple(TRANSFORMS):
             raise ValueError(
                 f"transform must be one of {tuple(TRANSFORMS)} or None, got {self.transform!r}"
             )
-        if not self.hyper_draws >= 0:
-            raise ValueError(f"hyper_draws must be 0 or more, got {self.hyper_draws}")
+        checked_integer("hyper_draws", self.hyper_draws, 0)
 
     def learner(self, observed: np.ndarray) -> "DiscrepancyLearner":
         return DiscrepancyLearner(self, _distance(self.discrepancy, observed), observed)
@@ -81,6 +85,10 @@ class DiscrepancyLearner:
         """Features [n, 0] and discrepancies [n] of signals [n, ...]; NaN where failed."""
         return np.zeros((len(signals), 0)), evaluate(self.distance, self.observed, signals)
 
+    def learnable(self, discrepancy: np.ndarray) -> np.ndarray:
+        """Which of the successful simulations are learned from, bool [n]: all."""
+        return np.ones(len(discrepancy), bool)
+
     def learn(
         self, known: Learnable, rows: int, previous: DiscrepancySurrogate | None
     ) -> DiscrepancySurrogate:
@@ -103,11 +111,11 @@ class SignalFamily:
     Attributes:
         summary: Callable output -> vector, of the observed and of each simulated output; None
             takes the output as it is.
-        noise: Measurement noise that the simulator does not make: its sd (a number, or one for
-            each value), or its covariance over the flattened finite values of the observed
-            (summarised) output; 0 for none. None estimates it, as an AR(1) process, where the
-            output is a series of at least 16 samples without a summary, and takes none
-            elsewhere.
+        noise: Measurement noise that the simulator does not make: its sd, a number or an array
+            shaped like the observed (summarised) output; or sds [n], or a covariance [n, n], of
+            that output's n finite values, flattened; 0 for none. None estimates it, as an AR(1)
+            process, where the output is a series of at least 16 samples without a summary, and
+            takes none elsewhere.
         components: At most.
         discrepancy: As in `DiscrepancyFamily`; it only ranks simulations and finds outputs that
             blew up.
@@ -123,36 +131,16 @@ class SignalFamily:
     discrepancy: Discrepancy | None = None
 
     def __post_init__(self) -> None:
-        if not self.components >= 1:
-            raise ValueError(f"components must be at least 1, got {self.components}")
+        check_callable("summary", self.summary)
+        check_callable("discrepancy", self.discrepancy)
+        checked_integer("components", self.components)
 
     def learner(self, observed: np.ndarray) -> "SignalLearner":
         output = describe(observed, self.summary)
         values = output.values(observed)
         distance = self.discrepancy or _of_summaries(self.summary)
-        return SignalLearner(self, output, distance, observed, values, self._covariance(output))
-
-    def _covariance(self, output: Output) -> np.ndarray | None:
-        if self.noise is None:
-            return None
-        given, samples = np.asarray(self.noise, np.float64), len(output.present)
-        if given.ndim < 2 and given.size in (1, samples):
-            if not (np.isfinite(given) & (given >= 0.0)).all():
-                raise ValueError("noise must be finite and not negative")
-            full = np.diag(np.broadcast_to(given, samples) ** 2)
-        elif given.shape == (samples, samples):
-            full = given
-        else:
-            raise ValueError(
-                f"noise must be a number, [{samples}] sds or a [{samples}, {samples}] covariance "
-                f"of the finite observed values, got shape {given.shape}"
-            )
-        symmetric = np.isfinite(full).all() and np.allclose(full, full.T)
-        if not (symmetric and np.linalg.eigvalsh(full)[0] >= -1e-9 * np.abs(full).max()):
-            raise ValueError("noise must be a finite, symmetric, positive semidefinite covariance")
-        # rows and columns in the order of the values, then averaged as they are
-        order = np.argsort(np.argsort(output.present))
-        return output.average(output.average(full[np.ix_(order, order)]).T)
+        noise = None if self.noise is None else given_noise(self.noise, output)
+        return SignalLearner(self, output, distance, observed, values, noise)
 
 
 @dataclass(frozen=True)
@@ -164,7 +152,7 @@ class SignalLearner:
     distance: Discrepancy
     observed: np.ndarray
     values: np.ndarray
-    noise: np.ndarray | None
+    noise: GivenNoise | None
 
     @property
     def features(self) -> int:
@@ -184,10 +172,14 @@ class SignalLearner:
         failed = ~np.isfinite(features).all(1)
         return features, np.where(failed, np.nan, discrepancy)
 
+    def learnable(self, discrepancy: np.ndarray) -> np.ndarray:
+        """Which of the successful simulations are learned from, bool [n]: what blew up is not."""
+        return sane(discrepancy)
+
     def learn(
         self, known: Learnable, rows: int, previous: SignalSurrogate | None
     ) -> SignalSurrogate:
-        learnable = sane(known.discrepancy)
+        learnable = self.learnable(known.discrepancy)
         features = known.features[learnable]
         old = None if previous is None else previous.emulator
         scale = self.output.scale(features) if old is None else old.basis.scale
@@ -226,7 +218,7 @@ def resolve(surrogate: str | Family | None, options: dict) -> Family:
         for_signal = _options("signal") - _options("discrepancy")
         paper = bool(for_discrepancy & options.keys()) and not for_signal & options.keys()
         surrogate = "discrepancy" if paper else "signal"
-    if surrogate not in FAMILIES:
+    if surrogate not in tuple(FAMILIES):
         raise ValueError(f"surrogate must be one of {tuple(FAMILIES)} or None, got {surrogate!r}")
     unknown = options.keys() - _options(surrogate)
     if unknown:

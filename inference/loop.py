@@ -2,24 +2,25 @@
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor, Future
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from .arguments import checked_array, checked_integer
 from .bank import Simulation, SimulationBank
 from .base import Acquisition, Simulator, Theta
-from .bolfi import MIN_LEARN, Bolfi, checked_integer
+from .bolfi import MIN_LEARN, Bolfi
 from .design import start_size
 from .executors import opened
 from .families import Family
 from .posterior import Fit
 from .prior import Prior
+from .progress import progress_bar
 from .runner import Runner
 from .simulate import Job, columns, jobs, simulation_seed
 
@@ -88,14 +89,18 @@ def fit(  # noqa: PLR0913  the one call that most users make
 
     Raises:
         ValueError: bad argument; budget smaller than the start design; signals of wrong shape.
-        RuntimeError: no run of the start design succeeded; the executor lost its workers.
+        RuntimeError: no run of the start design succeeded, or fewer than three in all, of which
+            the bank keeps those that did; the executor lost its workers.
         ImportError, ConnectionError: Dask is not installed, or does not answer.
+
+    Warns:
+        EmulatorWarning: for each of the surrogate's complaints, see `Fit.warnings`.
     """
     batch = checked_integer("batch", batch)
     budget = checked_integer("budget", budget, MIN_LEARN if earlier is None else 0)
     _check_timeout(timeout)
-    told = 0 if earlier is None else len(np.atleast_1d(np.asarray(earlier[1])))
-    if initial is None:
+    told = _length(earlier)
+    if initial is None and isinstance(prior, Prior):  # `Bolfi` refuses what is none
         initial = max(MIN_LEARN, min(start_size(len(prior)), budget + told))
     engine = Bolfi(
         prior,
@@ -117,7 +122,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
     with ExitStack() as stack:
         if not isinstance(bank, SimulationBank):
             bank = stack.enter_context(SimulationBank(bank))
-        advance = stack.enter_context(_bar(budget)) if progress else _no_bar
+        advance = stack.enter_context(progress_bar("simulations", budget, shown=progress))
         workers = stack.enter_context(opened(executor))
         runner = stack.enter_context(Runner(simulate, bank, identity, workers, timeout))
         finished = (_in_rounds if workers is None else _in_flight)(engine, runner, budget, batch)
@@ -125,6 +130,13 @@ def fit(  # noqa: PLR0913  the one call that most users make
         for simulation in finished:
             seconds += simulation.seconds
             advance(1)
+        if engine.succeeded < MIN_LEARN:
+            raise RuntimeError(
+                f"{engine.succeeded} of {engine.told} simulations succeeded, {MIN_LEARN} are "
+                f"needed; the last error: {engine.errors[-1]}. Finished simulations are kept in "
+                f"{bank.where}; mend the cause, or raise budget, and repeat the call to go on "
+                "from there"
+            )
     return engine.fit({"simulator": seconds})
 
 
@@ -168,7 +180,7 @@ def _tell(engine: Bolfi, asked: list[Job], results: list[Simulation]) -> list[Si
     if engine.told >= engine.initial and engine.succeeded == 0:
         raise RuntimeError(
             f"all {engine.told} simulations of the start design failed; the last error: "
-            f"{errors[-1] or 'the signal or its discrepancy was not finite'}"
+            f"{engine.errors[-1]}"
         )
     return results
 
@@ -184,17 +196,19 @@ def _signals(results: list[Simulation], shape: tuple[int, ...]) -> np.ndarray:
     return np.stack([empty if r.signal is None else r.signal for r in results])
 
 
+def _length(earlier: Any) -> int:
+    """Simulations in `fit`'s argument `earlier`."""
+    if earlier is None:
+        return 0
+    pair = isinstance(earlier, tuple | list) and len(earlier) in (2, 3)
+    if not (pair and isinstance(earlier[0], Mapping)):
+        raise ValueError(
+            "earlier must be (theta, signals) or (theta, signals, seeds), theta a mapping of "
+            f"names to values, or None, got {earlier!r:.100}"
+        )
+    return len(np.atleast_1d(checked_array("earlier's signals", earlier[1])))
+
+
 def _check_timeout(timeout: float | None) -> None:
     if timeout is not None and not 0 < timeout < math.inf:
         raise ValueError(f"timeout must be positive and finite [s], or None, got {timeout!r}")
-
-
-@contextmanager
-def _bar(total: int) -> Iterator[Callable[[int], None]]:
-    columns = TextColumn("simulations"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
-    with Progress(*columns) as bar:
-        task = bar.add_task("", total=total)
-        yield lambda n: bar.advance(task, n)
-
-
-def _no_bar(_: int) -> None: ...

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .arguments import checked_array
 from .noise import Layout
 
 SERIES = 16  # samples from which an output counts as a series, whose noise can be estimated
@@ -34,6 +35,11 @@ class Output:
     starts: np.ndarray
     series: bool
 
+    @property
+    def counts(self) -> np.ndarray:
+        """Samples that are averaged for each value [m]."""
+        return np.diff(np.append(self.starts, len(self.present)))
+
     def values(self, output: np.ndarray) -> np.ndarray:
         """[m] of one output.
 
@@ -50,15 +56,13 @@ class Output:
 
     def average(self, samples: np.ndarray) -> np.ndarray:
         """Samples [len(present), ...] in the order of the values -> [m, ...]."""
-        counts = np.diff(np.append(self.starts, len(samples)))
         sums = np.add.reduceat(samples, self.starts, axis=0)
-        return sums / counts.reshape(-1, *[1] * (samples.ndim - 1))
+        return sums / self.counts.reshape(-1, *[1] * (samples.ndim - 1))
 
     def restore(self, values: np.ndarray) -> np.ndarray:
         """Values [n, m] at their places in the (summarised) output: [n, *shape]; NaN elsewhere."""
-        counts = np.diff(np.append(self.starts, len(self.present)))
         full = np.full((len(values), int(np.prod(self.shape))), np.nan)
-        full[:, self.present] = np.repeat(values, counts, axis=1)
+        full[:, self.present] = np.repeat(values, self.counts, axis=1)
         return full.reshape(len(values), *self.shape)
 
     def scale(self, values: np.ndarray) -> np.ndarray:
@@ -76,7 +80,8 @@ class Output:
 def summarise(summary: Summary | None, output: np.ndarray) -> np.ndarray:
     """float64, at least one-dimensional."""
     raw = output if summary is None else summary(output)
-    return np.atleast_1d(np.asarray(raw, np.float64))
+    name = "an output" if summary is None else "what summary returns"
+    return np.atleast_1d(checked_array(name, raw))
 
 
 def describe(observed: np.ndarray, summary: Summary | None) -> Output:

@@ -41,7 +41,8 @@ SHARPENED = 0.5  # width of half the proposals, while the temperature still has 
 class Population(NamedTuple):
     """Weighted points, and the mixture that proposes more of their kind.
 
-    Coordinates x = Phi^-1(u), in which the prior is standard normal.
+    Coordinates x = Phi^-1(u), in which the prior is standard normal. sum_i w_i f(x_i) / sum_i w_i
+    estimates the posterior mean of f; n is constant.
     """
 
     x: jax.Array  # [n, d]
@@ -64,10 +65,11 @@ class _Progress(NamedTuple):
     effective: jax.Array
 
 
-def population(
+@partial(jax.jit, static_argnames=("log_likelihood", "dimension"))
+def explore(
     key: jax.Array, log_likelihood: LogLikelihood, state: Any, dimension: int
-) -> tuple[jax.Array, jax.Array]:
-    """Weighted points of the posterior over prior quantiles.
+) -> Population:
+    """Weighted points of the posterior, and what proposes more of them.
 
     About 1500 to 2500 evaluations, in batches of 256; up to 4096 for posteriors so narrow
     that they must be approached in steps. Compiled once per likelihood and shape of state;
@@ -79,21 +81,7 @@ def population(
             counts as zero likelihood.
         state: Its first argument, a pytree.
         dimension: d.
-
-    Returns:
-        u [n, d] and log weights [n]: sum_i w_i f(u_i) / sum_i w_i estimates the posterior
-        mean of f, and logsumexp of the log weights the log evidence. n is constant; unused
-        rows have log weight -inf.
     """
-    found = explore(key, log_likelihood, state, dimension)
-    return to_unit(found.x), found.log_weights
-
-
-@partial(jax.jit, static_argnames=("log_likelihood", "dimension"))
-def explore(
-    key: jax.Array, log_likelihood: LogLikelihood, state: Any, dimension: int
-) -> Population:
-    """`population`, with what samplers need besides."""
     shifts = _shifts(key, dimension + UNIFORMS)
     points = jnp.asarray(_quasi_random(dimension))
 

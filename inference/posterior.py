@@ -3,6 +3,7 @@
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import jax
@@ -42,7 +43,7 @@ class SurrogateView:
         """What the surrogate's `predict` says at theta, each array [..., *its own axes]."""
         u = self.prior.to_unit(theta)
         made = self.learned.predict(u.reshape(-1, u.shape[-1]))  # type: ignore[attr-defined]
-        return jax.tree.map(lambda a: np.asarray(a).reshape(*u.shape[:-1], *a.shape[1:]), made)
+        return jax.tree.map(lambda a: np.asarray(a).reshape((*u.shape[:-1], *a.shape[1:])), made)
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,7 @@ class Fit:
         prior, observed: As given.
         history: Every simulation, in the order told.
         learned: The surrogate over prior quantiles.
+        learned_from: Which simulations it knows, bool [n].
         settings: How the run was made.
         seconds: Time in the "simulator" and in the "engine" [s].
     """
@@ -61,8 +63,25 @@ class Fit:
     observed: np.ndarray
     history: History
     learned: Surrogate
+    learned_from: np.ndarray
     settings: Mapping[str, object]
     seconds: Mapping[str, float]
+
+    def __repr__(self) -> str:
+        parameters = [f"{name} ~ {of['prior']}" for name, of in self.prior.describe().items()]
+        failed = ", ".join(f"{n} {kind}" for kind, n in self.failures.items())
+        lines = [
+            f"parameters: {', '.join(parameters)}",
+            f"simulations: {len(self.history.theta)}, failed: {failed or 'none'}",
+            f"surrogate: {self.settings['surrogate']!r}, of {self.learned_from.sum()} simulations",
+            f"warnings: {'; '.join(self.warnings) or 'none'}",
+        ]
+        return "\n  ".join(["Fit", *lines])
+
+    @cached_property
+    def warnings(self) -> list[str]:
+        """What the surrogate's own checks complain of."""
+        return self.learned.warnings()
 
     @property
     def surrogate(self) -> SurrogateView:
@@ -160,9 +179,10 @@ class Fit:
             what the sampler records. prior: `draws` draws. observed_data: `signal`.
             posterior_predictive: what the surrogate predicts at some draws, whose indices are
             its coordinate `draw`. constant_data: the surrogate's constants. emulator_checks:
-            the surrogate's own checks for each simulation, what it complains of in the
-            attribute `warnings`. simulations: as `Fit.simulations`. The root's attributes
-            hold how the run was made, and the seconds it took.
+            the surrogate's own checks for each simulation, NaN where it learned nothing from
+            one, and what it complains of in the attribute `warnings`. simulations: as
+            `Fit.simulations`. The root's attributes hold how the run was made, and the seconds
+            it took.
 
         Raises:
             ValueError: unknown sampler, a length too small, quadrature of more than two
@@ -186,7 +206,8 @@ class Fit:
         drawn = self.prior.from_unit(rng.random((draws, len(self.prior))))
         tree = results_tree(self.prior, made.chains, drawn, self.observed, self.simulations)
         tree["posterior"].attrs.update(status=made.status, draws_made=made.steps, **made.checks)
-        add_surrogate(tree, self.learned, made.chains.u, jax.random.key(seed))
+        key = jax.random.key(seed)
+        add_surrogate(tree, self.learned, self.learned_from, made.chains.u, key)
         attributes = {
             **self.settings,
             **{"sampler": sampler, **length._asdict(), "extend": extend, "sampling_seed": seed},

@@ -9,6 +9,7 @@ import numpyro.distributions as dist
 from scipy.special import ndtri
 
 from ._float64 import in_float64
+from .arguments import checked_array
 from .base import Theta
 from .distributions import Univariate, describe
 
@@ -38,17 +39,20 @@ class Prior:
         distributions: Mapping[str, dist.Distribution],
         units: Mapping[str, str] | None = None,
     ):
-        if not distributions:
-            raise ValueError("a prior needs at least one parameter, got an empty mapping")
+        if not (isinstance(distributions, Mapping) and distributions):
+            raise ValueError(
+                "distributions must map at least one parameter to its prior, such as "
+                f"{{'a': dist.Uniform(0, 1)}}, got {distributions!r}"
+            )
         self._univariate = {name: _checked(name, d) for name, d in distributions.items()}
         self.distributions = dict(distributions)
-        self.units = dict(units or {})
-        unknown = set(self.units) - set(distributions)
-        if unknown or not all(isinstance(unit, str) for unit in self.units.values()):
+        named = isinstance(units, Mapping) and set(units) <= set(distributions)
+        if units is not None and not (named and all(isinstance(u, str) for u in units.values())):
             raise ValueError(
                 f"units must map some of the parameters {tuple(distributions)} to strings, "
-                f"got {self.units}"
+                f"got {units!r}"
             )
+        self.units = dict(units or {})
         self._bounds = {name: u.bounds for name, u in self._univariate.items()}
 
     @property
@@ -84,9 +88,10 @@ class Prior:
         Raises:
             ValueError: names or shapes differ from the prior's, or a value is not finite.
         """
-        if set(theta) != set(self.names):
-            raise ValueError(f"theta must have the parameters {self.names}, got {tuple(theta)}")
-        columns = [np.asarray(theta[name], np.float64) for name in self.names]
+        if not isinstance(theta, Mapping) or set(theta) != set(self.names):
+            got = tuple(theta) if isinstance(theta, Mapping) else repr(theta)[:100]
+            raise ValueError(f"theta must map the parameters {self.names} to values, got {got}")
+        columns = [checked_array(f"theta[{name!r}]", theta[name]) for name in self.names]
         if len({c.shape for c in columns}) > 1 or columns[0].ndim > 1:
             shapes = {name: c.shape for name, c in zip(self.names, columns, strict=True)}
             raise ValueError(f"theta must hold scalars or [n] arrays of one length, got {shapes}")
@@ -116,7 +121,16 @@ class Prior:
         0 and 1 give exactly the bounds of a prior that ends abruptly, as the uniform does,
         and a far but finite quantile of one that fades out, as the log-normal does at zero:
         so the prior's density is positive and finite there.
+
+        Raises:
+            ValueError: u is of another shape.
         """
+        u = checked_array("u", u)
+        if u.shape[-1:] != (len(self),):
+            raise ValueError(
+                f"u must have shape [..., {len(self)}], one quantile for each of the parameters "
+                f"{self.names}, got {u.shape}"
+            )
         return {
             name: _quantile(self._univariate[name], u[..., j]) for j, name in enumerate(self.names)
         }
@@ -189,16 +203,23 @@ def _checked(name: str, distribution: object) -> Univariate:
             "give one distribution per parameter"
         )
     try:
-        univariate = Univariate(distribution)
-        middle = univariate.cdf(univariate.icdf(np.array(0.5)))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            univariate = Univariate(distribution)
+            middle = univariate.cdf(univariate.icdf(np.array(0.5)))
     except (NotImplementedError, ImportError) as error:  # numpyro asks for TFP in some icdf
         raise ValueError(
             f"prior of {name!r} needs cdf and icdf, which {type(distribution).__name__} lacks; "
             "use for example Uniform, LogUniform, Normal, LogNormal, TruncatedNormal, Gamma or Beta"
         ) from error
+    low, high = univariate.bounds
+    if low >= high:
+        raise ValueError(
+            f"prior of {name!r} must begin below its end, got {describe(distribution)}; "
+            "exchange its bounds, or leave a fixed parameter out"
+        )
     if not np.isclose(middle, 0.5):
         raise ValueError(
-            f"prior of {name!r} must be continuous: cdf(icdf(0.5)) gave {middle}; "
-            "check its arguments"
+            f"prior of {name!r} must be continuous, with finite arguments, got "
+            f"{describe(distribution)}, whose cdf(icdf(0.5)) is {middle}"
         )
     return univariate

@@ -18,9 +18,9 @@ def next_replicate(history: History, pending: np.ndarray) -> np.ndarray | None:
         history: What was told.
         pending: Asked and not yet told, theta [m, d].
     """
-    good = history.succeeded
+    good, failed = history.distinct, ~history.succeeded
     theta, features = history.theta[good], history.features[good]
-    known = np.concatenate([history.theta, pending])  # a replicate that failed was tried
+    known = np.concatenate([history.theta[good | failed], pending])  # what failed was tried
     points, count = np.unique(known, axis=0, return_counts=True)
     repeated = points[count > 1]
     wanted = max(FIRST, int(SHARE * len(known)))

@@ -81,12 +81,19 @@ def results_tree(
     return tree
 
 
-def add_surrogate(tree: xr.DataTree, surrogate: Surrogate, u: np.ndarray, key: jax.Array) -> None:
+def add_surrogate(
+    tree: xr.DataTree,
+    surrogate: Surrogate,
+    learned_from: np.ndarray,
+    u: np.ndarray,
+    key: jax.Array,
+) -> None:
     """Add what the surrogate says of itself: constant_data, posterior_predictive (at evenly
     spaced draws u [chain, draw, d], whose indices are its coordinate `draw`), emulator_checks.
 
-    The checks' first axis is the simulation; their group's attribute `warnings` joins what the
-    surrogate complains of, one per line, and is empty where there is nothing.
+    The checks' first axis is the simulation, with rows of NaN where nothing was learned from one
+    (`learned_from`, bool [n]); their group's attribute `warnings` joins what the surrogate
+    complains of, one per line, and is empty where there is nothing.
     """
     constants = {name: np.asarray(value) for name, value in surrogate.constants().items()}
     if constants:
@@ -101,10 +108,12 @@ def add_surrogate(tree: xr.DataTree, surrogate: Surrogate, u: np.ndarray, key: j
     if groups:
         made = arviz_base.from_dict({"posterior_predictive": groups}, coords={"draw": rows})
         tree["posterior_predictive"] = made["posterior_predictive"]
-    checks = {
-        name: (_axes(name, np.asarray(values)), np.asarray(values))
-        for name, values in surrogate.checks().items()
-    }
+    checks = {}
+    for name, values in surrogate.checks().items():
+        of_all = np.full((len(learned_from), *values.shape[1:]), np.nan)
+        of_all[learned_from] = values
+        axes = (f"{name}_dim_{i}" for i in range(values.ndim - 1))
+        checks[name] = (["simulation", *axes], of_all)
     attributes = {"warnings": "\n".join(surrogate.warnings())}
     tree["emulator_checks"] = xr.DataTree(xr.Dataset(checks, attrs=attributes))
 
@@ -113,10 +122,3 @@ def finished(tree: xr.DataTree, attributes: Mapping[str, object]) -> xr.DataTree
     """The tree with how it was made at its root."""
     tree.attrs.update(attributes, version=version("bolfi-liquids"))
     return tree
-
-
-def _axes(name: str, values: np.ndarray) -> list[str]:
-    """Dimension names of one of the emulator's checks."""
-    if values.ndim == 0:
-        return []
-    return ["simulation", *(f"{name}_dim_{i}" for i in range(values.ndim - 1))]

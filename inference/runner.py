@@ -133,6 +133,12 @@ class Runner:
         found = self.bank.get(self.identity, *order.job)
         if found is None or not is_final(found, self.timeout):
             return False
+        if found.signal is not None and order.shape not in (None, found.signal.shape):
+            raise ValueError(
+                f"the bank {self.bank.path} holds a signal of shape {found.signal.shape} under "
+                f"identity={self.identity!r}, where {order.shape} is expected; it is another "
+                "simulator's: give each its own identity=, or choose another bank"
+            )
         order.outcome.set_result(found)
         return True
 
@@ -189,12 +195,11 @@ class Runner:
                 f"({error}); define it at the top level of a module"
             )
         elif isinstance(error, BrokenExecutor | CancelledError):
-            where = "nothing, for bank is in memory" if self.bank.in_memory else self.bank.path
             jobs = "; ".join(f"{job.theta}, seed {job.seed}" for job in list(self._mine.values()))
             told = RuntimeError(
                 f"the executor lost its workers ({raised(error)}): one was killed, ran out of "
                 "memory, crashed in the simulator or could not import it. "
-                f"In flight: {jobs}. Finished simulations are kept in {where}; "
+                f"In flight: {jobs}. Finished simulations are kept in {self.bank.where}; "
                 "mend the cause and repeat the call with a new executor to go on from there"
             )
         else:

@@ -14,6 +14,7 @@ from .design import sobol
 from .emulator import Emulator, loo_errors, noise_share, predict, predictive_draws
 from .emulator_checks import complaints
 from .gaussian import SignalState, log_likelihood, log_second_moment, node_log_densities
+from .given_noise import GivenNoise
 from .noise import (
     NO_MEASUREMENT_NOISE,
     Nodes,
@@ -38,7 +39,7 @@ class SignalSurrogate:
         emulator: Of the outputs.
         output: How outputs become values.
         observed: The observed values [m].
-        known: Covariance [m, m] of the measurement noise, where the user gave it.
+        known: Measurement noise that the user gave.
         nodes: Sizes and correlations of the measurement noise, KEPT of them; one where there is
             none, or it is known.
         reduced: The observed scores at each, with the scores' run-to-run noise.
@@ -47,7 +48,7 @@ class SignalSurrogate:
     emulator: Emulator
     output: Output
     observed: np.ndarray
-    known: np.ndarray | None
+    known: GivenNoise | None
     nodes: Nodes
     reduced: Reduced
 
@@ -95,7 +96,7 @@ class SignalSurrogate:
         weights = self.node_weights
         sd = weights @ self.nodes.sigma * self.emulator.basis.scale[0]
         if self.known is not None:
-            sd = np.sqrt(self.known[0, 0])
+            sd = np.sqrt(self.known.variance[0])
         return {
             "components": np.asarray(self.emulator.basis.used),
             "explained_variance": np.asarray(self.emulator.basis.explained),
@@ -140,7 +141,8 @@ class SignalSurrogate:
         noise = correlated(white, self.output.layout, nodes)
         values = values + self.emulator.basis.scale * noise
         if self.known is not None:
-            values = values + white @ _root(self.known).T
+            rng = np.random.default_rng(np.asarray(jax.random.key_data(noise_key)))
+            values = values + self.known.draw(rng, len(values))
         return {"signal": self.output.restore(values)}
 
 
@@ -165,7 +167,7 @@ def observe(
     emulator: Emulator,
     output: Output,
     observed: np.ndarray,
-    noise: np.ndarray | None,
+    noise: GivenNoise | None,
     previous: SignalSurrogate | None = None,
 ) -> SignalSurrogate:
     """Compare with the observed values [m].
@@ -175,8 +177,8 @@ def observe(
     combination of the components explains.
 
     Args:
-        noise: Known covariance [m, m] of the measurement noise; None to estimate it where the
-            output is a series, and for none where it is not.
+        noise: The measurement noise; None to estimate it where the output is a series, and for
+            none where it is not.
         previous: Its nodes are kept.
     """
     basis, remainder = emulator.basis, emulator.remainder
@@ -184,14 +186,8 @@ def observe(
     vectors, factors = basis.vectors, remainder.factors
     white = np.full(len(target), remainder.white)
     if noise is not None:
-        standard = noise / np.outer(basis.scale, basis.scale)
-        diagonal = np.diag(standard)
-        if np.array_equal(standard, np.diag(diagonal)):
-            white = white + diagonal
-        else:  # much of it as white noise, lest rounding rule where factors alone are noisy
-            least = 0.9 * max(float(np.linalg.eigvalsh(standard)[0]), 0.0)
-            white = white + least
-            factors = np.column_stack([factors, _root(standard - least * np.eye(len(target)))])
+        white = white + noise.white / basis.scale**2
+        factors = np.column_stack([factors, noise.factors / basis.scale[:, None]])
     if previous is not None:
         nodes = previous.nodes
     elif noise is not None or not output.series or used == 0:
@@ -207,11 +203,6 @@ def observe(
         kept = _keep(emulator, reduced)
         reduced, nodes = (type(x)(*(part[kept] for part in x)) for x in (reduced, nodes))
     return SignalSurrogate(emulator, output, observed, noise, nodes, reduced)
-
-
-def _root(covariance: np.ndarray) -> np.ndarray:
-    values, vectors = np.linalg.eigh(covariance)
-    return vectors * np.sqrt(np.maximum(values, 0.0))
 
 
 def _widen(reduced: Reduced, emulator: Emulator) -> Reduced:

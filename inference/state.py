@@ -26,6 +26,16 @@ class History(NamedTuple):
         return np.isfinite(self.discrepancy)
 
     @property
+    def distinct(self) -> np.ndarray:
+        """Which succeeded and copy no run before: one of equal theta and seed tells nothing new."""
+        distinct, seen = self.succeeded, set()
+        for i in np.flatnonzero(distinct & (self.seeds != UNKNOWN)):
+            run = self.theta[i].tobytes(), int(self.seeds[i])
+            distinct[i] = run not in seen
+            seen.add(run)
+        return distinct
+
+    @property
     def failures(self) -> dict[str, int]:
         """Failed runs by kind: "raised", "not finite", "timeout"."""
         return count(self.errors)

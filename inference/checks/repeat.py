@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from ..arguments import checked_integer
 from ..base import Simulator
-from ..bolfi import checked_integer
+from ..describe import describe
 from ..prior import Prior
-from .describe import describe
+from ..progress import progress_bar
 from .replicate import Observe, Pipeline, Plan, Replicate, run_replicate
 from .replicated import Replicates
 from .store import ReplicateStore
@@ -82,13 +82,12 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
             for number, replicate in kept.load().items()
             if number < n and not (retry and replicate.error)
         }
-        bar = stack.enter_context(_bar(progress))
-        task = bar.add_task("", total=n, completed=len(done))
+        advance = stack.enter_context(progress_bar("replicates", n, shown=progress, done=len(done)))
         missing = [number for number in range(n) if number not in done]
         for replicate in _run(plan, missing, truths, executor):
             kept.put(replicate)
             done[replicate.number] = replicate
-            bar.advance(task)
+            advance(1)
     ordered = [done[number] for number in range(n)]
     finished = tuple(r for r in ordered if r.error is None)
     return Replicates(prior, seed, draws, finished, tuple(r for r in ordered if r.error))
@@ -143,8 +142,3 @@ def _run(
     finally:
         for future in futures:
             future.cancel()  # after a mistake or Ctrl-C there is no use in the rest
-
-
-def _bar(show: bool) -> Progress:
-    columns = TextColumn("replicates"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
-    return Progress(*columns, disable=not show)

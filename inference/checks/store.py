@@ -2,16 +2,15 @@
 
 import io
 import json
-import sqlite3
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
+from ..database import opened_database
 from .replicate import Replicate
 
-APPLICATION_ID = 0x424C4652  # marks the file; "BLFR"
-BUSY_MS = 60_000  # wait this long for another process's write
+MARK = 0x424C4652  # "BLFR"
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS settings (name TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS replicate (
@@ -37,42 +36,26 @@ class ReplicateStore:
             first use.
 
     Raises:
-        ValueError: the file is no such store, or holds replicates made with other settings.
+        ValueError: the file is no such store, holds replicates made with other settings, or
+            cannot be read and written.
     """
 
     def __init__(self, path: str | Path, settings: Mapping[str, str]):
         self.path = str(path)
-        self._connection = sqlite3.connect(self.path, timeout=BUSY_MS / 1000, isolation_level=None)
+        self._connection = opened_database(path, MARK, SCHEMA, "replicate store")
         try:
-            self._open(dict(settings))
+            self._agree_on(dict(settings))
         except BaseException:
             self._connection.close()
             raise
 
-    def _open(self, settings: dict[str, str]) -> None:
+    def _agree_on(self, settings: dict[str, str]) -> None:
         execute = self._connection.execute
-        try:
-            execute("BEGIN IMMEDIATE")  # two processes may create the file together
-            application = execute("PRAGMA application_id").fetchone()[0]
-            tables = execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
-        except sqlite3.OperationalError:
-            raise
-        except sqlite3.DatabaseError as error:
-            raise ValueError(
-                f"{self.path} is not a replicate store; choose another file"
-            ) from error
-        if application != APPLICATION_ID and tables:
-            raise ValueError(
-                f"{self.path} is an SQLite file but not a replicate store; choose another file"
-            )
-        execute(f"PRAGMA application_id = {APPLICATION_ID}")
-        for statement in SCHEMA.split(";")[:-1]:
-            execute(statement)
+        execute("BEGIN IMMEDIATE")  # two processes may begin together
         stored = dict(execute("SELECT name, value FROM settings").fetchall())
         if not stored:
             self._connection.executemany("INSERT INTO settings VALUES (?, ?)", settings.items())
         execute("COMMIT")
-        execute("PRAGMA journal_mode = WAL")
         if stored and stored != settings:
             raise ValueError(_difference(self.path, stored, settings))
 

@@ -1,3 +1,4 @@
+import re
 import sqlite3
 import subprocess
 import sys
@@ -78,6 +79,26 @@ def test_other_files_are_refused_and_left_alone(tmp_path):
         with pytest.raises(ValueError, match="not a simulation bank"):
             inference.SimulationBank(path)
     assert (foreign.read_bytes(), text.read_bytes()) == before
+
+
+@pytest.mark.parametrize("name", [".", "missing/b.sqlite"])
+@pytest.mark.parametrize("kind", ["simulation bank", "replicate store"])
+def test_a_path_that_cannot_be_used_is_named(tmp_path, simulate, prior, kind, name):
+    path = tmp_path / name
+    message = rf"{re.escape(str(path))} cannot be used as a {kind} \(unable to open"
+    with pytest.raises(ValueError, match=message):
+        if kind == "simulation bank":
+            inference.fit(simulate, prior, np.zeros(30), bank=path)
+        else:
+            inference.replicates(print, simulate, prior, 2, store=path)
+
+
+@pytest.mark.parametrize("path", [5, None, ""])
+def test_what_is_no_path_is_refused(path):
+    with pytest.raises(
+        ValueError, match=f"a simulation bank needs the path of a file, got {path!r}"
+    ):
+        inference.SimulationBank(path)
 
 
 def test_all_simulations_of_one_identity(tmp_path):

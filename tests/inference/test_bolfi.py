@@ -55,6 +55,23 @@ def test_foreign_simulations_replace_the_start_design(prior, observed, simulate)
     assert engine.ask(1)["slope"] != start["slope"]
 
 
+def test_a_copy_teaches_nothing(prior, observed, simulate):
+    """Copies have equal theta and seed; a replicate, or a run of unknown seed, is none."""
+    engine, plain = inference.Bolfi(prior, observed), inference.Bolfi(prior, observed)
+    theta = engine.ask(6)
+    signals = simulate(theta, np.arange(6))
+    for each in (engine, plain):
+        each.tell(theta, signals, np.arange(6))
+    engine.tell(theta, signals, np.arange(6))
+    assert (engine.told, engine.succeeded) == (12, 6)
+    fit = engine.fit()
+    assert fit.best == plain.fit().best
+    np.testing.assert_array_equal(fit.learned_from, np.arange(12) < 6)
+    engine.tell(theta, simulate(theta, np.arange(6, 12)), np.arange(6, 12))
+    engine.tell(theta, signals)
+    assert engine.succeeded == 18
+
+
 def test_failed_runs_count_and_teach_nothing(prior, observed, simulate):
     engine = inference.Bolfi(prior, observed)
     theta = engine.ask(6)
@@ -106,7 +123,15 @@ def test_a_discrepancy_may_compare_unlike_shapes(prior):
         ({"acquisition": "lcb"}, "'lcb' needs surrogate='discrepancy'"),
         ({"transform": "cube"}, "transform must be one of"),
         ({"surrogate": "signal", "transform": "log"}, "has the options"),
-        ({"noise": -1.0, "components": 0}, "components must be at least 1"),
+        ({"noise": -1.0, "components": 0}, "components must be an integer from 1"),
+        ({"components": 2.5}, "components must be an integer from 1 to .*, got 2.5"),
+        ({"components": "all"}, "components must be an integer"),
+        ({"hyper_draws": "many"}, "hyper_draws must be an integer from 0"),
+        ({"summary": "mean"}, "summary must be a function or None, got 'mean'"),
+        ({"summary": lambda signal: "loud"}, "what summary returns must be an array of numbers"),
+        ({"discrepancy": 2.0}, "discrepancy must be a function or None, got 2.0"),
+        ({"surrogate": ["signal"]}, "surrogate must be one of"),
+        ({"transform": ["log"]}, "transform must be one of"),
         ({"noise": np.ones((2, 2))}, "noise must be a number"),
         ({"initial": 1}, "initial must be an integer from 3"),
         ({"seed": -1}, "seed must be an integer"),
@@ -122,6 +147,12 @@ def test_bad_calls_are_refused(prior, observed):
     theta = engine.ask(2)
     with pytest.raises(ValueError, match=r"shape \(2, 30\).*got \(2, 29\)"):
         engine.tell(theta, np.zeros((2, 29)))
+    with pytest.raises(ValueError, match="theta must map the parameters"):
+        engine.tell(0.5, np.zeros((1, 30)))
+    with pytest.raises(ValueError, match="signals must be an array of numbers, got 'loud'"):
+        engine.tell(theta, "loud")
+    with pytest.raises(ValueError, match="observed must be an array of numbers"):
+        inference.Bolfi(prior, [[1.0], [1.0, 2.0]])
     with pytest.raises(ValueError, match="support of the prior"):
         engine.tell({"slope": [5.0], "offset": [0.5]}, np.zeros((1, 30)))
     with pytest.raises(ValueError, match="seeds must have shape"):

@@ -6,6 +6,8 @@ from scipy.stats import binom
 
 from bolfi_liquids import inference
 
+pytestmark = pytest.mark.filterwarnings("ignore::bolfi_liquids.inference.EmulatorWarning")
+
 ALPHA = 1e-4  # false alarms
 RUNS = 30
 SD = 0.05  # of the toy's noise

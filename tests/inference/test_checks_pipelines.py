@@ -10,6 +10,8 @@ import pytest
 
 from bolfi_liquids import inference
 
+pytestmark = pytest.mark.filterwarnings("ignore::bolfi_liquids.inference.EmulatorWarning")
+
 SHORT = {"sampler": "emcee", "chains": 2, "draws": 64, "warmup": 20}
 
 

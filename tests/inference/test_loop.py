@@ -54,6 +54,14 @@ def lines(path):
     return path.read_text().split() if path.exists() else []
 
 
+@pytest.fixture(scope="module")
+def signal_fit(simulate, prior, observed):
+    engine = inference.Bolfi(prior, observed)
+    theta = engine.ask(10)
+    engine.tell(theta, simulate(theta, range(10)))
+    return engine.fit()
+
+
 def test_killed_and_repeated_equals_undisturbed(tmp_path):
     """SIGKILL in the sixth simulation or later; only what was running is simulated again."""
     undisturbed = start(tmp_path, "whole", "0")
@@ -167,6 +175,28 @@ def test_a_shared_bank_serves_a_second_observation(tmp_path, prior, observed, si
         assert len(calls) == 14
 
 
+@pytest.mark.parametrize("workers", [0, 2])
+def test_another_simulators_signals_in_a_bank_are_refused(
+    tmp_path, prior, observed, simulate, workers
+):
+    path = tmp_path / "b.sqlite"
+    inference.fit(simulate, prior, observed, budget=7, bank=path)
+
+    def shorter(theta, seeds):
+        return simulate(theta, seeds)[:, :20]
+
+    message = (
+        rf"{re.escape(str(path))} holds a signal of shape \(30,\) under identity='', where "
+        r"\(20,\) is expected"
+    )
+    with ThreadPoolExecutor(2) as pool:
+        options = {"bank": path, "executor": pool if workers else None}
+        with pytest.raises(ValueError, match=message):
+            inference.fit(shorter, prior, observed[:20], budget=7, **options)
+        named = inference.fit(shorter, prior, observed[:20], budget=7, identity="20", **options)
+    assert named.failures == {}
+
+
 def test_an_exception_costs_one_run(tmp_path, prior, observed, simulate):
     def fragile(theta, seeds):
         if (theta["slope"] > 0.5).any():
@@ -228,6 +258,32 @@ def test_total_failure_is_an_error_with_its_cause(prior, observed):
         inference.fit(broken, prior, observed)
 
 
+@pytest.mark.parametrize("successes", [1, 2])
+def test_too_few_successes_are_an_error_that_loses_nothing(
+    tmp_path, prior, observed, simulate, successes
+):
+    calls = []
+
+    def fragile(theta, seeds):
+        calls.extend(seeds)
+        if len(calls) > successes:
+            raise OSError("no licence")
+        return simulate(theta, seeds)
+
+    path = tmp_path / "b.sqlite"
+    message = (
+        f"{successes} of 7 simulations succeeded, 3 are needed; the last error: OSError: "
+        f"no licence. Finished simulations are kept in {re.escape(str(path))}; mend the cause"
+    )
+    with pytest.raises(RuntimeError, match=message):
+        inference.fit(fragile, prior, observed, budget=7, batch=1, bank=path)
+    with inference.SimulationBank(path) as bank:
+        assert len(bank.simulations("").seeds) == successes
+    calls.clear()
+    with pytest.raises(RuntimeError, match="kept in nothing, for bank is in memory"):
+        inference.fit(fragile, prior, observed, budget=7, batch=1)
+
+
 @pytest.mark.parametrize("shape", [(2, 29), (3, 30), (30,), ()])
 def test_signals_of_wrong_shape_are_refused_and_not_stored(prior, observed, simulate, shape):
     message = re.escape(f"shape (2, 30), one row per theta, got {shape}")
@@ -251,6 +307,48 @@ def test_signals_of_wrong_shape_are_refused_and_not_stored(prior, observed, simu
 def test_bad_budgets_are_refused(prior, observed, simulate, options, message):
     with pytest.raises(ValueError, match=message):
         inference.fit(simulate, prior, observed, **options)
+
+
+def test_a_fit_says_what_it_is_in_a_few_lines(line_fit, prior, observed, simulate):
+    assert repr(line_fit).splitlines() == [
+        "Fit",
+        "  parameters: slope ~ Uniform(low=-1, high=1), offset ~ Uniform(low=0, high=1)",
+        "  simulations: 20, failed: none",
+        "  surrogate: 'discrepancy', of 20 simulations",
+        "  warnings: none",
+    ]
+    engine = inference.Bolfi(prior, observed)
+    theta = engine.ask(8)
+    signals = np.ones((8, 30))
+    signals[:2] = np.nan
+    engine.tell(theta, signals, errors=["OSError: no licence", *[""] * 7])
+    with pytest.warns(inference.EmulatorWarning, match="all simulated outputs are equal"):
+        lines = str(engine.fit()).splitlines()
+    assert lines[2] == "  simulations: 8, failed: 1 raised, 1 not finite"
+    assert lines[4].startswith("  warnings: all simulated outputs are equal")
+
+
+@pytest.mark.parametrize(
+    "earlier", [5, "runs.npz", {"theta": {}, "signals": []}, (np.zeros((4, 2)), np.zeros((4, 30)))]
+)
+def test_earlier_simulations_of_another_form_are_refused(prior, observed, simulate, earlier):
+    with pytest.raises(ValueError, match=r"earlier must be \(theta, signals\) or .*, got "):
+        inference.fit(simulate, prior, observed, earlier=earlier)
+    with pytest.raises(ValueError, match="earlier's signals must be an array of numbers"):
+        inference.fit(simulate, prior, observed, earlier=({"slope": [0]}, "loud"))
+
+
+@pytest.mark.parametrize("fixture", ["line_fit", "signal_fit"])
+def test_predictions_at_points_of_another_shape_are_refused(fixture, request, prior):
+    fit = request.getfixturevalue(fixture)
+    for theta in (0.5, {"slope": 0.5}, {"slope": np.zeros((2, 2)), "offset": np.zeros((2, 2))}):
+        for use in (fit.surrogate.predict, fit.log_prob):
+            with pytest.raises(ValueError, match="theta must"):
+                use(theta)
+    for u in (0.5, np.full(2, 0.5), np.full((4, 3), 0.5)):
+        with pytest.raises(ValueError, match=r"u must have shape \[n, 2\].*got \("):
+            fit.learned.predict(u)
+    assert np.shape(fit.surrogate.predict({"slope": 0.5, "offset": 0.5})[0]) in ((), (30,))
 
 
 def test_progress_is_shown_only_on_request(prior, observed, simulate, capsys):

@@ -5,8 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from bolfi_liquids.inference._float64 import in_float64
-from bolfi_liquids.inference.mixture import fit_mixture, log_density
-from bolfi_liquids.inference.population import explore, population
+from bolfi_liquids.inference.mixture import fit_mixture, log_density, to_unit
+from bolfi_liquids.inference.population import explore
 from scipy.special import logsumexp
 
 SEEDS = 5
@@ -39,9 +39,10 @@ def populations(state, d):
     """(u, normalised weights, log evidence) for each key."""
     found = []
     for seed in range(SEEDS):
-        u, log_weights = population(jax.random.key(seed), two_gaussians, state, d)
-        log_evidence = logsumexp(log_weights)
-        found.append((np.asarray(u), np.exp(np.asarray(log_weights) - log_evidence), log_evidence))
+        made = explore(jax.random.key(seed), two_gaussians, state, d)
+        log_evidence = logsumexp(made.log_weights)
+        weights = np.exp(np.asarray(made.log_weights) - log_evidence)
+        found.append((np.asarray(to_unit(made.x)), weights, log_evidence))
     return found
 
 
@@ -103,7 +104,7 @@ def test_compiles_once_and_repeats():
         return two_gaussians(state, u)
 
     results = [
-        population(jax.random.key(0), counted, bimodal_state(1, sd), 1)[0] for sd in (0.2, 0.1, 0.2)
+        explore(jax.random.key(0), counted, bimodal_state(1, sd), 1).x for sd in (0.2, 0.1, 0.2)
     ]
     assert len(traces) == 1
     np.testing.assert_array_equal(results[0], results[2])

@@ -99,7 +99,7 @@ def test_units_and_descriptions_are_kept():
     assert described["share"] == {"prior": "Beta(concentration1=2, concentration0=2)"}
 
 
-@pytest.mark.parametrize("units", [{"b": "m"}, {"a": 1.0}])
+@pytest.mark.parametrize("units", [{"b": "m"}, {"a": 1.0}, ["m"], "m"])
 def test_bad_units_are_refused(units):
     with pytest.raises(ValueError, match="units must map some of the parameters"):
         inference.Prior({"a": dist.Uniform(0.0, 1.0)}, units=units)
@@ -109,6 +109,18 @@ def test_bad_units_are_refused(units):
     ("distributions", "message"),
     [
         ({}, "at least one parameter"),
+        (dist.Uniform(0.0, 1.0), r"must map .* got <numpyro.*Uniform"),
+        ([dist.Uniform(0.0, 1.0)], r"must map .* got \[<numpyro"),
+        (
+            {"a": dist.Uniform(1.0, 0.0)},
+            r"'a' must begin below its end, got Uniform\(low=1, high=0\)",
+        ),
+        ({"a": dist.Uniform(1.0, 1.0)}, r"must begin below its end, got Uniform\(low=1, high=1\)"),
+        ({"a": dist.LogUniform(2.0, 1.0)}, "must begin below its end"),
+        ({"a": dist.TruncatedNormal(0.0, 1.0, low=2.0, high=1.0)}, "must begin below its end"),
+        ({"a": dist.Uniform(0.0, np.inf)}, r"finite arguments, got Uniform\(low=0, high=inf\)"),
+        ({"a": dist.Uniform(np.nan, 1.0)}, r"finite arguments, got Uniform\(low=nan, high=1\)"),
+        ({"a": dist.Normal(0.0, np.inf)}, r"finite arguments, got Normal\(loc=0, scale=inf\)"),
         ({"a": 1.0}, "numpyro distribution, got float"),
         ({"a": dist.Normal(np.zeros(2), 1.0)}, r"univariate with shape \(\), got \(2,\)"),
         ({"a": dist.MultivariateNormal(np.zeros(2), np.eye(2))}, "univariate"),
@@ -124,7 +136,12 @@ def test_bad_distributions_are_refused(distributions, message):
 @pytest.mark.parametrize(
     ("theta", "message"),
     [
-        ({"viscosity": 1.0}, "must have the parameters"),
+        ({"viscosity": 1.0}, "must map the parameters .* got \\('viscosity',\\)"),
+        (0.5, "must map the parameters .* to values, got 0.5"),
+        (
+            {"viscosity": "thick", "cohesion": 0.5, "shift": 0.0},
+            "theta\\['viscosity'\\] must be an array",
+        ),
         ({"viscosity": [1.0, 2.0], "cohesion": 0.5, "shift": 0.0}, "one length"),
         ({"viscosity": np.nan, "cohesion": 0.5, "shift": 0.0}, "must be finite"),
     ],
@@ -148,3 +165,9 @@ def test_which_priors_are_seen_as_normal_scores():
         }
     )
     assert prior.normal.tolist() == [False, False, True, True, True, False, False]
+
+
+@pytest.mark.parametrize("u", [0.5, np.zeros(2), np.zeros((4, 2)), "middle"])
+def test_bad_quantiles_are_refused(mixed, u):
+    with pytest.raises(ValueError, match=r"u must (have shape \[\.\.\., 3\]|be an array)"):
+        mixed.from_unit(u)

@@ -118,3 +118,18 @@ def test_how_it_was_made_is_at_the_root(tree):
     made = {"seed", "version", "sampler", "chains", "draws", "warmup", "extend", "sampling_seed"}
     assert made < set(tree.attrs)
     assert {"seconds_simulator", "seconds_engine", "seconds_sampling"} < set(tree.attrs)
+
+
+def test_each_simulation_has_a_row_of_checks(simulate, prior, observed):
+    """The third run fails and the fifth blows up: nothing is learned from these."""
+    engine = inference.Bolfi(prior, observed, surrogate="signal")
+    theta = engine.ask(12)
+    signals = simulate(theta, range(12))
+    signals[2], signals[4] = np.nan, 1e30
+    engine.tell(theta, signals)
+    fit = engine.fit()
+    checks = fit.sample("quadrature", draws=8)["emulator_checks"]["loo_z"]
+    assert checks.sizes["simulation"] == 12
+    missing = np.isnan(checks.to_numpy()).all(1)
+    np.testing.assert_array_equal(np.flatnonzero(missing), [2, 4])
+    np.testing.assert_array_equal(checks[~missing], fit.learned.checks()["loo_z"])

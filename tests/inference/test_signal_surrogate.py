@@ -189,6 +189,7 @@ def test_predictions_cover_new_runs(design):
     np.testing.assert_allclose(drawn.mean(0), mean[0], atol=5.0 * sd[0].max() / 20.0)
 
 
+@pytest.mark.filterwarnings("ignore:run-to-run noise")
 def test_the_engine_repeats_points_until_it_knows_the_noise():
     prior = inference.Prior({"a": dist.Uniform(0.0, 1.0), "b": dist.Uniform(0.0, 1.0)})
 
@@ -216,3 +217,16 @@ def test_no_point_is_repeated_while_its_replicate_is_pending():
     assert len(repeats) == 2
     assert len(np.unique(asked, axis=0)) == 5
     assert next_replicate(engine.fit().history, asked) is None
+
+
+def test_copies_are_no_replicates():
+    """Equal seeds give equal outputs, however noisy the simulator is."""
+    prior = inference.Prior({"a": dist.Uniform(0.0, 1.0), "b": dist.Uniform(0.0, 1.0)})
+    engine = inference.Bolfi(prior, outputs(np.array([[0.4, 0.6]]))[0], capacity=64)
+    theta = engine.ask(10)
+    signals = outputs(prior.to_unit(theta), range(10))
+    for _ in range(2):
+        engine.tell(theta, signals, range(10))
+    history = engine.fit().history
+    best = history.theta[np.argmin(history.discrepancy)]
+    np.testing.assert_array_equal(next_replicate(history, np.zeros((0, 2))), best)

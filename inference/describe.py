@@ -1,4 +1,4 @@
-"""Text that says what a pipeline is, the same in every process that makes it anew."""
+"""Text that says what a function or an option is, the same in every process that makes it anew."""
 
 import hashlib
 import re
@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 import numpyro.distributions as dist
 
-from ..prior import Prior
+from .prior import Prior
 
 ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
 
 def describe(value: Any) -> str:
-    """Name and settings of functions, dataclasses, priors and arrays; `repr` of the rest.
+    """Module and name of functions, fields of dataclasses and named tuples, parameters of priors,
+    shape and a hash of arrays; `repr` of the rest.
 
     It knows nothing of what a function does: code that changed under one name reads the same.
     """
@@ -38,6 +39,8 @@ def describe(value: Any) -> str:
 
 
 def _plain(value: Any) -> str:
+    if hasattr(value, "_asdict"):  # a named tuple
+        return f"{_name(type(value))}({describe(value._asdict())})"
     if isinstance(value, Mapping):
         return ", ".join(f"{key}={describe(value[key])}" for key in value)
     if isinstance(value, list | tuple):

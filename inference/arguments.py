@@ -1,0 +1,51 @@
+"""Arguments as users give them: made what they should be, or refused by name."""
+
+import numpy as np
+
+LARGEST = 2**31 - 1  # that every random number generator takes as a seed
+
+
+def checked_integer(name: str, value: object, least: int = 1) -> int:
+    """`value` as int.
+
+    Raises:
+        ValueError: not an integer, or not from `least` to `LARGEST`.
+    """
+    if isinstance(value, int | np.integer) and not isinstance(value, bool):
+        number = int(value)
+        if least <= number <= LARGEST:
+            return number
+    raise ValueError(f"{name} must be an integer from {least} to {LARGEST}, got {value!r}")
+
+
+def checked_array(name: str, value: object) -> np.ndarray:
+    """`value` as float64.
+
+    Raises:
+        ValueError: not numbers, or not of one shape.
+    """
+    try:
+        return np.asarray(value, np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} must be an array of numbers, got {value!r:.100}") from error
+
+
+def check_callable(name: str, value: object) -> None:
+    """Raise ValueError unless `value` is a function or None."""
+    if value is not None and not callable(value):
+        raise ValueError(f"{name} must be a function or None, got {value!r:.100}")
+
+
+def checked_points(u: object, dimension: int) -> np.ndarray:
+    """Prior quantiles u as float64 [n, dimension].
+
+    Raises:
+        ValueError: of another shape.
+    """
+    points = checked_array("u", u)
+    if points.ndim != 2 or points.shape[1] != dimension:
+        raise ValueError(
+            f"u must have shape [n, {dimension}], a row of prior quantiles for each point, "
+            f"got {points.shape}"
+        )
+    return points

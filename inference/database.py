@@ -1,0 +1,53 @@
+"""SQLite files of our own, told from all others by a mark."""
+
+import os
+import sqlite3
+from contextlib import ExitStack
+
+BUSY_MS = 60_000  # wait this long for another process's write
+
+
+def opened_database(path: object, mark: int, schema: str, what: str) -> sqlite3.Connection:
+    """A connection in WAL mode, where what is committed survives the death of the process.
+
+    Args:
+        path: File, created if missing; ":memory:" keeps nothing.
+        mark: The file's `application_id`.
+        schema: Statements, each ended by ";", that do nothing where they were done before.
+        what: Is kept in the file, for messages.
+
+    Raises:
+        ValueError: `path` is no path, another file, or cannot be read and written.
+    """
+    if not isinstance(path, str | os.PathLike) or not str(path):
+        raise ValueError(f"a {what} needs the path of a file, got {path!r}")
+    # threads may share it, if they take turns
+    options = {"timeout": BUSY_MS / 1000, "isolation_level": None, "check_same_thread": False}
+    try:
+        with ExitStack() as undo:
+            connection = sqlite3.connect(str(path), **options)
+            undo.callback(connection.close)
+            _prepare(connection, mark, schema, f"{path} is an SQLite file but not a {what}")
+            undo.pop_all()
+    except sqlite3.OperationalError as error:
+        raise ValueError(
+            f"{path} cannot be used as a {what} ({error}); give a file, in a directory that "
+            "exists and can be written"
+        ) from error
+    except sqlite3.DatabaseError as error:
+        raise ValueError(f"{path} is not a {what}; choose another file") from error
+    return connection
+
+
+def _prepare(connection: sqlite3.Connection, mark: int, schema: str, foreign: str) -> None:
+    execute = connection.execute
+    execute("BEGIN IMMEDIATE")  # two processes may create the file together
+    found = execute("PRAGMA application_id").fetchone()[0]
+    tables = execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
+    if found != mark and tables:
+        raise ValueError(f"{foreign}; choose another file")
+    execute(f"PRAGMA application_id = {mark}")
+    for statement in schema.split(";")[:-1]:
+        execute(statement)
+    execute("COMMIT")
+    execute("PRAGMA journal_mode = WAL")

@@ -1,0 +1,85 @@
+"""Measurement noise that the user knows, over the values of an output."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .arguments import checked_array
+from .output import Output
+
+
+class GivenNoise(NamedTuple):
+    """Gaussian noise of covariance diag(white) + factors factors^T."""
+
+    white: np.ndarray  # [m]
+    factors: np.ndarray  # [m, q]; q is 0 where the noise is independent
+
+    @property
+    def variance(self) -> np.ndarray:
+        return self.white + np.sum(self.factors**2, 1)
+
+    def draw(self, rng: np.random.Generator, n: int) -> np.ndarray:
+        """[n, m]"""
+        m, q = self.factors.shape
+        return (
+            rng.normal(size=(n, m)) * np.sqrt(self.white) + rng.normal(size=(n, q)) @ self.factors.T
+        )
+
+
+def given_noise(noise: ArrayLike, output: Output) -> GivenNoise:
+    """The noise of an output's values.
+
+    Args:
+        noise: As in `SignalFamily`: sd, sds or covariance of what was observed.
+        output: How what was observed becomes m values.
+
+    Raises:
+        ValueError: noise is none of these.
+    """
+    samples = len(output.present)
+    given = checked_array("noise", noise)
+    # from the order of the observed output to that of the values
+    rank = np.argsort(np.argsort(output.present))
+    if given.shape == (samples, samples):
+        return _covariance(given, rank, output)
+    if given.ndim < 2 and given.size == 1:
+        sds = np.full(samples, given.item())
+    elif given.shape == output.shape:
+        sds = given.ravel()[output.present]
+    elif given.shape == (samples,):
+        sds = given[rank]
+    else:
+        raise ValueError(
+            f"noise must be a number, sds of shape {output.shape} as observed or [{samples}], or a "
+            f"[{samples}, {samples}] covariance, of the finite observed values, "
+            f"got shape {given.shape}"
+        )
+    wrong = sds[~(np.isfinite(sds) & (sds >= 0.0))]
+    if wrong.size:
+        raise ValueError(
+            f"noise must be finite and not negative where observed is finite, got {wrong[0]}"
+        )
+    return _independent(output.average(sds**2) / output.counts)
+
+
+def _independent(variances: np.ndarray) -> GivenNoise:
+    return GivenNoise(variances, np.zeros((len(variances), 0)))
+
+
+def _covariance(given: np.ndarray, rank: np.ndarray, output: Output) -> GivenNoise:
+    """Much of it as white noise, lest rounding rule where factors alone are noisy."""
+    refusal = "noise must be a finite, symmetric, positive semidefinite covariance"
+    if not (np.isfinite(given).all() and np.allclose(given, given.T)):
+        raise ValueError(refusal)
+    averaged = output.average(output.average(given[np.ix_(rank, rank)]).T)
+    variances = np.diag(averaged).copy()
+    if np.array_equal(averaged, np.diag(variances)) and (variances >= 0.0).all():
+        return _independent(variances)
+    sds = np.sqrt(np.where(variances > 0.0, variances, 1.0))
+    values, vectors = np.linalg.eigh(averaged / np.outer(sds, sds))
+    if (variances < 0.0).any() or values[0] < -1e-9 * values[-1]:
+        raise ValueError(refusal)
+    least = 0.9 * max(values[0], 0.0)
+    factors = sds[:, None] * vectors * np.sqrt(np.maximum(values - least, 0.0))
+    return GivenNoise(least * sds**2, factors)

@@ -1,0 +1,64 @@
+import subprocess
+import sys
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import numpyro.distributions as dist
+import pytest
+from bolfi_liquids.inference.describe import describe
+
+from bolfi_liquids import inference
+
+
+@dataclass(frozen=True)
+class Filter:
+    width: float
+    weights: np.ndarray
+
+
+class Plain:
+    pass
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (None, "None"),
+        ("log", "'log'"),
+        (np.float64(0.5), "0.5"),
+        (np.linalg.norm, "numpy.linalg.norm"),
+        (partial(np.mean, axis=0), "partial(numpy.mean, [], axis=0)"),
+        (inference.Quantile(0.1), "bolfi_liquids.inference.likelihood.Quantile(q=0.1)"),
+        (inference.Prior({"a": dist.Uniform(0.0, 2.0)}), "Prior(a=Uniform(low=0.0, high=2.0))"),
+    ],
+)
+def test_says_what_it_is(value, text):
+    assert describe(value) == text
+
+
+def test_large_arrays_are_told_apart_in_few_words():
+    """NumPy elides what is in the middle."""
+    zeros = np.zeros((40, 100))
+    other = zeros.copy()
+    other[20, 50] = 1.0
+    texts = {describe(array) for array in (zeros, other, zeros.astype(int), zeros.T)}
+    assert len(texts) == 4 and max(map(len, texts)) < 60
+    assert describe(Filter(1.0, zeros)) != describe(Filter(1.0, other))
+
+
+def test_says_no_addresses():
+    assert "0x" not in describe(Plain()) + describe(lambda x: x)
+
+
+def test_another_process_says_the_same():
+    code = (
+        "import numpy as np, numpyro.distributions as dist; from bolfi_liquids import inference;"
+        "prior = inference.Prior({'a': dist.Uniform(0.0, 1.0)});"
+        "print(inference.Bolfi(prior, np.zeros(30), summary=np.sort,"
+        " noise=np.arange(30.0)).settings)"
+    )
+    run = partial(subprocess.run, [sys.executable, "-c", code], capture_output=True, text=True)
+    first = run(check=True).stdout
+    assert "'summary': 'numpy.sort'" in first and "array(float64, (30,)" in first
+    assert run(check=True).stdout == first

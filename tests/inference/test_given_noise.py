@@ -1,0 +1,89 @@
+"""Measurement noise as users give it, against the covariance that it means."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+from bolfi_liquids.inference.families import SignalFamily
+from bolfi_liquids.inference.given_noise import given_noise
+from bolfi_liquids.inference.output import LONGEST, describe
+
+from bolfi_liquids import inference
+
+RNG = np.random.default_rng(0)
+
+
+@pytest.fixture
+def gappy():
+    """Two channels, some samples missing."""
+    observed = np.zeros((20, 2))
+    observed[[3, 7], 1] = np.nan
+    return observed
+
+
+def test_sds_may_be_shaped_like_the_output_or_follow_its_finite_values(gappy):
+    sds = RNG.uniform(1.0, 2.0, gappy.shape)
+    there = np.isfinite(gappy)
+    output = describe(gappy, None)
+    expected = np.concatenate([sds[:, 0], sds[there[:, 1], 1]]) ** 2  # channel after channel
+    shaped = np.where(there, sds, np.nan)
+    for given in (shaped, sds[there], np.diag(sds[there] ** 2)):
+        found = given_noise(given, output)
+        np.testing.assert_allclose(found.white, expected)
+        assert found.factors.shape == (38, 0)
+    np.testing.assert_allclose(given_noise(0.5, output).white, np.full(38, 0.25))
+
+
+def test_a_covariance_stays_one_in_the_order_of_the_values(gappy):
+    root = RNG.normal(size=(38, 38))
+    found = given_noise(root @ root.T, describe(gappy, None))
+    position = np.full(40, -1)
+    position[np.flatnonzero(np.isfinite(gappy).ravel())] = np.arange(38)
+    rank = np.concatenate([position[0::2], position[1::2][position[1::2] >= 0]])
+    expected = (root @ root.T)[np.ix_(rank, rank)]
+    np.testing.assert_allclose(np.diag(found.white) + found.factors @ found.factors.T, expected)
+    assert (found.white > 0.0).all()
+    drawn = np.cov(found.draw(RNG, 40_000).T)
+    error = np.sqrt(np.outer(found.variance, found.variance) + expected**2) / 200.0
+    assert (np.abs(drawn - expected) < 5.0 * error).all()
+
+
+def test_averages_are_less_noisy():
+    """Every value the mean of three samples, or of two where one is missing."""
+    observed = np.zeros(3 * LONGEST)
+    observed[1] = np.nan
+    output = describe(observed, None)
+    counts = np.r_[2.0, np.full(LONGEST - 1, 3.0)]
+    np.testing.assert_allclose(given_noise(0.6, output).white, 0.36 / counts)
+    sds = RNG.uniform(1.0, 2.0, len(observed))
+    expected = [np.sum(sds[[0, 2]] ** 2) / 4.0, np.sum(sds[3:6] ** 2) / 9.0]
+    np.testing.assert_allclose(given_noise(sds, output).white[:2], expected)
+
+
+def test_a_long_series_needs_no_matrix():
+    """20 000 samples: as a covariance 3 GB."""
+    tracemalloc.start()
+    try:
+        learner = SignalFamily(noise=0.1).learner(np.zeros(20_000))
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert learner.noise.white.shape == (LONGEST,)
+    assert peak < 50e6
+
+
+@pytest.mark.parametrize(
+    ("noise", "message"),
+    [
+        ("loud", "noise must be an array of numbers, got 'loud'"),
+        ({"sd": 1.0}, "noise must be an array of numbers, got {'sd'"),
+        (-0.5, "not negative where observed is finite, got -0.5"),
+        (np.full((20, 2), np.nan), "finite and not negative where observed is finite, got nan"),
+        (np.ones(40), r"shape \(20, 2\) as observed or \[38\].*got shape \(40,\)"),
+        (-np.eye(38), "positive semidefinite"),
+        (np.triu(np.ones((38, 38))), "symmetric"),
+    ],
+)
+def test_other_noise_is_refused(prior, gappy, noise, message):
+    with pytest.raises(ValueError, match=message):
+        inference.Bolfi(prior, gappy, noise=noise)
