@@ -14,7 +14,8 @@ class EmulatorWarning(UserWarning):
 
 
 def complaints(loo_z: np.ndarray, noise_share: float, what: str) -> list[str]:
-    """Sentences, none where all is well.
+    """Sentences, none where all is well; of usual complaints the same in every fit, so that a
+    study of hundreds is warned once.
 
     Args:
         loo_z: Studentised leave-one-out errors [n, k].
@@ -38,7 +39,7 @@ def complaints(loo_z: np.ndarray, noise_share: float, what: str) -> list[str]:
         )
     if noise_share > NOISY:
         said.append(
-            f"run-to-run noise makes up {noise_share:.0%} of the {what}'s variance between "
+            f"run-to-run noise makes up more than {NOISY:.0%} of the {what}'s variance between "
             "simulations, and the likelihood takes it as Gaussian and equal for all parameters; "
             "where it is not, as with noise that accumulates, the posterior is off: compare the "
             "other surrogate, or choose a summary that averages the noise out"

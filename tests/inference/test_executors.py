@@ -207,7 +207,7 @@ def test_after_an_error_the_bank_is_free_for_the_next_call(prior, observed, simu
             with pytest.raises(ValueError, match="signals of shape"):
                 inference.fit(misshapen, prior, observed, bank=bank, **options(pool))
             finish.set()
-        assert len(bank) == 1
+        assert 1 <= len(bank) <= 2  # the worker that failed may have begun another
         fit = inference.fit(simulate, prior, observed, budget=5, initial=5, bank=bank)
     assert fit.failures == {}
 
