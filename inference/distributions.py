@@ -8,6 +8,13 @@ import numpyro.distributions as dist
 from scipy import stats
 
 SCIPY: dict[type, Callable[[Any], Any]] = {
+    dist.Uniform: lambda d: stats.uniform(d.low, d.high - d.low),
+    dist.LogUniform: lambda d: stats.loguniform(d.low, d.high),
+    dist.Normal: lambda d: stats.norm(d.loc, d.scale),
+    dist.LogNormal: lambda d: stats.lognorm(d.scale, scale=np.exp(d.loc)),
+    dist.HalfNormal: lambda d: stats.halfnorm(scale=d.scale),
+    dist.Exponential: lambda d: stats.expon(scale=1.0 / d.rate),
+    dist.Cauchy: lambda d: stats.cauchy(d.loc, d.scale),
     dist.Beta: lambda d: stats.beta(d.concentration1, d.concentration0),
     dist.Gamma: lambda d: stats.gamma(d.concentration, scale=1.0 / d.rate),
     dist.InverseGamma: lambda d: stats.invgamma(d.concentration, scale=d.rate),
@@ -15,8 +22,9 @@ SCIPY: dict[type, Callable[[Any], Any]] = {
     dist.Weibull: lambda d: stats.weibull_min(d.concentration, scale=d.scale),
     dist.Chi2: lambda d: stats.chi2(d.df),
 }
-"""Distributions whose quantiles numpyro leaves to TensorFlow Probability, or lacks; the engine
-works in quantiles, so that SciPy's, which JAX cannot differentiate, serve as well."""
+"""SciPy's equals, where numpyro leaves quantiles to TensorFlow Probability or lacks them, and of
+the usual ones: the engine works in quantiles and differentiates none of these, and outside a
+compiled function each of JAX's operations would be compiled by itself."""
 
 
 class Univariate:

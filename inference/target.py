@@ -15,7 +15,7 @@ NOWHERE_FINITE = (
     "the log likelihood is finite nowhere in the prior's box; nothing can be sampled. "
     "Look at the surrogate's checks, and at the simulations that it learned from"
 )
-BATCH = 1024  # evaluations in one call, at most
+BATCH = 256  # evaluations in one call
 
 
 class Target(NamedTuple):
@@ -56,12 +56,12 @@ def _log_likelihoods(function: LogLikelihood, state: Any, u: jax.Array) -> jax.A
 
 
 def log_likelihood(target: Target, u: np.ndarray) -> np.ndarray:
-    """Log likelihood [n] at u [n, d], in batches padded to powers of two up to BATCH, so that
-    few shapes are compiled; as it is, finite or not."""
+    """Log likelihood [n] at u [n, d], in padded batches, so that one shape is compiled; as it
+    is, finite or not."""
     values = np.empty(len(u))
     for start in range(0, len(u), BATCH):
         rows = u[start : start + BATCH]
-        padded = np.full((1 << (len(rows) - 1).bit_length(), u.shape[1]), 0.5)
+        padded = np.full((BATCH, u.shape[1]), 0.5)
         padded[: len(rows)] = rows
         batch = _log_likelihoods(target.log_likelihood, target.state, padded)
         values[start : start + BATCH] = np.asarray(batch)[: len(rows)]
