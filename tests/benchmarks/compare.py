@@ -49,7 +49,7 @@ def arguments() -> argparse.Namespace:
         "--timed-seeds",
         type=int,
         default=1,
-        help="how many of the seeds also show cold processes, single steps and the peers' NUTS",
+        help="how many of the seeds also show our warm runs, single steps, and NUTS",
     )
     add("--cores", nargs="+", type=int, default=[0], help="processors that work at once")
     add("--out", type=Path, default=ROOT / "runs" / "compare")
@@ -83,7 +83,7 @@ def plan(chosen: argparse.Namespace) -> list[Job]:
                         seed=seed,
                         budgets=left,
                         data=data,
-                        nuts=timed,
+                        timed=timed,
                         code=digest(engine),
                         out=str(chosen.out),
                         core=0,

@@ -25,7 +25,7 @@ class Job(NamedTuple):
         engine: Name in `compare.ENGINES`.
         kind: "posterior", or "steps" for the cost of single steps.
         task, seed, budgets, data: What to run: `data` names the data's seed.
-        nuts: Whether to time a peer's NUTS (ours always is).
+        timed: Whether to time warm runs of ours, and NUTS.
         code: Digest of the code that decides the result.
         out: Directory of results and references.
         core: Processor to which this process is bound.
@@ -37,7 +37,7 @@ class Job(NamedTuple):
     seed: int
     budgets: tuple[int, ...]
     data: int
-    nuts: bool
+    timed: bool
     code: str
     out: str
     core: int

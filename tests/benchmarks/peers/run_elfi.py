@@ -58,7 +58,7 @@ def main(job: Job, imported: float) -> None:
         except ValueError as error:  # GPy's hyperparameters may run away to NaN
             write(job, **row, error=str(error))
             continue
-        write(job, **row, **(sample(bolfi) if job.nuts else {}))
+        write(job, **row, **(sample(bolfi) if job.timed else {}))
 
 
 def sample(bolfi: Any) -> dict[str, object]:
