@@ -25,6 +25,8 @@ def checked_array(name: str, value: object) -> np.ndarray:
         ValueError: not numbers, or not of one shape.
     """
     try:
+        if isinstance(value, np.ma.MaskedArray):  # what is masked is missing
+            return np.ma.filled(value.astype(np.float64), np.nan)
         return np.asarray(value, np.float64)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name} must be an array of numbers, got {value!r:.100}") from error

@@ -44,7 +44,7 @@ class Surrogate(Protocol):
     @property
     def state(self) -> Any:
         """Pytree of arrays on which the likelihood depends, `gp` among them; data, never a
-        closure, and of one shape over a run."""
+        closure, and of few shapes over a run, for each is compiled anew."""
         ...
 
     @property

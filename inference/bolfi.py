@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import acquisition as acquisitions
+from ._float64 import in_float64
 from .arguments import checked_array, checked_integer
 from .base import Acquisition, Theta
 from .describe import describe
@@ -21,6 +22,7 @@ from .gp import padded_rows
 from .posterior import Fit
 from .prior import Prior
 from .repetition import next_replicate
+from .sane import sane
 from .state import UNKNOWN, History, explain, init, remember_asked, remember_told
 
 DIGITS, EDGE = 7, 1e-7  # of the prior quantiles that are asked, and how near the bounds
@@ -159,10 +161,10 @@ class Bolfi:
         repeated = next_replicate(history, pending) if self.family.replicates else None
         parts = [] if repeated is None else [repeated[None]]
         if n > len(parts):
-            runs = feasibility(history.u, history.succeeded, rows)
+            runs = feasibility(history.u, history.succeeded & sane(history.discrepancy), rows)
             key = jax.random.fold_in(jax.random.key(self.seed), self._state.asked)
             believing = self._learned.believe(self.prior.to_unit(self.prior.to_dict(pending)))
-            u = np.asarray(self._acquire(key, believing, n - len(parts), runs))
+            u = np.asarray(in_float64(self._acquire)(key, believing, n - len(parts), runs))
             # coarser than rounding errors, so that arrays of another size ask the same
             u = np.clip(np.round(u, DIGITS), EDGE, 1.0 - EDGE)
             parts.append(self.prior.to_array(self.prior.from_unit(u)))
@@ -229,11 +231,12 @@ class Bolfi:
                 f"signals must have shape {(n, *shape)}, one row per theta, got {signals.shape}"
             )
 
-    def fit(self, seconds: Mapping[str, float] | None = None) -> Fit:
+    def fit(self, seconds: Mapping[str, float] | None = None, stacklevel: int = 2) -> Fit:
         """What can be concluded from the simulations told so far.
 
         Args:
             seconds: Times that the caller measured (such as the simulator's), to be kept.
+            stacklevel: Of the warnings; 2 blames the line that calls this.
 
         Raises:
             ValueError: fewer than three simulations succeeded.
@@ -262,7 +265,7 @@ class Bolfi:
             seconds={"simulator": 0.0, **(seconds or {}), "engine": spent},
         )
         for complaint in made.warnings:
-            warnings.warn(complaint, EmulatorWarning, stacklevel=2)
+            warnings.warn(complaint, EmulatorWarning, stacklevel=stacklevel)
         return made
 
 

@@ -1,4 +1,4 @@
-"""Gaussian processes as the surrogates use them: compiled once for both, and grown by belief."""
+"""Gaussian processes as the surrogates use them: compiled, and grown by data and by belief."""
 
 import jax
 import jax.numpy as jnp
@@ -25,7 +25,8 @@ def extend(gp: GP, data: Data) -> GP:
     """The processes given `data`; quick where what they have seen comes first in it."""
     n = int(gp.data.used)
     before, now = np.asarray(gp.data.u), np.asarray(data.u)
-    if before.shape == now.shape and np.array_equal(before[:n], now[:n]):
+    more = before.shape == now.shape and int(data.used) >= n
+    if more and np.array_equal(before[:n], now[:n]):
         return _grow(gp, data, jnp.asarray(n))
     return condition(gp.hyper, data)
 

@@ -5,11 +5,13 @@ import re
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from functools import partial
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import numpyro.distributions as dist
 
+from .distributions import describe as describe_distribution
 from .prior import Prior
 
 ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
@@ -24,8 +26,7 @@ def describe(value: Any) -> str:
     if isinstance(value, Prior):
         return f"Prior({describe(value.distributions)})"
     if isinstance(value, dist.Distribution):
-        given = {name: getattr(value, name) for name in value.arg_constraints}
-        return f"{type(value).__name__}({describe(given)})"
+        return describe_distribution(value)
     if isinstance(value, partial):
         return (
             f"partial({describe(value.func)}, {describe(value.args)}, {describe(value.keywords)})"
@@ -34,8 +35,21 @@ def describe(value: Any) -> str:
         held = {field.name: getattr(value, field.name) for field in fields(value)}
         return f"{_name(type(value))}({describe(held)})"
     if callable(value) and hasattr(value, "__qualname__"):
-        return _name(value)
+        return _name(value) + _held(value)
     return _plain(value)
+
+
+def _held(function: Any) -> str:
+    """What a method or closure brings along, in brackets; nothing for a plain function."""
+    code, cells = getattr(function, "__code__", None), getattr(function, "__closure__", None) or ()
+    names = code.co_freevars if code else ()
+    # a function that calls itself is among its own cells
+    own = getattr(function, "__name__", None)
+    held = [cell.cell_contents for name, cell in zip(names, cells, strict=True) if name != own]
+    bound = getattr(function, "__self__", None)
+    if bound is not None and not isinstance(bound, ModuleType):
+        held = [bound, *held]
+    return f"[{', '.join(map(describe, held))}]" if held else ""
 
 
 def _plain(value: Any) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from ._float64 import in_float64
 from .base import LogLikelihood, LogSecondMoment
 from .compiled import GROWTH, believe, condition, extend, leave_one_out, predict
-from .emulator_checks import complaints
+from .emulator_checks import EQUAL, complaints
 from .gp import GP, Data, pad, predict_many
 from .hyper import maximum_a_posteriori
 from .likelihood import (
@@ -41,7 +41,7 @@ class Scale(NamedTuple):
 
 @dataclass(frozen=True)
 class DiscrepancySurrogate:
-    """GP of g(Delta) over prior quantiles; see `learn`.
+    """GP of g(Delta); see `learn`.
 
     Attributes:
         gp: The conditioned process; one for each draw of the hyperparameters, or one.
@@ -58,6 +58,11 @@ class DiscrepancySurrogate:
     threshold: float
     learned_at: int
     chosen_at: int
+
+    @property
+    def equal(self) -> bool:
+        """Whether all discrepancies are the same, but for rounding."""
+        return bool(np.ptp(self.scale(self.discrepancy)) < 0.5)  # of what has an sd of 1
 
     @property
     def transform(self) -> Transform:
@@ -106,11 +111,14 @@ class DiscrepancySurrogate:
         """Studentised leave-one-out errors `loo_z` [n, 1]."""
         mean, variance = (np.asarray(part) for part in leave_one_out(self.gp))
         n = len(self.discrepancy)
-        z = (np.asarray(self.gp.data.y) - mean)[:, :n] / np.sqrt(variance[:, :n])
-        return {"loo_z": z.mean(0)[:, None]}
+        error = np.asarray(self.gp.data.y)[0, :n] - mean.mean(0)[:n]
+        total = variance.mean(0) + mean.var(0)  # of the mixture over hyperparameters
+        return {"loo_z": (error / np.sqrt(total[:n]))[:, None]}
 
     def warnings(self) -> list[str]:
         """What the leave-one-out errors complain of."""
+        if self.equal:
+            return [EQUAL]
         return complaints(self.checks()["loo_z"], 0.0, "discrepancy")
 
     @in_float64
@@ -157,8 +165,9 @@ def learn(  # noqa: PLR0913  what is known, and how to learn from it
     """
     values = np.minimum(discrepancy, discrepancy[sane(discrepancy)].max())
     n = len(u)
-    old = previous is not None and np.isfinite(previous.scale(values)).all()
-    if previous is not None and old and n < RETHINK * previous.chosen_at:
+    with np.errstate(divide="ignore", invalid="ignore"):  # where the transform is undefined
+        old = previous is not None and np.isfinite(previous.scale(values)).all()
+    if previous is not None and old and not previous.equal and n < RETHINK * previous.chosen_at:
         data = pad(u, previous.scale(values)[None], rows, normal)
         if n >= GROWTH * previous.learned_at:
             gp, learned_at = condition(maximum_a_posteriori(data, previous.gp.hyper), data), n
@@ -209,9 +218,9 @@ def marginalised(
 
 def _standardise(transform: Transform, values: np.ndarray) -> Scale:
     transformed = transform(values)
-    spread = float(transformed.std())
+    spread, rounding = float(transformed.std()), 1e-12 * float(np.abs(transformed).max())
     # all equal: nothing to standardise
-    return Scale(transform, float(transformed.mean()), spread if spread > 0 else 1.0)
+    return Scale(transform, float(transformed.mean()), spread if spread > rounding else 1.0)
 
 
 def _score(gp: GP, scale: Scale, values: np.ndarray) -> float:

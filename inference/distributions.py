@@ -73,8 +73,14 @@ def describe(distribution: dist.Distribution) -> str:
         inner = [f"{key}={_number(base, key)}" for key in base.arg_constraints]
         return f"Truncated{type(base).__name__}({', '.join(inner + parts)})"
     if not parts and base is not None:
-        parts = [describe(base)]
+        parts = [describe(base), *map(_transform, getattr(distribution, "transforms", ()))]
     return f"{name}({', '.join(parts)})"
+
+
+def _transform(transform: Any) -> str:
+    held = {key: value for key, value in vars(transform).items() if np.ndim(value) == 0}
+    numbers = [f"{key}={value}" for key, value in held.items() if np.isreal(value)]
+    return f"{type(transform).__name__}({', '.join(numbers)})"
 
 
 def _number(distribution: dist.Distribution, key: str) -> str:

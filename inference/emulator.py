@@ -1,17 +1,20 @@
 """An emulator of vectors: principal components, a Gaussian process for each score."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from ._float64 import in_float64
 from .compiled import GROWTH, condition, extend, leave_one_out
 from .compiled import predict as predict_scores
 from .components import Basis, principal_components
-from .gp import GP, pad
+from .gp import GP, Hyper, pad
 from .hyper import maximum_a_posteriori
-from .noise import Remainder, shrunk_covariance
+from .noise import Remainder
+from .own_noise import left_over, own_noise
 
 SHARE = 0.9995  # of the variance, to be explained by components
 PRIOR_RUNS = 5.0  # runs that speak for uncorrelated scores
@@ -27,7 +30,7 @@ class Emulator(NamedTuple):
         noise: Covariance [k, k] of the scores' run-to-run noise, beyond the remainder's.
         outputs: What was learned from [n, m].
         learned_at: Simulations known when components and hyperparameters were found.
-        optimism: [k], see `optimism`.
+        excess: Of those simulations' scores, see `own_noise` [k].
     """
 
     gp: GP
@@ -36,14 +39,14 @@ class Emulator(NamedTuple):
     noise: np.ndarray
     outputs: np.ndarray
     learned_at: int
-    optimism: np.ndarray
+    excess: np.ndarray
 
 
 @in_float64
 def emulate(  # noqa: PLR0913  what is known, and how to learn from it
     u: np.ndarray,
     outputs: np.ndarray,
-    scale: np.ndarray,
+    scale: Callable[[np.ndarray], np.ndarray],
     components: int,
     rows: int,
     previous: Emulator | None = None,
@@ -52,7 +55,7 @@ def emulate(  # noqa: PLR0913  what is known, and how to learn from it
     """Learn outputs [n, m] at u [n, d].
 
     Args:
-        scale: [m], what makes values comparable.
+        scale: Outputs [n, m] -> [m], what makes values comparable.
         components: At most.
         rows: Reserved for data, at least n.
         previous: Learned from the first of these data; its components and hyperparameters are
@@ -60,43 +63,32 @@ def emulate(  # noqa: PLR0913  what is known, and how to learn from it
         normal: Which parameters the kernels see as normal scores [d], see `gp.coordinates`.
     """
     n = len(u)
-    if previous is not None and n < GROWTH * previous.learned_at:
-        basis, learned_at, excess = previous.basis, previous.learned_at, previous.optimism
+    if previous is not None and _goes_on(previous, outputs):
+        basis, learned_at, excess = previous.basis, previous.learned_at, previous.excess
         gp = extend(previous.gp, pad(u, _targets(basis, outputs, learned_at, excess), rows, normal))
-        remainder = shrunk_covariance(basis.residuals(outputs), basis.used + 1)
     else:
-        basis, learned_at = principal_components(outputs, scale, components, SHARE), n
-        remainder = shrunk_covariance(basis.residuals(outputs), basis.used + 1)
+        basis, learned_at = principal_components(outputs, scale(outputs), components, SHARE), n
         data = pad(u, basis.scores(outputs).T, rows, normal)
         hyper = maximum_a_posteriori(data, None if previous is None else previous.gp.hyper)
-        excess = optimism(basis, np.exp(2.0 * np.asarray(hyper.log_noise)), remainder, n)
+        excess = own_noise(basis, np.exp(2.0 * np.asarray(hyper.log_noise)), outputs)
+        smaller = jnp.log1p(-jnp.asarray(excess))
+        hyper = Hyper(hyper.log_length, hyper.log_amplitude + smaller, hyper.log_noise + smaller)
         gp = condition(hyper, pad(u, _targets(basis, outputs, n, excess), rows, normal))
+    remainder = left_over(basis, np.exp(2.0 * np.asarray(gp.hyper.log_noise)), outputs, excess)
     noise = run_to_run(gp, basis, remainder.white, n)
     return Emulator(gp, basis, remainder, noise, outputs, learned_at, excess)
 
 
-def optimism(basis: Basis, noise: np.ndarray, remainder: Remainder, n: int) -> np.ndarray:
-    """By what share scores exceed those of a new run alike, because the run made the component.
-
-    A component leans towards the noise of its own n runs: to first order by the noise's variance
-    across it over n times its own variance (Nadler 2008, finite sample perturbation of principal
-    components). Unheeded, the emulator is too steep by that share, most of all in the weak
-    components of few, long and noisy outputs.
-
-    Args:
-        noise: Run-to-run variances of the scores [k].
-    """
-    squared = np.sum(basis.vectors**2, 0)
-    total = np.sum(noise * squared) + np.sum(remainder.factors**2)
-    total = total + remainder.white * len(basis.vectors)
-    across = np.maximum(total - noise * squared, 0.0)
-    return np.where(squared > 0.0, across / (n * np.where(squared > 0.0, squared, 1.0)), 0.0)
+def _goes_on(previous: Emulator, outputs: np.ndarray) -> bool:
+    """Whether these are the outputs that were learned from, and not many more."""
+    n = previous.learned_at
+    return n <= len(outputs) < GROWTH * n and np.array_equal(previous.outputs[:n], outputs[:n])
 
 
 def _targets(basis: Basis, outputs: np.ndarray, learned_at: int, excess: np.ndarray) -> np.ndarray:
-    """Scores [k, n], without the excess of the first ones, from which the components came."""
+    """Scores [k, n]; of the first ones, from which the components came, less the excess."""
     scores = basis.scores(outputs)
-    scores[:learned_at] /= 1.0 + excess
+    scores[:learned_at] *= 1.0 - excess
     return scores.T
 
 

@@ -6,6 +6,7 @@ from scipy.stats import binom, chi2, norm
 FALSE_ALARMS = 1e-3  # of each check, where the emulator is right
 FAR = 3.0  # studentised errors beyond are rare
 TOO_SURE = 1.5  # mean square of the studentised errors that matters
+EQUAL = "all simulations are equal: the data cannot tell parameters apart"
 NOISY = 0.1  # share of run-to-run noise in the variance that deserves a word
 
 

@@ -27,7 +27,7 @@ class Learnable(NamedTuple):
     u: np.ndarray  # [n, d]
     features: np.ndarray  # [n, m]
     discrepancy: np.ndarray  # [n]
-    normal: np.ndarray | None = None  # bool [d], see `Prior.normal`; None for none
+    normal: np.ndarray  # bool [d], see `Prior.normal`
 
 
 @dataclass(frozen=True)
@@ -182,9 +182,10 @@ class SignalLearner:
         learnable = self.learnable(known.discrepancy)
         features = known.features[learnable]
         old = None if previous is None else previous.emulator
-        scale = self.output.scale(features) if old is None else old.basis.scale
         limits = self.family.components, rows
-        emulator = emulate(known.u[learnable], features, scale, *limits, old, known.normal)
+        emulator = emulate(
+            known.u[learnable], features, self.output.scale, *limits, old, known.normal
+        )
         kept = previous if old is not None and emulator.learned_at == old.learned_at else None
         return observe(emulator, self.output, self.values, self.noise, kept)
 

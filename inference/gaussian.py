@@ -39,17 +39,19 @@ def log_second_moment(state: SignalState, u: jax.Array, spread: jax.Array | None
     `spread` is the emulator's variance V (None), or that part of it which further simulations
     will resolve: N(z; m, S)^2 integrates over m ~ N(mu, T), S = C + V - T, to
     |4 pi S|^(-1/2) N(z; mu, S / 2 + T) (Surer et al. 2024). E[L^2] / E[L]^2 is taken from the
-    first node, that of most evidence.
+    node that speaks loudest at u.
     """
     mean, variance = predict(state.gp, u)
     mean, total = mean * state.used, variance * state.used
     varying = total if spread is None else spread * state.used
-    estimate, covariance = state.estimate[0], state.covariance[0]
+    terms = _terms(state, mean, total)
+    loudest = jnp.argmax(terms)
+    estimate, covariance = state.estimate[loudest], state.covariance[loudest]
     rest = covariance + jnp.diag(total - varying)
     half = 0.5 * rest.shape[0] * jnp.log(4.0 * jnp.pi) + 0.5 * _log_det(rest)
     second = _log_density(estimate, mean, rest / 2.0 + jnp.diag(varying)) - half
     first = _log_density(estimate, mean, covariance + jnp.diag(total))
-    return 2.0 * _mixture(state, mean, total) + second - 2.0 * first
+    return 2.0 * logsumexp(terms) + second - 2.0 * first
 
 
 def node_log_densities(state: SignalState, u: jax.Array) -> jax.Array:

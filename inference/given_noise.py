@@ -41,6 +41,10 @@ def given_noise(noise: ArrayLike, output: Output) -> GivenNoise:
     given = checked_array("noise", noise)
     # from the order of the observed output to that of the values
     rank = np.argsort(np.argsort(output.present))
+    if given.shape == (samples, samples) == output.shape:
+        raise ValueError(
+            f"noise of shape {given.shape} may be sds or a covariance; give sds as [{samples}]"
+        )
     if given.shape == (samples, samples):
         return _covariance(given, rank, output)
     if given.ndim < 2 and given.size == 1:

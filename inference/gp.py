@@ -167,7 +167,7 @@ def log_marginal_likelihood(hyper: Hyper, data: Data, wanted: jax.Array | None =
     """log p(y | hyper) [k], trend integrated out (Rasmussen and Williams 2006, eq. 2.30).
 
     Args:
-        wanted: bool [k]; of the others, which cost nothing, a constant is returned.
+        wanted: bool [k]; of the others, which cost next to nothing, a constant is returned.
     """
     wanted = jnp.ones(len(data.y), bool) if wanted is None else wanted
 

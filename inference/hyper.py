@@ -8,8 +8,8 @@ from scipy.stats import norm, qmc
 from .gp import Data, Hyper, log_marginal_likelihood
 from .optimise import minimise_many
 
-# Normal priors of the logs: inputs are prior quantiles and targets have unit variance, so one
-# choice fits every parameter, unit and simulator.
+# Normal priors of the logs: inputs are coordinates of the prior's sd (see `gp.coordinates`) and
+# targets of about unit variance, so one choice fits every parameter, unit and simulator.
 LENGTH = (np.log(0.5), 0.7)  # 95 %: a tenth of the box to twice the box
 AMPLITUDE = (np.log(1.0), 0.7)
 NOISE = (np.log(0.1), 1.0)  # 95 %: 1 % to 70 % of the targets' sd

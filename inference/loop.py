@@ -109,7 +109,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         acquisition=acquisition,
         seed=seed,
         initial=initial,
-        capacity=max(1, budget + told),
+        capacity=max(1, told + -(-budget // batch) * batch),  # whole rounds are asked
         **options,
     )
     if earlier is not None:
@@ -132,12 +132,13 @@ def fit(  # noqa: PLR0913  the one call that most users make
             advance(1)
         if engine.succeeded < MIN_LEARN:
             raise RuntimeError(
-                f"{engine.succeeded} of {engine.told} simulations succeeded, {MIN_LEARN} are "
-                f"needed; the last error: {engine.errors[-1]}. Finished simulations are kept in "
+                f"{engine.succeeded} of {engine.told} simulations succeeded, copies counted once; "
+                f"{MIN_LEARN} are needed; the last error: {(engine.errors or ['none'])[-1]}. "
+                "Finished simulations are kept in "
                 f"{bank.where}; mend the cause, or raise budget, and repeat the call to go on "
                 "from there"
             )
-    return engine.fit({"simulator": seconds})
+    return engine.fit({"simulator": seconds}, stacklevel=3)
 
 
 def _in_rounds(engine: Bolfi, runner: Runner, budget: int, batch: int) -> Iterator[Simulation]:

@@ -24,6 +24,11 @@ class Remainder(NamedTuple):
     factors: np.ndarray  # [m, FACTORS]
     white: float
 
+    @property
+    def total(self) -> float:
+        """Variance of all values together."""
+        return float(np.sum(self.factors**2)) + self.white * len(self.factors)
+
 
 class Layout(NamedTuple):
     """Where the m values lie: in channel `channel`, at `sample`; sorted by both."""

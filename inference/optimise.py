@@ -36,7 +36,8 @@ def minimise_many(
         tolerance: A problem is done when an iteration gains less.
 
     Returns:
-        The best points [k, d] and their values [k]; infinite where nothing was finite.
+        The best points [k, d] and their values [k]; infinite where nothing was finite, and
+        meaningless where not wanted.
     """
     x = np.array(start, np.float64)
     k, d = x.shape

@@ -14,7 +14,7 @@ from .base import Theta
 from .distributions import Univariate, describe
 
 RESERVED = frozenset(
-    {"chain", "draw", "simulation", "seed", "discrepancy", "failed", "round", "signal"}
+    {"chain", "draw", "simulation", "seed", "discrepancy", "failed", "error", "round", "signal"}
 )
 TAIL = 1e-12  # quantile at which an unbounded prior is cut, so that u = 0 and 1 stay finite
 

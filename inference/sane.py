@@ -6,8 +6,8 @@ FARTHEST = 1e6  # median deviations
 
 
 def sane(discrepancy: np.ndarray) -> np.ndarray:
-    """Which of the discrepancies [n] are not absurdly larger than the others, bool [n]."""
-    centre = np.median(discrepancy)
+    """Which of the discrepancies [n] are not absurdly larger than the others, bool [n]; NaN is."""
+    centre = np.nanmedian(discrepancy)
     deviation = np.abs(discrepancy - centre)
-    spread = np.median(deviation)
-    return (discrepancy <= centre + FARTHEST * spread) | (spread == 0.0)
+    spread = np.nanmedian(deviation)
+    return ~(discrepancy > centre + FARTHEST * spread) | (spread == 0.0)

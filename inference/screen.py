@@ -119,11 +119,11 @@ def _propose(kernel: _Kernel, uniforms: jax.Array) -> jax.Array:
     choice = uniforms[:, d]
     within = (choice - SHARE_OF_PRIOR) / (1.0 - SHARE_OF_PRIOR)
     centre = kernel.centres[jnp.clip((within * CENTRES).astype(int), 0, CENTRES - 1)]
-    factor = jax.vmap(lambda row: _back_substitute(kernel.whitener, row))(z)
+    factor = jax.vmap(lambda row: _lower_product(kernel.whitener, row))(z)
     return jnp.where(choice[:, None] < SHARE_OF_PRIOR, z, centre + factor)
 
 
-def _back_substitute(whitener: jax.Array, z: jax.Array) -> jax.Array:
+def _lower_product(whitener: jax.Array, z: jax.Array) -> jax.Array:
     """L z for the inverse `whitener` of L, d rows."""
     result = []
     for i in range(len(z)):

@@ -12,7 +12,7 @@ from .base import LogLikelihood, LogSecondMoment
 from .compiled import believe
 from .design import sobol
 from .emulator import Emulator, loo_errors, noise_share, predict, predictive_draws
-from .emulator_checks import complaints
+from .emulator_checks import EQUAL, complaints
 from .gaussian import SignalState, log_likelihood, log_second_moment, node_log_densities
 from .given_noise import GivenNoise
 from .noise import (
@@ -123,7 +123,7 @@ class SignalSurrogate:
     def warnings(self) -> list[str]:
         """What the emulator's own checks complain of."""
         if self.emulator.basis.used == 0:
-            return ["all simulated outputs are equal: the data cannot tell parameters apart"]
+            return [EQUAL]
         return complaints(loo_errors(self.emulator), noise_share(self.emulator), "output")
 
     @in_float64

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..arguments import checked_integer
 from ..bank import SimulationBank
 from ..base import Simulator
-from ..bolfi import MIN_LEARN, Bolfi, checked_integer
+from ..bolfi import MIN_LEARN, Bolfi
 from ..design import sobol
 from ..loop import fit
 from ..prior import Prior

@@ -78,7 +78,7 @@ def test_signal_surrogate_is_calibrated(run, task):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_signal_surrogate_of_a_shared_design_is_calibrated(toys, pool, task):
-    """One emulator for all data sets: only these and the draws are made anew."""
+    """One design for all data sets: no acquisition is involved."""
     simulate, prior = toys.TASKS[task]
     options = {"surrogate": "signal"}
     pipeline = inference.shared_design(simulate, prior, BUDGET, options=options, sampling=SAMPLING)
