@@ -5,6 +5,8 @@ import pytest
 
 from bolfi_liquids import inference
 
+COMPILED = "backend_compile_duration"
+
 
 def told(engine, simulate, rounds, n=2):
     for _ in range(rounds):
@@ -100,6 +102,49 @@ def test_rescaling_a_parameter_changes_nothing(observed, simulate):
         return prior.to_unit(engine.fit().best)
 
     np.testing.assert_allclose(run(1e4), run(1.0), atol=1e-4)  # optimisers stop near 1e-5
+
+
+def test_a_prior_that_fades_out_reaches_the_kernel():
+    """A bowl in the parameter itself, least in the prior's tail: over quantiles it is too steep
+    there for a stationary kernel."""
+    prior = inference.Prior({"a": dist.Normal(0.0, 1.0)})
+    theta = prior.from_unit((np.arange(24)[:, None] + 0.5) / 24)
+    squared = inference.Bolfi(
+        prior, [2.2], discrepancy=lambda a, b: float(np.sum((a - b) ** 2)), transform="identity"
+    )
+    noise = 0.05 * np.random.default_rng(0).normal(size=(24, 1))
+    squared.tell(theta, theta["a"][:, None] + noise)
+    fit = squared.fit()
+    assert abs(fit.best["a"] - 2.2) < 0.1
+    at = prior.to_unit({"a": np.array([2.3, 2.5, 2.7])})  # beyond the last run, 2.04
+    np.testing.assert_allclose(fit.learned.predict(at)[0], [0.01, 0.09, 0.25], atol=0.2)
+
+
+@pytest.mark.parametrize("surrogate", ["signal", "discrepancy"])
+def test_nothing_is_compiled_anew_up_to_the_capacity(prior, observed, simulate, surrogate):
+    """Over refits and another batch in every round."""
+    compiled = []
+    jax.monitoring.register_event_duration_secs_listener(
+        lambda event, *_, **__: compiled.append(event) if event.endswith(COMPILED) else None
+    )
+    for run in range(2):
+        engine = inference.Bolfi(prior, observed, surrogate=surrogate, seed=run, capacity=60)
+        before = len(compiled)
+        for batch in (10, 1, 2, 3, 4, 5, 6, 7, 8, 9):
+            theta = engine.ask(batch)
+            engine.tell(theta, simulate(theta, np.arange(batch) + engine.told))
+        assert run == 0 or len(compiled) == before
+
+
+def test_an_acquisition_is_called_in_float64(prior, observed, simulate):
+    seen = []
+
+    def acquire(key, surrogate, n, feasibility):
+        seen.append(jax.numpy.asarray(0.1).dtype)
+        return np.full((n, 2), 0.5) + 0.1 * np.arange(n)[:, None] / n
+
+    inference.fit(simulate, prior, observed, budget=6, initial=4, batch=2, acquisition=acquire)
+    assert seen == [np.float64]
 
 
 def test_a_discrepancy_may_compare_unlike_shapes(prior):

@@ -7,6 +7,7 @@ import numpy as np
 import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference.describe import describe
+from numpyro.distributions.transforms import AffineTransform
 
 from bolfi_liquids import inference
 
@@ -30,11 +31,41 @@ class Plain:
         (np.linalg.norm, "numpy.linalg.norm"),
         (partial(np.mean, axis=0), "partial(numpy.mean, [], axis=0)"),
         (inference.Quantile(0.1), "bolfi_liquids.inference.likelihood.Quantile(q=0.1)"),
-        (inference.Prior({"a": dist.Uniform(0.0, 2.0)}), "Prior(a=Uniform(low=0.0, high=2.0))"),
+        (inference.Prior({"a": dist.Uniform(0.0, 2.0)}), "Prior(a=Uniform(low=0, high=2))"),
     ],
 )
 def test_says_what_it_is(value, text):
     assert describe(value) == text
+
+
+class Model:
+    def __init__(self, size):
+        self.size = size
+
+    def __repr__(self):
+        return f"Model({self.size})"
+
+    def run(self, theta, seeds):
+        return self.size
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (Model(0.1).run, Model(9.0).run),
+        (inference.squared_difference([0, 1, 2]), inference.squared_difference([0, 5, 6])),
+        (
+            dist.TruncatedNormal(0.0, 1.0, low=-1.0, high=1.0),
+            dist.TruncatedNormal(0.9, 0.05, low=-1.0, high=1.0),
+        ),
+        (
+            dist.TransformedDistribution(dist.Normal(0.0, 1.0), AffineTransform(0.0, 2.0)),
+            dist.TransformedDistribution(dist.Normal(0.0, 1.0), AffineTransform(1.0, 2.0)),
+        ),
+    ],
+)
+def test_what_differs_reads_differently(one, other):
+    assert describe(one) != describe(other)
 
 
 def test_large_arrays_are_told_apart_in_few_words():

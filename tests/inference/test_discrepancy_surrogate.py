@@ -1,3 +1,5 @@
+import warnings
+
 import numpy as np
 import pytest
 from bolfi_liquids.inference.design import sobol
@@ -51,9 +53,29 @@ def test_negative_discrepancies_allow_only_the_identity():
         candidates("log", values)
 
 
-def test_equal_discrepancies_are_learned_as_flat():
-    fitted = learn(sobol(0, 0, 6, 2), np.full(6, 2.0), ROWS, "identity")
-    np.testing.assert_allclose(fitted.predict(sobol(1, 0, 4, 2))[0], 2.0, atol=1e-6)
+@pytest.mark.parametrize("value", [2.0, 0.1, 1e-16])
+def test_equal_discrepancies_are_learned_as_flat(value):
+    """But for rounding, which is not to be learned."""
+    u = np.random.default_rng(0).uniform(size=(12, 2))
+    almost = value * (1.0 + 1e-15 * np.random.default_rng(1).uniform(size=12))
+    found = learn(u, almost, 64)
+    mean, _ = found.predict(np.random.default_rng(2).uniform(size=(50, 2)))
+    assert np.ptp(found.transform.inverse(mean)) < 1e-9 * value
+    assert found.warnings() == ["all simulations are equal: the data cannot tell parameters apart"]
+    other = learn(u, np.arange(12.0), 64, previous=found)  # and then they are not
+    assert np.ptp(other.predict(u)[0]) > 0.1
+
+
+def test_a_discrepancy_outside_the_transform_changes_it():
+    rng = np.random.default_rng(3)
+    u = rng.uniform(size=(16, 1))
+    values = np.exp(6.0 * u[:, 0] + 0.1 * rng.normal(size=16))
+    found = learn(u, values, 64)
+    assert found.transform.name == "log"
+    values[3] = -1.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert learn(u, values, 64, previous=found).transform.name == "identity"
 
 
 def test_minimum_and_threshold_agree_with_a_grid():

@@ -87,3 +87,10 @@ def test_a_long_series_needs_no_matrix():
 def test_other_noise_is_refused(prior, gappy, noise, message):
     with pytest.raises(ValueError, match=message):
         inference.Bolfi(prior, gappy, noise=noise)
+
+
+def test_noise_that_reads_two_ways_is_refused(prior):
+    observed = np.array([[1.0, np.nan], [np.nan, 2.0]])
+    with pytest.raises(ValueError, match="may be sds or a covariance"):
+        SignalFamily(noise=np.full((2, 2), 0.1)).learner(observed)
+    np.testing.assert_allclose(SignalFamily(noise=[0.1, 0.1]).learner(observed).noise.white, 0.01)

@@ -231,3 +231,15 @@ def test_hyperparameters_are_a_stationary_point_that_tells_inputs_apart():
     np.testing.assert_allclose(
         total(hyperparameters.pack(warm)), total(hyperparameters.pack(found)), atol=1e-2
     )
+
+
+def test_processes_that_are_not_wanted_stay_out():
+    rng = np.random.default_rng(6)
+    u, y = rng.uniform(size=(20, 2)), rng.normal(size=(2, 20))
+    both, first = gaussian.pad(u, y, 32), gaussian.pad(u, y[:1], 32)
+    silent = gaussian.pad(u, np.stack([y[0], np.zeros(20)]), 32)
+    alone = hyperparameters.pack(hyperparameters.maximum_a_posteriori(first))
+    for data in (both, silent):
+        found = hyperparameters.pack(hyperparameters.maximum_a_posteriori(data))
+        np.testing.assert_array_equal(found[0], alone[0])
+    np.testing.assert_array_equal(found[1], hyperparameters.prior_moments(2)[0])

@@ -284,6 +284,35 @@ def test_too_few_successes_are_an_error_that_loses_nothing(
         inference.fit(fragile, prior, observed, budget=7, batch=1)
 
 
+def test_copies_among_earlier_simulations_are_too_few(prior, observed):
+    earlier = {"slope": [0.5] * 3, "offset": [0.5] * 3}, np.zeros((3, 30)), [0, 0, 0]
+    with pytest.raises(RuntimeError, match=r"1 of 3 .*copies counted once.*last error: none"):
+        inference.fit(None, prior, observed, budget=0, initial=3, earlier=earlier)
+
+
+def test_arrays_of_another_size_ask_the_same(tmp_path, prior, observed, simulate):
+    """64 and 128 rows; the larger run finds all simulations of the smaller in the bank."""
+    calls = []
+
+    def counted(theta, seeds):
+        calls.extend(seeds)
+        return simulate(theta, seeds)
+
+    bank = tmp_path / "b.sqlite"
+    for budget in (30, 66):
+        inference.fit(counted, prior, observed, budget=budget, batch=6, bank=bank)
+    assert len(calls) == 66
+
+
+def test_a_warning_points_at_who_called_fit(prior, observed):
+    def constant(theta, seeds):
+        return np.ones((len(seeds), 30))
+
+    with pytest.warns(inference.EmulatorWarning, match="all simulations are equal") as caught:
+        inference.fit(constant, prior, observed, budget=12)
+    assert {Path(warning.filename) for warning in caught} == {Path(__file__)}
+
+
 @pytest.mark.parametrize("shape", [(2, 29), (3, 30), (30,), ()])
 def test_signals_of_wrong_shape_are_refused_and_not_stored(prior, observed, simulate, shape):
     message = re.escape(f"shape (2, 30), one row per theta, got {shape}")
@@ -322,10 +351,10 @@ def test_a_fit_says_what_it_is_in_a_few_lines(line_fit, prior, observed, simulat
     signals = np.ones((8, 30))
     signals[:2] = np.nan
     engine.tell(theta, signals, errors=["OSError: no licence", *[""] * 7])
-    with pytest.warns(inference.EmulatorWarning, match="all simulated outputs are equal"):
+    with pytest.warns(inference.EmulatorWarning, match="all simulations are equal"):
         lines = str(engine.fit()).splitlines()
     assert lines[2] == "  simulations: 8, failed: 1 raised, 1 not finite"
-    assert lines[4].startswith("  warnings: all simulated outputs are equal")
+    assert lines[4].startswith("  warnings: all simulations are equal")
 
 
 @pytest.mark.parametrize(

@@ -171,3 +171,10 @@ def test_which_priors_are_seen_as_normal_scores():
 def test_bad_quantiles_are_refused(mixed, u):
     with pytest.raises(ValueError, match=r"u must (have shape \[\.\.\., 3\]|be an array)"):
         mixed.from_unit(u)
+
+
+def test_names_of_the_results_columns_are_reserved(prior, observed, simulate):
+    fit = inference.fit(simulate, prior, observed, budget=8)
+    for name in set(fit.simulations) - set(prior.names):
+        with pytest.raises(ValueError, match="reserved"):
+            inference.Prior({name: dist.Normal(0.0, 1.0)})

@@ -275,3 +275,18 @@ def test_components_are_found_anew_where_what_they_came_from_changed():
     fresh = emulate(u[left], signals[left], unit, 3, ROWS)
     np.testing.assert_array_equal(again.basis.vectors, fresh.basis.vectors)
     np.testing.assert_array_equal(again.basis.scale, fresh.basis.scale)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e3])
+def test_given_correlated_noise_weighs_the_data(scale):
+    """A simulator without noise, linear: the posterior is generalised least squares'."""
+    design = scale * DESIGN[:, :2]
+    lag = np.abs(np.subtract.outer(np.arange(40), np.arange(40)))
+    covariance = scale**2 * (0.3**2 * 0.8**lag + 0.05**2 * np.eye(40))
+    u = sobol(0, 0, 24, 2)
+    observed = design @ [0.45, 0.6]
+    found = learned(u, u @ design.T, observed, noise=covariance)
+    precision = design.T @ np.linalg.solve(covariance, design)
+    error = GRID - [0.45, 0.6]
+    exact = np.exp(-0.5 * np.einsum("ni,ij,nj->n", error, precision, error))
+    assert 0.5 * np.abs(posterior(found) - exact / exact.sum()).sum() < 0.02
