@@ -25,7 +25,7 @@ from .optimise import minimise_in_box
 from .sane import sane
 from .transform import Transform, candidates
 
-RETHINK = 3.0  # the transform is chosen anew when data have grown by this factor
+RETHINK = 2.0  # the transform is chosen anew when data have grown by this factor
 
 
 class Scale(NamedTuple):
@@ -94,8 +94,11 @@ class DiscrepancySurrogate:
 
     @in_float64
     def minimum(self) -> np.ndarray:
-        """Minimiser of the mean over the box, u [d]."""
-        return minimise_in_box(_mean, self.gp, self.gp.data.u.shape[1])
+        """Where the mean is surely low: minimiser of mean + sd over the box, u [d].
+
+        The mean alone may be least in a corner where nothing was simulated.
+        """
+        return minimise_in_box(_surely, self.gp, self.gp.data.u.shape[1])
 
     @in_float64
     def believe(self, u: np.ndarray) -> "DiscrepancySurrogate":
@@ -129,8 +132,9 @@ class DiscrepancySurrogate:
         return {"discrepancy": self.transform.inverse(drawn)}
 
 
-def _mean(gp: GP, u: jax.Array) -> jax.Array:
-    return jnp.mean(predict_many(gp, u[None])[0])
+def _surely(gp: GP, u: jax.Array) -> jax.Array:
+    mean, variance = predict_many(gp, u[None])
+    return jnp.mean(mean + jnp.sqrt(variance))
 
 
 @in_float64
@@ -176,8 +180,7 @@ def learn(  # noqa: PLR0913  what is known, and how to learn from it
         learned = DiscrepancySurrogate(
             gp, previous.scale, values, np.nan, learned_at, previous.chosen_at
         )
-        # to choose where to simulate next, the best point so far will do for a minimum
-        return _with_threshold(learned, rule, among_data=True)
+        return _with_threshold(learned, rule)
     options = [_standardise(option, values) for option in candidates(transform, values)]
     fitted = [_fit(pad(u, scale(values)[None], rows, normal)) for scale in options]
     scores = [_score(gp, scale, values) for gp, scale in zip(fitted, options, strict=True)]
@@ -190,15 +193,10 @@ def _fit(data: Data) -> GP:
     return condition(maximum_a_posteriori(data), data)
 
 
-def _with_threshold(
-    learned: DiscrepancySurrogate, rule: Threshold, among_data: bool = False
-) -> DiscrepancySurrogate:
-    """With the rule's threshold; the minimum is sought over the box, or among the data."""
-
+def _with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> DiscrepancySurrogate:
     def at_minimum() -> tuple[float, float]:
-        data = learned.gp.data
-        mean, sd = learned.predict(np.asarray(data.u) if among_data else learned.minimum()[None])
-        best = np.argmin(mean[: int(data.used)])
+        mean, sd = learned.predict(np.asarray(learned.gp.data.u)[: len(learned.discrepancy)])
+        best = np.argmin(mean)
         return float(mean[best]), float(sd[best])
 
     threshold = choose_threshold(rule, learned.discrepancy, learned.transform, at_minimum)

@@ -28,7 +28,8 @@ class Quantile(NamedTuple):
 
 
 class Predicted(NamedTuple):
-    """Threshold at the q quantile of a new discrepancy at the surrogate's minimum, 0 < q < 1."""
+    """Threshold at the q quantile of a new discrepancy where the surrogate expects least of it
+    among the simulated points, 0 < q < 1."""
 
     q: float
 
@@ -144,14 +145,15 @@ def choose_threshold(
 
     Args:
         rule: None is DEFAULT; Predicted(q), the q quantile of a new discrepancy at the
-            minimum of the surrogate's mean; "min_mean", that minimum itself, the same as
-            Predicted(0.5) (Gutmann and Corander 2016); "min_observed", the smallest
+            simulated point where the surrogate's mean is least; "min_mean", that mean, the same
+            as Predicted(0.5) (Gutmann and Corander 2016); "min_observed", the smallest
             discrepancy so far; a Quantile of the discrepancies so far; or a number on the
             discrepancy's own scale.
         discrepancy: Finite values [n].
         transform: That of the surrogate.
-        at_minimum: Mean and sd of a new discrepancy at the minimum of the mean, on the
-            transformed scale; called where the rule needs them.
+        at_minimum: Mean and sd of a new discrepancy at that simulated point where the mean is
+            least, on the transformed scale; called where the rule needs them. Elsewhere the mean
+            may extrapolate below anything that a discrepancy can be.
 
     Raises:
         ValueError: the transform is undefined at the given number.

@@ -77,7 +77,8 @@ def shrunk_covariance(residuals: np.ndarray, lost: int) -> Remainder:
     mean = values.sum() / freedom / m
     spread = np.sum((values / freedom) ** 2) / m - mean**2
     lengths = np.sum(residuals**2, 1)
-    error = (np.sum(lengths**2) / n - np.sum((values / n) ** 2)) / n / m
+    # what the components took makes residuals smaller, and as good as fewer
+    error = (np.sum(lengths**2) / n - np.sum((values / n) ** 2)) / n / m * (n / freedom) ** 3
     intensity = float(np.clip(error / spread, 0.0, 1.0)) if spread > 0 else 1.0
     top = np.argsort(values)[::-1][:FACTORS]
     factors[:, : len(top)] = residuals.T @ left[:, top] * np.sqrt((1.0 - intensity) / freedom)

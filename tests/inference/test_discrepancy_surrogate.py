@@ -84,9 +84,20 @@ def test_minimum_and_threshold_agree_with_a_grid():
     fitted = learn(u, values, ROWS, "identity", "min_mean")
     axis = np.linspace(0.0, 1.0, 101)
     grid = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2)
-    mean = fitted.predict(grid)[0]
-    np.testing.assert_allclose(fitted.minimum(), grid[mean.argmin()], atol=0.011)
-    assert mean.min() - 1e-3 < fitted.threshold <= mean.min()
+    mean, sd = fitted.predict(grid)
+    noise = fitted.scale.spread * np.exp(float(fitted.gp.hyper.log_noise[0]))
+    sure = mean + np.sqrt(sd**2 - noise**2)
+    np.testing.assert_allclose(fitted.minimum(), grid[sure.argmin()], atol=0.011)
+    assert fitted.threshold == pytest.approx(fitted.predict(u)[0].min())
+    assert mean.min() < fitted.threshold < mean.min() + sd.min()
+
+
+def test_the_threshold_is_not_taken_where_nothing_was_simulated():
+    """The trend falls off the edge of the data, below anything that a discrepancy can be."""
+    u = sobol(0, 0, 40, 2)
+    u = u[u.sum(1) < 1.1]
+    fitted = learn(u, 5.0 - 4.0 * u.sum(1), ROWS, "identity")
+    assert fitted.predict(np.ones((1, 2)))[0] < 0.0 < fitted.threshold
 
 
 def test_believing_keeps_the_mean_and_shrinks_the_variance():
