@@ -25,11 +25,24 @@ def checked_array(name: str, value: object) -> np.ndarray:
         ValueError: not numbers, or not of one shape.
     """
     try:
-        if isinstance(value, np.ma.MaskedArray):  # what is masked is missing
-            return np.ma.filled(value.astype(np.float64), np.nan)
-        return np.asarray(value, np.float64)
+        array = np.ma.asarray(value)
+        if array.dtype.kind == "c":
+            raise TypeError("complex")
+        return np.ma.filled(array.astype(np.float64), np.nan)  # what is masked is missing
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name} must be an array of numbers, got {value!r:.100}") from error
+
+
+def check_text(name: str, value: object) -> None:
+    """Raise ValueError unless `value` is text."""
+    if not isinstance(value, str):
+        raise ValueError(f"{name} must be text, got {value!r:.100}")
+
+
+def check_function(name: str, value: object) -> None:
+    """Raise ValueError unless `value` is a function."""
+    if not callable(value):
+        raise ValueError(f"{name} must be a function, got {value!r:.100}")
 
 
 def check_callable(name: str, value: object) -> None:

@@ -67,9 +67,14 @@ class Bolfi:
         **options: Any,
     ):
         if not isinstance(prior, Prior):
-            raise ValueError(f"prior must be a Prior, got {type(prior).__name__}")
+            raise ValueError(
+                f"prior must be a Prior, got {type(prior).__name__}; "
+                "make one of name -> distribution by inference.Prior({...})"
+            )
         self.prior = prior
         self.observed = checked_array("observed", observed)
+        if np.isinf(self.observed).any():
+            raise ValueError("observed must not be infinite; NaN is a missing sample")
         self.seed = checked_integer("seed", seed, 0)
         self.initial = checked_integer(
             "initial", start_size(len(prior)) if initial is None else initial, MIN_LEARN
@@ -278,8 +283,10 @@ def _resolve(given: str | Acquisition | None, family: Family) -> Acquisition:
                 f"got {acquisition!r}"
             )
         acquisition = acquisitions.RULES[acquisition]()
-    if not callable(acquisition):
-        raise ValueError(f"acquisition must be callable, got {type(acquisition).__name__}")
+    if not callable(acquisition) or isinstance(acquisition, type):
+        raise ValueError(
+            f"acquisition must be a name or an object to be called, got {acquisition!r:.100}"
+        )
     bound = isinstance(acquisition, acquisitions.LowerConfidenceBound)
     if bound and family.name != "discrepancy":
         raise ValueError(
@@ -292,7 +299,10 @@ def _resolve(given: str | Acquisition | None, family: Family) -> Acquisition:
 def _seeds(seeds: ArrayLike | None, n: int) -> np.ndarray:
     if seeds is None:
         return np.full(n, UNKNOWN)
-    array = np.asarray(seeds, np.int64)
+    try:
+        array = np.asarray(seeds, np.int64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"seeds must be integers, got {seeds!r:.100}") from error
     if array.shape != (n,):
         raise ValueError(f"seeds must have shape ({n},), one per theta, got {array.shape}")
     return array

@@ -6,8 +6,12 @@ from scipy.stats import binom, chi2, norm
 FALSE_ALARMS = 1e-3  # of each check, where the emulator is right
 FAR = 3.0  # studentised errors beyond are rare
 TOO_SURE = 1.5  # mean square of the studentised errors that matters
+OUTSIDE = (
+    "what was observed lies far outside of what was simulated: compare units, scales and offsets, "
+    "or widen the prior; the posterior says little"
+)
 EQUAL = "all simulations are equal: the data cannot tell parameters apart"
-NOISY = 0.1  # share of run-to-run noise in the variance that deserves a word
+NOISY = (0.9, 0.5, 0.1)  # shares of run-to-run noise in the variance that deserve a word
 
 
 class EmulatorWarning(UserWarning):
@@ -38,11 +42,12 @@ def complaints(loo_z: np.ndarray, noise_share: float, what: str) -> list[str]:
             f"leave-one-out errors of the {what} are {np.sqrt(mean_square):.1f} times what the "
             "emulator believes; simulate more"
         )
-    if noise_share > NOISY:
+    reached = [share for share in NOISY if noise_share > share]
+    if reached:
         said.append(
-            f"run-to-run noise makes up more than {NOISY:.0%} of the {what}'s variance between "
-            "simulations, and the likelihood takes it as Gaussian and equal for all parameters; "
-            "where it is not, as with noise that accumulates, the posterior is off: compare the "
-            "other surrogate, or choose a summary that averages the noise out"
+            f"run-to-run noise makes up more than {reached[0]:.0%} of the {what}'s variance "
+            "between simulations, and the likelihood takes it as Gaussian and equal for all "
+            "parameters; where it is not, as with noise that accumulates, the posterior is off: "
+            "compare the other surrogate, or choose a summary that averages the noise out"
         )
     return said

@@ -127,7 +127,7 @@ def check_rule(rule: Threshold) -> None:
     elif isinstance(rule, str):
         valid = rule in RULES
     else:
-        valid = rule is None or np.isfinite(rule)
+        valid = rule is None or (isinstance(rule, float | int | np.number) and np.isfinite(rule))
     if not valid:
         raise ValueError(
             f"threshold must be one of {RULES}, Predicted(q) with 0 < q < 1, Quantile(q) with "

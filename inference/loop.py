@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import checked_array, checked_integer
+from .arguments import check_function, check_text, checked_array, checked_integer
 from .bank import Simulation, SimulationBank
 from .base import Acquisition, Simulator, Theta
 from .bolfi import MIN_LEARN, Bolfi
@@ -99,6 +99,9 @@ def fit(  # noqa: PLR0913  the one call that most users make
     batch = checked_integer("batch", batch)
     budget = checked_integer("budget", budget, MIN_LEARN if earlier is None else 0)
     _check_timeout(timeout)
+    check_text("identity", identity)
+    if budget:
+        check_function("simulate", simulate)
     told = _length(earlier)
     if initial is None and isinstance(prior, Prior):  # `Bolfi` refuses what is none
         initial = max(MIN_LEARN, min(start_size(len(prior)), budget + told))
@@ -211,5 +214,6 @@ def _length(earlier: Any) -> int:
 
 
 def _check_timeout(timeout: float | None) -> None:
-    if timeout is not None and not 0 < timeout < math.inf:
+    number = isinstance(timeout, int | float) and not isinstance(timeout, bool)
+    if timeout is not None and not (number and 0 < timeout < math.inf):
         raise ValueError(f"timeout must be positive and finite [s], or None, got {timeout!r}")

@@ -80,8 +80,11 @@ class Fit:
 
     @cached_property
     def warnings(self) -> list[str]:
-        """What the surrogate's own checks complain of."""
-        return self.learned.warnings()
+        """What the surrogate's own checks complain of, and that most simulations failed."""
+        failed = int((~self.history.succeeded).sum())
+        told = len(self.history.succeeded)
+        few = [f"{failed} of {told} simulations failed: the fit rests on {told - failed}"]
+        return self.learned.warnings() + (few if failed > told / 2 else [])
 
     @property
     def surrogate(self) -> SurrogateView:

@@ -63,7 +63,7 @@ class Prior:
         return len(self.distributions)
 
     def __repr__(self) -> str:
-        inside = ", ".join(f"{n!r}: {type(d).__name__}" for n, d in self.distributions.items())
+        inside = ", ".join(f"{n!r}: {describe(d)}" for n, d in self.distributions.items())
         return f"Prior({{{inside}}})"
 
     def describe(self) -> dict[str, dict[str, str]]:

@@ -12,7 +12,7 @@ from .base import LogLikelihood, LogSecondMoment
 from .compiled import believe
 from .design import sobol
 from .emulator import Emulator, loo_errors, noise_share, predict, predictive_draws
-from .emulator_checks import EQUAL, complaints
+from .emulator_checks import EQUAL, OUTSIDE, complaints
 from .gaussian import SignalState, log_likelihood, log_second_moment, node_log_densities
 from .given_noise import GivenNoise
 from .noise import (
@@ -124,7 +124,19 @@ class SignalSurrogate:
         """What the emulator's own checks complain of."""
         if self.emulator.basis.used == 0:
             return [EQUAL]
-        return complaints(loo_errors(self.emulator), noise_share(self.emulator), "output")
+        said = complaints(loo_errors(self.emulator), noise_share(self.emulator), "output")
+        return [OUTSIDE, *said] if self._outside() else said
+
+    def _outside(self) -> bool:
+        """Whether the observed scores are twice as far out as any simulated ones, or what no
+        component can make of the output exceeds what simulations differ by."""
+        basis, n = self.emulator.basis, len(self.emulator.outputs)
+        used = slice(basis.used)
+        reach = np.abs(np.asarray(self.gp.data.y)[used, :n]).max(1)
+        error = np.sqrt(np.diagonal(self.reduced.covariance, axis1=1, axis2=2))[:, used]
+        far = np.abs(self.reduced.estimate[:, used]) > 2.0 * reach + 3.0 * error
+        size = residual_size(basis.standardise(self.observed), basis.vectors[:, used])
+        return bool(far.any(1).all()) or (self.output.series and size > 1.0)
 
     @in_float64
     def predictive(self, key: jax.Array, u: np.ndarray) -> dict[str, np.ndarray]:

@@ -3,17 +3,19 @@
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from ..arguments import checked_integer
+from ..arguments import check_function, checked_integer
 from ..bank import SimulationBank
 from ..base import Simulator
 from ..bolfi import MIN_LEARN, Bolfi
 from ..design import sobol
+from ..families import resolve
 from ..loop import fit
 from ..prior import Prior
 from ..runner import run_missing
@@ -40,6 +42,14 @@ class FitPipeline:
     options: Options = field(default_factory=dict)
     sampling: Options = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        """Raise ValueError where every replicate would."""
+        check_function("simulate", self.simulate)
+        checked_integer("budget", self.budget, MIN_LEARN)
+        loop = signature(fit).parameters
+        of_family = {name: value for name, value in self.options.items() if name not in loop}
+        resolve(self.options.get("surrogate"), of_family)
+
     def __call__(self, observed: np.ndarray, seed: int) -> tuple[xr.DataTree, LogDensity]:
         made = fit(
             self.simulate, self.prior, observed, budget=self.budget, seed=seed, **self.options
@@ -47,7 +57,7 @@ class FitPipeline:
         return made.sample(seed=seed, **self.sampling), made.log_prob
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SharedDesign:
     """One set of simulations that serves every set of data; see `shared_design`.
 
@@ -68,6 +78,10 @@ class SharedDesign:
     seeds: np.ndarray
     options: Options = field(default_factory=dict)
     sampling: Options = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        n, *shape = self.signals.shape
+        return f"SharedDesign({self.prior}, {n} simulations of shape {tuple(shape)})"
 
     def __call__(self, observed: np.ndarray, seed: int) -> tuple[xr.DataTree, LogDensity]:
         engine = Bolfi(self.prior, observed, seed=seed, **self.options)

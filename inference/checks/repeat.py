@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import checked_integer
+from ..arguments import check_callable, check_function, checked_integer
 from ..base import Simulator
 from ..describe import describe
 from ..prior import Prior
@@ -65,8 +65,13 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
         ValueError: bad argument; a store made with other settings; a simulator or pipeline
             that returns something of the wrong form.
     """
+    check_function("pipeline", pipeline)
     simulator = _own(pipeline, "simulate", simulate)
     prior = _own(pipeline, "prior", prior)
+    check_function("simulate", simulator)
+    check_callable("observe", observe)
+    if executor is not None and not hasattr(executor, "submit"):
+        raise ValueError(f"executor must be an Executor or None, got {executor!r:.100}")
     if not isinstance(prior, Prior):
         raise ValueError(f"prior must be a Prior, got {type(prior).__name__}")
     n, seed = checked_integer("n", n), checked_integer("seed", seed, 0)

@@ -21,7 +21,7 @@ Values = dict[str, tuple[np.ndarray, np.ndarray]]
 """Quantity -> (its value at the truths [R], at the draws [R, L] with NaN after the last)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Replicates:
     """What a pipeline concluded from data whose truth is known; R finished replicates.
 
@@ -41,6 +41,12 @@ class Replicates:
 
     def __len__(self) -> int:
         return len(self.finished)
+
+    def __repr__(self) -> str:
+        return (
+            f"Replicates({self.prior}, finished: {len(self)}, failed: {len(self.failed)}, "
+            f"draws of each: {self.most})"
+        )
 
     @property
     def index(self) -> np.ndarray:

@@ -164,7 +164,9 @@ def test_a_discrepancy_may_compare_unlike_shapes(prior):
     [
         ({"surrogate": "forest"}, "surrogate must be one of"),
         ({"acquisition": "guess"}, "acquisition must be one of"),
-        ({"acquisition": 3}, "must be callable"),
+        ({"acquisition": 3}, "must be a name or an object to be called, got 3"),
+        ({"acquisition": inference.MaxVariance}, "an object to be called, got <class"),
+        ({"threshold": lambda values: 0.1}, "threshold must be one of"),
         ({"acquisition": "lcb"}, "'lcb' needs surrogate='discrepancy'"),
         ({"transform": "cube"}, "transform must be one of"),
         ({"surrogate": "signal", "transform": "log"}, "has the options"),
@@ -185,6 +187,24 @@ def test_a_discrepancy_may_compare_unlike_shapes(prior):
 def test_bad_options_are_refused(prior, observed, options, message):
     with pytest.raises(ValueError, match=message):
         inference.Bolfi(prior, observed, **options)
+
+
+@pytest.mark.parametrize(
+    ("observed", "message"),
+    [
+        (np.full(30, np.inf), "must not be infinite"),
+        (np.ones(30) + 1j, "observed must be an array of numbers"),
+    ],
+)
+def test_bad_data_are_refused(prior, observed, message):
+    with pytest.raises(ValueError, match=message):
+        inference.Bolfi(prior, observed)
+
+
+def test_a_mask_is_a_missing_sample(prior, observed):
+    masked = np.ma.masked_array(np.where(np.arange(30) == 4, 1e36, observed), np.arange(30) == 4)
+    engine = inference.Bolfi(prior, masked)
+    np.testing.assert_array_equal(np.isnan(engine.observed), np.arange(30) == 4)
 
 
 def test_bad_calls_are_refused(prior, observed):

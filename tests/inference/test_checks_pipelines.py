@@ -81,3 +81,26 @@ def test_pipelines_travel_to_spawned_processes(monkeypatch):
             np.testing.assert_array_equal(
                 spread.draws, inference.replicates(pipeline, n=4, draws=7).draws
             )
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"budget": -2}, "budget must be an integer from 3"),
+        ({"simulate": 3}, "simulate must be a function, got 3"),
+        ({"options": {"nosie": 1}}, "surrogate 'signal' has the options"),
+    ],
+)
+def test_a_pipeline_that_can_only_fail_is_refused(simulate, prior, change, message):
+    given = {"simulate": simulate, "prior": prior, **change}
+    with pytest.raises(ValueError, match=message):
+        inference.FitPipeline(**given)
+
+
+def test_what_cannot_be_run_is_refused(simulate, prior):
+    pipeline = inference.FitPipeline(simulate, prior)
+    for wrong in ({"executor": 3}, {"observe": 3}, {"simulate": 3}):
+        with pytest.raises(ValueError, match=f"{next(iter(wrong))} must be"):
+            inference.replicates(pipeline, n=2, **wrong)
+    with pytest.raises(ValueError, match="pipeline must be a function, got 3"):
+        inference.sbc(3)

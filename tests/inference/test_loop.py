@@ -272,8 +272,9 @@ def test_too_few_successes_are_an_error_that_loses_nothing(
 
     path = tmp_path / "b.sqlite"
     message = (
-        f"{successes} of 7 simulations succeeded, 3 are needed; the last error: OSError: "
-        f"no licence. Finished simulations are kept in {re.escape(str(path))}; mend the cause"
+        f"{successes} of 7 simulations succeeded, copies counted once; 3 are needed; the "
+        "last error: OSError: no licence. Finished simulations are kept in "
+        f"{re.escape(str(path))}; mend the cause"
     )
     with pytest.raises(RuntimeError, match=message):
         inference.fit(fragile, prior, observed, budget=7, batch=1, bank=path)
@@ -322,6 +323,29 @@ def test_signals_of_wrong_shape_are_refused_and_not_stored(prior, observed, simu
         assert len(bank) == 0
         # and nothing is claimed any more, for which this call would wait
         assert inference.fit(simulate, prior, observed, budget=7, bank=bank).failures == {}
+
+
+@pytest.mark.parametrize("shift", [1e4, -50.0])
+def test_data_far_from_every_simulation_are_told(prior, observed, simulate, shift):
+    with pytest.warns(inference.EmulatorWarning, match="far outside of what was simulated"):
+        inference.fit(simulate, prior, observed + shift, budget=12)
+    fit = inference.fit(simulate, prior, observed, budget=12)
+    assert not any("outside" in said for said in fit.warnings)
+
+
+def test_a_fit_on_a_few_of_many_says_so(prior, observed, simulate):
+    def fragile(theta, seeds):
+        return np.where(theta["slope"][:, None] > 0.3, np.nan, simulate(theta, seeds))
+
+    engine = inference.Bolfi(prior, observed)
+    theta = {"slope": np.linspace(-1.0, 1.0, 12)[::-1], "offset": np.arange(12) * 5 % 12 / 12}
+    theta = {name: values[:10] for name, values in theta.items()}
+    engine.tell(theta, fragile(theta, np.arange(10)))
+    assert engine.fit().warnings == []
+    fewer = {name: np.concatenate([values[:4]] * 2) for name, values in theta.items()}
+    engine.tell(fewer, fragile(fewer, np.arange(8)))
+    with pytest.warns(inference.EmulatorWarning, match="12 of 18 simulations failed"):
+        engine.fit()
 
 
 @pytest.mark.parametrize(
