@@ -37,7 +37,7 @@ class Predicted(NamedTuple):
 Threshold = str | float | Quantile | Predicted | None
 TAIL = -30.0
 RULES = ("min_mean", "min_observed")
-DEFAULT = Predicted(0.25)
+DEFAULT = Predicted(0.2)
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(12)
 LEGENDRE = np.polynomial.legendre.leggauss(12)
 NEAR = -4.0
