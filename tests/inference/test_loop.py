@@ -62,6 +62,7 @@ def signal_fit(simulate, prior, observed):
     return engine.fit()
 
 
+@pytest.mark.slow
 def test_killed_and_repeated_equals_undisturbed(tmp_path):
     """SIGKILL in the sixth simulation or later; only what was running is simulated again."""
     undisturbed = start(tmp_path, "whole", "0")

@@ -234,7 +234,7 @@ def test_copies_are_no_replicates():
     np.testing.assert_array_equal(next_replicate(history, np.zeros((0, 2))), best)
 
 
-@pytest.mark.parametrize(("size", "share"), [(2.0, 0.09), (1.0, 0.29), (0.7, 0.46)])
+@pytest.mark.parametrize(("size", "share"), [(2.0, 0.09), (0.7, 0.46)])
 def test_components_that_lean_towards_their_own_noise_do_not_steepen_the_emulator(size, share):
     """The mean score predicted at one parameter against that of many new runs there, over 60
     designs of 20 noisy runs of 200 values; unheeded, the emulator is up to twice too steep."""
