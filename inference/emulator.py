@@ -13,7 +13,7 @@ from .compiled import predict as predict_scores
 from .components import Basis, principal_components
 from .gp import GP, Hyper, pad
 from .hyper import maximum_a_posteriori
-from .noise import Remainder
+from .noise import Remainder, shrunk_covariance
 from .own_noise import left_over, own_noise
 
 SHARE = 0.9995  # of the variance, to be explained by components
@@ -66,15 +66,17 @@ def emulate(  # noqa: PLR0913  what is known, and how to learn from it
     if previous is not None and _goes_on(previous, outputs):
         basis, learned_at, excess = previous.basis, previous.learned_at, previous.excess
         gp = extend(previous.gp, pad(u, _targets(basis, outputs, learned_at, excess), rows, normal))
+        remainder = shrunk_covariance(basis.residuals(outputs), basis.used + 1)
     else:
         basis, learned_at = principal_components(outputs, scale(outputs), components, SHARE), n
+        remainder = shrunk_covariance(basis.residuals(outputs), basis.used + 1)
         data = pad(u, basis.scores(outputs).T, rows, normal)
         hyper = maximum_a_posteriori(data, None if previous is None else previous.gp.hyper)
-        excess = own_noise(basis, np.exp(2.0 * np.asarray(hyper.log_noise)), outputs)
+        excess = own_noise(basis, np.exp(2.0 * np.asarray(hyper.log_noise)), remainder, n)
         smaller = jnp.log1p(-jnp.asarray(excess))
         hyper = Hyper(hyper.log_length, hyper.log_amplitude + smaller, hyper.log_noise + smaller)
         gp = condition(hyper, pad(u, _targets(basis, outputs, n, excess), rows, normal))
-    remainder = left_over(basis, np.exp(2.0 * np.asarray(gp.hyper.log_noise)), outputs, excess)
+    remainder = left_over(basis, np.exp(2.0 * np.asarray(gp.hyper.log_noise)), remainder, excess)
     noise = run_to_run(gp, basis, remainder.white, n)
     return Emulator(gp, basis, remainder, noise, outputs, learned_at, excess)
 

@@ -3,13 +3,13 @@
 import numpy as np
 
 from .components import Basis
-from .noise import Remainder, shrunk_covariance
+from .noise import Remainder
 
 MOST = 0.9  # of a score that may count as its own run's noise
 
 
-def own_noise(basis: Basis, noise: np.ndarray, outputs: np.ndarray) -> np.ndarray:
-    """Share [k] of the runs' own noise in what components made from them show of them.
+def own_noise(basis: Basis, noise: np.ndarray, remainder: Remainder, n: int) -> np.ndarray:
+    """Share [k] of their own noise in what components made from n runs show of these.
 
     A component leans towards the noise of the runs that made it, and so do their scores, which
     a new run's do not: to first order by the noise's variance across it over n times its own
@@ -19,27 +19,22 @@ def own_noise(basis: Basis, noise: np.ndarray, outputs: np.ndarray) -> np.ndarra
 
     Args:
         noise: Run-to-run variances of the scores [k].
-        outputs: From which the components came [n, m].
+        remainder: What the components leave.
     """
-    n, squared = len(outputs), np.sum(basis.vectors**2, 0)
-    total = np.sum(noise * squared) + _remainder(basis, outputs).total
+    squared = np.sum(basis.vectors**2, 0)
+    total = np.sum(noise * squared) + remainder.total
     across = np.maximum(total - noise * squared, 0.0)
     share = np.where(squared > 0.0, across / (n * np.where(squared > 0.0, squared, 1.0)), 0.0)
     return np.minimum(share, MOST)
 
 
 def left_over(
-    basis: Basis, noise: np.ndarray, outputs: np.ndarray, excess: np.ndarray
+    basis: Basis, noise: np.ndarray, remainder: Remainder, excess: np.ndarray
 ) -> Remainder:
-    """Covariance of what the components leave, and of the noise that only seemed to be theirs.
+    """`remainder`, and the noise that only seemed to be the components'.
 
     Args:
         noise: Run-to-run variances of the scores, without the excess [k].
     """
-    remainder = _remainder(basis, outputs)
     taken = np.sum(noise * ((1.0 - excess) ** -2 - 1.0) * np.sum(basis.vectors**2, 0))
     return remainder._replace(white=remainder.white + float(taken) / len(basis.vectors))
-
-
-def _remainder(basis: Basis, outputs: np.ndarray) -> Remainder:
-    return shrunk_covariance(basis.residuals(outputs), basis.used + 1)
