@@ -75,7 +75,7 @@ def maximum_a_posteriori(data: Data, previous: Hyper | None = None) -> Hyper:
         previous: The optimum for less data; optimisation then starts from there alone.
     """
     k, d = data.y.shape[0], data.u.shape[1]
-    taught = np.asarray(data.y).any(1)
+    taught = np.atleast_1d(np.any(data.y, axis=1))
 
     def evaluate(vectors: np.ndarray, wanted: np.ndarray) -> tuple[jax.Array, jax.Array]:
         return _value_and_grad(vectors, data, wanted)

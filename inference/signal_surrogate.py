@@ -213,7 +213,8 @@ def observe(
     reduced = _widen(reduced, emulator)
     if len(reduced.log_weight) > KEPT:
         kept = _keep(emulator, reduced)
-        reduced, nodes = (type(x)(*(part[kept] for part in x)) for x in (reduced, nodes))
+        reduced = Reduced(*(part[kept] for part in reduced))
+        nodes = Nodes(*(part[kept] for part in nodes))
     return SignalSurrogate(emulator, output, observed, noise, nodes, reduced)
 
 
