@@ -1,21 +1,28 @@
 """Particle fluid: stirring and pouring scenes. Taichi loads with the first simulation."""
 
 from .cups import Cups
+from .effect import Effect
+from .effects import EFFECTS, register
 from .liquid import Liquid
 from .numerics import MODEL_VERSION, Numerics
 from .pouring import PourAction, PourResult, pour
+from .rig import Rig
 from .stirring import Cup, Stick, StirSetup, stir
 
 __all__ = [
+    "EFFECTS",
     "MODEL_VERSION",
     "Cup",
     "Cups",
+    "Effect",
     "Liquid",
     "Numerics",
     "PourAction",
     "PourResult",
+    "Rig",
     "Stick",
     "StirSetup",
     "pour",
+    "register",
     "stir",
 ]

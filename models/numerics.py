@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-MODEL_VERSION = "1"  # rises with every change that alters a simulation's bits
+MODEL_VERSION = "2"  # rises with every change that alters a simulation's bits
 POUR_PARTICLES = 664  # 5 mm apart in the bundled cups
 
 

@@ -1,5 +1,6 @@
 """Pouring: an action in, the fractions spilled, received and retained out."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 
@@ -7,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import runtime
+from .coefficients import acting_in
 from .cups import Cups
 from .liquid import Liquid
 from .numerics import POUR_PARTICLES, Numerics
@@ -46,6 +48,7 @@ def pour(
     cups: Cups,
     seeds: ArrayLike,
     particles: int = POUR_PARTICLES,
+    effects: Mapping[str, ArrayLike] | None = None,
 ) -> PourResult:
     """Where the liquid ends when the source turns about its lip to its final angle and holds.
 
@@ -55,13 +58,17 @@ def pour(
         cups: Geometry.
         seeds: One integer a simulation, shape [B]; it decides the initial packing.
         particles: Number of particles.
+        effects: Coefficients of `EFFECTS` by name, scalars or of shape [B]. Those that do not
+            act in a pour change nothing, so all that a stir has taught may be given.
 
     Raises:
-        ValueError: lengths do not agree, or an action is not finite or does not turn.
+        ValueError: lengths do not agree, an action is not finite or does not turn, or an effect
+            is unknown.
         RuntimeError: neighbour lists overflowed.
     """
     seeds = checked_seeds(seeds)
     liquid = liquid.batch(len(seeds))
+    acting_in("pour", effects, len(seeds))
     rate = _batch("angular_velocity", action.angular_velocity, len(seeds))
     distance = _batch("distance", action.distance, len(seeds))
     if (rate <= 0).any():

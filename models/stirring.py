@@ -1,6 +1,6 @@
 """Stirring: a recorded gripper path in, the stick's inclination out."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cache
 from typing import Any, Protocol
@@ -9,12 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import runtime
+from .coefficients import acting_in, changed_rig, changed_signal
 from .liquid import Liquid
 from .numerics import MODEL_VERSION, Numerics
 from .packing import checked_seeds, pack_cylinder
+from .rig import Rig, check_rig
 from .runtime import CHUNK
 
 SETTLING = 1.0  # s that a packing relaxes around the held stick
+ROOM = 1.5  # times the setup's fill is the largest
 
 
 class GripperPath(Protocol):
@@ -53,9 +56,14 @@ class Stick:
     mass: float
 
     @property
+    def gyration(self) -> float:
+        """Moment of inertia about the pivot, by mass [m²]."""
+        return self.length**2 / 3.0 + self.radius**2 / 4.0
+
+    @property
     def inertia(self) -> float:
         """Moment of inertia about the pivot [kg m²]."""
-        return self.mass * (self.length**2 / 3.0 + self.radius**2 / 4.0)
+        return self.mass * self.gyration
 
 
 @dataclass(frozen=True)
@@ -116,8 +124,22 @@ class StirSetup:
     @property
     def spacing(self) -> float:
         """Particle spacing [m], the cube root of the liquid's volume per particle."""
-        discs = self.cup.radius**2 * self.cup.fill - self.stick.radius**2 * self.submerged
-        return float((np.pi * discs / self.particles) ** (1.0 / 3.0))
+        return float((self.liquid_volume(self.cup.fill) / self.particles) ** (1.0 / 3.0))
+
+    @property
+    def deepest(self) -> float:
+        """Largest depth of liquid for which there is room [m]."""
+        return max(min(self.cup.height, ROOM * self.cup.fill), self.cup.fill)
+
+    def liquid_volume(self, fill: ArrayLike) -> Any:
+        """Liquid [m³] whose surface is at the depth `fill` [m] around the stick."""
+        wet = np.clip(self.submerged + (np.asarray(fill) - self.cup.fill), 0.0, fill)
+        return np.pi * (self.cup.radius**2 * fill - self.stick.radius**2 * wet)
+
+    def count(self, fill: ArrayLike) -> np.ndarray:
+        """Particles, of the setup's size, that fill the cup to the depth `fill` [m]."""
+        share = self.liquid_volume(fill) / self.liquid_volume(self.cup.fill)
+        return np.rint(self.particles * share).astype(int)
 
     def settings(self) -> dict[str, Any]:
         """Everything that fixes the simulator, as plain numbers, with the model's version."""
@@ -129,6 +151,7 @@ def stir(
     gripper: GripperPath,
     setup: StirSetup,
     seeds: ArrayLike,
+    effects: Mapping[str, ArrayLike] | None = None,
 ) -> np.ndarray:
     """Inclination of the stick while the gripper repeats its path in each liquid.
 
@@ -137,27 +160,37 @@ def stir(
         gripper: Path, measured at T times; pivots move linearly between samples.
         setup: Geometry and discretisation.
         seeds: One integer a simulation, shape [B]; it decides the initial packing.
+        effects: Coefficients of `EFFECTS` by name, scalars or of shape [B]; they act in the
+            alphabetical order of their names, those in the rig before those in the sensor.
 
     Returns:
         Angles [rad] from the downward vertical in the xz and yz planes at the gripper's times,
         shape [B, T, 2]; NaN for a simulation that diverged.
 
     Raises:
-        ValueError: liquid and seeds do not agree in length, seeds are no integers, or the path
-            is too short.
+        ValueError: liquid, seeds and coefficients do not agree in length, seeds are no integers,
+            the path is too short, an effect is unknown or makes a rig that cannot be.
         RuntimeError: neighbour lists overflowed.
     """
     seeds = checked_seeds(seeds)
-    liquid = liquid.batch(len(seeds))
+    size = len(seeds)
+    liquid = liquid.batch(size)
+    acting = acting_in("stir", effects, size)
     path = substep_path(gripper, setup.numerics.rate)
-    signals = []
+    written = Rig(
+        stick_mass=np.full(size, setup.stick.mass),
+        pivot_friction=np.zeros(size),
+        fill=np.full(size, setup.cup.fill),
+        path=np.broadcast_to(path, (size, *path.shape)),
+    )
+    rig = changed_rig(written, acting)
+    check_rig(rig, setup.deepest, [a.effect.name for a in acting])
+    angles = np.empty((size, len(gripper.time), 2))
     with runtime.LOCK:
-        scene = _scene(setup)
-        for low in range(0, len(seeds), scene.slots):
-            part = slice(low, low + scene.slots)
-            directions = _run(scene, setup, liquid[part], path, seeds[part])
-            signals.append(inclination(directions, gripper.time, setup.numerics.rate))
-    return np.concatenate(signals)
+        for scene, part in _parts(setup, rig.fill):
+            directions = _run(scene, setup, liquid[part], rig.rows(part), seeds[part])
+            angles[part] = inclination(directions, gripper.time, setup.numerics.rate)
+    return changed_signal(gripper.time, angles, acting)
 
 
 def substep_path(gripper: GripperPath, rate: float) -> np.ndarray:
@@ -198,6 +231,18 @@ def inclination(directions: np.ndarray, time: np.ndarray, rate: float) -> np.nda
     )
 
 
+def _parts(setup: StirSetup, fill: np.ndarray) -> Iterator[tuple[Any, np.ndarray]]:
+    """Scenes, and which simulations run in each next, at most one a slot.
+
+    Only a simulation's own fill decides its scene, so its bits do not depend on its company.
+    """
+    usual = setup.count(fill) == setup.particles
+    for scene_of, rows in ((_scene, usual), (_roomy_scene, ~usual)):
+        todo = np.flatnonzero(rows)
+        for low in range(0, len(todo), runtime.SLOTS):
+            yield scene_of(setup), todo[low : low + runtime.SLOTS]
+
+
 @cache
 def _scene(setup: StirSetup):
     """The compiled scene of a setup; its fields live as long as the process."""
@@ -207,36 +252,45 @@ def _scene(setup: StirSetup):
     return StirringScene(runtime.SLOTS, setup)
 
 
-def _run(scene, setup, liquid, path, seeds) -> np.ndarray:
+@cache
+def _roomy_scene(setup: StirSetup):
+    """The same with room for more particles than the setup's."""
+    runtime.start()
+    from .stirring_kernel import StirringScene
+
+    return StirringScene(runtime.SLOTS, setup, int(setup.count(setup.deepest)))
+
+
+def _run(scene, setup, liquid, rig, seeds) -> np.ndarray:
     """Directions of the sticks, shape [B, substeps + 1, 3]; NaN where a trial diverged."""
     size = len(seeds)
-    pivot = path[0]
+    pivots = rig.path[:, 0]
+    starts = zip(setup.count(rig.fill), seeds, pivots, strict=True)
+    scene.place([_pack(setup, int(n), int(seed), pivot) for n, seed, pivot in starts])
+    scene.fit_stick(rig.stick_mass, rig.pivot_friction)
+    scene.place_stick(pivots)
+    scene.relax_packing(size, SETTLING)
+    scene.place_stick(pivots)  # the liquid has pushed at what was held
+    scene.pour_in(liquid)
+
+    path = rig.path[:, 1:].astype(np.float32, order="C")
+    steps = path.shape[1]
+    directions = np.empty((size, steps, 3), np.float32)
+    for start in range(0, steps, CHUNK):
+        stop = min(start + CHUNK, steps)
+        scene.stir(size, start, stop, path, directions)
+    scene.check_capacity()
+    directions[scene.diverged(size)] = np.nan
+    down = np.broadcast_to(np.array([0.0, 0.0, -1.0], np.float32), (size, 1, 3))
+    return np.concatenate([down, directions], axis=1).astype(np.float64)
+
+
+def _pack(setup: StirSetup, particles: int, seed: int, pivot: np.ndarray) -> np.ndarray:
+    """Where the particles start [m], shape [particles, 3], around a stick hung from `pivot`."""
     clearance = setup.stick.radius + 0.4 * setup.spacing
     tip = pivot[2] - setup.stick.length - 0.4 * setup.spacing
 
     def in_stick(points: np.ndarray) -> np.ndarray:
         return (np.hypot(*(points - pivot)[:, :2].T) < clearance) & (points[:, 2] > tip)
 
-    scene.place(
-        np.stack(
-            [
-                pack_cylinder(setup.cup.radius, setup.spacing, setup.particles, int(s), in_stick)
-                for s in seeds
-            ]
-        )
-    )
-    scene.place_stick(np.tile(pivot, (size, 1)))
-    scene.relax_packing(size, SETTLING)
-    scene.place_stick(np.tile(pivot, (size, 1)))  # the liquid has pushed at what was held
-    scene.pour_in(liquid)
-
-    steps = len(path) - 1
-    pivots = np.broadcast_to(path[1:].astype(np.float32), (size, steps, 3)).copy()
-    directions = np.empty((size, steps, 3), np.float32)
-    for start in range(0, steps, CHUNK):
-        stop = min(start + CHUNK, steps)
-        scene.stir(size, start, stop, pivots, directions)
-    scene.check_capacity()
-    directions[scene.diverged(size)] = np.nan
-    down = np.broadcast_to(np.array([0.0, 0.0, -1.0], np.float32), (size, 1, 3))
-    return np.concatenate([down, directions], axis=1).astype(np.float64)
+    return pack_cylinder(setup.cup.radius, setup.spacing, particles, seed, in_stick)

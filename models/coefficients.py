@@ -1,0 +1,136 @@
+"""From coefficients that a user gives to what they do to a rig and to a signal."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .effect import Effect
+from .effects import EFFECTS
+from .rig import Rig
+
+
+class Acting(NamedTuple):
+    """An effect and its coefficients.
+
+    Attributes:
+        effect: The effect.
+        coefficient: Of every simulation, neutral or not, float64 of shape [B].
+    """
+
+    effect: Effect
+    coefficient: np.ndarray
+
+    @property
+    def changed(self) -> np.ndarray:
+        """Which simulations it changes, bool [B]."""
+        return self.coefficient != self.effect.neutral
+
+
+def acting_in(scene: str, effects: Mapping[str, ArrayLike] | None, size: int) -> tuple[Acting, ...]:
+    """The effects that change at least one of `size` simulations of a scene.
+
+    They act in the alphabetical order of their names, so that the result depends on neither
+    the mapping's order nor that of registration. Among the built-in ones only the cameras'
+    do not commute, and there this is the physical order: late, turned about the vertical, and
+    then rolled about the axis along which they look.
+
+    Args:
+        scene: "stir" or "pour"; what does not act in it is checked and left out.
+        effects: Name -> coefficient, a scalar or of shape [size].
+        size: Number of simulations, B.
+
+    Raises:
+        ValueError: an unknown name, or a coefficient that is not finite or of another shape.
+    """
+    if effects is None:
+        return ()
+    if not isinstance(effects, Mapping):
+        raise ValueError(f"effects must map names to coefficients, got {effects!r}")
+    unknown = [str(name) for name in effects if name not in EFFECTS]
+    if unknown:
+        raise ValueError(
+            f"unknown effects: {', '.join(unknown)}; there are {', '.join(EFFECTS)}, "
+            "and models.register adds others"
+        )
+    checked = [Acting(EFFECTS[n], _coefficient(n, effects[n], size)) for n in sorted(effects)]
+    return tuple(a for a in checked if scene in a.effect.scenes and a.changed.any())
+
+
+def _coefficient(name: str, value: ArrayLike, size: int) -> np.ndarray:
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as err:
+        raise ValueError(f"the coefficient of {name} must be a number, got {value!r}") from err
+    if array.ndim > 1 or array.size not in (1, size):
+        raise ValueError(
+            f"the coefficient of {name} has shape {array.shape}, but there are {size} "
+            f"simulations; give a scalar or an array of shape ({size},)"
+        )
+    if not np.isfinite(array).all():
+        raise ValueError(f"the coefficient of {name} must be finite, got {value!r}")
+    return np.broadcast_to(array, (size,))
+
+
+def changed_rig(rig: Rig, acting: tuple[Acting, ...]) -> Rig:
+    """The rig after every effect that acts in it.
+
+    Raises:
+        ValueError: a hook returned no rig of the same shapes.
+    """
+    for effect, coefficient in acting:
+        if effect.rig is None:
+            continue
+        rows = coefficient != effect.neutral
+        before = rig.rows(rows)
+        after = effect.rig(before, coefficient[rows])
+        if not isinstance(after, Rig):
+            raise ValueError(f"effect {effect.name!r}: its hook rig must return a Rig")
+        # most effects touch one field, and the paths are large
+        touched = {
+            name: _put(effect, name, getattr(rig, name), rows, getattr(after, name))
+            for name in Rig._fields
+            if getattr(after, name) is not getattr(before, name)
+        }
+        rig = rig._replace(**touched)
+    return rig
+
+
+def changed_signal(time: np.ndarray, angles: np.ndarray, acting: tuple[Acting, ...]) -> np.ndarray:
+    """What the cameras make of the angles.
+
+    Args:
+        time: Sample times [s], shape [T].
+        angles: Inclination in the xz and yz planes [rad], shape [B, T, 2]; NaN if it diverged.
+        acting: Effects, in order.
+
+    Returns:
+        Angles of the same shape.
+
+    Raises:
+        ValueError: a hook returned another shape.
+    """
+    finite = np.isfinite(angles).all(axis=(1, 2))
+    for effect, coefficient in acting:
+        rows = (coefficient != effect.neutral) & finite
+        if effect.signal is None or not rows.any():
+            continue
+        seen = effect.signal(np.asarray(time), angles[rows], coefficient[rows])
+        angles = _put(effect, "signal", angles, rows, seen)
+    return angles
+
+
+def _put(
+    effect: Effect, name: str, whole: np.ndarray, rows: np.ndarray, part: ArrayLike
+) -> np.ndarray:
+    """A copy of `whole` with `part` in its `rows`."""
+    part = np.asarray(part)
+    if part.shape != whole[rows].shape:
+        raise ValueError(
+            f"effect {effect.name!r}: its hook returned {name} of shape {part.shape}, "
+            f"expected {whole[rows].shape}"
+        )
+    copied = whole.copy()
+    copied[rows] = part
+    return copied

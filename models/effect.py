@@ -1,0 +1,102 @@
+"""What an effect is: one coefficient whose neutral value leaves the base model as it was."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from .liquid import FIELDS
+from .rig import Rig
+
+if TYPE_CHECKING:
+    from numpyro.distributions import Distribution
+
+RigHook = Callable[[Rig, np.ndarray], Rig]
+SignalHook = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+
+SCENES = {"liquid": ("stir", "pour"), "rig": ("stir",), "sensor": ("stir",)}
+HOOKS = {"rig": "rig", "sensor": "signal"}  # acts_in -> the hook that such an effect needs
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A physical effect that the base model leaves out.
+
+    Hooks are pure functions of NumPy arrays. They are given only the B simulations whose
+    coefficient is not neutral, so the others keep their bits whatever a hook computes.
+
+    Attributes:
+        name: Name of the effect and of its coefficient, a Python identifier.
+        unit: Unit of the coefficient, "1" if it has none.
+        neutral: Coefficient at which there is no effect.
+        acts_in: Where it acts; this also decides in which scenes.
+        text: One sentence for a person.
+        source: Citation or derivation.
+        make_prior: Builds the coefficient's prior, a numpyro distribution; called once, when
+            `prior` is first read, so that simulating needs no numpyro.
+        rig: (rig, coefficient [B]) -> rig, of the same shapes.
+        signal: (time [T] in s, angles [B, T, 2] in rad, coefficient [B]) -> angles. The angles
+            are finite: a stir that diverged is passed by.
+
+    Raises:
+        ValueError: a field makes no sense, or the hook that `acts_in` needs is missing.
+    """
+
+    name: str
+    unit: str
+    neutral: float
+    acts_in: Literal["liquid", "rig", "sensor"]
+    text: str
+    source: str
+    make_prior: Callable[[], "Distribution"]
+    rig: RigHook | None = None
+    signal: SignalHook | None = None
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.name, str) and self.name.isidentifier()):
+            raise ValueError(f"an effect's name must be an identifier, got {self.name!r}")
+        if self.name in FIELDS:
+            raise ValueError(f"effect name {self.name!r} is taken by a liquid's {self.name}")
+        for field in ("unit", "text", "source"):
+            value = getattr(self, field)
+            if not (isinstance(value, str) and value.strip()):
+                raise self._fault(f"{field} must say something, got {value!r}")
+        if isinstance(self.neutral, bool) or not isinstance(self.neutral, (int, float)):
+            raise self._fault(f"neutral must be a number, got {self.neutral!r}")
+        if not math.isfinite(self.neutral):
+            raise self._fault(f"neutral must be finite, got {self.neutral}")
+        if self.acts_in not in SCENES:
+            raise self._fault(f"acts_in must be one of {', '.join(SCENES)}, got {self.acts_in!r}")
+        if not callable(self.make_prior):
+            raise self._fault(
+                "make_prior must be a function that returns a numpyro distribution, "
+                f"got {self.make_prior!r}"
+            )
+        needed = HOOKS.get(self.acts_in)
+        if needed and getattr(self, needed) is None:
+            raise self._fault(f"acts_in={self.acts_in!r} needs the hook {needed}")
+        for hook in HOOKS.values():
+            value = getattr(self, hook)
+            if value is not None and not callable(value):
+                raise self._fault(f"the hook {hook} must be a function, got {value!r}")
+
+    def _fault(self, what: str) -> ValueError:
+        return ValueError(f"effect {self.name!r}: {what}")
+
+    @property
+    def parameter(self) -> str:
+        """Name of the coefficient among the parameters of a fit: the effect's own."""
+        return self.name
+
+    @property
+    def scenes(self) -> tuple[str, ...]:
+        """Scenes in which it acts: "stir", "pour"; elsewhere its coefficient changes nothing."""
+        return SCENES[self.acts_in]
+
+    @cached_property
+    def prior(self) -> "Distribution":
+        """Prior of the coefficient; numpyro loads with the first one read."""
+        return self.make_prior()

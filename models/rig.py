@@ -1,0 +1,53 @@
+"""What an effect in the rig may change: the hardware of each simulated stir."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Rig(NamedTuple):
+    """Stick, pivot, filling and path of B stirs, float64.
+
+    Attributes:
+        stick_mass: Mass of the uniform stick [kg], shape [B].
+        pivot_friction: Dry friction torque of the pivot [N m], shape [B].
+        fill: Depth of the liquid with the stick in it [m], shape [B].
+        path: Pivot at the start and at the end of each substep [m], shape [B, substeps + 1, 3].
+    """
+
+    stick_mass: np.ndarray
+    pivot_friction: np.ndarray
+    fill: np.ndarray
+    path: np.ndarray
+
+    def rows(self, part: slice | np.ndarray) -> "Rig":
+        """The stirs that `part` picks."""
+        return Rig(*(field[part] for field in self))
+
+
+def check_rig(rig: Rig, deepest: float, effects: Sequence[str]) -> None:
+    """Refuse a rig that no stir can have.
+
+    Args:
+        rig: Rig to check.
+        deepest: Largest depth of liquid that the simulation has room for [m].
+        effects: Names of the effects that made it so, for the message.
+
+    Raises:
+        ValueError: a value is not finite or out of its range.
+    """
+    ranges = {
+        "stick_mass": (rig.stick_mass > 0, "must be positive [kg]"),
+        "pivot_friction": (rig.pivot_friction >= 0, "must not be negative [N m]"),
+        "fill": ((rig.fill >= 0) & (rig.fill <= deepest), f"must be 0 to {deepest:.4g} m"),
+        "path": (np.isfinite(rig.path), "must be finite [m]"),
+    }
+    for name, (inside, rule) in ranges.items():
+        values = getattr(rig, name)
+        wrong = values[~(inside & np.isfinite(values))]
+        if wrong.size:
+            raise ValueError(
+                f"the rig's {name} {rule}, got {wrong[0]:.4g} after the effects "
+                f"{', '.join(effects)}; change their coefficients"
+            )
