@@ -267,11 +267,13 @@ def _run(scene, setup, liquid, rig, seeds) -> np.ndarray:
     pivots = rig.path[:, 0]
     starts = zip(setup.count(rig.fill), seeds, pivots, strict=True)
     scene.place([_pack(setup, int(n), int(seed), pivot) for n, seed, pivot in starts])
-    scene.fit_stick(rig.stick_mass, rig.pivot_friction)
+    # packings settle around the setup's stick: the start tells sticks apart no more than liquids
+    scene.fit_stick(np.full(size, setup.stick.mass), np.zeros(size))
     scene.place_stick(pivots)
     scene.relax_packing(size, SETTLING)
     scene.place_stick(pivots)  # the liquid has pushed at what was held
     scene.pour_in(liquid)
+    scene.fit_stick(rig.stick_mass, rig.pivot_friction)
 
     path = rig.path[:, 1:].astype(np.float32, order="C")
     steps = path.shape[1]
