@@ -79,12 +79,14 @@ def changed_rig(rig: Rig, acting: tuple[Acting, ...]) -> Rig:
     Raises:
         ValueError: a hook returned no rig of the same shapes.
     """
-    for effect, coefficient in acting:
+    for act in acting:
+        effect, rows = act.effect, act.changed
         if effect.rig is None:
             continue
-        rows = coefficient != effect.neutral
         before = rig.rows(rows)
-        after = effect.rig(before, coefficient[rows])
+        for field in before:
+            field.flags.writeable = False  # what a hook wrote in place would be overlooked below
+        after = effect.rig(before, act.coefficient[rows])
         if not isinstance(after, Rig):
             raise ValueError(f"effect {effect.name!r}: its hook rig must return a Rig")
         # most effects touch one field, and the paths are large
@@ -112,11 +114,11 @@ def changed_signal(time: np.ndarray, angles: np.ndarray, acting: tuple[Acting, .
         ValueError: a hook returned another shape.
     """
     finite = np.isfinite(angles).all(axis=(1, 2))
-    for effect, coefficient in acting:
-        rows = (coefficient != effect.neutral) & finite
+    for act in acting:
+        effect, rows = act.effect, act.changed & finite
         if effect.signal is None or not rows.any():
             continue
-        seen = effect.signal(np.asarray(time), angles[rows], coefficient[rows])
+        seen = effect.signal(np.asarray(time), angles[rows], act.coefficient[rows])
         angles = _put(effect, "signal", angles, rows, seen)
     return angles
 

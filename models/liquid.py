@@ -44,6 +44,6 @@ class Liquid:
             raise ValueError("density must be positive [kg/m³], got 0")
         return Liquid(**fields)
 
-    def __getitem__(self, part: slice) -> "Liquid":
+    def __getitem__(self, part: slice | np.ndarray) -> "Liquid":
         """Part of a batch made by `batch`."""
         return Liquid(*(np.asarray(getattr(self, name))[part] for name in FIELDS))

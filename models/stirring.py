@@ -131,12 +131,12 @@ class StirSetup:
         """Largest depth of liquid for which there is room [m]."""
         return max(min(self.cup.height, ROOM * self.cup.fill), self.cup.fill)
 
-    def liquid_volume(self, fill: ArrayLike) -> Any:
+    def liquid_volume(self, fill: float | np.ndarray) -> Any:
         """Liquid [m³] whose surface is at the depth `fill` [m] around the stick."""
-        wet = np.clip(self.submerged + (np.asarray(fill) - self.cup.fill), 0.0, fill)
+        wet = np.clip(self.submerged + (fill - self.cup.fill), 0.0, fill)
         return np.pi * (self.cup.radius**2 * fill - self.stick.radius**2 * wet)
 
-    def count(self, fill: ArrayLike) -> np.ndarray:
+    def count(self, fill: float | np.ndarray) -> np.ndarray:
         """Particles, of the setup's size, that fill the cup to the depth `fill` [m]."""
         share = self.liquid_volume(fill) / self.liquid_volume(self.cup.fill)
         return np.rint(self.particles * share).astype(int)
