@@ -23,7 +23,7 @@ def test_two_tabulations_of_one_experiment_differ_by_a_fifth():
     ratio = dam_break.front_speed(repeated) / dam_break.front_speed(once)
     assert ratio == pytest.approx(1.2, abs=0.05)
     late = dam_break.fit_time_shift(repeated, once)
-    assert abs(late.shift) < 0.25 and late.rms < 0.1
+    assert abs(late.shift) < 0.25 and late.rms < 0.2
 
 
 def test_times_are_made_dimensionless_as_in_the_paper():
