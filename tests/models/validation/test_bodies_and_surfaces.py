@@ -4,7 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
-from bolfi_liquids.models.validation.truths import cylinder_drag, pendulum, surfaces
+from bolfi_liquids.models.validation.truths import (
+    cylinder_drag,
+    oscillating_rod,
+    pendulum,
+    surfaces,
+)
 from scipy.integrate import quad, solve_ivp
 
 ROD = pendulum.Rod(length=0.14, radius=0.005, mass=0.015)
@@ -163,3 +168,43 @@ def test_the_rayleigh_frequency_is_that_of_its_energies():
     expected = np.sqrt(stiffness / inertia) / (2 * np.pi)
     ours = surfaces.rayleigh_frequency(1.0, tension=1.0, density=1.0)
     assert ours == pytest.approx(expected, rel=0.02)
+
+
+@pytest.mark.parametrize("kinematic", [0.01, 0.3, 5.0])
+def test_stokes_reaction_solves_the_oscillating_boundary_layer(kinematic):
+    """A unit cylinder held in liquid that oscillates far away: ψ = (r + a/r + b w) sin θ.
+
+    w'' + w'/r - w/r² = iω/ν w decays outwards; q = w'/w is integrated inwards. No slip gives
+    a = (1 - q) / (1 + q), and pressure and friction add to -2 a of the displaced liquid's
+    inertia, of which 1 is that of the liquid's own acceleration.
+    """
+    omega, far = 2.0, 12.0
+    kappa = 1j * omega / kinematic
+
+    def inwards(depth, q):
+        r = far - depth
+        return -(kappa + 1.0 / r**2 - q / r - q**2)
+
+    start = np.array([-np.sqrt(kappa) - 0.5 / far])
+    q = solve_ivp(inwards, (0, far - 1), start, method="BDF", rtol=1e-9, atol=1e-9).y[0, -1]
+    reaction = -1.0 - 2.0 * (1.0 - q) / (1.0 + q)
+    ours = oscillating_rod.stokes_reaction(1.0, omega, kinematic)
+    assert ours.added_mass == pytest.approx(reaction.real, rel=1e-4)
+    assert ours.damping == pytest.approx(-reaction.imag, rel=1e-4)
+
+
+def test_a_swing_in_thin_liquid_is_that_of_potential_flow():
+    """And its slight decay comes from a boundary layer: 2.83 / (r sqrt(ω/ν)) of added mass."""
+    thin = oscillating_rod.swing_in_liquid(ROD, 0.06, density=1000.0, viscosity=1e-9)
+    period = pendulum.period_in_liquid(ROD, 0.06, 1000.0)
+    assert thin.period == pytest.approx(period, rel=1e-3)
+    omega = 2 * np.pi / period
+    layer = 2 * np.sqrt(2) / (ROD.radius * np.sqrt(omega / 1e-12))
+    wet = 1000.0 * ROD.area * (ROD.length**3 - (ROD.length - 0.06) ** 3) / 3
+    assert thin.decay == pytest.approx(0.5 * layer * wet * omega / (ROD.inertia + wet), rel=1e-2)
+    thick = oscillating_rod.swing_in_liquid(ROD, 0.06, density=1000.0, viscosity=0.05)
+    assert thick.period > thin.period and thick.decay > 10 * thin.decay
+    cup = oscillating_rod.swing_in_liquid(
+        ROD, 0.06, density=1000.0, viscosity=1e-9, outer_radius=0.02
+    )
+    assert cup.period > thin.period
