@@ -28,8 +28,8 @@ def physics(
 ) -> None:
     """Compare the fluid with analytic solutions and measurements.
 
-    The exit status is 1 when a case is out of its tolerance or failed. Cases that finished in
-    DIR before, with the same seed, model and settings, are not run again.
+    The exit status is 1 when a case is out of its tolerance or failed. What has finished in DIR
+    before, with the same seed, simulator and case, is not run again.
     """
     from rich.console import Console
 

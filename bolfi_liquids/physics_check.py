@@ -12,15 +12,14 @@ from .files import write_text
 from .physics_files import (
     CASES,
     RESULTS,
-    case_identity,
     failed_record,
     finished_record,
-    has_identity,
     is_finished,
     read_record,
     write_record,
     write_results,
 )
+from .physics_identity import case_identity, has_identity
 from .physics_progress import case_progress
 
 if TYPE_CHECKING:

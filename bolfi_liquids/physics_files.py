@@ -6,7 +6,6 @@ from these.
 """
 
 import json
-import math
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
@@ -14,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from .errors import InputError
 from .files import write_text
+from .physics_identity import case_identity, has_identity
+from .physics_json import plain
 from .provenance import versions
 
 if TYPE_CHECKING:
@@ -22,15 +23,6 @@ if TYPE_CHECKING:
 CASES = "cases"
 RESULTS = "physics.json"
 LIBRARIES = ("bolfi-liquids", "numpy", "scipy", "taichi")
-DECIDING = ("seed", "model", "settings")
-"""Fields of a record that decide its numbers: with others the case runs again."""
-
-
-def case_identity(case: "Case", seed: int) -> dict[str, Any]:
-    """What a finished record must agree with to be used again."""
-    from .models import MODEL_VERSION
-
-    return {"seed": seed, "model": MODEL_VERSION, "settings": _plain(case.settings)}
 
 
 def finished_record(
@@ -55,7 +47,7 @@ def finished_record(
         "notes": dict(result.notes),
         "panels": panels,
     }
-    return _plain(record)
+    return plain(record)
 
 
 def failed_record(case: "Case", error: str, seed: int, seconds: float) -> dict[str, Any]:
@@ -91,13 +83,8 @@ def read_record(out: Path, name: str) -> dict[str, Any] | None:
 
 
 def is_finished(record: Mapping[str, Any] | None, identity: Mapping[str, Any]) -> bool:
-    """The record is of a case that ran to its end with the same seed, model and settings."""
+    """The record is of a case that ran to its end with the same seed, model, settings and code."""
     return record is not None and record.get("error") is None and has_identity(record, identity)
-
-
-def has_identity(record: Mapping[str, Any], identity: Mapping[str, Any]) -> bool:
-    """Seed, model and settings of the record are these."""
-    return all(record.get(field) == identity[field] for field in DECIDING)
 
 
 def write_results(out: Path, records: Iterable[Mapping[str, Any]], seed: int) -> Path:
@@ -136,18 +123,3 @@ def _about(case: "Case", seed: int) -> dict[str, Any]:
 
 def _now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
-
-
-def _plain(value: Any) -> Any:
-    """As JSON gives it back: lists for arrays and tuples, null for what is not finite."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if hasattr(value, "tolist"):
-        return _plain(value.tolist())
-    if not isinstance(value, str | int | float | None):
-        raise TypeError(
-            f"a case's settings and notes must be plain numbers and text, got {value!r}"
-        )
-    return None if isinstance(value, float) and not math.isfinite(value) else value

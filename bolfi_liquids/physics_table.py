@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
@@ -14,18 +15,18 @@ def print_physics(records: Sequence[Mapping[str, Any]], console: Console) -> Non
     """One table: for each case its truth and where that is from, then what was compared."""
     numbers = ("truth", "ours", "error", "tolerance")
     table = Table(
-        "case",
-        Column("quantity", ratio=1),
+        "case, its truth and what was compared",
         *(Column(name, justify="right", no_wrap=True) for name in numbers),
         Column("result", no_wrap=True),
-        expand=False,
+        box=SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
     )
     for record in records:
         # as text: brackets of a source or a unit are no markup
-        truth = Text(f"{record['truth']} ({record['source']})", style="dim")
-        table.add_row(Text(record["name"]), truth, "", "", "", "", _verdict(record))
+        about = Text(f"{record['name']}: {record['truth']} ({record['source']})", style="bold")
+        table.add_row(about, "", "", "", "", _verdict(record))
         for row in record["rows"]:
-            table.add_row("", *_cells(row, record["unit"]))
+            table.add_row(*_cells(row, record["unit"]))
         table.add_section()
     console.print(table)
     for record in records:
@@ -39,7 +40,7 @@ def print_physics(records: Sequence[Mapping[str, Any]], console: Console) -> Non
 def _cells(row: Mapping[str, Any], unit: str) -> list[Text]:
     tolerance = _error(row["tolerance"], unit).lstrip("+")
     verdict = "pass" if row["passed"] else "FAIL"
-    cells = [row["quantity"], _number(row["truth"]), _number(row["ours"])]
+    cells = [f"  {row['quantity']}", _number(row["truth"]), _number(row["ours"])]
     return [Text(cell) for cell in (*cells, _error(row["error"], unit), tolerance, verdict)]
 
 
@@ -56,4 +57,4 @@ def _number(value: float | None) -> str:
 def _error(value: float | None, unit: str) -> str:
     if value is None:
         return "none"
-    return UNIT_FORMATS.get(unit, "{:+.3g} " + unit).format(value)
+    return UNIT_FORMATS.get(unit, "{:+.2g} " + unit).format(value)

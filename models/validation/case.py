@@ -121,9 +121,10 @@ class Case:
         source: Where that is known from.
         unit: Of the errors: "relative", "deg", "fraction".
         tolerance: Largest error of a row that sets no other.
-        settings: All that decides the outcome besides the seed, as plain numbers and text; a
-            finished result is kept for as long as these stay as they are.
-        run: The comparison itself, of a function to tell progress to and a seed. It may raise.
+        settings: What decides the outcome besides the seed, as plain numbers and text. A
+            finished result is kept for as long as these and the case's source stay as they are.
+        run: The comparison itself, a function of one to tell progress to and of a seed. It may
+            raise.
     """
 
     name: str

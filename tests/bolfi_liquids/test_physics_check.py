@@ -1,6 +1,7 @@
 """The runner of validation cases, on cases that take no time."""
 
 import json
+import runpy
 import signal
 import subprocess
 import sys
@@ -80,13 +81,19 @@ def test_a_finished_case_is_not_repeated(tmp_path, registry, calls):
     assert (tmp_path / "good.svg").read_text() == plot
 
 
-@pytest.mark.parametrize("change", ["seed", "settings", "model"])
+@pytest.mark.parametrize("change", ["seed", "settings", "model", "code"])
 def test_other_settings_run_again(tmp_path, registry, calls, change, monkeypatch):
     run(tmp_path, registry, ["good"])
     if change == "seed":
         check = run(tmp_path, registry, ["good"], seed=1)
     elif change == "settings":
         check = run(tmp_path, {"good": fake("good", registry["good"].run, particles=9)})
+    elif change == "code":
+        other = tmp_path / "edited.py"
+        other.write_text("def run(progress, seed):\n    return run.good(progress, seed)\n")
+        edited = runpy.run_path(str(other))["run"]
+        edited.good = registry["good"].run
+        check = run(tmp_path, {"good": fake("good", edited)})
     else:
         monkeypatch.setattr("bolfi_liquids.models.MODEL_VERSION", "another")
         check = run(tmp_path, registry, ["good"])

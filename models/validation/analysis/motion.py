@@ -23,6 +23,18 @@ class Oscillation(NamedTuple):
     middle: float
 
 
+class FarSide(NamedTuple):
+    """The first extreme on the other side of the middle; NaN where there is none.
+
+    Attributes:
+        time: Since the signal's start, half a period of a free swing [s].
+        ratio: Of that extreme to the signal's start, both from the middle.
+    """
+
+    time: float
+    ratio: float
+
+
 def rms_speed(velocity: ArrayLike) -> np.ndarray:
     """Root mean square of the speed [m/s]; velocities [..., n, 3] give shape [...]."""
     return np.sqrt(np.mean(np.sum(np.square(np.asarray(velocity, float)), axis=-1), axis=-1))
@@ -71,6 +83,21 @@ def oscillation(time: ArrayLike, signal: ArrayLike, middle: float = 0.0) -> Osci
     whole = 2 * ((len(at) - 1) // 2)
     period = 2.0 * (at[whole] - at[0]) / whole
     return Oscillation(float(period), float(decay), float(peak[0]), float(middle))
+
+
+def far_side(time: ArrayLike, signal: ArrayLike, middle: float = 0.0) -> FarSide:
+    """Where a signal [t] that starts at rest off its middle goes on the other side.
+
+    For swings that are damped so strongly that they have no period to speak of.
+    """
+    time, off = np.asarray(time, float), np.asarray(signal, float) - middle
+    crossed = np.flatnonzero(off * np.sign(off[0]) < 0.0)
+    if not len(crossed):
+        return FarSide(np.nan, np.nan)
+    back = np.flatnonzero(off[crossed[0] :] * np.sign(off[0]) > 0.0)
+    stop = crossed[0] + back[0] if len(back) else len(off)
+    at = crossed[0] + int(np.abs(off[crossed[0] : stop]).argmax())
+    return FarSide(float(time[at] - time[0]), float(abs(off[at] / off[0])))
 
 
 def fit_damped_oscillation(time: ArrayLike, signal: ArrayLike, period: float) -> Oscillation:

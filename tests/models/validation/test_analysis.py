@@ -148,3 +148,19 @@ def test_a_strongly_damped_swing_is_fitted(rng):
     fit = motion.fit_damped_oscillation(time, signal, 0.6)
     assert fit.period == pytest.approx(0.7, rel=0.02)
     assert fit.decay == pytest.approx(3.0, rel=0.05)
+
+
+@pytest.mark.parametrize("decay", [0.0, 1.5])
+def test_the_far_side_of_a_swing(decay):
+    time = 0.5 + np.arange(0, 2, 1 / 240)
+    angle = 2 * np.pi * (time - 0.5) / 0.7
+    start = np.cos(angle) + decay * 0.7 / (2 * np.pi) * np.sin(angle)  # released at rest
+    signal = 0.1 - 0.3 * np.exp(-decay * (time - 0.5)) * start
+    far = motion.far_side(time, signal, 0.1)
+    assert far.time == pytest.approx(0.35, abs=1 / 240)
+    assert far.ratio == pytest.approx(np.exp(-decay * 0.35), rel=1e-3)
+
+
+def test_an_overdamped_swing_has_no_far_side():
+    far = motion.far_side(np.arange(9.0), np.exp(-np.arange(9.0)))
+    assert np.isnan(far.time) and np.isnan(far.ratio)
