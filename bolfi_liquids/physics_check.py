@@ -91,19 +91,19 @@ def check_physics(
         raise InputError("not a directory", where=str(out), fix="choose another --out")
     (out / CASES).mkdir(parents=True, exist_ok=True)
 
-    records = {case.name: read_record(out, case.name) for case in chosen}
-    ran = []
-    for number, case in enumerate(chosen, 1):
-        held = records[case.name]
-        if not is_finished(held, case_identity(case, seed)):
+    held = [read_record(out, case.name) for case in chosen]
+    records, ran = [], []
+    for number, (case, record) in enumerate(zip(chosen, held, strict=True), 1):
+        if record is None or not is_finished(record, case_identity(case, seed)):
             label = f"{case.name} ({number} of {len(chosen)})"
-            held = records[case.name] = _run(case, seed, label, shown=progress)
-            write_record(out, held)
+            record = _run(case, seed, label, shown=progress)
+            write_record(out, record)
             ran.append(case.name)
             _plot_path(out, case.name).unlink(missing_ok=True)
-        _plot(out, held)
+        _plot(out, record)
+        records.append(record)
         write_results(out, _all_records(out, registry, seed), seed)
-    return PhysicsCheck(out, tuple(records[case.name] for case in chosen), tuple(ran))
+    return PhysicsCheck(out, tuple(records), tuple(ran))
 
 
 def _chosen(names: Iterable[str], registry: "Mapping[str, Case]") -> "list[Case]":

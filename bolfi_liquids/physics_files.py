@@ -82,9 +82,9 @@ def read_record(out: Path, name: str) -> dict[str, Any] | None:
     return record
 
 
-def is_finished(record: Mapping[str, Any] | None, identity: Mapping[str, Any]) -> bool:
+def is_finished(record: Mapping[str, Any], identity: Mapping[str, Any]) -> bool:
     """The record is of a case that ran to its end with the same seed, model, settings and code."""
-    return record is not None and record.get("error") is None and has_identity(record, identity)
+    return record.get("error") is None and has_identity(record, identity)
 
 
 def write_results(out: Path, records: Iterable[Mapping[str, Any]], seed: int) -> Path:

@@ -17,12 +17,12 @@ class Profile(NamedTuple):
     Attributes:
         at: Mean coordinate of the particles in the bin.
         mean: Their mean value.
-        count: How many there were.
+        particles: How many there were.
     """
 
     at: np.ndarray
     mean: np.ndarray
-    count: np.ndarray
+    particles: np.ndarray
 
 
 class PoiseuilleFit(NamedTuple):
@@ -74,8 +74,8 @@ def binned_profile(at: ArrayLike, values: ArrayLike, low: float, high: float, bi
     bin_of = ((at[inside] - low) / (high - low) * bins).astype(int)
     count = np.bincount(bin_of, minlength=bins)
     held = count > 0
-    sums = [np.bincount(bin_of, v[inside], bins)[held] / count[held] for v in (at, values)]
-    return Profile(*sums, count[held])
+    where, mean = (np.bincount(bin_of, v[inside], bins)[held] / count[held] for v in (at, values))
+    return Profile(where, mean, count[held])
 
 
 def fit_poiseuille(z: ArrayLike, velocity: ArrayLike, gap: float, gradient: float) -> PoiseuilleFit:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 
 class DensityProfile(NamedTuple):
@@ -93,7 +93,7 @@ def cluster_sizes(positions: ArrayLike, reach: float) -> np.ndarray:
     """
     positions = np.asarray(positions, float)
     n = len(positions)
-    pairs = cKDTree(positions).query_pairs(reach, output_type="ndarray")
+    pairs = KDTree(positions).query_pairs(reach, output_type="ndarray")
     graph = coo_array((np.ones(len(pairs), bool), tuple(pairs.T)), shape=(n, n))
     _, label = connected_components(graph, directed=False)
     return np.sort(np.bincount(label))[::-1]

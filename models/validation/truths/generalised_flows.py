@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import cumulative_simpson
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 
 NODES = 2001  # across half a channel, for the profiles that are integrated
 
@@ -115,4 +115,4 @@ def _shear_rate(stress: float, viscosity: Callable[[float], float]) -> float:
         raise ValueError(f"no shear rate up to 1e9 /s has a stress of {stress:g} Pa")
     if excess(low) > 0.0:
         return 0.0
-    return float(np.exp(brentq(excess, low, high, xtol=1e-12)))
+    return float(np.exp(root_scalar(excess, bracket=(low, high), xtol=1e-12).root))

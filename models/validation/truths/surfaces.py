@@ -15,7 +15,7 @@ def jeffreys_thickness(
     below_edge: ArrayLike,
     time: ArrayLike,
     *,
-    viscosity: float,
+    viscosity: ArrayLike,
     density: float,
     gravity: float = GRAVITY,
 ) -> np.ndarray:
@@ -27,9 +27,10 @@ def jeffreys_thickness(
     Args:
         below_edge: Distance z below the film's upper edge [m].
         time: Since the wall was laid bare [s].
+        viscosity: Scalar or array; all broadcast.
     """
     z, time = np.asarray(below_edge, float), np.asarray(time, float)
-    return np.sqrt(viscosity * z / (density * gravity * time))
+    return np.sqrt(np.asarray(viscosity, float) * z / (density * gravity * time))
 
 
 def jeffreys_volume(  # noqa: PLR0913  a wall and a liquid
@@ -37,7 +38,7 @@ def jeffreys_volume(  # noqa: PLR0913  a wall and a liquid
     height: float,
     time: ArrayLike,
     *,
-    viscosity: float,
+    viscosity: ArrayLike,
     density: float,
     gravity: float = GRAVITY,
 ) -> np.ndarray:

@@ -22,7 +22,7 @@ def test_a_profile_is_the_mean_of_each_bin():
     profile = profiles.binned_profile([0.0, 0.1, 0.9, 2.0], [1.0, 3.0, 5.0, 7.0], 0.0, 1.0, 4)
     np.testing.assert_allclose(profile.at, [0.05, 0.9])
     np.testing.assert_allclose(profile.mean, [2.0, 5.0])
-    assert profile.count.tolist() == [2, 1]
+    assert profile.particles.tolist() == [2, 1]
     with pytest.raises(ValueError, match="no particle"):
         profiles.binned_profile([5.0], [1.0], 0.0, 1.0, 4)
 
