@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from . import __version__
+from . import __version__, cli_check
 from .cli_errors import OneLineErrors
 from .settings import RISKS, SAMPLERS, SURROGATES, CalibrationSettings, PourSettings
 
@@ -18,6 +18,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+app.add_typer(cli_check.app, name="check")
 
 
 def _print_version(asked: bool) -> None:

@@ -55,4 +55,4 @@ def _say(line: str) -> None:
 def _how_to_go_on(arguments: list[str]) -> str:
     needs_flag = "calibrate" in arguments and "--resume" not in arguments
     command = shlex.join(["bolfi-liquids", *arguments, *(["--resume"] if needs_flag else [])])
-    return f"interrupted: finished simulations are kept; go on with: {command}"
+    return f"interrupted: what has finished is kept; go on with: {command}"

@@ -1,0 +1,54 @@
+"""The bundled recordings, simulated with the liquids that they were made with."""
+
+from importlib.resources import as_file, files
+
+import numpy as np
+
+from ..models import Liquid, StirSetup, stir
+from ..models.validation import Case, CaseResult, Curve, Panel, Progress, Row
+from ..recordings import Recording, open_recording
+
+LIQUIDS = {"glycerin": 1.0, "water": 1e-3}
+"""Viscosities [Pa s] given to the solver that made the recordings."""
+PARTICLES, SEEDS = 1000, 4
+TOLERANCE = 0.9  # deg
+
+
+def run(progress: Progress, seed: int) -> CaseResult:
+    """RMS difference of the inclination, over time, planes and packings."""
+    rows, panels = [], []
+    for number, (name, viscosity) in enumerate(LIQUIDS.items()):
+        recording = _bundled(f"{name}_v10.nc")
+        liquid = Liquid(viscosity, 0.0, recording.number("liquid_density"))
+        setup = StirSetup.from_recording(recording, particles=PARTICLES)
+        seeds = seed * SEEDS + np.arange(SEEDS)
+        signals = np.degrees(stir(liquid, recording.gripper, setup, seeds))
+        recorded = np.degrees(recording.inclination)
+        apart = float(np.sqrt(np.nanmean((signals - recorded) ** 2)))
+        rows.append(Row.absolute(f"{name}, RMS difference [deg]", 0.0, apart, TOLERANCE))
+        time = recording.gripper.time
+        curves = [Curve(f"{name}, recorded", time, recorded[:, 0], truth=True, series=number)]
+        curves += [
+            Curve("simulated" if k == 0 else "", time, trial[:, 0], series=number)
+            for k, trial in enumerate(signals)
+        ]
+        panels.append(Panel("time [s]", "inclination in the xz plane [deg]", tuple(curves)))
+        progress((number + 1) / len(LIQUIDS))
+    return CaseResult(tuple(rows), tuple(panels))
+
+
+def _bundled(name: str) -> Recording:
+    with as_file(files("bolfi_liquids.data") / name) as path:
+        return open_recording(path)
+
+
+CASE = Case(
+    name="recorded_stirs",
+    title="Stirs by an independent solver",
+    truth="the same inclination for the same liquid",
+    source="SPlisHSPlasH 2.19, DFSPH; the bundled recordings, not measurements",
+    unit="deg",
+    tolerance=TOLERANCE,
+    settings={"viscosity": LIQUIDS, "particles": PARTICLES, "seeds": SEEDS},
+    run=run,
+)

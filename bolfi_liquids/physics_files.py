@@ -1,0 +1,125 @@
+"""What `check physics` keeps: a file for each case, and one with all results.
+
+OUT/cases/NAME.json is written whole when its case has finished, so that a killed check repeats
+no finished case, and two checks may run different cases side by side. OUT/physics.json is made
+from these.
+"""
+
+import json
+from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .errors import InputError
+from .files import write_text
+from .physics_identity import case_identity, has_identity
+from .physics_json import plain
+from .provenance import versions
+
+if TYPE_CHECKING:
+    from .models.validation import Case, CaseResult
+
+CASES = "cases"
+RESULTS = "physics.json"
+LIBRARIES = ("bolfi-liquids", "numpy", "scipy", "taichi")
+
+
+def finished_record(
+    case: "Case", result: "CaseResult", seed: int, seconds: float
+) -> dict[str, Any]:
+    """A case that ran to its end, within its tolerances or not."""
+    from .models.validation import Row
+
+    rows = [
+        dict(zip(Row._fields, row, strict=True)) | {"passed": row.passed} for row in result.rows
+    ]
+    panels = [
+        {"x_label": p.x_label, "y_label": p.y_label, "log": p.log}
+        | {"curves": [dict(c._asdict()) for c in p.curves]}
+        for p in result.panels
+    ]
+    record = _about(case, seed) | {
+        "passed": result.passed,
+        "error": None,
+        "seconds": round(seconds, 3),
+        "rows": rows,
+        "notes": dict(result.notes),
+        "panels": panels,
+    }
+    return plain(record)
+
+
+def failed_record(case: "Case", error: str, seed: int, seconds: float) -> dict[str, Any]:
+    """A case that raised; it is tried again by the next check."""
+    outcome = {"passed": False, "error": error, "seconds": round(seconds, 3)}
+    return _about(case, seed) | outcome | {"rows": [], "notes": {}, "panels": []}
+
+
+def write_record(out: Path, record: Mapping[str, Any]) -> None:
+    """Keep a case's record."""
+    text = json.dumps(record, indent=1, allow_nan=False)
+    write_text(out / CASES / f"{record['name']}.json", text + "\n")
+
+
+def read_record(out: Path, name: str) -> dict[str, Any] | None:
+    """A case's record; None where there is none.
+
+    Raises:
+        InputError: the file is damaged.
+    """
+    path = out / CASES / f"{name}.json"
+    if not path.exists():
+        return None
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as err:
+        raise InputError(
+            f"not JSON ({err})", where=str(path), fix="delete it to run it again"
+        ) from err
+    if not isinstance(record, dict) or record.get("name") != name:
+        raise InputError("not a case's record", where=str(path), fix="delete it to run it again")
+    return record
+
+
+def is_finished(record: Mapping[str, Any], identity: Mapping[str, Any]) -> bool:
+    """The record is of a case that ran to its end with the same seed, model, settings and code."""
+    return record.get("error") is None and has_identity(record, identity)
+
+
+def write_results(out: Path, records: Iterable[Mapping[str, Any]], seed: int) -> Path:
+    """All records in one file, without the points of their plots; its path."""
+    from .models import MODEL_VERSION
+
+    cases = {
+        record["name"]: {key: value for key, value in record.items() if key != "panels"}
+        for record in records
+    }
+    results = {
+        "created": _now(),
+        "version": versions(LIBRARIES)["bolfi-liquids"],
+        "model": MODEL_VERSION,
+        "seed": seed,
+        "versions": versions(LIBRARIES),
+        "passed": all(record["passed"] for record in cases.values()),
+        "cases": cases,
+    }
+    return write_text(out / RESULTS, json.dumps(results, indent=2, allow_nan=False) + "\n")
+
+
+def _about(case: "Case", seed: int) -> dict[str, Any]:
+    return {
+        "name": case.name,
+        "title": case.title,
+        "truth": case.truth,
+        "source": case.source,
+        "unit": case.unit,
+        "tolerance": case.tolerance,
+        **case_identity(case, seed),
+        "version": versions(("bolfi-liquids",))["bolfi-liquids"],
+        "created": _now(),
+    }
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")

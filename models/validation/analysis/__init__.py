@@ -1,0 +1,1 @@
+"""What a simulation's particles and signals say, as pure functions of arrays."""

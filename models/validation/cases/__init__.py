@@ -1,0 +1,1 @@
+"""One module a case; see `bolfi_liquids.models.validation`."""

@@ -1,0 +1,65 @@
+"""The stick alone: a uniform rod that swings from the gripper at rest."""
+
+import numpy as np
+
+from ...liquid import Liquid
+from ...stirring import Cup, Stick, StirSetup, stir
+from ..analysis.motion import oscillation
+from ..case import Case, CaseResult, Curve, Panel, Progress, Row
+from ..truths.pendulum import period_in_air
+from . import _stirring
+
+STICK = Stick(radius=0.005, length=0.15, mass=0.02)
+CUP = Cup(radius=0.1, height=0.1, fill=0.02)
+DIP = 0.003  # m; a scene has a liquid, here of a thousandth of air's density
+SHIFTS = (0.01, 0.035, 0.055)  # m, of the gripper: swings of some 6, 20 and 35 degrees
+SECONDS, RATE = 4.0, 240.0
+KEPT_TOLERANCE = 0.05
+TOLERANCE = 0.005
+
+
+def run(progress: Progress, seed: int) -> CaseResult:
+    """Period of each swing, and how much of its amplitude is left at the end."""
+    setup = StirSetup(CUP, STICK, DIP, particles=100)
+    nothing = Liquid(viscosity=0.0, cohesion=0.0, density=1e-3)
+    rows, curves, swings = [], [], []
+    for number, shift in enumerate(SHIFTS):
+        path = _stirring.kicked(shift, STICK.length + CUP.fill - DIP, SECONDS, RATE)
+        free = slice(_stirring.KICK, None)
+        time, angle = path.time[free], stir(nothing, path, setup, [seed])[0, free, 0]
+        swing = oscillation(time, angle)
+        kept = np.exp(-swing.decay * SECONDS)
+        # the amplitude halfway, as the swing may die away
+        halfway = swing.amplitude * np.exp(-swing.decay * SECONDS / 2)
+        degrees = np.degrees(swing.amplitude)
+        expected = float(period_in_air(halfway, _stirring.rod(STICK)))
+        rows += [
+            Row.relative(f"period at {degrees:.0f} deg [s]", expected, swing.period, TOLERANCE),
+            Row.relative(f"amplitude left at {degrees:.0f} deg", 1.0, kept, KEPT_TOLERANCE),
+        ]
+        curves.append(Curve(f"{degrees:.0f} deg", time, np.degrees(angle), series=number))
+        swings.append((np.degrees(halfway), swing.period))
+        progress((number + 1) / len(SHIFTS))
+    amplitudes = np.linspace(0.0, 40.0, 50)
+    periods = period_in_air(np.radians(amplitudes), _stirring.rod(STICK))
+    against = (
+        Curve("elliptic integral", amplitudes, periods, truth=True),
+        Curve("simulated", *np.transpose(swings)),
+    )
+    panels = (
+        Panel("time [s]", "inclination [deg]", tuple(curves)),
+        Panel("amplitude [deg]", "period [s]", against),
+    )
+    return CaseResult(tuple(rows), panels)
+
+
+CASE = Case(
+    name="pendulum_in_air",
+    title="Stick that swings in air",
+    truth="a rigid rod's period by its amplitude, and no loss",
+    source="Landau & Lifshitz, Mechanics, section 11",
+    unit="relative",
+    tolerance=TOLERANCE,
+    settings={"shifts": SHIFTS, "seconds": SECONDS, "stick": "r 5 mm, l 15 cm, 20 g"},
+    run=run,
+)

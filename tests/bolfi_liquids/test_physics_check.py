@@ -1,0 +1,247 @@
+"""The runner of validation cases, on cases that take no time."""
+
+import json
+import runpy
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from bolfi_liquids.models.validation import Case, CaseResult, Curve, Panel, Row
+from typer.testing import CliRunner
+
+from bolfi_liquids import physics_check
+from bolfi_liquids.cli import app
+from bolfi_liquids.errors import InputError
+from bolfi_liquids.physics_check import all_cases, check_physics
+
+
+def outcome(error=0.01):
+    x = np.linspace(1, 2, 5)
+    curves = (Curve("truth", x, x, truth=True), Curve("ours", x, x + error))
+    rows = (Row.relative("mass [kg]", 2.0, 2.0 * (1 + error), 0.05),)
+    return CaseResult(rows, (Panel("time [s]", "mass [kg]", curves, log="xy"),), {"n": np.int64(3)})
+
+
+def fake(name, run, **settings):
+    return Case(name, f"The {name} one", "mass stays", "Lavoisier", "relative", 0.05, settings, run)
+
+
+@pytest.fixture
+def calls():
+    return []
+
+
+@pytest.fixture
+def registry(calls):
+    def good(progress, seed):
+        calls.append(("good", seed))
+        progress(0.5)
+        return outcome()
+
+    def bad(progress, seed):
+        calls.append(("bad", seed))
+        return outcome(error=0.2)
+
+    return {"good": fake("good", good), "bad": fake("bad", bad)}
+
+
+def run(out, registry, names=(), **more):
+    return check_physics(out, names, cases=registry, progress=False, **more)
+
+
+def test_a_check_leaves_table_rows_plots_and_one_results_file(tmp_path, registry):
+    check = run(tmp_path / "out", registry, seed=4)
+    assert not check.passed
+    assert [record["passed"] for record in check.records] == [True, False]
+    results = json.loads(check.results.read_text())
+    assert results["seed"] == 4 and results["passed"] is False
+    assert results["version"] and results["model"] and results["versions"]["numpy"]
+    row = results["cases"]["bad"]["rows"][0]
+    assert row["error"] == pytest.approx(0.2) and row["tolerance"] == 0.05
+    assert results["cases"]["good"]["notes"] == {"n": 3}
+    for name in registry:
+        svg = ET.parse(tmp_path / "out" / f"{name}.svg").getroot()
+        assert svg.tag.endswith("svg")
+        assert f"The {name} one" in "".join(svg.itertext())
+
+
+def test_a_finished_case_is_not_repeated(tmp_path, registry, calls):
+    first = run(tmp_path, registry)
+    plot = (tmp_path / "good.svg").read_text()
+    (tmp_path / "good.svg").unlink()  # as if killed between record and plot
+    second = run(tmp_path, registry)
+    assert calls == [("good", 0), ("bad", 0)]
+    assert first.ran == ("good", "bad") and second.ran == ()
+    assert second.records == first.records
+    assert (tmp_path / "good.svg").read_text() == plot
+
+
+@pytest.mark.parametrize("change", ["seed", "settings", "model", "code"])
+def test_other_settings_run_again(tmp_path, registry, calls, change, monkeypatch):
+    run(tmp_path, registry, ["good"])
+    if change == "seed":
+        check = run(tmp_path, registry, ["good"], seed=1)
+    elif change == "settings":
+        check = run(tmp_path, {"good": fake("good", registry["good"].run, particles=9)})
+    elif change == "code":
+        other = tmp_path / "edited.py"
+        other.write_text("def run(progress, seed):\n    return run.good(progress, seed)\n")
+        edited = runpy.run_path(str(other))["run"]
+        edited.good = registry["good"].run
+        check = run(tmp_path, {"good": fake("good", edited)})
+    else:
+        monkeypatch.setattr("bolfi_liquids.models.MODEL_VERSION", "another")
+        check = run(tmp_path, registry, ["good"])
+    assert check.ran == ("good",) and len(calls) == 2
+
+
+def test_some_cases_are_run_and_all_finished_ones_are_in_the_results(tmp_path, registry):
+    run(tmp_path, registry, ["bad"])
+    check = run(tmp_path, registry, ["good", "good"])
+    assert check.ran == ("good",) and check.passed
+    assert set(json.loads(check.results.read_text())["cases"]) == {"good", "bad"}
+
+
+def test_a_case_that_raises_costs_itself_alone_and_is_tried_again(tmp_path, registry):
+    tries = []
+
+    def breaks(progress, seed):
+        tries.append(seed)
+        if len(tries) == 1:
+            raise RuntimeError("neighbour lists\noverflowed")
+        return outcome()
+
+    registry = {"breaks": fake("breaks", breaks), **registry}
+    first = run(tmp_path, registry)
+    assert [record["name"] for record in first.records] == ["breaks", "good", "bad"]
+    assert first.records[0]["error"] == "RuntimeError: neighbour lists overflowed"
+    assert "in breaks" in first.records[0]["traceback"]
+    assert not first.passed and not (tmp_path / "breaks.svg").exists()
+    second = run(tmp_path, registry)
+    assert second.ran == ("breaks",) and second.records[0]["passed"]
+    assert (tmp_path / "breaks.svg").exists()
+
+
+def test_what_is_no_number_is_kept_as_null_and_fails(tmp_path):
+    def diverged(progress, seed):
+        panel = Panel("x", "y", (Curve("", [0.0, 1.0], [np.nan, 1.0]),))
+        return CaseResult((Row.absolute("speed [m/s]", 1.0, np.nan, 0.5),), (panel,))
+
+    check = run(tmp_path, {"diverged": fake("diverged", diverged)})
+    assert check.records[0]["rows"][0]["ours"] is None
+    assert not check.passed
+
+
+def test_interruption_keeps_what_has_finished(tmp_path, registry, calls):
+    def interrupted(progress, seed):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(tmp_path, registry | {"long": fake("long", interrupted)})
+    assert run(tmp_path, registry).ran == ()
+
+
+def test_a_killed_check_goes_on(tmp_path):
+    """SIGKILL in the second case; the first is not run again, the second is."""
+    script = tmp_path / "check.py"
+    script.write_text(
+        textwrap.dedent("""
+        import sys, time
+        from pathlib import Path
+        from bolfi_liquids.models.validation import Case, CaseResult, Curve, Panel, Row
+        from bolfi_liquids.physics_check import check_physics
+
+        here = Path(sys.argv[1])
+
+        def run(name, sleep):
+            def simulate(progress, seed):
+                with open(here / "log", "a") as log:
+                    log.write(name + "\\n")
+                time.sleep(sleep)
+                panel = Panel("x", "y", (Curve("", [0], [0]),))
+                return CaseResult((Row.absolute("q", 1, 1, 0),), (panel,))
+            return Case(name, name, "t", "s", "relative", 0.0, {}, simulate)
+
+        cases = [run("first", 0), run("second", float(sys.argv[2]))]
+        check_physics(here / "out", cases={case.name: case for case in cases}, progress=False)
+        """)
+    )
+    command = [sys.executable, str(script), str(tmp_path)]
+    process = subprocess.Popen([*command, "60"])
+    log = tmp_path / "log"
+    deadline = time.monotonic() + 60
+    while not (log.exists() and "second" in log.read_text()):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    subprocess.run([*command, "0"], check=True)
+    assert log.read_text().split() == ["first", "second", "second"]
+    assert json.loads((tmp_path / "out" / "physics.json").read_text())["passed"] is True
+
+
+def test_bad_arguments_are_named(tmp_path, registry):
+    with pytest.raises(InputError, match="--case.*'none'.*good, bad"):
+        run(tmp_path / "out", registry, ["none"])
+    with pytest.raises(InputError, match="--seed: is -1"):
+        run(tmp_path / "out", registry, seed=-1)
+    assert not (tmp_path / "out").exists()
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="not a directory"):
+        run(tmp_path / "file", registry)
+    (tmp_path / "cases").mkdir()
+    (tmp_path / "cases" / "good.json").write_text("{")
+    with pytest.raises(InputError, match=r"good\.json: not JSON.*delete it"):
+        run(tmp_path, registry)
+
+
+def check_on_the_command_line(*arguments):
+    return CliRunner().invoke(app, ["check", "physics", *map(str, arguments)])
+
+
+def test_the_command_prints_the_table_and_its_status(tmp_path, registry, monkeypatch):
+    monkeypatch.setattr(physics_check, "all_cases", lambda: registry)
+    failed = check_on_the_command_line("--out", tmp_path)
+    assert failed.exit_code == 1
+    for text in ("Lavoisier", "mass [kg]", "+20.0%", "5.0%", "FAIL", "pass", "1 of 2"):
+        assert text in failed.stdout
+    assert f"results: {tmp_path}/physics.json" in failed.stdout
+    assert "good (1 of 2)" in failed.stderr
+    passed = check_on_the_command_line("--out", tmp_path, "--case", "good")
+    assert passed.exit_code == 0
+    assert "bad" not in passed.stdout and passed.stderr == ""
+
+
+def test_the_command_says_what_failed(tmp_path, monkeypatch):
+    def breaks(progress, seed):
+        raise RuntimeError("overflow [b]")
+
+    monkeypatch.setattr(physics_check, "all_cases", lambda: {"breaks": fake("breaks", breaks)})
+    result = check_on_the_command_line("--out", tmp_path)
+    assert result.exit_code == 1
+    assert "ERROR" in result.stdout
+    assert "breaks failed: RuntimeError: overflow [b]; it is tried again" in result.stdout
+
+
+def test_misuse_of_the_command_is_one_line(tmp_path):
+    result = check_on_the_command_line("--out", tmp_path / "out", "--case", "none")
+    assert result.exit_code == 2
+    (line,) = result.stderr.strip().splitlines()
+    assert line.startswith("error: --case: no case 'none'")
+    assert CliRunner().invoke(app, ["check", "physics", "--help"]).exit_code == 0
+
+
+def test_all_cases_are_there_without_starting_taichi():
+    code = (
+        "import sys; from bolfi_liquids.physics_check import all_cases; all_cases();"
+        "print([m for m in ('taichi', 'jax', 'matplotlib') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+    for name, case in all_cases().items():
+        assert case.name == name

@@ -1,0 +1,210 @@
+"""Cylinders in a stream, rods on a pivot, films and drops."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from bolfi_liquids.models.validation.truths import (
+    cylinder_drag,
+    oscillating_rod,
+    pendulum,
+    surfaces,
+)
+from scipy.integrate import quad, solve_ivp
+
+ROD = pendulum.Rod(length=0.14, radius=0.005, mass=0.015)
+
+
+def test_drag_meets_the_creeping_flow_and_the_computed_one():
+    assert cylinder_drag.drag_coefficient(0.1) == pytest.approx(
+        cylinder_drag.lamb_drag_coefficient(0.1), rel=0.03
+    )
+    for reynolds, computed in cylinder_drag.DENNIS_CHANG.items():
+        assert cylinder_drag.drag_coefficient(reynolds) == pytest.approx(computed, rel=0.12)
+
+
+def test_drag_interpolates_its_table_and_falls():
+    reynolds, values = cylinder_drag.DRAG_COEFFICIENT.T
+    np.testing.assert_allclose(cylinder_drag.drag_coefficient(reynolds), values, rtol=1e-12)
+    fine = np.geomspace(0.1, 1000, 300)
+    assert (np.diff(cylinder_drag.drag_coefficient(fine)) < 0).all()
+    # while the force per length rises with the speed all the way
+    force = cylinder_drag.drag_per_length(fine, radius=0.5, density=1.0, viscosity=1.0)
+    assert (np.diff(force) > 0).all()
+    with pytest.raises(ValueError, match="0.1 to 1000"):
+        cylinder_drag.drag_coefficient(2000.0)
+
+
+@pytest.mark.parametrize("amplitude", [0.02, 0.5, 1.5])
+def test_period_in_air_is_that_of_the_equation_of_motion(amplitude):
+    lever = 0.5 * ROD.mass * 9.81 * ROD.length / ROD.inertia
+
+    def rhs(_, state):
+        return [state[1], -lever * np.sin(state[0])]
+
+    def at_bottom(_, state):
+        return state[0]
+
+    solved = solve_ivp(rhs, (0, 2), [amplitude, 0], events=at_bottom, rtol=1e-10, atol=1e-12)
+    expected = 2.0 * (solved.t_events[0][1] - solved.t_events[0][0])
+    assert pendulum.period_in_air(amplitude, ROD) == pytest.approx(expected, rel=1e-7)
+
+
+def test_inertia_is_the_integral_over_the_cylinder():
+    """Slices of a rod: x² + r²/4 each."""
+    slices, _ = quad(lambda x: x**2 + ROD.radius**2 / 4, 0, ROD.length)
+    assert ROD.inertia == pytest.approx(ROD.mass / ROD.length * slices)
+
+
+def test_a_dipped_rod_swings_slower_by_its_slices():
+    submerged, density = 0.06, 1000.0
+    dry = ROD.length - submerged
+    lift, _ = quad(lambda x: x, dry, ROD.length)
+    wet, _ = quad(lambda x: x**2, dry, ROD.length)
+    per_length = density * np.pi * ROD.radius**2
+    torque = 9.81 * (ROD.mass * ROD.length / 2 - per_length * lift)
+    expected = 2 * np.pi * np.sqrt((ROD.inertia + per_length * wet) / torque)
+    assert pendulum.period_in_liquid(ROD, submerged, density) == pytest.approx(expected)
+    assert pendulum.period_in_liquid(ROD, 0.0, density) == pytest.approx(
+        pendulum.period_in_air(0.0, ROD)
+    )
+    with pytest.raises(ValueError, match="floats"):
+        pendulum.period_in_liquid(dataclasses.replace(ROD, mass=1e-4), submerged, density)
+
+
+def test_added_mass_grows_as_the_walls_close_in():
+    """The potential flow in an annulus; its kinetic energy integrated by SciPy."""
+    inner, outer = 1.0, 2.5
+    # phi = (A r + B/r) cos θ with phi_r = cos θ at the inner wall and 0 at the outer
+    b = -(inner**2) * outer**2 / (outer**2 - inner**2)
+    a = b / outer**2
+    energy, _ = quad(
+        lambda r: np.pi * r * ((a - b / r**2) ** 2 + (a + b / r**2) ** 2), inner, outer
+    )
+    assert pendulum.added_mass_coefficient(inner, outer) == pytest.approx(energy / np.pi)
+    assert pendulum.added_mass_coefficient(inner) == 1.0
+    assert pendulum.added_mass_coefficient(inner, 1e6) == pytest.approx(1.0)
+
+
+def test_a_light_rod_floats_where_its_torque_vanishes_and_holds():
+    light = dataclasses.replace(ROD, mass=0.3 * 1000 * ROD.area * ROD.length)
+    angle = pendulum.floating_angle(light, 0.08, 1000.0)
+    assert 0.1 < angle < 1.2
+    around = pendulum.archimedes_torque(angle + np.array([-0.05, 0, 0.05]), light, 0.08, 1000.0)
+    assert around[1] == pytest.approx(0.0, abs=1e-9)
+    assert around[0] < 0 < around[2]
+    # a heavy one, and one that hardly dips in, hang straight down
+    assert pendulum.floating_angle(dataclasses.replace(ROD, mass=0.1), 0.08, 1000.0) == 0.0
+    assert pendulum.floating_angle(light, 0.13, 1000.0) == 0.0
+
+
+def test_the_torque_is_the_slope_of_the_potential_energy():
+    """Of the rod's weight and of the liquid it lifts, slice by slice."""
+    surface, density = 0.08, 1000.0
+
+    def energy(angle):
+        height, _ = quad(lambda x: -x * np.cos(angle), 0, ROD.length)
+        dry = surface / np.cos(angle)
+        lifted, _ = quad(lambda x: x * np.cos(angle) - surface, dry, ROD.length)
+        return 9.81 * (ROD.mass / ROD.length * height + density * ROD.area * lifted)
+
+    slope = (energy(0.4 + 1e-4) - energy(0.4 - 1e-4)) / 2e-4
+    assert pendulum.archimedes_torque(0.4, ROD, surface, density) == pytest.approx(slope, rel=1e-6)
+
+
+def test_pressure_grows_from_the_surface_down():
+    depth = np.array([-0.01, 0.0, 0.1])
+    np.testing.assert_allclose(surfaces.hydrostatic_pressure(depth, 1000.0), [0, 0, 981.0])
+
+
+def test_jeffreys_film_conserves_mass():
+    """h_t + (ρ g h³ / 3 μ)_z = 0 with the flux of a film in free fall."""
+    liquid = {"viscosity": 1.4, "density": 1260.0}
+
+    def film(z, t):
+        return surfaces.jeffreys_thickness(z, t, **liquid)
+
+    def flux(z, t):
+        return 1260.0 * 9.81 * film(z, t) ** 3 / (3 * 1.4)
+
+    z, t, step = 0.07, 3.0, 1e-4
+    thinning = (film(z, t + step) - film(z, t - step)) / (2 * step)
+    outflow = (flux(z + step, t) - flux(z - step, t)) / (2 * step)
+    assert thinning == pytest.approx(-outflow, rel=1e-5)
+    held, _ = quad(lambda z: 0.2 * film(z, t), 0, 0.1)
+    assert surfaces.jeffreys_volume(0.2, 0.1, t, **liquid) == pytest.approx(held, rel=1e-6)
+    # 1.5 mm of glycerol, 0.1 m down after 5 s
+    assert film(0.1, 5.0) == pytest.approx(1.5e-3, rel=0.05)
+
+
+def test_drops_of_known_size():
+    """A water drop of 1 mm radius: near 120 Hz, 146 Pa inside, 5 ν/R² = 5 /s."""
+    water = {"density": 998.2}
+    assert surfaces.rayleigh_frequency(1e-3, tension=0.0728, **water) == pytest.approx(121.6, 0.01)
+    assert surfaces.rayleigh_decay(1e-3, viscosity=1e-3, **water) == pytest.approx(5.0, rel=0.01)
+    assert surfaces.laplace_pressure(1e-3, 0.0728) == pytest.approx(145.6)
+    assert surfaces.rayleigh_frequency(1e-3, tension=0.07, density=1e3, mode=1) == 0.0
+
+
+def test_the_rayleigh_frequency_is_that_of_its_energies():
+    """Mode 2 of amplitude a: surface energy 8/5·π... by quadrature of the spheroid's area.
+
+    R(1 + a P2) has kinetic energy ½ (4π/5)(ρ R⁵/2) ȧ² and, at constant volume, an area that
+    grows by k a²/2: ω² = σ k / ((4π/5) ρ R⁵ / 2).
+    """
+
+    def area(a):
+        x, weight = np.polynomial.legendre.leggauss(60)
+        p2, slope = 0.5 * (3 * x**2 - 1), 3 * x
+        r = 1 + a * p2
+        tilt = a * slope * np.sqrt(1 - x**2)
+        volume = 2 * np.pi / 3 * np.sum(weight * r**3)
+        surface = 2 * np.pi * np.sum(weight * r * np.sqrt(r**2 + tilt**2))
+        return surface * (4 * np.pi / 3 / volume) ** (2 / 3)
+
+    a = 1e-2
+    stiffness = 2 * (area(a) - area(0.0)) / a**2
+    inertia = 4 * np.pi / 5 / 2
+    expected = np.sqrt(stiffness / inertia) / (2 * np.pi)
+    ours = surfaces.rayleigh_frequency(1.0, tension=1.0, density=1.0)
+    assert ours == pytest.approx(expected, rel=0.02)
+
+
+@pytest.mark.parametrize("kinematic", [0.01, 0.3, 5.0])
+def test_stokes_reaction_solves_the_oscillating_boundary_layer(kinematic):
+    """A unit cylinder held in liquid that oscillates far away: ψ = (r + a/r + b w) sin θ.
+
+    w'' + w'/r - w/r² = iω/ν w decays outwards; q = w'/w is integrated inwards. No slip gives
+    a = (1 - q) / (1 + q), and pressure and friction add to -2 a of the displaced liquid's
+    inertia, of which 1 is that of the liquid's own acceleration.
+    """
+    omega, far = 2.0, 12.0
+    kappa = 1j * omega / kinematic
+
+    def inwards(depth, q):
+        r = far - depth
+        return -(kappa + 1.0 / r**2 - q / r - q**2)
+
+    start = np.array([-np.sqrt(kappa) - 0.5 / far])
+    q = solve_ivp(inwards, (0, far - 1), start, method="BDF", rtol=1e-9, atol=1e-9).y[0, -1]
+    reaction = -1.0 - 2.0 * (1.0 - q) / (1.0 + q)
+    ours = oscillating_rod.stokes_reaction(1.0, omega, kinematic)
+    assert ours.added_mass == pytest.approx(reaction.real, rel=1e-4)
+    assert ours.damping == pytest.approx(-reaction.imag, rel=1e-4)
+
+
+def test_a_swing_in_thin_liquid_is_that_of_potential_flow():
+    """And its slight decay comes from a boundary layer: 2.83 / (r sqrt(ω/ν)) of added mass."""
+    thin = oscillating_rod.swing_in_liquid(ROD, 0.06, density=1000.0, viscosity=1e-9)
+    period = pendulum.period_in_liquid(ROD, 0.06, 1000.0)
+    assert thin.period == pytest.approx(period, rel=1e-3)
+    omega = 2 * np.pi / period
+    layer = 2 * np.sqrt(2) / (ROD.radius * np.sqrt(omega / 1e-12))
+    wet = 1000.0 * ROD.area * (ROD.length**3 - (ROD.length - 0.06) ** 3) / 3
+    assert thin.decay == pytest.approx(0.5 * layer * wet * omega / (ROD.inertia + wet), rel=1e-2)
+    thick = oscillating_rod.swing_in_liquid(ROD, 0.06, density=1000.0, viscosity=0.05)
+    assert thick.period > thin.period and thick.decay > 10 * thin.decay
+    cup = oscillating_rod.swing_in_liquid(
+        ROD, 0.06, density=1000.0, viscosity=1e-9, outer_radius=0.02
+    )
+    assert cup.period > thin.period

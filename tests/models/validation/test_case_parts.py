@@ -1,0 +1,41 @@
+"""What cases compute beside their simulation."""
+
+import numpy as np
+import pytest
+from bolfi_liquids.models.validation.cases import _stirring, retained_film, seed_noise
+
+
+def test_a_kick_ends_on_the_axis_and_stays():
+    path = _stirring.kicked(0.02, 0.15, 0.5, 60.0)
+    assert path.position.shape == (31, 3) and path.time[-1] == pytest.approx(0.5)
+    assert path.position[0] == pytest.approx([-0.02, 0.0, 0.15])
+    np.testing.assert_allclose(path.position[_stirring.KICK :], [[0.0, 0.0, 0.15]] * 29)
+
+
+def test_tilt_is_the_angle_between_vectors():
+    rng = np.random.default_rng(0)
+    direction = rng.normal(size=(20, 3))
+    direction[:, 2] = -np.abs(direction[:, 2])
+    signal = np.arctan2(direction[:, :2], -direction[:, 2:])
+    expected = np.arccos(-direction[:, 2] / np.linalg.norm(direction, axis=1))
+    np.testing.assert_allclose(_stirring.tilt(signal), expected)
+
+
+def test_strokes_keep_their_speed_and_stay_in_the_cup():
+    time, position = seed_noise.strokes()
+    speed = np.abs(np.diff(position[:, 0])) / np.diff(time)
+    assert np.median(speed) == pytest.approx(seed_noise.SPEED)
+    assert np.abs(position[:, 0]).max() <= seed_noise.STROKE
+    assert position[0, 0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_spread_is_the_noise_put_in():
+    rng = np.random.default_rng(1)
+    signals = np.linspace(-5, 5, 400)[:, None] + 0.3 * rng.standard_normal((8, 400, 2))
+    assert seed_noise.spread(signals) == pytest.approx(0.3, rel=0.03)
+
+
+def test_the_film_grows_with_the_root_of_the_viscosity():
+    thin, thick = retained_film.film(np.array([0.01, 1.0]))
+    assert thick / thin == pytest.approx(10.0)
+    assert 0.0 < thick < 0.2
