@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-MODEL_VERSION = "2"  # rises with every change that alters a simulation's bits
+MODEL_VERSION = "3"  # rises with every change that alters a simulation's bits
+COARSE = 0.0065  # m, the particle spacing that `Numerics.rate` is for
 POUR_PARTICLES = 664  # 5 mm apart in the bundled cups
 
 
@@ -12,27 +13,39 @@ class Numerics:
     given these, so they are fixed before inference and kept with every result.
 
     Attributes:
-        rate: Substeps per second [Hz].
-        iterations: Density iterations a substep.
-        sweeps: Gauss-Seidel sweeps of the viscosity a substep.
+        rate: Substeps per second at 6.5 mm between particles [Hz]; smaller ones take more, since
+            pressure makes them swing about each other faster.
+        iterations: Sweeps over the density constraints a substep.
+        feedback: Share of a density error that a substep corrects.
+        memory: Share of the last substep's multipliers that the next one starts from.
+        viscous_tolerance: Of the viscous solve, relative to its first residual.
         support: Kernel support radius h in particle spacings.
-        compliance: Relaxation of the density constraint, in 1/h² (Macklin & Müller 2013, eq. 11).
-        wall_slip: Factor on the tangential viscous coupling to walls, chosen on pours by an
-            independent solver. Flow mirrored in the wall would explain 2 to 4 of it; the rest
-            makes up for a wall that one layer of particles feels.
+        quiet: Least kinematic viscosity, in d² of a substep: what keeps thin liquids at rest.
+        own_viscosity: Kinematic viscosity that the particles' disorder adds, in d² of a substep.
+        viscosity_gain: Factor on the viscosity of pairs; with the former chosen such that
+            channel flow has the viscosity asked for.
+        wall_slip: Factor on the tangential viscous coupling to walls.
         wall_normal: The same factor for the normal direction.
         stick_drag: The same factor for the stick, which is about one particle wide.
         attraction: Acceleration of the surface attraction at cohesion 1 [m/s²].
         contact: Least distance of a particle's centre to a wall, in spacings.
     """
 
-    rate: float = 240.0
+    rate: float = 200.0
     iterations: int = 2
-    sweeps: int = 3
-    support: float = 2.0
-    compliance: float = 1.0
-    wall_slip: float = 40.0
+    feedback: float = 0.4
+    memory: float = 0.8
+    viscous_tolerance: float = 0.03
+    support: float = 2.12
+    quiet: float = 6e-4
+    own_viscosity: float = 1.8e-3
+    viscosity_gain: float = 1.5
+    wall_slip: float = 4.0
     wall_normal: float = 1.0
-    stick_drag: float = 1.0
+    stick_drag: float = 0.5
     attraction: float = 15.0
     contact: float = 0.25
+
+    def substep_rate(self, spacing: float) -> float:
+        """Substeps per second [Hz] for particles `spacing` [m] apart."""
+        return self.rate * COARSE / spacing

@@ -119,7 +119,7 @@ def _run(scene, cups, liquid, action, seeds) -> np.ndarray:
     scene.relax_packing(size, SETTLING)
     scene.pour_in(liquid)
     hold = cups.pour.hold + DRIP
-    steps = int((cups.pour.final_angle / rate.min() + hold) * scene.numerics.rate)
+    steps = int((cups.pour.final_angle / rate.min() + hold) * scene.rate)
     for start in range(0, steps, CHUNK):
         scene.pour(size, start, min(start + CHUNK, steps), hold)
     scene.count(size)

@@ -32,6 +32,7 @@ class PouringScene(Fluid):
             ti.field(ti.f32, slots) for _ in range(4)
         )
         self.region = ti.field(ti.i32, (slots, particles))
+        self.carry(self.region, ti.field(ti.i32, (slots, particles)))
         self.received, self.spilled, self.retained = (ti.field(ti.i32, slots) for _ in range(3))
 
     @ti.func
@@ -61,39 +62,41 @@ class PouringScene(Fluid):
 
     @ti.func
     def boundary(self, b, i):
+        """The cup is the moving body: it turns as it is told, whatever the liquid does."""
         density = 0.0
         self.wall[b, i] = vec3(0.0)
+        self.body_wall[b, i] = vec3(0.0)
+        grip, moving = ti.Matrix.zero(ti.f32, 3, 3), vec3(0.0)
         if self.region[b, i] == INSIDE:
-            side, floor, outward = self.walls_at(self.to_cup(b, self.predicted[b, i]))
-            gradient = (-side[1] * outward + floor[1] * vec3(0.0, 0.0, 1.0)) / self.h
-            self.wall[b, i] = self.turn(b, gradient)
+            p = self.position[b, i]
+            side, floor, outward = self.walls_at(self.to_cup(b, p))
+            outward = self.turn(b, outward)
+            up = self.turn(b, vec3(0.0, 0.0, 1.0))
+            self.body_wall[b, i] = (floor[1] * up - side[1] * outward) / self.h
             density = side[0] + floor[0]
+            moving = self.turning[b] * vec3(p.z, 0.0, -p.x)
+            grip = self.wall_grip(side, outward) + self.wall_grip(floor, up)
+        self.grip_walls(b, i, grip, moving)
         return density
+
+    @ti.func
+    def body_velocity(self, b, i):
+        return self.wall_velocity[b, i]
 
     @ti.func
     def contain(self, b):
         limit = self.cup_radius - self.margin
         for i in range(self.alive[b]):
             if self.region[b, i] == INSIDE:
-                q = self.to_cup(b, self.predicted[b, i])
+                p = self.position[b, i]
+                q = self.to_cup(b, p)
                 reach = ti.sqrt(q.x * q.x + q.y * q.y)
                 if q.z < self.cup_height and (reach > limit or q.z < self.margin):
                     inward = ti.min(limit / ti.max(reach, 1e-6), 1.0)
                     q = vec3(inward * q.x, inward * q.y, ti.max(q.z, self.margin))
-                    self.predicted[b, i] = self.to_world(b, q)
-
-    @ti.func
-    def drag(self, b):
-        share = self.wall_share(b)
-        for i in range(self.alive[b]):
-            if self.region[b, i] == INSIDE:
-                p = self.position[b, i]
-                side, floor, outward = self.walls_at(self.to_cup(b, p))
-                moving = self.turning[b] * vec3(p.z, 0.0, -p.x)
-                v = self.velocity[b, i] - moving
-                v = self.rub(v, self.turn(b, outward), side, share)
-                v = self.rub(v, self.turn(b, vec3(0.0, 0.0, -1.0)), floor, share)
-                self.velocity[b, i] = v + moving
+                    inside = self.to_world(b, q)
+                    self.position[b, i] = inside
+                    self.velocity[b, i] = self.velocity[b, i] + (inside - p) / self.dt
 
     @ti.func
     def follow(self, b):
@@ -122,7 +125,7 @@ class PouringScene(Fluid):
                 self.alive[b] = last
                 self.position[b, i] = self.position[b, last]
                 self.velocity[b, i] = self.velocity[b, last]
-                self.kick[b, i] = self.kick[b, last]
+                self.multiplier[b, i] = self.multiplier[b, last]
                 self.region[b, i] = self.region[b, last]
             else:
                 i += 1
@@ -141,7 +144,6 @@ class PouringScene(Fluid):
                         self.turning[b] = ti.select(self.angle[b] < self.final_angle, rate, 0.0)
                         self.follow(b)
                         self.flow(b)
-                        self.relax(b)
                         self.catch(b)
 
     @ti.kernel

@@ -127,6 +127,11 @@ class StirSetup:
         return float((self.liquid_volume(self.cup.fill) / self.particles) ** (1.0 / 3.0))
 
     @property
+    def rate(self) -> float:
+        """Substeps per second [Hz]."""
+        return self.numerics.substep_rate(self.spacing)
+
+    @property
     def deepest(self) -> float:
         """Largest depth of liquid for which there is room [m]."""
         return max(min(self.cup.height, ROOM * self.cup.fill), self.cup.fill)
@@ -176,7 +181,7 @@ def stir(
     size = len(seeds)
     liquid = liquid.batch(size)
     acting = acting_in("stir", effects, size)
-    path = substep_path(gripper, setup.numerics.rate)
+    path = substep_path(gripper, setup.rate)
     written = Rig(
         stick_mass=np.full(size, setup.stick.mass),
         pivot_friction=np.zeros(size),
@@ -189,7 +194,7 @@ def stir(
     with runtime.LOCK:
         for scene, part in _parts(setup, rig.fill):
             directions = _run(scene, setup, liquid[part], rig.rows(part), seeds[part])
-            angles[part] = inclination(directions, gripper.time, setup.numerics.rate)
+            angles[part] = inclination(directions, gripper.time, setup.rate)
     return changed_signal(gripper.time, angles, acting)
 
 
@@ -270,8 +275,9 @@ def _run(scene, setup, liquid, rig, seeds) -> np.ndarray:
     # packings settle around the setup's stick: the start tells sticks apart no more than liquids
     scene.fit_stick(np.full(size, setup.stick.mass), np.zeros(size))
     scene.place_stick(pivots)
+    scene.hold_stick(True)
     scene.relax_packing(size, SETTLING)
-    scene.place_stick(pivots)  # the liquid has pushed at what was held
+    scene.hold_stick(False)
     scene.pour_in(liquid)
     scene.fit_stick(rig.stick_mass, rig.pivot_friction)
 

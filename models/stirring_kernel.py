@@ -10,7 +10,12 @@ from .fluid import GRAVITY, STRIDE, Fluid, vec3
 
 @ti.data_oriented
 class StirringScene(Fluid):
-    """Fluid, cup and stick of a batch of stirring trials."""
+    """Fluid, cup and stick of a batch of stirring trials.
+
+    The stick is the moving body: `swing` is the rate of change of its direction [1/s]. In the
+    viscous solve its unknown is `swing` times the root of inertia over a particle's mass, which
+    makes the matrix symmetric.
+    """
 
     def __init__(self, slots, setup, particles=None):
         """
@@ -31,14 +36,18 @@ class StirringScene(Fluid):
         self.stick_end = stick.length - 2.0 * stick.radius / 3.0
         self.stick_gyration = stick.gyration
         self.stick_table = self.load(tables.cylinder(stick.radius / self.h))
-        self.pivot, self.pivot_velocity, self.direction, self.swing, self.torque = (
-            ti.Vector.field(3, ti.f32, slots) for _ in range(5)
+        self.pivot, self.pivot_velocity, self.direction, self.swing = (
+            ti.Vector.field(3, ti.f32, slots) for _ in range(4)
         )
-        self.stick_wall = ti.Vector.field(3, ti.f32, (slots, particles))
-        self.stick_mass, self.stick_inertia, self.pivot_friction = (
-            ti.field(ti.f32, slots) for _ in range(3)
+        self.stick_residual, self.stick_search, self.stick_image = (
+            ti.Vector.field(3, ti.f32, slots) for _ in range(3)
+        )
+        self.lever, self.stick_grip = (ti.field(ti.f32, (slots, particles)) for _ in range(2))
+        self.stick_mass, self.stick_inertia, self.pivot_friction, self.free = (
+            ti.field(ti.f32, slots) for _ in range(4)
         )
         self.fit_stick(np.full(slots, stick.mass), np.zeros(slots))
+        self.free.fill(1.0)
 
     @ti.func
     def from_stick(self, b, p):
@@ -49,104 +58,145 @@ class StirringScene(Fluid):
 
     @ti.func
     def boundary(self, b, i):
-        p = self.predicted[b, i]
-        radial = vec3(p.x, p.y, 0.0)
-        reach = ti.max(radial.norm(), 1e-6)
+        p = self.position[b, i]
+        reach = ti.max(ti.sqrt(p.x * p.x + p.y * p.y), 1e-6)
+        outward = vec3(p.x, p.y, 0.0) / reach
         side = self.look_up(self.half_space, self.cup_radius - reach)
         floor = self.look_up(self.half_space, p.z)
-        self.wall[b, i] = (-side[1] / (reach * self.h)) * radial + vec3(0.0, 0.0, floor[1] / self.h)
+        self.wall[b, i] = (floor[1] * vec3(0.0, 0.0, 1.0) - side[1] * outward) / self.h
+        grip = self.wall_grip(side, outward) + self.wall_grip(floor, vec3(0.0, 0.0, 1.0))
+        self.grip_walls(b, i, grip, vec3(0.0))
+
         offset, lever = self.from_stick(b, p)
         distance = ti.max(offset.norm(), 1e-6)
         stick = self.look_up(self.stick_table, distance - self.stick_radius)
-        self.stick_wall[b, i] = (stick[1] / (distance * self.h)) * offset
-        self.wall[b, i] = self.wall[b, i] + self.stick_wall[b, i]
+        self.body_wall[b, i] = (stick[1] / (distance * self.h)) * offset
+        self.lever[b, i] = lever
+        share = self.unit_coupling * self.kinematic(b) / (self.h * self.h)
+        self.stick_grip[b, i] = share * self.numerics.stick_drag * 0.5 * (stick[2] + stick[3])
         return side[0] + floor[0] + stick[0]
+
+    @ti.func
+    def across(self, b, v):
+        """The part of v that turns the stick."""
+        return v - v.dot(self.direction[b]) * self.direction[b]
+
+    @ti.func
+    def yielding(self, b, i):
+        """A particle's mass times its lever, by the stick's inertia; 0 while the stick is held."""
+        mass = self.density[b] * self.volume
+        return self.free[b] * mass * self.lever[b, i] / self.stick_inertia[b]
+
+    @ti.func
+    def body_softness(self, b, i):
+        normal = self.across(b, self.body_wall[b, i])
+        return self.yielding(b, i) * self.lever[b, i] * normal.dot(normal)
+
+    @ti.func
+    def body_velocity(self, b, i):
+        return self.pivot_velocity[b] + self.lever[b, i] * self.swing[b]
+
+    @ti.func
+    def push_body(self, b, i, multiplier):
+        push = multiplier * self.across(b, self.body_wall[b, i])
+        self.swing[b] = self.swing[b] + self.yielding(b, i) * push
+
+    @ti.func
+    def stick_scale(self, b):
+        """Root of the stick's inertia over a particle's mass [m]."""
+        return ti.sqrt(self.stick_inertia[b] / (self.density[b] * self.volume))
+
+    @ti.func
+    def body_load(self, b):
+        self.stick_search[b] = self.stick_scale(b) * self.swing[b]
+
+    @ti.func
+    def body_apply(self, b, moves):
+        scale = self.stick_scale(b)
+        search = self.stick_search[b]
+        image = search
+        for i in range(self.alive[b]):
+            q = self.stick_grip[b, i]
+            if q > 0.0:
+                arm = self.lever[b, i] / scale
+                slide = self.search_direction[b, i] - arm * search - moves * self.pivot_velocity[b]
+                self.image[b, i] = self.image[b, i] + q * slide
+                image -= (q * arm) * self.across(b, slide)
+        self.stick_image[b] = image
+
+    @ti.func
+    def body_residual(self, b):
+        r = self.free[b] * (self.stick_scale(b) * self.swing[b] - self.stick_image[b])
+        self.stick_residual[b] = r
+        self.stick_search[b] = r
+        return r.dot(r)
+
+    @ti.func
+    def body_curvature(self, b):
+        return self.stick_search[b].dot(self.stick_image[b])
+
+    @ti.func
+    def body_step(self, b, step):
+        scale = self.stick_scale(b)
+        self.swing[b] = self.swing[b] + (step / scale) * self.stick_search[b]
+        r = self.stick_residual[b] - self.free[b] * step * self.stick_image[b]
+        self.stick_residual[b] = r
+        return r.dot(r)
+
+    @ti.func
+    def body_turn(self, b, share):
+        self.stick_search[b] = self.stick_residual[b] + share * self.stick_search[b]
 
     @ti.func
     def contain(self, b):
         """Keep particles in the cup and off the stick; the stick takes what it gave."""
-        mass = self.density[b] * self.volume
         limit = self.cup_radius - self.margin
         for i in range(self.alive[b]):
-            push = self.multiplier[b, i] * self.stick_wall[b, i]
-            p = self.predicted[b, i]
+            start = self.position[b, i]
+            p = start
             offset, lever = self.from_stick(b, p)
             distance = offset.norm()
             if distance < self.stick_radius:
                 out = (self.stick_radius - distance) / ti.max(distance, 1e-6) * offset
-                push += out
                 p += out
-            self.torque[b] = self.torque[b] - (mass * lever / self.dt) * push
-            radial = vec3(p.x, p.y, 0.0)
-            reach = radial.norm()
-            if reach > limit:
-                p -= (1.0 - limit / reach) * radial
-            p.z = ti.max(p.z, self.margin)
-            self.predicted[b, i] = p
-
-    @ti.func
-    def drag(self, b):
-        """Friction of cup and stick, one sweep's share; the stick takes the reaction."""
-        share = self.wall_share(b)
-        mass = self.density[b] * self.volume
-        for i in range(self.alive[b]):
-            p, v = self.position[b, i], self.velocity[b, i]
-            radial = vec3(p.x, p.y, 0.0)
-            reach = ti.max(radial.norm(), 1e-6)
-            if self.cup_radius - reach < self.h:
-                side = self.look_up(self.half_space, self.cup_radius - reach)
-                v = self.rub(v, radial / reach, side, share)
-            if p.z < self.h:
-                v = self.rub(v, vec3(0.0, 0.0, -1.0), self.look_up(self.half_space, p.z), share)
-            offset, lever = self.from_stick(b, p)
-            distance = offset.norm()
-            if distance < self.stick_radius + self.h:
-                stick = self.look_up(self.stick_table, distance - self.stick_radius)
-                q = share * self.numerics.stick_drag * 0.5 * (stick[2] + stick[3])
-                u = self.direction[b]
-                slide = v - self.pivot_velocity[b] - lever * self.swing[b]
-                along = slide.dot(u) * u
-                # implicit in both partners: the stick yields by its inertia about the pivot
-                yielding = mass * lever * lever / self.stick_inertia[b]
-                impulse = -q / (1.0 + q * (1.0 + yielding)) * (slide - along)
-                v += impulse - q / (1.0 + q) * along
-                self.swing[b] = self.swing[b] - (mass * lever / self.stick_inertia[b]) * impulse
-            self.velocity[b, i] = v
+                self.lever[b, i] = lever
+                impulse = self.yielding(b, i) / self.dt * self.across(b, out)
+                self.swing[b] = self.swing[b] - impulse
+            reach = ti.sqrt(p.x * p.x + p.y * p.y)
+            inward = ti.min(limit / ti.max(reach, 1e-6), 1.0)
+            p = vec3(inward * p.x, inward * p.y, ti.max(p.z, self.margin))
+            self.position[b, i] = p
+            self.velocity[b, i] = self.velocity[b, i] + (p - start) / self.dt
 
     @ti.func
     def swing_stick(self, b, pivot):
-        """Move the pendulum one substep: gravity and the pivot's acceleration about the pivot."""
+        """Gravity and the pivot's acceleration on the pendulum, one substep."""
         velocity = (pivot - self.pivot[b]) / self.dt
         jolt = velocity - self.pivot_velocity[b]
         self.pivot[b], self.pivot_velocity[b] = pivot, velocity
         arm = 0.5 * self.stick_mass[b] * self.stick_length / self.stick_inertia[b]
         swing = self.swing[b] + arm * (vec3(0.0, 0.0, -GRAVITY * self.dt) - jolt)
-        u = self.direction[b]
-        swing = self.rub_pivot(b, swing - swing.dot(u) * u)
-        u = (u + self.dt * swing).normalized()
-        self.direction[b] = u
-        self.swing[b] = swing - swing.dot(u) * u
-        self.torque[b] = vec3(0.0)
+        self.swing[b] = self.across(b, swing)
 
     @ti.func
-    def rub_pivot(self, b, swing):
-        """The swing after dry friction: less by the pivot's torque for a substep, or none at all.
+    def turn_stick(self, b):
+        """Turn the stick by what the pivot's dry friction leaves of its swing.
 
-        `swing` holds every other impulse since the last call, so a stick that they cannot turn
+        All impulses of the substep are in the swing by now, so a stick that they cannot turn
         stays where it is.
         """
         loss = self.dt * self.pivot_friction[b] / self.stick_inertia[b]
-        rubbed = swing
+        swing = self.swing[b]
         if loss > 0.0:
-            rubbed = ti.max(1.0 - loss / ti.max(swing.norm(), 1e-12), 0.0) * swing
-        return rubbed
-
-    @ti.func
-    def react(self, b):
-        """Give the stick the liquid's pressure of this substep."""
+            swing *= ti.max(1.0 - loss / ti.max(swing.norm(), 1e-12), 0.0)
+            self.swing[b] = swing
         u = self.direction[b]
-        t = self.torque[b] / self.stick_inertia[b]
-        self.swing[b] = self.swing[b] + t - t.dot(u) * u
+        rate = swing.norm()
+        angle = self.dt * rate
+        if rate > 1e-12:
+            ahead = swing / rate
+            self.direction[b] = (ti.cos(angle) * u + ti.sin(angle) * ahead).normalized()
+            self.swing[b] = rate * (ti.cos(angle) * ahead - ti.sin(angle) * u)
 
     @ti.kernel
     def stir(
@@ -169,25 +219,8 @@ class StirringScene(Fluid):
                 for n in range(start, stop):
                     self.swing_stick(b, path[b, n])
                     self.flow(b)
-                    self.react(b)
-                    self.relax(b)
+                    self.turn_stick(b)
                     directions[b, n] = self.direction[b]
-
-    def place(self, packings):
-        """Put packings, each [n, 3] with n <= `particles`, at rest into the first slots."""
-        positions = np.zeros((len(packings), self.particles, 3), np.float32)
-        alive = np.zeros(self.slots, np.int32)
-        for b, packing in enumerate(packings):
-            positions[b, : len(packing)] = packing
-            alive[b] = len(packing)
-        super().place(positions)
-        self.alive.from_numpy(alive)
-
-    def fit_stick(self, mass, pivot_friction):
-        """Mass [kg] and pivot's friction torque [N m] of the first sticks, each [b]."""
-        self.stick_mass.from_numpy(self.padded(mass))
-        self.stick_inertia.from_numpy(self.padded(mass * self.stick_gyration))
-        self.pivot_friction.from_numpy(self.padded(pivot_friction))
 
     def place_stick(self, pivots):
         """Hang the sticks straight down from `pivots` [b, 3], at rest."""
@@ -195,3 +228,15 @@ class StirringScene(Fluid):
         self.pivot_velocity.fill(0.0)
         self.swing.fill(0.0)
         self.direction.from_numpy(np.tile(np.float32([0.0, 0.0, -1.0]), (self.slots, 1)))
+
+    def hold_stick(self, held):
+        """Whether the sticks stay as they are, whatever the liquid does."""
+        self.free.fill(0.0 if held else 1.0)
+
+    def fit_stick(self, mass, friction):
+        """Give the sticks `mass` [kg] and their pivots dry `friction` [N m], both [b]."""
+        full = np.ones(self.slots)
+        full[: len(mass)] = mass
+        self.stick_mass.from_numpy(full.astype(np.float32))
+        self.stick_inertia.from_numpy((full * self.stick_gyration).astype(np.float32))
+        self.pivot_friction.from_numpy(self.padded(friction))

@@ -131,7 +131,7 @@ def test_more_liquid_stands_higher(setup, short):
 
 def kicked(setup):
     """A gripper that jerks by 2 cm and then stands still for 4 s, seen at every substep."""
-    time = np.arange(0.0, 4.0, 1.0 / setup.numerics.rate)
+    time = np.arange(0.0, 4.0, 1.0 / setup.rate)
     position = np.zeros((len(time), 3))
     position[:, 0] = 0.02 * np.clip(time / 0.1, 0.0, 1.0)
     position[:, 2] = setup.cup.fill - setup.submerged + setup.stick.length

@@ -24,34 +24,28 @@ def free_fluid():
     @ti.data_oriented
     class FreeFluid(Fluid):
         @ti.func
-        def predict(self, b):
-            for i in range(self.alive[b]):
-                self.predicted[b, i] = self.position[b, i] + self.dt * (
-                    self.velocity[b, i] + self.kick[b, i]
-                )
-                self.kick[b, i] = 0.0
+        def gravity(self, b):
+            return ti.math.vec3(0.0)
 
         @ti.kernel
         def step(self, steps: ti.i32):
             for _ in range(1):
                 for _n in range(steps):
                     self.flow(0)
-                    self.relax(0)
 
         @ti.kernel
         def diffuse(self, steps: ti.i32):
             """Viscosity alone, between particles that stay where they are."""
             for _ in range(1):
-                for i in range(self.alive[0]):
-                    self.predicted[0, i] = self.position[0, i]
                 self.search(0)
+                self.measure(0)
                 for _n in range(steps):
                     self.couple(0)
-                    self.relax(0)
+                    self.shear(0)
 
     def build(positions, viscosity, cohesion):
         fluid = FreeFluid(1, len(positions), SPACING, models.Numerics(), [(-0.1,) * 3, (0.1,) * 3])
-        fluid.place(positions[None].astype(np.float32))
+        fluid.place([positions])
         fluid.pour_in(models.Liquid(viscosity, cohesion, DENSITY).batch(1))
         return fluid
 
@@ -157,7 +151,7 @@ def test_stick_and_liquid_exchange_angular_momentum(glycerin):
     centre, pivot = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 1.15])
     for viscosity in (0.0, 5.0):
         scene = StirringScene(1, small)
-        scene.place((points + centre)[None].astype(np.float32))
+        scene.place([points + centre])
         scene.velocity.from_numpy(rng.normal(0.0, 0.05, (1, len(points), 3)).astype(np.float32))
         scene.place_stick(pivot[None])
         lean = np.array([np.sin(0.1), 0.0, -np.cos(0.1)])

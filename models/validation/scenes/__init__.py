@@ -1,0 +1,1 @@
+"""Scenes for validation alone: the fluid between other walls than cups."""

@@ -1,0 +1,174 @@
+# type: ignore  (Taichi compiles this source and gives these names their types)
+"""Implicit viscosity between particles, at walls and at a moving body.
+
+Pairs exchange momentum along their line of centres by Monaghan's central form (Monaghan 2005,
+"Smoothed particle hydrodynamics", eq. 8.9; factor 2 (D + 2)), which keeps linear and angular
+momentum. The backward Euler step (1 + A) v' = v is solved by conjugate gradients, as Weiler et
+al. 2018 ("A physically consistent implicit viscosity solver for SPH fluids") do: the matrix is
+symmetric and positive, so any viscosity is stable, and every iterate keeps the momenta.
+"""
+
+import taichi as ti
+
+from .neighbours import vec3
+from .pressure import Pressure
+
+WEAK = 0.004  # of nu dt / h^2: so thin a liquid takes one explicit step instead
+MOST_ITERATIONS = 50
+
+
+@ti.data_oriented
+class Viscous(Pressure):
+    """A scene with walls writes `grip` and `wall_velocity` in `boundary`; one with a moving body
+    adds it to the unknowns by the methods `body_*`."""
+
+    def __init__(self, slots, particles, spacing, numerics, extent, period=(0.0, 0.0)):
+        super().__init__(slots, particles, spacing, numerics, extent, period)
+        shape = (slots, particles)
+        self.residual, self.search_direction, self.image, self.wall_velocity = (
+            ti.Vector.field(3, ti.f32, shape) for _ in range(4)
+        )
+        self.grip = ti.Matrix.field(3, 3, ti.f32, shape)
+        self.ease = ti.field(ti.f32, shape)
+        self.pair_coupling = ti.field(ti.f32, (slots, self.capacity))
+        self.viscosity, self.cohesion, self.density = (ti.field(ti.f32, slots) for _ in range(3))
+        self.unit_coupling = 10.0 * self.numerics.viscosity_gain * self.dt
+
+    @ti.func
+    def kinematic(self, b):
+        """Kinematic viscosity [m²/s] that pairs have to add for the liquid to have its own."""
+        unit = self.spacing**2 / self.dt
+        least = self.numerics.quiet * unit
+        lacking = self.viscosity[b] / self.density[b] - self.numerics.own_viscosity * unit
+        return ti.sqrt(ti.max(lacking, 0.0) ** 2 + least * least)
+
+    @ti.func
+    def boundary(self, b, i):
+        self.wall[b, i] = vec3(0.0)
+        self.body_wall[b, i] = vec3(0.0)
+        self.grip_walls(b, i, ti.Matrix.zero(ti.f32, 3, 3), vec3(0.0))
+        return 0.0
+
+    @ti.func
+    def wall_grip(self, row, normal):
+        """Friction matrix of a wall in units of 10 nu dt / h^2, from a row of its table."""
+        across = normal.outer_product(normal)
+        along = ti.Matrix.identity(ti.f32, 3) - across
+        return (
+            self.numerics.wall_normal * row[2] * across + self.numerics.wall_slip * row[3] * along
+        )
+
+    @ti.func
+    def grip_walls(self, b, i, grip, velocity):
+        """Friction of walls on particle i: a sum of `wall_grip`, and the walls' velocity."""
+        share = self.unit_coupling * self.kinematic(b) / (self.h * self.h)
+        self.grip[b, i] = share * grip
+        self.ease[b, i] = 1.0 / (1.0 + share * grip.trace() / 3.0)
+        self.wall_velocity[b, i] = velocity
+
+    @ti.func
+    def couple(self, b):
+        """Strength of every pair's viscous coupling, in terms of its gradient."""
+        scale = self.unit_coupling * self.kinematic(b)
+        for k in range(self.pair_start[b, self.alive[b]]):
+            self.pair_coupling[b, k] = scale * self.pair_viscous[b, k]
+
+    @ti.func
+    def apply(self, b, walls_move):
+        """`image` = (1 + A) `search_direction`; less what moving walls give, if they do."""
+        for i in range(self.alive[b]):
+            p = self.search_direction[b, i]
+            even, odd = self.grip[b, i] @ (p - walls_move * self.wall_velocity[b, i]), vec3(0.0)
+            k, stop = self.pair_start[b, i], self.pair_start[b, i + 1]
+            while k + 1 < stop:  # two sums, since one waits for its own last addition
+                even += self.coupled(b, k, p)
+                odd += self.coupled(b, k + 1, p)
+                k += 2
+            if k < stop:
+                even += self.coupled(b, k, p)
+            self.image[b, i] = p + even + odd
+        self.body_apply(b, walls_move)
+
+    @ti.func
+    def coupled(self, b, k, p):
+        """Part of A p at a particle of search direction p, from its pair k."""
+        g = self.gradient(b, k)
+        other = self.search_direction[b, self.pair_other[b, k]]
+        return (self.pair_coupling[b, k] * (p - other).dot(g)) * g
+
+    @ti.func
+    def shear(self, b):
+        """The viscous substep of the velocities."""
+        alive = self.alive[b]
+        for i in range(alive):
+            self.search_direction[b, i] = self.velocity[b, i]
+        self.body_load(b)
+        self.apply(b, 1.0)
+        size = 0.0
+        for i in range(alive):
+            r = self.velocity[b, i] - self.image[b, i]
+            self.residual[b, i] = r
+            self.search_direction[b, i] = self.ease[b, i] * r
+            size += self.ease[b, i] * r.dot(r)
+        size += self.body_residual(b)
+        weak = self.kinematic(b) * self.dt < WEAK * self.h * self.h and self.cohesion[b] == 0.0
+        if weak:
+            for i in range(alive):
+                self.velocity[b, i] = self.velocity[b, i] + self.search_direction[b, i]
+            self.body_step(b, 1.0)
+        else:
+            self.iterate(b, size)
+
+    @ti.func
+    def iterate(self, b, size):
+        """Conjugate gradients from the velocities, whose squared residual is `size`."""
+        alive = self.alive[b]
+        enough = self.numerics.viscous_tolerance**2 * size
+        left, count = size, 0
+        while count < MOST_ITERATIONS and left > enough and left > 1e-20:
+            count += 1
+            self.apply(b, 0.0)
+            curvature = self.body_curvature(b)
+            for i in range(alive):
+                curvature += self.search_direction[b, i].dot(self.image[b, i])
+            step = left / curvature
+            new = self.body_step(b, step)
+            for i in range(alive):
+                self.velocity[b, i] = self.velocity[b, i] + step * self.search_direction[b, i]
+                r = self.residual[b, i] - step * self.image[b, i]
+                self.residual[b, i] = r
+                new += self.ease[b, i] * r.dot(r)
+            for i in range(alive):
+                self.search_direction[b, i] = (
+                    self.ease[b, i] * self.residual[b, i]
+                    + (new / left) * self.search_direction[b, i]
+                )
+            self.body_turn(b, new / left)
+            left = new
+
+    @ti.func
+    def body_load(self, b):
+        """Put the body's velocity into its search direction."""
+
+    @ti.func
+    def body_apply(self, b, moves):
+        """Add the body's coupling to the images; its imposed motion counts if it `moves`."""
+
+    @ti.func
+    def body_residual(self, b):
+        """Residual and first search direction of the body; its squared size."""
+        return 0.0
+
+    @ti.func
+    def body_curvature(self, b):
+        """The body's part of search direction times image."""
+        return 0.0
+
+    @ti.func
+    def body_step(self, b, step):
+        """Move the body's velocity along its search direction; its new squared residual."""
+        return 0.0
+
+    @ti.func
+    def body_turn(self, b, share):
+        """The body's next search direction."""
