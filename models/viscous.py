@@ -154,6 +154,8 @@ class Viscous(Rheology):
         if ti.static(len(self.rheology_hooks) > 0):
             thickest = self.thickest[b]
         weak = thickest * self.dt < WEAK * self.h * self.h and self.cohesion[b] == 0.0
+        if ti.static(len(self.force_hooks) > 0):
+            weak = False  # a force may have coupled them strongly
         if weak:
             for i in range(alive):
                 self.velocity[b, i] = self.velocity[b, i] + self.search_direction[b, i]

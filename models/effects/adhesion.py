@@ -3,7 +3,9 @@
 from ..effect import Effect
 
 PULL = 20.0  # m/s², towards the wall at adhesion 1, halfway through the kernel's support
-DAMPED = 0.3  # of critical damping, along the normal
+RUB = 3.0  # friction over pull
+CREEP = 0.015  # m/s, below which friction is viscous
+DAMPED = 0.5  # of critical damping, along the normal
 
 
 def _prior():
@@ -25,19 +27,22 @@ def _force():
     def cling(scene: ti.template(), b, coefficient):
         damping = DAMPED * ti.sqrt(2.0 * PULL * coefficient / scene.h)
         for i in range(scene.alive[b]):
+            added = ti.Matrix.zero(ti.f32, 3, 3)
             for n in ti.static(range(scene.walls)):
                 distance, normal, share = scene.wall_near(b, i, n)
                 a = distance / scene.h
                 if share > 0.0 and a < 1.0:
                     t = 1.0 - a
                     kick = share * scene.dt * PULL * coefficient * pull(a)
-                    moving = scene.wall_velocity[b, i]
-                    v = scene.velocity[b, i] - moving
-                    across = v.dot(normal)
-                    along = v - across * normal
-                    held = ti.max(1.0 - kick / ti.max(along.norm(), 1e-12), 0.0)
-                    across = (across - kick) / (1.0 + share * scene.dt * damping * t * t)
-                    scene.velocity[b, i] = moving + across * normal + held * along
+                    v = scene.velocity[b, i] - scene.wall_velocity[b, i]
+                    slip = (v - v.dot(normal) * normal).norm()
+                    across = normal.outer_product(normal)
+                    along = ti.Matrix.identity(ti.f32, 3) - across
+                    added += RUB * kick / (slip + CREEP) * along
+                    added += share * scene.dt * damping * t * t * across
+                    scene.velocity[b, i] = scene.velocity[b, i] - kick * normal
+            scene.grip[b, i] = scene.grip[b, i] + added
+            scene.ease[b, i] = 1.0 / (1.0 / scene.ease[b, i] + added.trace() / 3.0)
 
     return cling
 
@@ -47,10 +52,11 @@ EFFECT = Effect(
     unit="1",
     neutral=0.0,
     acts_in="liquid",
-    text="The liquid sticks to the walls of its cup: they attract it and rub by as much, so that "
-    "a film stays; 0 to 1 is the useful range, and the stick is left out.",
+    text="The liquid sticks to the walls of its cup: they attract it and rub in proportion, so "
+    "that a film stays; 0 to 1 is the useful range, and the stick is left out.",
     source="Particles at a wall are pulled towards it, as in Akinci 2013 (ACM Trans. Graph. 32, "
-    "182) with another profile; dry friction of coefficient 1 under this pull holds them",
+    "182) with another profile; friction of coefficient 3 under this pull, viscous below 1.5 "
+    "cm/s and part of the implicit viscosity, holds them",
     make_prior=_prior,
     make_force=_force,
     lowest=0.0,

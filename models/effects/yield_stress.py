@@ -2,7 +2,7 @@
 
 from ..effect import Effect
 
-REGULARISED = 4.0  # s: below a shear rate of 1 / s the liquid creeps instead of standing still
+REGULARISED = 4.0  # s: below a shear rate of 1 / (4 s) the liquid creeps
 
 
 def _prior():
@@ -34,7 +34,7 @@ EFFECT = Effect(
     acts_in="liquid",
     text="The liquid is a gel: it flows only where it is sheared by more than this stress.",
     source="Herschel & Bulkley 1926, regularised by Papanastasiou 1987 (J. Rheol. 31, 385): "
-    "viscosity + yield stress (1 - exp(-m rate)) / rate with m = 1 s",
+    "viscosity + yield stress (1 - exp(-m rate)) / rate with m = 4 s",
     make_prior=_prior,
     make_rheology=_rheology,
     lowest=0.0,

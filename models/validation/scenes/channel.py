@@ -105,6 +105,7 @@ def channel_flow(  # noqa: PLR0913  what flows, what drives it, and when to look
     seconds: np.ndarray,
     start=None,
     effects: Mapping[str, np.ndarray] | None = None,
+    seed: int = 0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Heights and velocities of the particles after each of the times.
 
@@ -116,6 +117,7 @@ def channel_flow(  # noqa: PLR0913  what flows, what drives it, and when to look
         seconds: Ascending times [s] at which to look, shape [T].
         start: Optional function of heights [B, particles]: velocities along x [m/s] at time 0.
         effects: Coefficients of liquid effects by name, all of which act, shape [B] each.
+        seed: Of the jitter of the lattice from which the packing relaxes.
 
     Returns:
         z [m] and velocity along x [m/s], shape [T, B, particles] each.
@@ -127,7 +129,7 @@ def channel_flow(  # noqa: PLR0913  what flows, what drives it, and when to look
     axis = (np.arange(channel.around) + 0.5) * channel.spacing
     height = (np.arange(channel.layers) + 0.5) / channel.layers * channel.gap
     lattice = np.stack(np.meshgrid(axis, axis, height, indexing="ij"), axis=-1).reshape(-1, 3)
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(seed)
     with runtime.LOCK:
         jitter = 0.1 * channel.spacing * rng.standard_normal((size, *lattice.shape))
         scene.place((lattice + jitter).astype(np.float32))
