@@ -22,10 +22,11 @@ class Flow(NamedTuple):
 
 
 DENSITY = 1000.0
-GELS = (Flow(1.0, 5.0, 0.0, 0.5), Flow(2.0, 40.0, 0.0, 2.0))
-THINNING = (Flow(3.0, 0.0, 0.3, 1.0), Flow(5.0, 0.0, 0.5, 0.5))
+GELS = (Flow(2.0, 10.0, 0.0, 1.0), Flow(2.0, 20.0, 0.0, 1.0))
+THINNING = (Flow(3.0, 0.0, 0.3, 1.0), Flow(10.0, 0.0, 0.5, 1.0), Flow(5.0, 0.0, 0.5, 0.5))
 CHANNEL = Channel(layers=12)
-TIMES = np.linspace(3.0, 4.0, 5)  # s; a channel's time of diffusion is below 0.7 s
+TIMES = np.linspace(4.0, 6.0, 5)  # s; a channel's time of diffusion is below 0.4 s
+PACKINGS = 4  # of each flow; from one to the next the speed in the middle differs by 5 %
 TOLERANCE = 0.1  # of the speed in the middle
 
 
@@ -48,18 +49,18 @@ def truth(flow: Flow, z: np.ndarray) -> np.ndarray:
 
 
 def simulated(flows: tuple[Flow, ...], effect: str, coefficient: list[float], seed: int):
-    """Heights and velocities of the particles at all times, [B, particles of all times] each."""
-    size = len(flows)
+    """Heights and velocities, of shape [B, particles of all packings and times] each."""
+    size = PACKINGS * len(flows)
     z, u = channel_flow(
         CHANNEL,
-        Liquid([flow.viscosity for flow in flows], 0.0, DENSITY),
+        Liquid(np.repeat([flow.viscosity for flow in flows], PACKINGS), 0.0, DENSITY),
         np.zeros(size),
-        np.array([flow.push for flow in flows]),
+        np.repeat([flow.push for flow in flows], PACKINGS),
         TIMES,
-        effects={effect: np.array(coefficient)},
+        effects={effect: np.repeat(coefficient, PACKINGS)},
         seed=seed,
     )
-    return (np.moveaxis(a, 1, 0).reshape(size, -1) for a in (z, u))
+    return (np.moveaxis(a, 1, 0).reshape(len(flows), -1) for a in (z, u))
 
 
 def run(progress: Progress, seed: int) -> CaseResult:
@@ -106,6 +107,11 @@ CASE = Case(
     source="Bird, Dai & Yarusso 1983, Rev. Chem. Eng. 1, 1; Carreau 1972",
     unit="relative",
     tolerance=TOLERANCE,
-    settings={"gels": GELS, "thinning": THINNING, "layers": CHANNEL.layers},
+    settings={
+        "gels": GELS,
+        "thinning": THINNING,
+        "layers": CHANNEL.layers,
+        "packings": PACKINGS,
+    },
     run=run,
 )
