@@ -4,6 +4,8 @@
 import numpy as np
 import taichi as ti
 
+from .faults import COLLAPSED
+
 vec3 = ti.math.vec3
 MEAN_NEIGHBOURS = 40  # of a half list; settled liquid has about 14
 HALF_STENCIL = ((0, 0), (0, 1), (1, -1), (1, 0), (1, 1))
@@ -44,7 +46,7 @@ class NeighbourSearch:
         )
         self.half_other = ti.field(ti.i32, (slots, self.capacity // 2))
         self.pair_other = ti.field(ti.i32, (slots, self.capacity))
-        self.alive, self.overflow = (ti.field(ti.i32, slots) for _ in range(2))
+        self.alive, self.fault = (ti.field(ti.i32, slots) for _ in range(2))
         self.carried, self.scratch = [], []
         self.carry(self.position, ti.Vector.field(3, ti.f32, shape))
 
@@ -142,7 +144,7 @@ class NeighbourSearch:
             self.half_other[b, count] = a
             count += ti.cast(d.dot(d) < self.reach * self.reach, ti.i32)
         if count > self.capacity // 2 - self.particles:
-            self.overflow[b] = 1
+            self.fault[b] = COLLAPSED
             count = pairs
         return count
 
@@ -172,17 +174,6 @@ class NeighbourSearch:
                 self.pair_other[b, theirs] = i
                 self.pair_next[b, j] = theirs + 1
             self.pair_next[b, i] = own
-
-    def check_capacity(self):
-        """
-        Raises:
-            RuntimeError: neighbour lists overflowed since `overflow` was cleared.
-        """
-        if self.overflow.to_numpy().any():
-            raise RuntimeError(
-                f"particles have more than {MEAN_NEIGHBOURS} neighbours on average: the liquid "
-                "has collapsed; raise numerics.rate or lower cohesion"
-            )
 
 
 def _grid(reach, size, period):

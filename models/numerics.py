@@ -26,6 +26,7 @@ class Numerics:
             channel flow has the viscosity asked for.
         wall_slip: Factor on the tangential viscous coupling to walls.
         wall_normal: The same factor for the normal direction.
+        outer_wall: Share of that friction on what runs over a cup's rim and down outside.
         stick_drag: The same factor for the stick, which is about one particle wide.
         attraction: Acceleration of the surface attraction at cohesion 1 [m/s²].
         contact: Least distance of a particle's centre to a wall, in spacings.
@@ -40,8 +41,9 @@ class Numerics:
     quiet: float = 6e-4
     own_viscosity: float = 1.8e-3
     viscosity_gain: float = 1.5
-    wall_slip: float = 4.0
+    wall_slip: float = 5.0
     wall_normal: float = 1.0
+    outer_wall: float = 0.3
     stick_drag: float = 0.5
     attraction: float = 15.0
     contact: float = 0.25

@@ -5,6 +5,7 @@ import numpy as np
 import taichi as ti
 
 from . import tables
+from .faults import SOUND
 from .fluid import GRAVITY, STRIDE, Fluid, vec3
 
 
@@ -218,7 +219,8 @@ class StirringScene(Fluid):
                 b = k // STRIDE
                 for n in range(start, stop):
                     self.swing_stick(b, path[b, n])
-                    self.flow(b)
+                    if self.fault[b] == SOUND:
+                        self.flow(b)
                     self.turn_stick(b)
                     directions[b, n] = self.direction[b]
 
