@@ -32,15 +32,15 @@ class Numerics:
         contact: Least distance of a particle's centre to a wall, in spacings.
     """
 
-    rate: float = 200.0
+    rate: float = 160.0
     iterations: int = 2
-    feedback: float = 0.4
+    feedback: float = 0.5
     memory: float = 0.8
     viscous_tolerance: float = 0.03
     support: float = 2.12
-    quiet: float = 6e-4
-    own_viscosity: float = 1.8e-3
-    viscosity_gain: float = 1.5
+    quiet: float = 1.5e-3
+    own_viscosity: float = 2.3e-3
+    viscosity_gain: float = 1.43
     wall_slip: float = 5.0
     wall_normal: float = 1.0
     outer_wall: float = 0.3

@@ -40,7 +40,7 @@ class Viscous(Pressure):
         unit = self.spacing**2 / self.dt
         least = self.numerics.quiet * unit
         lacking = self.viscosity[b] / self.density[b] - self.numerics.own_viscosity * unit
-        return ti.sqrt(ti.max(lacking, 0.0) ** 2 + least * least)
+        return ti.max(lacking, least)
 
     @ti.func
     def boundary(self, b, i):

@@ -122,10 +122,10 @@ def channel_flow(
     rng = np.random.default_rng(0)
     with runtime.LOCK:
         jitter = 0.1 * channel.spacing * rng.standard_normal((size, *lattice.shape))
-        scene.place((lattice + jitter).astype(np.float32))
         scene.speed.from_numpy(np.zeros(scene.slots, np.float32))
         scene.push.from_numpy(np.zeros(scene.slots, np.float32))
-        scene.relax_packing(size, 1.0)
+        packings = scene.settled(list((lattice + jitter).astype(np.float32)), 1.0)
+        scene.place([p.position for p in packings], [p.multiplier for p in packings])
         scene.pour_in(liquid.batch(size))
         scene.speed.from_numpy(scene.padded(np.asarray(speed)))
         scene.push.from_numpy(scene.padded(np.asarray(push)))
