@@ -295,7 +295,7 @@ def _run(scene, setup, liquid, rig, seeds) -> np.ndarray:
     directions = np.empty((size, steps, 3), np.float32)
     for start in range(0, steps, CHUNK):
         stop = min(start + CHUNK, steps)
-        scene.stir(size, start, stop, path, directions)
+        scene.stir(size, start, stop, path, directions, 1.0)
     directions[faulty(scene.fault.to_numpy()[:size], seeds)] = np.nan
     down = np.broadcast_to(np.array([0.0, 0.0, -1.0], np.float32), (size, 1, 3))
     return np.concatenate([down, directions], axis=1).astype(np.float64)

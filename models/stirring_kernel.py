@@ -207,12 +207,14 @@ class StirringScene(Fluid):
         stop: ti.i32,
         path: ti.types.ndarray(dtype=ti.math.vec3, ndim=2),
         directions: ti.types.ndarray(dtype=ti.math.vec3, ndim=2),
+        damping: ti.f32,
     ):
         """Substeps start..stop-1 of the first `active` trials.
 
         Args:
             path: Pivot at the end of each substep [m], shape [active, substeps].
             directions: Out: unit vector from pivot to tip at the same times.
+            damping: Factor on the liquid's velocities after each substep; 1 but while it settles.
         """
         for k in range(active * STRIDE):
             if k % STRIDE == 0:
@@ -223,6 +225,15 @@ class StirringScene(Fluid):
                         self.flow(b)
                     self.turn_stick(b)
                     directions[b, n] = self.direction[b]
+                    if damping < 1.0:
+                        for i in range(self.alive[b]):
+                            self.velocity[b, i] = damping * self.velocity[b, i]
+
+    def settle(self, active, steps, damping):
+        """Let the packings relax around the sticks, by the kernel that stirs: building another
+        would double the time to the first result."""
+        pivots = np.repeat(self.pivot.to_numpy()[:active, None], steps, axis=1)
+        self.stir(active, 0, steps, pivots, np.empty_like(pivots), damping)
 
     def place_stick(self, pivots):
         """Hang the sticks straight down from `pivots` [b, 3], at rest."""
