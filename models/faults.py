@@ -4,9 +4,10 @@ import warnings
 
 import numpy as np
 
-SOUND, COLLAPSED, RUNAWAY = 0, 1, 2
+SOUND, COLLAPSED, RUNAWAY, UNSOLVED = 0, 1, 2, 3
 REASONS = {
     COLLAPSED: "the liquid collapsed: its particles have too many neighbours",
+    UNSOLVED: "its viscosity is too large to compute with",
     RUNAWAY: "a particle ran away: its velocity is not finite or beyond any liquid's",
 }
 

@@ -10,8 +10,8 @@ import numpy as np
 import taichi as ti
 
 from .attraction import Attraction
-from .liquid import Liquid
 from .faults import RUNAWAY, SOUND
+from .liquid import Liquid
 from .neighbours import vec3
 from .settled import Packing
 

@@ -10,11 +10,13 @@ symmetric and positive, so any viscosity is stable, and every iterate keeps the 
 
 import taichi as ti
 
+from .faults import UNSOLVED
 from .neighbours import vec3
 from .pressure import Pressure
 
 WEAK = 0.004  # of nu dt / h^2: so thin a liquid takes one explicit step instead
 MOST_ITERATIONS = 50
+LARGEST = 1e30  # squared residual [m²/s²] that single precision can still work with
 
 
 @ti.data_oriented
@@ -111,6 +113,8 @@ class Viscous(Pressure):
             self.search_direction[b, i] = self.ease[b, i] * r
             size += self.ease[b, i] * r.dot(r)
         size += self.body_residual(b)
+        if not size < LARGEST:
+            self.fault[b] = UNSOLVED
         weak = self.kinematic(b) * self.dt < WEAK * self.h * self.h and self.cohesion[b] == 0.0
         if weak:
             for i in range(alive):
