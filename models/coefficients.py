@@ -1,6 +1,6 @@
-"""From coefficients that a user gives to what they do to a rig and to a signal."""
+"""From coefficients that a user gives to what they do to a liquid, a rig and a signal."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from .effect import Effect
 from .effects import EFFECTS
+from .liquid import Liquid
 from .rig import Rig
 
 
@@ -70,7 +71,51 @@ def _coefficient(name: str, value: ArrayLike, size: int) -> np.ndarray:
         )
     if not np.isfinite(array).all():
         raise ValueError(f"the coefficient of {name} must be finite, got {value!r}")
+    lowest, highest = EFFECTS[name].lowest, EFFECTS[name].highest
+    if (array < lowest).any() or (array > highest).any():
+        raise ValueError(
+            f"the coefficient of {name} must be {lowest:g} to {highest:g}, got {value!r}"
+        )
     return np.broadcast_to(array, (size,))
+
+
+def with_adhesion(
+    liquid: Liquid, effects: Mapping[str, ArrayLike] | None, size: int
+) -> Mapping[str, ArrayLike] | None:
+    """Effects with the adhesion that the liquid itself names; 0 there names none.
+
+    Raises:
+        ValueError: both name one, and they differ.
+    """
+    own = np.asarray(liquid.adhesion, dtype=np.float64)
+    if not own.any() or not (effects is None or isinstance(effects, Mapping)):
+        return effects
+    other = (effects or {}).get("adhesion", own)
+    if not np.array_equal(_coefficient("adhesion", other, size), np.broadcast_to(own, (size,))):
+        raise ValueError(
+            f"the liquid's adhesion is {liquid.adhesion}, but effects say {other}; give one of both"
+        )
+    return {**(effects or {}), "adhesion": own}
+
+
+def liquid_sets(
+    acting: tuple[Acting, ...], size: int
+) -> Iterator[tuple[tuple[Effect, ...], np.ndarray, np.ndarray]]:
+    """Simulations by the effects that act in their liquid.
+
+    A simulation runs in a scene compiled for exactly its own ones. So neither its company nor a
+    neutral coefficient can change its bits, whatever the compiler makes of the hooks.
+
+    Yields:
+        The effects, which of `size` simulations [n], and coefficients [effects, size].
+    """
+    inside = [a for a in acting if a.effect.make_rheology or a.effect.make_force]
+    changed = np.array([a.changed for a in inside], dtype=bool).reshape(len(inside), size)
+    coefficients = np.array([a.coefficient for a in inside]).reshape(len(inside), size)
+    for which in np.unique(changed, axis=1).T:
+        rows = np.flatnonzero((changed == which[:, None]).all(axis=0))
+        effects = tuple(a.effect for a, acts in zip(inside, which, strict=True) if acts)
+        yield effects, rows, coefficients[which]
 
 
 def changed_rig(rig: Rig, acting: tuple[Acting, ...]) -> Rig:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -15,18 +15,23 @@ if TYPE_CHECKING:
     from numpyro.distributions import Distribution
 
 RigHook = Callable[[Rig, np.ndarray], Rig]
+KernelHook = Callable[[], Callable[..., Any]]
 SignalHook = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 SCENES = {"liquid": ("stir", "pour"), "rig": ("stir",), "sensor": ("stir",)}
-HOOKS = {"rig": "rig", "sensor": "signal"}  # acts_in -> the hook that such an effect needs
+# acts_in -> hooks of which such an effect needs at least one
+HOOKS = {"rig": ("rig",), "sensor": ("signal",), "liquid": ("make_rheology", "make_force")}
 
 
 @dataclass(frozen=True)
 class Effect:
     """A physical effect that the base model leaves out.
 
-    Hooks are pure functions of NumPy arrays. They are given only the B simulations whose
-    coefficient is not neutral, so the others keep their bits whatever a hook computes.
+    The hooks `rig` and `signal` are pure functions of NumPy arrays. They are given only the B
+    simulations whose coefficient is not neutral, so the others keep their bits whatever a hook
+    computes. Those in the liquid are compiled into the simulation, which is why an effect has
+    a function that makes them: it imports taichi, as this package does when it first simulates.
+    It is called once a scene, and a scene runs only simulations in which all its effects act.
 
     Attributes:
         name: Name of the effect and of its coefficient, a Python identifier.
@@ -40,6 +45,14 @@ class Effect:
         rig: (rig, coefficient [B]) -> rig, of the same shapes.
         signal: (time [T] in s, angles [B, T, 2] in rad, coefficient [B]) -> angles. The angles
             are finite: a stir that diverged is passed by.
+        make_rheology: Returns a `ti.func` (viscosity, shear_rate, time, coefficient) ->
+            viscosity: of a particle and dynamic [Pa s], root of 2 D:D [1/s], since the
+            recording or the pour began [s].
+        make_force: Returns a `ti.func` (scene, b, coefficient) that may change
+            scene.velocity[b, i], scene.grip[b, i] and scene.pair_coupling[b, k] of simulation
+            b, once a substep, after gravity and before pressure and viscosity. Annotate scene
+            as ti.template().
+        lowest, highest: Coefficients outside are refused.
 
     Raises:
         ValueError: a field makes no sense, or the hook that `acts_in` needs is missing.
@@ -54,6 +67,10 @@ class Effect:
     make_prior: Callable[[], "Distribution"]
     rig: RigHook | None = None
     signal: SignalHook | None = None
+    make_rheology: KernelHook | None = None
+    make_force: KernelHook | None = None
+    lowest: float = -math.inf
+    highest: float = math.inf
 
     def __post_init__(self) -> None:
         if not (isinstance(self.name, str) and self.name.isidentifier()):
@@ -75,10 +92,12 @@ class Effect:
                 "make_prior must be a function that returns a numpyro distribution, "
                 f"got {self.make_prior!r}"
             )
-        needed = HOOKS.get(self.acts_in)
-        if needed and getattr(self, needed) is None:
-            raise self._fault(f"acts_in={self.acts_in!r} needs the hook {needed}")
-        for hook in HOOKS.values():
+        if not self.lowest <= self.neutral <= self.highest:
+            raise self._fault(f"neutral must lie between {self.lowest} and {self.highest}")
+        needed = HOOKS[self.acts_in]
+        if all(getattr(self, hook) is None for hook in needed):
+            raise self._fault(f"acts_in={self.acts_in!r} needs the hook {' or '.join(needed)}")
+        for hook in (hook for hooks in HOOKS.values() for hook in hooks):
             value = getattr(self, hook)
             if value is not None and not callable(value):
                 raise self._fault(f"the hook {hook} must be a function, got {value!r}")

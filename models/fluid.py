@@ -30,6 +30,8 @@ class Fluid(Attraction):
     The first `alive[b]` particles of simulation b take part.
     """
 
+    walls = 0  # that `wall_near` knows
+
     @ti.func
     def gravity(self, b):
         """Acceleration of free fall [m/s²]."""
@@ -38,6 +40,21 @@ class Fluid(Attraction):
     @ti.func
     def contain(self, b):
         """Push positions out of walls, and take the velocity that leads into them."""
+
+    @ti.func
+    def wall_near(self, b, i, n: ti.template()):
+        """Distance of particle i to wall n < `walls` [m], the wall's inward normal, and its
+        share in [0, 1], which fades out where the wall ends."""
+        return 1e9, vec3(0.0), 0.0
+
+    @ti.func
+    def act(self, b):
+        """Forces of the effects, and their time."""
+        for n in ti.static(range(len(self.force_hooks))):
+            at = ti.static(self.force_at[n])
+            if self.acts[at, b] == 1:
+                self.force_hooks[n](self, b, self.coefficient[at, b])
+        self.substeps[b] = self.substeps[b] + 1
 
     @ti.func
     def flow(self, b):
@@ -49,6 +66,8 @@ class Fluid(Attraction):
         self.couple(b)
         if self.cohesion[b] > 0.0:
             self.attract(b)
+        if ti.static(len(self.effects) > 0):
+            self.act(b)
         for sweep in range(self.numerics.iterations - 1):
             self.project(b, sweep % 2)
         self.shear(b)
@@ -101,8 +120,10 @@ class Fluid(Attraction):
         self.velocity.fill(0)
         self.fault.fill(0)
 
-    def pour_in(self, liquid):
-        """Set what liquid each slot holds, from a batched `Liquid`."""
+    def pour_in(self, liquid, coefficients=None):
+        """Set what liquid each slot holds, from a batched `Liquid`, and the coefficients of the
+        scene's effects, shape [effects, b]; None: they do not act."""
+        self.start_effects(coefficients)
         self.viscosity.from_numpy(self.padded(liquid.viscosity))
         self.cohesion.from_numpy(self.padded(liquid.cohesion))
         density = self.padded(liquid.density)

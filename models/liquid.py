@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-FIELDS = ("viscosity", "cohesion", "density")
+FIELDS = ("viscosity", "cohesion", "density")  # names that no effect may have
 
 
 @dataclass(frozen=True)
@@ -16,11 +16,14 @@ class Liquid:
         viscosity: Effective dynamic viscosity [Pa s].
         cohesion: Dimensionless attraction between particles at free surfaces, useful from 0 to 1.
         density: Rest density [kg/m³].
+        adhesion: Dimensionless attraction to the walls of cups, useful from 0 to 1; the
+            coefficient of the effect of that name.
     """
 
     viscosity: ArrayLike
     cohesion: ArrayLike
     density: ArrayLike
+    adhesion: ArrayLike = 0.0
 
     def batch(self, size: int) -> "Liquid":
         """The same liquids with every field of shape (size,) and dtype float32.
@@ -30,7 +33,7 @@ class Liquid:
                 broadcast to `size`.
         """
         fields = {}
-        for name in FIELDS:
+        for name in (*FIELDS, "adhesion"):
             value = np.asarray(getattr(self, name), dtype=np.float32)
             if not np.isfinite(value).all() or (value < 0).any():
                 raise ValueError(f"{name} must be finite and not negative, got {value}")
@@ -46,4 +49,5 @@ class Liquid:
 
     def __getitem__(self, part: slice | np.ndarray) -> "Liquid":
         """Part of a batch made by `batch`."""
-        return Liquid(*(np.asarray(getattr(self, name))[part] for name in FIELDS))
+        names = (*FIELDS, "adhesion")
+        return Liquid(*(np.asarray(getattr(self, name))[part] for name in names))

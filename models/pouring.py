@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import runtime
-from .coefficients import acting_in
+from .coefficients import acting_in, liquid_sets, with_adhesion
 from .cups import Cups
+from .effect import Effect
 from .faults import faulty
 from .liquid import Liquid
 from .numerics import POUR_PARTICLES, Numerics
@@ -71,20 +72,21 @@ def pour(
         FailedSimulation: a pour went wrong; its fractions are NaN.
     """
     seeds = checked_seeds(seeds)
+    acting = acting_in("pour", with_adhesion(liquid, effects, len(seeds)), len(seeds))
     liquid = liquid.batch(len(seeds))
-    acting_in("pour", effects, len(seeds))
     rate = _batch("angular_velocity", action.angular_velocity, len(seeds))
     distance = _batch("distance", action.distance, len(seeds))
     if (rate <= 0).any():
         raise ValueError(f"angular_velocity must be positive [rad/s], got {rate.min()}")
-    counts = []
+    counts = np.empty((3, len(seeds)))
     with runtime.LOCK:
-        scene = _scene(cups, particles)
-        for low in range(0, len(seeds), scene.slots):
-            part = slice(low, low + scene.slots)
-            turned = rate[part], distance[part]
-            counts.append(_run(scene, cups, liquid[part], turned, seeds[part]))
-    spilled, received, retained = np.concatenate(counts, axis=1) / particles
+        for kinds, rows, coefficients in liquid_sets(acting, len(seeds)):
+            scene = _scene(cups, particles, kinds)
+            for low in range(0, len(rows), scene.slots):
+                part = rows[low : low + scene.slots]
+                held, turned = (liquid[part], coefficients[:, part]), (rate[part], distance[part])
+                counts[:, part] = _run(scene, cups, held, turned, seeds[part])
+    spilled, received, retained = counts / particles
     return PourResult(spilled, received, retained)
 
 
@@ -96,17 +98,20 @@ def _batch(name: str, value: ArrayLike, size: int) -> np.ndarray:
 
 
 @cache
-def _scene(cups: Cups, particles: int):
-    """The compiled scene; its fields live as long as the process."""
+def _scene(cups: Cups, particles: int, effects: tuple[Effect, ...] = ()):
+    """The scene compiled for liquid effects; its fields live as long as the process."""
     runtime.start()
     from .pouring_kernel import PouringScene
 
     spacing = (cups.liquid_volume / particles) ** (1.0 / 3.0)
-    return PouringScene(runtime.SLOTS, particles, spacing, Numerics(), cups)
+    return PouringScene(runtime.SLOTS, particles, spacing, Numerics(), cups, effects)
 
 
-def _run(scene, cups, liquid, action, seeds) -> np.ndarray:
-    """Particles spilled, received and retained, shape [3, B]; NaN where a pour diverged."""
+def _run(scene, cups, held, action, seeds) -> np.ndarray:
+    """Particles spilled, received and retained, shape [3, B]; NaN where a pour diverged.
+
+    `held` are the liquid and the coefficients [effects, B] of the scene's effects.
+    """
     size = len(seeds)
     rate, distance = action
     source = cups.source
@@ -120,10 +125,12 @@ def _run(scene, cups, liquid, action, seeds) -> np.ndarray:
         )
         return scene.settled([points - shift for points in packed], SETTLING)
 
-    packings = _packings.of([(source, scene.particles, seed) for seed in seeds], settle)
+    # by scene too: with effects compiled in, the last bit of a rest may differ
+    fixed = cups, scene.particles, tuple(effect.name for effect in scene.effects)
+    packings = _packings.of([(fixed, seed) for seed in seeds], settle)
     scene.place([p.position for p in packings], [p.multiplier for p in packings])
     scene.place_cups(rate, distance)
-    scene.pour_in(liquid)
+    scene.pour_in(*held)
     hold = cups.pour.hold + DRIP
     steps = int((cups.pour.final_angle / rate.min() + hold) * scene.rate)
     for start in range(0, steps, CHUNK):

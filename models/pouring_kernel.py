@@ -17,7 +17,9 @@ INSIDE, ABOVE, OUTSIDE = 0, 1, 2  # of the source: within its walls, above its r
 class PouringScene(Fluid):
     """Fluid, turning source cup and receiver of a batch of pours."""
 
-    def __init__(self, slots, particles, spacing, numerics, cups):
+    walls = 2
+
+    def __init__(self, slots, particles, spacing, numerics, cups, effects=()):
         source = cups.source
         reach = (4.0 * source.radius**2 + source.height**2) ** 0.5
         drop = cups.pour.lip_height - cups.receiver.height
@@ -25,6 +27,7 @@ class PouringScene(Fluid):
         ahead = cups.distance_range[1] + cups.receiver.radius
         extent = [(-reach, -side, -drop), (max(reach, ahead), side, reach)]
         super().__init__(slots, particles, spacing, numerics, extent)
+        self.bring(effects)
         self.cup_radius, self.cup_height = source.radius, source.height
         self.receiver_radius, self.rim = cups.receiver.radius, -drop
         self.margin = numerics.contact * spacing
@@ -84,6 +87,18 @@ class PouringScene(Fluid):
             grip = self.numerics.outer_wall * self.wall_grip(side, self.turn(b, outward))
         self.grip_walls(b, i, grip, moving)
         return density
+
+    @ti.func
+    def wall_near(self, b, i, n: ti.template()):
+        q = self.to_cup(b, self.position[b, i])
+        distance, normal, share = q.z, vec3(0.0, 0.0, 1.0), 1.0
+        if ti.static(n == 1):
+            reach = ti.max(ti.sqrt(q.x * q.x + q.y * q.y), 1e-6)
+            distance, normal = self.cup_radius - reach, -vec3(q.x, q.y, 0.0) / reach
+            share = ti.math.clamp((self.cup_height - q.z) / self.h + 0.5, 0.0, 1.0)
+        if self.region[b, i] != INSIDE:
+            share = 0.0
+        return distance, self.turn(b, normal), share
 
     @ti.func
     def body_velocity(self, b, i):

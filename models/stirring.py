@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import runtime
-from .coefficients import acting_in, changed_rig, changed_signal
+from .coefficients import acting_in, changed_rig, changed_signal, liquid_sets, with_adhesion
+from .effect import Effect
 from .faults import faulty
 from .liquid import Liquid
 from .numerics import MODEL_VERSION, Numerics
@@ -169,7 +170,8 @@ def stir(
         setup: Geometry and discretisation.
         seeds: One integer a simulation, shape [B]; it decides the initial packing.
         effects: Coefficients of `EFFECTS` by name, scalars or of shape [B]; they act in the
-            alphabetical order of their names, those in the rig before those in the sensor.
+            alphabetical order of their names, those in the rig and in the liquid before those
+            in the sensor.
 
     Returns:
         Angles [rad] from the downward vertical in the xz and yz planes at the gripper's times,
@@ -183,8 +185,8 @@ def stir(
     """
     seeds = checked_seeds(seeds)
     size = len(seeds)
+    acting = acting_in("stir", with_adhesion(liquid, effects, size), size)
     liquid = liquid.batch(size)
-    acting = acting_in("stir", effects, size)
     path = substep_path(gripper, setup.rate)
     written = Rig(
         stick_mass=np.full(size, setup.stick.mass),
@@ -196,9 +198,11 @@ def stir(
     check_rig(rig, setup.deepest, [a.effect.name for a in acting])
     angles = np.empty((size, len(gripper.time), 2))
     with runtime.LOCK:
-        for scene, part in _parts(setup, rig.fill):
-            directions = _run(scene, setup, liquid[part], rig.rows(part), seeds[part])
-            angles[part] = inclination(directions, gripper.time, setup.rate)
+        for kinds, rows, coefficients in liquid_sets(acting, size):
+            for scene, part in _parts(setup, rig.fill, rows, kinds):
+                held = liquid[part], coefficients[:, part]
+                directions = _run(scene, setup, held, rig.rows(part), seeds[part])
+                angles[part] = inclination(directions, gripper.time, setup.rate)
     return changed_signal(gripper.time, angles, acting)
 
 
@@ -240,38 +244,44 @@ def inclination(directions: np.ndarray, time: np.ndarray, rate: float) -> np.nda
     )
 
 
-def _parts(setup: StirSetup, fill: np.ndarray) -> Iterator[tuple[Any, np.ndarray]]:
-    """Scenes, and which simulations run in each next, at most one a slot.
+def _parts(
+    setup: StirSetup, fill: np.ndarray, rows: np.ndarray, effects: tuple[Effect, ...]
+) -> Iterator[tuple[Any, np.ndarray]]:
+    """Scenes, and which of the simulations `rows` run in each next, at most one a slot.
 
-    Only a simulation's own fill decides its scene, so its bits do not depend on its company.
+    Only a simulation's own fill and `effects` decide its scene, so its bits do not depend on
+    its company.
     """
-    usual = setup.count(fill) == setup.particles
-    for scene_of, rows in ((_scene, usual), (_roomy_scene, ~usual)):
-        todo = np.flatnonzero(rows)
+    usual = setup.count(fill[rows]) == setup.particles
+    for scene_of, todo in ((_scene, rows[usual]), (_roomy_scene, rows[~usual])):
         for low in range(0, len(todo), runtime.SLOTS):
-            yield scene_of(setup), todo[low : low + runtime.SLOTS]
+            yield scene_of(setup, effects), todo[low : low + runtime.SLOTS]
 
 
 @cache
-def _scene(setup: StirSetup):
-    """The compiled scene of a setup; its fields live as long as the process."""
+def _scene(setup: StirSetup, effects: tuple[Effect, ...] = ()):
+    """The scene compiled for a setup and liquid effects; its fields live as long as the
+    process."""
     runtime.start()
     from .stirring_kernel import StirringScene
 
-    return StirringScene(runtime.SLOTS, setup)
+    return StirringScene(runtime.SLOTS, setup, effects=effects)
 
 
 @cache
-def _roomy_scene(setup: StirSetup):
+def _roomy_scene(setup: StirSetup, effects: tuple[Effect, ...] = ()):
     """The same with room for more particles than the setup's."""
     runtime.start()
     from .stirring_kernel import StirringScene
 
-    return StirringScene(runtime.SLOTS, setup, int(setup.count(setup.deepest)))
+    return StirringScene(runtime.SLOTS, setup, int(setup.count(setup.deepest)), effects)
 
 
-def _run(scene, setup, liquid, rig, seeds) -> np.ndarray:
-    """Directions of the sticks, shape [B, substeps + 1, 3]; NaN where a trial diverged."""
+def _run(scene, setup, held, rig, seeds) -> np.ndarray:
+    """Directions of the sticks, shape [B, substeps + 1, 3]; NaN where a trial diverged.
+
+    `held` are the liquid and the coefficients [effects, B] of the scene's effects.
+    """
     size = len(seeds)
     pivots = rig.path[:, 0]
     counts = setup.count(rig.fill)
@@ -282,12 +292,14 @@ def _run(scene, setup, liquid, rig, seeds) -> np.ndarray:
         scene.hold_stick(True)
         return scene.settled(points, SETTLING)
 
-    keys = zip([setup] * size, counts, seeds, (tuple(p) for p in pivots), strict=True)
-    packings = _packings.of(list(keys), settle)
+    # by scene too: with effects compiled in, the last bit of a rest may differ
+    fixed = setup, tuple(effect.name for effect in scene.effects)
+    keys = [(fixed, counts[k], seeds[k], tuple(pivots[k])) for k in range(size)]
+    packings = _packings.of(keys, settle)
     scene.place([p.position for p in packings], [p.multiplier for p in packings])
     scene.place_stick(pivots)
     scene.hold_stick(False)
-    scene.pour_in(liquid)
+    scene.pour_in(*held)
     scene.fit_stick(rig.stick_mass, rig.pivot_friction)
 
     path = rig.path[:, 1:].astype(np.float32, order="C")

@@ -18,18 +18,22 @@ class StirringScene(Fluid):
     makes the matrix symmetric.
     """
 
-    def __init__(self, slots, setup, particles=None):
+    walls = 2
+
+    def __init__(self, slots, setup, particles=None, effects=()):
         """
         Args:
             slots: Trials that run side by side.
             setup: `StirSetup`.
             particles: Most particles that a trial may hold; None: the setup's.
+            effects: Liquid effects to compile for.
         """
         particles = setup.particles if particles is None else particles
         cup, stick = setup.cup, setup.stick
         top = 1.5 * cup.fill
         extent = [(-cup.radius, -cup.radius, 0.0), (cup.radius, cup.radius, top)]
         super().__init__(slots, particles, setup.spacing, setup.numerics, extent)
+        self.bring(effects)
         self.cup_radius = cup.radius
         self.margin = setup.numerics.contact * setup.spacing
         self.stick_radius, self.stick_length = stick.radius, stick.length
@@ -78,6 +82,15 @@ class StirringScene(Fluid):
         return side[0] + floor[0] + stick[0]
 
     @ti.func
+    def wall_near(self, b, i, n: ti.template()):
+        p = self.position[b, i]
+        distance, normal = p.z, vec3(0.0, 0.0, 1.0)
+        if ti.static(n == 1):
+            reach = ti.max(ti.sqrt(p.x * p.x + p.y * p.y), 1e-6)
+            distance, normal = self.cup_radius - reach, -vec3(p.x, p.y, 0.0) / reach
+        return distance, normal, 1.0
+
+    @ti.func
     def across(self, b, v):
         """The part of v that turns the stick."""
         return v - v.dot(self.direction[b]) * self.direction[b]
@@ -101,6 +114,10 @@ class StirringScene(Fluid):
     def push_body(self, b, i, multiplier):
         push = multiplier * self.across(b, self.body_wall[b, i])
         self.swing[b] = self.swing[b] + self.yielding(b, i) * push
+
+    @ti.func
+    def body_thicken(self, b, i, ratio):
+        self.stick_grip[b, i] = ratio * self.stick_grip[b, i]
 
     @ti.func
     def stick_scale(self, b):

@@ -1,6 +1,7 @@
 # type: ignore  (Taichi compiles this source and gives these names their types)
 """Flow between two plates that goes round in x and y, driven by a plate or by a body force."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 
@@ -8,6 +9,8 @@ import numpy as np
 import taichi as ti
 
 from ... import runtime
+from ...effect import Effect
+from ...effects import EFFECTS
 from ...fluid import STRIDE, Fluid, vec3
 from ...liquid import Liquid
 from ...numerics import Numerics
@@ -41,13 +44,14 @@ class Channel:
 class ChannelScene(Fluid):
     """Fluid between plates; the upper one moves at `speed` along x, `push` acts on all."""
 
-    def __init__(self, slots, channel):
+    def __init__(self, slots, channel, effects=()):
         particles = channel.layers * channel.around**2
         length = channel.around * channel.spacing
         extent = [(0.0, 0.0, 0.0), (length, length, channel.gap)]
         super().__init__(
             slots, particles, channel.spacing, channel.numerics, extent, (length, length)
         )
+        self.bring(effects)
         self.gap, self.length = channel.gap, length
         self.speed, self.push = (ti.field(ti.f32, slots) for _ in range(2))
         self.margin = channel.numerics.contact * channel.spacing
@@ -88,18 +92,20 @@ class ChannelScene(Fluid):
 
 
 @cache
-def _scene(channel: Channel, slots: int) -> ChannelScene:
+def _scene(channel: Channel, slots: int, effects: tuple[Effect, ...]) -> ChannelScene:
     runtime.start()
-    return ChannelScene(slots, channel)
+    return ChannelScene(slots, channel, effects)
 
 
-def channel_flow(
+def channel_flow(  # noqa: PLR0913  what flows, what drives it, and when to look
     channel: Channel,
     liquid: Liquid,
     speed: np.ndarray,
     push: np.ndarray,
     seconds: np.ndarray,
     start=None,
+    effects: Mapping[str, np.ndarray] | None = None,
+    seed: int = 0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Heights and velocities of the particles after each of the times.
 
@@ -110,23 +116,27 @@ def channel_flow(
         push: Acceleration along x [m/s²], shape [B].
         seconds: Ascending times [s] at which to look, shape [T].
         start: Optional function of heights [B, particles]: velocities along x [m/s] at time 0.
+        effects: Coefficients of liquid effects by name, all of which act, shape [B] each.
+        seed: Of the jitter of the lattice from which the packing relaxes.
 
     Returns:
         z [m] and velocity along x [m/s], shape [T, B, particles] each.
     """
     size = len(speed)
-    scene = _scene(channel, max(size, 1))
+    names = sorted(effects or {})
+    scene = _scene(channel, max(size, 1), tuple(EFFECTS[name] for name in names))
+    coefficients = np.array([(effects or {})[name] for name in names]).reshape(len(names), size)
     axis = (np.arange(channel.around) + 0.5) * channel.spacing
     height = (np.arange(channel.layers) + 0.5) / channel.layers * channel.gap
     lattice = np.stack(np.meshgrid(axis, axis, height, indexing="ij"), axis=-1).reshape(-1, 3)
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(seed)
     with runtime.LOCK:
         jitter = 0.1 * channel.spacing * rng.standard_normal((size, *lattice.shape))
         scene.speed.from_numpy(np.zeros(scene.slots, np.float32))
         scene.push.from_numpy(np.zeros(scene.slots, np.float32))
         packings = scene.settled(list((lattice + jitter).astype(np.float32)), 1.0)
         scene.place([p.position for p in packings], [p.multiplier for p in packings])
-        scene.pour_in(liquid.batch(size))
+        scene.pour_in(liquid.batch(size), coefficients)
         scene.speed.from_numpy(scene.padded(np.asarray(speed)))
         scene.push.from_numpy(scene.padded(np.asarray(push)))
         if start is not None:

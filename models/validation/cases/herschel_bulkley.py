@@ -1,0 +1,111 @@
+"""Gels and shear-thinning liquids pushed through a channel, against their profiles."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...effects.shear_thinning import ONSET
+from ...liquid import Liquid
+from ..analysis.profiles import binned_profile
+from ..case import Case, CaseResult, Curve, Panel, Progress, Row
+from ..scenes.channel import Channel, channel_flow
+from ..truths.generalised_flows import generalised_channel, herschel_bulkley_channel
+
+
+class Flow(NamedTuple):
+    """Viscosity at rest [Pa s], yield stress [Pa], 1 - n, and force per mass [m/s²]."""
+
+    viscosity: float
+    yield_stress: float
+    thinning: float
+    push: float
+
+
+DENSITY = 1000.0
+GELS = (Flow(1.0, 5.0, 0.0, 0.5), Flow(2.0, 40.0, 0.0, 2.0))
+THINNING = (Flow(3.0, 0.0, 0.3, 1.0), Flow(5.0, 0.0, 0.5, 0.5))
+CHANNEL = Channel(layers=12)
+TIMES = np.linspace(3.0, 4.0, 5)  # s; a channel's time of diffusion is below 0.7 s
+TOLERANCE = 0.1  # of the speed in the middle
+
+
+def truth(flow: Flow, z: np.ndarray) -> np.ndarray:
+    """Velocity [m/s] at z."""
+    gap, gradient = CHANNEL.gap, DENSITY * flow.push
+    if flow.yield_stress:
+        return herschel_bulkley_channel(
+            z,
+            gap=gap,
+            gradient=gradient,
+            consistency=flow.viscosity,
+            yield_stress=flow.yield_stress,
+        )
+
+    def carreau(rate: float) -> float:
+        return flow.viscosity * (1.0 + (ONSET * rate) ** 2) ** (-0.5 * flow.thinning)
+
+    return generalised_channel(z, gap=gap, gradient=gradient, viscosity=carreau)
+
+
+def simulated(flows: tuple[Flow, ...], effect: str, coefficient: list[float], seed: int):
+    """Heights and velocities of the particles at all times, [B, particles of all times] each."""
+    size = len(flows)
+    z, u = channel_flow(
+        CHANNEL,
+        Liquid([flow.viscosity for flow in flows], 0.0, DENSITY),
+        np.zeros(size),
+        np.array([flow.push for flow in flows]),
+        TIMES,
+        effects={effect: np.array(coefficient)},
+        seed=seed,
+    )
+    return (np.moveaxis(a, 1, 0).reshape(size, -1) for a in (z, u))
+
+
+def run(progress: Progress, seed: int) -> CaseResult:
+    """Profiles; the layer of particles at each wall, half of it inside its friction, is left
+    out of the largest error, as one bin cannot follow the slope there."""
+    groups = (
+        (GELS, "yield_stress", [flow.yield_stress for flow in GELS]),
+        (THINNING, "shear_thinning", [flow.thinning for flow in THINNING]),
+    )
+    rows, panels = [], []
+    for number, (flows, effect, coefficient) in enumerate(groups):
+        z, u = simulated(flows, effect, coefficient, seed)
+        curves = []
+        for k, flow in enumerate(flows):
+            profile = binned_profile(z[k], u[k], 0.0, CHANNEL.gap, CHANNEL.layers)
+            expected = truth(flow, profile.at)
+            middle = float(truth(flow, np.array([CHANNEL.gap / 2]))[0])
+            off = (profile.mean - expected)[1:-1] / middle
+            name = f"{effect} {coefficient[k]:g}, {flow.viscosity:g} Pa s"
+            worst = float(np.abs(off).max())
+            rows += [
+                Row.relative(
+                    f"speed in the middle, {name} [m/s]",
+                    middle,
+                    float(profile.mean.max()),
+                    TOLERANCE,
+                ),
+                Row(f"largest error of the profile, {name}", 0.0, worst, worst, TOLERANCE),
+            ]
+            fine = np.linspace(0.0, CHANNEL.gap, 200)
+            curves += [
+                Curve(name, 100.0 * fine, truth(flow, fine), truth=True, series=k),
+                Curve("", 100.0 * profile.at, profile.mean, series=k),
+            ]
+        panels.append(Panel("height [cm]", "velocity [m/s]", tuple(curves)))
+        progress((number + 1) / len(groups))
+    return CaseResult(tuple(rows), tuple(panels))
+
+
+CASE = Case(
+    name="herschel_bulkley",
+    title="Gels and shear-thinning liquids in a channel",
+    truth="the profile that carries a stress linear across the gap",
+    source="Bird, Dai & Yarusso 1983, Rev. Chem. Eng. 1, 1; Carreau 1972",
+    unit="relative",
+    tolerance=TOLERANCE,
+    settings={"gels": GELS, "thinning": THINNING, "layers": CHANNEL.layers},
+    run=run,
+)
