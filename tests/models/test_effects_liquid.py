@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.models import pouring, runtime
 from bolfi_liquids.models.validation.analysis.profiles import binned_profile
-from bolfi_liquids.models.validation.scenes.channel import Channel, channel_flow
+from bolfi_liquids.models.validation.scenes.plates import Channel, channel_flow
 from bolfi_liquids.models.validation.truths.generalised_flows import herschel_bulkley_channel
 
 from bolfi_liquids import models
@@ -79,8 +79,8 @@ def test_hooks_from_outside_act(register):
         return u[0, 0].mean()
 
     base = profile(1.0, 0.5, None)
-    assert profile(1.0, 0.0, {"push": np.array([0.5])}) == pytest.approx(base, rel=0.02)
-    assert profile(0.5, 0.5, {"thicken": np.array([2.0])}) == pytest.approx(base, rel=0.02)
+    assert profile(1.0, 0.0, {"push": np.array([0.5])}) == pytest.approx(base, rel=0.05)
+    assert profile(0.5, 0.5, {"thicken": np.array([2.0])}) == pytest.approx(base, rel=0.05)
     assert profile(1.0, 0.5, {"thicken": np.array([2.0])}) < 0.7 * base
 
 
