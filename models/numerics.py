@@ -41,9 +41,9 @@ class Numerics:
     quiet: float = 1.5e-3
     own_viscosity: float = 2.3e-3
     viscosity_gain: float = 1.43
-    wall_slip: float = 5.0
+    wall_slip: float = 4.0
     wall_normal: float = 1.0
-    outer_wall: float = 0.3
+    outer_wall: float = 0.4
     stick_drag: float = 0.5
     attraction: float = 15.0
     contact: float = 0.25

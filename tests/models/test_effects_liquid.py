@@ -164,9 +164,10 @@ def test_adhesion_does_not_heat(cups):
     particles, source = 664, cups.source
     scene = pouring._scene(cups, particles, (adhesion,))
     shift = np.array([source.radius, 0.0, source.height])
-    scene.place([pack_cylinder(source.radius, scene.spacing, particles, 0) - shift])
     scene.place_cups(np.ones(1), np.zeros(1))
-    scene.relax_packing(1, 0.6)
+    points = pack_cylinder(source.radius, scene.spacing, particles, 0) - shift
+    (packing,) = scene.settled([points], 0.6)
+    scene.place([packing.position], [packing.multiplier])
     scene.pour_in(models.Liquid(0.01, 0.0, 1000.0).batch(1), np.ones((1, 1)))
     scene.settle(1, int(3.0 * scene.rate), 1.0)
     speed = np.linalg.norm(scene.velocity.to_numpy()[0], axis=1)
