@@ -55,8 +55,9 @@ class Numerics:
     def least_viscosity(self, spacing: float, density: float, speed: float = 0.1) -> float:
         """Viscosity [Pa s] below which liquids look alike: particles cannot flow with less.
 
-        Measured in channels twelve particles wide (validation case `poiseuille`). It rises with
-        speed, as particles that pass each other pick up disorder.
+        Measured without gravity in channels twelve particles wide (validation case `poiseuille`).
+        It rises with speed, as particles that pass each other pick up disorder, and, beyond what
+        this says, with the pressure that they bear (case `film_flow`).
 
         Args:
             spacing: Particle spacing [m].

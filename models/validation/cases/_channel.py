@@ -17,13 +17,12 @@ LOOKS, APART = 10, 0.05  # profiles of a steady flow, and the time between them 
 Start = Callable[[np.ndarray], np.ndarray]
 
 
-def packed(viscosity: float, seed: int) -> tuple[Liquid, int]:
-    """One liquid for `PACKINGS` channels, and the seed of their packings."""
-    return Liquid(np.full(PACKINGS, viscosity), 0.0, DENSITY), seed
+def flow(viscosity: float, drive: tuple[float, float], start: Start, looks, seed: int) -> Profiles:
+    """One liquid in `PACKINGS` channels at the times `looks` [s].
 
-
-def flow(viscosity: float, drive: tuple[float, float], start: Start, seconds, seed: int) -> Profiles:
-    """Profiles of `PACKINGS` channels; `drive` is the lid's speed and the push."""
+    Args:
+        drive: Speed of the lid [m/s] and push [m/s²].
+    """
     lid_speed, push = (np.full(PACKINGS, value) for value in drive)
-    liquid, seed = packed(viscosity, seed)
-    return channel_flow(CHANNEL, liquid, Drive(lid_speed, push, start), seconds, seed=seed)
+    liquid = Liquid(np.full(PACKINGS, viscosity), 0.0, DENSITY)
+    return channel_flow(CHANNEL, liquid, Drive(lid_speed, push, start), looks, seed=seed)

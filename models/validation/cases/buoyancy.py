@@ -11,7 +11,7 @@ STICK = Stick(radius=0.0045, length=0.22, mass=1200.0 * np.pi * 0.0045**2 * 0.22
 CUP = Cup(radius=0.04, height=0.075, fill=0.05)
 SUBMERGED = 0.04  # m, upright
 DENSITY, VISCOSITY = 1260.0, 0.05
-TILTS = (8.0, 15.0)  # deg; less shows the push of single particles
+TILTS = (8.0, 15.0, 25.0)  # deg
 HEAVY = 1e4  # times the stick's mass: it stays where it is, and its swing sums up the pushes
 REST, SPAN = 1.0, 3.0  # s, before and while the pushes are summed
 PACKINGS = 8

@@ -13,6 +13,7 @@ BEGIN, END = 0.02, 0.1
 LONGEST = 6.0  # s
 STEADY = 2.0  # s before the first look at the steady flow
 TOLERANCE = 0.1
+RATE = CHANNEL.numerics.substep_rate(CHANNEL.spacing)
 
 
 def startup(z: np.ndarray, time: float, kinematic: float) -> np.ndarray:
@@ -51,16 +52,15 @@ def grown(viscosity: float, seed: int) -> tuple[float, Curve, Curve]:
     )
 
 
-RATE = CHANNEL.numerics.substep_rate(CHANNEL.spacing)
-
-
 def run(progress: Progress, seed: int) -> CaseResult:
     """How a layer grows, then the shear rate of the steady flow."""
     rows, curves = [], []
     for number, viscosity in enumerate(VISCOSITY):
         name = f"{viscosity:g} Pa s"
         ours, truth, seen = grown(viscosity, seed)
-        rows.append(Row.relative(f"{name} by the layer's growth [Pa s]", viscosity, ours, TOLERANCE))
+        rows.append(
+            Row.relative(f"{name} by the layer's growth [Pa s]", viscosity, ours, TOLERANCE)
+        )
 
         def start(z: np.ndarray) -> np.ndarray:
             return couette_steady(z, CHANNEL.gap, SPEED)

@@ -62,6 +62,11 @@ CASE = Case(
     source="Landau & Lifshitz, Mechanics, section 11",
     unit="relative",
     tolerance=TOLERANCE,
-    settings={"shifts": SHIFTS, "seconds": SECONDS, "particles": PARTICLES, "stick": "r 5 mm, l 15 cm, 20 g"},
+    settings={
+        "shifts": SHIFTS,
+        "seconds": SECONDS,
+        "particles": PARTICLES,
+        "stick": "r 5 mm, l 15 cm, 20 g",
+    },
     run=run,
 )
