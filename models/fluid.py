@@ -130,11 +130,15 @@ class Fluid(Attraction):
         density[len(liquid.density) :] = 1.0
         self.density.from_numpy(density)
 
+    def relax_packing(self, active, seconds):
+        """Let the first `active` packings come to rest, the same for every liquid."""
+        self.pour_in(SETTLING_LIQUID.batch(active))
+        self.settle(active, round(seconds * self.rate), DAMPING)
+
     def settled(self, positions, seconds):
-        """Particles [n, 3] each, come to rest: the same for every liquid."""
+        """Particles [n, 3] each, come to rest."""
         self.place(positions)
-        self.pour_in(SETTLING_LIQUID.batch(len(positions)))
-        self.settle(len(positions), round(seconds * self.rate), DAMPING)
+        self.relax_packing(len(positions), seconds)
         position, multiplier = self.position.to_numpy(), self.multiplier.to_numpy()
         return [
             Packing(position[b, : len(points)], multiplier[b, : len(points)])
