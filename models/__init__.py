@@ -3,6 +3,7 @@
 from .cups import Cups
 from .effect import Effect
 from .effects import EFFECTS, register
+from .faults import FailedSimulation
 from .liquid import Liquid
 from .numerics import MODEL_VERSION, Numerics
 from .pouring import PourAction, PourResult, pour
@@ -15,6 +16,7 @@ __all__ = [
     "Cup",
     "Cups",
     "Effect",
+    "FailedSimulation",
     "Liquid",
     "Numerics",
     "PourAction",

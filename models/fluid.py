@@ -10,10 +10,13 @@ import numpy as np
 import taichi as ti
 
 from .attraction import Attraction
+from .faults import RUNAWAY, SOUND
 from .liquid import Liquid
 from .neighbours import vec3
+from .settled import Packing
 
 GRAVITY = 9.81
+TOP_SPEED = 20.0  # m/s, ten times what falls from a cup
 STRIDE = 512  # Taichi gives each CPU thread at least this many consecutive iterations
 SETTLING_LIQUID = Liquid(viscosity=0.05, cohesion=0.0, density=1000.0)
 DAMPING = 0.97  # of velocities each substep while a packing settles
@@ -69,9 +72,20 @@ class Fluid(Attraction):
             self.project(b, sweep % 2)
         self.shear(b)
         self.project(b, (self.numerics.iterations - 1) % 2)
-        for i in range(self.alive[b]):
-            self.position[b, i] = self.position[b, i] + self.dt * self.velocity[b, i]
+        self.advance(b)
         self.contain(b)
+
+    @ti.func
+    def advance(self, b):
+        """Move the particles, unless one is faster than any liquid here can be."""
+        fastest = 0.0
+        for i in range(self.alive[b]):
+            fastest = ti.max(fastest, self.velocity[b, i].norm_sqr())
+        if not fastest < TOP_SPEED * TOP_SPEED:
+            self.fault[b] = RUNAWAY
+        else:
+            for i in range(self.alive[b]):
+                self.position[b, i] = self.position[b, i] + self.dt * self.velocity[b, i]
 
     @ti.kernel
     def settle(self, active: ti.i32, steps: ti.i32, damping: ti.f32):
@@ -80,21 +94,31 @@ class Fluid(Attraction):
             if n % STRIDE == 0:
                 b = n // STRIDE
                 for _n in range(steps):
-                    self.flow(b)
+                    if self.fault[b] == SOUND:
+                        self.flow(b)
                     for i in range(self.alive[b]):
                         self.velocity[b, i] = damping * self.velocity[b, i]
 
-    def place(self, packings):
-        """Put `packings`, arrays [particles, 3] of any length that fits, at rest into the slots."""
-        positions = np.zeros((self.slots, self.particles, 3), np.float32)
+    def place(self, positions, multipliers=None):
+        """Put particles at rest into the first slots.
+
+        Args:
+            positions: For each simulation [n, 3] in m, of any n that fits.
+            multipliers: The pressures that held them where they settled, [n] each.
+        """
+        position = np.zeros((self.slots, self.particles, 3), np.float32)
+        multiplier = np.zeros((self.slots, self.particles), np.float32)
         alive = np.zeros(self.slots, np.int32)
-        for b, packing in enumerate(packings):
-            alive[b] = len(packing)
-            positions[b, : len(packing)] = packing
-        self.position.from_numpy(positions)
+        for b, points in enumerate(positions):
+            alive[b] = len(points)
+            position[b, : len(points)] = points
+            if multipliers is not None:
+                multiplier[b, : len(points)] = multipliers[b]
+        self.position.from_numpy(position)
+        self.multiplier.from_numpy(multiplier)
         self.alive.from_numpy(alive)
-        for field in (self.velocity, self.multiplier, self.overflow):
-            field.fill(0)
+        self.velocity.fill(0)
+        self.fault.fill(0)
 
     def pour_in(self, liquid, coefficients=None):
         """Set what liquid each slot holds, from a batched `Liquid`, and the coefficients of the
@@ -111,9 +135,15 @@ class Fluid(Attraction):
         self.pour_in(SETTLING_LIQUID.batch(active))
         self.settle(active, round(seconds * self.rate), DAMPING)
 
-    def diverged(self, active):
-        """Which of the first `active` liquids hold a particle that is nowhere, bool [active]."""
-        return ~np.isfinite(self.position.to_numpy()[:active]).all(axis=(1, 2))
+    def settled(self, positions, seconds):
+        """Particles [n, 3] each, come to rest."""
+        self.place(positions)
+        self.relax_packing(len(positions), seconds)
+        position, multiplier = self.position.to_numpy(), self.multiplier.to_numpy()
+        return [
+            Packing(position[b, : len(points)], multiplier[b, : len(points)])
+            for b, points in enumerate(positions)
+        ]
 
     def padded(self, values):
         """`values` [b, ...] as float32 with zeros up to the number of slots."""

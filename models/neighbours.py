@@ -4,9 +4,10 @@
 import numpy as np
 import taichi as ti
 
+from .faults import COLLAPSED
+
 vec3 = ti.math.vec3
 MEAN_NEIGHBOURS = 40  # of a half list; settled liquid has about 14
-HALF_STENCIL = ((0, 0), (0, 1), (1, -1), (1, 0), (1, 1))
 FLAT = 3  # layers of cells in one reach: a column's neighbours lie in one run, the thinner the less
 
 
@@ -44,7 +45,7 @@ class NeighbourSearch:
         )
         self.half_other = ti.field(ti.i32, (slots, self.capacity // 2))
         self.pair_other = ti.field(ti.i32, (slots, self.capacity))
-        self.alive, self.overflow = (ti.field(ti.i32, slots) for _ in range(2))
+        self.alive, self.fault = (ti.field(ti.i32, slots) for _ in range(2))
         self.carried, self.scratch = [], []
         self.carry(self.position, ti.Vector.field(3, ti.f32, shape))
 
@@ -114,18 +115,17 @@ class NeighbourSearch:
             self.half_start[b, i] = pairs
             p = self.position[b, i]
             q = self.cell_of(p)
-            for k in ti.static(range(len(HALF_STENCIL))):
-                dx, dy = ti.static(HALF_STENCIL[k])
-                x, y = q[0] + dx, q[1] + dy
+            for k in range(5):  # this column, the next in y, and the three next in x
+                x, y = q[0] + ti.select(k < 2, 0, 1), q[1] + ti.select(k < 2, k, k - 3)
                 if ti.static(self.period[0] > 0):
                     x = (x + nx) % nx
                 if ti.static(self.period[1] > 0):
                     y = (y + ny) % ny
                 if x < nx and 0 <= y and y < ny:
                     column = (x * ny + y) * nz
-                    low = i + 1
-                    if ti.static(k > 0):
-                        low = self.cell_start[b, column + ti.max(q[2] - FLAT, 0)]
+                    low = self.cell_start[b, column + ti.max(q[2] - FLAT, 0)]
+                    if k == 0:
+                        low = i + 1
                     high = self.cell_start[b, column + ti.min(q[2] + FLAT, nz - 1) + 1]
                     pairs = self.collect(b, p, low, high, pairs)
         self.half_start[b, self.alive[b]] = pairs
@@ -142,7 +142,7 @@ class NeighbourSearch:
             self.half_other[b, count] = a
             count += ti.cast(d.dot(d) < self.reach * self.reach, ti.i32)
         if count > self.capacity // 2 - self.particles:
-            self.overflow[b] = 1
+            self.fault[b] = COLLAPSED
             count = pairs
         return count
 
@@ -172,17 +172,6 @@ class NeighbourSearch:
                 self.pair_other[b, theirs] = i
                 self.pair_next[b, j] = theirs + 1
             self.pair_next[b, i] = own
-
-    def check_capacity(self):
-        """
-        Raises:
-            RuntimeError: neighbour lists overflowed since `overflow` was cleared.
-        """
-        if self.overflow.to_numpy().any():
-            raise RuntimeError(
-                f"particles have more than {MEAN_NEIGHBOURS} neighbours on average: the liquid "
-                "has collapsed; raise numerics.rate or lower cohesion"
-            )
 
 
 def _grid(reach, size, period):

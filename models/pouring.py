@@ -11,12 +11,15 @@ from . import runtime
 from .coefficients import acting_in, liquid_sets, with_adhesion
 from .cups import Cups
 from .effect import Effect
+from .faults import faulty
 from .liquid import Liquid
 from .numerics import POUR_PARTICLES, Numerics
 from .packing import checked_seeds, pack_cylinder
 from .runtime import CHUNK
+from .settled import Packing, SettledPackings
 
 SETTLING = 0.6  # s
+_packings = SettledPackings()
 DRIP = 1.2  # s beyond the cups' hold; viscous liquids need it, and others end earlier
 
 
@@ -65,7 +68,8 @@ def pour(
     Raises:
         ValueError: lengths do not agree, an action is not finite or does not turn, or an effect
             is unknown.
-        RuntimeError: neighbour lists overflowed.
+    Warns:
+        FailedSimulation: a pour went wrong; its fractions are NaN.
     """
     seeds = checked_seeds(seeds)
     acting = acting_in("pour", with_adhesion(liquid, effects, len(seeds)), len(seeds))
@@ -112,24 +116,27 @@ def _run(scene, cups, held, action, seeds) -> np.ndarray:
     rate, distance = action
     source = cups.source
     shift = np.array([source.radius, 0.0, source.height], np.float32)
-    scene.place(
-        np.stack(
-            [
-                pack_cylinder(source.radius, scene.spacing, scene.particles, int(s)) - shift
-                for s in seeds
-            ]
+
+    def settle(places: list[int]) -> list[Packing]:
+        scene.place_cups(np.ones(len(places)), np.zeros(len(places)))
+        packed = (
+            pack_cylinder(source.radius, scene.spacing, scene.particles, int(seeds[k]))
+            for k in places
         )
-    )
+        return scene.settled([points - shift for points in packed], SETTLING)
+
+    # by scene too: with effects compiled in, the last bit of a rest may differ
+    fixed = cups, scene.particles, tuple(effect.name for effect in scene.effects)
+    packings = _packings.of([(fixed, seed) for seed in seeds], settle)
+    scene.place([p.position for p in packings], [p.multiplier for p in packings])
     scene.place_cups(rate, distance)
-    scene.relax_packing(size, SETTLING)
     scene.pour_in(*held)
     hold = cups.pour.hold + DRIP
     steps = int((cups.pour.final_angle / rate.min() + hold) * scene.rate)
     for start in range(0, steps, CHUNK):
         scene.pour(size, start, min(start + CHUNK, steps), hold)
     scene.count(size)
-    scene.check_capacity()
     fields = (scene.spilled, scene.received, scene.retained)
     counts = np.stack([field.to_numpy()[:size] for field in fields]).astype(float)
-    counts[:, scene.diverged(size)] = np.nan
+    counts[:, faulty(scene.fault.to_numpy()[:size], seeds)] = np.nan
     return counts

@@ -7,6 +7,7 @@ the cup's floor, z along its axis; it coincides with the world's directions befo
 
 import taichi as ti
 
+from .faults import SOUND
 from .fluid import STRIDE, Fluid, vec3
 
 INSIDE, ABOVE, OUTSIDE = 0, 1, 2  # of the source: within its walls, above its rim, past it
@@ -58,7 +59,7 @@ class PouringScene(Fluid):
         """Side and floor rows at a point of the cup frame; the side fades out at the rim."""
         reach = ti.sqrt(q.x * q.x + q.y * q.y)
         fade = ti.math.clamp((self.cup_height - q.z) / self.h + 0.5, 0.0, 1.0)
-        side = fade * self.look_up(self.half_space, self.cup_radius - reach)
+        side = fade * self.look_up(self.half_space, ti.abs(self.cup_radius - reach))
         floor = self.look_up(self.half_space, q.z)
         outward = vec3(q.x, q.y, 0.0) / ti.max(reach, 1e-6)
         return side, floor, outward
@@ -70,15 +71,20 @@ class PouringScene(Fluid):
         self.wall[b, i] = vec3(0.0)
         self.body_wall[b, i] = vec3(0.0)
         grip, moving = ti.Matrix.zero(ti.f32, 3, 3), vec3(0.0)
+        p = self.position[b, i]
+        q = self.to_cup(b, p)
+        side, floor, outward = self.walls_at(q)
         if self.region[b, i] == INSIDE:
-            p = self.position[b, i]
-            side, floor, outward = self.walls_at(self.to_cup(b, p))
             outward = self.turn(b, outward)
             up = self.turn(b, vec3(0.0, 0.0, 1.0))
             self.body_wall[b, i] = (floor[1] * up - side[1] * outward) / self.h
             density = side[0] + floor[0]
             moving = self.turning[b] * vec3(p.z, 0.0, -p.x)
             grip = self.wall_grip(side, outward) + self.wall_grip(floor, up)
+        elif q.z > 0.0 and side[3] > 0.0:
+            # what runs over the rim still drags along the wall's edge and outer face
+            moving = self.turning[b] * vec3(p.z, 0.0, -p.x)
+            grip = self.numerics.outer_wall * self.wall_grip(side, self.turn(b, outward))
         self.grip_walls(b, i, grip, moving)
         return density
 
@@ -154,7 +160,7 @@ class PouringScene(Fluid):
                 rate = self.rate_of_turn[b]
                 steps = ti.cast((self.final_angle / rate + hold) / self.dt, ti.i32)
                 for n in range(start, ti.min(stop, steps)):
-                    if self.alive[b] > 0:
+                    if self.alive[b] > 0 and self.fault[b] == SOUND:
                         self.angle[b] = ti.min(rate * (n + 1) * self.dt, self.final_angle)
                         self.turning[b] = ti.select(self.angle[b] < self.final_angle, rate, 0.0)
                         self.follow(b)

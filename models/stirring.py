@@ -11,13 +11,16 @@ from numpy.typing import ArrayLike
 from . import runtime
 from .coefficients import acting_in, changed_rig, changed_signal, liquid_sets, with_adhesion
 from .effect import Effect
+from .faults import faulty
 from .liquid import Liquid
 from .numerics import MODEL_VERSION, Numerics
 from .packing import checked_seeds, pack_cylinder
 from .rig import Rig, check_rig
 from .runtime import CHUNK
+from .settled import Packing, SettledPackings
 
 SETTLING = 1.0  # s that a packing relaxes around the held stick
+_packings = SettledPackings()
 ROOM = 1.5  # times the setup's fill is the largest
 
 
@@ -177,7 +180,8 @@ def stir(
     Raises:
         ValueError: liquid, seeds and coefficients do not agree in length, seeds are no integers,
             the path is too short, an effect is unknown or makes a rig that cannot be.
-        RuntimeError: neighbour lists overflowed.
+    Warns:
+        FailedSimulation: a simulation went wrong; its angles are NaN.
     """
     seeds = checked_seeds(seeds)
     size = len(seeds)
@@ -282,13 +286,20 @@ def _run(scene, setup, held, rig, seeds) -> np.ndarray:
     """
     size = len(seeds)
     pivots = rig.path[:, 0]
-    starts = zip(setup.count(rig.fill), seeds, pivots, strict=True)
-    scene.place([_pack(setup, int(n), int(seed), pivot) for n, seed, pivot in starts])
-    # packings settle around the setup's stick: the start tells sticks apart no more than liquids
-    scene.fit_stick(np.full(size, setup.stick.mass), np.zeros(size))
+    counts = setup.count(rig.fill)
+
+    def settle(places: list[int]) -> list[Packing]:
+        points = [_pack(setup, int(counts[k]), int(seeds[k]), pivots[k]) for k in places]
+        scene.place_stick(pivots[places])
+        scene.hold_stick(True)
+        return scene.settled(points, SETTLING)
+
+    # by scene too: with effects compiled in, the last bit of a rest may differ
+    fixed = setup, tuple(effect.name for effect in scene.effects)
+    keys = [(fixed, counts[k], seeds[k], tuple(pivots[k])) for k in range(size)]
+    packings = _packings.of(keys, settle)
+    scene.place([p.position for p in packings], [p.multiplier for p in packings])
     scene.place_stick(pivots)
-    scene.hold_stick(True)
-    scene.relax_packing(size, SETTLING)
     scene.hold_stick(False)
     scene.pour_in(*held)
     scene.fit_stick(rig.stick_mass, rig.pivot_friction)
@@ -298,9 +309,8 @@ def _run(scene, setup, held, rig, seeds) -> np.ndarray:
     directions = np.empty((size, steps, 3), np.float32)
     for start in range(0, steps, CHUNK):
         stop = min(start + CHUNK, steps)
-        scene.stir(size, start, stop, path, directions)
-    scene.check_capacity()
-    directions[scene.diverged(size)] = np.nan
+        scene.stir(size, start, stop, path, directions, 1.0)
+    directions[faulty(scene.fault.to_numpy()[:size], seeds)] = np.nan
     down = np.broadcast_to(np.array([0.0, 0.0, -1.0], np.float32), (size, 1, 3))
     return np.concatenate([down, directions], axis=1).astype(np.float64)
 

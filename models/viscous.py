@@ -10,11 +10,13 @@ symmetric and positive, so any viscosity is stable, and every iterate keeps the 
 
 import taichi as ti
 
+from .faults import UNSOLVED
 from .neighbours import vec3
 from .rheology import Rheology
 
 WEAK = 0.004  # of nu dt / h^2: so thin a liquid takes one explicit step instead
 MOST_ITERATIONS = 50
+LARGEST = 1e30  # squared residual [m²/s²] that single precision can still work with
 MOST_UNEVEN = 200  # the same where particles differ in viscosity
 UNEVEN_TOLERANCE = 0.3  # of the usual one, where they do
 
@@ -47,7 +49,7 @@ class Viscous(Rheology):
         unit = self.spacing**2 / self.dt
         least = self.numerics.quiet * unit
         lacking = viscosity / self.density[b] - self.numerics.own_viscosity * unit
-        return ti.sqrt(ti.max(lacking, 0.0) ** 2 + least * least)
+        return ti.max(lacking, least)
 
     @ti.func
     def boundary(self, b, i):
@@ -150,6 +152,8 @@ class Viscous(Rheology):
             self.search_direction[b, i] = self.ease[b, i] * r
             size += self.ease[b, i] * r.dot(r)
         size += self.body_residual(b)
+        if not size < LARGEST:
+            self.fault[b] = UNSOLVED
         thickest = self.kinematic(b)
         if ti.static(len(self.rheology_hooks) > 0):
             thickest = self.thickest[b]

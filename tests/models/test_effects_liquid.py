@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.models import pouring, runtime
 from bolfi_liquids.models.validation.analysis.profiles import binned_profile
-from bolfi_liquids.models.validation.scenes.channel import Channel, channel_flow
+from bolfi_liquids.models.validation.scenes.plates import Channel, channel_flow
 from bolfi_liquids.models.validation.truths.generalised_flows import herschel_bulkley_channel
 
 from bolfi_liquids import models
@@ -82,7 +82,7 @@ def test_hooks_from_outside_act(register):
     base = flow([1.0], 0.5, None)[0]
     pushed, factor = np.full(3, 0.5), np.array([1.0, 2.0, 2.0])
     acting = flow([1.0, 0.5, 1.0], 0.0, {"push": pushed, "thicken": factor})
-    assert acting[:2] == pytest.approx(base, rel=0.03)
+    assert acting[:2] == pytest.approx(base, rel=0.05)
     assert acting[2] < 0.7 * base
 
 
@@ -166,9 +166,10 @@ def test_adhesion_does_not_heat(cups):
     particles, source = 664, cups.source
     scene = pouring._scene(cups, particles, (adhesion,))
     shift = np.array([source.radius, 0.0, source.height])
-    scene.place([pack_cylinder(source.radius, scene.spacing, particles, 0) - shift])
     scene.place_cups(np.ones(1), np.zeros(1))
-    scene.relax_packing(1, 0.6)
+    points = pack_cylinder(source.radius, scene.spacing, particles, 0) - shift
+    (packing,) = scene.settled([points], 0.6)
+    scene.place([packing.position], [packing.multiplier])
     scene.pour_in(models.Liquid(0.01, 0.0, 1000.0).batch(1), np.ones((1, 1)))
     scene.settle(1, int(3.0 * scene.rate), 1.0)
     speed = np.linalg.norm(scene.velocity.to_numpy()[0], axis=1)

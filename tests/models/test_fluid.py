@@ -6,12 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bolfi_liquids.models import runtime
+from bolfi_liquids.models.validation.analysis.profiles import decay_rate, wave_amplitude
+from bolfi_liquids.models.validation.scenes.box import Box, box_scene, lattice
 
 from bolfi_liquids import models
 
 SPACING = 0.006
 DENSITY = 1000.0
-STEPS = 12
 
 
 @pytest.fixture(scope="module")
@@ -32,16 +33,6 @@ def free_fluid():
             for _ in range(1):
                 for _n in range(steps):
                     self.flow(0)
-
-        @ti.kernel
-        def diffuse(self, steps: ti.i32):
-            """Viscosity alone, between particles that stay where they are."""
-            for _ in range(1):
-                self.search(0)
-                self.measure(0)
-                for _n in range(steps):
-                    self.couple(0)
-                    self.shear(0)
 
     def build(positions, viscosity, cohesion):
         fluid = FreeFluid(1, len(positions), SPACING, models.Numerics(), [(-0.1,) * 3, (0.1,) * 3])
@@ -69,35 +60,37 @@ def test_linear_momentum_is_kept(free_fluid, cohesion):
     assert np.abs(drift).max() < 1e-5  # of 0.05 m/s, by float32's rounding in 60 steps
 
 
-def test_viscosity_damps_a_shear_wave_as_its_number_says(free_fluid):
-    """A shear wave v_x = cos(k z) of a slab decays at the rate mu k² / rho.
+@pytest.mark.parametrize("viscosity", [0.1, 1.0])
+def test_viscosity_damps_a_shear_wave_as_its_number_says(viscosity):
+    """u_x = cos(k y) decays at the rate ν k², in a block that repeats along x and y.
 
-    One wavelength between free faces, at antinodes, where they carry no stress. The pair form
-    reaches 0.8 of its nominal viscosity in a bulk this coarse, and 0.6 in a slab with edges; a
-    factor of a half or two in it would show.
+    Channel flow has the viscosity asked for within a tenth; a single packing and a wave of twelve
+    particles deserve a sixth. Without room to pass each other particles jam, so the block has 2 %
+    along each side; what pressure does is for the validation case `film_flow`.
     """
-    rng = np.random.default_rng(1)
-    counts = np.array([15, 9, 13])
-    axes = [SPACING * (np.arange(n) - (n - 1) / 2) for n in counts]
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
-    # disordered, as liquid is: pairs along a lattice's axes transmit no shear across them
-    points += rng.normal(0.0, 0.2 * SPACING, points.shape)
-    wave_number = 2.0 * np.pi / (counts[2] * SPACING)
-    inside = (np.abs(points[:, :2]) < SPACING * (counts[:2] - 5) / 2).all(axis=1)
-    shape = np.cos(wave_number * points[:, 2])
-    rates = []
-    for viscosity in (0.2, 0.6):
-        fluid = free_fluid(points, viscosity, 0.0)
-        velocity = np.zeros((1, len(points), 3), np.float32)
-        velocity[0, :, 0] = 0.01 * shape
-        fluid.velocity.from_numpy(velocity)
-        fluid.diffuse(STEPS)
-        left = fluid.velocity.to_numpy()[0, inside, 0] @ shape[inside]
-        rates.append(-np.log(left / (0.01 * shape[inside] @ shape[inside])) / (STEPS * fluid.dt))
-    # the difference cancels what the scheme dissipates at any viscosity
-    measured = (rates[1] - rates[0]) / 0.4
-    expected = wave_number**2 / DENSITY
-    assert 0.45 < measured / expected < 0.95
+    spacing, counts, speed = 0.0065, (8, 12, 10), 0.03
+    size = tuple(1.02 * spacing * n for n in counts)
+    box = Box(size, spacing, int(np.prod(counts)), lid=True, slippery=True)
+    wave_number = 2.0 * np.pi / size[1]
+    expected = viscosity / DENSITY * wave_number**2
+    with runtime.LOCK:
+        scene = box_scene(box, 1)
+        scene.place([lattice(counts, size, 3)])
+        scene.drive(push=(0.0, 0.0, 0.0))
+        scene.relax_packing(1, 1.0)
+        scene.pour_in(models.Liquid(viscosity, 0.0, DENSITY).batch(1))
+        velocity = np.zeros((1, scene.particles, 3), np.float32)
+        velocity[0, :, 0] = speed * np.cos(wave_number * scene.positions(1)[0, :, 1])
+        scene.velocity.from_numpy(velocity)
+        steps, amplitudes = max(1, round(0.1 / expected * scene.rate)), [speed]
+        for _ in range(10):
+            scene.advance(1, steps)
+            at, along = scene.positions(1)[0, :, 1], scene.velocities(1)[0, :, 0]
+            amplitudes.append(float(wave_amplitude(at, along, wave_number)))
+    times = np.arange(11) * steps * scene.dt
+    # an implicit step damps by 1 / (1 + rate dt)
+    measured = np.expm1(decay_rate(times, amplitudes) * scene.dt) / scene.dt
+    assert measured / expected == pytest.approx(1.0, abs=1 / 6)
 
 
 def test_cohesion_keeps_a_free_cube_together_and_rounds_it(free_fluid):
@@ -174,7 +167,8 @@ def test_stick_and_liquid_exchange_angular_momentum(glycerin):
         stick_gain = stick[1] - stick[0] - half_weight * np.cross(before[2], gravity)
         assert np.linalg.norm(liquid_gain[:2]) > 1e-6
         missing = np.linalg.norm((liquid_gain + stick_gain)[:2])
-        assert missing < 0.03 * np.linalg.norm(liquid_gain[:2])
+        # what a particle gives along the stick, beside its axis, the gripper takes
+        assert missing < 0.005 * np.linalg.norm(liquid_gain[:2])
 
 
 def _state(scene):

@@ -8,7 +8,7 @@ from ...effects.shear_thinning import ONSET
 from ...liquid import Liquid
 from ..analysis.profiles import binned_profile
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
-from ..scenes.channel import Channel, channel_flow
+from ..scenes.plates import Channel, channel_flow
 from ..truths.generalised_flows import generalised_channel, herschel_bulkley_channel
 
 

@@ -1,0 +1,33 @@
+"""How a simulation can go wrong: it stops, its result is NaN, and a warning says why."""
+
+import warnings
+
+import numpy as np
+
+SOUND, COLLAPSED, RUNAWAY, UNSOLVED = 0, 1, 2, 3
+REASONS = {
+    COLLAPSED: "the liquid collapsed: its particles have too many neighbours",
+    UNSOLVED: "its viscosity is too large to compute with",
+    RUNAWAY: "a particle ran away: its velocity is not finite or beyond any liquid's",
+}
+
+
+class FailedSimulation(UserWarning):
+    """A simulation stopped; its result is NaN."""
+
+
+def faulty(faults: np.ndarray, seeds: np.ndarray) -> np.ndarray:
+    """Which simulations went wrong, bool [B], after a warning for each.
+
+    Args:
+        faults: Code of each simulation's fault, [B].
+        seeds: Their seeds [B], for the message.
+    """
+    for fault, seed in zip(faults, seeds, strict=True):
+        if fault != SOUND:
+            warnings.warn(
+                f"simulation with seed {seed}: {REASONS[int(fault)]}; its result is NaN",
+                FailedSimulation,
+                stacklevel=2,
+            )
+    return faults != SOUND

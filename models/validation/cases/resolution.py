@@ -1,0 +1,49 @@
+"""The inclination that four times as many particles give."""
+
+import numpy as np
+
+from ...liquid import Liquid
+from ...stirring import StirSetup, stir
+from ..case import Case, CaseResult, Curve, Panel, Progress, Row
+from . import seed_noise
+
+VISCOSITY = (0.03, 0.3, 1.0, 5.0)
+DENSITY = 1000.0
+PARTICLES = (1000, 4000)
+SEEDS = 4
+BEGIN = 1.0  # s, of the first stroke
+TOLERANCE = 0.25  # deg
+
+
+def run(progress: Progress, seed: int) -> CaseResult:
+    """Mean size of the inclination along the strokes, the mean over packings."""
+    path, rows, curves, seeds = seed_noise.strokes(), [], [], seed * SEEDS + np.arange(SEEDS)
+    for number, viscosity in enumerate(VISCOSITY):
+        liquid, seen = Liquid(viscosity, 0.0, DENSITY), []
+        for count in PARTICLES:
+            setup = StirSetup(seed_noise.CUP, seed_noise.STICK, seed_noise.SUBMERGED, count)
+            seen.append(np.degrees(stir(liquid, path, setup, seeds)[..., 0]))
+            step = number * len(PARTICLES) + len(seen)
+            progress(step / len(VISCOSITY) / len(PARTICLES))
+        late = path.time > BEGIN
+        coarse, fine = (float(np.abs(angle[:, late]).mean()) for angle in seen)
+        name = f"mean inclination at {viscosity:g} Pa s [deg]"
+        rows.append(Row.absolute(name, fine, coarse, TOLERANCE))
+        curves += [
+            Curve(f"{viscosity:g} Pa s", path.time, seen[1].mean(axis=0), True, number),
+            Curve("", path.time, seen[0].mean(axis=0), series=number),
+        ]
+    panel = Panel("time [s]", "inclination [deg]", tuple(curves))
+    return CaseResult(tuple(rows), (panel,))
+
+
+CASE = Case(
+    name="resolution",
+    title="A thousand particles against four thousand",
+    truth="the inclination does not depend on the size of particles",
+    source="the same stir with more particles",
+    unit="deg",
+    tolerance=TOLERANCE,
+    settings={"viscosity": VISCOSITY, "particles": PARTICLES, "seeds": SEEDS, "begin": BEGIN},
+    run=run,
+)
