@@ -88,8 +88,8 @@ class Viscous(Rheology):
     def couple_unevenly(self, b):
         """Give pairs and walls the viscosities of their particles, as of the last substep.
 
-        Pairs take the arithmetic mean, as in the sum of two particles' stresses; with the
-        harmonic one, which is for jumps, the plug of a gel came out 15 % too fast.
+        Pairs take the geometric mean. In channels it errs least: with the harmonic one, which is
+        for jumps, a gel's plug came out 12 % too fast, and with the arithmetic one too slow.
         """
         base = self.kinematic(b)
         self.thickest[b] = base
@@ -107,7 +107,7 @@ class Viscous(Rheology):
                 diagonal = self.grip[b, i].trace()
                 for k in range(self.pair_start[b, i], self.pair_start[b, i + 1]):
                     other = self.thickness[b, self.pair_other[b, k]]
-                    mean = 2.0 * own * other / (own + other)
+                    mean = ti.sqrt(own * other)
                     coupling = mean * self.pair_coupling[b, k]
                     self.pair_coupling[b, k] = coupling
                     g = self.gradient(b, k)
