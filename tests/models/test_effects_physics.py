@@ -121,7 +121,7 @@ def test_more_liquid_stands_higher(setup, short):
     heights = {}
     for scene_of, levels in ((stirring._roomy_scene, [-0.015, 0.02]), (stirring._scene, [0.0])):
         models.stir(liquid, still, setup, range(len(levels)), {"fill_level": levels})
-        scene = scene_of(setup)
+        scene = scene_of(setup, ())
         alive, position = scene.alive.to_numpy(), scene.position.to_numpy()
         for b, level in enumerate(levels):
             heights[level] = position[b, : alive[b], 2].mean()

@@ -155,7 +155,9 @@ def test_stick_and_liquid_exchange_angular_momentum(glycerin):
         mass, inertia = DENSITY * spacing**3, setup.stick.inertia
         gravity = np.array([0.0, 0.0, -9.81]) * scene.dt
         before = _state(scene)
-        scene.stir(1, 0, 1, pivot[None, None].astype(np.float32), np.empty((1, 1, 3), np.float32))
+        scene.stir(
+            1, 0, 1, pivot[None, None].astype(np.float32), np.empty((1, 1, 3), np.float32), 1.0
+        )
         after = _state(scene)
 
         liquid = [np.cross(x - pivot, mass * v).sum(axis=0) for x, v, _, _ in (before, after)]
