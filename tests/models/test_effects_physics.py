@@ -75,6 +75,7 @@ def test_a_tipped_frame_shifts_one_plane_and_hardly_the_other():
     assert np.degrees(np.abs(seen - exact)).max() < 0.01
 
 
+@pytest.mark.slow
 def test_mass_matters_only_against_the_liquids(setup, short):
     """The stick's motion knows mu / mass and rho / mass alone, so in air it knows no mass."""
     seeds = [1, 2]
