@@ -72,11 +72,11 @@ class Fluid(Attraction):
             self.project(b, sweep % 2)
         self.shear(b)
         self.project(b, (self.numerics.iterations - 1) % 2)
-        self.advance(b)
+        self.move(b)
         self.contain(b)
 
     @ti.func
-    def advance(self, b):
+    def move(self, b):
         """Move the particles, unless one is faster than any liquid here can be."""
         fastest = 0.0
         for i in range(self.alive[b]):
@@ -88,8 +88,8 @@ class Fluid(Attraction):
                 self.position[b, i] = self.position[b, i] + self.dt * self.velocity[b, i]
 
     @ti.kernel
-    def settle(self, active: ti.i32, steps: ti.i32, damping: ti.f32):
-        """Let the first `active` packings relax, velocities times `damping` each substep."""
+    def flow_on(self, active: ti.i32, steps: ti.i32, damping: ti.f32):
+        """Substeps of the first `active` liquids, velocities times `damping` after each."""
         for n in range(active * STRIDE):
             if n % STRIDE == 0:
                 b = n // STRIDE
@@ -129,6 +129,10 @@ class Fluid(Attraction):
         density = self.padded(liquid.density)
         density[len(liquid.density) :] = 1.0
         self.density.from_numpy(density)
+
+    def settle(self, active, steps, damping):
+        """Let the first `active` packings relax."""
+        self.flow_on(active, steps, damping)
 
     def relax_packing(self, active, seconds):
         """Let the first `active` packings come to rest, the same for every liquid."""

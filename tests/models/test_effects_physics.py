@@ -75,6 +75,7 @@ def test_a_tipped_frame_shifts_one_plane_and_hardly_the_other():
     assert np.degrees(np.abs(seen - exact)).max() < 0.01
 
 
+@pytest.mark.slow
 def test_mass_matters_only_against_the_liquids(setup, short):
     """The stick's motion knows mu / mass and rho / mass alone, so in air it knows no mass."""
     seeds = [1, 2]
@@ -121,7 +122,7 @@ def test_more_liquid_stands_higher(setup, short):
     heights = {}
     for scene_of, levels in ((stirring._roomy_scene, [-0.015, 0.02]), (stirring._scene, [0.0])):
         models.stir(liquid, still, setup, range(len(levels)), {"fill_level": levels})
-        scene = scene_of(setup)
+        scene = scene_of(setup, ())
         alive, position = scene.alive.to_numpy(), scene.position.to_numpy()
         for b, level in enumerate(levels):
             heights[level] = position[b, : alive[b], 2].mean()

@@ -38,10 +38,10 @@ def torque(tilt: float, seed: int) -> tuple[np.ndarray, float]:
         scene.relax_packing(PACKINGS, REST)
         scene.density.fill(DENSITY)
         scene.viscosity.fill(VISCOSITY)
-        scene.settle(PACKINGS, round(REST * scene.rate), 1.0)
+        scene.flow_on(PACKINGS, round(REST * scene.rate), 1.0)
         scene.swing.fill(0.0)
         steps = round(SPAN * scene.rate)
-        scene.settle(PACKINGS, steps, 1.0)
+        scene.flow_on(PACKINGS, steps, 1.0)
         swing = scene.swing.to_numpy()[:PACKINGS].astype(float)
     turn = swing @ [np.cos(tilt), 0.0, np.sin(tilt)]
     ours = turn * HEAVY * STICK.inertia * scene.rate / steps
