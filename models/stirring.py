@@ -255,9 +255,7 @@ def _parts(
     usual = setup.count(fill[rows]) == setup.particles
     for scene_of, todo in ((_scene, rows[usual]), (_roomy_scene, rows[~usual])):
         for low in range(0, len(todo), runtime.SLOTS):
-            # the cache tells () from nothing
-            scene = scene_of(setup, effects) if effects else scene_of(setup)
-            yield scene, todo[low : low + runtime.SLOTS]
+            yield scene_of(setup, effects), todo[low : low + runtime.SLOTS]
 
 
 @cache
