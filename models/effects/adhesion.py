@@ -24,7 +24,7 @@ def _force():
         return ti.select(a < 0.25, 27.0 / 16.0 * ti.max(a, 0.0), 64.0 * bump * bump * bump)
 
     @ti.func
-    def cling(scene: ti.template(), b, coefficient):
+    def cling(scene: ti.template(), b, coefficient):  # type: ignore[valid-type]
         damping = DAMPED * ti.sqrt(2.0 * PULL * coefficient / scene.h)
         for i in range(scene.alive[b]):
             added = ti.Matrix.zero(ti.f32, 3, 3)

@@ -47,8 +47,8 @@ def run(progress: Progress, seed: int) -> CaseResult:
         reynolds = 2.0 * DENSITY * speed * RADIUS / viscosity
         expected = drag_coefficient(reynolds)
         rows += [
-            Row.relative(f"Cd at Re {re:.3g}, {name}", *pair, TOLERANCE)
-            for re, *pair in zip(reynolds, expected, ours, strict=True)
+            Row.relative(f"Cd at Re {re:.3g}, {name}", known_drag, our_drag, TOLERANCE)
+            for re, known_drag, our_drag in zip(reynolds, expected, ours, strict=True)
         ]
         curves.append(
             Curve(f"{name}, {1e3 * stream.spacing:.2g} mm", reynolds, ours, series=number)

@@ -1,7 +1,7 @@
 """Effective viscosity of liquid that bears its own weight: particles under pressure may rub."""
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 
 from ...liquid import Liquid
 from ..analysis.profiles import binned_profile
@@ -31,7 +31,7 @@ def effective(viscosity: float, means: tuple[float, float], seconds: float) -> f
     low, high = 0.01, 1000.0
     if missing(low) * missing(high) > 0.0:
         return np.nan
-    return viscosity * float(brentq(missing, low, high))
+    return viscosity * float(root_scalar(missing, bracket=(low, high)).root)
 
 
 def run(progress: Progress, seed: int) -> CaseResult:

@@ -1,7 +1,7 @@
 """Effective viscosity of a flow between plates that a body force drives."""
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 
 from ...numerics import Numerics
 from ..analysis.profiles import binned_profile, fit_poiseuille
@@ -35,7 +35,7 @@ def by_flux(viscosity: float, flow: Profiles, seconds: float) -> float:
     low, high = 0.01, 100.0
     if missing(low) * missing(high) > 0.0:
         return np.nan
-    return viscosity * float(brentq(missing, low, high))
+    return viscosity * float(root_scalar(missing, bracket=(low, high)).root)
 
 
 def steady(viscosity: float, seed: int) -> tuple[Profiles, float]:
