@@ -30,7 +30,7 @@ class Numerics:
         wall_normal: The same factor for the normal direction.
         outer_wall: Share of that friction on what runs over a cup's rim and down outside.
         stick_drag: The same factor for the stick, which is about one particle wide.
-        attraction: Acceleration of the surface attraction at cohesion 1 [m/s²].
+        attraction: Acceleration towards a unit of kernel-sum gradient at cohesion 1 [m/s²].
         contact: Least distance of a particle's centre to a wall, in spacings.
     """
 
@@ -47,7 +47,7 @@ class Numerics:
     wall_normal: float = 1.0
     outer_wall: float = 0.4
     stick_drag: float = 0.5
-    attraction: float = 15.0
+    attraction: float = 2.25
     contact: float = 0.25
 
     def substep_rate(self, spacing: float) -> float:

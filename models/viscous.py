@@ -157,7 +157,7 @@ class Viscous(Rheology):
         thickest = self.kinematic(b)
         if ti.static(len(self.rheology_hooks) > 0):
             thickest = self.thickest[b]
-        weak = thickest * self.dt < WEAK * self.h * self.h and self.cohesion[b] == 0.0
+        weak = thickest * self.dt < WEAK * self.h * self.h
         if ti.static(len(self.force_hooks) > 0):
             weak = False  # a force may have coupled them strongly
         if weak:

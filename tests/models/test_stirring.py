@@ -148,7 +148,7 @@ def test_liquid_at_rest_stays_at_rest(water, cohesion):
     liquid = models.Liquid(1e-3, cohesion, 1000.0)
     signal = models.stir(liquid, still, setup, [0])[0]
     velocity = stirring._scene(setup, ()).velocity.to_numpy()[0]
-    assert np.sqrt(np.mean(np.sum(velocity**2, axis=-1))) < 0.03
+    assert np.sqrt(np.mean(np.sum(velocity**2, axis=-1))) < 0.01
     assert np.abs(np.degrees(signal)).max() < 1.0
 
 
