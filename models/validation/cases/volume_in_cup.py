@@ -33,7 +33,7 @@ def run(progress: Progress, seed: int) -> CaseResult:
     mu, cohesion = (np.ravel(grid) for grid in np.meshgrid(VISCOSITY, COHESION))
     stirring.stir(Liquid(mu, cohesion, DENSITY), path, setup, np.full(len(mu), seed))
     with runtime.LOCK:
-        height = stirring._scene(setup).position.to_numpy()[: len(mu), :, 2].mean(axis=1)
+        height = stirring._scene(setup, ()).position.to_numpy()[: len(mu), :, 2].mean(axis=1)
     progress(1.0)
     # of liquid around a stick that reaches to `tip` above the floor
     cup, stick = setup.cup, setup.stick
