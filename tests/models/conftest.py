@@ -4,6 +4,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
+from bolfi_liquids.models import effects as registry
 
 from bolfi_liquids import models
 
@@ -31,3 +32,15 @@ def water():
 @pytest.fixture(scope="session")
 def cups():
     return models.Cups.from_toml(files("bolfi_liquids.data") / "cups.toml")
+
+
+@pytest.fixture
+def register(monkeypatch):
+    """Registers effects for one test."""
+
+    def add(effect):
+        monkeypatch.setitem(registry._registered, effect.name, effect)
+        monkeypatch.delitem(registry._registered, effect.name)
+        return models.register(effect)
+
+    return add

@@ -7,7 +7,6 @@ import numpy as np
 import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference.distributions import Univariate
-from bolfi_liquids.models import effects as registry
 from bolfi_liquids.models.coefficients import acting_in, changed_signal
 from jax import random
 
@@ -50,18 +49,6 @@ def stir(glycerin):
         return models.stir(liquid, short, setup, SEEDS[part], effects)
 
     return run
-
-
-@pytest.fixture
-def register(monkeypatch):
-    """Registers for one test."""
-
-    def add(effect):
-        monkeypatch.setitem(registry._registered, effect.name, effect)
-        monkeypatch.delitem(registry._registered, effect.name)
-        return models.register(effect)
-
-    return add
 
 
 @pytest.fixture
@@ -192,6 +179,7 @@ def test_a_stir_that_diverged_stays_nan_behind_every_sensor(stir):
         (["fill_level"], "must map names to coefficients"),
         ({"pivot_friction": -1e-4}, "pivot_friction must not be negative.*-0.0001"),
         ({"stick_mass": [1.0, -1.0, 1.0]}, "stick_mass must be positive"),
+        ({"gripper_scale": 1e9}, "path must be finite and within 10 m"),
         ({"fill_level": 1.0}, r"fill must be 0 to 0\.075 m, got 1\.05.*effects fill_level"),
     ],
 )

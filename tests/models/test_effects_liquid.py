@@ -55,16 +55,6 @@ def _effect(name, **changes):
     return models.Effect(name=name, **{**fields, **changes})
 
 
-@pytest.fixture
-def register(monkeypatch):
-    from bolfi_liquids.models import effects as registry
-
-    def add(effect):
-        monkeypatch.setitem(registry._registered, effect.name, effect)
-
-    return add
-
-
 @pytest.mark.slow
 def test_hooks_from_outside_act(register):
     """A force equal to the scene's own, and a factor on the viscosity: the same flow."""
