@@ -89,6 +89,8 @@ def test_section_is_of_the_pour(pour, calibration):
         np.degrees(pour.chosen.angular_velocity)
     )
     assert section["distance_cm"] == pytest.approx(100 * pour.chosen.distance)
+    floor = bundled_cups().least_viscosity(calibration.liquid_density, pour.chosen.angular_velocity)
+    assert section["least_viscosity"] == floor > 0.0
     assert section["plug_in"]["expected_spillage"] == pour.plug_in.expected_spillage
     assert section["n_simulations"] == 7 * (4 + 4) + 2 * 8
     assert bl.Calibration.open(pour.path).summary == calibration.summary  # left as it was
