@@ -2,7 +2,7 @@
 
 import csv
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -77,8 +77,10 @@ def _table(name, table, cups, bars) -> Iterator[Line]:
     rank = spearmanr(ours[~gel], table.spilled[~gel]).statistic
     yield Line(f"{name}, without gel: rank correlation", float(rank), RANK, least=True)
     for liquid in dict.fromkeys(table.liquid):
+        mean, worst = regret(table.of(liquid), lambda tried: _mean(tried, cups))
         what = f"{name}, {liquid}: spilled beyond the best action"
-        yield Line(what, regret(table.of(liquid), lambda tried: _mean(tried, cups)), REGRET)
+        yield Line(what, mean, REGRET)
+        yield Line(f"{what}, worst of equals", worst)
 
 
 def pour(table: Table, cups: models.Cups, seed: int) -> np.ndarray:
@@ -94,15 +96,19 @@ def _mean(table: Table, cups: models.Cups) -> np.ndarray:
     return np.mean([pour(table, cups, seed=n * count) for n in range(SEEDS)], axis=0)
 
 
-def regret(table: Table, simulate) -> float:
+def regret(table: Table, simulate: Callable[[Table], np.ndarray]) -> tuple[float, float]:
     """What the action that we like best spills by the table, beyond the table's best.
 
     The table of one liquid is interpolated between its actions; ours tries these and those
-    between them. Of actions that it likes equally the worst counts.
+    between them.
 
     Args:
         table: Pours of one liquid.
         simulate: Ours, from a table whose spilled fractions are not looked at.
+
+    Returns:
+        Mean over the actions that ours likes equally, as several spill nothing, and their worst;
+        NaN where a simulation failed.
     """
     reference = LinearNDInterpolator(
         np.column_stack([table.rate, table.distance]), table.spilled, rescale=True
@@ -114,8 +120,9 @@ def regret(table: Table, simulate) -> float:
     liquid = np.repeat(table.liquid[:1], known.sum())
     ours = simulate(Table(liquid, rate[known], distance[known], theirs[known]))
     if not np.isfinite(ours).all():
-        return float("nan")
-    return float(theirs[known][ours == ours.min()].max() - table.spilled.min())
+        return float("nan"), float("nan")
+    beyond = theirs[known][ours == ours.min()] - table.spilled.min()
+    return float(beyond.mean()), float(beyond.max())
 
 
 def _finer(values: np.ndarray) -> np.ndarray:

@@ -80,14 +80,14 @@ def scene(job, folder):
                 "geometryFile": cup,
                 "isWall": True,
                 "mapInvert": True,
-                "mapResolution": [40, 40, 80],
+                "mapResolution": [30, 30, 60],
             },
             {
                 **body,
                 "geometryFile": stick,
                 "isWall": False,
                 "isAnimated": True,
-                "mapResolution": [20, 20, 200],
+                "mapResolution": [16, 16, 120],
             },
         ],
         "Materials": [
@@ -122,15 +122,20 @@ def main():
     base.initSimulation()
     simulation, clock = splish.Simulation.getCurrent(), splish.TimeManager.getCurrent()
     times = np.array(job["time"]) - job["time"][0]
-    velocity = np.gradient(np.array(job["position"]), times, axis=0).T
+    shift = np.array(job["position"]) - job["position"][0]
+    velocity = np.gradient(shift, times, axis=0)
     began = []
+
+    def along(values, now):
+        return np.array([np.interp(now, times, axis) for axis in values.T])
 
     def step():
         now = clock.getTime() - FALL
         if now >= 0.0:
             began.append(time.process_time())
             stick = simulation.getBoundaryModel(1).getRigidBodyObject()
-            stick.setVelocity(np.array([np.interp(now, times, v) for v in velocity]))
+            stick.setPosition(along(shift, now))
+            stick.setVelocity(along(velocity, now))
 
     base.setTimeStepCB(step)
     base.runSimulation()
@@ -138,7 +143,7 @@ def main():
     fluid = simulation.getFluidModel(0)
     position = np.array([fluid.getPosition(n) for n in range(fluid.numActiveParticles())])
     inside = (np.hypot(position[:, 0], position[:, 1]) < job["cup_radius"]) & (position[:, 2] > 0)
-    stick = simulation.getBoundaryModel(1).getRigidBodyObject().getWorldSpacePosition()
+    stick = simulation.getBoundaryModel(1).getRigidBodyObject().getPosition()
     result = {
         "cpu_seconds": spent,
         "particles": int(inside.sum()),
