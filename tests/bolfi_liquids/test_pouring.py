@@ -65,11 +65,12 @@ def test_other_seeds_agree_with_the_judgement(pour, calibration):
 def test_no_draw_that_judges_has_chosen(calibration, monkeypatch, tmp_path):
     run = bl.Calibration.open(shutil.copytree(calibration.path, tmp_path / "run"))
     searched, judged = [], []
-    whole = spillage.Outcomes.simulate
 
     def watched(self, action, seeds):
+        """In place of pours: the farther the receiver, the more is spilled."""
         (searched if len(seeds) and len(judged_draws(self)) == 4 else judged).append(self)
-        return whole(self, action, seeds)
+        spilled = np.repeat(5.0 * np.abs(action["distance"] - 0.03)[:, None], len(self.seeds), 1)
+        return np.stack([spilled, 1.0 - spilled, 0.0 * spilled], axis=-1)
 
     def judged_draws(outcomes):
         return outcomes.theta["viscosity"]

@@ -61,7 +61,14 @@ def pour(cups):
     return run
 
 
-@pytest.mark.parametrize("name", models.EFFECTS)
+# an effect in the liquid compiles a scene; the next test has one of all together
+ALONE = [
+    pytest.param(name, marks=[pytest.mark.slow] if effect.acts_in == "liquid" else [])
+    for name, effect in models.EFFECTS.items()
+]
+
+
+@pytest.mark.parametrize("name", ALONE)
 def test_a_neutral_coefficient_leaves_every_bit(stir, name):
     base, neutral = stir(), models.EFFECTS[name].neutral
     assert np.isfinite(base).all() and np.ptp(base[:, -1], axis=0).min() > 0

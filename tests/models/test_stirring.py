@@ -73,6 +73,7 @@ def test_without_liquid_the_stick_is_the_driven_spherical_pendulum(glycerin):
     assert rms_deg(signal - expected) < 0.05 * swing
 
 
+@pytest.mark.slow
 @pytest.mark.xfail(reason="packed particles push the stick: 22 % too much", strict=False)
 def test_a_submerged_stick_is_buoyed_as_archimedes_says(glycerin):
     """At 15 degrees, where buoyancy outweighs the packing's own push of a particle's weight."""
