@@ -93,9 +93,8 @@ def test_effects_compose_whatever_the_order_they_are_given_in(stir):
     every = {name: coefficient(name) for name in models.EFFECTS}
     together = stir(every)
     np.testing.assert_array_equal(stir(dict(reversed(every.items()))), together)
-    # a scene is compiled for each set of effects in the liquid, so one of those will do
-    liquid = [name for name in every if models.EFFECTS[name].acts_in == "liquid"]
-    for name in [name for name in every if name not in liquid[1:]]:
+    # each set of effects in the liquid compiles a scene; what one alone does is tested above
+    for name in [name for name in every if models.EFFECTS[name].acts_in != "liquid"]:
         fewer = {other: value for other, value in every.items() if other != name}
         assert np.abs(stir(fewer) - together).max() > 1e-6, name
 
@@ -112,6 +111,7 @@ def test_sensors_act_after_the_rig_in_the_order_of_their_names(stir):
     np.testing.assert_array_equal(seen, expected)
 
 
+@pytest.mark.slow
 def test_a_pour_keeps_every_bit_where_coefficients_are_neutral(pour):
     neutral = {name: effect.neutral for name, effect in models.EFFECTS.items()}
     mixed = pour({name: [neutral[name], coefficient(name), neutral[name]] for name in neutral})

@@ -144,6 +144,7 @@ def test_a_film_sticks_and_drains(cups):
     assert (later < sticky).all() and (later > bare).all()
 
 
+@pytest.mark.slow
 def test_adhesion_keeps_liquid_in_the_cup(cups):
     bare, sticky = (retained(cups, a, np.array([0.05]))[0] for a in (0.0, 1.0))
     assert bare == 0.0

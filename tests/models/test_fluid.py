@@ -1,6 +1,7 @@
 """The liquid by itself: momentum, viscosity and cohesion, away from every wall."""
 
 import dataclasses
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -34,8 +35,13 @@ def free_fluid():
                 for _n in range(steps):
                     self.flow(0)
 
+    @cache
+    def sized(particles):
+        """Compiled once for a number of particles."""
+        return FreeFluid(1, particles, SPACING, models.Numerics(), [(-0.1,) * 3, (0.1,) * 3])
+
     def build(positions, viscosity, cohesion):
-        fluid = FreeFluid(1, len(positions), SPACING, models.Numerics(), [(-0.1,) * 3, (0.1,) * 3])
+        fluid = sized(len(positions))
         fluid.place([positions])
         fluid.pour_in(models.Liquid(viscosity, cohesion, DENSITY).batch(1))
         return fluid

@@ -7,6 +7,7 @@ let fall into the cup and come to rest first; that time is not counted.
 import ctypes
 import json
 import os
+import shutil
 import sys
 import tempfile
 import time
@@ -154,6 +155,7 @@ def main():
     }
     os.dup2(out, 1)
     print(json.dumps(result), flush=True)
+    shutil.rmtree(folder)
     os._exit(0)  # its own clean-up crashes
 
 
