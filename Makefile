@@ -1,5 +1,5 @@
 # Two commands on a fresh machine: `make demo` and `make test`. Both set up .venv first.
-# `make peers` is for tests/benchmarks/compare.py alone.
+# `make peers` is for tests/benchmarks alone.
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -42,7 +42,8 @@ lint: setup
 	$(BIN)/ruff format --check
 
 # ELFI and sbi cannot be installed beside us, nor beside each other: each has its own old Python.
-peers: $(PEERS)/elfi/.installed $(PEERS)/sbi/.installed
+# SPlisHSPlasH, for tests/benchmarks/fluid.py, is kept apart like them.
+peers: $(PEERS)/elfi/.installed $(PEERS)/sbi/.installed $(PEERS)/pysplishsplash/.installed
 
 $(PEERS)/%/.installed: tests/benchmarks/peers/%.txt
 	@python=; \

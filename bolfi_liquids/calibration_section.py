@@ -25,7 +25,8 @@ def calibration_section(
     `fit_rms_deg` is the RMS between the recording and the closest simulated hypothesis;
     `noise_deg` what the right model would leave (see `noise.irreducible_rms`).
     `n_simulations` counts those that the engine learned from, `n_check_simulations` those that
-    judged the result.
+    judged the result. Below `least_viscosity` [Pa s] liquids look alike to the simulator;
+    `below_least_viscosity` is the share of the posterior there.
     """
     posterior = tree["posterior"]
     closest = fit.closest
@@ -34,6 +35,10 @@ def calibration_section(
         "parameters": {
             name: parameter_summary(draws) for name, draws in posterior.data_vars.items()
         },
+        "least_viscosity": stirring.least_viscosity,
+        "below_least_viscosity": float(
+            (posterior["viscosity"].to_numpy() < stirring.least_viscosity).mean()
+        ),
         "best": fit.best,
         "closest": closest.theta,
         "n_simulations": int(fit.simulations.sizes["simulation"]),

@@ -12,6 +12,7 @@ RHAT_MAX, ESS_MIN = 1.01, 400.0  # Vehtari et al. 2021
 DIVERGENT_MAX = 0.01  # share of the draws
 AT_THE_END = 0.02  # quantile of the prior; an interval that reaches it is cut off there
 AS_GOOD_AS_NOISE = 1.5
+WORTH_A_WORD = 0.01  # share of the posterior
 
 
 def with_unit(name: str, value: float) -> str:
@@ -73,6 +74,18 @@ def sampler_sentence(section: Mapping[str, Any]) -> str:
         f"The sampler did not converge well (R-hat {rhat:.3f}, effective sample size {ess:.0f},"
         f" {percent(divergent)} of the draws divergent): calibrate again with more draws or"
         " --sampler emcee before relying on the intervals."
+    )
+
+
+def floor_sentence(section: Mapping[str, Any]) -> str:
+    """That thin liquids look alike, where the liquid may be one of them; else empty."""
+    share = section["below_least_viscosity"]
+    if share < WORTH_A_WORD:
+        return ""
+    return (
+        f"Below about {with_unit('viscosity', section['least_viscosity'])} liquids look alike to"
+        f" the simulator, at this size of its particles and speed of the stirring: {percent(share)}"
+        " of the posterior lies there, and says no more than that the liquid may be as thin."
     )
 
 

@@ -24,16 +24,20 @@ GRID = 41
 UNITS = {"angular_velocity": "rad s-1", "distance": "m"}
 
 
-def pour_section(pour: "Pour", settings: PourSettings, searches: Sequence["Fit"]) -> dict[str, Any]:
+def pour_section(
+    pour: "Pour", settings: PourSettings, searches: Sequence["Fit"], least_viscosity: float
+) -> dict[str, Any]:
     """Numbers of a pour, in the design's form: degrees and centimetres, fractions of liquid.
 
-    `n_simulations` counts pours of one liquid, in both searches and in judging.
+    `n_simulations` counts pours of one liquid, in both searches and in judging. Below
+    `least_viscosity` [Pa s] liquids look alike to the simulator in the chosen pour.
     """
     searched = sum(fit.simulations["signal"][:, :, 0].size for fit in searches)
     judged = len(pour.chosen.fractions) + len(pour.plug_in.fractions)
     return {
         **_action(pour.chosen),
         "spillage_q95": pour.chosen.spillage_q95,
+        "least_viscosity": least_viscosity,
         "n_simulations": int(searched + judged),
         "risk": settings.risk,
         "seed": settings.seed,

@@ -116,9 +116,11 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         chosen, plug_in = (search.judge(fit.best, others) for fit in (over_posterior, at_best))
     pour = Pour(calibration.path, chosen, plug_in)
     tree = pour_tree(pour, over_posterior, at_best, liquids)
-    tree.attrs.update(asdict(settings), cups=json.dumps(cups.settings()))
+    floor = cups.least_viscosity(calibration.liquid_density, chosen.angular_velocity)
+    tree.attrs.update(asdict(settings), cups=json.dumps(cups.settings()), least_viscosity=floor)
     write_tree(tree, calibration.path / POUR)
-    write_section(calibration.path, "pour", pour_section(pour, settings, (over_posterior, at_best)))
+    section = pour_section(pour, settings, (over_posterior, at_best), floor)
+    write_section(calibration.path, "pour", section)
     return pour
 
 

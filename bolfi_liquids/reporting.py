@@ -51,6 +51,7 @@ def _calibration_context(calibration: Calibration) -> dict[str, Any]:
         "section": section,
         "sentences": sentences,
         "fit_sentence": narrative.fit_sentence(section),
+        "floor_sentence": narrative.floor_sentence(section),
         "sampler_sentence": narrative.sampler_sentence(section),
         "inclination": inclination_figure(tree),
         "posterior": posterior_figure(tree),

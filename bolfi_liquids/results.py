@@ -57,6 +57,7 @@ def results_tree(sampled: "DataTree", fit: "Fit", stirring: Stirring, check: Che
     for name, dataset in added.items():
         tree[name] = DataTree(dataset)
     tree.attrs["seconds_simulator"] += check.seconds
+    tree.attrs["least_viscosity"] = stirring.least_viscosity
     tree.attrs["liquid_density"] = stirring.recordings[0].number("liquid_density")
     return tree
 

@@ -47,6 +47,14 @@ class Stirring:
         return np.concatenate(signals, axis=1)
 
     @property
+    def least_viscosity(self) -> float:
+        """Viscosity [Pa s] below which liquids look alike in all of the recordings."""
+        return min(
+            setup.least_viscosity(recording.number("liquid_density"), recording.gripper)
+            for recording, setup in zip(self.recordings, self.setups, strict=True)
+        )
+
+    @property
     def observed(self) -> NDArray[np.float64]:
         """Recorded inclinations (T of all recordings, 2) [rad], NaN where missing."""
         return np.concatenate([recording.inclination for recording in self.recordings])

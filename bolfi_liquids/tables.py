@@ -6,7 +6,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Column, Table
 
-from .narrative import sampler_sentence
+from .narrative import floor_sentence, sampler_sentence
 
 UNITS = {"viscosity": "Pa s", "cohesion": ""}
 
@@ -29,6 +29,8 @@ def print_calibration(section: Mapping[str, Any], console: Console) -> None:
         f" sampling {seconds['sampling']:.1f}",
         highlight=False,
     )
+    if floor := floor_sentence(section):
+        console.print(floor, highlight=False, soft_wrap=True)
     if warning := sampler_sentence(section):
         console.print(f"warning: {warning}", highlight=False, soft_wrap=True)
 

@@ -128,6 +128,16 @@ class Cups(_Section, frozen=True):
         """Liquid in the source before the pour [m³]."""
         return float(np.pi * self.source.radius**2 * self.source.fill)
 
+    def spacing(self, particles: int = POUR_PARTICLES) -> float:
+        """Particle spacing [m], the cube root of the liquid's volume per particle."""
+        return (self.liquid_volume / particles) ** (1.0 / 3.0)
+
+    def least_viscosity(self, density: float, angular_velocity: float) -> float:
+        """Viscosity [Pa s] below which liquids of `density` [kg/m³] look alike in a pour; see
+        `Numerics.least_viscosity`. The source's floor turns about the lip at the flow's speed."""
+        speed = angular_velocity * self.source.height
+        return Numerics().least_viscosity(self.spacing(), density, speed)
+
     def settings(self, particles: int = POUR_PARTICLES) -> dict[str, Any]:
         """Everything that fixes the simulator, as plain numbers, with the model's version."""
         return {

@@ -103,8 +103,9 @@ def _scene(cups: Cups, particles: int, effects: tuple[Effect, ...] = ()):
     runtime.start()
     from .pouring_kernel import PouringScene
 
-    spacing = (cups.liquid_volume / particles) ** (1.0 / 3.0)
-    return PouringScene(runtime.SLOTS, particles, spacing, Numerics(), cups, effects)
+    return PouringScene(
+        runtime.SLOTS, particles, cups.spacing(particles), Numerics(), cups, effects
+    )
 
 
 def _run(scene, cups, held, action, seeds) -> np.ndarray:

@@ -140,6 +140,11 @@ class StirSetup:
         """Largest depth of liquid for which there is room [m]."""
         return max(min(self.cup.height, ROOM * self.cup.fill), self.cup.fill)
 
+    def least_viscosity(self, density: float, gripper: GripperPath) -> float:
+        """Viscosity [Pa s] below which liquids of `density` [kg/m³] look alike while the gripper
+        repeats its path; see `Numerics.least_viscosity`."""
+        return self.numerics.least_viscosity(self.spacing, density, mean_speed(gripper))
+
     def liquid_volume(self, fill: float | np.ndarray) -> Any:
         """Liquid [m³] whose surface is at the depth `fill` [m] around the stick."""
         wet = np.clip(self.submerged + (fill - self.cup.fill), 0.0, fill)
@@ -212,15 +217,31 @@ def substep_path(gripper: GripperPath, rate: float) -> np.ndarray:
     Raises:
         ValueError: fewer than two finite samples.
     """
+    time, (seen, position) = np.asarray(gripper.time), _finite(gripper)
+    substeps = int(np.ceil((time[-1] - time[0]) * rate))
+    grid = time[0] + np.arange(substeps + 1) / rate
+    return np.stack([np.interp(grid, seen, position[:, axis]) for axis in range(3)], axis=1)
+
+
+def _finite(gripper: GripperPath) -> tuple[np.ndarray, np.ndarray]:
+    """Times [n] and positions [n, 3] of the finite samples, two at least."""
     time, position = np.asarray(gripper.time), np.asarray(gripper.position)
     finite = np.isfinite(position).all(axis=1)
     if finite.sum() < 2:
         raise ValueError(f"the gripper path has {finite.sum()} finite samples; it needs 2 or more")
-    substeps = int(np.ceil((time[-1] - time[0]) * rate))
-    grid = time[0] + np.arange(substeps + 1) / rate
-    return np.stack(
-        [np.interp(grid, time[finite], position[finite, axis]) for axis in range(3)], axis=1
-    )
+    return time[finite], position[finite]
+
+
+def mean_speed(gripper: GripperPath) -> float:
+    """Root mean square speed of the pivot between its finite samples [m/s].
+
+    Raises:
+        ValueError: fewer than two finite samples.
+    """
+    time, position = _finite(gripper)
+    interval = np.diff(time)
+    stretch = np.sum(np.diff(position, axis=0) ** 2, axis=1) / interval
+    return float(np.sqrt(stretch.sum() / interval.sum()))
 
 
 def inclination(directions: np.ndarray, time: np.ndarray, rate: float) -> np.ndarray:

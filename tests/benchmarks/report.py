@@ -1,11 +1,7 @@
 """The table of a comparison: medians over seeds."""
 
-import platform
-import subprocess
-from datetime import date
-from pathlib import Path
-
 import numpy as np
+from machine import machine
 
 COLUMNS = {  # title -> width and digits
     "TV": (5, 2),
@@ -109,20 +105,5 @@ def shown(value: float, digits: int) -> str:
 
 
 def heading(rows: list[dict]) -> str:
-    commit = subprocess.run(
-        ["git", "describe", "--always", "--dirty"],
-        cwd=Path(__file__).parent,
-        capture_output=True,
-        text=True,
-        check=False,
-    ).stdout.strip()
     versions = ", ".join(dict.fromkeys(f"{row['engine']}: {row['version']}" for row in rows))
-    return f"{date.today()}, {platform.machine()} {processor()}, commit {commit} ({versions})\n"
-
-
-def processor() -> str:
-    """As the system names it, where it does."""
-    information = Path("/proc/cpuinfo")
-    lines = information.read_text().splitlines() if information.exists() else []
-    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor()
+    return f"{machine()} ({versions})\n"

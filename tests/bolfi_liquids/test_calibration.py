@@ -10,7 +10,7 @@ import xarray as xr
 from arviz_stats.base.array import array_stats
 
 import bolfi_liquids as bl
-from bolfi_liquids import inference
+from bolfi_liquids import inference, models
 from bolfi_liquids.prior import default_prior
 from bolfi_liquids.stirring import stirring_of
 
@@ -32,6 +32,23 @@ def test_summary_is_of_the_posterior(calibration, settings):
     assert section["n_simulations"] == tree["simulations"].sizes["simulation"]
     assert section["n_simulations"] == settings["budget"]
     tree.close()
+
+
+def test_summary_says_below_which_viscosity_liquids_look_alike(
+    calibration, short_recording, settings
+):
+    recording = bl.open_recording(short_recording)
+    setup = models.StirSetup.from_recording(recording, settings["particles"])
+    moving = np.linalg.norm(np.diff(recording.gripper.position, axis=0), axis=1).sum()
+    mean = moving / np.ptp(recording.time)  # below the root mean square, above rest
+    density = recording.number("liquid_density")
+    section = calibration.summary
+    floor = section["least_viscosity"]
+    assert setup.numerics.least_viscosity(setup.spacing, density, mean) <= floor
+    assert floor < setup.numerics.least_viscosity(setup.spacing, density, 2.0 * mean)
+    assert calibration.tree.attrs["least_viscosity"] == floor
+    draws = calibration.posterior["viscosity"].to_numpy()
+    assert section["below_least_viscosity"] == pytest.approx((draws < floor).mean())
 
 
 def test_closest_is_the_least_discrepancy_and_reproducible(calibration, short_recording, settings):

@@ -1,14 +1,18 @@
 """Noise estimates, picked draws and contour levels, against what is known of them."""
 
+import io
+
 import numpy as np
 import pytest
 import xarray as xr
+from rich.console import Console
 
 from bolfi_liquids.draws import pick_draws
-from bolfi_liquids.narrative import parameter_sentence, percent, sampler_sentence
+from bolfi_liquids.narrative import floor_sentence, parameter_sentence, percent, sampler_sentence
 from bolfi_liquids.noise import irreducible_rms, replicate_noise, sensor_noise
 from bolfi_liquids.posterior_figure import contour_levels, marginal
 from bolfi_liquids.spillage import mean_spillage, tail_spillage
+from bolfi_liquids.tables import print_calibration
 
 
 def test_sensor_noise_is_found_under_a_smooth_signal(rng):
@@ -77,6 +81,21 @@ def test_a_posterior_at_the_end_of_its_prior_says_so():
     assert "may be beyond" in parameter_sentence("viscosity", cut, prior)
     assert "may be beyond" not in parameter_sentence("viscosity", inside, prior)
     assert percent(1.0) == "100 %" and percent(0.0034) == "0.34 %"
+
+
+def test_thin_liquids_that_look_alike_are_told():
+    section = {"least_viscosity": 0.0123, "below_least_viscosity": 0.42}
+    sentence = floor_sentence(section)
+    assert "Below about 0.0123 Pa s liquids look alike" in sentence
+    assert "42 % of the posterior" in sentence
+    assert floor_sentence(section | {"below_least_viscosity": 0.001}) == ""
+
+
+@pytest.mark.parametrize("share", [0.0, 0.42])
+def test_the_printed_summary_tells_them_too(calibration, share):
+    console = Console(file=io.StringIO())
+    print_calibration(dict(calibration.summary) | {"below_least_viscosity": share}, console)
+    assert ("liquids look alike" in console.file.getvalue()) == (share > 0.0)
 
 
 def test_a_sampler_that_did_not_converge_is_told():

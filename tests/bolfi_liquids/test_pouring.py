@@ -65,11 +65,12 @@ def test_other_seeds_agree_with_the_judgement(pour, calibration):
 def test_no_draw_that_judges_has_chosen(calibration, monkeypatch, tmp_path):
     run = bl.Calibration.open(shutil.copytree(calibration.path, tmp_path / "run"))
     searched, judged = [], []
-    whole = spillage.Outcomes.simulate
 
     def watched(self, action, seeds):
+        """In place of pours: the farther the receiver, the more is spilled."""
         (searched if len(seeds) and len(judged_draws(self)) == 4 else judged).append(self)
-        return whole(self, action, seeds)
+        spilled = np.repeat(5.0 * np.abs(action["distance"] - 0.03)[:, None], len(self.seeds), 1)
+        return np.stack([spilled, 1.0 - spilled, 0.0 * spilled], axis=-1)
 
     def judged_draws(outcomes):
         return outcomes.theta["viscosity"]
@@ -89,6 +90,8 @@ def test_section_is_of_the_pour(pour, calibration):
         np.degrees(pour.chosen.angular_velocity)
     )
     assert section["distance_cm"] == pytest.approx(100 * pour.chosen.distance)
+    floor = bundled_cups().least_viscosity(calibration.liquid_density, pour.chosen.angular_velocity)
+    assert section["least_viscosity"] == floor > 0.0
     assert section["plug_in"]["expected_spillage"] == pour.plug_in.expected_spillage
     assert section["n_simulations"] == 7 * (4 + 4) + 2 * 8
     assert bl.Calibration.open(pour.path).summary == calibration.summary  # left as it was

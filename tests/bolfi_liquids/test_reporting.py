@@ -8,6 +8,7 @@ import pytest
 
 import bolfi_liquids as bl
 from bolfi_liquids.narrative import fit_sentence, parameter_sentence
+from bolfi_liquids.summary import write_section
 
 FIGURES = {
     "inclination [deg]": "inclination against time",
@@ -61,13 +62,22 @@ def test_report_shows_the_runs_numbers(pour, calibration):
     assert calibration.record["inputs"]["sha256"][0] in text
 
 
+def test_report_says_below_which_viscosity_liquids_look_alike(calibration, tmp_path):
+    run = tmp_path / "run"
+    shutil.copytree(calibration.path, run)
+    for share, told in ((0.3, True), (0.0, False)):
+        section = dict(calibration.summary) | {"below_least_viscosity": share}
+        write_section(run, "calibrate", section)
+        text, _ = read(bl.report(run))
+        assert f"{section['least_viscosity']:.2g} (stir)" in text
+        assert (f"Below about {section['least_viscosity']:.3g} Pa s" in text) == told
+
+
 def test_report_without_a_pour_says_how_to_get_one(calibration, tmp_path):
     run = tmp_path / "run"
     run.mkdir()
     for name in ("run.toml", "posterior.nc"):
         shutil.copy(calibration.path / name, run)
-    from bolfi_liquids.summary import write_section
-
     write_section(run, "calibrate", dict(calibration.summary))
     text, page = read(bl.report(run))
     assert f"bolfi-liquids pour {run}" in text

@@ -38,6 +38,7 @@ def finished(run):
     return {(theta, seed): created for theta, seed, created in rows}
 
 
+@pytest.mark.slow
 def test_killed_and_resumed_equals_undisturbed(short_recording, calibration, settings, tmp_path):
     run = tmp_path / "killed"
     process = subprocess.Popen(command(short_recording, run, settings), stderr=subprocess.DEVNULL)

@@ -292,6 +292,7 @@ def test_copies_among_earlier_simulations_are_too_few(prior, observed):
         inference.fit(None, prior, observed, budget=0, initial=3, earlier=earlier)
 
 
+@pytest.mark.slow
 def test_arrays_of_another_size_ask_the_same(tmp_path, prior, observed, simulate):
     """64 and 128 rows; the larger run finds all simulations of the smaller in the bank."""
     calls = []

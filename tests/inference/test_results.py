@@ -98,7 +98,9 @@ def test_the_surrogate_speaks_for_itself(tree, fit):
     assert 0.75 < z.std() < 1.25  # 200 draws: six standard errors
 
 
-@pytest.mark.parametrize("sampler", ["nuts", "emcee", "quadrature"])
+@pytest.mark.parametrize(
+    "sampler", [pytest.param("nuts", marks=pytest.mark.slow), "emcee", "quadrature"]
+)
 def test_survives_the_disk(fit, tmp_path, sampler):
     tree = fit.sample(sampler, draws=40, warmup=40)
     tree.to_netcdf(tmp_path / "posterior.nc", engine="h5netcdf")

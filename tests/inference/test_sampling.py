@@ -76,7 +76,7 @@ def assert_means(values, truth):
 
 
 @pytest.mark.parametrize("sampler", ["nuts", "emcee"])
-@pytest.mark.parametrize("d", [1, 2, 4])
+@pytest.mark.parametrize("d", [1, 2, pytest.param(4, marks=pytest.mark.slow)])
 def test_moments_of_a_correlated_gaussian(sampler, d):
     """Means and variances; a twin shifted by 0.3 sd must fail: with 2000 effective draws it is
     13 standard errors off, where the bound is 4.5."""
@@ -120,6 +120,7 @@ def test_a_posterior_at_the_border_and_an_open_direction():
     assert_means(made.chains.u**2, [0.02**2, 1 / 3])
 
 
+@pytest.mark.slow
 def test_compiles_once_for_all_fits_and_lengths(line_fit, prior, observed, simulate):
     traces = []
 
@@ -226,6 +227,7 @@ def test_a_likelihood_that_is_nowhere_finite_is_an_error(sampler):
         sample(sampler, one(np.full(2, 0.5), np.full((2, 2), np.nan)), SMALL)
 
 
+@pytest.mark.slow
 def test_a_hole_in_the_likelihood_is_avoided_or_told():
     """NaN wherever u_1 < 0.45: half of the Gaussian remains, which emcee samples; trajectories
     break off at the edge, which NUTS must say."""
@@ -269,6 +271,7 @@ def test_a_fit_agrees_with_its_quadrature(line_fit, sampler):
     assert posterior.attrs["status"] == CONVERGED
 
 
+@pytest.mark.slow
 def test_finds_separated_modes_of_a_fit(prior):
     """The slope's modulus is observed, so plus and minus are equally likely; every chain must
     visit both."""

@@ -83,6 +83,7 @@ def test_estimated_measurement_noise_comes_near_it(design, noise):
     assert total_variation(posterior(bold), exact(observed, SD**2 * np.eye(40))) > 0.5
 
 
+@pytest.mark.slow
 def test_correlated_noise_widens_the_posterior(design):
     """AR(1) noise of correlation 0.9: on eight data sets far wider than if taken as white."""
     widths, correlations = [], []

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
+from bolfi_liquids.models import effects as registry
 from bolfi_liquids.models import runtime
 
 from bolfi_liquids import models
@@ -63,3 +64,15 @@ def weightless():
             assert not self.fault.to_numpy().any()
 
     return Weightless
+
+
+@pytest.fixture
+def register(monkeypatch):
+    """Registers effects for one test."""
+
+    def add(effect):
+        monkeypatch.setitem(registry._registered, effect.name, effect)
+        monkeypatch.delitem(registry._registered, effect.name)
+        return models.register(effect)
+
+    return add

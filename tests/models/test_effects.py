@@ -7,7 +7,6 @@ import numpy as np
 import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference.distributions import Univariate
-from bolfi_liquids.models import effects as registry
 from bolfi_liquids.models.coefficients import acting_in, changed_signal
 from jax import random
 
@@ -53,18 +52,6 @@ def stir(glycerin):
 
 
 @pytest.fixture
-def register(monkeypatch):
-    """Registers for one test."""
-
-    def add(effect):
-        monkeypatch.setitem(registry._registered, effect.name, effect)
-        monkeypatch.delitem(registry._registered, effect.name)
-        return models.register(effect)
-
-    return add
-
-
-@pytest.fixture
 def pour(cups):
     def run(effects=None):
         action = models.PourAction(angular_velocity=6.0, distance=[0.01, 0.03, 0.05])
@@ -74,7 +61,14 @@ def pour(cups):
     return run
 
 
-@pytest.mark.parametrize("name", models.EFFECTS)
+# an effect in the liquid compiles a scene; the next test has one of all together
+ALONE = [
+    pytest.param(name, marks=[pytest.mark.slow] if effect.acts_in == "liquid" else [])
+    for name, effect in models.EFFECTS.items()
+]
+
+
+@pytest.mark.parametrize("name", ALONE)
 def test_a_neutral_coefficient_leaves_every_bit(stir, name):
     base, neutral = stir(), models.EFFECTS[name].neutral
     assert np.isfinite(base).all() and np.ptp(base[:, -1], axis=0).min() > 0
@@ -99,9 +93,8 @@ def test_effects_compose_whatever_the_order_they_are_given_in(stir):
     every = {name: coefficient(name) for name in models.EFFECTS}
     together = stir(every)
     np.testing.assert_array_equal(stir(dict(reversed(every.items()))), together)
-    # a scene is compiled for each set of effects in the liquid, so one of those will do
-    liquid = [name for name in every if models.EFFECTS[name].acts_in == "liquid"]
-    for name in [name for name in every if name not in liquid[1:]]:
+    # each set of effects in the liquid compiles a scene; what one alone does is tested above
+    for name in [name for name in every if models.EFFECTS[name].acts_in != "liquid"]:
         fewer = {other: value for other, value in every.items() if other != name}
         assert np.abs(stir(fewer) - together).max() > 1e-6, name
 
@@ -118,6 +111,7 @@ def test_sensors_act_after_the_rig_in_the_order_of_their_names(stir):
     np.testing.assert_array_equal(seen, expected)
 
 
+@pytest.mark.slow
 def test_a_pour_keeps_every_bit_where_coefficients_are_neutral(pour):
     neutral = {name: effect.neutral for name, effect in models.EFFECTS.items()}
     mixed = pour({name: [neutral[name], coefficient(name), neutral[name]] for name in neutral})
@@ -192,6 +186,7 @@ def test_a_stir_that_diverged_stays_nan_behind_every_sensor(stir):
         (["fill_level"], "must map names to coefficients"),
         ({"pivot_friction": -1e-4}, "pivot_friction must not be negative.*-0.0001"),
         ({"stick_mass": [1.0, -1.0, 1.0]}, "stick_mass must be positive"),
+        ({"gripper_scale": 1e9}, "path must be finite and within 10 m"),
         ({"fill_level": 1.0}, r"fill must be 0 to 0\.075 m, got 1\.05.*effects fill_level"),
     ],
 )

@@ -55,16 +55,6 @@ def _effect(name, **changes):
     return models.Effect(name=name, **{**fields, **changes})
 
 
-@pytest.fixture
-def register(monkeypatch):
-    from bolfi_liquids.models import effects as registry
-
-    def add(effect):
-        monkeypatch.setitem(registry._registered, effect.name, effect)
-
-    return add
-
-
 @pytest.mark.slow
 def test_hooks_from_outside_act(register):
     """A force equal to the scene's own, and a factor on the viscosity: the same flow."""
@@ -154,6 +144,7 @@ def test_a_film_sticks_and_drains(cups):
     assert (later < sticky).all() and (later > bare).all()
 
 
+@pytest.mark.slow
 def test_adhesion_keeps_liquid_in_the_cup(cups):
     bare, sticky = (retained(cups, a, np.array([0.05]))[0] for a in (0.0, 1.0))
     assert bare == 0.0

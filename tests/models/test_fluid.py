@@ -71,8 +71,8 @@ def test_stick_and_liquid_exchange_angular_momentum(glycerin):
         numerics=setup.numerics,
     )
     centre, pivot = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 1.15])
+    scene = StirringScene(1, small)
     for viscosity in (0.0, 5.0):
-        scene = StirringScene(1, small)
         scene.place([points + centre])
         scene.velocity.from_numpy(rng.normal(0.0, 0.05, (1, len(points), 3)).astype(np.float32))
         scene.place_stick(pivot[None])

@@ -73,6 +73,7 @@ def test_without_liquid_the_stick_is_the_driven_spherical_pendulum(glycerin):
     assert rms_deg(signal - expected) < 0.05 * swing
 
 
+@pytest.mark.slow
 @pytest.mark.xfail(reason="packed particles push the stick: 22 % too much", strict=False)
 def test_a_submerged_stick_is_buoyed_as_archimedes_says(glycerin):
     """At 15 degrees, where buoyancy outweighs the packing's own push of a particle's weight."""
@@ -174,6 +175,21 @@ def test_a_setup_says_what_fixes_it(glycerin):
     displaced = np.pi * setup.stick.radius**2 * setup.submerged
     cup = np.pi * setup.cup.radius**2 * setup.cup.fill
     assert volume + displaced == pytest.approx(cup)
+
+
+def test_a_stir_s_least_viscosity_is_that_of_its_mean_speed(glycerin):
+    """A pivot that moves at 10 cm/s for half of the time, then with samples missing."""
+    time = np.linspace(0.0, 2.0, 61)
+    position = np.zeros((61, 3))
+    position[:, 0] = 0.1 * np.maximum(time - 1.0, 0.0)
+    speed = 0.1 / np.sqrt(2.0)
+    path = SimpleNamespace(time=time, position=position)
+    assert stirring.mean_speed(path) == pytest.approx(speed)
+    position[40:43] = np.nan
+    assert stirring.mean_speed(path) == pytest.approx(speed)
+    setup = models.StirSetup.from_recording(glycerin)
+    expected = setup.numerics.least_viscosity(setup.spacing, 1260.0, speed)
+    assert setup.least_viscosity(1260.0, path) == pytest.approx(expected)
 
 
 def test_missing_geometry_and_a_short_stick_are_named(glycerin):

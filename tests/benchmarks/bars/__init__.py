@@ -1,0 +1,19 @@
+"""What the fluid is held to, measured: each module yields lines of one table."""
+
+from .line import HEAD, Line, row
+from .peer import against_peer
+from .pours import pours
+from .speed import start_up, stirring_seconds, throughput
+from .stirs import stirs
+
+__all__ = [
+    "HEAD",
+    "Line",
+    "against_peer",
+    "pours",
+    "row",
+    "start_up",
+    "stirring_seconds",
+    "stirs",
+    "throughput",
+]

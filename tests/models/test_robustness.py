@@ -1,0 +1,267 @@
+"""Nothing goes wrong anywhere in the prior box; what is made to go wrong is NaN, with a reason."""
+
+import warnings
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from bolfi_liquids.models import faults, pouring, stirring
+from jax import random
+
+from bolfi_liquids import models
+
+POINTS, BATCH = 500, 25
+SOME_EFFECTS = 125  # of the points have a subset of the effects, one for each batch
+PARTICLES = {"stir": 400, "pour": 300}
+FIRST, LAST = 0.5, 4.5  # s of the recording: from rest into strokes at 10 cm/s,
+HASTE = 2.0  # times as fast
+LOOK = 20  # substeps between two looks at the particles' speeds
+FASTEST = {"stir": 2.0, "pour": 4.0}  # m/s; a fall over the cup's depth gains 1.2, a pour's 1.9
+STEEPEST = np.radians(60.0)
+
+
+class Points(NamedTuple):
+    """Points of the prior box, every array of shape [n]."""
+
+    liquid: models.Liquid
+    effects: dict[str, np.ndarray]
+    action: models.PourAction
+    seeds: np.ndarray
+
+    def text(self, k):
+        """What repeats point k."""
+        given = {name: float(values[k]) for name, values in self.effects.items()}
+        rate, distance = self.action.angular_velocity[k], self.action.distance[k]
+        return f"{self.liquid[k]}, {given}, {rate} rad/s, {distance} m, seed {self.seeds[k]}"
+
+
+def points(start, cups):
+    """The batch of points from number `start` on."""
+    rng = np.random.default_rng(start)
+    names = sorted(models.EFFECTS)
+    if start >= POINTS - SOME_EFFECTS:
+        names = [name for name in names if rng.random() < 0.5]
+    keys = random.split(random.key(start), len(names))
+    return Points(
+        models.Liquid(
+            viscosity=np.exp(rng.uniform(np.log(1e-3), np.log(50.0), BATCH)),
+            cohesion=rng.uniform(0.0, 1.0, BATCH),
+            density=rng.uniform(700.0, 1400.0, BATCH),
+            adhesion=np.zeros(BATCH),  # drawn as the effect of that name
+        ),
+        {
+            name: np.asarray(models.EFFECTS[name].prior.sample(key, (BATCH,)), float)
+            for name, key in zip(names, keys, strict=True)
+        },
+        models.PourAction(
+            rng.uniform(*cups.angular_velocity_range, BATCH),
+            rng.uniform(*cups.distance_range, BATCH),
+        ),
+        start + np.arange(BATCH),
+    )
+
+
+class End(NamedTuple):
+    """What became of a simulation's particles: where they are [m], [n, 3], and how fast one of
+    them ever was [m/s]."""
+
+    position: np.ndarray
+    fastest: float
+
+
+class Watched:
+    """A scene that notes how fast its particles get."""
+
+    def __init__(self, scene):
+        self.scene, self.fastest = scene, np.zeros(scene.slots)
+
+    def __getattr__(self, name):
+        return getattr(self.scene, name)
+
+    def stir(self, *how):
+        self.scene.stir(*how)
+        self._look()
+
+    def pour(self, *how):
+        self.scene.pour(*how)
+        self._look()
+
+    def end(self, slot):
+        alive = self.scene.alive.to_numpy()[slot]
+        return End(self.scene.position.to_numpy()[slot, :alive], self.fastest[slot])
+
+    def _look(self):
+        speed = np.linalg.norm(self.scene.velocity.to_numpy(), axis=-1)
+        present = np.arange(self.scene.particles) < self.scene.alive.to_numpy()[:, None]
+        self.fastest = np.maximum(self.fastest, np.where(present, speed, 0.0).max(axis=1))
+
+
+@pytest.fixture
+def ends(monkeypatch):
+    """The `End` of each simulation from here on, by seed."""
+    seen = {}
+
+    def noting(run):
+        def noted(scene, *given):
+            watched, seeds = Watched(scene), given[-1]
+            result = run(watched, *given)
+            seen.update({int(seed): watched.end(slot) for slot, seed in enumerate(seeds)})
+            return result
+
+        return noted
+
+    for module in (stirring, pouring):
+        monkeypatch.setattr(module, "_run", noting(module._run))
+        monkeypatch.setattr(module, "CHUNK", LOOK)
+    return seen
+
+
+@pytest.fixture(scope="module")
+def violent(glycerin):
+    """A setup, and the gripper's path from rest into fast strokes."""
+    gripper = glycerin.gripper
+    part = (gripper.time >= FIRST) & (gripper.time <= LAST)
+    path = SimpleNamespace(time=gripper.time[part] / HASTE, position=gripper.position[part])
+    return models.StirSetup.from_recording(glycerin, PARTICLES["stir"]), path
+
+
+def told(run):
+    """The result of `run` and the reasons that it warned of."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", models.FailedSimulation)
+        result = run()
+    return result, [str(warning.message) for warning in caught]
+
+
+def stir_faults(drawn, violent, ends):
+    """Point -> what was wrong with its stir."""
+    setup, path = violent
+    signal, reasons = told(
+        lambda: models.stir(drawn.liquid, path, setup, drawn.seeds, drawn.effects)
+    )
+    fill = setup.cup.fill + drawn.effects.get("fill_level", np.zeros(BATCH))
+    for k, wanted in enumerate(setup.count(fill)):
+        position, fastest = ends[int(drawn.seeds[k])]
+        reach, height = np.hypot(*position[:, :2].T), position[:, 2]
+        checks = {
+            f"not finite: {reasons}": np.isfinite(signal[k]).all(),
+            f"tilt {np.degrees(np.abs(signal[k]).max()):.0f} deg": np.abs(signal[k]).max()
+            < STEEPEST,
+            f"{len(position)} of {wanted} particles": len(position) == wanted,
+            f"{reach.max():.4f} m from the axis": reach.max() <= setup.cup.radius,
+            f"height {height.min():.4f} to {height.max():.4f} m": 0.0 <= height.min()
+            and height.max() <= setup.cup.height,
+            f"{fastest:.2f} m/s": fastest < FASTEST["stir"],
+        }
+        yield from ((k, what) for what, fine in checks.items() if not fine)
+
+
+def pour_faults(drawn, cups, ends):
+    """Point -> what was wrong with its pour."""
+    count = PARTICLES["pour"]
+    result, reasons = told(
+        lambda: models.pour(
+            drawn.liquid, drawn.action, cups, drawn.seeds, count, effects=drawn.effects
+        )
+    )
+    fractions = np.stack([result.spilled, result.received, result.retained], axis=-1)
+    for k, shares in enumerate(fractions):
+        particles, fastest = count * shares, ends[int(drawn.seeds[k])].fastest
+        checks = {
+            f"not finite: {reasons}": np.isfinite(shares).all(),
+            f"fractions {shares}": (shares >= 0.0).all() and abs(shares.sum() - 1.0) < 1e-12,
+            f"parts of particles {particles}": np.allclose(particles, np.rint(particles)),
+            f"{fastest:.2f} m/s": fastest < FASTEST["pour"],
+        }
+        yield from ((k, what) for what, fine in checks.items() if not fine)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("start", range(0, POINTS, BATCH))
+def test_no_point_of_the_prior_box_goes_wrong(start, violent, cups, ends):
+    drawn = points(start, cups)
+    found = [("stir", *fault) for fault in stir_faults(drawn, violent, ends)]
+    found += [("pour", *fault) for fault in pour_faults(drawn, cups, ends)]
+    told_apart = [f"{scene}: {what}: {drawn.text(k)}" for scene, k, what in found]
+    assert not found, "\n".join(told_apart)
+
+
+def heaps():
+    """A force that puts all particles into one place."""
+    import taichi as ti
+
+    @ti.func
+    def heap(scene: ti.template(), b, coefficient):
+        for i in range(scene.alive[b]):
+            scene.position[b, i] = coefficient * scene.position[b, 0]
+
+    return heap
+
+
+def hurls():
+    """A force that makes particles ever faster."""
+    import taichi as ti
+
+    @ti.func
+    def hurl(scene: ti.template(), b, coefficient):
+        for i in range(scene.alive[b]):
+            scene.velocity[b, i] = (1.0 + coefficient) * scene.velocity[b, i]
+
+    return hurl
+
+
+def planted(name, make_force):
+    return models.Effect(
+        name=name,
+        unit="1",
+        neutral=0.0,
+        acts_in="liquid",
+        text="A fault.",
+        source="This test",
+        make_prior=lambda: None,
+        make_force=make_force,
+    )
+
+
+ABSURD = {
+    # viscosity [Pa s], cohesion, effects, how it ends; what compiles scenes of its own is slow
+    "solid": (1e30, 0.0, {}, faults.UNSOLVED),
+    "glue": (0.1, 1e5, {}, faults.RUNAWAY),
+    "rock": (0.1, 0.0, {"yield_stress": 1e30}, faults.UNSOLVED),
+    "explosion": (0.1, 0.0, {"hurls": 1.0}, faults.RUNAWAY),
+    "implosion": (0.1, 0.0, {"heaps": 1.0}, faults.COLLAPSED),
+}
+CASES = [pytest.param(n, marks=[pytest.mark.slow] if ABSURD[n][2] else []) for n in ABSURD]
+
+
+def test_every_fault_is_provoked():
+    assert {fault for *_, fault in ABSURD.values()} == set(faults.REASONS)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_what_goes_wrong_is_nan_with_a_reason(name, glycerin, violent, cups, register):
+    """And the other in its batch keeps its bits."""
+    viscosity, cohesion, effects, fault = ABSURD[name]
+    register(planted("heaps", heaps))
+    register(planted("hurls", hurls))
+    setup, path = models.StirSetup.from_recording(glycerin, 150), violent[1]
+    seeds, size = np.array([1, 2]), setup.particles
+    action = models.PourAction(6.0, 0.03)
+
+    def simulate(part):
+        liquid = models.Liquid(
+            np.array([0.1, viscosity])[part], np.array([0.0, cohesion])[part], 1000.0
+        )
+        given = {n: np.array([models.EFFECTS[n].neutral, c])[part] for n, c in effects.items()}
+        poured = models.pour(liquid, action, cups, seeds[part], size, given)
+        shares = np.stack([poured.spilled, poured.received, poured.retained], axis=-1)
+        return models.stir(liquid, path, setup, seeds[part], given), shares
+
+    (angles, fractions), reasons = told(lambda: simulate(slice(0, 2)))
+    assert len(reasons) == 2
+    assert all(f"seed 2: {faults.REASONS[fault]}" in reason for reason in reasons)
+    assert np.isnan(angles[1, 1:]).all() and np.isnan(fractions[1]).all()
+    alone = simulate(slice(0, 1))
+    np.testing.assert_array_equal(angles[:1], alone[0])
+    np.testing.assert_array_equal(fractions[:1], alone[1])
