@@ -62,7 +62,7 @@ class Pressure(NeighbourSearch):
     def look_up(self, table, distance):
         """Row of `table` at `distance` [m], linearly interpolated; zero beyond the support."""
         row = ti.Vector([0.0, 0.0, 0.0, 0.0])
-        at = ti.max(distance / self.h, 0.0) * (tables.ENTRIES - 1)
+        at = ti.math.clamp(distance / self.h, 0.0, 1.0) * (tables.ENTRIES - 1)
         k = ti.cast(at, ti.i32)
         if k < tables.ENTRIES - 1:
             f = at - k

@@ -1,5 +1,12 @@
 # type: ignore  (Taichi compiles this source and gives these names their types)
-"""The stirring scene: liquid in a cup, a stick hung from the gripper as a spherical pendulum."""
+"""The stirring scene: liquid in a cup, a stick hung from the gripper as a spherical pendulum.
+
+The stick is about one particle wide. Particles keep off it by a part of their spacing, so at its
+own radius it drags like a thicker one; to them it is as thin as makes the drag right (validation
+case `cylinder_drag`). What it displaces beyond that core acts on it by closed forms: Archimedes'
+lift, whose reaction all liquid bears like that of a risen surface, and the added mass of a
+cylinder in potential flow, which is what it displaces (Lamb 1932, "Hydrodynamics", art. 68).
+"""
 
 import numpy as np
 import taichi as ti
@@ -36,17 +43,24 @@ class StirringScene(Fluid):
         self.bring(effects)
         self.cup_radius = cup.radius
         self.margin = setup.numerics.contact * setup.spacing
-        self.stick_radius, self.stick_length = stick.radius, stick.length
+        self.core = setup.numerics.stick_core(stick.radius, setup.spacing)
+        self.stick_length = stick.length
         # a capsule of the stick's volume: its round end reaches as far as the flat one on average
         self.stick_end = stick.length - 2.0 * stick.radius / 3.0
         self.stick_gyration = stick.gyration
-        self.stick_table = self.load(tables.cylinder(stick.radius / self.h))
+        table = tables.cylinder(self.core / self.h)
+        self.stick_table = self.load(table)
+        hidden = np.pi * (stick.radius**2 - self.core**2)  # [m²]
+        around = self.h**2 * tables.around_cylinder(table.density, self.core / self.h)
+        self.hidden_share = hidden / around  # of a particle's volume, where the table is 1
         self.pivot, self.pivot_velocity, self.direction, self.swing = (
             ti.Vector.field(3, ti.f32, slots) for _ in range(4)
         )
         self.stick_residual, self.stick_search, self.stick_image = (
             ti.Vector.field(3, ti.f32, slots) for _ in range(3)
         )
+        # volume that the core does not displace, and its first and second moment about the pivot
+        self.hidden, self.hidden_sum = (ti.Vector.field(3, ti.f32, slots) for _ in range(2))
         self.lever, self.stick_grip = (ti.field(ti.f32, (slots, particles)) for _ in range(2))
         self.stick_mass, self.stick_inertia, self.pivot_friction, self.free = (
             ti.field(ti.f32, slots) for _ in range(4)
@@ -74,9 +88,10 @@ class StirringScene(Fluid):
 
         offset, lever = self.from_stick(b, p)
         distance = ti.max(offset.norm(), 1e-6)
-        stick = self.look_up(self.stick_table, distance - self.stick_radius)
+        stick = self.look_up(self.stick_table, distance - self.core)
         self.body_wall[b, i] = (stick[1] / (distance * self.h)) * offset
         self.lever[b, i] = lever
+        self.hide(b, (p - self.pivot[b]).dot(self.direction[b]), stick[0])
         share = self.unit_coupling * self.kinematic(b) / (self.h * self.h)
         self.stick_grip[b, i] = share * self.numerics.stick_drag * 0.5 * (stick[2] + stick[3])
         return side[0] + floor[0] + stick[0]
@@ -91,6 +106,18 @@ class StirringScene(Fluid):
         return distance, normal, 1.0
 
     @ti.func
+    def hide(self, b, lever, density):
+        """Add a particle's share of the volume that the core does not displace."""
+        if 0.0 < lever and lever < self.stick_length:
+            volume = self.hidden_share * self.volume * density
+            self.hidden_sum[b] = self.hidden_sum[b] + volume * vec3(1.0, lever, lever * lever)
+
+    @ti.func
+    def inertia(self, b):
+        """Of the stick and of its hidden part's added mass, about the pivot [kg m²]."""
+        return self.stick_inertia[b] + self.density[b] * self.hidden[b][2]
+
+    @ti.func
     def across(self, b, v):
         """The part of v that turns the stick."""
         return v - v.dot(self.direction[b]) * self.direction[b]
@@ -99,7 +126,7 @@ class StirringScene(Fluid):
     def yielding(self, b, i):
         """A particle's mass times its lever, by the stick's inertia; 0 while the stick is held."""
         mass = self.density[b] * self.volume
-        return self.free[b] * mass * self.lever[b, i] / self.stick_inertia[b]
+        return self.free[b] * mass * self.lever[b, i] / self.inertia(b)
 
     @ti.func
     def body_softness(self, b, i):
@@ -122,7 +149,7 @@ class StirringScene(Fluid):
     @ti.func
     def stick_scale(self, b):
         """Root of the stick's inertia over a particle's mass [m]."""
-        return ti.sqrt(self.stick_inertia[b] / (self.density[b] * self.volume))
+        return ti.sqrt(self.inertia(b) / (self.density[b] * self.volume))
 
     @ti.func
     def body_load(self, b):
@@ -168,14 +195,15 @@ class StirringScene(Fluid):
     @ti.func
     def contain(self, b):
         """Keep particles in the cup and off the stick; the stick takes what it gave."""
+        sinking = self.float_stick(b)
         limit = self.cup_radius - self.margin
         for i in range(self.alive[b]):
             start = self.position[b, i]
             p = start
             offset, lever = self.from_stick(b, p)
             distance = offset.norm()
-            if distance < self.stick_radius:
-                out = (self.stick_radius - distance) / ti.max(distance, 1e-6) * offset
+            if distance < self.core:
+                out = (self.core - distance) / ti.max(distance, 1e-6) * offset
                 p += out
                 self.lever[b, i] = lever
                 impulse = self.yielding(b, i) / self.dt * self.across(b, out)
@@ -184,7 +212,17 @@ class StirringScene(Fluid):
             inward = ti.min(limit / ti.max(reach, 1e-6), 1.0)
             p = vec3(inward * p.x, inward * p.y, ti.max(p.z, self.margin))
             self.position[b, i] = p
-            self.velocity[b, i] = self.velocity[b, i] + (p - start) / self.dt
+            self.velocity[b, i] = self.velocity[b, i] + (p - start) / self.dt + sinking
+
+    @ti.func
+    def float_stick(self, b):
+        """Lift of the hidden volume on the stick; the velocity that the liquid takes for it."""
+        self.hidden[b] = self.hidden_sum[b]
+        self.hidden_sum[b] = vec3(0.0)
+        fall = vec3(0.0, 0.0, -GRAVITY * self.dt)
+        lift = self.free[b] * self.density[b] * self.hidden[b][1] / self.inertia(b)
+        self.swing[b] = self.swing[b] - lift * self.across(b, fall)
+        return self.hidden[b][0] / (self.alive[b] * self.volume) * fall
 
     @ti.func
     def swing_stick(self, b, pivot):
@@ -192,11 +230,12 @@ class StirringScene(Fluid):
         velocity = (pivot - self.pivot[b]) / self.dt
         jolt = velocity - self.pivot_velocity[b]
         self.pivot[b], self.pivot_velocity[b] = pivot, velocity
-        arm = 0.5 * self.stick_mass[b] * self.stick_length / self.stick_inertia[b]
+        arm = 0.5 * self.stick_mass[b] * self.stick_length / self.inertia(b)
+        dragged = self.density[b] * self.hidden[b][1] / self.inertia(b)
         # kick and drift swing (ω dt)²/24 too fast; the gradient of the kick's square makes up for
         # it (Rowlands 1991, J. Comput. Phys. 97, 235) and keeps them symplectic
         fall = GRAVITY * self.dt * (1.0 + arm * GRAVITY * self.dt**2 / 12.0 * self.direction[b].z)
-        swing = self.swing[b] - arm * (vec3(0.0, 0.0, fall) + jolt)
+        swing = self.swing[b] - arm * vec3(0.0, 0.0, fall) - (arm + dragged) * jolt
         self.swing[b] = self.across(b, swing)
 
     @ti.func
@@ -206,7 +245,7 @@ class StirringScene(Fluid):
         All impulses of the substep are in the swing by now, so a stick that they cannot turn
         stays where it is.
         """
-        loss = self.dt * self.pivot_friction[b] / self.stick_inertia[b]
+        loss = self.dt * self.pivot_friction[b] / self.inertia(b)
         swing = self.swing[b]
         if loss > 0.0:
             swing *= ti.max(1.0 - loss / ti.max(swing.norm(), 1e-12), 0.0)
@@ -259,6 +298,8 @@ class StirringScene(Fluid):
         """Hang the sticks straight down from `pivots` [b, 3], at rest."""
         self.pivot.from_numpy(self.padded(pivots))
         self.pivot_velocity.fill(0.0)
+        self.hidden.fill(0.0)
+        self.hidden_sum.fill(0.0)
         self.swing.fill(0.0)
         self.direction.from_numpy(np.tile(np.float32([0.0, 0.0, -1.0]), (self.slots, 1)))
 

@@ -103,3 +103,9 @@ def cylinder(radius: float) -> BoundaryTable:
         along = np.sum(area * np.interp(d, rho, axial_line, right=0.0))
         tangential[k] = 0.5 * (around + along)
     return BoundaryTable(density, np.gradient(density, at), normal, tangential)
+
+
+def around_cylinder(values: np.ndarray, radius: float) -> float:
+    """Integral [h²] of a column of `cylinder(radius)` over a plane across, outside the cylinder."""
+    r = radius + np.linspace(0.0, 1.0, ENTRIES)
+    return float(np.trapezoid(2.0 * np.pi * r * values, r))

@@ -5,9 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...numerics import PUBLISHED_DRAG, Numerics
 from ...stirring import Stick
 from ..truths.pendulum import Rod
 
+STICKS = {"": Numerics(), ", drag as published": PUBLISHED_DRAG}
 KICK = 2  # samples that a kick lasts
 
 

@@ -3,9 +3,13 @@
 import numpy as np
 
 from ... import runtime, stirring
+from ...fluid import DAMPING
+from ...liquid import Liquid
+from ...numerics import Numerics
 from ...stirring import Cup, Stick, StirSetup
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from ..truths.pendulum import Rod, archimedes_torque
+from ._stirring import STICKS
 
 STICK = Stick(radius=0.0045, length=0.22, mass=1200.0 * np.pi * 0.0045**2 * 0.22)
 CUP = Cup(radius=0.04, height=0.075, fill=0.05)
@@ -18,15 +22,15 @@ PACKINGS = 8
 TOLERANCE = 0.05
 
 
-def torque(tilt: float, seed: int) -> tuple[np.ndarray, float]:
+def torque(numerics: Numerics, tilt: float, seed: int) -> tuple[np.ndarray, float]:
     """Of the liquid on each stick about its pivot, towards the surface, and of Archimedes [N m]."""
-    setup = StirSetup(CUP, STICK, SUBMERGED)
+    setup = StirSetup(CUP, STICK, SUBMERGED, numerics=numerics)
     # the wet part near the axis
     reach = STICK.length - SUBMERGED / 2
     height = STICK.length - SUBMERGED + CUP.fill
     pivots = np.tile([-reach * np.sin(tilt), 0.0, height], (PACKINGS, 1))
     with runtime.LOCK:
-        scene = stirring._scene(setup)
+        scene = stirring._scene(setup, ())
         seeds = seed * PACKINGS + np.arange(PACKINGS)
         upright = pivots * [0.0, 0.0, 1.0]
         scene.place([stirring._pack(setup, setup.particles, int(s), upright[0]) for s in seeds])
@@ -35,10 +39,9 @@ def torque(tilt: float, seed: int) -> tuple[np.ndarray, float]:
         direction = np.zeros((scene.slots, 3), np.float32)
         direction[:, 0], direction[:, 2] = np.sin(tilt), -np.cos(tilt)
         scene.direction.from_numpy(direction)
-        scene.relax_packing(PACKINGS, REST)
-        scene.density.fill(DENSITY)
-        scene.viscosity.fill(VISCOSITY)
-        scene.flow_on(PACKINGS, round(REST * scene.rate), 1.0)
+        scene.pour_in(Liquid(VISCOSITY, 0.0, DENSITY).batch(PACKINGS))
+        for damping in (DAMPING, 1.0):
+            scene.flow_on(PACKINGS, round(REST * scene.rate), damping)
         scene.swing.fill(0.0)
         steps = round(SPAN * scene.rate)
         scene.flow_on(PACKINGS, steps, 1.0)
@@ -51,24 +54,24 @@ def torque(tilt: float, seed: int) -> tuple[np.ndarray, float]:
 
 
 def run(progress: Progress, seed: int) -> CaseResult:
-    """The mean over packings at each tilt."""
-    rows, tilts, means = [], [], []
-    for number, degrees in enumerate(TILTS):
-        ours, expected = torque(np.radians(degrees), seed)
-        name = f"torque at {degrees:g} deg [N m]"
-        rows.append(Row.relative(name, expected, ours.mean(), TOLERANCE))
-        tilts.append(np.full(PACKINGS, degrees))
-        means.append(1e3 * ours)
-        progress((number + 1) / len(TILTS))
+    """The mean over packings at each tilt, for either stick."""
+    rows, curves = [], []
+    for number, (stick, numerics) in enumerate(STICKS.items()):
+        tilts, means = [], []
+        for degrees in TILTS:
+            ours, expected = torque(numerics, np.radians(degrees), seed)
+            name = f"torque at {degrees:g} deg{stick} [N m]"
+            rows.append(Row.relative(name, expected, ours.mean(), TOLERANCE))
+            tilts.append(np.full(PACKINGS, degrees))
+            means.append(1e3 * ours)
+        curves.append(Curve(f"packings{stick}", np.ravel(tilts), np.ravel(means), series=number))
+        progress((number + 1) / len(STICKS))
     fine = np.linspace(0.0, 1.2 * TILTS[-1], 30)
     surface = STICK.length - SUBMERGED
     weightless = Rod(STICK.length, STICK.radius, 1e-12)
     exact = -1e3 * archimedes_torque(np.radians(fine), weightless, surface, DENSITY)
-    curves = (
-        Curve("Archimedes", fine, exact, truth=True),
-        Curve("packings", np.ravel(tilts), np.ravel(means)),
-    )
-    panel = Panel("tilt [deg]", "torque of the lift [mN m]", curves)
+    curves.append(Curve("Archimedes", fine, exact, truth=True))
+    panel = Panel("tilt [deg]", "torque of the lift [mN m]", tuple(curves))
     return CaseResult(tuple(rows), (panel,))
 
 

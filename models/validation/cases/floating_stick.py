@@ -24,23 +24,25 @@ TOLERANCE = 2.0  # deg
 
 def run(progress: Progress, seed: int) -> CaseResult:
     """Mean angle over the last second, the mean over packings, from either side."""
-    setup = StirSetup(CUP, STICK, SUBMERGED, PARTICLES)
     surface = STICK.length - SUBMERGED
     liquid = Liquid(VISCOSITY, 0.0, DENSITY)
     expected = np.degrees(floating_angle(_stirring.rod(STICK), surface, DENSITY))
     rows = []
     curves = [Curve("Archimedes", [0.0, SECONDS], [expected, expected], truth=True)]
-    for number, (side, shift) in enumerate(SHIFTS.items()):
-        path = _stirring.kicked(shift, surface + CUP.fill, SECONDS, RATE)
+    starts = [(side, stick) for stick in _stirring.STICKS for side in SHIFTS]
+    for number, (side, stick) in enumerate(starts):
+        setup = StirSetup(CUP, STICK, SUBMERGED, PARTICLES, _stirring.STICKS[stick])
+        path = _stirring.kicked(SHIFTS[side], surface + CUP.fill, SECONDS, RATE)
         signals = stir(liquid, path, setup, seed * SEEDS + np.arange(SEEDS))
         angle = np.degrees(_stirring.tilt(signals))
         ours = float(angle[:, path.time > SECONDS - 1.0].mean())
-        rows.append(Row.absolute(f"angle at rest, from {side} [deg]", expected, ours, TOLERANCE))
+        name = f"from {side}{stick}"
+        rows.append(Row.absolute(f"angle at rest, {name} [deg]", expected, ours, TOLERANCE))
         curves += [
-            Curve("" if k else f"from {side}", path.time, trial, series=number)
+            Curve("" if k else name, path.time, trial, series=number)
             for k, trial in enumerate(angle)
         ]
-        progress((number + 1) / len(SHIFTS))
+        progress((number + 1) / len(starts))
     panel = Panel("time [s]", "angle from the vertical [deg]", tuple(curves))
     return CaseResult(tuple(rows), (panel,))
 

@@ -23,13 +23,14 @@ LEFT_TOLERANCE = 0.2
 
 def run(progress: Progress, seed: int) -> CaseResult:
     """Half a period, and what is left of the swing after it; the mean over packings."""
-    setup = StirSetup(CUP, STICK, SUBMERGED, PARTICLES)
     height = STICK.length - SUBMERGED + CUP.fill
     path = _stirring.kicked(SHIFT, height, SECONDS, RATE)
     free = slice(_stirring.KICK, None)
     time = path.time[free]
     rows, curves = [], []
-    for number, viscosity in enumerate(VISCOSITY):
+    runs = [(viscosity, stick) for stick in _stirring.STICKS for viscosity in VISCOSITY]
+    for number, (viscosity, stick) in enumerate(runs):
+        setup = StirSetup(CUP, STICK, SUBMERGED, PARTICLES, _stirring.STICKS[stick])
         liquid = Liquid(viscosity, 0.0, DENSITY)
         signals = stir(liquid, path, setup, seed * SEEDS + np.arange(SEEDS))[:, free, 0]
         angle = signals.mean(axis=0)
@@ -42,7 +43,7 @@ def run(progress: Progress, seed: int) -> CaseResult:
         )
         half, far = expected.period / 2, far_side(time, angle)
         left = float(np.exp(-expected.decay * half))
-        name = f"at {viscosity:g} Pa s"
+        name = f"at {viscosity:g} Pa s{stick}"
         rows += [
             Row.relative(f"half a period {name} [s]", half, far.time, TOLERANCE),
             Row.relative(f"swing left after it {name}", left, far.ratio, LEFT_TOLERANCE),
@@ -51,9 +52,9 @@ def run(progress: Progress, seed: int) -> CaseResult:
         free_swing = np.exp(-expected.decay * (time - time[0])) * np.cos(turn)
         curves += [
             Curve("", time, np.degrees(angle[0] * free_swing), truth=True, series=number),
-            Curve(f"{viscosity:g} Pa s", time, np.degrees(angle), series=number),
+            Curve(f"{viscosity:g} Pa s{stick}", time, np.degrees(angle), series=number),
         ]
-        progress((number + 1) / len(VISCOSITY))
+        progress((number + 1) / len(runs))
     return CaseResult(tuple(rows), (Panel("time [s]", "inclination [deg]", tuple(curves)),))
 
 

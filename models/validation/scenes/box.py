@@ -26,7 +26,8 @@ class Box:
         ends: Walls at both ends of x.
         lid: A plate at the top; without one `size` only says how far neighbours are searched.
         slippery: Walls take no shear.
-        rod: Radius of an upright rod in the middle of x and y [m]; 0: none.
+        rod: Radius of an upright rod in the middle of x and y [m]; 0: none. To the particles it
+            is as thin as a stick of that radius.
         sponge: Length at the start of x in which the liquid is brought to `stream` [m].
         numerics: Constants of the discretisation.
     """
@@ -66,7 +67,8 @@ class BoxScene(Fluid):
         self.lid_speed, self.stream = (ti.field(ti.f32, slots) for _ in range(2))
         self.rod_grip = ti.field(ti.f32, (slots, box.particles))
         if box.rod > 0.0:
-            self.rod_table = self.load(tables.cylinder(box.rod / self.h))
+            self.rod = box.numerics.stick_core(box.rod, box.spacing)
+            self.rod_table = self.load(tables.cylinder(self.rod / self.h))
 
     @ti.func
     def gravity(self, b):
