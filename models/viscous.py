@@ -17,6 +17,7 @@ from .rheology import Rheology
 WEAK = 0.004  # of nu dt / h^2: so thin a liquid takes one explicit step instead
 MOST_ITERATIONS = 50
 LARGEST = 1e30  # squared residual [m²/s²] that single precision can still work with
+HOPELESS = 0.3  # of the first residual: with so much left, the velocities are no solution
 MOST_UNEVEN = 200  # the same where particles differ in viscosity
 UNEVEN_TOLERANCE = 0.3  # of the usual one, where they do
 
@@ -197,6 +198,8 @@ class Viscous(Rheology):
                 )
             self.body_turn(b, new / left)
             left = new
+        if left > HOPELESS**2 * size:
+            self.fault[b] = UNSOLVED
 
     @ti.func
     def body_thicken(self, b, i, ratio):
