@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.models import pouring, runtime
 from bolfi_liquids.models.validation.analysis.profiles import binned_profile
-from bolfi_liquids.models.validation.scenes.plates import Channel, channel_flow
+from bolfi_liquids.models.validation.scenes.channel import Channel, Drive, channel_flow
 from bolfi_liquids.models.validation.truths.generalised_flows import herschel_bulkley_channel
 
 from bolfi_liquids import models
@@ -61,33 +61,30 @@ def test_hooks_from_outside_act(register):
     for effect in (push(), thicken()):
         register(effect)
 
-    def flow(viscosity, own, effects):
-        size = len(viscosity)
-        liquid, still = models.Liquid(viscosity, 0.0, 1000.0), np.zeros(size)
-        seconds = np.array([1.5])
-        _, u = channel_flow(
-            Channel(layers=6), liquid, still, np.full(size, own), seconds, effects=effects
-        )
-        return u[0].mean(axis=1)
+    def flow(viscosity, own, pushed, factor):
+        # one at a time, each in the same packing: between packings speeds differ by 5 %
+        liquid = models.Liquid(viscosity, 0.0, 1000.0)
+        drive = Drive(np.zeros(1), np.full(1, own), np.zeros_like)
+        effects = {"push": np.full(1, pushed), "thicken": np.full(1, factor)}
+        _, u = channel_flow(Channel(layers=6), liquid, drive, [0.75], effects=effects)
+        return u.mean()
 
-    base = flow([1.0], 0.5, None)[0]
-    pushed, factor = np.full(3, 0.5), np.array([1.0, 2.0, 2.0])
-    acting = flow([1.0, 0.5, 1.0], 0.0, {"push": pushed, "thicken": factor})
-    assert acting[:2] == pytest.approx(base, rel=0.05)
-    assert acting[2] < 0.7 * base
+    base = flow(1.0, 0.5, 0.0, 1.0)
+    assert flow(1.0, 0.0, 0.5, 1.0) == pytest.approx(base, rel=0.05)
+    assert flow(0.5, 0.0, 0.5, 2.0) == pytest.approx(base, rel=0.05)
+    assert flow(1.0, 0.0, 0.5, 2.0) < 0.7 * base
 
 
 @pytest.mark.slow
 def test_gels_flow_as_plugs():
     """A plug of a quarter of the gap, within a tenth of its speed (Herschel-Bulkley)."""
-    channel, push, stress, size = Channel(layers=12), 1.0, 10.0, 2
+    channel, push, stress, still = Channel(layers=12), 1.0, 10.0, np.zeros(2)
     z, u = channel_flow(
         channel,
         models.Liquid(2.0, 0.0, 1000.0),
-        np.zeros(size),
-        np.full(size, push),
-        np.array([3.0, 3.5]),
-        effects={"yield_stress": np.full(size, stress)},
+        Drive(still, still + push, np.zeros_like),
+        [1.5, 2.0],
+        effects={"yield_stress": still + stress},
     )
     profile = binned_profile(z, u, 0.0, channel.gap, channel.layers)
     expected = herschel_bulkley_channel(

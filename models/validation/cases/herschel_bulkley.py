@@ -8,7 +8,7 @@ from ...effects.shear_thinning import ONSET
 from ...liquid import Liquid
 from ..analysis.profiles import binned_profile
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
-from ..scenes.plates import Channel, channel_flow
+from ..scenes.channel import Channel, Drive, channel_flow
 from ..truths.generalised_flows import generalised_channel, herschel_bulkley_channel
 
 
@@ -50,17 +50,16 @@ def truth(flow: Flow, z: np.ndarray) -> np.ndarray:
 
 def simulated(flows: tuple[Flow, ...], effect: str, coefficient: list[float], seed: int):
     """Heights and velocities, of shape [B, particles of all packings and times] each."""
-    size = PACKINGS * len(flows)
-    z, u = channel_flow(
+    push = np.repeat([flow.push for flow in flows], PACKINGS)
+    profiles = channel_flow(
         CHANNEL,
         Liquid(np.repeat([flow.viscosity for flow in flows], PACKINGS), 0.0, DENSITY),
-        np.zeros(size),
-        np.repeat([flow.push for flow in flows], PACKINGS),
+        Drive(np.zeros_like(push), push, np.zeros_like),
         TIMES,
         effects={effect: np.repeat(coefficient, PACKINGS)},
         seed=seed,
     )
-    return (np.moveaxis(a, 1, 0).reshape(len(flows), -1) for a in (z, u))
+    return (np.moveaxis(a, 1, 0).reshape(len(flows), -1) for a in profiles)
 
 
 def run(progress: Progress, seed: int) -> CaseResult:

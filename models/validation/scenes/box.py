@@ -8,6 +8,7 @@ import numpy as np
 import taichi as ti
 
 from ... import runtime, tables
+from ...effect import Effect
 from ...fluid import GRAVITY, STRIDE, Fluid, vec3
 from ...numerics import Numerics
 from ...runtime import CHUNK
@@ -53,11 +54,12 @@ class BoxScene(Fluid):
 
     plain_shear = Fluid.shear
 
-    def __init__(self, slots, box):
+    def __init__(self, slots, box, effects=()):
         x, y, z = box.size
         period = (0.0 if box.ends else x, y)
         extent = [(0.0, 0.0, 0.0), box.size]
         super().__init__(slots, box.particles, box.spacing, box.numerics, extent, period)
+        self.bring(effects)
         self.size, self.ends, self.lid, self.rod, self.sponge = (
             *(box.size, box.ends, box.lid, box.rod, box.sponge),
         )
@@ -192,10 +194,10 @@ class BoxScene(Fluid):
 
 
 @cache
-def box_scene(box: Box, slots: int) -> BoxScene:
-    """The compiled scene; to be used under `runtime.LOCK`."""
+def box_scene(box: Box, slots: int, effects: tuple[Effect, ...] = ()) -> BoxScene:
+    """The scene compiled for these liquid effects; to be used under `runtime.LOCK`."""
     runtime.start()
-    return BoxScene(slots, box)
+    return BoxScene(slots, box, effects)
 
 
 def lattice(counts: tuple[int, int, int], size, seed: int) -> np.ndarray:

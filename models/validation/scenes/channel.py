@@ -1,13 +1,14 @@
 # type: ignore  (Taichi compiles this source and gives these names their types)
 """Flow between two plates, driven by one of them or by a body force, from a profile on."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from ... import runtime
+from ...effects import EFFECTS
 from ...liquid import Liquid
 from ...numerics import COARSE, Numerics
 from .box import Box, box_scene, lattice
@@ -71,12 +72,24 @@ class Profiles(NamedTuple):
 
 
 def channel_flow(
-    channel: Channel, liquid: Liquid, drive: Drive, seconds: Iterable[float], *, seed: int = 0
+    channel: Channel,
+    liquid: Liquid,
+    drive: Drive,
+    seconds: Iterable[float],
+    *,
+    effects: Mapping[str, np.ndarray] | None = None,
+    seed: int = 0,
 ) -> Profiles:
-    """The flow after each of some ascending times [s], in B channels with a liquid each."""
+    """The flow after each of some ascending times [s], in B channels with a liquid each.
+
+    Args:
+        effects: Coefficients of liquid effects by name, shape [B] each; they act from time 0.
+    """
     size, counts = len(drive.push), (channel.around, channel.around, channel.layers)
+    names = sorted(effects or {})
+    coefficients = np.array([(effects or {})[name] for name in names]).reshape(len(names), size)
     with runtime.LOCK:
-        scene = box_scene(channel.box, size)
+        scene = box_scene(channel.box, size, tuple(EFFECTS[name] for name in names))
         seeds = [[seed, b] for b in range(size)]
         scene.place([lattice(counts, channel.box.size, one) for one in seeds])
         scene.drive(push=(0.0, 0.0, 0.0))
@@ -84,6 +97,8 @@ def channel_flow(
         scene.pour_in(liquid.batch(size))
         scene.drive((0.0, 0.0, 0.0), SHEAR * channel.gap)
         scene.advance(size, round(SHEARED * scene.rate))
+        # only now: so effects neither order the packing nor age while it is sheared
+        scene.pour_in(liquid.batch(size), coefficients)
         push = np.zeros((size, 3))
         push[:, 0] = drive.push
         scene.drive(push, drive.lid_speed)
