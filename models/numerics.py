@@ -28,6 +28,9 @@ class Numerics:
             channel flow has the viscosity asked for.
         wall_slip: Factor on the tangential viscous coupling to walls.
         wall_normal: The same factor for the normal direction.
+        wall_friction: Stress on a pouring cup by the speed at which liquid slips along it, at
+            most [Pa s/m]: above 1 Pa s or so liquids slip (Navier 1823). What gels pour by; the
+            weaker stresses of stirring move none.
         outer_wall: Share of that friction on what runs over a cup's rim and down outside.
         stick_drag: The same factor for the stick, which is about one particle wide.
         stick_thinner: How much less than its own the stick's radius is to the particles, in
@@ -45,8 +48,9 @@ class Numerics:
     quiet: float = 1.5e-3
     own_viscosity: float = 2.3e-3
     viscosity_gain: float = 1.43
-    wall_slip: float = 4.0
+    wall_slip: float = 4.5
     wall_normal: float = 1.0
+    wall_friction: float = 2000.0
     outer_wall: float = 0.4
     stick_drag: float = 1.0
     stick_thinner: float = 0.05

@@ -31,6 +31,7 @@ class PouringScene(Fluid):
         self.cup_radius, self.cup_height = source.radius, source.height
         self.receiver_radius, self.rim = cups.receiver.radius, -drop
         self.margin = numerics.contact * spacing
+        self.wall_friction = numerics.wall_friction
         self.final_angle = cups.pour.final_angle
         self.rate_of_turn, self.distance, self.angle, self.turning = (
             ti.field(ti.f32, slots) for _ in range(4)

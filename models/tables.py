@@ -105,6 +105,11 @@ def cylinder(radius: float) -> BoundaryTable:
     return BoundaryTable(density, np.gradient(density, at), normal, tangential)
 
 
+def over_half_space(values: np.ndarray) -> float:
+    """Integral [h] of a column of `half_space()` over the distance from the wall."""
+    return float(np.trapezoid(values, dx=1.0 / (ENTRIES - 1)))
+
+
 def around_cylinder(values: np.ndarray, radius: float) -> float:
     """Integral [h²] of a column of `cylinder(radius)` over a plane across, outside the cylinder."""
     r = radius + np.linspace(0.0, 1.0, ENTRIES)

@@ -10,6 +10,7 @@ symmetric and positive, so any viscosity is stable, and every iterate keeps the 
 
 import taichi as ti
 
+from . import tables
 from .faults import UNSOLVED
 from .neighbours import vec3
 from .rheology import Rheology
@@ -27,6 +28,8 @@ class Viscous(Rheology):
     """A scene with walls writes `grip` and `wall_velocity` in `boundary`; one with a moving body
     adds it to the unknowns by the methods `body_*`."""
 
+    wall_friction = 1e30  # stress by slip at walls, at most [Pa s/m]
+
     def __init__(self, slots, particles, spacing, numerics, extent, period=(0.0, 0.0)):
         super().__init__(slots, particles, spacing, numerics, extent, period)
         shape = (slots, particles)
@@ -38,6 +41,9 @@ class Viscous(Rheology):
         self.pair_coupling = ti.field(ti.f32, (slots, self.capacity))
         self.cohesion, self.density = (ti.field(ti.f32, slots) for _ in range(2))
         self.unit_coupling = 10.0 * self.numerics.viscosity_gain * self.dt
+        # stress by slip of all liquid near a wall together, at a share of 1 and density of 1
+        rubbing = self.h * tables.over_half_space(tables.half_space().tangential)
+        self.unit_friction = self.numerics.wall_slip * rubbing / self.dt
 
     @ti.func
     def kinematic(self, b):
@@ -69,9 +75,15 @@ class Viscous(Rheology):
         )
 
     @ti.func
+    def wall_share(self, b, kinematic):
+        """10 nu dt / h^2 at walls, on which liquid slips rather than exceed `wall_friction`."""
+        most = self.wall_friction / (self.density[b] * self.unit_friction)
+        return ti.min(self.unit_coupling * kinematic / (self.h * self.h), most)
+
+    @ti.func
     def grip_walls(self, b, i, grip, velocity):
         """Friction of walls on particle i: a sum of `wall_grip`, and the walls' velocity."""
-        share = self.unit_coupling * self.kinematic(b) / (self.h * self.h)
+        share = self.wall_share(b, self.kinematic(b))
         self.grip[b, i] = share * grip
         self.ease[b, i] = 1.0 / (1.0 + share * grip.trace() / 3.0)
         self.wall_velocity[b, i] = velocity
@@ -103,7 +115,8 @@ class Viscous(Rheology):
             self.thickest[b] = most
             for i in range(self.alive[b]):
                 own = self.thickness[b, i]
-                self.grip[b, i] = own * self.grip[b, i]
+                share = self.wall_share(b, own * base) / self.wall_share(b, base)
+                self.grip[b, i] = share * self.grip[b, i]
                 self.body_thicken(b, i, own)
                 diagonal = self.grip[b, i].trace()
                 for k in range(self.pair_start[b, i], self.pair_start[b, i + 1]):

@@ -14,7 +14,7 @@ from scipy.stats import spearmanr
 from bolfi_liquids import models
 
 from .line import Line
-from .liquids import LISTED
+from .liquids import COHESION, LISTED
 
 # table, cups, RMS without gel, RMS of gel; fractions of the liquid
 TABLES = (
@@ -88,7 +88,7 @@ def pour(table: Table, cups: models.Cups, seed: int) -> np.ndarray:
     viscosity, density = np.array([LISTED[name] for name in table.liquid]).T
     action = models.PourAction(np.radians(table.rate), table.distance / 100.0)
     seeds = seed + np.arange(len(table.liquid))
-    return models.pour(models.Liquid(viscosity, 0.0, density), action, cups, seeds).spilled
+    return models.pour(models.Liquid(viscosity, COHESION, density), action, cups, seeds).spilled
 
 
 def _mean(table: Table, cups: models.Cups) -> np.ndarray:
