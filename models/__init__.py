@@ -5,7 +5,7 @@ from .effect import Effect
 from .effects import EFFECTS, register
 from .faults import FailedSimulation
 from .liquid import Liquid
-from .numerics import MODEL_VERSION, Numerics
+from .numerics import MODEL_VERSION, PUBLISHED_DRAG, Numerics
 from .pouring import PourAction, PourResult, pour
 from .rig import Rig
 from .stirring import Cup, Stick, StirSetup, stir
@@ -13,6 +13,7 @@ from .stirring import Cup, Stick, StirSetup, stir
 __all__ = [
     "EFFECTS",
     "MODEL_VERSION",
+    "PUBLISHED_DRAG",
     "Cup",
     "Cups",
     "Effect",

@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 
+LARGEST = 1e30  # squared speed [m²/s²] that single precision can still work with
 SOUND, COLLAPSED, RUNAWAY, UNSOLVED = 0, 1, 2, 3
 REASONS = {
     COLLAPSED: "the liquid collapsed: its particles have too many neighbours",

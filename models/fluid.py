@@ -10,7 +10,7 @@ import numpy as np
 import taichi as ti
 
 from .attraction import Attraction
-from .faults import RUNAWAY, SOUND
+from .faults import LARGEST, RUNAWAY, SOUND
 from .liquid import Liquid
 from .neighbours import vec3
 from .settled import Packing
@@ -78,10 +78,12 @@ class Fluid(Attraction):
     @ti.func
     def move(self, b):
         """Move the particles, unless one is faster than any liquid here can be."""
-        fastest = 0.0
+        fastest, total = 0.0, 0.0
         for i in range(self.alive[b]):
-            fastest = ti.max(fastest, self.velocity[b, i].norm_sqr())
-        if not fastest < TOP_SPEED * TOP_SPEED:
+            squared = self.velocity[b, i].norm_sqr()
+            fastest = ti.max(fastest, squared)
+            total += squared  # NaN where any is, which a maximum passes over
+        if not (fastest < TOP_SPEED * TOP_SPEED and total < LARGEST):
             self.fault[b] = RUNAWAY
         else:
             for i in range(self.alive[b]):

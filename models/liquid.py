@@ -14,7 +14,7 @@ class Liquid:
 
     Attributes:
         viscosity: Effective dynamic viscosity [Pa s].
-        cohesion: Dimensionless attraction between particles at free surfaces, useful from 0 to 1.
+        cohesion: Dimensionless attraction between particles, useful from 0 to 1.
         density: Rest density [kg/m³].
         adhesion: Dimensionless attraction to the walls of cups, useful from 0 to 1; the
             coefficient of the effect of that name.

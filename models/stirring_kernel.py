@@ -5,7 +5,9 @@ The stick is about one particle wide. Particles keep off it by a part of their s
 own radius it drags like a thicker one; to them it is as thin as makes the drag right (validation
 case `cylinder_drag`). What it displaces beyond that core acts on it by closed forms: Archimedes'
 lift, whose reaction all liquid bears like that of a risen surface, and the added mass of a
-cylinder in potential flow, which is what it displaces (Lamb 1932, "Hydrodynamics", art. 68).
+cylinder in potential flow, which is what it displaces (Lamb 1932, "Hydrodynamics", art. 68), as
+in liquid that does not itself accelerate. So vertical momentum balances between stick and liquid,
+but the angular one only up to these two.
 """
 
 import numpy as np
@@ -213,16 +215,16 @@ class StirringScene(Fluid):
             p = vec3(inward * p.x, inward * p.y, ti.max(p.z, self.margin))
             self.position[b, i] = p
             self.velocity[b, i] = self.velocity[b, i] + (p - start) / self.dt + sinking
+        self.hidden[b] = self.hidden_sum[b]
+        self.hidden_sum[b] = vec3(0.0)
 
     @ti.func
     def float_stick(self, b):
         """Lift of the hidden volume on the stick; the velocity that the liquid takes for it."""
-        self.hidden[b] = self.hidden_sum[b]
-        self.hidden_sum[b] = vec3(0.0)
         fall = vec3(0.0, 0.0, -GRAVITY * self.dt)
-        lift = self.free[b] * self.density[b] * self.hidden[b][1] / self.inertia(b)
+        lift = self.free[b] * self.density[b] * self.hidden_sum[b][1] / self.inertia(b)
         self.swing[b] = self.swing[b] - lift * self.across(b, fall)
-        return self.hidden[b][0] / (self.alive[b] * self.volume) * fall
+        return self.hidden_sum[b][0] / (self.alive[b] * self.volume) * fall
 
     @ti.func
     def swing_stick(self, b, pivot):

@@ -105,9 +105,10 @@ def cylinder(radius: float) -> BoundaryTable:
     return BoundaryTable(density, np.gradient(density, at), normal, tangential)
 
 
-def over_half_space(values: np.ndarray) -> float:
-    """Integral [h] of a column of `half_space()` over the distance from the wall."""
-    return float(np.trapezoid(values, dx=1.0 / (ENTRIES - 1)))
+def over_half_space(values: np.ndarray, nearest: float) -> float:
+    """Integral [h] of a column of `half_space()` over distances from `nearest` [h] on."""
+    at = np.linspace(nearest, 1.0, ENTRIES)
+    return float(np.trapezoid(np.interp(at, np.linspace(0.0, 1.0, ENTRIES), values), at))
 
 
 def around_cylinder(values: np.ndarray, radius: float) -> float:

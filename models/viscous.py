@@ -11,16 +11,16 @@ symmetric and positive, so any viscosity is stable, and every iterate keeps the 
 import taichi as ti
 
 from . import tables
-from .faults import UNSOLVED
+from .faults import LARGEST, UNSOLVED
 from .neighbours import vec3
 from .rheology import Rheology
 
 WEAK = 0.004  # of nu dt / h^2: so thin a liquid takes one explicit step instead
 MOST_ITERATIONS = 50
-LARGEST = 1e30  # squared residual [m²/s²] that single precision can still work with
-HOPELESS = 0.3  # of the first residual: with so much left, the velocities are no solution
 MOST_UNEVEN = 200  # the same where particles differ in viscosity
 UNEVEN_TOLERANCE = 0.3  # of the usual one, where they do
+NOTHING = 1e-20  # squared residual [m²/s²] of a solution
+HOPELESS = 0.3  # of the first residual: with so much left, the velocities are no solution
 
 
 @ti.data_oriented
@@ -42,7 +42,8 @@ class Viscous(Rheology):
         self.cohesion, self.density = (ti.field(ti.f32, slots) for _ in range(2))
         self.unit_coupling = 10.0 * self.numerics.viscosity_gain * self.dt
         # stress by slip of all liquid near a wall together, at a share of 1 and density of 1
-        rubbing = self.h * tables.over_half_space(tables.half_space().tangential)
+        nearest = self.numerics.contact / self.numerics.support
+        rubbing = self.h * tables.over_half_space(tables.half_space().tangential, nearest)
         self.unit_friction = self.numerics.wall_slip * rubbing / self.dt
 
     @ti.func
@@ -191,7 +192,7 @@ class Viscous(Rheology):
                 enough *= UNEVEN_TOLERANCE**2
         left, count = size, 0
         most = ti.static(MOST_UNEVEN if len(self.rheology_hooks) > 0 else MOST_ITERATIONS)
-        while count < most and left > enough and left > 1e-20:
+        while count < most and left > enough and left > NOTHING:
             count += 1
             self.apply(b, 0.0)
             curvature = self.body_curvature(b)
@@ -211,7 +212,7 @@ class Viscous(Rheology):
                 )
             self.body_turn(b, new / left)
             left = new
-        if left > HOPELESS**2 * size:
+        if not left <= ti.max(HOPELESS**2 * size, NOTHING):  # nor where it is NaN
             self.fault[b] = UNSOLVED
 
     @ti.func

@@ -19,7 +19,8 @@ def run(progress: Progress, seed: int) -> CaseResult:
     rows, panels = [], []
     for number, (name, viscosity) in enumerate(LIQUIDS.items()):
         recording = _bundled(f"{name}_v10.nc")
-        signals = repeated(recording, viscosity, PARTICLES, seed * SEEDS + np.arange(SEEDS))
+        liquid = Liquid(viscosity, 0.0, recording.number("liquid_density"))
+        signals = repeated(recording, liquid, PARTICLES, seed * SEEDS + np.arange(SEEDS))
         recorded = np.degrees(recording.inclination)
         far = apart(signals, recorded)
         rows.append(Row.absolute(f"{name}, RMS difference [deg]", 0.0, far, TOLERANCE))
@@ -34,12 +35,8 @@ def run(progress: Progress, seed: int) -> CaseResult:
     return CaseResult(tuple(rows), tuple(panels))
 
 
-def repeated(
-    recording: Recording, viscosity: float, particles: int, seeds: np.ndarray
-) -> np.ndarray:
-    """Inclinations [deg] of the recorded stir in a liquid of `viscosity` [Pa s] and no cohesion,
-    shape [seeds, T, 2]."""
-    liquid = Liquid(viscosity, 0.0, recording.number("liquid_density"))
+def repeated(recording: Recording, liquid: Liquid, particles: int, seeds: np.ndarray) -> np.ndarray:
+    """Inclinations [deg] of the recorded stir in a liquid, shape [seeds, T, 2]."""
     setup = StirSetup.from_recording(recording, particles=particles)
     return np.degrees(stir(liquid, recording.gripper, setup, seeds))
 

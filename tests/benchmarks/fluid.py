@@ -1,4 +1,4 @@
-"""Every figure that the fluid is held to, beside its bar.
+"""Speed of the fluid, and how well it repeats recorded stirs and pours, beside their bars.
 
     .venv/bin/python tests/benchmarks/fluid.py --recordings FOLDER --only speed pours
 

@@ -40,7 +40,7 @@ def test_every_particle_is_somewhere(cups):
     counts = 664 * np.stack([result.spilled, result.received, result.retained])
     assert counts == pytest.approx(np.round(counts), abs=1e-9)
     assert (np.round(counts).sum(axis=0) == 664).all()
-    assert result.retained[3] > result.retained[0]
+    assert result.retained[2] > result.retained[0]
 
 
 def test_same_bits_again_and_anywhere_in_a_batch(cups):
@@ -63,12 +63,13 @@ def test_a_tilt_short_of_the_surface_spills_nothing(cups):
 
 
 def test_walls_hold_a_viscous_liquid_back(cups):
-    """Free slip lets it go; walls that rub keep a film (the paper's glycerin)."""
-    retained = {}
-    for viscosity in (0.01, 30.0):
-        retained[viscosity] = pour((viscosity, 1260.0), [(180, 2.0)], cups).retained[0]
-    assert retained[0.01] == 0.0
-    assert retained[30.0] > 0.02
+    """Free slip lets it go; walls that rub keep a film (the paper's glycerin). What is much
+    thicker slips: the gel's plug leaves the cup, as it does in the other solver."""
+    viscosity = (0.01, 1.0, 30.0)
+    thin, thick, stiff = pour((viscosity, 1260.0), [(180, 2.0)] * 3, cups).retained
+    assert thin == 0.0
+    assert thick > 0.05
+    assert stiff < 0.5 * thick
 
 
 def test_bad_actions_are_named(cups):

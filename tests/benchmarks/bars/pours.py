@@ -79,8 +79,8 @@ def _table(name, table, cups, bars) -> Iterator[Line]:
     for liquid in dict.fromkeys(table.liquid):
         mean, worst = regret(table.of(liquid), lambda tried: _mean(tried, cups))
         what = f"{name}, {liquid}: spilled beyond the best action"
-        yield Line(what, mean, REGRET)
-        yield Line(f"{what}, worst of equals", worst)
+        yield Line(f"{what}, worst of equals", worst, REGRET)
+        yield Line(f"{what}, mean of equals", mean)
 
 
 def pour(table: Table, cups: models.Cups, seed: int) -> np.ndarray:

@@ -10,7 +10,7 @@ from bolfi_liquids import open_recording
 from bolfi_liquids.physics_cases.recorded_stirs import apart, repeated
 
 from .line import Line
-from .liquids import LISTED
+from .liquids import LISTED, listed
 
 PARTICLES = (1000, 4000)
 SEEDS = 4
@@ -32,7 +32,7 @@ def _recording(file: Path, liquid: str) -> Iterator[Line]:
     recording, means = open_recording(file), []
     recorded = np.degrees(recording.inclination)
     for particles in PARTICLES:
-        signals = repeated(recording, LISTED[liquid][0], particles, np.arange(SEEDS))
+        signals = repeated(recording, listed(liquid), particles, np.arange(SEEDS))
         name = f"{file.stem}, N = {particles}"
         far = apart(signals, recorded)
         yield Line(f"{name}, RMS to the recording [deg]", far, FAR.get(liquid, FAR_OTHERS))
