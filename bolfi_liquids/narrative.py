@@ -86,7 +86,7 @@ def floor_sentence(section: Mapping[str, Any]) -> str:
         f"Below about {with_unit('viscosity', section['least_viscosity'])} liquids look alike to"
         f" the simulator, at this size of its particles and speed of the stirring: {percent(share)}"
         " of the posterior lies there, and says no more than that the liquid may be as thin."
-        " Deeper liquid, under its own weight, they resist more."
+        " Under its own weight, deep liquid resists as if it were thicker still."
     )
 
 
