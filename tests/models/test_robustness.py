@@ -11,6 +11,7 @@ from jax import random
 
 from bolfi_liquids import models
 
+INSIDE = 0  # the code of `pouring_kernel`, which loads Taichi
 POINTS, BATCH = 500, 25
 SOME_EFFECTS = 125  # of the points have a subset of the effects, one for each batch
 PARTICLES = {"stir": 400, "pour": 300}
@@ -63,11 +64,12 @@ def points(start, cups):
 
 
 class End(NamedTuple):
-    """What became of a simulation's particles: where they are [m], [n, 3], and how fast one of
-    them ever was [m/s]."""
+    """What became of a simulation's particles: where they are [m], [n, 3], how fast one of them
+    ever was [m/s], and how many that should be in the pouring cup are past its walls."""
 
     position: np.ndarray
     fastest: float
+    astray: int
 
 
 class Watched:
@@ -89,7 +91,18 @@ class Watched:
 
     def end(self, slot):
         alive = self.scene.alive.to_numpy()[slot]
-        return End(self.scene.position.to_numpy()[slot, :alive], self.fastest[slot])
+        position = self.scene.position.to_numpy()[slot, :alive].astype(float)
+        return End(position, self.fastest[slot], self._astray(slot, position))
+
+    def _astray(self, slot, position):
+        if not hasattr(self.scene, "region"):
+            return 0
+        scene, angle = self.scene, self.scene.angle.to_numpy()[slot]
+        x = np.cos(angle) * position[:, 0] - np.sin(angle) * position[:, 2] + scene.cup_radius
+        z = np.sin(angle) * position[:, 0] + np.cos(angle) * position[:, 2] + scene.cup_height
+        beyond = (np.hypot(x, position[:, 1]) > scene.cup_radius) | (z < 0.0)
+        held = scene.region.to_numpy()[slot, : len(position)] == INSIDE
+        return int((held & beyond & (z < scene.cup_height)).sum())
 
     def _look(self):
         speed = np.linalg.norm(self.scene.velocity.to_numpy(), axis=-1)
@@ -142,7 +155,7 @@ def stir_faults(drawn, violent, ends):
     )
     fill = setup.cup.fill + drawn.effects.get("fill_level", np.zeros(BATCH))
     for k, wanted in enumerate(setup.count(fill)):
-        position, fastest = ends[int(drawn.seeds[k])]
+        position, fastest, _ = ends[int(drawn.seeds[k])]
         reach, height = np.hypot(*position[:, :2].T), position[:, 2]
         checks = {
             f"not finite: {reasons}": np.isfinite(signal[k]).all(),
@@ -167,11 +180,12 @@ def pour_faults(drawn, cups, ends):
     )
     fractions = np.stack([result.spilled, result.received, result.retained], axis=-1)
     for k, shares in enumerate(fractions):
-        particles, fastest = count * shares, ends[int(drawn.seeds[k])].fastest
+        particles, (_, fastest, astray) = count * shares, ends[int(drawn.seeds[k])]
         checks = {
             f"not finite: {reasons}": np.isfinite(shares).all(),
             f"fractions {shares}": (shares >= 0.0).all() and abs(shares.sum() - 1.0) < 1e-12,
             f"parts of particles {particles}": np.allclose(particles, np.rint(particles)),
+            f"{astray} particles past the cup's walls": astray == 0,
             f"{fastest:.2f} m/s": fastest < FASTEST["pour"],
         }
         yield from ((k, what) for what, fine in checks.items() if not fine)
