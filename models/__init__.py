@@ -8,7 +8,8 @@ from .liquid import Liquid
 from .numerics import MODEL_VERSION, PUBLISHED_DRAG, Numerics
 from .pouring import PourAction, PourResult, pour
 from .rig import Rig
-from .stirring import Cup, Stick, StirSetup, stir
+from .stir_setup import Cup, Stick, StirSetup
+from .stirring import stir
 
 __all__ = [
     "EFFECTS",

@@ -8,7 +8,7 @@ LARGEST = 1e30  # squared speed [m²/s²] that single precision can still work w
 SOUND, COLLAPSED, RUNAWAY, UNSOLVED = 0, 1, 2, 3
 REASONS = {
     COLLAPSED: "the liquid collapsed: its particles have too many neighbours",
-    UNSOLVED: "its viscosity is too large to compute with",
+    UNSOLVED: "its viscosity is too large to compute with; up to 100 Pa s it is safe",
     RUNAWAY: "a particle ran away: its velocity is not finite or beyond any liquid's",
 }
 

@@ -34,7 +34,11 @@ class Liquid:
         """
         fields = {}
         for name in (*FIELDS, "adhesion"):
-            value = np.asarray(getattr(self, name), dtype=np.float32)
+            try:
+                value = np.asarray(getattr(self, name), dtype=np.float32)
+            except (TypeError, ValueError):
+                given = getattr(self, name)
+                raise ValueError(f"{name} must be a number or an array, got {given!r}") from None
             if not np.isfinite(value).all() or (value < 0).any():
                 raise ValueError(f"{name} must be finite and not negative, got {value}")
             if value.ndim > 1 or value.size not in (1, size):

@@ -1,6 +1,8 @@
 """Constants of the discretisation."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+
+from .checks import check_numbers
 
 MODEL_VERSION = "4"  # rises with every change that alters a simulation's bits
 COARSE = 0.0065  # m, the particle spacing that `Numerics.rate` is for
@@ -56,6 +58,17 @@ class Numerics:
     stick_thinner: float = 0.05
     attraction: float = 2.25
     contact: float = 0.25
+
+    def __post_init__(self) -> None:
+        """Refuse what makes no sense.
+
+        Raises:
+            ValueError: a number is not finite or negative, or a rate, size or count is 0.
+        """
+        numbers = asdict(self)
+        needed = {name: numbers.pop(name) for name in ("rate", "iterations", "support")}
+        check_numbers("numerics", **needed)
+        check_numbers("numerics", zero=True, **numbers)
 
     def substep_rate(self, spacing: float) -> float:
         """Substeps per second [Hz] for particles `spacing` [m] apart."""

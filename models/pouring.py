@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import runtime
+from .checks import check_numbers
 from .coefficients import acting_in, liquid_sets, with_adhesion
 from .cups import Cups
 from .effect import Effect
@@ -20,6 +21,7 @@ from .settled import Packing, SettledPackings
 
 SETTLING = 0.6  # s
 _packings = SettledPackings()
+SLOWEST, FASTEST = 0.01, 30.0  # rad/s: a pour of three minutes; a cup that is flung
 DRIP = 1.2  # s beyond the cups' hold; viscous liquids need it, and others end earlier
 
 
@@ -66,8 +68,8 @@ def pour(
             act in a pour change nothing, so all that a stir has taught may be given.
 
     Raises:
-        ValueError: lengths do not agree, an action is not finite or does not turn, or an effect
-            is unknown.
+        ValueError: lengths do not agree, an action is not finite, too slow or too fast, there are
+            no particles, or an effect is unknown.
     Warns:
         FailedSimulation: a pour went wrong; its fractions are NaN.
     """
@@ -78,6 +80,12 @@ def pour(
     distance = _batch("distance", action.distance, len(seeds))
     if (rate <= 0).any():
         raise ValueError(f"angular_velocity must be positive [rad/s], got {rate.min()}")
+    for wrong in rate[(rate < SLOWEST) | (rate > FASTEST)]:
+        raise ValueError(
+            f"angular_velocity must be {SLOWEST} to {FASTEST} rad/s, got {wrong:.4g}; "
+            "is it in rad/s?"
+        )
+    check_numbers("pour", particles=particles)
     counts = np.empty((3, len(seeds)))
     with runtime.LOCK:
         for kinds, rows, coefficients in liquid_sets(acting, len(seeds)):

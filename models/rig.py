@@ -49,7 +49,7 @@ def check_rig(rig: Rig, deepest: float, effects: Sequence[str]) -> None:
         values = getattr(rig, name)
         wrong = values[~(inside & np.isfinite(values))]
         if wrong.size:
+            after = f" after the effects {', '.join(effects)}; change their coefficients"
             raise ValueError(
-                f"the rig's {name} {rule}, got {wrong[0]:.4g} after the effects "
-                f"{', '.join(effects)}; change their coefficients"
+                f"the rig's {name} {rule}, got {wrong[0]:.4g}{after if effects else ''}"
             )

@@ -1,9 +1,8 @@
 """Stirring: a recorded gripper path in, the stick's inclination out."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
 from functools import cache
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,152 +11,16 @@ from . import runtime
 from .coefficients import acting_in, changed_rig, changed_signal, liquid_sets, with_adhesion
 from .effect import Effect
 from .faults import faulty
+from .gripper_path import GripperPath, substep_path
 from .liquid import Liquid
-from .numerics import MODEL_VERSION, Numerics
 from .packing import checked_seeds, pack_cylinder
 from .rig import Rig, check_rig
 from .runtime import CHUNK
 from .settled import Packing, SettledPackings
+from .stir_setup import StirSetup
 
 SETTLING = 1.0  # s that a packing relaxes around the held stick
 _packings = SettledPackings()
-ROOM = 1.5  # times the setup's fill is the largest
-
-
-class GripperPath(Protocol):
-    """Times [T] in s and pivot positions [T, 3] in m; rows that are not finite are skipped."""
-
-    @property
-    def time(self) -> np.ndarray: ...
-    @property
-    def position(self) -> np.ndarray: ...
-
-
-class HasRig(Protocol):
-    """What a setup reads from a recording."""
-
-    @property
-    def attrs(self) -> Mapping[str, Any]: ...
-    @property
-    def gripper(self) -> GripperPath: ...
-
-
-@dataclass(frozen=True)
-class Cup:
-    """An upright cylinder on z = 0 [m]; `fill` is the liquid's depth with the stick in it."""
-
-    radius: float
-    height: float
-    fill: float
-
-
-@dataclass(frozen=True)
-class Stick:
-    """A uniform cylinder that pivots freely at its upper end [m, kg]."""
-
-    radius: float
-    length: float
-    mass: float
-
-    @property
-    def gyration(self) -> float:
-        """Moment of inertia about the pivot, by mass [m²]."""
-        return self.length**2 / 3.0 + self.radius**2 / 4.0
-
-    @property
-    def inertia(self) -> float:
-        """Moment of inertia about the pivot [kg m²]."""
-        return self.mass * self.gyration
-
-
-@dataclass(frozen=True)
-class StirSetup:
-    """All that fixes a stirring simulation besides liquid, path and seed.
-
-    Attributes:
-        cup: The cup.
-        stick: The stick.
-        submerged: Depth of the stick's tip below the surface at rest [m].
-        particles: Number of particles.
-        numerics: Constants of the discretisation.
-    """
-
-    cup: Cup
-    stick: Stick
-    submerged: float
-    particles: int = 1000
-    numerics: Numerics = field(default_factory=Numerics)
-
-    @classmethod
-    def from_recording(
-        cls, recording: HasRig, particles: int = 1000, numerics: Numerics | None = None
-    ) -> "StirSetup":
-        """The setup that a recording's attributes describe (the first pivot position too).
-
-        Raises:
-            ValueError: an attribute is missing, or the stick does not reach the liquid.
-        """
-        attrs = recording.attrs
-        wanted = ("cup_radius", "cup_height", "fill", "stick_radius", "stick_length")
-        missing = [name for name in wanted if name not in attrs]
-        if "stick_mass" not in attrs and "stick_density" not in attrs:
-            missing.append("stick_mass or stick_density")
-        if missing:
-            raise ValueError(f"the recording lacks the attributes {', '.join(missing)}; add them")
-        cup_radius, height, fill, radius, length = (float(attrs[name]) for name in wanted)
-        if "stick_mass" in attrs:
-            mass = float(attrs["stick_mass"])
-        else:
-            mass = float(attrs["stick_density"]) * np.pi * radius**2 * length
-        position = np.asarray(recording.gripper.position)
-        start = position[np.isfinite(position).all(axis=1)][0]
-        submerged = fill - (float(start[2]) - length)
-        if not 0.0 < submerged:
-            raise ValueError(
-                f"the stick's tip starts {-submerged:.4f} m above the liquid; check fill={fill}, "
-                f"stick_length={length} and the gripper's z={start[2]:.4f}"
-            )
-        return cls(
-            cup=Cup(cup_radius, height, fill),
-            stick=Stick(radius, length, mass),
-            submerged=min(submerged, fill),
-            particles=particles,
-            numerics=numerics or Numerics(),
-        )
-
-    @property
-    def spacing(self) -> float:
-        """Particle spacing [m], the cube root of the liquid's volume per particle."""
-        return float((self.liquid_volume(self.cup.fill) / self.particles) ** (1.0 / 3.0))
-
-    @property
-    def rate(self) -> float:
-        """Substeps per second [Hz]."""
-        return self.numerics.substep_rate(self.spacing)
-
-    @property
-    def deepest(self) -> float:
-        """Largest depth of liquid for which there is room [m]."""
-        return max(min(self.cup.height, ROOM * self.cup.fill), self.cup.fill)
-
-    def least_viscosity(self, density: float, gripper: GripperPath) -> float:
-        """Viscosity [Pa s] below which liquids of `density` [kg/m³] look alike while the gripper
-        repeats its path; see `Numerics.least_viscosity`."""
-        return self.numerics.least_viscosity(self.spacing, density, mean_speed(gripper))
-
-    def liquid_volume(self, fill: float | np.ndarray) -> Any:
-        """Liquid [m³] whose surface is at the depth `fill` [m] around the stick."""
-        wet = np.clip(self.submerged + (fill - self.cup.fill), 0.0, fill)
-        return np.pi * (self.cup.radius**2 * fill - self.stick.radius**2 * wet)
-
-    def count(self, fill: float | np.ndarray) -> np.ndarray:
-        """Particles, of the setup's size, that fill the cup to the depth `fill` [m]."""
-        share = self.liquid_volume(fill) / self.liquid_volume(self.cup.fill)
-        return np.rint(self.particles * share).astype(int)
-
-    def settings(self) -> dict[str, Any]:
-        """Everything that fixes the simulator, as plain numbers, with the model's version."""
-        return {"model": MODEL_VERSION, "scene": "stir", **asdict(self)}
 
 
 def stir(
@@ -209,39 +72,6 @@ def stir(
                 directions = _run(scene, setup, held, rig.rows(part), seeds[part])
                 angles[part] = inclination(directions, gripper.time, setup.rate)
     return changed_signal(gripper.time, angles, acting)
-
-
-def substep_path(gripper: GripperPath, rate: float) -> np.ndarray:
-    """Pivot at the start and at the end of each substep [m], shape [substeps + 1, 3].
-
-    Raises:
-        ValueError: fewer than two finite samples.
-    """
-    time, (seen, position) = np.asarray(gripper.time), _finite(gripper)
-    substeps = int(np.ceil((time[-1] - time[0]) * rate))
-    grid = time[0] + np.arange(substeps + 1) / rate
-    return np.stack([np.interp(grid, seen, position[:, axis]) for axis in range(3)], axis=1)
-
-
-def _finite(gripper: GripperPath) -> tuple[np.ndarray, np.ndarray]:
-    """Times [n] and positions [n, 3] of the finite samples, two at least."""
-    time, position = np.asarray(gripper.time), np.asarray(gripper.position)
-    finite = np.isfinite(position).all(axis=1)
-    if finite.sum() < 2:
-        raise ValueError(f"the gripper path has {finite.sum()} finite samples; it needs 2 or more")
-    return time[finite], position[finite]
-
-
-def mean_speed(gripper: GripperPath) -> float:
-    """Root mean square speed of the pivot between its finite samples [m/s].
-
-    Raises:
-        ValueError: fewer than two finite samples.
-    """
-    time, position = _finite(gripper)
-    interval = np.diff(time)
-    stretch = np.sum(np.diff(position, axis=0) ** 2, axis=1) / interval
-    return float(np.sqrt(stretch.sum() / interval.sum()))
 
 
 def inclination(directions: np.ndarray, time: np.ndarray, rate: float) -> np.ndarray:

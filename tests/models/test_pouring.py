@@ -76,6 +76,10 @@ def test_bad_actions_are_named(cups):
     liquid = models.Liquid(1.0, 0.0, 1000.0)
     with pytest.raises(ValueError, match="angular_velocity must be positive"):
         models.pour(liquid, models.PourAction(0.0, 0.02), cups, [0])
+    with pytest.raises(ValueError, match="angular_velocity must be 0.01 to 30.0 rad/s, got 90"):
+        models.pour(liquid, models.PourAction(90.0, 0.02), cups, [0])
+    with pytest.raises(ValueError, match="particles must be .* positive, got 0"):
+        models.pour(liquid, models.PourAction(1.0, 0.02), cups, [0], particles=0)
     with pytest.raises(ValueError, match="distance must be finite"):
         models.pour(liquid, models.PourAction(1.0, np.inf), cups, [0])
 

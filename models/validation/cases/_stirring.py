@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...numerics import PUBLISHED_DRAG, Numerics
-from ...stirring import Stick
+from ...stir_setup import Stick
 from ..truths.pendulum import Rod
 
 STICKS = {"": Numerics(), ", drag as published": PUBLISHED_DRAG}

@@ -6,7 +6,7 @@ from ... import runtime, stirring
 from ...fluid import DAMPING
 from ...liquid import Liquid
 from ...numerics import Numerics
-from ...stirring import Cup, Stick, StirSetup
+from ...stir_setup import Cup, Stick, StirSetup
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from ..truths.pendulum import Rod, archimedes_torque
 from ._stirring import STICKS

@@ -7,7 +7,8 @@ stick wherever it was put.
 import numpy as np
 
 from ...liquid import Liquid
-from ...stirring import Cup, Stick, StirSetup, stir
+from ...stir_setup import Cup, Stick, StirSetup
+from ...stirring import stir
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from ..truths.pendulum import floating_angle
 from . import _stirring

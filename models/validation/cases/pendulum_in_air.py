@@ -3,7 +3,8 @@
 import numpy as np
 
 from ...liquid import Liquid
-from ...stirring import Cup, Stick, StirSetup, stir
+from ...stir_setup import Cup, Stick, StirSetup
+from ...stirring import stir
 from ..analysis.motion import oscillation
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from ..truths.pendulum import period_in_air

@@ -3,7 +3,8 @@
 import numpy as np
 
 from ...liquid import Liquid
-from ...stirring import Cup, Stick, StirSetup, stir
+from ...stir_setup import Cup, Stick, StirSetup
+from ...stirring import stir
 from ..analysis.motion import far_side
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from ..truths.oscillating_rod import swing_in_liquid

@@ -3,7 +3,8 @@
 import numpy as np
 
 from ...liquid import Liquid
-from ...stirring import StirSetup, stir
+from ...stir_setup import StirSetup
+from ...stirring import stir
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from . import seed_noise
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from ... import runtime, stirring
 from ...liquid import Liquid
-from ...stirring import StirSetup
+from ...stir_setup import StirSetup
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from . import seed_noise
 from ._stirring import Path

@@ -1,0 +1,55 @@
+"""A gripper's measured path."""
+
+from typing import Protocol
+
+import numpy as np
+
+
+class GripperPath(Protocol):
+    """Times [T] in s and pivot positions [T, 3] in m; rows that are not finite are skipped."""
+
+    @property
+    def time(self) -> np.ndarray: ...
+    @property
+    def position(self) -> np.ndarray: ...
+
+
+def substep_path(gripper: GripperPath, rate: float) -> np.ndarray:
+    """Pivot at the start and at the end of each substep [m], shape [substeps + 1, 3].
+
+    Raises:
+        ValueError: fewer than two finite samples, times that do not rise, positions of another
+            shape.
+    """
+    time, (seen, position) = np.asarray(gripper.time), _finite(gripper)
+    substeps = int(np.ceil((time[-1] - time[0]) * rate))
+    grid = time[0] + np.arange(substeps + 1) / rate
+    return np.stack([np.interp(grid, seen, position[:, axis]) for axis in range(3)], axis=1)
+
+
+def _finite(gripper: GripperPath) -> tuple[np.ndarray, np.ndarray]:
+    """Times [n] and positions [n, 3] of the finite samples, two at least."""
+    time, position = np.asarray(gripper.time), np.asarray(gripper.position)
+    if position.shape != (len(time), 3):
+        raise ValueError(
+            f"the gripper path has {len(time)} times and positions of shape {position.shape}; "
+            f"give shape ({len(time)}, 3)"
+        )
+    if not (np.diff(time) > 0).all():
+        raise ValueError("the gripper path's times must rise from sample to sample")
+    finite = np.isfinite(position).all(axis=1)
+    if finite.sum() < 2:
+        raise ValueError(f"the gripper path has {finite.sum()} finite samples; it needs 2 or more")
+    return time[finite], position[finite]
+
+
+def mean_speed(gripper: GripperPath) -> float:
+    """Root mean square speed of the pivot between its finite samples [m/s].
+
+    Raises:
+        ValueError: fewer than two finite samples.
+    """
+    time, position = _finite(gripper)
+    interval = np.diff(time)
+    stretch = np.sum(np.diff(position, axis=0) ** 2, axis=1) / interval
+    return float(np.sqrt(stretch.sum() / interval.sum()))

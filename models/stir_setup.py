@@ -1,0 +1,159 @@
+"""What fixes a stirring simulation besides liquid, path and seed: cup, stick, discretisation."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from .checks import check_numbers
+from .gripper_path import GripperPath, mean_speed
+from .numerics import MODEL_VERSION, Numerics
+
+ROOM = 1.5  # times the setup's fill is the largest
+
+
+class HasRig(Protocol):
+    """What a setup reads from a recording."""
+
+    @property
+    def attrs(self) -> Mapping[str, Any]: ...
+    @property
+    def gripper(self) -> GripperPath: ...
+
+
+@dataclass(frozen=True)
+class Cup:
+    """An upright cylinder on z = 0 [m]; `fill` is the liquid's depth with the stick in it."""
+
+    radius: float
+    height: float
+    fill: float
+
+    def __post_init__(self) -> None:
+        check_numbers("cup", radius=self.radius, height=self.height, fill=self.fill)
+        if self.fill > self.height:
+            raise ValueError(f"cup: fill {self.fill} m is more than its height {self.height} m")
+
+
+@dataclass(frozen=True)
+class Stick:
+    """A uniform cylinder that pivots freely at its upper end [m, kg]."""
+
+    radius: float
+    length: float
+    mass: float
+
+    def __post_init__(self) -> None:
+        check_numbers("stick", radius=self.radius, length=self.length, mass=self.mass)
+
+    @property
+    def gyration(self) -> float:
+        """Moment of inertia about the pivot, by mass [m²]."""
+        return self.length**2 / 3.0 + self.radius**2 / 4.0
+
+    @property
+    def inertia(self) -> float:
+        """Moment of inertia about the pivot [kg m²]."""
+        return self.mass * self.gyration
+
+
+@dataclass(frozen=True)
+class StirSetup:
+    """All that fixes a stirring simulation besides liquid, path and seed.
+
+    Attributes:
+        cup: The cup.
+        stick: The stick.
+        submerged: Depth of the stick's tip below the surface at rest [m].
+        particles: Number of particles.
+        numerics: Constants of the discretisation.
+    """
+
+    cup: Cup
+    stick: Stick
+    submerged: float
+    particles: int = 1000
+    numerics: Numerics = field(default_factory=Numerics)
+
+    def __post_init__(self) -> None:
+        check_numbers("setup", submerged=self.submerged, particles=self.particles)
+        if self.particles != int(self.particles):
+            raise ValueError(f"setup: particles must be a whole number, got {self.particles}")
+        if self.stick.radius >= self.cup.radius:
+            raise ValueError(
+                f"setup: the stick, of radius {self.stick.radius} m, does not fit into the cup, of "
+                f"radius {self.cup.radius} m"
+            )
+
+    @classmethod
+    def from_recording(
+        cls, recording: HasRig, particles: int = 1000, numerics: Numerics | None = None
+    ) -> "StirSetup":
+        """The setup that a recording's attributes describe (the first pivot position too).
+
+        Raises:
+            ValueError: an attribute is missing or makes no sense, or the stick does not reach the
+                liquid.
+        """
+        attrs = recording.attrs
+        wanted = ("cup_radius", "cup_height", "fill", "stick_radius", "stick_length")
+        missing = [name for name in wanted if name not in attrs]
+        if "stick_mass" not in attrs and "stick_density" not in attrs:
+            missing.append("stick_mass or stick_density")
+        if missing:
+            raise ValueError(f"the recording lacks the attributes {', '.join(missing)}; add them")
+        cup_radius, height, fill, radius, length = (float(attrs[name]) for name in wanted)
+        if "stick_mass" in attrs:
+            mass = float(attrs["stick_mass"])
+        else:
+            mass = float(attrs["stick_density"]) * np.pi * radius**2 * length
+        position = np.asarray(recording.gripper.position)
+        start = position[np.isfinite(position).all(axis=1)][0]
+        submerged = fill - (float(start[2]) - length)
+        if not 0.0 < submerged:
+            raise ValueError(
+                f"the stick's tip starts {-submerged:.4f} m above the liquid; check fill={fill}, "
+                f"stick_length={length} and the gripper's z={start[2]:.4f}"
+            )
+        return cls(
+            cup=Cup(cup_radius, height, fill),
+            stick=Stick(radius, length, mass),
+            submerged=min(submerged, fill),
+            particles=particles,
+            numerics=numerics or Numerics(),
+        )
+
+    @property
+    def spacing(self) -> float:
+        """Particle spacing [m], the cube root of the liquid's volume per particle."""
+        return float((self.liquid_volume(self.cup.fill) / self.particles) ** (1.0 / 3.0))
+
+    @property
+    def rate(self) -> float:
+        """Substeps per second [Hz]."""
+        return self.numerics.substep_rate(self.spacing)
+
+    @property
+    def deepest(self) -> float:
+        """Largest depth of liquid for which there is room [m]."""
+        return max(min(self.cup.height, ROOM * self.cup.fill), self.cup.fill)
+
+    def least_viscosity(self, density: float, gripper: GripperPath) -> float:
+        """Viscosity [Pa s] below which liquids of `density` [kg/m³] look alike while the gripper
+        repeats its path; see `Numerics.least_viscosity`."""
+        return self.numerics.least_viscosity(self.spacing, density, mean_speed(gripper))
+
+    def liquid_volume(self, fill: float | np.ndarray) -> Any:
+        """Liquid [m³] whose surface is at the depth `fill` [m] around the stick."""
+        wet = np.clip(self.submerged + (fill - self.cup.fill), 0.0, fill)
+        return np.pi * (self.cup.radius**2 * fill - self.stick.radius**2 * wet)
+
+    def count(self, fill: float | np.ndarray) -> np.ndarray:
+        """Particles, of the setup's size, that fill the cup to the depth `fill` [m]."""
+        share = self.liquid_volume(fill) / self.liquid_volume(self.cup.fill)
+        return np.rint(self.particles * share).astype(int)
+
+    def settings(self) -> dict[str, Any]:
+        """Everything that fixes the simulator, as plain numbers, with the model's version."""
+        return {"model": MODEL_VERSION, "scene": "stir", **asdict(self)}
