@@ -12,23 +12,13 @@ UNIT_FORMATS = {"relative": "{:+.1%}", "fraction": "{:+.3f}"}
 
 
 def print_physics(records: Sequence[Mapping[str, Any]], console: Console) -> None:
-    """One table: for each case its truth and where that is from, then what was compared."""
-    numbers = ("truth", "ours", "error", "tolerance")
-    table = Table(
-        "case, its truth and what was compared",
-        *(Column(name, justify="right", no_wrap=True) for name in numbers),
-        Column("result", no_wrap=True),
-        box=SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-    )
+    """For each case its truth and where that is from, over a table of what was compared."""
     for record in records:
         # as text: brackets of a source or a unit are no markup
-        about = Text(f"{record['name']}: {record['truth']} ({record['source']})", style="bold")
-        table.add_row(about, "", "", "", "", _verdict(record))
-        for row in record["rows"]:
-            table.add_row(*_cells(row, record["unit"]))
-        table.add_section()
-    console.print(table)
+        about = f"{record['name']}: {record['truth']} ({record['source']}): {_verdict(record)}"
+        console.print(Text(about, style="bold"))
+        if record["rows"]:
+            console.print(_compared(record))
     for record in records:
         if record["error"]:
             line = f"{record['name']} failed: {record['error']}; it is tried again next time"
@@ -37,17 +27,32 @@ def print_physics(records: Sequence[Mapping[str, Any]], console: Console) -> Non
     console.print(f"cases within their tolerances: {passed} of {len(records)}", highlight=False)
 
 
+def _compared(record: Mapping[str, Any]) -> Table:
+    numbers = ("truth", "ours", "error", "tolerance")
+    table = Table(
+        Column("compared", ratio=1),
+        *(Column(name, justify="right", no_wrap=True, min_width=9) for name in numbers),
+        Column("result", no_wrap=True),
+        box=SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        expand=True,
+    )
+    for row in record["rows"]:
+        table.add_row(*_cells(row, record["unit"]))
+    return table
+
+
 def _cells(row: Mapping[str, Any], unit: str) -> list[Text]:
     tolerance = _error(row["tolerance"], unit).lstrip("+")
     verdict = "pass" if row["passed"] else "FAIL"
-    cells = [f"  {row['quantity']}", _number(row["truth"]), _number(row["ours"])]
+    cells = [row["quantity"], _number(row["truth"]), _number(row["ours"])]
     return [Text(cell) for cell in (*cells, _error(row["error"], unit), tolerance, verdict)]
 
 
-def _verdict(record: Mapping[str, Any]) -> Text:
+def _verdict(record: Mapping[str, Any]) -> str:
     if record["error"]:
-        return Text("ERROR")
-    return Text("pass" if record["passed"] else "FAIL")
+        return "ERROR"
+    return "pass" if record["passed"] else "FAIL"
 
 
 def _number(value: float | None) -> str:
