@@ -80,9 +80,10 @@ def pour(
     distance = _batch("distance", action.distance, len(seeds))
     if (rate <= 0).any():
         raise ValueError(f"angular_velocity must be positive [rad/s], got {rate.min()}")
-    for wrong in rate[(rate < SLOWEST) | (rate > FASTEST)]:
+    wrong = rate[(rate < SLOWEST) | (rate > FASTEST)]
+    if wrong.size:
         raise ValueError(
-            f"angular_velocity must be {SLOWEST} to {FASTEST} rad/s, got {wrong:.4g}; "
+            f"angular_velocity must be {SLOWEST} to {FASTEST} rad/s, got {wrong[0]:.4g}; "
             "is it in rad/s?"
         )
     check_numbers("pour", particles=particles)

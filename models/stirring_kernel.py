@@ -59,7 +59,7 @@ class StirringScene(HangingStick):
         self.body_wall[b, i] = (stick[1] / (distance * self.h)) * offset
         self.lever[b, i] = lever
         self.hide(b, (p - self.pivot[b]).dot(self.direction[b]), stick[0])
-        share = self.unit_coupling * self.kinematic(b) / (self.h * self.h)
+        share = self.share(self.kinematic(b))
         self.stick_grip[b, i] = share * self.numerics.stick_drag * 0.5 * (stick[2] + stick[3])
         return side[0] + floor[0] + stick[0]
 

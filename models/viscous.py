@@ -76,10 +76,15 @@ class Viscous(Rheology):
         )
 
     @ti.func
+    def share(self, kinematic):
+        """10 nu dt / h^2, the unit of what couples particles to walls and bodies."""
+        return self.unit_coupling * kinematic / (self.h * self.h)
+
+    @ti.func
     def wall_share(self, b, kinematic):
-        """10 nu dt / h^2 at walls, on which liquid slips rather than exceed `wall_friction`."""
+        """The same at walls, on which liquid slips rather than exceed `wall_friction`."""
         most = self.wall_friction / (self.density[b] * self.unit_friction)
-        return ti.min(self.unit_coupling * kinematic / (self.h * self.h), most)
+        return ti.min(self.share(kinematic), most)
 
     @ti.func
     def grip_walls(self, b, i, grip, velocity):

@@ -110,7 +110,7 @@ class BoxScene(Fluid):
             self.body_wall[b, i] = (rod[1] / (distance * self.h)) * offset
             held = self.numerics.stick_drag * 0.5 * (rod[2] + rod[3])
             grip += held * ti.Matrix.identity(ti.f32, 3)
-            share = self.unit_coupling * self.kinematic(b) / (self.h * self.h)
+            share = self.share(self.kinematic(b))
             self.rod_grip[b, i] = share * held
             density += rod[0]
         self.wall[b, i] = wall / self.h
