@@ -158,3 +158,14 @@ def predictive_draws(key: jax.Array, emulator: Emulator, u: np.ndarray) -> np.nd
     scores = (mean + np.sqrt(variance) * latent + noisy) * full
     standard = scores @ basis.vectors.T + factor @ remainder.factors.T
     return basis.centre + basis.scale * (standard + np.sqrt(remainder.white) * white)
+
+
+def covariance(emulator: Emulator, u: np.ndarray) -> np.ndarray:
+    """Of a new simulated output about the mean at u [d]: [m, m], run-to-run noise included."""
+    basis, remainder = emulator.basis, emulator.remainder
+    variance = predict_scores(emulator.gp, u[None])[1][:, 0]
+    of_scores = emulator.noise + np.diag(variance)
+    standard = basis.vectors @ of_scores @ basis.vectors.T
+    standard += remainder.factors @ remainder.factors.T
+    standard[np.diag_indices_from(standard)] += remainder.white
+    return standard * np.outer(basis.scale, basis.scale)

@@ -19,6 +19,11 @@ class GivenNoise(NamedTuple):
     def variance(self) -> np.ndarray:
         return self.white + np.sum(self.factors**2, 1)
 
+    @property
+    def covariance(self) -> np.ndarray:
+        """[m, m]"""
+        return np.diag(self.white) + self.factors @ self.factors.T
+
     def draw(self, rng: np.random.Generator, n: int) -> np.ndarray:
         """[n, m]"""
         m, q = self.factors.shape

@@ -1,0 +1,41 @@
+"""Where to simulate: boxes of prior quantiles, filled evenly."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..design import sobol
+from ..prior import Prior
+
+REACH = 10.0  # posterior sds: narrower boxes make slopes of noise (errors in variables)
+LEAST, MOST = 0.08, 0.5  # half a box's width
+END = 0.02  # quantile of a coefficient's prior beyond which nothing is simulated
+
+
+class Box(NamedTuple):
+    """low, high: prior quantiles [d]."""
+
+    low: np.ndarray
+    high: np.ndarray
+
+    def holds(self, u: np.ndarray) -> np.ndarray:
+        """Which of u [n, d] lie inside, bool [n]."""
+        return ((u >= self.low) & (u <= self.high)).all(-1)
+
+
+def around(centre: np.ndarray, sd: np.ndarray) -> Box:
+    """The box about a posterior."""
+    half = np.clip(REACH * sd, LEAST, MOST)
+    return Box(np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0))
+
+
+def with_coefficients(box: Box, count: int) -> Box:
+    """The box of the base parameters, and the whole prior of `count` coefficients."""
+    ends = np.full(count, END)
+    return Box(np.append(box.low, ends), np.append(box.high, 1.0 - ends))
+
+
+def fill(box: Box, prior: Prior, seed: int, count: int) -> dict[str, np.ndarray]:
+    """`count` points of the box in natural units, name -> [count]."""
+    u = sobol(seed, 0, count, len(box.low))
+    return prior.from_unit(box.low + (box.high - box.low) * u)

@@ -1,0 +1,145 @@
+"""A model, base or extended, fitted to data: what is left, and how large that may be."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from .._float64 import in_float64
+from ..bolfi import Bolfi
+from ..emulator import covariance, predict
+from ..families import SignalFamily
+from ..noise import Layout
+from ..posterior import Fit
+from ..signal_surrogate import SignalSurrogate
+from .noise import Noise
+from .runs import Runs
+
+COMPONENTS = 10
+STEP = 0.02  # of prior quantiles, for slopes
+SEPARATE = 1e-8  # relative size below which a slope adds nothing to those before
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A fitted model; arrays over the m values of what was observed.
+
+    Attributes:
+        names: Effects that act.
+        fit: The engine's; its likelihood knows the noise.
+        u: Where the likelihood is greatest, prior quantiles [d].
+        difference: Observed less expected there [m].
+        spread: Covariance of what the simulator and its emulator add [m, m].
+        noise: Covariance of the noise between the simulator and the data [m, m].
+    """
+
+    names: tuple[str, ...]
+    fit: Fit
+    u: np.ndarray
+    difference: np.ndarray
+    spread: np.ndarray
+    noise: np.ndarray
+
+    @property
+    def surrogate(self) -> SignalSurrogate:
+        assert isinstance(self.fit.learned, SignalSurrogate)
+        return self.fit.learned
+
+    @property
+    def best(self) -> dict[str, float]:
+        """Parameters at which the likelihood is greatest."""
+        return {name: float(v) for name, v in self.fit.prior.from_unit(self.u).items()}
+
+    @property
+    def layout(self) -> Layout:
+        return self.surrogate.output.layout
+
+    @cached_property
+    def factor(self) -> np.ndarray:
+        """Lower Cholesky factor of the difference's covariance [m, m]."""
+        return np.linalg.cholesky(self.spread + self.noise)
+
+    @cached_property
+    def slopes(self) -> np.ndarray:
+        """Whitened derivatives of the expected values by the prior quantiles [m, d]."""
+        d = len(self.u)
+        above = np.minimum(self.u + STEP * np.eye(d), 1.0)
+        below = np.maximum(self.u - STEP * np.eye(d), 0.0)
+        rise = self.expected(above) - self.expected(below)
+        return self.whiten(rise / np.diag(above - below)[:, None])
+
+    @cached_property
+    def tangents(self) -> np.ndarray:
+        """Orthonormal directions of whitened values that the parameters absorb [m, <= d]."""
+        left, size, _ = np.linalg.svd(self.slopes, full_matrices=False)
+        return left[:, size > SEPARATE * max(size[0], 1.0)]
+
+    @cached_property
+    def sd(self) -> np.ndarray:
+        """Of the parameters in prior quantiles, by Laplace's approximation [d]."""
+        # a uniform quantile has the variance 1/12
+        information = self.slopes.T @ self.slopes + 12.0 * np.eye(len(self.u))
+        return np.sqrt(np.diag(np.linalg.inv(information)))
+
+    def whiten(self, rows: np.ndarray) -> np.ndarray:
+        """Values [n, m] -> columns [m, n] of unit covariance."""
+        return solve_triangular(self.factor, np.atleast_2d(rows).T, lower=True)
+
+    def project(self, white: np.ndarray) -> np.ndarray:
+        """Whitened columns [m, n] less what the parameters absorb of them."""
+        return white - self.tangents @ (self.tangents.T @ white)
+
+    @in_float64
+    def expected(self, u: np.ndarray) -> np.ndarray:
+        """Expected values [n, m] at prior quantiles u [n, d]."""
+        return predict(self.surrogate.emulator, np.atleast_2d(u))[0]
+
+    def misfit(self, metric: "Hypothesis") -> float:
+        """Squared length of the difference under another hypothesis's covariance."""
+        return float(np.sum(metric.whiten(self.difference) ** 2))
+
+
+@in_float64
+def hypothesise(
+    names: tuple[str, ...], prior, runs: Runs, observed: np.ndarray, noise: Noise
+) -> Hypothesis:
+    """Fit the model in which the named effects act to what was observed.
+
+    Args:
+        prior: Of the base parameters and the named coefficients.
+        runs: Simulations; those in which another effect acts are left out.
+        observed: [*signal_shape], NaN where missing.
+        noise: Between the simulator and the data.
+    """
+    told = runs.of(names)
+    family = SignalFamily(noise=noise.covariance(samples(observed)), components=COMPONENTS)
+    engine = Bolfi(prior, observed, surrogate=family, capacity=1)
+    engine.tell({name: told.theta[name] for name in prior.names}, told.signals, told.seeds)
+    fit = engine.fit()
+    surrogate = fit.learned
+    assert isinstance(surrogate, SignalSurrogate) and surrogate.known is not None
+    u = surrogate.minimum()
+    expected = predict(surrogate.emulator, u[None])[0][0]
+    return Hypothesis(
+        names=names,
+        fit=fit,
+        u=u,
+        difference=surrogate.observed - expected,
+        spread=covariance(surrogate.emulator, u),
+        noise=surrogate.known.covariance,
+    )
+
+
+def samples(observed: np.ndarray) -> Layout:
+    """Channel and sample of each finite value, in the flattened order."""
+    at = np.flatnonzero(np.isfinite(observed))
+    channels = int(np.prod(observed.shape[1:]))
+    return Layout(at % channels, at // channels)
+
+
+def values_of(hypothesis: Hypothesis, drawn: np.ndarray) -> np.ndarray:
+    """Draws [n, samples] in the flattened order as values [n, m]."""
+    output = hypothesis.surrogate.output
+    rank = np.argsort(np.argsort(output.present))
+    return output.average(drawn[:, rank].T).T

@@ -1,0 +1,112 @@
+"""Runs of a simulator and of its extensions, kept in a bank."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..bank import SimulationBank
+from ..base import Simulator
+from ..prior import Prior
+from ..runner import run_missing
+from ..simulate import Job
+from .extension import Extensions
+from .runs import Runs
+
+Report = Callable[[str, int], None]
+"""(phase, simulations finished in it since the last call)"""
+
+
+def silent(phase: str, finished: int) -> None:
+    """Reports nothing."""
+
+
+@dataclass(frozen=True)
+class Keeping:
+    """Where simulations are kept, and how they are made.
+
+    Attributes:
+        bank: Takes every finished one; what it holds is not simulated again.
+        batch: Simulated in one call.
+        seed: All of their seeds derive from it.
+        report: Told of every batch.
+    """
+
+    bank: SimulationBank = field(default_factory=SimulationBank)
+    batch: int = 8
+    seed: int = 0
+    report: Report = silent
+
+
+@dataclass(frozen=True)
+class Laboratory:
+    """A simulator whose runs are kept.
+
+    Attributes:
+        simulate: (theta, seeds) -> signals; theta holds the base parameters, and of the
+            coefficients those that act.
+        prior: Of the base parameters.
+        extensions: All that may act.
+        identity: The simulator's name in the bank.
+        keeping: Where runs are kept.
+    """
+
+    simulate: Simulator
+    prior: Prior
+    extensions: Extensions
+    identity: str
+    keeping: Keeping
+
+    def run(self, phase: str, theta: Mapping[str, np.ndarray]) -> Runs:
+        """Simulate at theta, name -> [n]; runs that fail are left out.
+
+        Args:
+            phase: A word for what they are for; with the run's number it fixes the seeds.
+
+        Raises:
+            RuntimeError: all of them failed.
+        """
+        count = len(next(iter(theta.values())))
+        seeds = phase_seeds(self.keeping.seed, phase, count)
+        return self.again(phase, theta, seeds)
+
+    def again(self, phase: str, theta: Mapping[str, np.ndarray], seeds: np.ndarray) -> Runs:
+        """The same with seeds [n] of the caller's."""
+        jobs = [
+            Job({name: float(column[i]) for name, column in theta.items()}, int(seed))
+            for i, seed in enumerate(seeds)
+        ]
+        keeping, results = self.keeping, []
+        for start in range(0, len(jobs), keeping.batch):
+            part = jobs[start : start + keeping.batch]
+            results += run_missing(self.simulate, part, None, keeping.bank, self.identity, None)
+            keeping.report(phase, len(part))
+        good = [
+            i
+            for i, result in enumerate(results)
+            if result.signal is not None and np.isfinite(result.signal).all()
+        ]
+        if not good:
+            raise RuntimeError(
+                f"all {len(jobs)} simulations of the phase {phase!r} failed, the first at "
+                f"{jobs[0].theta}: {results[0].error or 'its output is not finite'}"
+            )
+        signals = np.stack([results[i].signal for i in good])
+        kept = {name: np.asarray(column, float)[good] for name, column in theta.items()}
+        return self.table(kept, signals, np.asarray(seeds)[good])
+
+    def table(
+        self, theta: Mapping[str, np.ndarray], signals: np.ndarray, seeds: np.ndarray
+    ) -> Runs:
+        """Simulations made elsewhere, coefficients that theta lacks being neutral."""
+        count, effects = len(seeds), tuple(self.extensions)
+        neutral = {name: np.full(count, self.extensions[name].neutral) for name in effects}
+        whole = {**neutral, **theta}
+        acting = np.stack([whole[name] != neutral[name] for name in effects], axis=1)
+        return Runs(whole, acting, signals, seeds, effects)
+
+
+def phase_seeds(seed: int, phase: str, count: int) -> np.ndarray:
+    """Seeds in [0, 2^31), others for every phase."""
+    words = np.random.SeedSequence([seed, *phase.encode()]).generate_state(count)
+    return (words >> 1).astype(np.int64)

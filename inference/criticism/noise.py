@@ -1,0 +1,136 @@
+"""What lies between a simulator's mean output and the data, besides the simulator's own noise."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from ..noise import Layout, Nodes, correlated
+
+CORRELATIONS = np.linspace(0.0, 0.97, 40)  # of neighbouring samples
+DRAWS = 400
+
+
+class Noise(Protocol):
+    """Gaussian noise on samples, known as well as it is known."""
+
+    def covariance(self, at: Layout) -> np.ndarray:
+        """[n, n] of n samples."""
+        ...
+
+    def draw(self, rng: np.random.Generator, at: Layout, count: int) -> np.ndarray:
+        """[count, n], each row with sizes that the noise may as well have."""
+        ...
+
+
+@dataclass(frozen=True)
+class KnownNoise:
+    """Independent noise of known size.
+
+    Attributes:
+        sd: In the output's unit: a number, or one for each sample.
+    """
+
+    sd: float | np.ndarray
+
+    def covariance(self, at: Layout) -> np.ndarray:
+        return np.diag(np.broadcast_to(np.asarray(self.sd, float) ** 2, at.channel.shape))
+
+    def draw(self, rng: np.random.Generator, at: Layout, count: int) -> np.ndarray:
+        return self.sd * rng.normal(size=(count, len(at.channel)))
+
+
+@dataclass(frozen=True)
+class AutoregressiveNoise:
+    """AR(1) noise, independent between channels, of uncertain size and correlation.
+
+    Attributes:
+        sd: Draws of its size from what is known of it, shape [g].
+        correlation: And of the correlation of neighbouring samples, shape [g].
+        samples: From how many samples it was learned; 0 where it was given.
+    """
+
+    sd: np.ndarray
+    correlation: np.ndarray
+    samples: int = 0
+
+    def covariance(self, at: Layout) -> np.ndarray:
+        apart = np.abs(np.subtract.outer(at.sample, at.sample))
+        lags = np.arange(apart.max() + 1)
+        # the mean over the draws: what one sample predicts of another, all in all
+        of_lag = np.mean(self.sd[:, None] ** 2 * self.correlation[:, None] ** lags, 0)
+        return of_lag[apart] * np.equal.outer(at.channel, at.channel)
+
+    def draw(self, rng: np.random.Generator, at: Layout, count: int) -> np.ndarray:
+        which = rng.integers(len(self.sd), size=count)
+        order = np.lexsort((at.sample, at.channel))
+        white = rng.normal(size=(count, len(order)))
+        sorted_at = Layout(at.channel[order], at.sample[order])
+        noise = np.empty_like(white)
+        noise[:, order] = correlated(
+            white, sorted_at, Nodes(self.sd[which], self.correlation[which])
+        )
+        return noise
+
+
+@dataclass(frozen=True)
+class SumOfNoises:
+    """Independent noises, added up."""
+
+    parts: tuple[Noise, ...]
+
+    def covariance(self, at: Layout) -> np.ndarray:
+        return np.sum([part.covariance(at) for part in self.parts], axis=0)
+
+    def draw(self, rng: np.random.Generator, at: Layout, count: int) -> np.ndarray:
+        return np.sum([part.draw(rng, at, count) for part in self.parts], axis=0)
+
+
+def rest_noise(
+    rests: list[np.ndarray], seed: int = 0, *, trend: int = 0, draws: int = DRAWS
+) -> AutoregressiveNoise:
+    """AR(1) noise of one size in all channels, from stretches in which nothing moved.
+
+    The posterior under a prior flat in the correlation and in the log of the size, of all that is
+    left after a polynomial in time is taken from each channel (restricted likelihood, Harville
+    1974).
+
+    Args:
+        rests: Stretches [samples, channels].
+        seed: Fixes the draws.
+        trend: Degree of the polynomial.
+        draws: From the posterior.
+
+    Raises:
+        ValueError: fewer than eight samples are left to learn from.
+    """
+    freedom = sum((len(rest) - trend - 1) * rest.shape[1] for rest in rests)
+    if freedom < 8:
+        raise ValueError(
+            f"the stretches at rest leave {freedom} samples to learn the noise from, of 8 needed; "
+            "give longer ones"
+        )
+    log_weight, squares = np.transpose([_restricted(rests, rho, trend) for rho in CORRELATIONS])
+    log_weight = log_weight - 0.5 * freedom * np.log(squares)
+    weight = np.exp(log_weight - log_weight.max())
+    rng = np.random.default_rng(seed)
+    which = rng.choice(len(weight), draws, p=weight / weight.sum())
+    sd = np.sqrt(squares[which] / rng.chisquare(freedom, draws))
+    return AutoregressiveNoise(sd, CORRELATIONS[which], sum(rest.size for rest in rests))
+
+
+def _restricted(rests: list[np.ndarray], rho: float, trend: int) -> tuple[float, float]:
+    """Log determinants' part of the restricted likelihood, and the whitened sum of squares."""
+    log_weight = squares = 0.0
+    for rest in rests:
+        steps = np.arange(len(rest))
+        factor = np.linalg.cholesky(rho ** np.abs(np.subtract.outer(steps, steps)))
+        powers = (steps / len(rest))[:, None] ** np.arange(trend + 1)
+        columns = solve_triangular(factor, np.column_stack([powers, rest]), lower=True)
+        smooth, white = columns[:, : trend + 1], columns[:, trend + 1 :]
+        left = white - smooth @ np.linalg.lstsq(smooth, white)[0]
+        squares += np.sum(left**2)
+        log_det = np.log(np.diag(factor)).sum() + 0.5 * np.linalg.slogdet(smooth.T @ smooth)[1]
+        log_weight -= rest.shape[1] * log_det
+    return log_weight, squares

@@ -1,0 +1,167 @@
+"""The search for what a model lacks."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from .design import Box, around, fill, with_coefficients
+from .extension import extended
+from .hypothesis import Hypothesis, hypothesise
+from .laboratory import Laboratory
+from .misfit import Check, check, null_draws
+from .noise import Noise
+from .runs import Runs, joined
+from .signatures import Signature, directions, signature
+from .verdict import Candidate, near_best, tied
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How many runs each step may make.
+
+    Attributes:
+        base: Of the base model, near where it fits best, beside those there are already.
+        start: Of the base model all over the prior, where there are none yet.
+        extension: Of each effect.
+        refit: Near the best parameters of a near-best explanation.
+        refits: Explanations that are refitted, and pairs of effects after them.
+        held_out: Of each model for each held-out data set.
+    """
+
+    base: int = 24
+    start: int = 16
+    extension: int = 10
+    refit: int = 16
+    refits: int = 3
+    held_out: int = 8
+
+
+class Study(NamedTuple):
+    """Data, and the simulator that should explain them."""
+
+    laboratory: Laboratory
+    observed: np.ndarray
+    noise: Noise
+    plan: Plan
+    seed: int
+
+    def hypothesis(self, names: tuple[str, ...], runs: Runs) -> Hypothesis:
+        """The model in which the named effects act, fitted."""
+        prior = extended(self.laboratory.prior, self.laboratory.extensions, names)
+        return hypothesise(names, prior, runs, self.observed, self.noise)
+
+    def run(self, phase: str, box: Box, names: tuple[str, ...], count: int) -> Runs:
+        """Runs all over a box."""
+        prior = extended(self.laboratory.prior, self.laboratory.extensions, names)
+        return self.laboratory.run(phase, fill(box, prior, self.seed, count))
+
+    def check(
+        self, hypothesis: Hypothesis, signatures: Mapping[str, Signature]
+    ) -> tuple[Check, np.ndarray]:
+        """Its test, and residuals [m, n] of a right model."""
+        null = null_draws(hypothesis, self.noise, np.random.default_rng(self.seed))
+        return check(hypothesis, directions(hypothesis, signatures), null), null
+
+    def candidate(
+        self,
+        base: Hypothesis,
+        names: tuple[str, ...],
+        runs: Runs,
+        signatures: Mapping[str, Signature],
+        refitted: bool = False,
+    ) -> Candidate:
+        """The extended model, fitted and tested."""
+        hypothesis = self.hypothesis(names, runs)
+        gain = 0.5 * (base.misfit(base) - hypothesis.misfit(base))
+        return Candidate(hypothesis, self.check(hypothesis, signatures)[0], gain, refitted)
+
+
+class Base(NamedTuple):
+    """The base model and what the effects would do to it."""
+
+    hypothesis: Hypothesis
+    check: Check
+    null: np.ndarray  # [m, n], residuals of a right model
+    signatures: dict[str, Signature]
+    singles: dict[str, Hypothesis]
+    runs: Runs
+
+
+def examine(study: Study, earlier: Runs | None) -> Base:
+    """Fit the base model, learn every effect's signature, test."""
+    laboratory, plan = study.laboratory, study.plan
+    everywhere = Box(np.zeros(len(laboratory.prior)), np.ones(len(laboratory.prior)))
+    runs = study.run("start", everywhere, (), plan.start) if earlier is None else earlier
+    first = study.hypothesis((), runs)
+    box = around(first.u, first.sd)
+    runs = joined([runs, study.run("base", box, (), plan.base)])
+    base = study.hypothesis((), runs)
+    parts = [runs]
+    singles = {}
+    for name in laboratory.extensions:
+        wide = with_coefficients(box, 1)
+        made = study.run(f"effect {name}", wide, (name,), plan.extension)
+        parts.append(made)
+        singles[name] = study.hypothesis((name,), joined([runs, made]))
+    signatures = {
+        name: signature(base, single, laboratory.extensions[name])
+        for name, single in singles.items()
+    }
+    tested, null = study.check(base, signatures)
+    return Base(base, tested, null, signatures, singles, joined(parts))
+
+
+def explain(study: Study, base: Base) -> tuple[list[Candidate], list[Candidate], Runs]:
+    """Every explanation by one effect, or by two where none suffices; those that remain; runs."""
+    plan, runs = study.plan, base.runs
+    first = {
+        name: study.candidate(base.hypothesis, (name,), runs, base.signatures)
+        for name in base.singles
+    }
+    found: dict[tuple[str, ...], Candidate] = {c.names: c for c in first.values()}
+    for one in near_best(list(first.values()), plan.refits):
+        runs = joined([runs, _near(study, one)])
+        found[one.names] = study.candidate(
+            base.hypothesis, one.names, runs, base.signatures, refitted=True
+        )
+    remaining = tied(list(found.values()))
+    if not remaining:
+        pairs, runs = _pairs(study, base, found, runs)
+        found |= {pair.names: pair for pair in pairs}
+        remaining = tied(pairs)
+    return list(found.values()), remaining, runs
+
+
+def _near(study: Study, candidate: Candidate) -> Runs:
+    """Runs about where an explanation fits best."""
+    box = around(candidate.hypothesis.u, candidate.hypothesis.sd)
+    names = candidate.names
+    return study.run(f"refit {' '.join(names)}", box, names, study.plan.refit)
+
+
+def _pairs(
+    study: Study, base: Base, found: Mapping[tuple[str, ...], Candidate], runs: Runs
+) -> tuple[list[Candidate], Runs]:
+    """The best effect with a second one; both must gain."""
+    best = max(found.values(), key=lambda c: c.gain)
+    pairs = [
+        study.candidate(base.hypothesis, (*best.names, other), runs, base.signatures)
+        for other in base.singles
+        if other not in best.names
+    ]
+    refitted = []
+    for pair in sorted(pairs, key=lambda c: -c.gain)[: study.plan.refits]:
+        runs = joined([runs, _near(study, pair)])
+        again = study.candidate(base.hypothesis, pair.names, runs, base.signatures, True)
+        alone = max(found[(name,)].gain for name in pair.names)
+        refitted.append(again if again.gain > alone + SECOND else _refused(again))
+    return refitted, runs
+
+
+SECOND = 6.0  # log likelihood that a second effect must gain
+
+
+def _refused(candidate: Candidate) -> Candidate:
+    return replace(candidate, check=candidate.check._replace(p_value=0.0))

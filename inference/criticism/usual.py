@@ -1,0 +1,84 @@
+"""What a simulator usually gets wrong, learned from data believed to be clean."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..noise import Layout
+
+
+@dataclass(frozen=True)
+class UsualResidual:
+    """A simulator's own residual, as a Gaussian process of uncertain size.
+
+    Its covariance has two parts: a stationary one, the clean data's mean autocovariance, and for
+    data made by the same experiment the clean residuals themselves as directions in which the
+    model may be wrong again (Brynjarsdottir and O'Hagan 2014 on why its shape matters).
+
+    Attributes:
+        autocovariance: Of clean residuals by lag in samples, shape [lags]; zero beyond.
+        directions: Clean residuals of the same experiment at each sample, shape [k, T, channels];
+            NaN where missing.
+        freedom: Clean data sets: the size is known as well as a variance from so many numbers.
+    """
+
+    autocovariance: np.ndarray
+    directions: np.ndarray
+    freedom: int
+
+    def covariance(self, at: Layout) -> np.ndarray:
+        apart = np.abs(np.subtract.outer(at.sample, at.sample))
+        known = np.append(self.autocovariance, np.zeros(max(apart.max() + 1, 1)))
+        stationary = known[apart] * np.equal.outer(at.channel, at.channel)
+        shapes = self._shapes(at)
+        return stationary + shapes.T @ shapes
+
+    def draw(self, rng: np.random.Generator, at: Layout, count: int) -> np.ndarray:
+        values, vectors = np.linalg.eigh(self.covariance(at))
+        white = rng.normal(size=(count, len(values)))
+        size = np.sqrt(self.freedom / rng.chisquare(self.freedom, count))
+        return size[:, None] * (white * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+
+    def _shapes(self, at: Layout) -> np.ndarray:
+        flat = self.directions[:, at.sample, at.channel] if self.directions.size else None
+        return np.zeros((0, len(at.sample))) if flat is None else np.nan_to_num(flat)
+
+
+def usual_residual(
+    residuals: list[np.ndarray], noise_variance: float, same: list[bool]
+) -> UsualResidual:
+    """What clean data teach.
+
+    Args:
+        residuals: Clean data less the calibrated simulator's mean, each [T, channels] with
+            samples equally far apart; NaN where missing.
+        noise_variance: Of the measurement, which is not the simulator's fault.
+        same: Which of them repeat the experiment that will be looked at, sample by sample.
+
+    Raises:
+        ValueError: there are none.
+    """
+    if not residuals:
+        raise ValueError("a usual residual needs at least one clean data set")
+    lags = max(len(residual) for residual in residuals)
+    mean = np.mean([_autocovariance(residual, lags) for residual in residuals], axis=0)
+    mean[0] = max(mean[0] - noise_variance, 0.0)
+    kept = [residual for residual, again in zip(residuals, same, strict=True) if again]
+    directions = np.stack(kept) if kept else np.zeros((0, 0, 0))
+    return UsualResidual(_positive(mean), directions, len(residuals))
+
+
+def _autocovariance(residual: np.ndarray, lags: int) -> np.ndarray:
+    """Biased estimate by lag, averaged over channels: it makes no negative variance."""
+    filled = np.nan_to_num(residual)
+    found = np.zeros(lags)
+    for lag in range(len(filled)):
+        found[lag] = np.sum(filled[lag:] * filled[: len(filled) - lag]) / filled.size
+    return found
+
+
+def _positive(autocovariance: np.ndarray) -> np.ndarray:
+    """The nearest autocovariance whose spectrum is not negative."""
+    even = np.concatenate([autocovariance, autocovariance[:0:-1]])
+    spectrum = np.maximum(np.fft.rfft(even).real, 0.0)
+    return np.fft.irfft(spectrum, len(even))[: len(autocovariance)]

@@ -1,0 +1,90 @@
+"""What is concluded from the tests of a model and of its extensions."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from .hypothesis import Hypothesis
+from .misfit import Check
+
+ALARM = 0.05  # p-value below which the base model is rejected
+ACCEPTED = 0.01  # p-value above which an extended model is not
+MARGIN = 4.0  # log likelihood by which one explanation must excel another
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An explanation, tested like the base model.
+
+    Attributes:
+        hypothesis: The extended model.
+        check: Its own test.
+        gain: Log likelihood beyond the base model's, in the base model's metric.
+        refitted: Whether runs near its best parameters were made for it; one that was not is
+            counted as untested unless it was far behind.
+    """
+
+    hypothesis: Hypothesis
+    check: Check
+    gain: float
+    refitted: bool = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.hypothesis.names
+
+    @property
+    def accepted(self) -> bool:
+        return self.check.p_value > ACCEPTED
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The conclusion.
+
+    Attributes:
+        kind: "none": model and data agree. "effect": `effects` explain the difference. "tie": one
+            of `effects` does. "unknown": they differ, and no known effect explains it.
+        effects: Their names.
+        p_value: Of the base model.
+        reason: The conclusion in a sentence.
+    """
+
+    kind: Literal["none", "effect", "tie", "unknown"]
+    effects: tuple[str, ...]
+    p_value: float
+    reason: str
+
+
+def near_best(candidates: Sequence[Candidate], count: int) -> list[Candidate]:
+    """Those worth a refit, best first."""
+    ranked = sorted(candidates, key=lambda c: -c.gain)
+    worth = [c for c in ranked if c.gain > 0.0 or c.accepted]
+    # one that passes already must be looked at, however far behind
+    return sorted(worth[: 2 * count], key=lambda c: (not c.accepted, -c.gain))[:count]
+
+
+def tied(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The accepted ones that the data cannot tell from the best of them, best first."""
+    accepted = sorted((c for c in candidates if c.accepted), key=lambda c: -c.gain)
+    return [c for c in accepted if c.gain > accepted[0].gain - MARGIN]
+
+
+def conclude(base: Check, members: Sequence[Candidate]) -> Verdict:
+    """From the base model's test and the explanations that no test tells apart."""
+    p = base.p_value
+    if p >= ALARM:
+        return Verdict("none", (), p, f"Model and data agree (p = {p:.2g}).")
+    if not members:
+        reason = f"Model and data differ (p = {p:.2g}), and no known effect explains it."
+        return Verdict("unknown", (), p, reason)
+    if len(members) == 1:
+        names = members[0].names
+        reason = f"Model and data differ (p = {p:.2g}); {' with '.join(names)} explains it."
+        return Verdict("effect", names, p, reason)
+    names = tuple(dict.fromkeys(name for member in members for name in member.names))
+    reason = (
+        f"Model and data differ (p = {p:.2g}); one of {', '.join(names)} explains it, and these "
+        "data cannot say which."
+    )
+    return Verdict("tie", names, p, reason)

@@ -1,0 +1,170 @@
+"""A stir that takes milliseconds, with effects that it may lack: a stand-in for the fluid.
+
+A stick that pivots freely is dragged by a liquid of one drag coefficient, which follows the stick
+as an eddy of another. Runs differ by their seed: a smooth error of .15 degrees stands for the
+packing of particles, and is in the data as well.
+"""
+
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import numpyro.distributions as dist
+from bolfi_liquids import inference
+from bolfi_liquids.hardware import star
+from scipy.ndimage import gaussian_filter1d
+
+GRAVITY, LENGTH, WET = 9.81, 0.22, 0.9  # m/s2, m, where the liquid's force acts over LENGTH
+BUOYANCY = 0.12  # share of the weight's moment
+SUBSTEPS = 8  # for each of 30 samples a second
+REST, DURATION = 2.0, 8.0  # s
+EDDY = 0.4  # s, in which the liquid follows
+RUB = 0.05  # rad/s below which dry friction is viscous
+SLOSH = 2.0 * np.pi * 2.4  # rad/s
+
+JITTER, JITTER_TIME = np.deg2rad(0.15), 0.1  # of a run: size, and correlation time [s]
+NOISE, CORRELATION = np.deg2rad(0.2), 0.6  # of the cameras, of neighbouring samples
+
+PRIOR = inference.Prior({"drag": dist.LogUniform(0.3, 10.0), "eddy": dist.Uniform(0.0, 0.6)})
+
+EXTENSIONS = {
+    "friction": inference.Extension(dist.HalfNormal(0.6)),
+    "thinning": inference.Extension(dist.HalfNormal(0.6)),
+    "wall": inference.Extension(dist.HalfNormal(2.0)),
+    "fill": inference.Extension(dist.Normal(0.0, 0.2)),
+    "tilt": inference.Extension(dist.Normal(0.0, 0.05)),
+    "delay": inference.Extension(dist.Normal(0.0, 0.05)),
+    "drift": inference.Extension(dist.Normal(0.0, 0.005)),
+    "mass": inference.Extension(dist.Normal(0.0, 0.3)),
+    "gripper_scale": inference.Extension(dist.Normal(0.0, 0.1)),
+}
+"""What the model may lack, and knows of."""
+
+UNKNOWN = ("rotation", "slosh", "swirl", "settling")
+"""What it may lack, and does not know of."""
+
+_NAMES = (*PRIOR.names, *EXTENSIONS, *UNKNOWN)
+
+
+@dataclass(frozen=True)
+class Stir:
+    """A path of the gripper; `simulate` is what `inference` calls."""
+
+    points: int = 9
+    radius: float = 0.025
+    speed: float = 0.1
+
+    @property
+    def time(self) -> np.ndarray:
+        """Of the samples [s], shape [240]."""
+        return np.arange(0.0, DURATION, 1.0 / 30.0)
+
+    def simulate(self, theta: dict[str, np.ndarray], seeds: np.ndarray) -> np.ndarray:
+        """Inclinations [b, 240, 2] in rad, each with the error of its seed."""
+        return self.exact(theta, len(seeds)) + np.stack([self._jitter(s, theta) for s in seeds])
+
+    def exact(self, theta: dict[str, np.ndarray], n: int) -> np.ndarray:
+        """Without the error of a seed."""
+        values = np.zeros((n, len(_NAMES)), np.float32)
+        for name, column in theta.items():
+            values[:, _NAMES.index(name)] = column
+        padded = np.zeros((-(-n // 16) * 16, len(_NAMES)), np.float32)
+        padded[:] = values[0]
+        padded[:n] = values
+        angles = [_swing(jnp.asarray(self._driven), part) for part in np.split(padded, len(padded) // 16)]
+        return np.concatenate(angles)[:n].astype(float)
+
+    def observe(self, theta: dict[str, float], seed: int) -> np.ndarray:
+        """What cameras see of one more stir, [240, 2] in rad."""
+        rng = np.random.default_rng([seed, 1])
+        columns = {name: np.array([value]) for name, value in theta.items()}
+        return self.simulate(columns, np.array([seed]))[0] + camera_noise(rng, len(self.time))
+
+    def _jitter(self, seed: int, theta: Any) -> np.ndarray:
+        white = np.random.default_rng([int(seed), 2]).normal(size=(len(self.time), 2))
+        smooth = gaussian_filter1d(white, JITTER_TIME * 30.0 / np.sqrt(2.0), axis=0, mode="wrap")
+        size = JITTER * np.sqrt(2.0 * np.sqrt(np.pi) * JITTER_TIME * 30.0 / np.sqrt(2.0))
+        stirred = np.clip((self.time - REST) / 0.5, 0.0, 1.0)  # liquid at rest is quiet
+        return size * stirred[:, None] * smooth
+
+    @property
+    def _driven(self) -> np.ndarray:
+        return _driven(self.points, self.radius, self.speed)
+
+
+def camera_noise(rng: np.random.Generator, samples: int) -> np.ndarray:
+    """AR(1) noise [samples, 2] in rad."""
+    white = rng.normal(size=(samples, 2)) * NOISE
+    for i in range(1, samples):
+        white[i] = CORRELATION * white[i - 1] + np.sqrt(1.0 - CORRELATION**2) * white[i]
+    return white
+
+
+@cache
+def _driven(points: int, radius: float, speed: float) -> np.ndarray:
+    """Position, velocity and acceleration of the gripper at each substep, [substeps, 6]."""
+    path = star(speed=speed, height=0.235, radius=radius, points=points, rest=REST)
+    fine = np.arange(0.0, DURATION, 1.0 / (30.0 * SUBSTEPS))
+    place = np.stack([np.interp(fine, path.time, path.position[:, k]) for k in range(2)], 1)
+    place = gaussian_filter1d(place, 0.04 * 30.0 * SUBSTEPS, axis=0, mode="nearest")
+    step = 1.0 / (30.0 * SUBSTEPS)
+    velocity = np.gradient(place, step, axis=0)
+    return np.column_stack([place, velocity, np.gradient(velocity, step, axis=0)]).astype(np.float32)
+
+
+@jax.jit
+def _swing(driven: jax.Array, values: jax.Array) -> jax.Array:
+    return jax.vmap(partial(_one, driven))(values)
+
+
+def _one(driven: jax.Array, values: jax.Array) -> jax.Array:
+    """Seen angles [240, 2] of one stir."""
+    of = dict(zip(_NAMES, values, strict=True))
+    step = 1.0 / (30.0 * SUBSTEPS)
+    inertia = LENGTH**2 / 3.0 * (1.0 + of["mass"])
+    weight = GRAVITY * LENGTH / 2.0 * (1.0 + of["mass"])
+    lift = GRAVITY * LENGTH / 2.0 * BUOYANCY * (1.0 + 2.0 * of["fill"])
+    lever = WET * LENGTH
+
+    def advance(now, row):
+        angle, rate, flow, wave, time = now
+        place, velocity, acceleration = row[:2], row[2:4], row[4:]
+        scale = 1.0 + of["gripper_scale"]
+        place, velocity, acceleration = scale * place, scale * velocity, scale * acceleration
+        tip = velocity + lever * rate
+        slip = tip - flow - wave[0]
+        fast = jnp.sqrt(jnp.sum(slip**2) + 1e-6)
+        away = jnp.sum((place + lever * angle) ** 2) / 0.04**2
+        drag = of["drag"] * (1.0 + of["fill"]) * (1.0 + of["wall"] * away**2)
+        drag = drag * (1.0 + fast / 0.05) ** -of["thinning"] * (1.0 - 0.3 * of["settling"] * time)
+        swirl = of["swirl"] * jnp.exp(-time / 1.5) * jnp.stack([-place[1], place[0]])
+        torque = lift * jnp.sin(angle) - weight * jnp.sin(angle)
+        torque = torque - (1.0 + of["mass"]) * LENGTH / 2.0 * jnp.cos(angle) * acceleration
+        torque = torque - 0.01 * of["friction"] * jnp.tanh(rate / RUB)
+        torque = torque + drag * lever * 0.05 * (flow + wave[0] + swirl - velocity)
+        damping = drag * lever**2 * 0.05
+        rate = (rate + step * torque / inertia) / (1.0 + step * damping / inertia)
+        angle = angle + step * rate
+        flow = flow + step / EDDY * (of["eddy"] * tip - flow)
+        push = of["slosh"] * acceleration - SLOSH**2 * wave[1] - 0.6 * wave[0]
+        wave = jnp.stack([wave[0] + step * push, wave[1] + step * (wave[0] + step * push)])
+        return (angle, rate, flow, wave, time + step), angle
+
+    zero = jnp.zeros(2)
+    start = (zero, zero, zero, jnp.zeros((2, 2)), jnp.asarray(0.0))
+    angles = jax.lax.scan(advance, start, driven)[1]
+    return _seen(angles, of)
+
+
+def _seen(angles: jax.Array, of: dict[str, jax.Array]) -> jax.Array:
+    """By cameras that are late, turned, tilted and drifting."""
+    fine = jnp.arange(len(angles)) / (30.0 * SUBSTEPS)
+    time = fine[::SUBSTEPS]
+    late = jnp.stack([jnp.interp(time - of["delay"], fine, angles[:, k]) for k in range(2)], 1)
+    cos, sin = jnp.cos(of["rotation"]), jnp.sin(of["rotation"])
+    turned = jnp.stack([cos * late[:, 0] - sin * late[:, 1], sin * late[:, 0] + cos * late[:, 1]], 1)
+    tilt = jnp.stack([of["tilt"], jnp.asarray(0.0)])
+    return turned + tilt + of["drift"] * time[:, None]
