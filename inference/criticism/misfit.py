@@ -77,9 +77,7 @@ def null_draws(
     return hypothesis.project(hypothesis.whiten(measured + simulated))
 
 
-def check(
-    hypothesis: Hypothesis, unused: Mapping[str, np.ndarray], null: np.ndarray
-) -> Check:
+def check(hypothesis: Hypothesis, unused: Mapping[str, np.ndarray], null: np.ndarray) -> Check:
     """Test a model against the data.
 
     Args:
@@ -103,9 +101,7 @@ def check(
     return Check(float(together), float(p_score), float(p_smooth), scores)
 
 
-def locate(
-    hypothesis: Hypothesis, windows: list[Window], null: np.ndarray
-) -> list[Found]:
+def locate(hypothesis: Hypothesis, windows: list[Window], null: np.ndarray) -> list[Found]:
     """Where a model and the data disagree, with one error rate for all windows (max statistic).
 
     In each window the slow part of the residual is looked at.
@@ -135,9 +131,7 @@ def locate(
     return [Found(*seen, float(p)) for seen, p in zip(found, together, strict=True)]
 
 
-def slow_modes(
-    layout: Layout, count: int, inside: np.ndarray | None = None
-) -> np.ndarray:
+def slow_modes(layout: Layout, count: int, inside: np.ndarray | None = None) -> np.ndarray:
     """Cosines over the samples of each channel [m, channels * count], only `inside` [m]."""
     columns = []
     inside = np.ones(len(layout.sample), bool) if inside is None else inside

@@ -30,9 +30,7 @@ class Runs:
     def rows(self, which: np.ndarray) -> "Runs":
         """Those that `which` picks."""
         theta = {name: column[which] for name, column in self.theta.items()}
-        return Runs(
-            theta, self.acting[which], self.signals[which], self.seeds[which], self.effects
-        )
+        return Runs(theta, self.acting[which], self.signals[which], self.seeds[which], self.effects)
 
     def of(self, names: tuple[str, ...]) -> "Runs":
         """Those in which no other effect than the named ones acts."""

@@ -1,6 +1,6 @@
 """The search for what a model lacks."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -89,8 +89,8 @@ class Base(NamedTuple):
     runs: Runs
 
 
-def examine(study: Study, earlier: Runs | None) -> Base:
-    """Fit the base model, learn every effect's signature, test."""
+def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
+    """Fit the base model, learn every effect's signature, test; and what could not be run."""
     laboratory, plan = study.laboratory, study.plan
     everywhere = Box(np.zeros(len(laboratory.prior)), np.ones(len(laboratory.prior)))
     runs = study.run("start", everywhere, (), plan.start) if earlier is None else earlier
@@ -99,10 +99,14 @@ def examine(study: Study, earlier: Runs | None) -> Base:
     runs = joined([runs, study.run("base", box, (), plan.base)])
     base = study.hypothesis((), runs)
     parts = [runs]
-    singles = {}
+    singles, untested = {}, []
     for name in laboratory.extensions:
         wide = with_coefficients(box, 1)
-        made = study.run(f"effect {name}", wide, (name,), plan.extension)
+        try:
+            made = study.run(f"effect {name}", wide, (name,), plan.extension)
+        except RuntimeError:
+            untested.append(name)
+            continue
         parts.append(made)
         singles[name] = study.hypothesis((name,), joined([runs, made]))
     signatures = {
@@ -110,11 +114,17 @@ def examine(study: Study, earlier: Runs | None) -> Base:
         for name, single in singles.items()
     }
     tested, null = study.check(base, signatures)
-    return Base(base, tested, null, signatures, singles, joined(parts))
+    return Base(base, tested, null, signatures, singles, joined(parts)), tuple(untested)
 
 
-def explain(study: Study, base: Base) -> tuple[list[Candidate], list[Candidate], Runs]:
-    """Every explanation by one effect, or by two where none suffices; those that remain; runs."""
+def explain(
+    study: Study, base: Base, accept: Sequence[str] | None = None
+) -> tuple[list[Candidate], list[Candidate], Runs]:
+    """Every explanation by one effect, or by two where none suffices; those that remain; runs.
+
+    Args:
+        accept: Effects that are refitted together, whatever their rank.
+    """
     plan, runs = study.plan, base.runs
     first = {
         name: study.candidate(base.hypothesis, (name,), runs, base.signatures)
@@ -131,6 +141,13 @@ def explain(study: Study, base: Base) -> tuple[list[Candidate], list[Candidate],
         pairs, runs = _pairs(study, base, found, runs)
         found |= {pair.names: pair for pair in pairs}
         remaining = tied(pairs)
+    forced = tuple(accept or ())
+    if forced and not (forced in found and found[forced].refitted):
+        first_fit = study.candidate(base.hypothesis, forced, runs, base.signatures)
+        runs = joined([runs, _near(study, first_fit)])
+        found[forced] = study.candidate(
+            base.hypothesis, forced, runs, base.signatures, refitted=True
+        )
     return list(found.values()), remaining, runs
 
 

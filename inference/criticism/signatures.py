@@ -56,16 +56,16 @@ def signature(base: Hypothesis, extended: Hypothesis, extension: Extension) -> S
     )
 
 
-def _changes(
-    base: Hypothesis, extended: Hypothesis, neutral: float, u: np.ndarray
-) -> np.ndarray:
+def _changes(base: Hypothesis, extended: Hypothesis, neutral: float, u: np.ndarray) -> np.ndarray:
     """What coefficients at prior quantiles u [n] change, whitened and projected [m, n]."""
     points = np.column_stack([np.tile(base.u, (len(u) + 1, 1)), np.append(neutral, u)])
     expected = extended.expected(points)
     return base.project(base.whiten(expected[1:] - expected[0]))
 
 
-def directions(hypothesis: Hypothesis, signatures: Mapping[str, Signature]) -> dict[str, np.ndarray]:
+def directions(
+    hypothesis: Hypothesis, signatures: Mapping[str, Signature]
+) -> dict[str, np.ndarray]:
     """Signatures of the effects that do not act yet, as far as a hypothesis leaves them:
     name -> unit vector [m]. What it absorbs nearly whole is left out."""
     found = {}

@@ -22,12 +22,14 @@ class Candidate:
         gain: Log likelihood beyond the base model's, in the base model's metric.
         refitted: Whether runs near its best parameters were made for it; one that was not is
             counted as untested unless it was far behind.
+        held: Whether it held on the held-out data, where there were any.
     """
 
     hypothesis: Hypothesis
     check: Check
     gain: float
     refitted: bool = False
+    held: bool = True
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -35,7 +37,7 @@ class Candidate:
 
     @property
     def accepted(self) -> bool:
-        return self.check.p_value > ACCEPTED
+        return self.check.p_value > ACCEPTED and self.held
 
 
 @dataclass(frozen=True)
@@ -88,3 +90,13 @@ def conclude(base: Check, members: Sequence[Candidate]) -> Verdict:
         "data cannot say which."
     )
     return Verdict("tie", names, p, reason)
+
+
+def failed(base: Check, members: Sequence[Candidate]) -> Verdict:
+    """The verdict on explanations that held-out data refute."""
+    names = " or ".join(" with ".join(member.names) for member in members)
+    reason = (
+        f"Model and data differ (p = {base.p_value:.2g}); {names} explains these data, but not "
+        "those held out, so what is missing is not known."
+    )
+    return Verdict("unknown", (), base.p_value, reason)

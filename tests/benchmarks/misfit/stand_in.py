@@ -13,9 +13,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import numpyro.distributions as dist
-from bolfi_liquids import inference
 from bolfi_liquids.hardware import star
 from scipy.ndimage import gaussian_filter1d
+
+from bolfi_liquids import inference
 
 GRAVITY, LENGTH, WET = 9.81, 0.22, 0.9  # m/s2, m, where the liquid's force acts over LENGTH
 BUOYANCY = 0.12  # share of the weight's moment
@@ -38,7 +39,6 @@ EXTENSIONS = {
     "tilt": inference.Extension(dist.Normal(0.0, 0.05)),
     "delay": inference.Extension(dist.Normal(0.0, 0.05)),
     "drift": inference.Extension(dist.Normal(0.0, 0.005)),
-    "mass": inference.Extension(dist.Normal(0.0, 0.3)),
     "gripper_scale": inference.Extension(dist.Normal(0.0, 0.1)),
 }
 """What the model may lack, and knows of."""
@@ -74,7 +74,9 @@ class Stir:
         padded = np.zeros((-(-n // 16) * 16, len(_NAMES)), np.float32)
         padded[:] = values[0]
         padded[:n] = values
-        angles = [_swing(jnp.asarray(self._driven), part) for part in np.split(padded, len(padded) // 16)]
+        angles = [
+            _swing(jnp.asarray(self._driven), part) for part in np.split(padded, len(padded) // 16)
+        ]
         return np.concatenate(angles)[:n].astype(float)
 
     def observe(self, theta: dict[str, float], seed: int) -> np.ndarray:
@@ -112,7 +114,9 @@ def _driven(points: int, radius: float, speed: float) -> np.ndarray:
     place = gaussian_filter1d(place, 0.04 * 30.0 * SUBSTEPS, axis=0, mode="nearest")
     step = 1.0 / (30.0 * SUBSTEPS)
     velocity = np.gradient(place, step, axis=0)
-    return np.column_stack([place, velocity, np.gradient(velocity, step, axis=0)]).astype(np.float32)
+    return np.column_stack([place, velocity, np.gradient(velocity, step, axis=0)]).astype(
+        np.float32
+    )
 
 
 @jax.jit
@@ -124,8 +128,8 @@ def _one(driven: jax.Array, values: jax.Array) -> jax.Array:
     """Seen angles [240, 2] of one stir."""
     of = dict(zip(_NAMES, values, strict=True))
     step = 1.0 / (30.0 * SUBSTEPS)
-    inertia = LENGTH**2 / 3.0 * (1.0 + of["mass"])
-    weight = GRAVITY * LENGTH / 2.0 * (1.0 + of["mass"])
+    inertia = LENGTH**2 / 3.0
+    weight = GRAVITY * LENGTH / 2.0
     lift = GRAVITY * LENGTH / 2.0 * BUOYANCY * (1.0 + 2.0 * of["fill"])
     lever = WET * LENGTH
 
@@ -142,7 +146,7 @@ def _one(driven: jax.Array, values: jax.Array) -> jax.Array:
         drag = drag * (1.0 + fast / 0.05) ** -of["thinning"] * (1.0 - 0.3 * of["settling"] * time)
         swirl = of["swirl"] * jnp.exp(-time / 1.5) * jnp.stack([-place[1], place[0]])
         torque = lift * jnp.sin(angle) - weight * jnp.sin(angle)
-        torque = torque - (1.0 + of["mass"]) * LENGTH / 2.0 * jnp.cos(angle) * acceleration
+        torque = torque - LENGTH / 2.0 * jnp.cos(angle) * acceleration
         torque = torque - 0.01 * of["friction"] * jnp.tanh(rate / RUB)
         torque = torque + drag * lever * 0.05 * (flow + wave[0] + swirl - velocity)
         damping = drag * lever**2 * 0.05
@@ -165,6 +169,16 @@ def _seen(angles: jax.Array, of: dict[str, jax.Array]) -> jax.Array:
     time = fine[::SUBSTEPS]
     late = jnp.stack([jnp.interp(time - of["delay"], fine, angles[:, k]) for k in range(2)], 1)
     cos, sin = jnp.cos(of["rotation"]), jnp.sin(of["rotation"])
-    turned = jnp.stack([cos * late[:, 0] - sin * late[:, 1], sin * late[:, 0] + cos * late[:, 1]], 1)
+    turned = jnp.stack(
+        [cos * late[:, 0] - sin * late[:, 1], sin * late[:, 0] + cos * late[:, 1]], 1
+    )
     tilt = jnp.stack([of["tilt"], jnp.asarray(0.0)])
     return turned + tilt + of["drift"] * time[:, None]
+
+
+def covariance() -> np.ndarray:
+    """Of one channel's noise and of a run's error [240, 240], while the liquid moves."""
+    samples = np.arange(int(DURATION * 30))
+    lag = np.abs(np.subtract.outer(samples, samples))
+    smooth = np.exp(-0.5 * (lag / (30.0 * JITTER_TIME)) ** 2)
+    return NOISE**2 * CORRELATION**lag + JITTER**2 * smooth

@@ -1,0 +1,35 @@
+"""Criticism of a fitted simulator: where it and the data disagree, and what it lacks."""
+
+from .criticise import Criticism, criticise
+from .experiment import Experiment, Proposal
+from .extension import Extension
+from .held_out import Gap
+from .misfit import Check, Found, Window
+from .next_experiment import Suggestion
+from .noise import AutoregressiveNoise, KnownNoise, Noise, SumOfNoises, rest_noise
+from .search import Plan
+from .usual import UsualResidual, usual_residual
+from .verdict import Candidate, Verdict
+
+__all__ = [
+    "AutoregressiveNoise",
+    "Candidate",
+    "Check",
+    "Criticism",
+    "Experiment",
+    "Extension",
+    "Found",
+    "Gap",
+    "KnownNoise",
+    "Noise",
+    "Plan",
+    "Proposal",
+    "Suggestion",
+    "SumOfNoises",
+    "UsualResidual",
+    "Verdict",
+    "Window",
+    "criticise",
+    "rest_noise",
+    "usual_residual",
+]

@@ -1,0 +1,215 @@
+"""Find where a calibrated simulator and data disagree, name what it lacks, and prove it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..bank import SimulationBank
+from ..prior import Prior
+from .experiment import Experiment, Proposal
+from .extension import Extensions, check_extensions
+from .held_out import Gap, gap, predict
+from .hypothesis import Hypothesis
+from .laboratory import Keeping, Laboratory, Report, silent
+from .misfit import Found, locate, null_draws
+from .next_experiment import Suggestion, suggest
+from .posterior import Interval, Weighted, weighted_posterior
+from .search import Base, Plan, Study, examine, explain
+from .verdict import Candidate, Verdict, conclude, failed, tied
+
+
+@dataclass(frozen=True)
+class Criticism:
+    """What was found.
+
+    Attributes:
+        verdict: The conclusion.
+        accepted: Effects that join the model: the verdict's one explanation, or what the caller
+            accepted.
+        base: The base model, its test, and every effect's signature.
+        candidates: Every explanation that was fitted.
+        extended: The model with the accepted effects; None without.
+        posterior: Of the extended model, or else of the base model.
+        before, after: Where the data disagree with the base and with the extended model.
+        gaps: On held-out data, for each explanation that came so far: names -> gaps.
+        suggestions: Experiments that would separate explanations, best first.
+        untested: Effects whose simulations failed.
+        simulations: Runs that were asked for, those found in the bank included.
+    """
+
+    verdict: Verdict
+    accepted: tuple[str, ...]
+    base: Base
+    candidates: tuple[Candidate, ...]
+    extended: Hypothesis | None
+    posterior: Weighted
+    before: tuple[Found, ...]
+    after: tuple[Found, ...]
+    gaps: Mapping[tuple[str, ...], tuple[Gap, ...]]
+    suggestions: tuple[Suggestion, ...]
+    untested: tuple[str, ...]
+    simulations: int
+
+    @property
+    def coefficients(self) -> dict[str, Interval]:
+        """Of the accepted effects."""
+        return {name: self.posterior.interval(name) for name in self.accepted}
+
+
+def criticise(  # noqa: PLR0913  the one call that most users make
+    experiment: Experiment,
+    prior: Prior,
+    extensions: Extensions,
+    *,
+    earlier: tuple[Mapping[str, np.ndarray], np.ndarray, np.ndarray] | None = None,
+    held_out: Sequence[Experiment] = (),
+    proposals: Sequence[Proposal] = (),
+    accept: Sequence[str] | None = None,
+    plan: Plan | None = None,
+    bank: SimulationBank | None = None,
+    batch: int = 8,
+    seed: int = 0,
+    report: Report = silent,
+) -> Criticism:
+    """Test a simulator against data, and look for what it lacks.
+
+    The base model is fitted and its residual tested (`misfit`). If it is rejected, every effect
+    is fitted together with the base parameters; the best are simulated where they fit best,
+    fitted again, and must pass the test that the base model failed. Those that no test tells
+    apart are a tie; where no one passes, pairs are tried. On held-out data an explanation must
+    leave no more than noise and predict better than the base model, or it is withdrawn.
+
+    All runs are kept in the bank under seeds that derive from `seed`: the same call repeats
+    nothing that was finished and concludes the same.
+
+    Args:
+        experiment: What was observed, and the simulator.
+        prior: Of the base parameters.
+        extensions: What the simulator may lack, by name.
+        earlier: Runs of the base model made before: theta, signals, seeds.
+        held_out: Experiments that nothing is fitted to.
+        proposals: Experiments that could be made next.
+        accept: Effects to accept, whatever the verdict; None accepts what the verdict names.
+        plan: How many runs each step may make.
+        bank: Keeps the runs; None forgets them.
+        batch: Runs of one call of the simulator.
+        seed: Fixes everything random.
+        report: Told of every batch: phase, number of runs.
+
+    Raises:
+        ValueError: an argument makes no sense, or a held-out experiment is the fitted one.
+        RuntimeError: every simulation of a phase failed.
+    """
+    check_extensions(prior, extensions)
+    _check_held_out(experiment, held_out)
+    _check_accept(accept, extensions)
+    count = 0
+
+    def counted(phase: str, finished: int) -> None:
+        nonlocal count
+        count += finished
+        report(phase, finished)
+
+    keeping = Keeping(SimulationBank() if bank is None else bank, batch, seed, counted)
+    laboratory = Laboratory(experiment.simulate, prior, extensions, experiment.identity, keeping)
+    study = Study(laboratory, experiment.observed, experiment.noise, plan or Plan(), seed)
+    before = None if earlier is None else laboratory.table(*earlier)
+    base, untested = examine(study, before)
+    candidates, members, gaps = [], [], {}
+    if accept is not None or conclude(base.check, []).kind != "none":
+        candidates, members, runs = explain(study, base, accept)
+        gaps = _gaps(study, base, _chosen(candidates, members, accept), held_out)
+        members = [_judged(member, gaps) for member in members]
+        verdict = conclude(base.check, tied(members)) if members else conclude(base.check, [])
+        if members and not tied(members):
+            verdict = failed(base.check, members)
+    else:
+        verdict = conclude(base.check, [])
+    accepted = tuple(accept) if accept is not None else _named(verdict)
+    extended = _extended(candidates, accepted)
+    windows = list(experiment.windows)
+    found = locate(base.hypothesis, windows, base.null) if windows else []
+    left = []
+    if extended is not None and windows:
+        null = null_draws(extended, study.noise, np.random.default_rng(seed))
+        left = locate(extended, windows, null)
+    rivals = tied(members) if verdict.kind == "tie" else []
+    if verdict.kind == "unknown":
+        rivals = sorted(candidates, key=lambda c: -c.gain)[:2]
+    return Criticism(
+        verdict=verdict,
+        accepted=accepted,
+        base=base,
+        candidates=tuple(candidates),
+        extended=extended,
+        posterior=weighted_posterior(extended or base.hypothesis, seed),
+        before=tuple(found),
+        after=tuple(left),
+        gaps=gaps,
+        suggestions=tuple(suggest(laboratory, proposals, rivals)),
+        untested=untested,
+        simulations=count,
+    )
+
+
+def _named(verdict: Verdict) -> tuple[str, ...]:
+    return verdict.effects if verdict.kind == "effect" else ()
+
+
+def _extended(candidates: Sequence[Candidate], accepted: tuple[str, ...]) -> Hypothesis | None:
+    for candidate in candidates:
+        if accepted and set(candidate.names) == set(accepted):
+            return candidate.hypothesis
+    return None
+
+
+def _chosen(
+    candidates: Sequence[Candidate], members: Sequence[Candidate], accept: Sequence[str] | None
+) -> list[Candidate]:
+    """The explanations to be tried on held-out data."""
+    forced = [c for c in candidates if accept and set(c.names) == set(accept)]
+    return list({c.names: c for c in [*members, *forced]}.values())
+
+
+def _gaps(
+    study: Study, base: Base, chosen: Sequence[Candidate], held_out: Sequence[Experiment]
+) -> dict[tuple[str, ...], tuple[Gap, ...]]:
+    count, laboratory, seed = study.plan.held_out, study.laboratory, study.seed
+    if not held_out or not chosen:
+        return {}
+    theta = weighted_posterior(base.hypothesis, seed).draw(seed, count)
+    usual = [predict(laboratory, one, "held out, base", theta) for one in held_out]
+    gaps = {}
+    for candidate in chosen:
+        theta = weighted_posterior(candidate.hypothesis, seed).draw(seed, count)
+        phase = f"held out, {' '.join(candidate.names)}"
+        gaps[candidate.names] = tuple(
+            gap(one, before, predict(laboratory, one, phase, theta), seed)
+            for one, before in zip(held_out, usual, strict=True)
+        )
+    return gaps
+
+
+def _judged(candidate: Candidate, gaps: Mapping[tuple[str, ...], tuple[Gap, ...]]) -> Candidate:
+    """The candidate in view of the held-out data: their evidence counts, and their veto."""
+    found = gaps.get(candidate.names, ())
+    gain = candidate.gain + sum(one.lpd_gain for one in found)
+    return replace(candidate, gain=gain, held=all(one.passes for one in found))
+
+
+def _check_held_out(experiment: Experiment, held_out: Sequence[Experiment]) -> None:
+    for one in held_out:
+        if np.array_equal(one.observed, experiment.observed, equal_nan=True):
+            raise ValueError(
+                f"the held-out experiment {one.label!r} holds the very data that are fitted; "
+                "nothing can be proved on them: give data of another run"
+            )
+
+
+def _check_accept(accept: Sequence[str] | None, extensions: Extensions) -> None:
+    unknown = [name for name in accept or () if name not in extensions]
+    if unknown:
+        raise ValueError(
+            f"cannot accept {', '.join(map(repr, unknown))}; there are {', '.join(extensions)}"
+        )

@@ -1,0 +1,65 @@
+"""Data of one experiment, and the simulator that should explain them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arguments import check_function, checked_array
+from ..base import Simulator
+from .misfit import Window
+from .noise import Noise
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One experiment; others may share the simulator's parameters, not its settings.
+
+    Attributes:
+        simulate: (theta, seeds) -> signals [b, *signal_shape]. theta holds the base parameters
+            and those coefficients that are not neutral.
+        observed: [*signal_shape], NaN where missing.
+        noise: Between the simulator and the data.
+        identity: Names the simulator and its settings in the bank.
+        label: A name for tables.
+        windows: Where to look for disagreement.
+
+    Raises:
+        ValueError: `observed` has no finite value, or a window is of another shape.
+    """
+
+    simulate: Simulator
+    observed: np.ndarray
+    noise: Noise
+    identity: str = ""
+    label: str = "data"
+    windows: tuple[Window, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_function("simulate", self.simulate)
+        observed = checked_array("observed", self.observed)
+        if not np.isfinite(observed).any():
+            raise ValueError(f"{self.label}: observed must have a finite value, got none")
+        for window in self.windows:
+            if window.samples.shape != observed.shape:
+                raise ValueError(
+                    f"{self.label}: the window {dict(window.label)} has the shape "
+                    f"{window.samples.shape}, expected {observed.shape} as observed"
+                )
+        object.__setattr__(self, "observed", observed)
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """An experiment that could be made.
+
+    Attributes:
+        simulate, noise, identity: As of an `Experiment`.
+        shape: Of its output.
+        label: What to do, for a person.
+    """
+
+    simulate: Simulator
+    noise: Noise
+    shape: tuple[int, ...]
+    identity: str = ""
+    label: str = "experiment"

@@ -1,0 +1,90 @@
+"""Whether an explanation holds on data that it was not fitted to."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from ..noise import shrunk_covariance
+from .experiment import Experiment
+from .hypothesis import samples
+from .laboratory import Laboratory
+
+FLOOR = 0.99  # quantile of the noise's RMS below which a gap may be noise
+GAIN = 3.0  # log predictive density that an explanation must win
+REPLICATES = 999
+
+
+class Gap(NamedTuple):
+    """Before and after, on one held-out experiment.
+
+    Attributes:
+        label: The experiment's.
+        before, after: RMS of observed less expected.
+        noise: What noise alone is expected to leave.
+        floor: RMS that noise alone exceeds once in a hundred times.
+        lpd_gain: Log predictive density after less before.
+    """
+
+    label: str
+    before: float
+    after: float
+    noise: float
+    floor: float
+    lpd_gain: float
+
+    @property
+    def passes(self) -> bool:
+        """Whether noise may be all that is left, and the explanation predicts better."""
+        return self.after <= self.floor and self.lpd_gain > GAIN
+
+
+def predict(
+    laboratory: Laboratory, experiment: Experiment, phase: str, theta: Mapping[str, np.ndarray]
+) -> np.ndarray:
+    """Simulated outputs of another experiment at posterior draws, finite samples only [k, n]."""
+    elsewhere = Laboratory(
+        experiment.simulate,
+        laboratory.prior,
+        laboratory.extensions,
+        experiment.identity,
+        laboratory.keeping,
+    )
+    there = np.isfinite(experiment.observed)
+    return elsewhere.run(f"{phase} {experiment.label}", theta).signals[:, there]
+
+
+def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int) -> Gap:
+    """Compare two models' predictions, [k, n] each.
+
+    Both are judged under one covariance, so that neither wins by being vague: noise, and what
+    runs at posterior draws differ by, pooled.
+    """
+    observed = experiment.observed[np.isfinite(experiment.observed)]
+    runs = np.concatenate([before - before.mean(0), after - after.mean(0)])
+    spread = shrunk_covariance(runs, 2)
+    fewer = 1.0 + 1.0 / min(len(before), len(after))  # the mean of few runs is noisy, too
+    at = samples(experiment.observed)
+    simulated = spread.factors @ spread.factors.T + spread.white * np.eye(len(observed))
+    covariance = experiment.noise.covariance(at) + fewer * simulated
+    factor = np.linalg.cholesky(covariance)
+    rng = np.random.default_rng(seed)
+    white = rng.normal(size=(REPLICATES, len(observed)))
+    root = np.linalg.cholesky(
+        fewer * simulated + 1e-12 * np.trace(covariance) / len(observed) * np.eye(len(observed))
+    )
+    null = experiment.noise.draw(rng, at, REPLICATES) + white @ root.T
+
+    def density(mean: np.ndarray) -> float:
+        return -0.5 * float(np.sum(np.linalg.solve(factor, observed - mean) ** 2))
+
+    means = before.mean(0), after.mean(0)
+    sizes = [float(np.sqrt(np.mean((observed - mean) ** 2))) for mean in means]
+    return Gap(
+        label=experiment.label,
+        before=sizes[0],
+        after=sizes[1],
+        noise=float(np.sqrt(np.trace(covariance) / len(observed))),
+        floor=float(np.quantile(np.sqrt(np.mean(null**2, axis=1)), FLOOR)),
+        lpd_gain=density(means[1]) - density(means[0]),
+    )

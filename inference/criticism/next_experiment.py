@@ -1,0 +1,81 @@
+"""Which further experiment would tell explanations apart."""
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from ..noise import shrunk_covariance
+from .experiment import Proposal
+from .hypothesis import samples
+from .laboratory import Laboratory
+from .misfit import MODES, orthonormal, slow_modes
+from .verdict import Candidate
+
+RUNS = 4  # of each explanation in each proposed experiment
+
+
+class Suggestion(NamedTuple):
+    """How well an experiment would separate two explanations.
+
+    Attributes:
+        label: The experiment's.
+        between: The two that it separates least well, each its effects' names.
+        snr: Signal-to-noise ratio of their difference.
+    """
+
+    label: str
+    between: tuple[str, str]
+    snr: float
+
+
+def suggest(
+    laboratory: Laboratory, proposals: Sequence[Proposal], rivals: Sequence[Candidate]
+) -> list[Suggestion]:
+    """Proposals by how well they separate the worst separated rivals, best first."""
+    if len(rivals) < 2:
+        return []
+    made = [_separation(laboratory, proposal, rivals) for proposal in proposals]
+    return sorted(made, key=lambda suggestion: -suggestion.snr)
+
+
+def _separation(
+    laboratory: Laboratory, proposal: Proposal, rivals: Sequence[Candidate]
+) -> Suggestion:
+    elsewhere = Laboratory(
+        proposal.simulate,
+        laboratory.prior,
+        laboratory.extensions,
+        proposal.identity,
+        laboratory.keeping,
+    )
+    names = [" with ".join(rival.names) for rival in rivals]
+    signals = []
+    for name, rival in zip(names, rivals, strict=True):
+        theta = {key: np.full(RUNS, value) for key, value in rival.hypothesis.best.items()}
+        made = elsewhere.run(f"next {proposal.label} {name}", theta).signals
+        signals.append(made.reshape(len(made), -1))
+    snr = {
+        (names[a], names[b]): _distance(proposal, signals, a, b)
+        for a, b in combinations(range(len(rivals)), 2)
+    }
+    worst = min(snr, key=lambda pair: snr[pair])
+    return Suggestion(proposal.label, worst, snr[worst])
+
+
+def _distance(proposal: Proposal, signals: Sequence[np.ndarray], a: int, b: int) -> float:
+    """Length of the whitened difference of two means in its slow part, less what the noise of
+    the runs adds to it."""
+    at = samples(np.zeros(proposal.shape))
+    runs = np.concatenate([s - s.mean(0) for s in signals])
+    spread = shrunk_covariance(runs, len(signals))
+    covariance = proposal.noise.covariance(at) + spread.factors @ spread.factors.T
+    covariance[np.diag_indices_from(covariance)] += spread.white
+    factor = np.linalg.cholesky(covariance)
+    modes = slow_modes(at, MODES) if len(proposal.shape) > 1 else np.eye(len(at.sample))
+    span = orthonormal(np.linalg.solve(factor, modes))
+    difference = signals[a].mean(0) - signals[b].mean(0)
+    length = np.sum((span.T @ np.linalg.solve(factor, difference)) ** 2)
+    noise = span.shape[1] * (1.0 / len(signals[a]) + 1.0 / len(signals[b]))
+    return float(np.sqrt(max(length - noise, 0.0)))
