@@ -1,6 +1,7 @@
 """The prior of the liquid's parameters."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, TypeVar
 
 from .errors import InputError
 
@@ -8,6 +9,13 @@ if TYPE_CHECKING:
     from .inference import Prior
 
 PARAMETERS = ("viscosity", "cohesion")
+V = TypeVar("V")
+
+
+def split_parameters(theta: Mapping[str, V]) -> tuple[dict[str, V], dict[str, V]]:
+    """Parameters of the liquid, and coefficients of effects."""
+    liquid = {name: value for name, value in theta.items() if name in PARAMETERS}
+    return liquid, {name: value for name, value in theta.items() if name not in PARAMETERS}
 
 
 def default_prior() -> "Prior":

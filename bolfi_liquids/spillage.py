@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .prior import split_parameters
+
 if TYPE_CHECKING:
     from .models import Cups
 
@@ -39,7 +41,7 @@ class Outcomes:
     what they are and not by luck.
 
     Attributes:
-        theta: Parameter of the liquid -> values, shape (draws,).
+        theta: Parameter of the liquid, or coefficient of an effect -> values, shape (draws,).
         density: Of the liquid [kg/m3].
         cups: Source, receiver and how the source is turned.
         seeds: One for each draw, shape (draws,).
@@ -60,13 +62,15 @@ class Outcomes:
         from . import models
 
         draws, actions = len(self.seeds), len(seeds)
-        liquid = {name: np.tile(values, actions) for name, values in self.theta.items()}
+        tiled = {name: np.tile(values, actions) for name, values in self.theta.items()}
+        liquid, effects = split_parameters(tiled)
         turned = {name: np.repeat(action[name], draws) for name in ACTION}
         result = models.pour(
             models.Liquid(**liquid, density=self.density),
             models.PourAction(**turned),
             self.cups,
             np.tile(self.seeds, actions),
+            effects=effects,
         )
         columns = [np.asarray(getattr(result, name), np.float64) for name in FRACTIONS]
         return np.stack(columns, axis=-1).reshape(actions, draws, len(FRACTIONS))

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError
+from .prior import split_parameters
 from .recordings import Recording
 
 if TYPE_CHECKING:
@@ -31,16 +33,21 @@ class Stirring:
     recordings: tuple[Recording, ...]
     setups: tuple["StirSetup", ...]
 
-    def simulate(self, theta: dict[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
-        """Inclinations (B, T of all recordings, 2) [rad] for parameters of shape (B,)."""
+    def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
+        """Inclinations (B, T of all recordings, 2) [rad] for parameters of shape (B,).
+
+        Besides the liquid's parameters, theta may hold coefficients of `models.EFFECTS`.
+        """
         from . import models
 
+        liquid, effects = split_parameters(theta)
         signals = [
             models.stir(
-                models.Liquid(**theta, density=recording.number("liquid_density")),
+                models.Liquid(**liquid, density=recording.number("liquid_density")),
                 recording.gripper,
                 setup,
                 seeds,
+                effects,
             )
             for recording, setup in zip(self.recordings, self.setups, strict=True)
         ]

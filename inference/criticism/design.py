@@ -8,7 +8,7 @@ from ..design import sobol
 from ..prior import Prior
 
 REACH = 10.0  # posterior sds: narrower boxes make slopes of noise (errors in variables)
-LEAST, MOST = 0.08, 0.5  # half a box's width
+WIDE, NARROW, MOST = 0.25, 0.08, 0.5  # half a box's width: to begin with, later, and at most
 END = 0.02  # quantile of a coefficient's prior beyond which nothing is simulated
 
 
@@ -23,9 +23,12 @@ class Box(NamedTuple):
         return ((u >= self.low) & (u <= self.high)).all(-1)
 
 
-def around(centre: np.ndarray, sd: np.ndarray) -> Box:
-    """The box about a posterior."""
-    half = np.clip(REACH * sd, LEAST, MOST)
+def around(centre: np.ndarray, sd: np.ndarray, least: float) -> Box:
+    """The box about a posterior, `least` or wider to each side.
+
+    A missing effect displaces the base parameters by many of their sds, so the first box is wide.
+    """
+    half = np.clip(REACH * sd, least, MOST)
     return Box(np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0))
 
 

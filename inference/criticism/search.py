@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .design import Box, around, fill, with_coefficients
+from .design import NARROW, WIDE, Box, around, fill, with_coefficients
 from .extension import extended
 from .hypothesis import Hypothesis, hypothesise
 from .laboratory import Laboratory
@@ -15,6 +15,10 @@ from .noise import Noise
 from .runs import Runs, joined
 from .signatures import Signature, directions, signature
 from .verdict import Candidate, near_best, tied
+
+
+PASSES = 2  # of a refit, the second only if the first moved the best fit out of its box
+SECOND = 6.0  # log likelihood that a second effect must gain
 
 
 @dataclass(frozen=True)
@@ -89,15 +93,21 @@ class Base(NamedTuple):
     runs: Runs
 
 
+def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Box]:
+    """The base model, fitted to runs near where it fits best; they, and where they are."""
+    dimension = len(study.laboratory.prior)
+    everywhere = Box(np.zeros(dimension), np.ones(dimension))
+    runs = study.run("start", everywhere, (), study.plan.start) if earlier is None else earlier
+    first = study.hypothesis((), runs)
+    box = around(first.u, first.sd, WIDE)
+    runs = joined([runs, study.run("base", box, (), study.plan.base)])
+    return study.hypothesis((), runs), runs, box
+
+
 def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
     """Fit the base model, learn every effect's signature, test; and what could not be run."""
     laboratory, plan = study.laboratory, study.plan
-    everywhere = Box(np.zeros(len(laboratory.prior)), np.ones(len(laboratory.prior)))
-    runs = study.run("start", everywhere, (), plan.start) if earlier is None else earlier
-    first = study.hypothesis((), runs)
-    box = around(first.u, first.sd)
-    runs = joined([runs, study.run("base", box, (), plan.base)])
-    base = study.hypothesis((), runs)
+    base, runs, box = fit_base(study, earlier)
     parts = [runs]
     singles, untested = {}, []
     for name in laboratory.extensions:
@@ -132,52 +142,53 @@ def explain(
     }
     found: dict[tuple[str, ...], Candidate] = {c.names: c for c in first.values()}
     for one in near_best(list(first.values()), plan.refits):
-        runs = joined([runs, _near(study, one)])
-        found[one.names] = study.candidate(
-            base.hypothesis, one.names, runs, base.signatures, refitted=True
-        )
+        found[one.names], runs = _refit(study, base, one, runs)
     remaining = tied(list(found.values()))
     if not remaining:
         pairs, runs = _pairs(study, base, found, runs)
         found |= {pair.names: pair for pair in pairs}
-        remaining = tied(pairs)
+        remaining = tied([c for c in found.values() if len(c.names) == 1]) or tied(pairs)
     forced = tuple(accept or ())
     if forced and not (forced in found and found[forced].refitted):
-        first_fit = study.candidate(base.hypothesis, forced, runs, base.signatures)
-        runs = joined([runs, _near(study, first_fit)])
-        found[forced] = study.candidate(
-            base.hypothesis, forced, runs, base.signatures, refitted=True
-        )
+        unrefined = study.candidate(base.hypothesis, forced, runs, base.signatures)
+        found[forced], runs = _refit(study, base, unrefined, runs)
     return list(found.values()), remaining, runs
 
 
-def _near(study: Study, candidate: Candidate) -> Runs:
-    """Runs about where an explanation fits best."""
-    box = around(candidate.hypothesis.u, candidate.hypothesis.sd)
+def _refit(study: Study, base: Base, candidate: Candidate, runs: Runs) -> tuple[Candidate, Runs]:
+    """The candidate, simulated where it fits best and fitted again, until it stays there."""
     names = candidate.names
-    return study.run(f"refit {' '.join(names)}", box, names, study.plan.refit)
+    for attempt in range(PASSES):
+        box = around(candidate.hypothesis.u, candidate.hypothesis.sd, NARROW)
+        phase = f"refit {' '.join(names)} {attempt}"
+        runs = joined([runs, study.run(phase, box, names, study.plan.refit)])
+        candidate = study.candidate(base.hypothesis, names, runs, base.signatures, refitted=True)
+        if box.holds(candidate.hypothesis.u):
+            break
+    return candidate, runs
 
 
 def _pairs(
-    study: Study, base: Base, found: Mapping[tuple[str, ...], Candidate], runs: Runs
+    study: Study, base: Base, found: dict[tuple[str, ...], Candidate], runs: Runs
 ) -> tuple[list[Candidate], Runs]:
-    """The best effect with a second one; both must gain."""
+    """The best effect with a second one; both must gain, and `found` learns how each does alone."""
     best = max(found.values(), key=lambda c: c.gain)
     pairs = [
         study.candidate(base.hypothesis, (*best.names, other), runs, base.signatures)
         for other in base.singles
         if other not in best.names
     ]
-    refitted = []
+    tried = []
     for pair in sorted(pairs, key=lambda c: -c.gain)[: study.plan.refits]:
-        runs = joined([runs, _near(study, pair)])
-        again = study.candidate(base.hypothesis, pair.names, runs, base.signatures, True)
-        alone = max(found[(name,)].gain for name in pair.names)
-        refitted.append(again if again.gain > alone + SECOND else _refused(again))
-    return refitted, runs
-
-
-SECOND = 6.0  # log likelihood that a second effect must gain
+        again, runs = _refit(study, base, pair, runs)
+        if again.accepted:
+            for name in again.names:
+                if not found[(name,)].refitted:
+                    found[(name,)], runs = _refit(study, base, found[(name,)], runs)
+            alone = max(found[(name,)].gain for name in again.names)
+            again = again if again.gain > alone + SECOND else _refused(again)
+        tried.append(again)
+    return tried, runs
 
 
 def _refused(candidate: Candidate) -> Candidate:

@@ -9,6 +9,7 @@ from .misfit import Check
 
 ALARM = 0.05  # p-value below which the base model is rejected
 ACCEPTED = 0.01  # p-value above which an extended model is not
+LEAST_GAIN = 2.0  # log likelihood below which an effect explains nothing
 MARGIN = 4.0  # log likelihood by which one explanation must excel another
 
 
@@ -37,7 +38,7 @@ class Candidate:
 
     @property
     def accepted(self) -> bool:
-        return self.check.p_value > ACCEPTED and self.held
+        return self.check.p_value > ACCEPTED and self.gain > LEAST_GAIN and self.held
 
 
 @dataclass(frozen=True)

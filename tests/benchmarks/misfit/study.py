@@ -27,7 +27,7 @@ from stand_in import EXTENSIONS, NOISE, PRIOR, REST, UNKNOWN, Stir
 
 from bolfi_liquids import inference
 
-STRENGTHS = (1.0, 2.5, 6.0)  # RMS of what the effect changes, over the cameras' noise
+STRENGTHS = (2.5, 6.0)  # RMS of what the effect changes, over the cameras' noise
 NULLS, SETS, OUTSIDE_SETS = 300, 50, 40
 FIRST, SECOND = Stir(), Stir(points=7, radius=0.02, speed=0.08)
 QUIET = int(REST * 30)  # samples before the gripper moves

@@ -1,0 +1,107 @@
+"""Stirring recordings as experiments that the engine can criticise."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .errors import InputError
+from .noise import sensor_noise
+from .recordings import Recording
+from .stirring import Stirring, stirring_of
+from .strokes import resting, windows
+
+if TYPE_CHECKING:
+    from .inference import AutoregressiveNoise, Experiment, Extension, Noise, UsualResidual
+
+TREND = 2  # degree of what the hanging stick does by itself in the second before it is moved
+SHORTEST = 8  # samples at rest from which noise can be learned
+SAME_PATH = 1e-3  # m, up to which two paths are the same
+
+
+def camera_noise(recordings: Sequence[Recording]) -> "AutoregressiveNoise":
+    """Noise of the cameras, from the time in which the gripper rests before it stirs.
+
+    Raises:
+        InputError: They rest too shortly for that.
+    """
+    from .inference import rest_noise
+
+    rests = [_longest_seen(recording.inclination[resting(recording)]) for recording in recordings]
+    rests = [rest for rest in rests if len(rest) >= SHORTEST]
+    if not rests:
+        names = ", ".join(recording.path.name for recording in recordings)
+        raise InputError(
+            f"fewer than {SHORTEST} samples before the gripper moves, too few to learn the "
+            "cameras' noise from",
+            where=names,
+            fix="let the gripper rest for a second before it stirs",
+        )
+    return rest_noise(rests, trend=TREND)
+
+
+def _longest_seen(rest: np.ndarray) -> np.ndarray:
+    """The part after the last missing sample, or before the first, whichever is longer."""
+    missing = np.flatnonzero(~np.isfinite(rest).all(axis=1))
+    if not missing.size:
+        return rest
+    return max(rest[: missing[0]], rest[missing[-1] + 1 :], key=len)
+
+
+def stir_experiment(
+    stirring: Stirring, usual: "UsualResidual | None", label: str
+) -> "Experiment":
+    """Recordings of one liquid, with the cameras' noise and what the simulator usually lacks."""
+    from .inference import Experiment, SumOfNoises
+
+    measured = camera_noise(stirring.recordings)
+    noise: Noise = measured if usual is None else SumOfNoises((measured, usual))
+    return Experiment(
+        stirring.simulate, stirring.observed, noise, stirring.identity, label, windows(stirring)
+    )
+
+
+def stir_extensions(names: Sequence[str] | None = None) -> dict[str, "Extension"]:
+    """The registered effects that act in a stir, or the named ones among them."""
+    return effects_of("stir", names)
+
+
+def effects_of(scene: str, names: Sequence[str] | None = None) -> dict[str, "Extension"]:
+    """The registered effects that act in a scene, "stir" or "pour".
+
+    Raises:
+        InputError: A name that is not registered.
+    """
+    from .inference import Extension
+    from .models import EFFECTS
+
+    unknown = [name for name in names or () if name not in EFFECTS]
+    if unknown:
+        raise InputError(
+            f"there is no effect {', '.join(unknown)}",
+            where="--effects",
+            fix=f"choose from {', '.join(EFFECTS)}",
+        )
+    return {
+        name: Extension(effect.prior, effect.neutral, effect.unit, effect.text)
+        for name, effect in EFFECTS.items()
+        if scene in effect.scenes and (names is None or name in names)
+    }
+
+
+def same_experiment(one: Recording, other: Recording) -> bool:
+    """Whether two recordings are of one path, sample by sample."""
+    if one.inclination.shape != other.inclination.shape:
+        return False
+    apart = np.abs(one.gripper.position - other.gripper.position).max()
+    return bool(apart < SAME_PATH and np.allclose(one.time, other.time, rtol=0.1))
+
+
+def one_stirring(recording: Recording, particles: int) -> Stirring:
+    """A single recording's simulator."""
+    return stirring_of([recording], particles)
+
+
+def white_variance(recording: Recording) -> float:
+    """Variance of the cameras' noise as the quick measure sees it [rad2]."""
+    return sensor_noise(recording.inclination) ** 2
