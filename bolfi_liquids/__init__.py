@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .calibration import Calibration
     from .calibrator import calibrate
+    from .criticiser import criticise
+    from .criticism import Criticism
     from .models import Cups
     from .pouring import choose_pour
     from .recordings import Recording, open_recording
@@ -15,11 +17,13 @@ if TYPE_CHECKING:
 __version__ = version("bolfi-liquids")
 __all__ = [
     "Calibration",
+    "Criticism",
     "Cups",
     "Recording",
     "__version__",
     "calibrate",
     "choose_pour",
+    "criticise",
     "open_recording",
     "report",
 ]
@@ -27,10 +31,12 @@ __all__ = [
 # loaded on use: `import bolfi_liquids` must cost neither JAX nor Taichi
 _HOME = {
     "Calibration": ".calibration",
+    "Criticism": ".criticism",
     "Cups": ".models",
     "Recording": ".recordings",
     "calibrate": ".calibrator",
     "choose_pour": ".pouring",
+    "criticise": ".criticiser",
     "open_recording": ".recordings",
     "report": ".reporting",
 }

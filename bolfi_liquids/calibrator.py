@@ -12,6 +12,7 @@ from .prior import check_prior, default_prior
 from .progress import Simulate, progress_bar, reported
 from .provenance import run_record
 from .recordings import Recording, open_recording
+from .recordings_kept import keep_recordings
 from .run_directory import POSTERIOR, enter_run, open_bank
 from .settings import MIN_SIMULATIONS, CalibrationSettings
 from .stirring import Stirring, stirring_of
@@ -82,6 +83,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     stirring = stirring_of(opened, particles)
     run = Path(out)
     enter_run(run, run_record(settings, prior, stirring), resume=resume)
+    keep_recordings(run, stirring.recordings)
     if not is_calibrated(run):
         _calibrate(run, stirring, prior, settings, progress)
     return Calibration.open(run)

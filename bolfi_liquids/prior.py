@@ -1,5 +1,6 @@
 """The prior of the liquid's parameters."""
 
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, TypeVar
 
@@ -30,6 +31,30 @@ def default_prior() -> "Prior":
     from .inference import Prior
 
     return Prior({"viscosity": dist.LogUniform(3e-3, 20.0), "cohesion": dist.Uniform(0.0, 1.0)})
+
+
+_DESCRIBED = re.compile(r"(\w+)\((.*)\)")
+
+
+def read_prior(described: Mapping[str, str]) -> "Prior":
+    """The prior that `describe_prior` described.
+
+    Raises:
+        ValueError: a distribution that numpyro does not know by that name.
+    """
+    import numpyro.distributions as dist
+
+    from .inference import Prior
+
+    distributions = {}
+    for name, text in described.items():
+        found = _DESCRIBED.fullmatch(text)
+        made = getattr(dist, found[1], None) if found else None
+        if found is None or made is None:
+            raise ValueError(f"the prior of {name} is {text!r}, which no distribution describes")
+        pairs = (pair.split("=") for pair in found[2].split(", ") if pair)
+        distributions[name] = made(**{key: float(value) for key, value in pairs})
+    return Prior(distributions)
 
 
 def check_prior(prior: "Prior") -> None:

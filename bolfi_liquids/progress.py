@@ -40,6 +40,36 @@ def progress_bar(task: str, total: int, *, shown: bool) -> Iterator[Advance]:
         yield lambda steps: bar.advance(handle, steps)
 
 
+@contextmanager
+def phases(*, shown: bool) -> Iterator[Callable[[str, int], None]]:
+    """A line for each phase of long work, with a running count of simulations.
+
+    Yields:
+        Called with the phase and the simulations finished in it since the last call.
+    """
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    if not shown:
+        yield lambda phase, finished: None
+        return
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    count, current = 0, ""
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        handle = bar.add_task("starting", total=None)
+
+        def report(phase: str, finished: int) -> None:
+            nonlocal count, current
+            count += finished
+            if phase != current and not console.is_terminal:
+                console.print(phase, highlight=False)
+            current = phase
+            bar.update(handle, description=f"{phase} ({count} simulations)")
+
+        yield report
+
+
 def reported(simulate: Simulate, advance: Advance) -> Simulate:
     """The same simulator, which moves a bar on after each batch."""
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 RUN_TOML = "run.toml"
 SIMULATIONS = "simulations.sqlite"
 POSTERIOR = "posterior.nc"
+CRITICISM = "criticism.nc"
 POUR = "pour.nc"
 REPORT = "report.html"
 

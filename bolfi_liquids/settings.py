@@ -1,8 +1,12 @@
 """Settings of a calibration and of a pour, checked before anything is simulated."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from .errors import InputError
+
+if TYPE_CHECKING:
+    from .inference import Plan
 
 SURROGATES = ("signal", "discrepancy")
 SAMPLERS = ("nuts", "emcee")
@@ -71,6 +75,47 @@ class PourSettings:
         for name, least in {"iterations": MIN_SIMULATIONS, "draws": 1, "seed": 0}.items():
             _at_least(least, name, getattr(self, name))
         _one_of(RISKS, "risk", self.risk)
+
+
+@dataclass(frozen=True)
+class CriticismSettings:
+    """What decides a criticism besides its data.
+
+    Attributes:
+        effects: Names of those that are considered; None is all.
+        accept: Names of those that join the model whatever the verdict.
+        seed: Of everything random.
+        batch: Simulations run at the same time.
+    """
+
+    effects: tuple[str, ...] | None = None
+    accept: tuple[str, ...] | None = None
+    seed: int = 0
+    batch: int = 8
+
+    def __post_init__(self):
+        _at_least(0, "seed", self.seed)
+
+    @property
+    def stir_plan(self) -> "Plan":
+        """Runs of each step for stirs: with six baselines, at most 350 in all."""
+        from .inference import Plan
+
+        return Plan(base=24, extension=8, refit=12)
+
+    @property
+    def pour_plan(self) -> "Plan":
+        """The same for pours, of which each run makes the whole table."""
+        from .inference import Plan
+
+        return Plan(start=12, base=12, extension=8, refit=10)
+
+    @property
+    def clean_plan(self) -> "Plan":
+        """The same for each clean recording."""
+        from .inference import Plan
+
+        return Plan(start=8, base=8)
 
 
 def _at_least(lowest: int, name: str, value: object) -> None:

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .errors import InputError
-from .noise import sensor_noise
 from .recordings import Recording
-from .stirring import Stirring, stirring_of
+from .stirring import Stirring
 from .strokes import resting, windows
 
 if TYPE_CHECKING:
@@ -48,9 +47,7 @@ def _longest_seen(rest: np.ndarray) -> np.ndarray:
     return max(rest[: missing[0]], rest[missing[-1] + 1 :], key=len)
 
 
-def stir_experiment(
-    stirring: Stirring, usual: "UsualResidual | None", label: str
-) -> "Experiment":
+def stir_experiment(stirring: Stirring, usual: "UsualResidual | None", label: str) -> "Experiment":
     """Recordings of one liquid, with the cameras' noise and what the simulator usually lacks."""
     from .inference import Experiment, SumOfNoises
 
@@ -59,11 +56,6 @@ def stir_experiment(
     return Experiment(
         stirring.simulate, stirring.observed, noise, stirring.identity, label, windows(stirring)
     )
-
-
-def stir_extensions(names: Sequence[str] | None = None) -> dict[str, "Extension"]:
-    """The registered effects that act in a stir, or the named ones among them."""
-    return effects_of("stir", names)
 
 
 def effects_of(scene: str, names: Sequence[str] | None = None) -> dict[str, "Extension"]:
@@ -95,13 +87,3 @@ def same_experiment(one: Recording, other: Recording) -> bool:
         return False
     apart = np.abs(one.gripper.position - other.gripper.position).max()
     return bool(apart < SAME_PATH and np.allclose(one.time, other.time, rtol=0.1))
-
-
-def one_stirring(recording: Recording, particles: int) -> Stirring:
-    """A single recording's simulator."""
-    return stirring_of([recording], particles)
-
-
-def white_variance(recording: Recording) -> float:
-    """Variance of the cameras' noise as the quick measure sees it [rad2]."""
-    return sensor_noise(recording.inclination) ** 2

@@ -1,5 +1,5 @@
 """What the robot does: stirring patterns."""
 
-from .patterns import Path, star
+from .patterns import Path, circle, star
 
-__all__ = ["Path", "star"]
+__all__ = ["Path", "circle", "star"]

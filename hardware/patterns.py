@@ -74,3 +74,43 @@ def _travelled(
     cruising = np.clip(elapsed - ramp, 0.0, duration - 2.0 * ramp)
     slowing = peak * falling - 0.5 * peak / ramp * falling**2
     return 0.5 * peak / ramp * rising**2 + peak * cruising + slowing
+
+
+def circle(
+    *,
+    speed: float,
+    height: float,
+    radius: float = 0.02,
+    turns: float = 4.0,
+    rest: float = 0.5,
+    rate: float = 30.0,
+) -> Path:
+    """Turns on a horizontal circle about the cup's axis, reached and left along a spiral.
+
+    The radius grows over the first half turn and shrinks over the last, both smoothly.
+
+    Args:
+        speed: On the circle [m/s].
+        height: Gripper above the cup's floor [m].
+        radius: Of the circle [m].
+        turns: In all, at least 2.
+        rest: Time at rest before and after [s].
+        rate: Samples per second.
+
+    Raises:
+        ValueError: an argument is not positive and finite, or there are fewer than 2 turns.
+    """
+    given = {"speed": speed, "height": height, "radius": radius, "rest": rest, "rate": rate}
+    for name, value in given.items():
+        if not (np.isfinite(value) and value > 0):
+            raise ValueError(f"{name} must be positive and finite, got {value}")
+    if not (np.isfinite(turns) and turns >= 2):
+        raise ValueError(f"turns must be at least 2, got {turns}")
+    duration = turns * 2.0 * np.pi * radius / speed
+    time = np.arange(0.0, duration + 2.0 * rest, 1.0 / rate)
+    turned = turns * np.clip((time - rest) / duration, 0.0, 1.0)
+    near = np.clip(2.0 * np.minimum(turned, turns - turned), 0.0, 1.0)
+    out = radius * np.sin(0.5 * np.pi * near) ** 2
+    angle = 2.0 * np.pi * turned
+    plane = np.column_stack([out * np.cos(angle), out * np.sin(angle)])
+    return Path(time, np.column_stack([plane, np.full(len(time), height)]))

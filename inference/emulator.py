@@ -160,12 +160,9 @@ def predictive_draws(key: jax.Array, emulator: Emulator, u: np.ndarray) -> np.nd
     return basis.centre + basis.scale * (standard + np.sqrt(remainder.white) * white)
 
 
-def covariance(emulator: Emulator, u: np.ndarray) -> np.ndarray:
-    """Of a new simulated output about the mean at u [d]: [m, m], run-to-run noise included."""
-    basis, remainder = emulator.basis, emulator.remainder
+def latent_covariance(emulator: Emulator, u: np.ndarray) -> np.ndarray:
+    """Of the emulator's own error in the mean output at u [d]: [m, m], run-to-run noise apart."""
+    basis = emulator.basis
     variance = predict_scores(emulator.gp, u[None])[1][:, 0]
-    of_scores = emulator.noise + np.diag(variance)
-    standard = basis.vectors @ of_scores @ basis.vectors.T
-    standard += remainder.factors @ remainder.factors.T
-    standard[np.diag_indices_from(standard)] += remainder.white
+    standard = (basis.vectors * variance) @ basis.vectors.T
     return standard * np.outer(basis.scale, basis.scale)

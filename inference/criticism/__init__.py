@@ -1,9 +1,12 @@
 """Criticism of a fitted simulator: where it and the data disagree, and what it lacks."""
 
+from .clean import own_residual
 from .criticise import Criticism, criticise
 from .experiment import Experiment, Proposal
 from .extension import Extension
 from .held_out import Gap
+from .hypothesis import Hypothesis
+from .laboratory import Keeping
 from .misfit import Check, Found, Window
 from .next_experiment import Suggestion
 from .noise import AutoregressiveNoise, KnownNoise, Noise, SumOfNoises, rest_noise
@@ -20,6 +23,8 @@ __all__ = [
     "Extension",
     "Found",
     "Gap",
+    "Hypothesis",
+    "Keeping",
     "KnownNoise",
     "Noise",
     "Plan",
@@ -30,6 +35,7 @@ __all__ = [
     "Verdict",
     "Window",
     "criticise",
+    "own_residual",
     "rest_noise",
     "usual_residual",
 ]

@@ -5,17 +5,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..bank import SimulationBank
 from ..prior import Prior
 from .experiment import Experiment, Proposal
 from .extension import Extensions, check_extensions
 from .held_out import Gap, gap, predict
 from .hypothesis import Hypothesis
-from .laboratory import Keeping, Laboratory, Report, silent
+from .laboratory import Keeping, Laboratory
 from .misfit import Found, locate, null_draws
 from .next_experiment import Suggestion, suggest
 from .posterior import Interval, Weighted, weighted_posterior
 from .search import Base, Plan, Study, examine, explain
+from .signatures import confusion
 from .verdict import Candidate, Verdict, conclude, failed, tied
 
 
@@ -35,6 +35,7 @@ class Criticism:
         gaps: On held-out data, for each explanation that came so far: names -> gaps.
         suggestions: Experiments that would separate explanations, best first.
         untested: Effects whose simulations failed.
+        tied: Names of each explanation that remains, best first.
         simulations: Runs that were asked for, those found in the bank included.
     """
 
@@ -49,12 +50,35 @@ class Criticism:
     gaps: Mapping[tuple[str, ...], tuple[Gap, ...]]
     suggestions: tuple[Suggestion, ...]
     untested: tuple[str, ...]
+    tied: tuple[tuple[str, ...], ...]
     simulations: int
 
     @property
     def coefficients(self) -> dict[str, Interval]:
         """Of the accepted effects."""
         return {name: self.posterior.interval(name) for name in self.accepted}
+
+    @property
+    def singles(self) -> dict[str, Candidate]:
+        """The explanations by one effect."""
+        return {one.names[0]: one for one in self.candidates if len(one.names) == 1}
+
+    @property
+    def leading(self) -> Candidate | None:
+        """The accepted explanation, or the best of those that are tied."""
+        wanted = [set(self.accepted)] if self.accepted else []
+        if self.verdict.kind == "tie":
+            wanted += [set(names) for names in self.tied]
+        for names in wanted:
+            for candidate in self.candidates:
+                if set(candidate.names) == names:
+                    return candidate
+        return None
+
+    @property
+    def confusion(self) -> np.ndarray:
+        """Cosines between the effects' signatures [e, e]."""
+        return confusion(self.base.signatures)
 
 
 def criticise(  # noqa: PLR0913  the one call that most users make
@@ -67,10 +91,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     proposals: Sequence[Proposal] = (),
     accept: Sequence[str] | None = None,
     plan: Plan | None = None,
-    bank: SimulationBank | None = None,
-    batch: int = 8,
-    seed: int = 0,
-    report: Report = silent,
+    keeping: Keeping | None = None,
 ) -> Criticism:
     """Test a simulator against data, and look for what it lacks.
 
@@ -80,7 +101,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     apart are a tie; where no one passes, pairs are tried. On held-out data an explanation must
     leave no more than noise and predict better than the base model, or it is withdrawn.
 
-    All runs are kept in the bank under seeds that derive from `seed`: the same call repeats
+    All runs are kept in the bank under seeds that derive from one: the same call repeats
     nothing that was finished and concludes the same.
 
     Args:
@@ -92,10 +113,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         proposals: Experiments that could be made next.
         accept: Effects to accept, whatever the verdict; None accepts what the verdict names.
         plan: How many runs each step may make.
-        bank: Keeps the runs; None forgets them.
-        batch: Runs of one call of the simulator.
-        seed: Fixes everything random.
-        report: Told of every batch: phase, number of runs.
+        keeping: Where runs are kept and how they are made; it also holds the seed of everything
+            random. None forgets them.
 
     Raises:
         ValueError: an argument makes no sense, or a held-out experiment is the fitted one.
@@ -109,10 +128,11 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     def counted(phase: str, finished: int) -> None:
         nonlocal count
         count += finished
-        report(phase, finished)
+        keeping.report(phase, finished)
 
-    keeping = Keeping(SimulationBank() if bank is None else bank, batch, seed, counted)
-    laboratory = Laboratory(experiment.simulate, prior, extensions, experiment.identity, keeping)
+    keeping = keeping or Keeping()
+    seed, counting = keeping.seed, replace(keeping, report=counted)
+    laboratory = Laboratory(experiment.simulate, prior, extensions, experiment.identity, counting)
     study = Study(laboratory, experiment.observed, experiment.noise, plan or Plan(), seed)
     before = None if earlier is None else laboratory.table(*earlier)
     base, untested = examine(study, before)
@@ -149,6 +169,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         gaps=gaps,
         suggestions=tuple(suggest(laboratory, proposals, rivals)),
         untested=untested,
+        tied=tuple(one.names for one in tied(members)),
         simulations=count,
     )
 

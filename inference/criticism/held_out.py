@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..noise import shrunk_covariance
 from .experiment import Experiment
 from .hypothesis import samples
 from .laboratory import Laboratory
+from .run_noise import errors_of, smooth_covariance
 
 FLOOR = 0.99  # quantile of the noise's RMS below which a gap may be noise
 GAIN = 3.0  # log predictive density that an explanation must win
@@ -61,19 +61,17 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
     runs at posterior draws differ by, pooled.
     """
     observed = experiment.observed[np.isfinite(experiment.observed)]
-    runs = np.concatenate([before - before.mean(0), after - after.mean(0)])
-    spread = shrunk_covariance(runs, 2)
     fewer = 1.0 + 1.0 / min(len(before), len(after))  # the mean of few runs is noisy, too
     at = samples(experiment.observed)
-    simulated = spread.factors @ spread.factors.T + spread.white * np.eye(len(observed))
-    covariance = experiment.noise.covariance(at) + fewer * simulated
+    series = experiment.observed.ndim > 1
+    simulated = fewer * smooth_covariance(errors_of([before, after]), at, series)
+    covariance = experiment.noise.covariance(at) + simulated
     factor = np.linalg.cholesky(covariance)
     rng = np.random.default_rng(seed)
+    values, vectors = np.linalg.eigh(simulated)
     white = rng.normal(size=(REPLICATES, len(observed)))
-    root = np.linalg.cholesky(
-        fewer * simulated + 1e-12 * np.trace(covariance) / len(observed) * np.eye(len(observed))
-    )
-    null = experiment.noise.draw(rng, at, REPLICATES) + white @ root.T
+    runs = (white * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    null = experiment.noise.draw(rng, at, REPLICATES) + runs
 
     def density(mean: np.ndarray) -> float:
         return -0.5 * float(np.sum(np.linalg.solve(factor, observed - mean) ** 2))

@@ -8,12 +8,13 @@ from scipy.linalg import solve_triangular
 
 from .._float64 import in_float64
 from ..bolfi import Bolfi
-from ..emulator import covariance, predict
+from ..emulator import latent_covariance, predict
 from ..families import SignalFamily
 from ..noise import Layout
 from ..posterior import Fit
 from ..signal_surrogate import SignalSurrogate
 from .noise import Noise
+from .run_noise import run_noise
 from .runs import Runs
 
 COMPONENTS = 10
@@ -121,12 +122,13 @@ def hypothesise(
     assert isinstance(surrogate, SignalSurrogate) and surrogate.known is not None
     u = surrogate.minimum()
     expected = predict(surrogate.emulator, u[None])[0][0]
+    own = run_noise(surrogate.emulator, surrogate.output.layout, surrogate.output.series)
     return Hypothesis(
         names=names,
         fit=fit,
         u=u,
         difference=surrogate.observed - expected,
-        spread=covariance(surrogate.emulator, u),
+        spread=latent_covariance(surrogate.emulator, u) + own,
         noise=surrogate.known.covariance,
     )
 

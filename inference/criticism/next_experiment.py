@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..noise import shrunk_covariance
 from .experiment import Proposal
 from .hypothesis import samples
 from .laboratory import Laboratory
 from .misfit import MODES, orthonormal, slow_modes
+from .run_noise import errors_of, smooth_covariance
 from .verdict import Candidate
 
 RUNS = 4  # of each explanation in each proposed experiment
@@ -68,12 +68,11 @@ def _distance(proposal: Proposal, signals: Sequence[np.ndarray], a: int, b: int)
     """Length of the whitened difference of two means in its slow part, less what the noise of
     the runs adds to it."""
     at = samples(np.zeros(proposal.shape))
-    runs = np.concatenate([s - s.mean(0) for s in signals])
-    spread = shrunk_covariance(runs, len(signals))
-    covariance = proposal.noise.covariance(at) + spread.factors @ spread.factors.T
-    covariance[np.diag_indices_from(covariance)] += spread.white
+    series = len(proposal.shape) > 1
+    runs = smooth_covariance(errors_of(signals), at, series)
+    covariance = proposal.noise.covariance(at) + runs
     factor = np.linalg.cholesky(covariance)
-    modes = slow_modes(at, MODES) if len(proposal.shape) > 1 else np.eye(len(at.sample))
+    modes = slow_modes(at, MODES) if series else np.eye(len(at.sample))
     span = orthonormal(np.linalg.solve(factor, modes))
     difference = signals[a].mean(0) - signals[b].mean(0)
     length = np.sum((span.T @ np.linalg.solve(factor, difference)) ** 2)

@@ -16,7 +16,6 @@ from .runs import Runs, joined
 from .signatures import Signature, directions, signature
 from .verdict import Candidate, near_best, tied
 
-
 PASSES = 2  # of a refit, the second only if the first moved the best fit out of its box
 SECOND = 6.0  # log likelihood that a second effect must gain
 

@@ -65,7 +65,7 @@ def usual_residual(
     mean[0] = max(mean[0] - noise_variance, 0.0)
     kept = [residual for residual, again in zip(residuals, same, strict=True) if again]
     directions = np.stack(kept) if kept else np.zeros((0, 0, 0))
-    return UsualResidual(_positive(mean), directions, len(residuals))
+    return UsualResidual(positive_autocovariance(mean), directions, len(residuals))
 
 
 def _autocovariance(residual: np.ndarray, lags: int) -> np.ndarray:
@@ -77,7 +77,7 @@ def _autocovariance(residual: np.ndarray, lags: int) -> np.ndarray:
     return found
 
 
-def _positive(autocovariance: np.ndarray) -> np.ndarray:
+def positive_autocovariance(autocovariance: np.ndarray) -> np.ndarray:
     """The nearest autocovariance whose spectrum is not negative."""
     even = np.concatenate([autocovariance, autocovariance[:0:-1]])
     spectrum = np.maximum(np.fft.rfft(even).real, 0.0)

@@ -70,8 +70,7 @@ def examine(one: Set) -> dict:
         PRIOR,
         EXTENSIONS,
         held_out=[experiment(SECOND, seeds[1], "other star")],
-        batch=64,
-        seed=seed,
+        keeping=inference.Keeping(batch=64, seed=seed),
     )
     return {
         "effect": effect,

@@ -1,0 +1,73 @@
+"""Recordings believed to lack nothing: what the simulator gets wrong on them is usual."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .noise import sensor_noise
+from .recordings import Recording
+from .stir_experiment import same_experiment, stir_experiment
+from .stirring import stirring_of
+
+if TYPE_CHECKING:
+    from .inference import Extension, Keeping, Plan, Prior, UsualResidual
+    from .stirring import Stirring
+
+
+@dataclass(frozen=True, eq=False)
+class Clean:
+    """A clean recording, and what the calibrated simulator leaves of it.
+
+    Attributes:
+        recording: The recording.
+        residual: Recorded less expected [rad], shape (T, 2), NaN where missing.
+    """
+
+    recording: Recording
+    residual: NDArray[np.float64]
+
+
+def clean_residuals(
+    recordings: Sequence[Recording],
+    particles: int,
+    prior: "Prior",
+    extensions: "dict[str, Extension]",
+    plan: "Plan",
+    keeping: "Keeping",
+) -> list[Clean]:
+    """Calibrate the simulator on each of them in turn.
+
+    Raises:
+        RuntimeError: Every simulation of one of them failed.
+    """
+    from .inference import own_residual
+
+    found = []
+    for recording in recordings:
+        stirring = stirring_of([recording], particles)
+        experiment = stir_experiment(stirring, None, recording.path.name)
+
+        def report(phase: str, finished: int, name: str = recording.path.name) -> None:
+            keeping.report(f"baseline {name}", finished)
+
+        own = replace(keeping, report=report)
+        found.append(Clean(recording, own_residual(experiment, prior, extensions, own, plan)))
+    return found
+
+
+def usual_for(stirring: "Stirring", clean: Sequence[Clean]) -> "UsualResidual | None":
+    """What is usual for an experiment; None where nothing is known to be.
+
+    A clean recording of the same path also shows where on it the simulator errs.
+    """
+    from .inference import usual_residual
+
+    if not clean:
+        return None
+    only = stirring.recordings[0] if len(stirring.recordings) == 1 else None
+    same = [only is not None and same_experiment(one.recording, only) for one in clean]
+    noise = float(np.mean([sensor_noise(one.recording.inclination) ** 2 for one in clean]))
+    return usual_residual([one.residual for one in clean], noise, same)

@@ -1,0 +1,117 @@
+"""What a criticism found: verdict, evidence, extended calibration, plots."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from .calibration import Calibration
+from .errors import InputError
+from .run_directory import CRITICISM
+from .summary import read_summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from xarray import Dataset, DataTree
+
+
+@dataclass(frozen=True, eq=False)
+class Criticism:
+    """A finished criticism; nothing here simulates.
+
+    Attributes:
+        base: The calibration that was criticised.
+        tree: criticism.nc; its groups are listed in `criticism_results`.
+        summary: The section "criticise" of summary.json.
+    """
+
+    base: Calibration
+    tree: "DataTree"
+    summary: Mapping[str, Any]
+
+    @classmethod
+    def open(cls, run: str | Path) -> "Criticism":
+        """Read a finished criticism.
+
+        Raises:
+            InputError: There is none in the directory.
+        """
+        from .results import read_tree
+
+        run = Path(run)
+        if not is_criticised(run):
+            raise InputError(
+                "the calibration in it was not criticised",
+                where=str(run),
+                fix=f"run: bolfi-liquids criticise {run}",
+            )
+        tree = read_tree(run / CRITICISM, fix=f"write it again: bolfi-liquids criticise {run}")
+        summary = read_summary(run)["criticise"]
+        return cls(Calibration.open(run), tree, MappingProxyType(summary))
+
+    @property
+    def verdict(self) -> str:
+        """ "none", "effect", "tie" or "unknown"."""
+        return str(self.summary["verdict"])
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """What the verdict names: the effect, or those that are tied."""
+        return tuple(self.summary["effects"])
+
+    @property
+    def table(self) -> "Dataset":
+        """Over effects: SNR of a typical one, score, gain, p-value, coefficient, status."""
+        return self.tree["stirs/effects"].to_dataset()
+
+    @property
+    def calibration(self) -> Calibration:
+        """The extended calibration, with the accepted effects; the base one without."""
+        if not self.summary["accepted"]:
+            return self.base
+        tree = self.base.tree.copy()
+        tree["posterior"] = self.tree["posterior"]
+        section = {**self.base.summary, "best": self.summary["best"]}
+        return replace(self.base, tree=tree, summary=MappingProxyType(section))
+
+    def plot_residuals(self) -> "Figure":
+        """Observed less expected against time, before and after, strokes that differ marked."""
+        from .criticism_figures import residual_plot
+
+        return residual_plot(self.tree["stirs"])
+
+    def plot_scores(self, source: str = "stirs") -> "Figure":
+        """How well each effect alone would explain the difference."""
+        from .criticism_figures import score_plot
+
+        return score_plot(self.tree[source])
+
+    def plot_confusion(self, source: str = "stirs") -> "Figure":
+        """Which effects look alike in these data."""
+        from .criticism_figures import confusion_plot
+
+        return confusion_plot(self.tree[source])
+
+    def plot_coefficient(self) -> "Figure":
+        """Posterior of the accepted effects' coefficients.
+
+        Raises:
+            ValueError: no effect was accepted.
+        """
+        from .criticism_figures import coefficient_plot
+
+        if not self.summary["accepted"]:
+            raise ValueError("no effect was accepted, so there is no coefficient to plot")
+        return coefficient_plot(self.tree, self.summary["accepted"])
+
+
+def is_criticised(run: Path) -> bool:
+    """Whether a run's criticism was finished."""
+    return (run / CRITICISM).is_file() and "criticise" in read_summary(run)
+
+
+def latest_calibration(run: str | Path) -> Calibration:
+    """The calibration of a run, extended by what a criticism accepted."""
+    run = Path(run)
+    return Criticism.open(run).calibration if is_criticised(run) else Calibration.open(run)

@@ -1,0 +1,116 @@
+"""Outcomes of pours as an experiment that the engine can criticise."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .pour_table import PourTable
+from .prior import split_parameters
+
+if TYPE_CHECKING:
+    from numpyro.distributions import Distribution
+
+    from .inference import Experiment, Prior
+    from .models import Cups
+
+WEIGHING = 0.005  # sd of a weighed fraction
+NARROWEST = 0.05  # sd of the log of a parameter, and share of the range of another
+OUTCOMES = ("spilled", "retained")
+
+
+@dataclass(frozen=True)
+class Pouring:
+    """Pours of one liquid as a simulator.
+
+    Attributes:
+        angular_velocity, distance: Of each pour [rad/s], [m], shape (A,).
+        cups: Source and receiver.
+        density: Of the liquid [kg/m3].
+    """
+
+    angular_velocity: NDArray[np.float64]
+    distance: NDArray[np.float64]
+    cups: "Cups"
+    density: float
+
+    def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
+        """Spilled and retained fractions (B, A, 2) of liquids (B,), each pouring all actions."""
+        from . import models
+
+        pours, runs = len(self.distance), len(seeds)
+        liquid, effects = split_parameters(
+            {name: np.repeat(values, pours) for name, values in theta.items()}
+        )
+        # each pour of a run has a packing of its own
+        own = np.add.outer(np.asarray(seeds) * 1009 % 2**31, np.arange(pours)) % 2**31
+        result = models.pour(
+            models.Liquid(**liquid, density=self.density),
+            models.PourAction(np.tile(self.angular_velocity, runs), np.tile(self.distance, runs)),
+            self.cups,
+            own.ravel(),
+            effects=effects,
+        )
+        outcomes = [np.asarray(getattr(result, name), np.float64) for name in OUTCOMES]
+        return np.stack(outcomes, axis=-1).reshape(runs, pours, len(OUTCOMES))
+
+    @property
+    def identity(self) -> str:
+        """A text that two equal experiments share."""
+        actions = [self.angular_velocity.tolist(), self.distance.tolist()]
+        return json.dumps(["pours", self.cups.settings(), self.density, actions], sort_keys=True)
+
+
+def pour_experiment(table: PourTable, cups: "Cups", density: float) -> "Experiment":
+    """The pours of a table, each outcome a window of its own."""
+    from .inference import Experiment, KnownNoise, Window
+
+    pouring = Pouring(table.angular_velocity, table.distance, cups, density)
+    every = np.ones(table.observed.shape, bool)
+    windows = [
+        Window({"outcome": name}, every & (np.arange(len(OUTCOMES)) == k))
+        for k, name in enumerate(OUTCOMES)
+    ]
+    return Experiment(
+        pouring.simulate,
+        table.observed,
+        KnownNoise(WEIGHING),
+        pouring.identity,
+        table.path.name,
+        tuple(windows),
+    )
+
+
+def as_prior(theta: Mapping[str, NDArray], weights: NDArray, prior: "Prior") -> "Prior":
+    """What stirring taught, as the prior of the next experiment.
+
+    Each parameter by itself: log-normal where its prior is log-uniform, else normal within the
+    prior's bounds. Stirring hardly correlates them.
+
+    Args:
+        theta: Points of the posterior, name -> (n,).
+        weights: Theirs, shape (n,).
+        prior: Of the same parameters before the stirring.
+    """
+    import numpyro.distributions as dist
+
+    from .inference import Prior
+
+    def moments(values: NDArray) -> tuple[float, float]:
+        mean = float(np.average(values, weights=weights))
+        return mean, float(np.sqrt(np.average((values - mean) ** 2, weights=weights)))
+
+    ends = prior.from_unit(np.array([[0.0] * len(prior), [1.0] * len(prior)]))
+
+    def learned(name: str, before: "Distribution") -> "Distribution":
+        if isinstance(before, dist.LogUniform):
+            mean, sd = moments(np.log(theta[name]))
+            return dist.LogNormal(mean, max(sd, NARROWEST))
+        mean, sd = moments(theta[name])
+        low, high = (float(end) for end in ends[name])
+        return dist.TruncatedNormal(mean, max(sd, NARROWEST * (high - low)), low=low, high=high)
+
+    return Prior({name: learned(name, before) for name, before in prior.distributions.items()})

@@ -1,0 +1,97 @@
+"""Stirs and pours that could be made next."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .pour_experiment import OUTCOMES, WEIGHING, Pouring
+from .recordings import Gripper, Recording
+from .stirring import Stirring
+from .strokes import speed
+
+if TYPE_CHECKING:
+    from .inference import Noise, Proposal
+    from .models import Cups
+
+FASTER, SLOWER, FASTEST = 1.6, 0.5, 0.2  # times the recording's speed; and at most, m/s
+ROOM = 0.8  # of the way from the axis to the wall that the stick may go
+RATE = 30.0  # samples a second
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """A stir that was not made: what a simulator needs of a recording."""
+
+    gripper: Gripper
+    recording: Recording
+
+    @property
+    def attrs(self):
+        return self.recording.attrs
+
+    @property
+    def time(self):
+        return self.gripper.time
+
+    def number(self, name: str) -> float:
+        """A numeric attribute of the recording whose rig it repeats."""
+        return self.recording.number(name)
+
+
+def stir_proposals(stirring: Stirring, noise: "Noise") -> list["Proposal"]:
+    """The first recording's rig on other paths."""
+    from .hardware import circle, star
+    from .inference import Proposal
+    from .models import StirSetup
+
+    recording, setup = stirring.recordings[0], stirring.setups[0]
+    fast = float(np.quantile(speed(recording), 0.95))
+    height = float(recording.gripper.position[0, 2])
+    position = recording.gripper.position[:, :2]
+    wide = float(np.linalg.norm(position, axis=1).max())
+    most = ROOM * (setup.cup.radius - setup.stick.radius)
+    radius = min(max(wide, 0.01), most)
+    faster, slower = min(FASTER * fast, FASTEST), SLOWER * fast
+    paths = {
+        f"the star at {100 * faster:.0f} cm/s": star(speed=faster, height=height, radius=radius),
+        f"the star at {100 * slower:.0f} cm/s": star(speed=slower, height=height, radius=radius),
+        f"a star of 7 points at {100 * fast:.0f} cm/s": star(
+            speed=fast, height=height, radius=0.8 * radius, points=7
+        ),
+        f"four circles at {100 * fast:.0f} cm/s": circle(
+            speed=fast, height=height, radius=0.8 * radius
+        ),
+    }
+    made = []
+    for label, path in paths.items():
+        planned = Planned(Gripper(path.time, path.position), recording)
+        particles = setup.particles
+        own = Stirring((planned,), (StirSetup.from_recording(planned, particles=particles),))  # type: ignore[arg-type]
+        shape = (len(path.time), 2)
+        made.append(Proposal(own.simulate, noise, shape, own.identity, label))
+    return made
+
+
+def pour_proposals(cups: "Cups", density: float, tried: int = 2) -> list["Proposal"]:
+    """Pours at the middle and the ends of what may be chosen."""
+    from .inference import KnownNoise, Proposal
+
+    rates = np.linspace(*cups.angular_velocity_range, tried + 1)[:tried]
+    made = []
+    for rate in rates:
+        distance = np.linspace(*cups.distance_range, 4)[1:3]
+        pouring = Pouring(np.full(len(distance), rate), distance, cups, density)
+        label = f"pours at {np.degrees(rate):.0f} deg/s from " + " and ".join(
+            f"{100 * d:.1f}" for d in distance
+        )
+        made.append(
+            Proposal(
+                pouring.simulate,
+                KnownNoise(WEIGHING),
+                (len(distance), len(OUTCOMES)),
+                pouring.identity,
+                f"{label} cm",
+            )
+        )
+    return made

@@ -1,0 +1,91 @@
+"""What runs of equal parameters differ by, as a covariance over the output."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..compiled import leave_one_out
+from ..emulator import Emulator
+from ..noise import Layout
+from .usual import positive_autocovariance
+
+SMOOTHED = 15  # samples over which the noise's size varies
+
+
+def run_noise(emulator: Emulator, layout: Layout, series: bool) -> np.ndarray:
+    """Covariance [m, m] of the simulator's own noise.
+
+    Runs are few and the values many, so what the runs show is shrunk (Ledoit and Wolf 2004):
+    for a series towards noise of a size that changes slowly and of one autocorrelation, both
+    seen by all runs, samples and channels together; else towards independent noise. The usual
+    target, white noise, would take smooth noise for white: the slow part would be thought
+    quieter than it is, and right models be refused for it.
+    """
+    return smooth_covariance(own_errors(emulator), layout, series)
+
+
+def smooth_covariance(errors: np.ndarray, layout: Layout, series: bool) -> np.ndarray:
+    """Covariance [m, m] of what few draws [n, m] of noise show, see `run_noise`."""
+    target = _target(errors, layout) if series else np.diag(np.mean(errors**2, 0))
+    return _shrunk(errors, target)
+
+
+def errors_of(groups: Sequence[np.ndarray]) -> np.ndarray:
+    """Draws of the noise [n, m] from groups of runs [k, m] of equal parameters."""
+    return np.concatenate(
+        [(group - group.mean(0)) * np.sqrt(len(group) / max(len(group) - 1, 1)) for group in groups]
+    )
+
+
+def own_errors(emulator: Emulator) -> np.ndarray:
+    """One draw of the noise from each run that was learned from [n, m].
+
+    Of the scores, what is left when a run is left out, less what the emulator's own error adds
+    to it; of the rest, what the components leave.
+    """
+    basis, n = emulator.basis, len(emulator.outputs)
+    used = basis.used
+    mean, variance = (np.asarray(part)[:used, :n] for part in leave_one_out(emulator.gp))
+    noise = np.exp(2.0 * np.asarray(emulator.gp.hyper.log_noise))[:used, None]
+    left = np.asarray(emulator.gp.data.y)[:used, :n] - mean
+    scores = left * np.sqrt(np.minimum(noise / variance, 1.0))
+    # the components lean towards the runs that made them
+    lost = np.sqrt(n / max(n - used - 1, 1))
+    standard = scores.T @ basis.vectors[:, :used].T + lost * basis.residuals(emulator.outputs)
+    return standard * basis.scale
+
+
+def _target(errors: np.ndarray, layout: Layout) -> np.ndarray:
+    """D^1/2 R D^1/2: a slowly varying size, and one autocorrelation."""
+    size = np.empty(errors.shape[1])
+    channels = [np.flatnonzero(layout.channel == c) for c in np.unique(layout.channel)]
+    least = 1e-6 * np.mean(errors**2)
+    for here in channels:
+        window = np.ones(min(SMOOTHED, len(here)))
+        weight = np.convolve(np.ones(len(here)), window, "same")
+        variance = np.convolve(np.mean(errors[:, here] ** 2, 0), window, "same") / weight
+        size[here] = np.sqrt(np.maximum(variance, least))
+    scaled = errors / size
+    lags = int(layout.sample.max() - layout.sample.min()) + 1
+    found = np.zeros(lags)
+    for here in channels:
+        rows = np.zeros((len(errors), lags))
+        rows[:, layout.sample[here] - layout.sample.min()] = scaled[:, here]
+        power = np.abs(np.fft.rfft(rows, 2 * lags, axis=1)) ** 2
+        found += np.fft.irfft(power.mean(0), 2 * lags)[:lags] / lags
+    correlation = positive_autocovariance(found / len(channels))
+    apart = np.abs(np.subtract.outer(layout.sample, layout.sample))
+    same = np.equal.outer(layout.channel, layout.channel)
+    return correlation[apart] * same * np.outer(size, size) / correlation[0]
+
+
+def _shrunk(errors: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """A mixture of the sample covariance and the target, of least expected squared error."""
+    n = len(errors)
+    sample = errors.T @ errors / n
+    lengths = np.sum(errors**2, 1)
+    own = np.sum(sample**2)
+    error = (np.mean(lengths**2) - own) / n
+    distance = np.sum((sample - target) ** 2)
+    intensity = float(np.clip(error / distance, 0.0, 1.0)) if distance > 0 else 1.0
+    return (1.0 - intensity) * sample + intensity * target
