@@ -114,7 +114,7 @@ def _residual(findings: Findings, name: str, source: "inference.Criticism") -> "
     else:
         table = findings.table
         assert table is not None
-        dims = ("pour", "outcome")
+        dims = ("outcome", "pour")
         coords = {
             "angular_velocity": ("pour", table.angular_velocity, {"units": "rad s-1"}),
             "distance": ("pour", table.distance, {"units": "m"}),
@@ -139,16 +139,10 @@ def _expected(hypothesis: "inference.Hypothesis") -> tuple[np.ndarray, np.ndarra
 def _where(source: "inference.Criticism") -> "Dataset":
     from xarray import Dataset
 
-    labels: dict[str, list] = {}
-    for found in source.before:
-        for key in found.label:
-            labels.setdefault(key, [])
+    keys = {key: type(value) for found in source.before for key, value in found.label.items()}
     columns: dict[str, Any] = {
-        key: (
-            "window",
-            [found.label.get(key, _NOTHING[_kind(source, key)]) for found in source.before],
-        )
-        for key in labels
+        key: ("window", [found.label.get(key, _NOTHING[kind]) for found in source.before])
+        for key, kind in keys.items()
     }
     for when, windows in (("before", source.before), ("after", source.after)):
         if windows:
@@ -159,10 +153,6 @@ def _where(source: "inference.Criticism") -> "Dataset":
 
 
 _NOTHING: dict[type, Any] = {str: "", int: -1, float: float("nan")}
-
-
-def _kind(source: "inference.Criticism", key: str) -> type:
-    return next(type(found.label[key]) for found in source.before if key in found.label)
 
 
 def _effects(source: "inference.Criticism") -> "Dataset":

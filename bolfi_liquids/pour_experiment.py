@@ -38,7 +38,7 @@ class Pouring:
     density: float
 
     def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
-        """Spilled and retained fractions (B, A, 2) of liquids (B,), each pouring all actions."""
+        """Spilled and retained fractions (B, 2, A) of liquids (B,), each pouring all actions."""
         from . import models
 
         pours, runs = len(self.distance), len(seeds)
@@ -55,7 +55,7 @@ class Pouring:
             effects=effects,
         )
         outcomes = [np.asarray(getattr(result, name), np.float64) for name in OUTCOMES]
-        return np.stack(outcomes, axis=-1).reshape(runs, pours, len(OUTCOMES))
+        return np.stack([outcome.reshape(runs, pours) for outcome in outcomes], axis=1)
 
     @property
     def identity(self) -> str:
@@ -71,7 +71,7 @@ def pour_experiment(table: PourTable, cups: "Cups", density: float) -> "Experime
     pouring = Pouring(table.angular_velocity, table.distance, cups, density)
     every = np.ones(table.observed.shape, bool)
     windows = [
-        Window({"outcome": name}, every & (np.arange(len(OUTCOMES)) == k))
+        Window({"outcome": name}, every & (np.arange(len(OUTCOMES)) == k)[:, None])
         for k, name in enumerate(OUTCOMES)
     ]
     return Experiment(

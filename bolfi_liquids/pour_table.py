@@ -35,8 +35,8 @@ class PourTable:
 
     @property
     def observed(self) -> NDArray[np.float64]:
-        """Spilled and retained fractions, shape (A, 2); what was received is the rest."""
-        return self.fractions[:, [0, 2]]
+        """Spilled and retained fractions, shape (2, A); what was received is the rest."""
+        return self.fractions[:, [0, 2]].T
 
 
 def open_pours(path: str | Path, liquid: str | None = None) -> PourTable:

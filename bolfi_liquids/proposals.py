@@ -89,7 +89,7 @@ def pour_proposals(cups: "Cups", density: float, tried: int = 2) -> list["Propos
             Proposal(
                 pouring.simulate,
                 KnownNoise(WEIGHING),
-                (len(distance), len(OUTCOMES)),
+                (len(OUTCOMES), len(distance)),
                 pouring.identity,
                 f"{label} cm",
             )

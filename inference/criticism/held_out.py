@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..output import SERIES
 from .experiment import Experiment
 from .hypothesis import samples
 from .laboratory import Laboratory
@@ -63,7 +64,7 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
     observed = experiment.observed[np.isfinite(experiment.observed)]
     fewer = 1.0 + 1.0 / min(len(before), len(after))  # the mean of few runs is noisy, too
     at = samples(experiment.observed)
-    series = experiment.observed.ndim > 1
+    series = len(experiment.observed) >= SERIES
     simulated = fewer * smooth_covariance(errors_of([before, after]), at, series)
     covariance = experiment.noise.covariance(at) + simulated
     factor = np.linalg.cholesky(covariance)

@@ -1,5 +1,6 @@
 """A model, base or extended, fitted to data: what is left, and how large that may be."""
 
+import warnings
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,6 +10,7 @@ from scipy.linalg import solve_triangular
 from .._float64 import in_float64
 from ..bolfi import Bolfi
 from ..emulator import latent_covariance, predict
+from ..emulator_checks import EmulatorWarning
 from ..families import SignalFamily
 from ..noise import Layout
 from ..posterior import Fit
@@ -117,7 +119,10 @@ def hypothesise(
     family = SignalFamily(noise=noise.covariance(samples(observed)), components=COMPONENTS)
     engine = Bolfi(prior, observed, surrogate=family, capacity=1)
     engine.tell({name: told.theta[name] for name in prior.names}, told.signals, told.seeds)
-    fit = engine.fit()
+    with warnings.catch_warnings():
+        # that a model cannot reach the data is what is being looked for
+        warnings.simplefilter("ignore", EmulatorWarning)
+        fit = engine.fit()
     surrogate = fit.learned
     assert isinstance(surrogate, SignalSurrogate) and surrogate.known is not None
     u = surrogate.minimum()

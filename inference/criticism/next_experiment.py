@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..output import SERIES
 from .experiment import Proposal
 from .hypothesis import samples
 from .laboratory import Laboratory
@@ -68,7 +69,7 @@ def _distance(proposal: Proposal, signals: Sequence[np.ndarray], a: int, b: int)
     """Length of the whitened difference of two means in its slow part, less what the noise of
     the runs adds to it."""
     at = samples(np.zeros(proposal.shape))
-    series = len(proposal.shape) > 1
+    series = proposal.shape[0] >= SERIES
     runs = smooth_covariance(errors_of(signals), at, series)
     covariance = proposal.noise.covariance(at) + runs
     factor = np.linalg.cholesky(covariance)

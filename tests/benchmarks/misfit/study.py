@@ -30,6 +30,7 @@ from bolfi_liquids import inference
 STRENGTHS = (2.5, 6.0)  # RMS of what the effect changes, over the cameras' noise
 NULLS, SETS, OUTSIDE_SETS = 300, 50, 40
 FIRST, SECOND = Stir(), Stir(points=7, radius=0.02, speed=0.08)
+LARGEST = 1e4  # coefficient
 QUIET = int(REST * 30)  # samples before the gripper moves
 
 Set = tuple[str, float, int]
@@ -97,6 +98,8 @@ def _coefficient(base: dict, effect: str, strength: float, rng: np.random.Genera
     low, high = 0.0, 1e-4
     while _change(base, effect, sign * high) < strength:
         low, high = high, 2.0 * high
+        if high > LARGEST:  # it changes no more, however large it is
+            return sign * low
     size = root_scalar(
         lambda c: _change(base, effect, sign * c) - strength, bracket=(low, high), rtol=1e-3
     ).root
