@@ -7,7 +7,14 @@ import typer
 
 from . import __version__, cli_check
 from .cli_errors import OneLineErrors
-from .settings import RISKS, SAMPLERS, SURROGATES, CalibrationSettings, PourSettings
+from .settings import (
+    RISKS,
+    SAMPLERS,
+    SURROGATES,
+    CalibrationSettings,
+    CriticismSettings,
+    PourSettings,
+)
 
 RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="Directory of a run.")]
 
@@ -81,6 +88,54 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
 
 
 @app.command()
+def criticise(  # noqa: PLR0913  one parameter for each option
+    run: RunArgument,
+    held_out: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="RECORDING", help="Same liquid, other path or speed: the proof."),
+    ] = None,
+    baseline: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="RECORDING", help="Believed to lack nothing, of any liquid."),
+    ] = None,
+    pours: Annotated[
+        Path | None, typer.Option(metavar="CSV", help="What pours of the liquid spilled.")
+    ] = None,
+    liquid: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Whose pours, if CSV has several.")
+    ] = None,
+    cups: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="cups.toml; without it, the bundled one.")
+    ] = None,
+    effects: Annotated[
+        list[str] | None, typer.Option(metavar="EFFECT", help="To consider; all if not given.")
+    ] = None,
+    accept: Annotated[
+        list[str] | None, typer.Option(metavar="EFFECT", help="Joins the model in any case.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of everything random.")] = CriticismSettings.seed,
+) -> None:
+    """Find where simulation and recording disagree, and which effect is missing."""
+    from .criticiser import criticise as run_criticise
+    from .cups import open_cups
+    from .pour_table import open_pours
+
+    if pours is None and (liquid or cups):
+        raise typer.BadParameter("--liquid and --cups are of --pours, which is missing")
+    run_criticise(
+        run,
+        held_out=held_out or (),
+        baseline=baseline or (),
+        pours=None if pours is None else open_pours(pours, liquid),
+        cups=None if cups is None else open_cups(cups),
+        effects=effects or None,
+        accept=accept or None,
+        seed=seed,
+    )
+    _print_section(run, "criticise")
+
+
+@app.command()
 def pour(
     run: RunArgument,
     cups: Annotated[
@@ -94,13 +149,16 @@ def pour(
         ),
     ] = PourSettings.risk,
 ) -> None:
-    """Choose the pour that spills least over all that the liquid might be."""
-    from .calibration import Calibration
+    """Choose the pour that spills least over all that the liquid might be.
+
+    What a criticism accepted is part of the liquid.
+    """
+    from .criticism import latest_calibration
     from .cups import bundled_cups, open_cups
     from .pouring import choose_pour
 
     chosen_cups = bundled_cups() if cups is None else open_cups(cups)
-    choose_pour(Calibration.open(run), chosen_cups, iterations=iterations, risk=risk)
+    choose_pour(latest_calibration(run), chosen_cups, iterations=iterations, risk=risk)
     _print_section(run, "pour")
 
 
@@ -131,9 +189,14 @@ def _print_section(run: Path, name: str) -> None:
     from rich.console import Console
 
     from .summary import read_summary
-    from .tables import print_calibration, print_pour
+    from .tables import print_calibration, print_criticism, print_pour
 
-    {"calibrate": print_calibration, "pour": print_pour}[name](read_summary(run)[name], Console())
+    printers = {
+        "calibrate": print_calibration,
+        "criticise": print_criticism,
+        "pour": print_pour,
+    }
+    printers[name](read_summary(run)[name], Console())
 
 
 def main() -> None:

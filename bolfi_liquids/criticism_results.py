@@ -297,24 +297,38 @@ def _degrees(value: float | None) -> float | None:
 
 
 def _gap_deg(source: "inference.Criticism") -> dict[str, float | None]:
-    """RMS before and after, of what was accepted or else of the best of what is tied."""
+    """The gap before and after, by what was accepted or else by the best of what is tied.
+
+    A gap is the RMS of observed less expected beyond what the cameras and the simulator's own
+    noise would leave of a right model, in quadrature; the RMS itself stands beside it.
+    """
     best = source.leading
     base = source.base.hypothesis
-    expected = float(np.sqrt(np.mean(np.diag(base.spread + base.noise))))
+    own = np.diag(base.spread) + np.diag(source.measurement)
     gaps = () if best is None else source.gaps.get(best.names, ())
 
-    def pooled(field: str) -> float | None:
-        if not gaps:
-            return None
-        return float(np.sqrt(np.mean([getattr(gap, field) ** 2 for gap in gaps])))
+    def pooled(values: list[float]) -> float | None:
+        return float(np.sqrt(np.mean(np.square(values)))) if values else None
 
-    return {
-        "before": _degrees(_rms(base)),
-        "after": _degrees(_rms(None if best is None else best.hypothesis)),
-        "held_out_before": _degrees(pooled("before")),
-        "held_out_after": _degrees(pooled("after")),
-        "noise": _degrees(pooled("noise") or expected),
+    after = None if best is None else _rms(best.hypothesis)
+    noise = float(np.sqrt(np.mean(own)))
+    numbers = {
+        "before": _beyond(_rms(base), noise),
+        "after": _beyond(after, noise),
+        "held_out_before": pooled([gap.excess[0] for gap in gaps]),
+        "held_out_after": pooled([gap.excess[1] for gap in gaps]),
+        "noise": noise,
+        "rms_before": _rms(base),
+        "rms_after": after,
+        "held_out_rms_before": pooled([gap.before for gap in gaps]),
+        "held_out_rms_after": pooled([gap.after for gap in gaps]),
+        "held_out_noise": pooled([gap.noise for gap in gaps]),
     }
+    return {name: _degrees(value) for name, value in numbers.items()}
+
+
+def _beyond(rms: float | None, noise: float) -> float | None:
+    return None if rms is None else max(rms**2 - noise**2, 0.0) ** 0.5
 
 
 def _pour_gap(source: "inference.Criticism") -> dict[str, Any]:

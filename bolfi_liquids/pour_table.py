@@ -3,6 +3,7 @@
 import csv
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,11 +83,11 @@ def open_pours(path: str | Path, liquid: str | None = None) -> PourTable:
     )
 
 
-def _of_liquid(path: Path, rows: list, liquid: str | None) -> tuple[list, str]:
+def _of_liquid(path: Path, rows: list[Any], liquid: str | None) -> tuple[list[Any], str]:
     names = sorted({(row.get("liquid") or "").strip() for _, row in rows})
     if liquid is None and len(names) <= 1:
         return rows, "".join(names)
-    if liquid not in names:
+    if liquid is None or liquid not in names:
         raise InputError(
             f"holds pours of {', '.join(names)}" + (f", not of {liquid}" if liquid else ""),
             where=str(path),

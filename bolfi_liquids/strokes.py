@@ -69,7 +69,7 @@ def windows(stirring: "Stirring") -> tuple["Window", ...]:
     def whole(member: int, samples: NDArray[np.bool_], planes: tuple[int, ...]) -> NDArray:
         there = np.zeros((*stirring.member.shape, len(PLANE_NAMES)), bool)
         rows = np.flatnonzero(stirring.member == member)[samples]
-        there[np.ix_(rows, planes)] = True
+        there[rows[:, None], list(planes)] = True
         return there
 
     found = []

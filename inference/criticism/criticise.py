@@ -9,13 +9,15 @@ from ..prior import Prior
 from .experiment import Experiment, Proposal
 from .extension import Extensions, check_extensions
 from .held_out import Gap, gap, predict
-from .hypothesis import Hypothesis
+from .hypothesis import Hypothesis, samples
 from .laboratory import Keeping, Laboratory
 from .misfit import Found, locate, null_draws
 from .next_experiment import Suggestion, suggest
+from .noise import Noise
 from .posterior import Interval, Weighted, weighted_posterior
 from .search import Base, Plan, Study, examine, explain
 from .signatures import confusion
+from .usual import without_usual
 from .verdict import Candidate, Verdict, conclude, failed, tied
 
 
@@ -35,6 +37,7 @@ class Criticism:
         gaps: On held-out data, for each explanation that came so far: names -> gaps.
         suggestions: Experiments that would separate explanations, best first.
         untested: Effects whose simulations failed.
+        noise: The experiment's.
         tied: Names of each explanation that remains, best first.
         simulations: Runs that were asked for, those found in the bank included.
     """
@@ -50,6 +53,7 @@ class Criticism:
     gaps: Mapping[tuple[str, ...], tuple[Gap, ...]]
     suggestions: tuple[Suggestion, ...]
     untested: tuple[str, ...]
+    noise: Noise
     tied: tuple[tuple[str, ...], ...]
     simulations: int
 
@@ -74,6 +78,11 @@ class Criticism:
                 if set(candidate.names) == names:
                     return candidate
         return None
+
+    @property
+    def measurement(self) -> np.ndarray:
+        """Covariance of the data's own noise, without what is usual for the simulator [n, n]."""
+        return without_usual(self.noise).covariance(samples(self.base.hypothesis.fit.observed))
 
     @property
     def confusion(self) -> np.ndarray:
@@ -123,15 +132,14 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     check_extensions(prior, extensions)
     _check_held_out(experiment, held_out)
     _check_accept(accept, extensions)
-    count = 0
+    kept, count = keeping or Keeping(), 0
 
     def counted(phase: str, finished: int) -> None:
         nonlocal count
         count += finished
-        keeping.report(phase, finished)
+        kept.report(phase, finished)
 
-    keeping = keeping or Keeping()
-    seed, counting = keeping.seed, replace(keeping, report=counted)
+    seed, counting = kept.seed, replace(kept, report=counted)
     laboratory = Laboratory(experiment.simulate, prior, extensions, experiment.identity, counting)
     study = Study(laboratory, experiment.observed, experiment.noise, plan or Plan(), seed)
     before = None if earlier is None else laboratory.table(*earlier)
@@ -169,6 +177,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         gaps=gaps,
         suggestions=tuple(suggest(laboratory, proposals, rivals)),
         untested=untested,
+        noise=experiment.noise,
         tied=tuple(one.names for one in tied(members)),
         simulations=count,
     )

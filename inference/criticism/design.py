@@ -18,9 +18,9 @@ class Box(NamedTuple):
     low: np.ndarray
     high: np.ndarray
 
-    def holds(self, u: np.ndarray) -> np.ndarray:
-        """Which of u [n, d] lie inside, bool [n]."""
-        return ((u >= self.low) & (u <= self.high)).all(-1)
+    def holds(self, u: np.ndarray) -> "np.bool | np.ndarray":
+        """Whether u [..., d] lies inside, bool [...]."""
+        return np.all((u >= self.low) & (u <= self.high), axis=-1)
 
 
 def around(centre: np.ndarray, sd: np.ndarray, least: float) -> Box:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
 import numpyro.distributions as dist
 
 from ..prior import Prior
@@ -31,7 +32,9 @@ class Extension:
     def __post_init__(self) -> None:
         if not math.isfinite(self.neutral):
             raise ValueError(f"an extension's neutral must be finite, got {self.neutral!r}")
-        inside = Prior({"coefficient": self.prior}).contains({"coefficient": self.neutral})
+        inside = Prior({"coefficient": self.prior}).contains(
+            {"coefficient": np.asarray(self.neutral)}
+        )
         if not inside:
             raise ValueError(
                 f"an extension's neutral must lie in the prior's support, got {self.neutral!r}"

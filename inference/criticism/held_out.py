@@ -10,6 +10,7 @@ from .experiment import Experiment
 from .hypothesis import samples
 from .laboratory import Laboratory
 from .run_noise import errors_of, smooth_covariance
+from .usual import without_usual
 
 FLOOR = 0.99  # quantile of the noise's RMS below which a gap may be noise
 GAIN = 3.0  # log predictive density that an explanation must win
@@ -22,8 +23,8 @@ class Gap(NamedTuple):
     Attributes:
         label: The experiment's.
         before, after: RMS of observed less expected.
-        noise: What noise alone is expected to leave.
-        floor: RMS that noise alone exceeds once in a hundred times.
+        noise: RMS that measurement and the simulator's own noise would leave of a right model.
+        floor: RMS that these, and what is usual for the simulator, exceed once in a hundred times.
         lpd_gain: Log predictive density after less before.
     """
 
@@ -33,6 +34,12 @@ class Gap(NamedTuple):
     noise: float
     floor: float
     lpd_gain: float
+
+    @property
+    def excess(self) -> tuple[float, float]:
+        """Before and after, less the noise (in quadrature)."""
+        before, after = (max(rms**2 - self.noise**2, 0.0) ** 0.5 for rms in self[1:3])
+        return before, after
 
     @property
     def passes(self) -> bool:
@@ -67,6 +74,7 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
     series = len(experiment.observed) >= SERIES
     simulated = fewer * smooth_covariance(errors_of([before, after]), at, series)
     covariance = experiment.noise.covariance(at) + simulated
+    measured = without_usual(experiment.noise).covariance(at)
     factor = np.linalg.cholesky(covariance)
     rng = np.random.default_rng(seed)
     values, vectors = np.linalg.eigh(simulated)
@@ -83,7 +91,7 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
         label=experiment.label,
         before=sizes[0],
         after=sizes[1],
-        noise=float(np.sqrt(np.trace(covariance) / len(observed))),
+        noise=float(np.sqrt(np.trace(measured + simulated) / len(observed))),
         floor=float(np.quantile(np.sqrt(np.mean(null**2, axis=1)), FLOOR)),
         lpd_gain=density(means[1]) - density(means[0]),
     )

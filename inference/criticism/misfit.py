@@ -108,7 +108,8 @@ def locate(hypothesis: Hypothesis, windows: list[Window], null: np.ndarray) -> l
     """
     output = hypothesis.surrogate.output
     residual = hypothesis.project(hypothesis.whiten(hypothesis.difference))
-    found, sizes, usual = [], [], []
+    seen: list[tuple[Mapping[str, object], float, float]] = []
+    sizes, usual = [], []
     kept = [w for w in windows if w.samples.ravel()[output.present].any()]
     for window in kept:
         inside = output.average(window.samples.ravel()[output.present].astype(float)) > 0.5
@@ -122,13 +123,15 @@ def locate(hypothesis: Hypothesis, windows: list[Window], null: np.ndarray) -> l
         usual.append(np.sum((span.T @ null) ** 2, 0))
         rms = float(np.sqrt(np.mean(hypothesis.difference[inside] ** 2)))
         mean = white[:, 0] / max(float(np.linalg.norm(white[:, 0])), 1e-12)
-        found.append((window.label, rms, float(mean @ residual[:, 0])))
+        seen.append((window.label, rms, float(mean @ residual[:, 0])))
     if not kept:
         return []
     alone = exceedance(np.stack(usual), np.array(sizes))
     least = _own_exceedance(np.stack(usual)).min(0)
     together = exceedance(-np.tile(least, (len(alone), 1)), -alone)
-    return [Found(*seen, float(p)) for seen, p in zip(found, together, strict=True)]
+    return [
+        Found(label, rms, z, float(p)) for (label, rms, z), p in zip(seen, together, strict=True)
+    ]
 
 
 def slow_modes(layout: Layout, count: int, inside: np.ndarray | None = None) -> np.ndarray:

@@ -35,7 +35,7 @@ class Runs:
     def of(self, names: tuple[str, ...]) -> "Runs":
         """Those in which no other effect than the named ones acts."""
         others = [k for k, effect in enumerate(self.effects) if effect not in names]
-        return self.rows(~self.acting[:, others].any(1))
+        return self.rows(self.acting[:, others].sum(axis=1) == 0)
 
 
 def joined(parts: Sequence[Runs]) -> Runs:

@@ -36,7 +36,8 @@ def signature(base: Hypothesis, extended: Hypothesis, extension: Extension) -> S
     """
     prior = extended.fit.prior
     (name,) = extended.names
-    neutral = float(prior.to_unit({**base.best, name: extension.neutral})[-1])
+    at = {key: np.asarray(value) for key, value in base.best.items()}
+    neutral = float(prior.to_unit({**at, name: np.asarray(extension.neutral)})[-1])
     units = []
     for side in (-1.0, 1.0):
         u = neutral + side * STEPS

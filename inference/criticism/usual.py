@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..noise import Layout
+from .noise import Noise, SumOfNoises
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,13 @@ def usual_residual(
     kept = [residual for residual, again in zip(residuals, same, strict=True) if again]
     directions = np.stack(kept) if kept else np.zeros((0, 0, 0))
     return UsualResidual(positive_autocovariance(mean), directions, len(residuals))
+
+
+def without_usual(noise: Noise) -> Noise:
+    """The noise that is not the simulator's fault."""
+    if not isinstance(noise, SumOfNoises):
+        return noise
+    return SumOfNoises(tuple(p for p in noise.parts if not isinstance(p, UsualResidual)))
 
 
 def _autocovariance(residual: np.ndarray, lags: int) -> np.ndarray:

@@ -1,0 +1,239 @@
+"""How often criticism is right on the particle fluid itself.
+
+    python tests/benchmarks/misfit/fluid_study.py --out fluid_study
+
+Effects are hidden in stirs and pours that were simulated with more particles than the model has,
+and other seeds; stirs are criticised beside clean ones of other liquids. The folder keeps every
+simulation and result: a study that was interrupted goes on where it stopped.
+"""
+
+import argparse
+import json
+import time
+import warnings
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import numpyro.distributions as dist
+from bolfi_liquids.hardware import circle, star
+
+from bolfi_liquids import inference, models
+from bolfi_liquids.clean_recordings import Clean, clean_residuals, usual_for
+from bolfi_liquids.pour_experiment import Pouring
+from bolfi_liquids.prior import default_prior
+from bolfi_liquids.recordings import Gripper, Recording
+from bolfi_liquids.settings import CriticismSettings
+from bolfi_liquids.stir_experiment import effects_of, stir_experiment
+from bolfi_liquids.stirring import Stirring, stirring_of
+
+RIG = {
+    "cup_radius": 0.04,
+    "cup_height": 0.075,
+    "fill": 0.05,
+    "stick_radius": 0.0045,
+    "stick_length": 0.22,
+    "stick_density": 1200.0,
+    "liquid_density": 1200.0,
+}
+MODEL, DATA = 300, 450  # particles
+POURED = 900  # particles of the pours that are data; the model has its usual number
+NOISE, CORRELATION = np.radians(0.1), 0.5
+NULLS, SETS, CLEAN = 20, 5, 4
+VISCOSITY = 0.2, 3.0  # Pa s, of the truths
+EFFECTS = {
+    "camera_delay": (0.03, 0.06),
+    "camera_tilt": (0.012, 0.02),
+    "pivot_friction": (4e-4, 8e-4),
+    "stick_mass": (1.25, 1.4),
+    "yield_stress": (4.0, 10.0),
+}
+"""Hidden in stirs: sizes, with either sign where an effect has both."""
+SIGNED = ("camera_delay", "camera_tilt")
+ADHESION = 0.3, 0.8
+PATHS = {
+    "star": star(points=5, radius=0.022, speed=0.12, height=0.235, rest=1.0),
+    "circle": circle(radius=0.018, speed=0.1, turns=3.0, height=0.235, rest=1.0),
+}
+ACTIONS = np.array([(w, d) for w in (45.0, 90.0) for d in (0.5, 1.5, 2.5, 4.0)])
+
+Set = tuple[str, int]
+"""Effect ("" for none), number."""
+
+
+def all_sets() -> list[Set]:
+    """Every data set, the kinds interleaved."""
+    sets = [("", i) for i in range(NULLS)]
+    sets += [(name, i) for name in (*EFFECTS, "adhesion") for i in range(SETS)]
+    return sorted(sets, key=lambda one: one[1] / (SETS if one[0] else NULLS))
+
+
+def examine(one: Set, bank: inference.SimulationBank) -> dict:
+    """Make a data set, criticise the base model on it, and say how that went."""
+    effect, number = one
+    started = time.perf_counter()
+    rng = np.random.default_rng([number, *effect.encode()])
+    truth = {
+        "viscosity": float(np.exp(rng.uniform(*np.log(VISCOSITY)))),
+        "cohesion": float(rng.uniform(0.1, 0.9)),
+    }
+    if effect == "adhesion":
+        truth[effect] = float(rng.uniform(*ADHESION))
+        found = _criticised_pours(truth, rng, bank)
+    else:
+        if effect:
+            sign = rng.choice([-1.0, 1.0]) if effect in SIGNED else 1.0
+            truth[effect] = float(sign * rng.uniform(*EFFECTS[effect]))
+        found = _criticised_stirs(truth, rng, bank)
+    gaps = found.gaps.get(found.accepted, ())
+    return {
+        "effect": effect,
+        "number": number,
+        "truth": truth,
+        "snr": _snr(found, effect, truth) if effect else 0.0,
+        "p_value": found.base.check.p_value,
+        "verdict": found.verdict.kind,
+        "effects": list(found.verdict.effects),
+        "interval": list(found.coefficients[effect]) if effect in found.accepted else None,
+        "gaps": [[gap.before, gap.after, gap.noise] for gap in gaps],
+        "simulations": found.simulations,
+        "seconds": time.perf_counter() - started,
+    }
+
+
+def _criticised_stirs(
+    truth: dict, rng: np.random.Generator, bank: inference.SimulationBank
+) -> inference.Criticism:
+    usual = _clean(bank)
+
+    def experiment(path: str) -> inference.Experiment:
+        recording = _record(path, truth, rng)
+        stirring = stirring_of([recording], MODEL)
+        return stir_experiment(stirring, usual_for(stirring, usual), path)
+
+    return inference.criticise(
+        experiment("star"),
+        default_prior(),
+        effects_of("stir"),
+        held_out=[experiment("circle")],
+        plan=CriticismSettings().stir_plan,
+        keeping=inference.Keeping(bank),
+    )
+
+
+def _record(path: str, truth: dict, rng: np.random.Generator) -> Recording:
+    """A simulated stir with cameras' noise."""
+    gripper = Gripper(*PATHS[path])
+    recording = _recording(path, np.zeros((len(gripper.time), 2)))
+    own = Stirring((recording,), (models.StirSetup.from_recording(recording, particles=DATA),))
+    theta = {name: np.array([value]) for name, value in truth.items()}
+    angles = own.simulate(theta, rng.integers(2**31, size=1))[0]
+    noise = rng.normal(size=angles.shape) * NOISE
+    for i in range(1, len(noise)):
+        noise[i] = CORRELATION * noise[i - 1] + np.sqrt(1.0 - CORRELATION**2) * noise[i]
+    return _recording(path, angles + noise)
+
+
+def _recording(path: str, inclination: np.ndarray) -> Recording:
+    gripper = Gripper(*PATHS[path])
+    label = f"{path}-{hash(inclination.tobytes())}"
+    return Recording(
+        gripper.time, gripper, inclination, MappingProxyType(RIG), Path(f"{path}.nc"), label
+    )
+
+
+@cache
+def _clean(bank: inference.SimulationBank) -> list[Clean]:
+    """Stirs of other liquids that lack nothing, along both paths."""
+    rng = np.random.default_rng(0)
+    truths = [
+        {"viscosity": float(np.exp(rng.uniform(*np.log(VISCOSITY)))), "cohesion": rng.uniform()}
+        for _ in range(CLEAN)
+    ]
+    recordings = [_record(path, truth, rng) for truth in truths for path in PATHS]
+    return clean_residuals(
+        recordings,
+        MODEL,
+        default_prior(),
+        effects_of("stir"),
+        CriticismSettings().clean_plan,
+        inference.Keeping(bank),
+    )
+
+
+def _criticised_pours(
+    truth: dict, rng: np.random.Generator, bank: inference.SimulationBank
+) -> inference.Criticism:
+    """As after a stir that told the viscosity within a fifth, and nothing of the cohesion."""
+    told = np.log(truth["viscosity"]) + 0.2 * rng.normal()
+    prior = inference.Prior(
+        {"viscosity": dist.LogNormal(told, 0.2), "cohesion": dist.Uniform(0.0, 1.0)}
+    )
+    return inference.criticise(
+        _poured(ACTIONS, truth, rng),
+        prior,
+        effects_of("pour"),
+        held_out=[_poured(ACTIONS + [30.0, 0.3], truth, rng)],
+        plan=CriticismSettings().pour_plan,
+        keeping=inference.Keeping(bank),
+    )
+
+
+def _poured(actions: np.ndarray, truth: dict, rng: np.random.Generator) -> inference.Experiment:
+    from bolfi_liquids.cups import bundled_cups
+
+    rate, distance = np.radians(actions[:, 0]), actions[:, 1] / 100.0
+    cups = bundled_cups()
+    pouring = Pouring(rate, distance, cups, RIG["liquid_density"])
+    liquid = models.Liquid(truth["viscosity"], truth["cohesion"], density=RIG["liquid_density"])
+    made = models.pour(
+        liquid,
+        models.PourAction(rate, distance),
+        cups,
+        rng.integers(2**31, size=len(rate)),
+        particles=POURED,
+        effects={"adhesion": truth["adhesion"]},
+    )
+    observed = np.stack([made.spilled, made.retained]) + 0.005 * rng.normal(size=(2, len(rate)))
+    noise = inference.KnownNoise(0.005)
+    return inference.Experiment(pouring.simulate, observed, noise, pouring.identity, "pours")
+
+
+def _snr(found: inference.Criticism, effect: str, truth: dict) -> float:
+    """Of the effect at its true size, as the emulator of its model sees it."""
+    base = found.base.hypothesis
+    candidate = found.singles.get(effect)
+    extended = candidate.hypothesis if candidate else found.base.singles[effect]
+    neutral = effects_of("stir" if effect != "adhesion" else "pour")[effect].neutral
+    theta = extended.best
+    u = [extended.fit.prior.to_unit({**theta, effect: at}) for at in (truth[effect], neutral)]
+    with_it, without = extended.expected(np.stack(u))
+    return float(np.linalg.norm(base.project(base.whiten(with_it - without))))
+
+
+def results(folder: Path) -> list[dict]:
+    """What was finished; a half-written last line is none."""
+    path = folder / "results.jsonl"
+    lines = path.read_text().splitlines() if path.exists() else []
+    return [json.loads(line) for line in lines if line.endswith("}")]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("fluid_study"))
+    folder = parser.parse_args().out
+    folder.mkdir(exist_ok=True)
+    done = {(r["effect"], r["number"]) for r in results(folder)}
+    with inference.SimulationBank(folder / "simulations.sqlite") as bank:
+        for one in all_sets():
+            if one not in done:
+                result = examine(one, bank)
+                with (folder / "results.jsonl").open("a") as file:
+                    file.write(json.dumps(result) + "\n")
+                print(json.dumps(result), flush=True)
+
+
+if __name__ == "__main__":
+    warnings.simplefilter("ignore", models.FailedSimulation)
+    main()
