@@ -4,15 +4,20 @@ import warnings
 from dataclasses import dataclass
 from functools import cached_property
 
+import jax
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from .. import gp as processes
 from .._float64 import in_float64
 from ..bolfi import Bolfi
 from ..emulator import latent_covariance, predict
 from ..emulator_checks import EmulatorWarning
 from ..families import SignalFamily
+from ..gaussian import SignalState
+from ..linalg import small_inverse_cholesky
 from ..noise import Layout
+from ..optimise import minimise_in_box
 from ..posterior import Fit
 from ..signal_surrogate import SignalSurrogate
 from .noise import Noise
@@ -31,7 +36,7 @@ class Hypothesis:
     Attributes:
         names: Effects that act.
         fit: The engine's; its likelihood knows the noise.
-        u: Where the likelihood is greatest, prior quantiles [d].
+        u: Where the expected output is nearest to what was observed, prior quantiles [d].
         difference: Observed less expected there [m].
         spread: Covariance of what the simulator and its emulator add [m, m].
         noise: Covariance of the noise between the simulator and the data [m, m].
@@ -51,7 +56,7 @@ class Hypothesis:
 
     @property
     def best(self) -> dict[str, float]:
-        """Parameters at which the likelihood is greatest."""
+        """Parameters at which the expected output is nearest to what was observed."""
         return {name: float(v) for name, v in self.fit.prior.from_unit(self.u).items()}
 
     @property
@@ -125,7 +130,7 @@ def hypothesise(
         fit = engine.fit()
     surrogate = fit.learned
     assert isinstance(surrogate, SignalSurrogate) and surrogate.known is not None
-    u = surrogate.minimum()
+    u = minimise_in_box(_squared_distance, surrogate.state, len(prior))
     expected = predict(surrogate.emulator, u[None])[0][0]
     own = run_noise(surrogate.emulator, surrogate.output.layout, surrogate.output.series)
     return Hypothesis(
@@ -136,6 +141,17 @@ def hypothesise(
         spread=latent_covariance(surrogate.emulator, u) + own,
         noise=surrogate.known.covariance,
     )
+
+
+def _squared_distance(state: SignalState, u: jax.Array) -> jax.Array:
+    """Half the squared distance of expected from observed scores, by the noise alone.
+
+    Not the likelihood, in which the emulator's variance counts as noise: where a model cannot
+    reach the data, it is greatest where the emulator knows least.
+    """
+    mean, _ = processes.predict(state.gp, u)
+    white = small_inverse_cholesky(state.covariance[0]) @ (state.estimate[0] - mean * state.used)
+    return 0.5 * white @ white
 
 
 def samples(observed: np.ndarray) -> Layout:
