@@ -79,25 +79,25 @@ class Criticism:
         """Observed less expected against time, before and after, strokes that differ marked."""
         from .criticism_figures import residual_plot
 
-        return residual_plot(self.tree["stirs"])
+        return residual_plot(self.tree.children["stirs"])
 
     def plot_strokes(self) -> "Figure":
         """Size of the difference by stroke, plane and speed, before and after."""
         from .criticism_figures import stroke_plot
 
-        return stroke_plot(self.tree["stirs"])
+        return stroke_plot(self.tree.children["stirs"])
 
     def plot_scores(self, source: str = "stirs") -> "Figure":
         """How well each effect alone would explain the difference."""
         from .effect_figures import score_plot
 
-        return score_plot(self.tree[source])
+        return score_plot(self.tree.children[source])
 
     def plot_confusion(self, source: str = "stirs") -> "Figure":
         """Which effects look alike in these data."""
         from .effect_figures import confusion_plot
 
-        return confusion_plot(self.tree[source])
+        return confusion_plot(self.tree.children[source])
 
     def plot_coefficient(self) -> "Figure":
         """Posterior of the accepted effects' coefficients.
@@ -123,7 +123,7 @@ class Criticism:
             raise ValueError(
                 "no explanation was tried on a recording held out; criticise the run with held_out"
             )
-        return held_out_plot(self.tree["stirs"])
+        return held_out_plot(self.tree.children["stirs"])
 
     def plot_pours(self) -> "Figure":
         """Observed against expected fractions of each pour, before and after.
@@ -135,7 +135,7 @@ class Criticism:
 
         if "pours" not in self.tree.children:
             raise ValueError("no pours were criticised; criticise the run with pours")
-        return pour_residual_plot(self.tree["pours"])
+        return pour_residual_plot(self.tree.children["pours"])
 
 
 def is_criticised(run: Path) -> bool:

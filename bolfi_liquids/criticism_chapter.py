@@ -41,10 +41,11 @@ def criticism_chapter(
         tree: criticism.nc.
         calibrated: "calibrate" of summary.json.
     """
-    stirs, held = tree["stirs"], held_out_of(tree["stirs"])
-    accepted = section["accepted"]
+    stirs, accepted = tree.children["stirs"], section["accepted"]
+    held = held_out_of(stirs)
     return {
         "results": _results(section, held, calibrated),
+        "superseded": narrative.superseded_sentence(section),
         "caution": narrative.baseline_sentence(section),
         "gap_sentence": narrative.gap_sentence(section),
         "where_sentence": narrative.where_sentence(section),
@@ -59,7 +60,9 @@ def criticism_chapter(
         "held_out": "" if held is None else to_svg(held_out_plot(stirs), "held-out"),
         "held_rows": [] if held is None else _held_rows(held),
         "suggestions": _suggestion_rows(section),
-        "sources": [_effects_part(name, tree[name]) for name in SOURCES if name in tree.children],
+        "sources": [
+            _effects_part(name, tree.children[name]) for name in SOURCES if name in tree.children
+        ],
         "pours": _pours_part(section, tree),
         "made_with": _made_with(tree),
     }
@@ -164,7 +167,7 @@ def _pours_part(section: Mapping[str, Any], tree: "DataTree") -> dict[str, Any] 
         return None
     return {
         "sentence": narrative.pours_sentence(section["pours"]),
-        "figure": to_svg(pour_residual_plot(tree["pours"]), "pour-residual"),
+        "figure": to_svg(pour_residual_plot(tree.children["pours"]), "pour-residual"),
     }
 
 
@@ -172,7 +175,7 @@ def _made_with(tree: "DataTree") -> list[tuple[str, str]]:
     """Attributes of criticism.nc; each baseline recording with its hash."""
     attrs = dict(tree.attrs)
     names, hashes = (_texts(attrs.pop(key, ())) for key in ("baseline", "baseline_sha256"))
-    rows = [(key, ", ".join(_texts(value)) or "none") for key, value in attrs.items()]
+    rows = [(str(key), ", ".join(_texts(value)) or "none") for key, value in attrs.items()]
     clean = zip(names, hashes, strict=True)
     files = [(f"baseline {name}, SHA-256", digest) for name, digest in clean]
     return [*rows, *(files or [("baseline", "none")])]

@@ -123,6 +123,13 @@ def refit_sentences(section: Mapping[str, Any], calibrated: Mapping[str, Any]) -
     ]
 
 
+def superseded_sentence(section: Mapping[str, Any]) -> str:
+    """What leads over to the calibration's own results; empty where they still stand."""
+    if not section["accepted"]:
+        return ""
+    return f"The calibration itself, without {listed(section['accepted'])}, had found:"
+
+
 def gap_sentence(section: Mapping[str, Any]) -> str:
     """How far the stirs and the model are apart, before and after, fitted and held out."""
     gap = section["gap_deg"]
@@ -144,15 +151,10 @@ def window(found: Mapping[str, Any]) -> str:
     """Where a window is: stroke, plane and time, or speed."""
     if "speed" in found:
         return f"at {found['speed']} ({found['recording']})"
-    if "stroke" in found:
-        number = found["stroke"]
-        stroke = f"in stroke {number}" if number else "before the first stroke"
-        time = f"{found['start_s']:.1f} to {found['stop_s']:.1f} s"
-        return f"{stroke}, {found['channel']} plane, {time} ({found['recording']})"
-    return ", ".join(f"{key} {value}" for key, value in found.items() if key not in _MEASURES)
-
-
-_MEASURES = ("rms_deg", "p_value")
+    number = found["stroke"]
+    stroke = f"in stroke {number}" if number else "before the first stroke"
+    time = f"{found['start_s']:.1f} to {found['stop_s']:.1f} s"
+    return f"{stroke}, {found['channel']} plane, {time} ({found['recording']})"
 
 
 def where_sentence(section: Mapping[str, Any]) -> str:
@@ -196,6 +198,15 @@ def refuted(held: "Dataset | None") -> list[str]:
         return []
     holds = held["passes"].to_numpy().astype(bool).all(axis=1)
     return [str(name) for name in held["explanation"].to_numpy()[~holds]]
+
+
+def refuted_alone(section: Mapping[str, Any], effects: "Dataset") -> list[str]:
+    """Effects that alone explained the data, and yet are not in the verdict: nothing but data
+    that were held out could refute them."""
+    if section["verdict"] != "unknown":
+        return []
+    passed = effects["status"].to_numpy() == "accepted"
+    return [str(name) for name in effects["effect"].to_numpy()[passed]]
 
 
 def unseen_sentence(effects: "Dataset") -> str:

@@ -62,7 +62,7 @@ def _draw_gains(axes: "Axes", gain: NDArray, states: list[str]) -> None:
         if rows:
             axes.barh(rows, np.nan_to_num(gain[rows]), 0.7, color=colour, label=group)
     for at in np.flatnonzero(np.isnan(gain)):
-        axes.text(0.0, at, " not fitted", va="center", color=GREY)
+        axes.text(0.0, float(at), " not fitted", va="center", color=GREY)
     axes.axvline(0.0, color=INK, linewidth=0.8)
     axes.set_xlabel("gain in log likelihood")
 
