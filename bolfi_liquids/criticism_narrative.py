@@ -201,10 +201,10 @@ def refuted(held: "Dataset | None") -> list[str]:
 
 
 def refuted_alone(section: Mapping[str, Any], effects: "Dataset") -> list[str]:
-    """Effects that alone explained the data, and yet are not in the verdict: nothing but data
-    that were held out could refute them."""
+    """Effects that alone explained the data, but did not hold on recordings held out."""
     if section["verdict"] != "unknown":
         return []
+    # nothing else turns down what passed its test
     passed = effects["status"].to_numpy() == "accepted"
     return [str(name) for name in effects["effect"].to_numpy()[passed]]
 

@@ -77,7 +77,7 @@ def print_criticism(
     ]
     lines += _gap_lines(section["gap_deg"])
     lines += [
-        f"{criticism.window(found)}: {found['rms_deg']:.2f} deg RMS"
+        f"surest {criticism.window(found)}: {found['rms_deg']:.2f} deg RMS"
         for found in section["where"][: criticism.NAMED]
     ]
     if section["verdict"] in ("tie", "unknown") and effects is not None:
