@@ -79,19 +79,25 @@ class Criticism:
         """Observed less expected against time, before and after, strokes that differ marked."""
         from .criticism_figures import residual_plot
 
-        return residual_plot(self.tree["stirs"])
+        return residual_plot(self.tree.children["stirs"])
+
+    def plot_strokes(self) -> "Figure":
+        """Size of the difference by stroke, plane and speed, before and after."""
+        from .criticism_figures import stroke_plot
+
+        return stroke_plot(self.tree.children["stirs"])
 
     def plot_scores(self, source: str = "stirs") -> "Figure":
         """How well each effect alone would explain the difference."""
-        from .criticism_figures import score_plot
+        from .effect_figures import score_plot
 
-        return score_plot(self.tree[source])
+        return score_plot(self.tree.children[source])
 
     def plot_confusion(self, source: str = "stirs") -> "Figure":
         """Which effects look alike in these data."""
-        from .criticism_figures import confusion_plot
+        from .effect_figures import confusion_plot
 
-        return confusion_plot(self.tree[source])
+        return confusion_plot(self.tree.children[source])
 
     def plot_coefficient(self) -> "Figure":
         """Posterior of the accepted effects' coefficients.
@@ -99,11 +105,37 @@ class Criticism:
         Raises:
             ValueError: no effect was accepted.
         """
-        from .criticism_figures import coefficient_plot
+        from .effect_figures import coefficient_plot
 
         if not self.summary["accepted"]:
             raise ValueError("no effect was accepted, so there is no coefficient to plot")
         return coefficient_plot(self.tree, self.summary["accepted"])
+
+    def plot_held_out(self) -> "Figure":
+        """What is left on recordings that nothing was fitted to, before and after.
+
+        Raises:
+            ValueError: nothing was tried on such recordings.
+        """
+        from .criticism_figures import held_out_plot
+
+        if "held_out" not in self.tree["stirs"].children:
+            raise ValueError(
+                "no explanation was tried on a recording held out; criticise the run with held_out"
+            )
+        return held_out_plot(self.tree.children["stirs"])
+
+    def plot_pours(self) -> "Figure":
+        """Observed against expected fractions of each pour, before and after.
+
+        Raises:
+            ValueError: no pours were criticised.
+        """
+        from .criticism_figures import pour_residual_plot
+
+        if "pours" not in self.tree.children:
+            raise ValueError("no pours were criticised; criticise the run with pours")
+        return pour_residual_plot(self.tree.children["pours"])
 
 
 def is_criticised(run: Path) -> bool:

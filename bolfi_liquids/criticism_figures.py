@@ -1,1 +1,241 @@
-"""stub"""
+"""Figures of a criticism: where model and data differ, before and after."""
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .criticism_narrative import words
+from .drawing import BLUE, GREY, INK, LIGHT, ORANGE, new_figure, styled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from xarray import Dataset, DataTree
+
+MODELS = {"before": (ORANGE, "before"), "after": (BLUE, "with the missing effect")}
+SURE = 0.05  # p-value of a window that is marked
+BAND = 2.0  # sd
+
+
+def residual_plot(node: "DataTree") -> "Figure":
+    """Observed less expected against time, a row for each recording, a column for each plane.
+
+    Args:
+        node: The group `stirs`.
+    """
+    residual, where = (node[name].to_dataset() for name in ("residual", "where"))
+    members, planes = np.unique(residual["recording"]), residual["plane"].to_numpy()
+    with styled():
+        figure = new_figure(8.6, 2.5 * len(members) + 0.5)
+        shape = (len(members), len(planes))
+        grid = figure.subplots(*shape, sharex="row", sharey=True, squeeze=False)
+        for row, member in zip(grid, members, strict=True):
+            frames = np.flatnonzero(residual["recording"].to_numpy() == member)
+            windows = _of_recording(where, int(member))
+            for axes, plane in zip(row, planes, strict=True):
+                _draw_residual(axes, residual.isel(frame=frames).sel(plane=plane))
+                _shade(axes, _strokes(windows, str(plane)))
+                axes.set_title(f"{plane} plane", loc="left")
+                axes.set_xlabel("time [s]")
+            row[0].set_ylabel("observed less expected [deg]")
+            if len(members) > 1:
+                row[0].set_title(f"{_recording(windows)}\n{planes[0]} plane", loc="left")
+        figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    return figure
+
+
+def _draw_residual(axes: "Axes", part: "Dataset") -> None:
+    time = part["time"].to_numpy()
+    drawn = {when: style for when, style in MODELS.items() if f"expected_{when}" in part}
+    last = list(drawn)[-1]
+    width = BAND * np.degrees(part[f"sd_{last}"].to_numpy())
+    axes.fill_between(
+        time, -width, width, color=GREY, alpha=0.3, linewidth=0, label="±2 sd of noise and model"
+    )
+    axes.axhline(0.0, color=GREY, linewidth=0.8)
+    for when, (colour, label) in drawn.items():
+        left = np.degrees((part["observed"] - part[f"expected_{when}"]).to_numpy())
+        axes.plot(time, left, color=colour, linewidth=1.2, label=label)
+
+
+def _shade(axes: "Axes", strokes: "Dataset") -> None:
+    sure = strokes["p_value_before"].to_numpy() < SURE
+    for at in np.flatnonzero(sure):
+        start, stop = (float(strokes[edge][at]) for edge in ("start_s", "stop_s"))
+        axes.axvspan(start, stop, color=ORANGE, alpha=0.14, linewidth=0, zorder=0)
+        axes.text(
+            (start + stop) / 2.0,
+            1.0,
+            f"{int(strokes['stroke'][at])}",
+            transform=axes.get_xaxis_transform(),
+            ha="center",
+            va="bottom",
+            fontweight="bold",
+        )
+
+
+def stroke_plot(node: "DataTree") -> "Figure":
+    """RMS of observed less expected, by stroke and plane and by the gripper's speed.
+
+    Args:
+        node: The group `stirs`.
+    """
+    residual, where = (node[name].to_dataset() for name in ("residual", "where"))
+    members = np.unique(residual["recording"])
+    with styled():
+        figure = new_figure(8.6, 2.5 * len(members) + 0.5)
+        count = residual.sizes["plane"] + 1
+        grid = figure.subplots(len(members), count, sharey=True, squeeze=False)
+        for row, member in zip(grid, members, strict=True):
+            windows = _of_recording(where, int(member))
+            for axes, (title, part, ticks) in zip(row, _panels(residual, windows), strict=True):
+                _draw_bars(axes, part, ticks)
+                axes.set_title(title, loc="left")
+                by_speed = title == "both planes"
+                axes.set_xlabel("gripper's speed [cm/s]" if by_speed else "stroke")
+            row[0].set_ylabel("RMS [deg]")
+            if len(members) > 1:
+                title = row[0].get_title(loc="left")
+                row[0].set_title(f"{_recording(windows)}\n{title}", loc="left")
+        figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    return figure
+
+
+def _panels(residual: "Dataset", windows: "Dataset") -> Iterator[tuple[str, "Dataset", list[str]]]:
+    """Title, windows and their names, of each panel of a recording."""
+    for plane in residual["plane"].to_numpy():
+        strokes = _strokes(windows, str(plane))
+        yield f"{plane} plane", strokes, [f"{int(k)}" for k in strokes["stroke"]]
+    by_speed = windows.isel(window=np.flatnonzero(windows["speed"].to_numpy() != ""))
+    speeds = [str(speed).removesuffix(" cm/s") for speed in by_speed["speed"].to_numpy()]
+    yield "both planes", by_speed, speeds
+
+
+def _draw_bars(axes: "Axes", part: "Dataset", ticks: list[str]) -> None:
+    at = np.arange(len(ticks))
+    drawn = {when: style for when, style in MODELS.items() if f"rms_{when}" in part}
+    width = 0.8 / len(drawn)
+    for k, (when, (colour, label)) in enumerate(drawn.items()):
+        shift = (k - (len(drawn) - 1) / 2.0) * width
+        height = np.degrees(part[f"rms_{when}"].to_numpy())
+        axes.bar(at + shift, height, width, color=colour, label=label)
+    sure = part["p_value_before"].to_numpy() < SURE
+    top = np.degrees(part["rms_before"].to_numpy())
+    label = f"surely different (p < {SURE:g})"
+    shift = -(len(drawn) - 1) / 2.0 * width
+    axes.scatter(at[sure] + shift, 1.05 * top[sure], s=28, marker="*", color=INK, label=label)
+    axes.set_xticks(at, ticks)
+
+
+def _of_recording(where: "Dataset", member: int) -> "Dataset":
+    """The windows of a recording, whose files are numbered from 1."""
+    first = f"{member + 1}-"
+    mine = [str(name).startswith(first) for name in where["recording"].to_numpy()]
+    return where.isel(window=np.flatnonzero(mine))
+
+
+def _recording(windows: "Dataset") -> str:
+    return str(windows["recording"].to_numpy()[0]) if windows.sizes["window"] else ""
+
+
+def _strokes(windows: "Dataset", plane: str) -> "Dataset":
+    by_speed = windows["speed"].to_numpy() != ""
+    return windows.isel(window=np.flatnonzero(~by_speed & (windows["channel"] == plane).to_numpy()))
+
+
+def held_out_plot(node: "DataTree") -> "Figure":
+    """RMS on recordings that nothing was fitted to, against what noise leaves.
+
+    Args:
+        node: A source that has the group `held_out`.
+    """
+    held = node["held_out"].to_dataset()
+    rows = [
+        (f"{words(str(name))}\n{recording}", held.sel(explanation=name, recording=recording))
+        for name in held["explanation"].to_numpy()
+        for recording in held["recording"].to_numpy()
+    ]
+    with styled():
+        figure = new_figure(8.6, 0.55 * len(rows) + 1.2)
+        axes = figure.subplots()
+        for at, (_, row) in enumerate(rows):
+            values = {name: float(np.degrees(row[name])) for name in _MARKS}
+            _draw_held_out(axes, at, values)
+        axes.set_yticks(range(len(rows)), [label for label, _ in rows])
+        axes.set_ylim(len(rows) - 0.4, -0.6)
+        axes.set_xlim(left=0.0)
+        axes.set_xlabel("RMS of observed less expected [deg]")
+        handles, labels = axes.get_legend_handles_labels()
+        once = dict(zip(labels, handles, strict=True))
+        figure.legend(once.values(), once.keys(), loc="outside upper center", ncols=len(once))
+    return figure
+
+
+_MARKS = {
+    "noise": ("|", GREY, "noise alone"),
+    "floor": ("|", INK, "noise is below in 99 %"),
+    "before": ("s", ORANGE, "before"),
+    "after": ("o", BLUE, "after"),
+}
+
+
+def _draw_held_out(axes: "Axes", at: int, values: Mapping[str, float]) -> None:
+    axes.barh(at, values["floor"], 0.5, color=LIGHT, zorder=0)
+    axes.plot([values["before"], values["after"]], [at, at], color=GREY, linewidth=1.0)
+    for name, (marker, colour, label) in _MARKS.items():
+        size, edge = (18, 2.0) if marker == "|" else (8, 0.0)
+        axes.plot(
+            values[name],
+            at,
+            marker,
+            color=colour,
+            markersize=size,
+            markeredgewidth=edge,
+            label=label,
+        )
+
+
+def pour_residual_plot(node: "DataTree") -> "Figure":
+    """Observed against expected fractions of each pour, a panel for each outcome.
+
+    Args:
+        node: The group `pours`.
+    """
+    residual = node["residual"].to_dataset()
+    outcomes = residual["outcome"].to_numpy()
+    with styled():
+        figure = new_figure(4.3 * len(outcomes), 3.9)
+        grid = figure.subplots(1, len(outcomes), squeeze=False)
+        for axes, outcome in zip(grid[0], outcomes, strict=True):
+            _draw_pours(axes, residual.sel(outcome=outcome))
+            axes.set_title(str(outcome), loc="left")
+            axes.set_xlabel("expected [% of the liquid]")
+        grid[0, 0].set_ylabel("observed [% of the liquid]")
+        figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    return figure
+
+
+def _draw_pours(axes: "Axes", part: "Dataset") -> None:
+    observed = 100.0 * part["observed"].to_numpy()
+    drawn: list[NDArray] = [observed]
+    markers = {"before": "s", "after": "o"}
+    for when, (colour, label) in MODELS.items():
+        if f"expected_{when}" not in part:
+            continue
+        expected = 100.0 * part[f"expected_{when}"].to_numpy()
+        spread = BAND * 100.0 * part[f"sd_{when}"].to_numpy()
+        drawn += [expected - spread, expected + spread]
+        axes.errorbar(
+            expected,
+            observed,
+            xerr=spread,
+            fmt=markers[when],
+            color=colour,
+            markerfacecolor="none" if when == "before" else colour,
+            elinewidth=0.8,
+            label=f"{label}, ±2 sd",
+        )
+    ends = [np.nanmin(drawn), np.nanmax(drawn)]
+    axes.plot(ends, ends, color=GREY, linewidth=0.8, zorder=0, label="as expected")

@@ -7,6 +7,7 @@ from typing import Any
 from . import narrative
 from .calibration import Calibration
 from .calibration_figures import discrepancy_figure, inclination_figure
+from .criticism_chapter import criticism_context
 from .files import write_text
 from .posterior_figure import posterior_figure
 from .run_directory import POUR, REPORT
@@ -33,6 +34,7 @@ def report(run: str | Path) -> Path:
     )
     page = environment.get_template(TEMPLATE).render(
         calibration=_calibration_context(calibration),
+        criticism=criticism_context(calibration),
         pour=_pour_context(calibration.path),
         record=calibration.record,
         run=calibration.path,

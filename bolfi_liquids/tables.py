@@ -1,12 +1,16 @@
-"""What the command line prints of a calibration and of a pour."""
+"""What the command line prints of a calibration, of its criticism and of a pour."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Column, Table
 
+from . import criticism_narrative as criticism
 from .narrative import floor_sentence, sampler_sentence
+
+if TYPE_CHECKING:
+    from xarray import Dataset
 
 UNITS = {"viscosity": "Pa s", "cohesion": ""}
 
@@ -48,6 +52,56 @@ def print_pour(section: Mapping[str, Any], console: Console) -> None:
         )
     console.print(table)
     console.print(f"simulations: {section['n_simulations']} pours", highlight=False)
+
+
+def print_criticism(
+    section: Mapping[str, Any], effects: "Dataset | None", console: Console
+) -> None:
+    """The verdict, its evidence and what to do next; from the section "criticise".
+
+    Args:
+        section: Of summary.json.
+        effects: The group of that name; without it, nothing is said of those that nearly explain.
+        console: Where to print.
+    """
+    refuted = [] if effects is None else criticism.refuted_alone(section, effects)
+    lines = [criticism.verdict_sentence(section, refuted)]
+    if not section["baseline"]:
+        lines.append(criticism.NO_BASELINE)
+    if accepted := criticism.accepted_sentence(section):
+        lines.append(accepted)
+    lines += [
+        f"{criticism.words(name)}: {criticism.interval(name, values)}"
+        for name, values in section["parameters"].items()
+        if section["accepted"]
+    ]
+    lines += _gap_lines(section["gap_deg"])
+    lines += [
+        f"surest {criticism.window(found)}: {found['rms_deg']:.2f} deg RMS"
+        for found in section["where"][: criticism.NAMED]
+    ]
+    if section["verdict"] in ("tie", "unknown") and effects is not None:
+        if nearest := criticism.best_gains(effects):
+            lines.append(f"explain most: {'; '.join(nearest)}")
+    if section["pours"] is not None:
+        lines.append(criticism.pours_sentence(section["pours"]))
+    if section["suggestions"]:
+        lines.append(criticism.suggestion_sentence(section))
+    for line in lines:
+        console.print(line, highlight=False, markup=False)
+
+
+def _gap_lines(gap: Mapping[str, float | None]) -> list[str]:
+    """Before and after, on the data and on those held out."""
+    rows = {"difference": ("before", "after"), "held out": ("held_out_before", "held_out_after")}
+    lines = []
+    for label, (before, after) in rows.items():
+        if gap[before] is None:
+            continue
+        then = "" if gap[after] is None else f", after {gap[after]:.2f} deg"
+        lines.append(f"{label}: before {gap[before]:.2f} deg RMS{then}")
+    lines[-1] += f" (noise: {gap['noise']:.2f} deg)"
+    return lines
 
 
 def _table(label: str, *numbers: str) -> Table:

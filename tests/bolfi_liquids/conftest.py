@@ -49,3 +49,149 @@ def pour(calibration):
 @pytest.fixture
 def rng():
     return np.random.default_rng(0)
+
+
+EFFECTS = ("camera_delay", "gripper_scale", "stick_mass")
+FILES = ("1-first.nc", "2-second.nc")
+
+
+def _spread(q50):
+    return {"mean": q50, "sd": 0.1 * q50, "q05": 0.8 * q50, "q50": q50, "q95": 1.2 * q50}
+
+
+@pytest.fixture
+def criticism_section():
+    """Of a criticism that names and accepts one effect."""
+    window = {"channel": "xz", "recording": FILES[0], "stroke": 1, "start_s": 1.0, "stop_s": 2.0}
+    speed = {"recording": FILES[1], "speed": "0 to 3 cm/s"}
+    return {
+        "verdict": "effect",
+        "effects": ["camera_delay"],
+        "accepted": ["camera_delay"],
+        "accepted_by": "verdict",
+        "reason": "",
+        "p_value": 0.002,
+        "where": [
+            {**window, "rms_deg": 2.5, "p_value": 0.01},
+            {**speed, "rms_deg": 1.5, "p_value": 0.02},
+        ],
+        "coefficient": {"camera_delay": _spread(0.05)},
+        "parameters": {"viscosity": _spread(0.1), "camera_delay": _spread(0.05)},
+        "best": {"viscosity": 0.1, "camera_delay": 0.05},
+        "n_simulations": 77,
+        "gap_deg": {
+            "before": 1.25,
+            "after": 0.31,
+            "held_out_before": 1.5,
+            "held_out_after": 0.42,
+            "noise": 0.33,
+        },
+        "pours": None,
+        "suggestions": [],
+        "untested": [],
+        "baseline": 2,
+        "noise": {"sd_deg": 0.2, "sd_uncertainty": 0.4, "correlation": 0.25, "samples": 32},
+        "seconds": 8.0,
+        "seed": 0,
+        "version": bl.__version__,
+    }
+
+
+def _windows(after):
+    strokes = [
+        (plane, name, number, float(number), number + 1.0, "")
+        for name in FILES
+        for number in (0, 1)
+        for plane in ("xz", "yz")
+    ]
+    speeds = [("", name, -1, np.nan, np.nan, "0 to 3 cm/s") for name in FILES]
+    rows = strokes + speeds
+    keys = ("channel", "recording", "stroke", "start_s", "stop_s", "speed")
+    columns = {
+        key: ("window", list(values))
+        for key, values in zip(keys, zip(*rows, strict=True), strict=True)
+    }
+    for when in ("before", "after") if after else ("before",):
+        size = np.full(len(rows), 0.02)
+        p_value = np.where(np.arange(len(rows)) == 2, 0.01, 0.5)  # stroke 1 of the first, in xz
+        columns |= {f"{key}_{when}": ("window", size) for key in ("rms", "z")}
+        columns[f"p_value_{when}"] = ("window", p_value)
+    return xr.Dataset(columns)
+
+
+def _effects(status):
+    cosine = np.array([[1.0, 0.2, -0.9], [0.2, 1.0, 0.1], [-0.9, 0.1, 1.0]])
+    fitted = status[0] != "not needed"
+    columns = {
+        "typical": [0.07, 1.07, 1.1],
+        "snr": [14.0, 3.5, 0.4],
+        "score": [11.0, -4.0, 1.0],
+        "gain": [286.0, -20.0, 4.0] if fitted else [np.nan] * 3,
+        "p_value": [0.8, 0.003, 0.002] if fitted else [np.nan] * 3,
+        "coefficient": [0.05, 0.8, 1.4],
+        "status": status,
+    }
+    names = list(EFFECTS)
+    found = xr.Dataset({k: ("effect", v) for k, v in columns.items()}, coords={"effect": names})
+    coords = {"effect": names, "other": names}
+    return found, xr.Dataset({"cosine": (("effect", "other"), cosine)}, coords=coords)
+
+
+def _held_out(passes):
+    at = ("explanation", "recording")
+    sizes = {"before": 0.03, "after": 0.01, "noise": 0.008, "floor": 0.012, "lpd_gain": 33.3}
+    columns = {key: (at, [[value]]) for key, value in sizes.items()}
+    return xr.Dataset(
+        {**columns, "passes": (at, [[passes]])},
+        coords={"explanation": ["camera_delay"], "recording": ["third.nc"]},
+    )
+
+
+def _made(*, after=True, held=None, pours=False, status=("accepted", "rejected", "rejected")):
+    """A tree as `criticise` writes it: two recordings of 2 s, and maybe four pours."""
+    rng = np.random.default_rng(0)
+    frames, each = ("frame", "plane"), 20
+    coords = {
+        "time": ("frame", np.tile(np.linspace(0.0, 2.0, each), 2)),
+        "recording": ("frame", np.repeat([0, 1], each)),
+        "plane": ["xz", "yz"],
+    }
+    names = ["observed"]
+    for when in ("before", "after") if after else ("before",):
+        names += [f"expected_{when}", f"sd_{when}"]
+    angles = {name: (frames, rng.uniform(0.0, 0.05, (2 * each, 2))) for name in names}
+    found, confusion = _effects(list(status))
+    draws = rng.normal(0.05, 0.005, (2, 100))
+    groups = {
+        "/posterior": xr.Dataset({"camera_delay": (("chain", "draw"), draws)}),
+        "/stirs/residual": xr.Dataset(angles, coords=coords),
+        "/stirs/where": _windows(after),
+        "/stirs/effects": found,
+        "/stirs/confusion": confusion,
+    }
+    if held is not None:
+        groups["/stirs/held_out"] = _held_out(held)
+    if pours:
+        pour = {
+            "angular_velocity": ("pour", np.linspace(0.5, 2.0, 4)),
+            "distance": ("pour", np.full(4, 0.03)),
+            "outcome": ["spilled", "retained"],
+        }
+        fractions = {name: (("outcome", "pour"), rng.uniform(0.0, 0.3, (2, 4))) for name in names}
+        groups["/pours/residual"] = xr.Dataset(fractions, coords=pour)
+        groups["/pours/effects"], groups["/pours/confusion"] = found, confusion
+    tree = xr.DataTree.from_dict(groups)
+    tree.attrs.update(
+        version=bl.__version__,
+        baseline=["clean.nc"],
+        baseline_sha256=["abc123"],
+        accepted=["camera_delay"],
+        accepted_by="verdict",
+    )
+    return tree
+
+
+@pytest.fixture
+def made():
+    """Makes a tree as `criticise` writes it, see `_made`."""
+    return _made

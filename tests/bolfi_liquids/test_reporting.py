@@ -8,6 +8,8 @@ import pytest
 
 import bolfi_liquids as bl
 from bolfi_liquids.narrative import fit_sentence, parameter_sentence
+from bolfi_liquids.results import write_tree
+from bolfi_liquids.run_directory import CRITICISM
 from bolfi_liquids.summary import write_section
 
 FIGURES = {
@@ -104,3 +106,36 @@ def test_sentence_tells_learned_from_not_learned(rng, high, verdict):
 def test_sentence_measures_the_fit_by_the_noise(fit, verdict):
     section = {"fit_rms_deg": fit, "noise_deg": 0.3, "n_simulations": 20}
     assert verdict in fit_sentence(section)
+
+
+@pytest.fixture
+def criticised(calibration, criticism_section, tmp_path, made):
+    """A copy of a calibrated run with a criticism in it."""
+    run = tmp_path / "run"
+    shutil.copytree(calibration.path, run)
+    names = calibration.summary["parameters"]
+    criticism_section["parameters"] = {
+        name: criticism_section["coefficient"]["camera_delay"] for name in names
+    } | criticism_section["coefficient"]
+    write_section(run, "criticise", criticism_section)
+    write_tree(made(held=True), run / CRITICISM)
+    return run
+
+
+def test_page_shows_the_criticism_before_the_pour(criticised):
+    page = bl.report(criticised).read_text(encoding="utf-8")
+    verdict = "<strong>Simulation and data differ (p = 0.002): the missing effect is camera delay."
+    assert page.count(verdict) == 2
+    assert page.index("What the simulator lacks") < page.index("<h2>The pour")
+    assert "The calibration itself, without camera delay, had found:" in page
+    how = page[page.index("How this was made") :]
+    assert "77 to criticise it with" in how
+    assert "baseline clean.nc, SHA-256" in how
+    assert "abc123" in how
+    assert "criticism: accepted_by" in how
+
+
+def test_page_without_a_criticism_says_how_to_get_one(calibration):
+    page = bl.report(calibration.path).read_text(encoding="utf-8")
+    assert f"bolfi-liquids criticise {calibration.path}" in page
+    assert "Where they differ" not in page

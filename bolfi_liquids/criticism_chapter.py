@@ -1,0 +1,186 @@
+"""What the report shows of a criticism."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import criticism_narrative as narrative
+from .calibration import Calibration
+from .criticism import is_criticised
+from .criticism_figures import held_out_plot, pour_residual_plot, residual_plot, stroke_plot
+from .drawing import to_svg
+from .effect_figures import coefficient_plot, confusion_plot, score_plot
+from .results import read_tree
+from .run_directory import CRITICISM
+from .summary import read_summary
+
+if TYPE_CHECKING:
+    from xarray import Dataset, DataTree
+
+SOURCES = ("stirs", "pours")
+
+
+def criticism_context(calibration: Calibration) -> dict[str, Any] | None:
+    """What the template needs; None if the run was not criticised."""
+    run = calibration.path
+    if not is_criticised(run):
+        return None
+    section = read_summary(run)["criticise"]
+    tree = read_tree(run / CRITICISM, fix=f"write it again: bolfi-liquids criticise {run}")
+    return {"section": section, **criticism_chapter(section, tree, calibration.summary)}
+
+
+def criticism_chapter(
+    section: Mapping[str, Any], tree: "DataTree", calibrated: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Sentences, figures and tables.
+
+    Args:
+        section: "criticise" of summary.json.
+        tree: criticism.nc.
+        calibrated: "calibrate" of summary.json.
+    """
+    stirs, accepted = tree.children["stirs"], section["accepted"]
+    held = held_out_of(stirs)
+    return {
+        "results": _results(section, held, calibrated),
+        "superseded": narrative.superseded_sentence(section),
+        "caution": narrative.baseline_sentence(section),
+        "gap_sentence": narrative.gap_sentence(section),
+        "where_sentence": narrative.where_sentence(section),
+        "held_sentence": narrative.held_out_sentence(held),
+        "unseen_sentence": narrative.unseen_sentence(stirs["effects"].to_dataset()),
+        "untested_sentence": narrative.untested_sentence(section),
+        "suggestion_sentence": narrative.suggestion_sentence(section),
+        "noise_sentence": narrative.noise_sentence(section),
+        "residual": to_svg(residual_plot(stirs), "residual"),
+        "strokes": to_svg(stroke_plot(stirs), "strokes"),
+        "coefficient": to_svg(coefficient_plot(tree, accepted), "coefficient") if accepted else "",
+        "held_out": "" if held is None else to_svg(held_out_plot(stirs), "held-out"),
+        "held_rows": [] if held is None else _held_rows(held),
+        "suggestions": _suggestion_rows(section),
+        "sources": [
+            _effects_part(name, tree.children[name]) for name in SOURCES if name in tree.children
+        ],
+        "pours": _pours_part(section, tree),
+        "made_with": _made_with(tree),
+    }
+
+
+def held_out_of(node: "DataTree") -> "Dataset | None":
+    """The group `held_out` of a source, where it has one."""
+    return node["held_out"].to_dataset() if "held_out" in node.children else None
+
+
+def _results(
+    section: Mapping[str, Any], held: "Dataset | None", calibrated: Mapping[str, Any]
+) -> list[str]:
+    """What the top of the page says beside the verdict, which comes first."""
+    sentences = [
+        narrative.verdict_sentence(section, narrative.refuted(held)),
+        narrative.accepted_sentence(section),
+        *(narrative.coefficient_sentence(*item) for item in section["coefficient"].items()),
+        *narrative.refit_sentences(section, calibrated),
+    ]
+    return [sentence for sentence in sentences if sentence]
+
+
+def _held_rows(held: "Dataset") -> list[list[str]]:
+    rows = []
+    for name in held["explanation"].to_numpy():
+        for recording in held["recording"].to_numpy():
+            gap = held.sel(explanation=name, recording=recording)
+            angles = [np.degrees(float(gap[k])) for k in ("before", "after", "noise", "floor")]
+            rows.append(
+                [
+                    narrative.words(str(name)),
+                    str(recording),
+                    *(f"{angle:.2f}" for angle in angles),
+                    f"{float(gap['lpd_gain']):.1f}",
+                    "yes" if bool(gap["passes"]) else "no",
+                ]
+            )
+    return rows
+
+
+def _suggestion_rows(section: Mapping[str, Any]) -> list[list[str]]:
+    ranked = sorted(section["suggestions"], key=lambda one: -one["snr"])
+    return [
+        [
+            one["experiment"],
+            " or ".join(narrative.words(name) for name in one["between"]),
+            f"{one['snr']:.1f}",
+        ]
+        for one in ranked
+    ]
+
+
+def _effects_part(name: str, node: "DataTree") -> dict[str, Any]:
+    """Scores, likenesses and the table of effects of a source."""
+    effects, confusion = (node[group].to_dataset() for group in ("effects", "confusion"))
+    refuted = narrative.refuted(held_out_of(node))
+    return {
+        "name": name,
+        "scores": to_svg(score_plot(node), f"scores-{name}"),
+        "confusion": to_svg(confusion_plot(node), f"confusion-{name}"),
+        "rows": [
+            _effect_row(str(effect), effects.sel(effect=effect), confusion, refuted)
+            for effect in effects["effect"].to_numpy()
+        ],
+    }
+
+
+def _effect_row(name: str, found: "Dataset", confusion: "Dataset", refuted: list[str]) -> list[str]:
+    status = str(found["status"].item())
+    if name in refuted:
+        status = "refuted by held-out data"
+    return [
+        narrative.words(name),
+        _number(found["typical"].item(), ".3g", narrative.unit_of(name)),
+        _number(found["snr"].item(), ".1f"),
+        _most_similar(name, confusion),
+        _number(found["gain"].item(), ".1f"),
+        _number(found["p_value"].item(), ".2g"),
+        _number(found["coefficient"].item(), ".3g", narrative.unit_of(name)),
+        status,
+    ]
+
+
+def _number(value: float, form: str, unit: str = "") -> str:
+    return f"{value:{form}} {unit}".strip() if np.isfinite(value) else "–"
+
+
+def _most_similar(name: str, confusion: "Dataset") -> str:
+    """The other effect whose signature is most like an effect's, with their cosine."""
+    names = [str(other) for other in confusion["effect"].to_numpy()]
+    if name not in names or len(names) < 2:
+        return "–"
+    cosine = confusion["cosine"].sel(effect=name).to_numpy()
+    others = np.where(np.array(names) == name, 0.0, np.abs(cosine))
+    closest = int(np.argmax(others))
+    return f"{narrative.words(names[closest])} ({cosine[closest]:.2f})"
+
+
+def _pours_part(section: Mapping[str, Any], tree: "DataTree") -> dict[str, Any] | None:
+    if section["pours"] is None or "pours" not in tree.children:
+        return None
+    return {
+        "sentence": narrative.pours_sentence(section["pours"]),
+        "figure": to_svg(pour_residual_plot(tree.children["pours"]), "pour-residual"),
+    }
+
+
+def _made_with(tree: "DataTree") -> list[tuple[str, str]]:
+    """Attributes of criticism.nc; each baseline recording with its hash."""
+    attrs = dict(tree.attrs)
+    names, hashes = (_texts(attrs.pop(key, ())) for key in ("baseline", "baseline_sha256"))
+    rows = [(str(key), ", ".join(_texts(value)) or "none") for key, value in attrs.items()]
+    clean = zip(names, hashes, strict=True)
+    files = [(f"baseline {name}, SHA-256", digest) for name, digest in clean]
+    return [*rows, *(files or [("baseline", "none")])]
+
+
+def _texts(value: Any) -> list[str]:
+    """An attribute as a list; NetCDF gives a list of one text back as the text."""
+    return [str(one) for one in ([value] if np.ndim(value) == 0 else value)]

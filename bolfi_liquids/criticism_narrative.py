@@ -1,0 +1,283 @@
+"""What a criticism found, in plain sentences."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .narrative import UNITS
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+SEEN = 3.0  # signal-to-noise ratio from which a difference can be relied upon
+NAMED = 3  # windows that a sentence lists
+NO_BASELINE = "Without clean recordings (--baseline) the residual may be the simulator's own."
+
+
+def words(name: str) -> str:
+    """An effect's or an explanation's name as it is spoken."""
+    return name.replace("_", " ")
+
+
+def unit_of(name: str) -> str:
+    """Unit of an effect's coefficient or of a liquid's parameter; "" if it has none."""
+    from .models import EFFECTS
+
+    unit = EFFECTS[name].unit if name in EFFECTS else UNITS.get(name, "")
+    return "" if unit == "1" else unit
+
+
+def with_unit(name: str, value: float) -> str:
+    """A coefficient or a parameter to three digits, with its unit."""
+    return f"{value:.3g} {unit_of(name)}".strip()
+
+
+def interval(name: str, values: Mapping[str, float]) -> str:
+    """Median and 90 % interval of a coefficient or a parameter."""
+    middle = with_unit(name, values["q50"])
+    return f"{middle} (90 %: {values['q05']:.3g} to {values['q95']:.3g})"
+
+
+def listed(names: Sequence[str], last: str = "and") -> str:
+    """ "a", "a and b", "a, b and c"."""
+    spoken = [words(name) for name in names]
+    return f" {last} ".join(part for part in (", ".join(spoken[:-1]), spoken[-1]) if part)
+
+
+def verdict_sentence(section: Mapping[str, Any], refuted: Sequence[str] = ()) -> str:
+    """The conclusion.
+
+    Args:
+        section: "criticise" of summary.json.
+        refuted: Explanations that failed on held-out data.
+    """
+    kind, effects, p = section["verdict"], section["effects"], f"p = {section['p_value']:.2g}"
+    if kind == "none":
+        return f"Simulation and data agree ({p}): nothing is known to be missing."
+    differ = f"Simulation and data differ ({p})"
+    if kind == "effect":
+        missing = "the missing effect is" if len(effects) == 1 else "the missing effects are"
+        return f"{differ}: {missing} {listed(effects)}."
+    if kind == "tie":
+        return (
+            f"{differ}: the missing effect is {listed(effects, 'or')}, and these data cannot say"
+            " which."
+        )
+    if refuted:
+        verb = "explains" if len(refuted) == 1 else "explain"
+        return (
+            f"{differ}: {listed(refuted)} {verb} these data, but not the recordings held out, so"
+            " what is missing is not known."
+        )
+    return f"{differ}, and no known effect explains it: what is missing is not known."
+
+
+def accepted_sentence(section: Mapping[str, Any]) -> str:
+    """That someone accepted effects whatever the verdict; empty if nobody did."""
+    if section["accepted_by"] != "user" or not section["accepted"]:
+        return ""
+    names = listed(section["accepted"])
+    return f"{names.capitalize()} joined the model on request (--accept), whatever the verdict."
+
+
+def baseline_sentence(section: Mapping[str, Any]) -> str:
+    """What the verdict owes to clean recordings, or a warning where there were none."""
+    count = section["baseline"]
+    if not count:
+        return NO_BASELINE
+    recordings = "clean recording" if count == 1 else "clean recordings"
+    return (
+        f"What the simulator gets wrong on {count} {recordings} as well counts as its own and not"
+        " as a missing effect."
+    )
+
+
+def coefficient_sentence(name: str, values: Mapping[str, float]) -> str:
+    """How large a missing effect is, and what it is."""
+    from .models import EFFECTS
+
+    sentence = (
+        f"{words(name).capitalize()} is probably between {with_unit(name, values['q05'])} and"
+        f" {with_unit(name, values['q95'])} (90 %), median {with_unit(name, values['q50'])}"
+    )
+    effect = EFFECTS.get(name)
+    if effect is None:
+        return f"{sentence}."
+    return f"{sentence}; {with_unit(name, effect.neutral)} would be no effect. {effect.text}"
+
+
+def refit_sentences(section: Mapping[str, Any], calibrated: Mapping[str, Any]) -> list[str]:
+    """What the liquid is with the accepted effects, beside what it was thought to be.
+
+    Args:
+        section: "criticise" of summary.json.
+        calibrated: Its section "calibrate".
+    """
+    if not section["accepted"]:
+        return []
+    names, now = listed(section["accepted"]), section["parameters"]
+    return [
+        f"With {names}, {name} is {interval(name, now[name])} instead of {interval(name, values)}."
+        for name, values in calibrated["parameters"].items()
+    ]
+
+
+def superseded_sentence(section: Mapping[str, Any]) -> str:
+    """What leads over to the calibration's own results; empty where they still stand."""
+    if not section["accepted"]:
+        return ""
+    return f"The calibration itself, without {listed(section['accepted'])}, had found:"
+
+
+def gap_sentence(section: Mapping[str, Any]) -> str:
+    """How far the stirs and the model are apart, before and after, fitted and held out."""
+    gap = section["gap_deg"]
+    noise = f"noise of cameras and simulator would leave {gap['noise']:.2f}°."
+    sentence = f"Recorded and expected inclination differ by {gap['before']:.2f}° RMS"
+    if gap["after"] is None:
+        return f"{sentence}; {noise}"
+    explained = listed(section["accepted"]) if section["accepted"] else "the best explanation"
+    sentence = f"{sentence}, and with {explained} by {gap['after']:.2f}°"
+    if gap["held_out_before"] is None:
+        return f"{sentence}; {noise}"
+    return (
+        f"{sentence}. On recordings held out, to which nothing was fitted, it is"
+        f" {gap['held_out_before']:.2f}° before and {gap['held_out_after']:.2f}° after; {noise}"
+    )
+
+
+def window(found: Mapping[str, Any]) -> str:
+    """Where a window is: stroke, plane and time, or speed."""
+    if "speed" in found:
+        return f"at {found['speed']} ({found['recording']})"
+    number = found["stroke"]
+    stroke = f"in stroke {number}" if number else "before the first stroke"
+    time = f"{found['start_s']:.1f} to {found['stop_s']:.1f} s"
+    return f"{stroke}, {found['channel']} plane, {time} ({found['recording']})"
+
+
+def where_sentence(section: Mapping[str, Any]) -> str:
+    """Where model and data surely differ."""
+    where = section["where"]
+    if not where:
+        return "In no stroke, plane or range of speeds alone is the difference sure."
+    first = [
+        f"{window(found)}: {found['rms_deg']:.2f}° RMS, p = {found['p_value']:.2g}"
+        for found in where[:NAMED]
+    ]
+    rest = len(where) - len(first)
+    more = f"; and in {rest} more" if rest else ""
+    return f"The difference is surest {'; '.join(first)}{more}."
+
+
+def held_out_sentence(held: "Dataset | None") -> str:
+    """Whether the explanations hold on recordings that nothing was fitted to.
+
+    Args:
+        held: The group `held_out`; None if there is none.
+    """
+    if held is None:
+        return (
+            "Nothing was tried on recordings held out: give some with --held-out to see whether an"
+            " explanation holds elsewhere."
+        )
+    parts = []
+    for name in held["explanation"].to_numpy():
+        passes = held["passes"].sel(explanation=name).to_numpy().astype(bool)
+        failed = held["recording"].to_numpy()[~passes]
+        holds = "does not hold on " + ", ".join(map(str, failed)) if failed.size else "holds"
+        parts.append(f"{words(str(name))} {holds}")
+    sentence = "; ".join(parts)
+    return f"On the recordings held out, {sentence}."
+
+
+def refuted(held: "Dataset | None") -> list[str]:
+    """Explanations that failed on held-out data."""
+    if held is None:
+        return []
+    holds = held["passes"].to_numpy().astype(bool).all(axis=1)
+    return [str(name) for name in held["explanation"].to_numpy()[~holds]]
+
+
+def refuted_alone(section: Mapping[str, Any], effects: "Dataset") -> list[str]:
+    """Effects that alone explained the data, but did not hold on recordings held out."""
+    if section["verdict"] != "unknown":
+        return []
+    # nothing else turns down what passed its test
+    passed = effects["status"].to_numpy() == "accepted"
+    return [str(name) for name in effects["effect"].to_numpy()[passed]]
+
+
+def unseen_sentence(effects: "Dataset") -> str:
+    """Which effects could act without being seen; empty if there are none.
+
+    Args:
+        effects: The group of that name.
+    """
+    low = effects["snr"].to_numpy() < SEEN
+    names = [str(name) for name in effects["effect"].to_numpy()[low]]
+    if not names:
+        return ""
+    return (
+        f"At its typical size, {listed(names, 'or')} has a signal-to-noise ratio below {SEEN:.0f}"
+        " in these data: it could act without being seen."
+    )
+
+
+def untested_sentence(section: Mapping[str, Any]) -> str:
+    """Which effects could not be simulated; empty if all could."""
+    if not section["untested"]:
+        return ""
+    return f"Simulations with {listed(section['untested'])} failed, so nothing is said about it."
+
+
+def suggestion_sentence(section: Mapping[str, Any]) -> str:
+    """Which experiment to make next."""
+    suggestions = section["suggestions"]
+    if not suggestions:
+        return "No two explanations remain that a further experiment would have to tell apart."
+    best = max(suggestions, key=lambda one: one["snr"])
+    between = " from ".join(words(name) for name in best["between"])
+    ratio = f"a signal-to-noise ratio of {best['snr']:.1f}"
+    if best["snr"] < SEEN:
+        return (
+            f"None of the experiments considered would tell {between}: the best of them,"
+            f" {best['experiment']}, is expected to have {ratio}."
+        )
+    return f"To tell {between}, record {best['experiment']}: {ratio} is expected."
+
+
+def noise_sentence(section: Mapping[str, Any]) -> str:
+    """How the cameras' noise was learned."""
+    noise = section["noise"]
+    return (
+        f"The cameras' noise was learned from {noise['samples']} samples at rest before the"
+        f" gripper moved: {noise['sd_deg']:.2f}° (sd), known to"
+        f" {100.0 * noise['sd_uncertainty']:.0f} %, with a correlation of"
+        f" {noise['correlation']:.2f} from one sample to the next."
+    )
+
+
+def pours_sentence(pours: Mapping[str, Any]) -> str:
+    """The verdict on the pours alone, and how far they are from what was expected.
+
+    Args:
+        pours: The entry of that name in "criticise".
+    """
+    points = f"{100.0 * pours['before']:.1f} percentage points RMS"
+    if pours["after"] is not None:
+        points += f", and {100.0 * pours['after']:.1f} with what explains them"
+    verdict = verdict_sentence(pours).replace("Simulation and data", "Simulated and real pours")
+    return f"{verdict} Spilled and retained fractions differ by {points}."
+
+
+def best_gains(effects: "Dataset", count: int = NAMED) -> list[str]:
+    """The effects that alone explain most, best first."""
+    gains = effects["gain"].to_numpy()
+    order = [i for i in np.argsort(-np.nan_to_num(gains, nan=-np.inf)) if gains[i] > 0.0]
+    return [
+        f"{words(str(effects['effect'].to_numpy()[i]))} (gain {gains[i]:.1f},"
+        f" p = {effects['p_value'].to_numpy()[i]:.2g})"
+        for i in order[:count]
+    ]

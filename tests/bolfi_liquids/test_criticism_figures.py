@@ -1,0 +1,104 @@
+"""Figures of a criticism that was made by hand."""
+
+import re
+from types import MappingProxyType, SimpleNamespace
+
+import numpy as np
+import pytest
+
+import bolfi_liquids as bl
+from bolfi_liquids.criticism_figures import residual_plot, stroke_plot
+from bolfi_liquids.drawing import to_svg
+from bolfi_liquids.effect_figures import coefficient_plot, confusion_plot, score_plot
+
+
+def drawn(figure):
+    """The texts of a figure."""
+    return re.findall(r"<text[^>]*>([^<]*)</text>", to_svg(figure, "test"))
+
+
+def panel(figure, title):
+    """The axes whose title ends so."""
+    return [axes for axes in figure.axes if axes.get_title(loc="left").endswith(title)]
+
+
+def test_residuals_are_drawn_in_degrees_with_the_sure_stroke_shaded(made):
+    tree = made()
+    figure = residual_plot(tree["stirs"])
+    assert len(figure.axes) == 4
+    first = panel(figure, "xz plane")[0]
+    part = tree["stirs/residual"].to_dataset().isel(frame=slice(0, 20), plane=0)
+    lines = {line.get_label(): np.asarray(line.get_ydata()) for line in first.get_lines()}
+    for when, label in (("before", "before"), ("after", "with the missing effect")):
+        left = np.degrees((part["observed"] - part[f"expected_{when}"]).to_numpy())
+        np.testing.assert_allclose(lines[label], left)
+    assert [text.get_text() for text in first.texts] == ["1"]
+    for axes in figure.axes:
+        if axes is not first:
+            assert not axes.texts
+    texts = drawn(figure)
+    assert {"observed less expected [deg]", "time [s]", "1-first.nc", "2-second.nc"} <= set(texts)
+
+
+def test_without_an_extended_model_only_what_was_before_is_drawn(made):
+    tree = made(after=False)
+    for plot in (residual_plot, stroke_plot):
+        texts = drawn(plot(tree["stirs"]))
+        assert "before" in texts
+        assert "with the missing effect" not in texts
+
+
+def test_strokes_are_bars_of_rms_in_degrees(made):
+    figure = stroke_plot(made()["stirs"])
+    assert len(figure.axes) == 6
+    for axes in figure.axes:
+        heights = [patch.get_height() for patch in axes.patches]
+        np.testing.assert_allclose(heights, np.degrees(0.02))
+    texts = drawn(figure)
+    assert {"RMS [deg]", "stroke", "gripper's speed [cm/s]", "0 to 3"} <= set(texts)
+
+
+def test_effects_are_sorted_by_what_they_gain(made):
+    figure = score_plot(made()["stirs"])
+    labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert labels == ["camera delay", "stick mass", "gripper scale"]
+    texts = drawn(figure)
+    assert {"gain in log likelihood", "size of the score [sd]", "accepted", "rejected"} <= set(
+        texts
+    )
+
+
+def test_effects_that_were_not_fitted_are_sorted_by_score(made):
+    tree = made(status=["not needed"] * 3)
+    figure = score_plot(tree["stirs"])
+    labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert labels == ["camera delay", "gripper scale", "stick mass"]
+    assert [text for text in drawn(figure) if "not fitted" in text] == [" not fitted"] * 3
+
+
+def test_likeness_has_no_sign(made):
+    texts = drawn(confusion_plot(made()["stirs"]))
+    assert texts.count("0.90") == 2
+    assert texts.count("1.00") == 3
+    assert "camera delay" in texts
+
+
+def test_coefficient_is_drawn_in_its_unit_beside_no_effect(made):
+    figure = coefficient_plot(made(), ["camera_delay"])
+    texts = drawn(figure)
+    assert {"camera delay [s]", "90 % interval", "no effect"} <= set(texts)
+    (neutral,) = [line for line in figure.axes[0].get_lines() if line.get_label() == "no effect"]
+    assert set(neutral.get_xdata()) == {0.0}
+
+
+def test_plots_of_what_there_is_not_say_how_to_get_it(criticism_section, made):
+    missing = bl.Criticism(SimpleNamespace(), made(), MappingProxyType(criticism_section))
+    with pytest.raises(ValueError, match="held_out"):
+        missing.plot_held_out()
+    with pytest.raises(ValueError, match="pours"):
+        missing.plot_pours()
+    there = bl.Criticism(
+        SimpleNamespace(), made(held=True, pours=True), MappingProxyType(criticism_section)
+    )
+    assert "third.nc" in "".join(drawn(there.plot_held_out()))
+    assert "as expected" in drawn(there.plot_pours())
