@@ -1,7 +1,7 @@
 """The command line; each command calls the function of the same name."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -15,6 +15,9 @@ from .settings import (
     CriticismSettings,
     PourSettings,
 )
+
+if TYPE_CHECKING:
+    from .criticism import Criticism
 
 RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="Directory of a run.")]
 
@@ -122,7 +125,7 @@ def criticise(  # noqa: PLR0913  one parameter for each option
 
     if pours is None and (liquid or cups):
         raise typer.BadParameter("--liquid and --cups are of --pours, which is missing")
-    run_criticise(
+    criticism = run_criticise(
         run,
         held_out=held_out or (),
         baseline=baseline or (),
@@ -132,7 +135,7 @@ def criticise(  # noqa: PLR0913  one parameter for each option
         accept=accept or None,
         seed=seed,
     )
-    _print_section(run, "criticise")
+    _print_criticism(criticism)
 
 
 @app.command()
@@ -176,11 +179,13 @@ def demo(
         "runs/demo"
     ),
 ) -> None:
-    """Calibrate on the bundled glycerin, choose a pour and write the report."""
+    """Calibrate on the bundled glycerin, criticise, choose a pour and write the report."""
+    from .criticism import Criticism
     from .demo import run_demo
 
     path = run_demo(out)
     _print_section(out, "calibrate")
+    _print_criticism(Criticism.open(out))
     _print_section(out, "pour")
     typer.echo(f"report: {path}")
 
@@ -189,14 +194,17 @@ def _print_section(run: Path, name: str) -> None:
     from rich.console import Console
 
     from .summary import read_summary
-    from .tables import print_calibration, print_criticism, print_pour
+    from .tables import print_calibration, print_pour
 
-    printers = {
-        "calibrate": print_calibration,
-        "criticise": print_criticism,
-        "pour": print_pour,
-    }
-    printers[name](read_summary(run)[name], Console())
+    {"calibrate": print_calibration, "pour": print_pour}[name](read_summary(run)[name], Console())
+
+
+def _print_criticism(criticism: "Criticism") -> None:
+    from rich.console import Console
+
+    from .tables import print_criticism
+
+    print_criticism(criticism.summary, criticism.table, Console())
 
 
 def main() -> None:

@@ -1,24 +1,27 @@
-"""The whole way on bundled data: stir, learn, pour, report."""
+"""The whole way on bundled data: stir, learn, criticise, pour, report."""
 
 from importlib.resources import as_file, files
 from pathlib import Path
 
 from .calibrator import calibrate
+from .criticiser import criticise
 from .pouring import choose_pour
 from .reporting import report
 
-RECORDING = "glycerin_v10.nc"
+RECORDING, CLEAN = "glycerin_v10.nc", "water_v10.nc"
 
 
 def run_demo(out: Path) -> Path:
-    """Calibrate on the bundled recording, choose a pour and write the report.
+    """Calibrate on the bundled recording, criticise, choose a pour and write the report.
 
     A second call takes everything that was simulated from the run.
 
     Returns:
         The report.
     """
-    with as_file(files("bolfi_liquids.data") / RECORDING) as recording:
+    data = files("bolfi_liquids.data")
+    with as_file(data / RECORDING) as recording, as_file(data / CLEAN) as clean:
         calibration = calibrate(recording, out=out, resume=True)
-    choose_pour(calibration)
+        criticism = criticise(calibration, baseline=clean)
+    choose_pour(criticism.calibration)
     return report(out)

@@ -148,6 +148,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     if accept is not None or conclude(base.check, []).kind != "none":
         candidates, members, runs = explain(study, base, accept)
         gaps = _gaps(study, base, _chosen(candidates, members, accept), held_out)
+        candidates = [replace(c, held=_holds(c, gaps)) for c in candidates]
         members = [_judged(member, gaps) for member in members]
         verdict = conclude(base.check, tied(members)) if members else conclude(base.check, [])
         if members and not tied(members):
@@ -223,9 +224,12 @@ def _gaps(
 
 def _judged(candidate: Candidate, gaps: Mapping[tuple[str, ...], tuple[Gap, ...]]) -> Candidate:
     """The candidate in view of the held-out data: their evidence counts, and their veto."""
-    found = gaps.get(candidate.names, ())
-    gain = candidate.gain + sum(one.lpd_gain for one in found)
-    return replace(candidate, gain=gain, held=all(one.passes for one in found))
+    gain = candidate.gain + sum(one.lpd_gain for one in gaps.get(candidate.names, ()))
+    return replace(candidate, gain=gain, held=_holds(candidate, gaps))
+
+
+def _holds(candidate: Candidate, gaps: Mapping[tuple[str, ...], tuple[Gap, ...]]) -> bool:
+    return all(one.passes for one in gaps.get(candidate.names, ()))
 
 
 def _check_held_out(experiment: Experiment, held_out: Sequence[Experiment]) -> None:
