@@ -56,6 +56,7 @@ if TYPE_CHECKING:
         own_residual,
         rest_noise,
         usual_residual,
+        weighted_posterior,
     )
     from .discrepancy import squared_difference
     from .emulator_checks import EmulatorWarning
@@ -129,6 +130,7 @@ __all__ = [
     "squared_difference",
     "tarp",
     "usual_residual",
+    "weighted_posterior",
 ]
 
 # loaded on use: a worker that imports `.simulate` to run a simulation must not pay for JAX
@@ -194,6 +196,7 @@ _HOME = {
     "squared_difference": ".discrepancy",
     "tarp": ".checks",
     "usual_residual": ".criticism",
+    "weighted_posterior": ".criticism",
 }
 
 

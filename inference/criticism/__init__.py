@@ -10,6 +10,7 @@ from .laboratory import Keeping
 from .misfit import Check, Found, Window
 from .next_experiment import Suggestion
 from .noise import AutoregressiveNoise, KnownNoise, Noise, SumOfNoises, rest_noise
+from .posterior import weighted_posterior
 from .search import Plan
 from .usual import UsualResidual, usual_residual
 from .verdict import Candidate, Verdict
@@ -38,4 +39,5 @@ __all__ = [
     "own_residual",
     "rest_noise",
     "usual_residual",
+    "weighted_posterior",
 ]

@@ -1,7 +1,7 @@
 """A model, base or extended, fitted to data: what is left, and how large that may be."""
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import jax
@@ -16,7 +16,7 @@ from ..emulator_checks import EmulatorWarning
 from ..families import SignalFamily
 from ..gaussian import SignalState
 from ..linalg import small_inverse_cholesky
-from ..noise import Layout
+from ..noise import Layout, Reduced
 from ..optimise import minimise_in_box
 from ..posterior import Fit
 from ..signal_surrogate import SignalSurrogate
@@ -35,7 +35,7 @@ class Hypothesis:
 
     Attributes:
         names: Effects that act.
-        fit: The engine's; its likelihood knows the noise.
+        fit: The engine's; its likelihood takes all noise from here.
         u: Where the expected output is nearest to what was observed, prior quantiles [d].
         difference: Observed less expected there [m].
         spread: Covariance of what the simulator and its emulator add [m, m].
@@ -130,17 +130,33 @@ def hypothesise(
         fit = engine.fit()
     surrogate = fit.learned
     assert isinstance(surrogate, SignalSurrogate) and surrogate.known is not None
+    emulator = surrogate.emulator
+    own = run_noise(emulator, surrogate.output.layout, surrogate.output.series)
+    known = surrogate.known.covariance
+    surrogate = replace(surrogate, reduced=_reduced(surrogate, own + known))
     u = minimise_in_box(_squared_distance, surrogate.state, len(prior))
-    expected = predict(surrogate.emulator, u[None])[0][0]
-    own = run_noise(surrogate.emulator, surrogate.output.layout, surrogate.output.series)
     return Hypothesis(
         names=names,
-        fit=fit,
+        fit=replace(fit, learned=surrogate),
         u=u,
-        difference=surrogate.observed - expected,
-        spread=latent_covariance(surrogate.emulator, u) + own,
-        noise=surrogate.known.covariance,
+        difference=surrogate.observed - predict(emulator, u[None])[0][0],
+        spread=latent_covariance(emulator, u) + own,
+        noise=known,
     )
+
+
+def _reduced(surrogate: SignalSurrogate, covariance: np.ndarray) -> Reduced:
+    """What was observed says of the scores, all noise having this covariance [m, m]."""
+    basis = surrogate.emulator.basis
+    used, k = basis.used, basis.vectors.shape[1]
+    estimate, error = np.zeros((1, k)), np.eye(k)[None]
+    if used:
+        vectors = basis.vectors[:, :used]
+        weighted = np.linalg.solve(covariance / np.outer(basis.scale, basis.scale), vectors)
+        error[0, :used, :used] = np.linalg.inv(vectors.T @ weighted)
+        target = basis.standardise(surrogate.observed)
+        estimate[0, :used] = error[0, :used, :used] @ (weighted.T @ target)
+    return Reduced(estimate, error, np.zeros(1))
 
 
 def _squared_distance(state: SignalState, u: jax.Array) -> jax.Array:
