@@ -141,6 +141,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         candidates, members, runs = explain(study, base, accept)
         gaps = _gaps(study, base, _chosen(candidates, members, accept), held_out)
         members = [_judged(member, gaps) for member in members]
+        withdrawn = [member.names for member in members if not member.held]
+        candidates = [replace(one, held=one.names not in withdrawn) for one in candidates]
         verdict = conclude(base.check, tied(members)) if members else conclude(base.check, [])
         if members and not tied(members):
             verdict = failed(base.check, members)
