@@ -146,3 +146,26 @@ def test_experiments_without_data_and_windows_of_other_shape_are_refused():
     window = inference.Window({"stroke": 1}, np.ones(19, bool))
     with pytest.raises(ValueError, match=r"stroke.*\(19,\), expected \(20,\)"):
         inference.Experiment(never, np.zeros(20), inference.KnownNoise(0.1), windows=(window,))
+
+
+def other(theta, seeds):
+    raise AssertionError("simulated")
+
+
+def test_experiments_that_the_bank_would_confuse_are_refused():
+    """Of one label and without identities, the second would be given the first one's runs."""
+    first = experiment(np.zeros(20), "recording")
+    second = replace(first, simulate=other, observed=np.ones(20))
+    refused("two experiments 'recording'.*identity", held_out=[first, second])
+    noise = inference.KnownNoise(0.1)
+    proposals = [inference.Proposal(one, noise, (20,)) for one in (never, other)]
+    refused("two experiments 'experiment'.*identity", proposals=proposals)
+
+
+@pytest.mark.parametrize("told_apart", [{"label": "b"}, {"identity": "b"}, {"simulate": never}])
+def test_experiments_that_the_bank_tells_apart_or_may_confuse_are_not_refused(told_apart):
+    """The simulator is reached."""
+    first = experiment(np.zeros(20), "recording")
+    second = replace(first, **{"simulate": other, "observed": np.ones(20), **told_apart})
+    with pytest.raises(RuntimeError, match="AssertionError: simulated"):
+        inference.criticise(experiment(np.arange(20.0)), PRIOR, DRAG, held_out=[first, second])
