@@ -16,6 +16,8 @@ from scipy.stats import binom, kstest, norm
 
 from bolfi_liquids import inference
 
+pytestmark = pytest.mark.slow  # compiling takes half a minute on busy cores
+
 ALPHA = 1e-4  # false alarms per test
 BANKS, SETS = 5, 30  # emulators, and data sets for each
 LEVEL = 0.05

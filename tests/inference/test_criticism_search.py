@@ -12,6 +12,8 @@ from bolfi_liquids.inference.criticism.next_experiment import suggest
 
 from bolfi_liquids import inference
 
+pytestmark = pytest.mark.slow  # compiling takes half a minute on busy cores
+
 TIME = np.linspace(0.0, 6.0, 60)
 PRIOR = inference.Prior({"frequency": dist.Uniform(2.0, 4.0)})
 EXTENSIONS = {
