@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -126,12 +127,15 @@ def criticise(  # noqa: PLR0913  the one call that most users make
             random. None forgets them.
 
     Raises:
-        ValueError: an argument makes no sense, or a held-out experiment is the fitted one.
+        ValueError: an argument makes no sense, a held-out experiment is the fitted one, or the
+            bank would confuse two experiments.
         RuntimeError: every simulation of a phase failed.
     """
     check_extensions(prior, extensions)
     _check_held_out(experiment, held_out)
     _check_accept(accept, extensions)
+    _check_told_apart(held_out)
+    _check_told_apart(proposals)
     kept, count = keeping or Keeping(), 0
 
     def counted(phase: str, finished: int) -> None:
@@ -247,3 +251,14 @@ def _check_accept(accept: Sequence[str] | None, extensions: Extensions) -> None:
         raise ValueError(
             f"cannot accept {', '.join(map(repr, unknown))}; there are {', '.join(extensions)}"
         )
+
+
+def _check_told_apart(experiments: Sequence[Experiment] | Sequence[Proposal]) -> None:
+    for one, other in combinations(experiments, 2):
+        named = one.identity or other.identity or one.label != other.label
+        if not named and one.simulate != other.simulate:
+            raise ValueError(
+                f"two experiments {one.label!r} of different simulators have no identity, so the "
+                "bank would take the runs of one for the other's: give each its own identity or "
+                "label"
+            )

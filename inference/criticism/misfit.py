@@ -114,16 +114,17 @@ def locate(hypothesis: Hypothesis, windows: list[Window], null: np.ndarray) -> l
     for window in kept:
         inside = output.average(window.samples.ravel()[output.present].astype(float)) > 0.5
         if not inside.any():
-            inside[np.argmax(window.samples.ravel()[output.present])] = True
+            first = np.argmax(window.samples.ravel()[output.present])
+            inside[np.searchsorted(output.starts, first, "right") - 1] = True
         count = WINDOW_MODES if output.series else 1
         modes = slow_modes(hypothesis.layout, count, inside)
-        white = hypothesis.project(hypothesis.whiten(modes.T))
-        span = orthonormal(white)
+        span = orthonormal(hypothesis.project(hypothesis.whiten(modes.T)))
         sizes.append(float(np.sum((span.T @ residual) ** 2)))
         usual.append(np.sum((span.T @ null) ** 2, 0))
         rms = float(np.sqrt(np.mean(hypothesis.difference[inside] ** 2)))
-        mean = white[:, 0] / max(float(np.linalg.norm(white[:, 0])), 1e-12)
-        seen.append((window.label, rms, float(mean @ residual[:, 0])))
+        mean = hypothesis.project(hypothesis.whiten(inside.astype(float)))[:, 0]
+        z = float(mean @ residual[:, 0]) / max(float(np.linalg.norm(mean)), 1e-12)
+        seen.append((window.label, rms, z))
     if not kept:
         return []
     alone = exceedance(np.stack(usual), np.array(sizes))

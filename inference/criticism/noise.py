@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from ..noise import Layout, Nodes, correlated
 
@@ -127,7 +126,7 @@ def _restricted(rests: list[np.ndarray], rho: float, trend: int) -> tuple[float,
         steps = np.arange(len(rest))
         factor = np.linalg.cholesky(rho ** np.abs(np.subtract.outer(steps, steps)))
         powers = (steps / len(rest))[:, None] ** np.arange(trend + 1)
-        columns = solve_triangular(factor, np.column_stack([powers, rest]), lower=True)
+        columns = np.linalg.solve(factor, np.column_stack([powers, rest]))
         smooth, white = columns[:, : trend + 1], columns[:, trend + 1 :]
         left = white - smooth @ np.linalg.lstsq(smooth, white)[0]
         squares += np.sum(left**2)

@@ -41,17 +41,19 @@ def own_errors(emulator: Emulator) -> np.ndarray:
     """One draw of the noise from each run that was learned from [n, m].
 
     Of the scores, what is left when a run is left out, less what the emulator's own error adds
-    to it; of the rest, what the components leave.
+    to it; of the rest, what the components leave. Components lean towards the noise of their own
+    runs: what the emulator took from the scores for it (`own_noise`) is noise and is given back,
+    and then nothing is lost to the rest.
     """
     basis, n = emulator.basis, len(emulator.outputs)
     used = basis.used
     mean, variance = (np.asarray(part)[:used, :n] for part in leave_one_out(emulator.gp))
     noise = np.exp(2.0 * np.asarray(emulator.gp.hyper.log_noise))[:used, None]
     left = np.asarray(emulator.gp.data.y)[:used, :n] - mean
+    left[:, : emulator.learned_at] /= 1.0 - emulator.excess[:used, None]
     scores = left * np.sqrt(np.minimum(noise / variance, 1.0))
-    # the components lean towards the runs that made them
-    lost = np.sqrt(n / max(n - used - 1, 1))
-    standard = scores.T @ basis.vectors[:, :used].T + lost * basis.residuals(emulator.outputs)
+    centred = np.sqrt(n / max(n - 1, 1))
+    standard = scores.T @ basis.vectors[:, :used].T + centred * basis.residuals(emulator.outputs)
     return standard * basis.scale
 
 

@@ -171,6 +171,8 @@ def _pairs(
     study: Study, base: Base, found: dict[tuple[str, ...], Candidate], runs: Runs
 ) -> tuple[list[Candidate], Runs]:
     """The best effect with a second one; both must gain, and `found` learns how each does alone."""
+    if not found:  # no effect could be simulated
+        return [], runs
     best = max(found.values(), key=lambda c: c.gain)
     pairs = [
         study.candidate(base.hypothesis, (*best.names, other), runs, base.signatures)

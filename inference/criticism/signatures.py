@@ -82,5 +82,7 @@ def directions(
 
 def confusion(signatures: Mapping[str, Signature]) -> np.ndarray:
     """Cosines between all signatures [e, e]: 1 is the same, 0 nothing in common."""
+    if not signatures:
+        return np.zeros((0, 0))
     rows = np.stack([of.direction for of in signatures.values()])
     return rows @ rows.T

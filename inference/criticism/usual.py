@@ -29,7 +29,9 @@ class UsualResidual:
 
     def covariance(self, at: Layout) -> np.ndarray:
         apart = np.abs(np.subtract.outer(at.sample, at.sample))
-        known = np.append(self.autocovariance, np.zeros(max(apart.max() + 1, 1)))
+        missing = max(apart.max() + 1 - len(self.autocovariance), 0)
+        # over more samples than it was learned from, it must be made positive anew
+        known = positive_autocovariance(np.append(self.autocovariance, np.zeros(missing)))
         stationary = known[apart] * np.equal.outer(at.channel, at.channel)
         shapes = self._shapes(at)
         return stationary + shapes.T @ shapes

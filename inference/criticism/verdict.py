@@ -95,6 +95,8 @@ def conclude(base: Check, members: Sequence[Candidate]) -> Verdict:
 
 def failed(base: Check, members: Sequence[Candidate]) -> Verdict:
     """The verdict on explanations that held-out data refute."""
+    if base.p_value >= ALARM:
+        return conclude(base, [])
     names = " or ".join(" with ".join(member.names) for member in members)
     reason = (
         f"Model and data differ (p = {base.p_value:.2g}); {names} explains these data, but not "

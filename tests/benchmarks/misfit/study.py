@@ -149,14 +149,20 @@ def results(path: Path) -> list[dict]:
     """What was finished; a half-written last line is none."""
     if not path.exists():
         return []
-    lines = path.read_text().splitlines()
-    return [json.loads(line) for line in lines if line.endswith("}")]
+    return [json.loads(line) for line in path.read_bytes()[: _whole(path)].splitlines()]
+
+
+def _whole(path: Path) -> int:
+    """Length of the file's finished lines."""
+    return path.read_bytes().rfind(b"\n") + 1
 
 
 def run(path: Path, workers: int) -> Iterator[dict]:
     """Finish the study; yields each data set's result as it is kept."""
     done = {(r["effect"], r["strength"], r["number"]) for r in results(path)}
     left = [one for one in all_sets() if one not in done]
+    if path.exists():  # or the next result would go on from half a line
+        os.truncate(path, _whole(path))
     with (
         ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool,
         path.open("a") as file,

@@ -1,0 +1,135 @@
+"""What an emulator that is coarse adds to a misfit, and where windows of an output lie."""
+
+import numpy as np
+import numpyro.distributions as dist
+import pytest
+from bolfi_liquids.inference import output
+from bolfi_liquids.inference.criticism.design import Box, fill
+from bolfi_liquids.inference.criticism.hypothesis import hypothesise, samples, values_of
+from bolfi_liquids.inference.criticism.laboratory import Laboratory
+from bolfi_liquids.inference.criticism.misfit import locate, null_draws
+from scipy.stats import binom, chi2, norm
+
+from bolfi_liquids import inference
+
+ALPHA = 1e-4  # false alarms per test
+EMULATORS, RUNS = 20, 8
+LEVEL = 0.05
+TIME = np.linspace(0.0, 3.0, 40)
+PRIOR = inference.Prior({"rate": dist.Uniform(2.0, 6.0)})
+EXTENSIONS = {"offset": inference.Extension(dist.Normal(0.0, 1.0))}
+NOISE = inference.KnownNoise(0.01)
+
+
+def oscillate(theta, seeds):
+    """Without noise: what an emulator errs by, it does for want of runs."""
+    return np.cos(theta["rate"][:, None] * TIME) * np.exp(-0.3 * TIME)
+
+
+def fitted(simulate, observed, noise, bank, count=RUNS):
+    keeping = inference.Keeping(seed=bank, batch=64)
+    laboratory = Laboratory(simulate, PRIOR, EXTENSIONS, "", keeping)
+    runs = laboratory.run("start", fill(Box(np.zeros(1), np.ones(1)), PRIOR, bank, count))
+    return hypothesise((), PRIOR, runs, observed, noise)
+
+
+@pytest.fixture(scope="module")
+def coarse():
+    """Hypotheses on as many emulators, each with data of another truth."""
+    found = []
+    for bank in range(EMULATORS):
+        rng = np.random.default_rng(bank)
+        clean = oscillate({"rate": rng.uniform(2.5, 5.5, 1)}, [0])[0]
+        observed = clean + NOISE.draw(rng, samples(clean), 1)[0]
+        found.append(fitted(oscillate, observed, NOISE, bank))
+    return found
+
+
+def alarms(hypotheses, spread):
+    """Of a chi-square test at LEVEL of what the parameters leave."""
+    count = 0
+    for one in hypotheses:
+        root = np.linalg.inv(np.linalg.cholesky(one.noise + (one.spread if spread else 0.0)))
+        basis = np.linalg.qr(root @ one.factor @ one.tangents)[0]
+        left = root @ one.difference
+        left = left - basis @ (basis.T @ left)
+        count += np.sum(left**2) > chi2.isf(LEVEL, len(left) - basis.shape[1])
+    return count
+
+
+def test_a_coarse_emulators_error_is_reckoned_with(coarse):
+    """Without it a right model would be refused in half of all cases."""
+    limit = binom.isf(ALPHA, EMULATORS, LEVEL)
+    assert alarms(coarse, spread=True) <= limit
+    assert alarms(coarse, spread=False) > limit
+
+
+# Two channels, neighbouring samples averaged as in a long series.
+
+SHAPE = (60, 2)
+SD = np.array([0.15, 0.2])
+
+
+def tilted(theta, seeds):
+    rate = theta["rate"][:, None]
+    time = np.linspace(0.0, 3.0, SHAPE[0])
+    return np.stack([np.cos(rate * time), np.sin(rate * time)], -1)
+
+
+def window(start, end, channels=slice(None)):
+    chosen = np.zeros(SHAPE, bool)
+    chosen[start:end, channels] = True
+    return inference.Window({"start": start}, chosen)
+
+
+@pytest.fixture(scope="module")
+def averaged():
+    """A hypothesis on values of three samples each; what was observed has a gap, and an offset of
+    the second channel from sample 30 to 45."""
+    rng = np.random.default_rng(0)
+    observed = tilted({"rate": np.array([4.0])}, [0])[0] + SD * rng.normal(size=SHAPE)
+    observed[30:45, 1] += 0.5
+    observed[10:16, 0] = np.nan
+    here = np.isfinite(observed).ravel()
+    noise = inference.KnownNoise(np.tile(SD, SHAPE[0])[here])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(output, "LONGEST", 40)
+        return fitted(tilted, observed, noise, 0, count=16), noise
+
+
+def test_noise_is_averaged_like_the_output(averaged):
+    """A draw's place in the flattened output is not that of its value."""
+    hypothesis, noise = averaged
+    at = samples(hypothesis.fit.observed)
+    drawn = values_of(hypothesis, noise.draw(np.random.default_rng(0), at, 20_000))
+    layout, counts = hypothesis.layout, hypothesis.surrogate.output.counts
+    assert counts.max() == 3 and set(layout.channel) == {0, 1}
+    expected = SD[layout.channel] ** 2 / counts
+    np.testing.assert_allclose(np.diag(hypothesis.noise), expected, rtol=1e-9)
+    error = norm.isf(ALPHA / 2 / len(expected)) * np.sqrt(2.0 / 20_000)
+    np.testing.assert_allclose(drawn.var(0), expected, rtol=error)
+
+
+def test_windows_of_averaged_values_and_of_single_samples_are_looked_at(averaged):
+    hypothesis, noise = averaged
+    null = null_draws(hypothesis, noise, np.random.default_rng(0))
+    windows = [window(30, 45, 1), window(36, 37, 1), window(0, 9), window(12, 14, 0)]
+    # of the last one nothing was observed
+    planted, single, other = locate(hypothesis, windows, null)
+    assert max(planted.p_value, single.p_value) < LEVEL < other.p_value
+    error = 5.0 * SD[1]
+    assert planted.rms == pytest.approx(0.5, abs=error / np.sqrt(15))
+    assert single.rms == pytest.approx(0.5, abs=error / np.sqrt(3))
+
+
+def test_the_mean_of_a_window_is_over_all_its_channels(averaged):
+    """The first channel alone is where it should be."""
+    hypothesis, noise = averaged
+    null = null_draws(hypothesis, noise, np.random.default_rng(0))
+    both, second, first = locate(
+        hypothesis, [window(30, 45), window(30, 45, 1), window(30, 45, 0)], null
+    )
+    weights = SD**-2 / np.sqrt(np.sum(SD**-2))
+    expected = weights @ (SD * [first.z, second.z])
+    assert abs(first.z) < 4.0 < second.z
+    assert both.z == pytest.approx(expected, abs=0.5)

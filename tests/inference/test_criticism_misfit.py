@@ -1,0 +1,188 @@
+"""The tests of a model against data, on a simulator that is linear and Gaussian."""
+
+from dataclasses import replace
+
+import numpy as np
+import numpyro.distributions as dist
+import pytest
+from bolfi_liquids.inference._float64 import in_float64
+from bolfi_liquids.inference.criticism.hypothesis import samples
+from bolfi_liquids.inference.criticism.laboratory import Laboratory
+from bolfi_liquids.inference.criticism.misfit import check, locate, null_draws
+from bolfi_liquids.inference.criticism.run_noise import run_noise
+from bolfi_liquids.inference.criticism.search import Study, examine
+from bolfi_liquids.inference.criticism.signatures import directions
+from scipy.stats import binom, kstest, norm
+
+from bolfi_liquids import inference
+
+pytestmark = pytest.mark.slow  # compiling takes half a minute on busy cores
+
+ALPHA = 1e-4  # false alarms per test
+BANKS, SETS = 5, 30  # emulators, and data sets for each
+LEVEL = 0.05
+
+N = 96  # values
+STEPS = np.arange(N)
+DESIGN = np.stack([np.ones(N), np.sin(STEPS / 15.0)], axis=1)
+INSIDE = (STEPS >= 48) & (STEPS < 64)
+BUMP = np.where(INSIDE, np.sin(2.0 * np.pi * (STEPS - 47.5) / 16.0), 0.0)
+OWN = 0.1**2 * np.exp(-0.5 * (np.subtract.outer(STEPS, STEPS) / 3.0) ** 2) + 1e-12 * np.eye(N)
+NOISE = inference.AutoregressiveNoise(np.array([0.2]), np.array([0.6]))
+WHITE = inference.KnownNoise(0.2)
+AT = samples(np.zeros(N))
+PRIOR = inference.Prior({"level": dist.Uniform(-2.0, 2.0), "wave": dist.Uniform(-2.0, 2.0)})
+EXTENSIONS = {"bump": inference.Extension(dist.Uniform(-2.0, 2.0))}
+WINDOWS = [
+    inference.Window({"start": start}, (STEPS >= start) & (STEPS < start + 16))
+    for start in range(0, N, 16)
+]
+
+
+def exact(theta, seeds):
+    bump = theta.get("bump", np.zeros(len(seeds)))
+    return np.stack([theta["level"], theta["wave"]], 1) @ DESIGN.T + bump[:, None] * BUMP
+
+
+def noisy(theta, seeds):
+    """With the simulator's own, smooth noise."""
+    white = np.stack([np.random.default_rng(int(seed)).normal(size=N) for seed in seeds])
+    return exact(theta, seeds) + white @ np.linalg.cholesky(OWN).T
+
+
+def observe(simulate, number, bump=0.0):
+    rng = np.random.default_rng([number, 1])
+    theta = {"level": rng.uniform(-1.0, 1.0, 1), "wave": rng.uniform(-1.0, 1.0, 1)}
+    theta["bump"] = np.array([bump])
+    return simulate(theta, [10**6 + number])[0] + NOISE.draw(rng, AT, 1)[0]
+
+
+def examined(simulate, observed, bank):
+    keeping = inference.Keeping(seed=bank, batch=64)
+    laboratory = Laboratory(simulate, PRIOR, EXTENSIONS, "", keeping)
+    return examine(Study(laboratory, observed, NOISE, inference.Plan(), bank), None)[0]
+
+
+def on(hypothesis, observed):
+    """The hypothesis with other data. Where the parameters are does not matter to what they
+    leave of the data, for the simulator is linear in them."""
+    moved = replace(hypothesis, difference=observed - hypothesis.expected(hypothesis.u)[0])
+    # what was computed of the covariance and the slopes stays as it is
+    vars(moved).update({name: getattr(hypothesis, name) for name in ("factor", "tangents")})
+    return moved
+
+
+@pytest.fixture(scope="module")
+def banks():
+    return [examined(noisy, observe(noisy, bank), bank) for bank in range(BANKS)]
+
+
+def checks(banks, noise, bump=0.0):
+    """Of all data sets, by a model that believes in `noise`."""
+    found = []
+    for bank, base in enumerate(banks):
+        believed = replace(base.hypothesis, noise=noise.covariance(AT))
+        null = null_draws(believed, noise, np.random.default_rng(bank))
+        rows = directions(believed, base.signatures)
+        for number in range(SETS):
+            observed = observe(noisy, 1000 * (bank + 1) + number, bump)
+            found.append(check(on(believed, observed), rows, null))
+    return found
+
+
+def too_many(p_values):
+    """Alarms beyond what chance allows at LEVEL."""
+    return np.sum(np.array(p_values) < LEVEL) > binom.isf(ALPHA, len(p_values), LEVEL)
+
+
+@pytest.fixture(scope="module")
+def nulls(banks):
+    return checks(banks, NOISE)
+
+
+@pytest.mark.parametrize("kind", ["p_value", "p_score", "p_smooth"])
+def test_p_values_of_a_right_model_are_uniform(nulls, kind):
+    """150 of them: a distribution function off by .18 is found."""
+    p_values = [getattr(one, kind) for one in nulls]
+    assert kstest(p_values, "uniform").pvalue > ALPHA
+    assert not too_many(p_values)
+
+
+def test_scores_of_a_right_model_are_standard_normal(nulls):
+    scores = np.array([one.scores["bump"] for one in nulls])
+    assert kstest(scores, "norm").pvalue > ALPHA
+
+
+def test_taking_correlated_noise_for_white_is_caught(banks):
+    """Of the same variance; its slow part is up to four times as large as believed."""
+    p_values = [one.p_value for one in checks(banks, WHITE)]
+    assert kstest(p_values, "uniform").pvalue < ALPHA
+    assert too_many(p_values)
+    assert np.mean(np.array(p_values) < LEVEL) > 4.0 * LEVEL
+
+
+def test_an_effect_is_found_and_its_score_says_how_large_it_is(banks):
+    found = checks(banks, NOISE, bump=0.5)
+    assert np.mean([one.p_value < LEVEL for one in found]) > 0.9
+    length = closed_form(np.zeros(N), OWN)[1]
+    scores = np.array([one.scores["bump"] for one in found])
+    error = norm.isf(ALPHA / 2) / np.sqrt(len(scores))
+    # the covariance of the own noise is learned from 40 runs, so the length is, too
+    assert abs(scores.mean() / (0.5 * length) - 1.0) < 0.1 + error / (0.5 * length)
+
+
+def closed_form(observed, own):
+    """The bump's score by generalised least squares, and that of a bump of size one."""
+    root = np.linalg.inv(np.linalg.cholesky(NOISE.covariance(AT) + own))
+    base = np.linalg.qr(root @ DESIGN)[0]
+    left = root @ BUMP - base @ (base.T @ (root @ BUMP))
+    length = np.linalg.norm(left)
+    return left @ root @ observed / length, length
+
+
+def test_scores_are_those_of_generalised_least_squares():
+    """Of a simulator without noise, which the emulator follows to 1 % of the noise."""
+    for number in range(3):
+        observed = observe(exact, number, bump=0.1 * number)
+        base = examined(exact, observed, number)
+        expected = closed_form(observed, np.zeros((N, N)))[0]
+        assert base.check.scores["bump"] == pytest.approx(expected, abs=0.02)
+
+
+def test_the_simulators_own_noise_is_known_to_be_smooth(banks):
+    """Its variance along the slowest cosines, from 40 runs, on average over the banks."""
+    modes = np.cos(np.pi * np.arange(1, 7) * (STEPS[:, None] + 0.5) / N)
+    truth = np.sum(modes * (OWN @ modes), 0)
+    ratios = np.array(
+        [np.sum(modes * (own_covariance(base.hypothesis) @ modes), 0) / truth for base in banks]
+    )
+    # 40 runs tell one variance to 22 %, the mean of 5 times 6 to 4 %
+    assert abs(ratios.mean() - 1.0) < 0.15, ratios.mean(0)
+
+
+@in_float64
+def own_covariance(hypothesis):
+    return run_noise(hypothesis.surrogate.emulator, hypothesis.layout, True)
+
+
+def located(banks, bump):
+    """p-values [data sets, windows]."""
+    p_values = []
+    for bank, base in enumerate(banks):
+        for number in range(SETS):
+            hypothesis = on(base.hypothesis, observe(noisy, 1000 * (bank + 1) + number, bump))
+            p_values.append([found.p_value for found in locate(hypothesis, WINDOWS, base.null)])
+    return np.array(p_values)
+
+
+def test_all_windows_share_one_error_rate(banks):
+    least = located(banks, 0.0).min(1)
+    assert not too_many(least)
+    assert np.mean(least < 0.5) > 0.3  # and are not merely deaf
+
+
+def test_the_window_in_which_the_data_differ_is_found(banks):
+    p_values = located(banks, 1.5)
+    assert np.mean(p_values.argmin(1) == 3) > 0.9
+    assert np.mean(p_values[:, 3] < LEVEL) > 0.9
+    assert not too_many(p_values[:, [0, 1, 5]].min(1))

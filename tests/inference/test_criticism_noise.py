@@ -1,0 +1,194 @@
+"""The noises that criticism reckons with: learned from rest and clean data, drawn as believed."""
+
+import numpy as np
+import pytest
+from bolfi_liquids.inference.criticism.noise import CORRELATIONS
+from bolfi_liquids.inference.noise import Layout
+from scipy.linalg import toeplitz
+from scipy.signal import lfilter
+from scipy.stats import chisquare, norm
+
+from bolfi_liquids import inference
+
+ALPHA = 1e-4  # false alarms per test
+DRAWS, RUNS, BINS = 63, 128, 8  # of the rank test; the bins divide DRAWS + 1
+FREEDOM = 20
+
+
+def autoregressive(rng, shape, sd, correlation):
+    """Stationary AR(1) noise along the first axis."""
+    white = rng.normal(size=shape)
+    white[1:] *= np.sqrt(1.0 - correlation**2)
+    return sd * lfilter([1.0], [1.0, -correlation], white, axis=0)
+
+
+@pytest.fixture
+def gappy():
+    """Two channels, sample after sample, some missing: as a flattened output with NaN."""
+    at = np.delete(np.arange(20), [3, 4, 6, 11])
+    return Layout(at % 2, at // 2)
+
+
+# Learned from rest.
+
+
+@pytest.fixture(scope="module")
+def rests():
+    """Truths [RUNS, 2] and posterior draws [RUNS, DRAWS, 2] of size and correlation.
+
+    The correlation comes from the prior. That of the size is improper, but invariant under
+    scaling, so that its ranks are uniform at every true size.
+    """
+    rng = np.random.default_rng(0)
+    truths, draws = [], []
+    for run in range(RUNS):
+        sd, correlation = 10.0 ** rng.uniform(-3.0, 3.0), rng.choice(CORRELATIONS)
+        stretches = []
+        for samples in (30, 18):
+            line = np.stack([np.ones(samples), np.arange(samples)], axis=1)
+            drift = line @ rng.normal(0.0, [[100.0 * sd], [sd]], (2, 2))
+            stretches.append(drift + autoregressive(rng, (samples, 2), sd, correlation))
+        found = inference.rest_noise(stretches, seed=run, trend=1, draws=DRAWS)
+        truths.append([sd, correlation])
+        draws.append(np.stack([found.sd, found.correlation], -1))
+    return np.array(truths), np.array(draws)
+
+
+def p_uniform(truths, draws):
+    """Of the truths' ranks, ties broken at random."""
+    rng = np.random.default_rng(1)
+    below, equal = (draws < truths[:, None]).sum(1), (draws == truths[:, None]).sum(1)
+    ranks = below + rng.integers(0, equal + 1)
+    return chisquare(np.histogram(ranks, BINS, (-0.5, DRAWS + 0.5))[0]).pvalue
+
+
+@pytest.mark.parametrize("which", [0, 1], ids=["size", "correlation"])
+def test_ranks_of_the_true_noise_are_uniform_among_its_posterior_draws(rests, which):
+    """128 ranks find draws that are half as wide, or half an sd off, nearly always."""
+    truths, draws = rests[0][:, which], rests[1][:, :, which]
+    assert p_uniform(truths, draws) > ALPHA
+    centre = np.median(draws, axis=1, keepdims=True)
+    assert p_uniform(truths, centre + 0.4 * (draws - centre)) < ALPHA
+    assert p_uniform(truths, draws + 0.7 * draws.std(1, keepdims=True)) < ALPHA
+
+
+def test_a_trend_that_is_not_taken_out_is_taken_for_correlated_noise():
+    rng = np.random.default_rng(0)
+    rest = rng.normal(size=(60, 2)) + np.linspace(0.0, 10.0, 60)[:, None]
+    straight = inference.rest_noise([rest], trend=1)
+    assert abs(straight.sd.mean() - 1.0) < 4.0 / np.sqrt(2.0 * rest.size)
+    assert inference.rest_noise([rest], trend=0).correlation.mean() > 0.8
+
+
+@pytest.mark.parametrize(("samples", "channels", "trend"), [(8, 1, 0), (4, 2, 0), (9, 1, 1)])
+def test_stretches_too_short_to_learn_from_are_refused(samples, channels, trend):
+    rest = np.random.default_rng(0).normal(size=(samples, channels))
+    with pytest.raises(ValueError, match="of 8 needed; give longer ones"):
+        inference.rest_noise([rest], trend=trend)
+    more = np.random.default_rng(0).normal(size=(samples + 1, channels))
+    assert inference.rest_noise([more], trend=trend).samples == more.size
+
+
+# Drawn as believed.
+
+
+def deviation(drawn, covariance):
+    """Largest z of second moments [n, m], each with its own Monte Carlo error."""
+    products = drawn[:, :, None] * drawn[:, None, :]
+    return np.abs((products.mean(0) - covariance) / (products.std(0) / np.sqrt(len(drawn)))).max()
+
+
+AR = inference.AutoregressiveNoise(np.array([0.5, 0.7, 0.6]), np.array([0.2, 0.9, 0.6]))
+SIZES = inference.KnownNoise(np.linspace(0.1, 2.0, 16))
+RESIDUALS = [autoregressive(np.random.default_rng(k), (10, 2), 1.0, 0.8) for k in range(FREEDOM)]
+USUAL = inference.usual_residual(RESIDUALS, 0.0, [k < 2 for k in range(FREEDOM)])
+NOISES = {
+    "known": (inference.KnownNoise(0.3), 1.0),
+    "of each sample": (SIZES, 1.0),
+    "autoregressive": (AR, 1.0),
+    "sum": (inference.SumOfNoises((AR, SIZES)), 1.0),
+    # of a size that is known as well as a variance from FREEDOM numbers: Student's t
+    "usual residual": (USUAL, FREEDOM / (FREEDOM - 2.0)),
+}
+
+
+@pytest.mark.parametrize("kind", NOISES)
+def test_draws_have_the_covariance(gappy, kind):
+    noise, wider = NOISES[kind]
+    drawn = noise.draw(np.random.default_rng(0), gappy, 20_000)
+    covariance = wider * noise.covariance(gappy)
+    limit = norm.isf(ALPHA / 2 / covariance.size)
+    assert deviation(drawn, covariance) < limit
+    assert deviation(1.05 * drawn, covariance) > limit
+
+
+def test_white_draws_are_not_taken_for_correlated_ones(gappy):
+    covariance = AR.covariance(gappy)
+    white = inference.KnownNoise(np.sqrt(np.diag(covariance)))
+    drawn = white.draw(np.random.default_rng(0), gappy, 20_000)
+    assert deviation(drawn, covariance) > 2.0 * norm.isf(ALPHA / 2 / covariance.size)
+
+
+# Learned from clean data.
+
+LENGTH, SETS, WHITE = 300, 30, 0.05
+
+
+@pytest.fixture(scope="module")
+def clean():
+    """AR(1) residuals of unit variance, and white measurement noise."""
+    rng = np.random.default_rng(0)
+    shape = (LENGTH, 2)
+    sets = [autoregressive(rng, shape, 1.0, 0.8) for _ in range(SETS)]
+    return [one + np.sqrt(WHITE) * rng.normal(size=shape) for one in sets]
+
+
+def test_the_autocovariance_of_a_stationary_process_is_recovered(clean):
+    """Within Bartlett's errors; measurement noise, and the residuals' own noise, apart."""
+    found = inference.usual_residual(clean, WHITE, [False] * SETS).autocovariance
+    lags = np.arange(25)
+    expected = 0.8**lags * (1.0 - lags / LENGTH)
+    m = np.arange(-200, 201)
+    process = 0.8 ** np.abs(m) + WHITE * (m == 0)
+
+    def at(lag):
+        return 0.8 ** np.abs(m + lag) + WHITE * (m + lag == 0)
+
+    variance = np.array([np.sum(process**2 + at(lag) * at(-lag)) for lag in lags])
+    error = np.sqrt(variance / (2 * SETS * LENGTH))
+    limit = norm.isf(ALPHA / 2 / len(lags))
+    assert np.abs((found[lags] - expected) / error).max() < limit
+    ignored = inference.usual_residual(clean, 0.0, [False] * SETS).autocovariance
+    np.testing.assert_allclose(ignored[0] - found[0], WHITE, atol=0.01)
+
+
+def test_residuals_of_the_same_experiment_are_directions_in_which_it_errs_again(clean):
+    at = Layout(np.repeat([0, 1], 40), np.tile(np.arange(40), 2))
+    again = [residual[:40].copy() for residual in clean[:3]]
+    again[1][7, 0] = np.nan
+    learned = inference.usual_residual(again, 0.0, [False, True, True])
+    stationary = np.kron(np.eye(2), toeplitz(learned.autocovariance))
+    flat = [np.nan_to_num(residual).T.ravel() for residual in again[1:]]
+    shapes = sum(np.outer(residual, residual) for residual in flat)
+    np.testing.assert_allclose(learned.covariance(at), stationary + shapes, atol=1e-12)
+    other = inference.usual_residual(again, 0.0, [False] * 3)
+    np.testing.assert_allclose(other.covariance(at), stationary, atol=1e-12)
+
+
+@pytest.mark.parametrize("longest", [12, 40, 70], ids=["shorter", "as long", "longer"])
+def test_the_covariance_is_positive_semidefinite(longest):
+    """Also where the noise exceeds the residuals, they alternate, or the data are longer."""
+    rng = np.random.default_rng(0)
+    at = Layout(np.zeros(longest, int), np.arange(longest))
+    waves = np.cos(np.pi * np.arange(40))[:, None] * [1.0, -1.0]
+    lengths = [rng.normal(size=(samples, 2)) for samples in (20, 40)]
+    for residuals in ([waves], lengths, [waves, *lengths], [np.cumsum(waves, 0) + 3.0]):
+        for noise in (0.0, 0.5, 2.0):
+            learned = inference.usual_residual(residuals, noise, [False] * len(residuals))
+            values = np.linalg.eigvalsh(learned.covariance(at))
+            assert values[0] > -1e-9 * max(values[-1], 1e-12)
+
+
+def test_no_clean_data_teach_nothing():
+    with pytest.raises(ValueError, match="at least one clean data set"):
+        inference.usual_residual([], 0.0, [])

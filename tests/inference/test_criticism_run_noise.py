@@ -1,0 +1,124 @@
+"""The covariance of the simulator's own noise, from runs far fewer than values."""
+
+import functools
+
+import numpy as np
+import pytest
+from bolfi_liquids.inference.criticism.misfit import slow_modes
+from bolfi_liquids.inference.criticism.run_noise import errors_of, smooth_covariance
+from bolfi_liquids.inference.noise import Layout, shrunk_covariance
+from scipy.stats import norm
+
+ALPHA = 1e-4  # false alarms per test
+RUNS, SAMPLES, REPEATS, SLOW = 40, 200, 20, 6
+BIAS = 0.15  # of the slow modes' variance
+AT = Layout(np.zeros(SAMPLES, int), np.arange(SAMPLES))
+MODES = slow_modes(AT, SLOW)
+
+
+def smooth():
+    """[SAMPLES, SAMPLES]: a correlation over five samples, thrice the size in the middle."""
+    lag = np.subtract.outer(AT.sample, AT.sample)
+    size = 1.0 + 2.0 * np.sin(np.pi * AT.sample / SAMPLES) ** 2
+    return np.exp(-0.5 * (lag / 5.0) ** 2) * np.outer(size, size)
+
+
+PROCESSES = {"smooth": smooth(), "white": np.eye(SAMPLES)}
+
+
+def towards_white(errors):
+    """Ledoit and Wolf's."""
+    found = shrunk_covariance(errors, 0)
+    return found.factors @ found.factors.T + found.white * np.eye(SAMPLES)
+
+
+def towards_smooth(errors):
+    return smooth_covariance(errors, AT, True)
+
+
+@functools.cache
+def estimates(process, estimate):
+    """Relative Frobenius errors, and slow modes' variances over the true ones [REPEATS, SLOW]."""
+    truth = PROCESSES[process]
+    values, vectors = np.linalg.eigh(truth)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    expected = np.sum(MODES * (truth @ MODES), 0)
+    errors, ratios = [], []
+    for repeat in range(REPEATS):
+        white = np.random.default_rng(repeat).normal(size=(RUNS, SAMPLES))
+        found = estimate(white @ root.T)
+        errors.append(np.linalg.norm(found - truth) / np.linalg.norm(truth))
+        ratios.append(np.sum(MODES * (found @ MODES), 0) / expected)
+    return np.array(errors), np.array(ratios)
+
+
+def surely_biased(ratios):
+    """Modes whose mean is beyond BIAS by more than its Monte Carlo error."""
+    error = ratios.std(0, ddof=1) / np.sqrt(REPEATS)
+    return np.abs(ratios.mean(0) - 1.0) - norm.isf(ALPHA / SLOW) * error > BIAS
+
+
+def surely_unbiased(ratios):
+    error = ratios.std(0, ddof=1) / np.sqrt(REPEATS)
+    return np.abs(ratios.mean(0) - 1.0) + error < BIAS
+
+
+@pytest.mark.parametrize("process", PROCESSES)
+def test_the_slow_part_of_noise_is_as_large_as_it_is(process):
+    found = estimates(process, towards_smooth)[1]
+    assert surely_unbiased(found).all(), found.mean(0)
+
+
+def test_shrinking_smooth_noise_towards_white_makes_its_slow_part_too_small():
+    found = estimates("smooth", towards_white)[1]
+    assert surely_biased(found).any() and (found.mean(0) < 1.0).all(), found.mean(0)
+
+
+def test_smooth_noise_is_found_better_than_by_shrinking_towards_white():
+    ours, theirs = (estimates("smooth", how)[0] for how in (towards_smooth, towards_white))
+    assert (ours < theirs).all()
+    assert ours.mean() < 0.8 * theirs.mean()
+
+
+def test_white_noise_is_found_nearly_as_well_as_if_it_were_known_to_be_white():
+    """The sample covariance errs by sqrt(m / n) = 2.2; what is learned besides the one size are
+    the sizes, to 2 / sqrt(n * 15) each, and 199 correlations, to 1 / sqrt(n m) each."""
+    ours = estimates("white", towards_smooth)[0]
+    allowed = np.sqrt(2.0 / (RUNS * 15) + SAMPLES / (RUNS * SAMPLES))
+    assert ours.mean() < 2.0 * allowed
+
+
+def test_channels_of_unlike_size_and_of_samples_in_any_order_are_kept_apart():
+    """As in a flattened output, whose channels alternate."""
+    rng = np.random.default_rng(0)
+    at = Layout(np.tile([0, 1], 100), np.repeat(np.arange(100), 2))
+    errors = rng.normal(size=(RUNS, 200)) * np.where(at.channel == 0, 1.0, 10.0)
+    found = np.diag(smooth_covariance(errors, at, True))
+    means = found[at.channel == 0].mean(), found[at.channel == 1].mean()
+    allowed = norm.isf(ALPHA) * np.sqrt(2.0 / (RUNS * 100))
+    np.testing.assert_allclose(means, [1.0, 100.0], rtol=allowed)
+    order = np.lexsort((at.sample, at.channel))
+    sorted_at = Layout(at.channel[order], at.sample[order])
+    np.testing.assert_allclose(
+        smooth_covariance(errors[:, order], sorted_at, True),
+        smooth_covariance(errors, at, True)[np.ix_(order, order)],
+        rtol=1e-9,
+        atol=1e-9,
+    )
+
+
+def test_single_values_are_shrunk_towards_independent_ones():
+    rng = np.random.default_rng(0)
+    errors = rng.normal(size=(500, 4)) @ np.linalg.cholesky(0.5 * np.eye(4) + 0.5).T
+    found = smooth_covariance(errors, Layout(np.zeros(4, int), np.arange(4)), False)
+    error = norm.isf(ALPHA / 16) * np.sqrt(2.0 / 500)
+    np.testing.assert_allclose(found, 0.5 * np.eye(4) + 0.5, atol=error)
+
+
+def test_differences_within_groups_are_as_large_as_the_noise():
+    """Whatever the groups' means are, and however small the groups."""
+    rng = np.random.default_rng(0)
+    groups = [rng.normal(100.0 * k, 1.0, (2 + k % 3, 50)) for k in range(60)]
+    errors = errors_of(groups)
+    freedom = sum((len(group) - 1) * 50 for group in groups)
+    assert abs(np.mean(errors**2) - 1.0) < norm.isf(ALPHA / 2) * np.sqrt(2.5 / freedom)

@@ -1,0 +1,235 @@
+"""Criticism from end to end: an oscillation that is late, shifted or drifting."""
+
+from dataclasses import replace
+from functools import partial
+from types import SimpleNamespace
+
+import numpy as np
+import numpyro.distributions as dist
+import pytest
+from bolfi_liquids.inference.criticism.laboratory import Laboratory
+from bolfi_liquids.inference.criticism.next_experiment import suggest
+
+from bolfi_liquids import inference
+
+pytestmark = pytest.mark.slow  # compiling takes half a minute on busy cores
+
+TIME = np.linspace(0.0, 6.0, 60)
+PRIOR = inference.Prior({"frequency": dist.Uniform(2.0, 4.0)})
+EXTENSIONS = {
+    "offset": inference.Extension(dist.Normal(0.0, 0.5)),
+    "delay": inference.Extension(dist.Normal(0.0, 0.1)),
+    "phase": inference.Extension(dist.Normal(0.0, 0.3)),
+    "drift": inference.Extension(dist.Normal(0.0, 0.1)),
+    "broken": inference.Extension(dist.HalfNormal(1.0)),
+}
+NOISE = inference.AutoregressiveNoise(np.array([0.05]), np.array([0.6]))
+PLAN = inference.Plan(refits=2)
+WINDOWS = (
+    inference.Window({"part": "first"}, TIME < 3.0),
+    inference.Window({"part": "second"}, TIME >= 3.0),
+)
+
+
+def oscillate(theta, seeds, speed=1.0):
+    """A late oscillation and one of another phase are the same, but not at another speed."""
+    if "broken" in theta:
+        raise RuntimeError("never converges")
+    of = {name: np.zeros((len(seeds), 1)) for name in EXTENSIONS}
+    of |= {name: np.asarray(column)[:, None] for name, column in theta.items()}
+    angle = speed * of["frequency"] * (TIME - of["delay"]) - of["phase"]
+    mean = np.exp(-0.2 * TIME) * np.cos(angle) + of["offset"] + of["drift"] * TIME
+    waves = np.cos(np.pi * np.arange(1, 6)[:, None] * TIME / 6.0)
+    sizes = np.stack([np.random.default_rng(int(seed)).normal(size=5) for seed in seeds])
+    return mean + 0.01 * sizes @ waves
+
+
+def experiment(simulate=oscillate, seed=0, label="fitted", **truth):
+    theta = {name: np.array([value]) for name, value in {"frequency": 3.0, **truth}.items()}
+    at = SimpleNamespace(channel=np.zeros(60, int), sample=np.arange(60))
+    noise = NOISE.draw(np.random.default_rng([seed, 1]), at, 1)[0]
+    observed = simulate(theta, [10**6 + seed])[0] + noise
+    return inference.Experiment(simulate, observed, NOISE, label, label, WINDOWS)
+
+
+class Counted:
+    """A simulator that counts its runs."""
+
+    def __init__(self):
+        self.runs = 0
+
+    def __call__(self, theta, seeds):
+        signals = oscillate(theta, seeds)
+        self.runs += len(seeds)
+        return signals
+
+
+def held_out(**truth):
+    return experiment(partial(oscillate, speed=1.3), 1, "other speed", **truth)
+
+
+def same(a, b):
+    """Bit for bit: fits, tests, posterior and all that was concluded."""
+    assert a.verdict == b.verdict and a.accepted == b.accepted
+    assert [c.names for c in a.candidates] == [c.names for c in b.candidates]
+    for one, other in zip([a.base, *a.candidates], [b.base, *b.candidates], strict=True):
+        assert one.check == other.check
+        assert one.hypothesis.best == other.hypothesis.best
+        np.testing.assert_array_equal(one.hypothesis.difference, other.hypothesis.difference)
+        np.testing.assert_array_equal(one.hypothesis.spread, other.hypothesis.spread)
+    np.testing.assert_array_equal(a.confusion, b.confusion)
+    np.testing.assert_array_equal(a.posterior.weights, b.posterior.weights)
+    for name, values in a.posterior.theta.items():
+        np.testing.assert_array_equal(values, b.posterior.theta[name])
+
+
+@pytest.fixture(scope="module")
+def bank():
+    with inference.SimulationBank() as bank:
+        yield bank
+
+
+@pytest.fixture(scope="module")
+def criticised(bank):
+    """(fitted, ...) -> Criticism, all runs in one bank."""
+
+    def call(fitted, extensions=EXTENSIONS, **asked):
+        keeping = inference.Keeping(bank=bank, batch=64)
+        return inference.criticise(fitted, PRIOR, extensions, plan=PLAN, keeping=keeping, **asked)
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def counted():
+    return Counted()
+
+
+@pytest.fixture(scope="module")
+def drifting(criticised, counted):
+    """What is said of drifting data."""
+    fitted = replace(experiment(drift=0.06), simulate=counted)
+    return criticised(fitted, held_out=[held_out(drift=0.06)])
+
+
+def test_the_effect_that_acts_is_named_and_its_coefficient_found(drifting):
+    assert drifting.verdict.kind == "effect"
+    assert drifting.accepted == drifting.verdict.effects == ("drift",)
+    interval = drifting.coefficients["drift"]
+    assert interval.q05 < 0.06 < interval.q95 < 0.12
+    (gap,) = drifting.gaps[("drift",)]
+    assert gap.passes and gap.after < 0.5 * gap.before
+
+
+def test_where_the_data_differ_is_said_before_and_after(drifting):
+    assert drifting.before[1].p_value < 0.05 and drifting.before[1].z > 5.0
+    assert min(found.p_value for found in drifting.after) > 0.05
+
+
+def test_an_effect_that_cannot_be_simulated_is_untested_and_stops_nothing(drifting):
+    assert drifting.untested == ("broken",)
+    assert "broken" not in drifting.base.signatures and "broken" not in drifting.singles
+
+
+def test_the_same_call_simulates_nothing_again_and_concludes_the_same(
+    drifting, criticised, counted
+):
+    made = counted.runs
+    # the base model, four effects and a refit at the least
+    assert made > PLAN.start + PLAN.base + 4 * PLAN.extension
+    fitted = replace(experiment(drift=0.06), simulate=counted)
+    again = criticised(fitted, held_out=[held_out(drift=0.06)])
+    assert counted.runs == made
+    same(drifting, again)
+    assert again.gaps == drifting.gaps and again.simulations == drifting.simulations
+
+
+def test_other_held_out_data_change_no_fit(drifting, criticised):
+    """Data that are as good, with other noise: a leak would change the last digits."""
+    unseen = held_out(drift=0.06)
+    noise = 0.01 * np.random.default_rng(5).normal(size=60)
+    other = replace(unseen, observed=unseen.observed + noise)
+    again = criticised(experiment(drift=0.06), held_out=[other])
+    assert again.gaps != drifting.gaps
+    same(drifting, again)
+
+
+def test_held_out_data_that_the_explanation_fails_withdraw_it(drifting, criticised):
+    """The other way round the drift makes all predictions worse."""
+    again = criticised(experiment(drift=0.06), held_out=[held_out(drift=-0.06)])
+    assert again.verdict.kind == "unknown" and "held out" in again.verdict.reason
+    assert again.accepted == () and again.extended is None
+    assert not again.gaps[("drift",)][0].passes
+    assert not again.singles["drift"].accepted
+    for one, other in zip(drifting.candidates, again.candidates, strict=True):
+        assert one.check == other.check and one.gain == other.gain
+
+
+def test_a_user_may_accept_another_effect_than_is_named(criticised):
+    found = criticised(experiment(drift=0.06), accept=["offset"])
+    assert found.verdict.effects == ("drift",)
+    assert found.accepted == ("offset",) == tuple(found.coefficients)
+    assert found.extended is not None and found.extended.names == ("offset",)
+    assert found.coefficients["offset"].q05 > 0.0
+
+
+def test_data_that_lack_nothing_are_let_alone(criticised):
+    found = criticised(experiment(seed=2))
+    assert found.verdict.kind == "none" and found.accepted == () and found.candidates == ()
+    assert (
+        found.posterior.interval("frequency").q05 < 3.0 < found.posterior.interval("frequency").q95
+    )
+
+
+def test_with_no_effect_that_can_be_simulated_nothing_is_known(criticised):
+    only = {"broken": EXTENSIONS["broken"]}
+    found = criticised(experiment(drift=0.06), only)
+    assert found.verdict.kind == "unknown"
+    assert found.untested == ("broken",) and found.candidates == ()
+    assert found.confusion.shape == (0, 0)
+
+
+# Which experiment next?
+
+
+def proposal(speed):
+    return inference.Proposal(
+        partial(oscillate, speed=speed), NOISE, (60,), f"speed {speed}", f"speed {speed}"
+    )
+
+
+def test_effects_that_look_alike_are_tied_and_the_experiment_that_separates_them_comes_first(
+    criticised,
+):
+    found = criticised(experiment(delay=0.15), proposals=[proposal(1.0), proposal(2.0)])
+    assert found.verdict.kind == "tie"
+    assert set(found.verdict.effects) == {"delay", "phase"}
+    names = list(found.base.signatures)
+    assert abs(found.confusion[names.index("delay"), names.index("phase")]) > 0.95
+    assert [one.label for one in found.suggestions] == ["speed 2.0", "speed 1.0"]
+    assert found.suggestions[0].snr > 10.0 > 2.0 * found.suggestions[1].snr
+
+
+@pytest.fixture
+def laboratory():
+    return Laboratory(oscillate, PRIOR, EXTENSIONS, "", inference.Keeping())
+
+
+def rival(**best):
+    best = {"frequency": 3.0, **best}
+    names = tuple(name for name in best if name in EXTENSIONS)
+    return SimpleNamespace(names=names, hypothesis=SimpleNamespace(best=best))
+
+
+def test_an_experiment_is_as_good_as_the_pair_that_it_separates_least(laboratory):
+    """A delay and the phase that equals it at speed 1, against an offset."""
+    rivals = [rival(delay=0.1), rival(phase=0.3), rival(offset=0.3)]
+    fast, again = suggest(laboratory, [proposal(1.0), proposal(2.0)], rivals)
+    assert (fast.label, again.label) == ("speed 2.0", "speed 1.0")
+    assert again.between == ("delay", "phase") and again.snr < 3.0 < fast.snr
+    alone = suggest(laboratory, [proposal(1.0)], rivals[1:])[0]
+    assert alone.between == ("phase", "offset") and alone.snr > 3.0
+
+
+def test_one_explanation_needs_no_further_experiment(laboratory):
+    assert suggest(laboratory, [proposal(1.0)], [rival(delay=0.1)]) == []

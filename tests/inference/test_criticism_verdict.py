@@ -1,0 +1,171 @@
+"""What is concluded, from explanations made by hand; and what a user may not ask for."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import numpyro.distributions as dist
+import pytest
+from bolfi_liquids.inference.criticism.verdict import conclude, failed, near_best, tied
+
+from bolfi_liquids import inference
+
+REJECTED = inference.Check(0.001, 0.001, 0.2, {})
+FITS = inference.Check(0.4, 0.3, 0.5, {})
+
+
+def candidate(*names, gain, p_value=0.4, **more):
+    """An explanation as `conclude` sees it."""
+    check = inference.Check(p_value, p_value, p_value, {})
+    return inference.Candidate(SimpleNamespace(names=names), check, gain, **more)
+
+
+def verdict(*candidates, base=REJECTED):
+    found = conclude(base, tied(candidates))
+    return found.kind, found.effects
+
+
+def test_a_model_that_fits_lacks_nothing():
+    assert verdict(candidate("drag", gain=20.0), base=FITS) == ("none", ())
+    assert "agree" in conclude(FITS, []).reason
+
+
+def test_the_one_explanation_that_fits_is_named():
+    drag, tilt = candidate("drag", gain=20.0), candidate("tilt", gain=18.0, p_value=0.001)
+    assert verdict(drag, tilt) == ("effect", ("drag",))
+
+
+def test_a_pair_is_one_explanation():
+    assert verdict(candidate("drag", "tilt", gain=20.0)) == ("effect", ("drag", "tilt"))
+    assert (
+        "drag with tilt explains it"
+        in conclude(REJECTED, [candidate("drag", "tilt", gain=9)]).reason
+    )
+
+
+@pytest.mark.parametrize(("behind", "kind"), [(3.9, "tie"), (4.1, "effect")])
+def test_explanations_that_are_nearly_as_good_are_tied(behind, kind):
+    drag, tilt = candidate("drag", gain=20.0), candidate("tilt", gain=20.0 - behind)
+    assert verdict(tilt, drag) == (kind, ("drag", "tilt") if kind == "tie" else ("drag",))
+
+
+def test_effects_of_tied_pairs_are_named_once():
+    pairs = candidate("drag", "tilt", gain=20.0), candidate("drag", "delay", gain=19.0)
+    assert verdict(*pairs) == ("tie", ("drag", "tilt", "delay"))
+
+
+@pytest.mark.parametrize(
+    "poor",
+    [
+        candidate("drag", gain=20.0, p_value=0.01),
+        candidate("drag", gain=2.0),
+        candidate("drag", gain=20.0, held=False),
+    ],
+    ids=["does not fit", "gains nothing", "does not hold"],
+)
+def test_what_explains_nothing_is_not_named(poor):
+    assert verdict(poor) == ("unknown", ())
+    better = replace(poor, check=FITS, gain=20.0, held=True)
+    assert verdict(better) == ("effect", ("drag",))
+
+
+def test_held_out_data_decide_only_where_there_is_something_to_explain():
+    """An effect may be tried on data with which the base model agrees, if the user asks."""
+    refuted = [candidate("drag", gain=20.0, held=False)]
+    found = failed(REJECTED, refuted)
+    assert (found.kind, found.effects) == ("unknown", ())
+    assert "drag explains these data, but not those held out" in found.reason
+    agreeing = failed(FITS, refuted)
+    assert agreeing.kind == "none" and "differ" not in agreeing.reason
+
+
+def test_the_best_and_what_fits_already_are_refitted():
+    worst = candidate("worst", gain=-1.0, p_value=0.001)
+    fits = candidate("fits", gain=1.0)
+    others = [candidate(str(k), gain=10.0 - k, p_value=0.001) for k in range(4)]
+    chosen = near_best([worst, *others, fits], 3)
+    assert [one.names for one in chosen] == [("0",), ("1",), ("2",)]
+    passing = replace(fits, gain=2.5)
+    assert [one.names for one in near_best([worst, *others, passing], 3)][0] == ("fits",)
+    assert near_best([worst], 3) == []
+
+
+# What makes no sense is refused before anything is simulated.
+
+PRIOR = inference.Prior({"rate": dist.Uniform(0.0, 1.0)})
+DRAG = {"drag": inference.Extension(dist.HalfNormal(1.0))}
+
+
+def never(theta, seeds):
+    raise AssertionError("simulated")
+
+
+def experiment(observed, label="data"):
+    return inference.Experiment(never, observed, inference.KnownNoise(0.1), label=label)
+
+
+def refused(match, extensions=DRAG, **asked):
+    with pytest.raises(ValueError, match=match):
+        inference.criticise(experiment(np.arange(20.0)), PRIOR, extensions, **asked)
+
+
+def test_accepting_what_is_not_registered_is_refused():
+    refused("cannot accept 'tilt', 'delay'; there are drag", accept=["tilt", "drag", "delay"])
+
+
+def test_an_effect_named_like_a_parameter_is_refused():
+    refused("extension 'rate' has the name of a parameter", {"rate": DRAG["drag"]})
+
+
+@pytest.mark.parametrize("extensions", [{}, None, ["drag"], {"drag": 1.0}])
+def test_what_is_no_registry_is_refused(extensions):
+    refused("[Ee]xtension", extensions)
+
+
+def test_held_out_data_that_are_fitted_are_refused():
+    """Also as a copy, or with the same gaps."""
+    observed = np.arange(20.0)
+    refused("very data that are fitted", held_out=[experiment(observed.copy(), "other")])
+    observed[3] = np.nan
+    with pytest.raises(ValueError, match="very data that are fitted"):
+        inference.criticise(
+            experiment(observed), PRIOR, DRAG, held_out=[experiment(observed.copy(), "other")]
+        )
+
+
+@pytest.mark.parametrize("neutral", [-0.1, np.inf, np.nan])
+def test_a_neutral_coefficient_must_be_possible(neutral):
+    with pytest.raises(ValueError, match="neutral must"):
+        inference.Extension(dist.HalfNormal(1.0), neutral)
+    assert inference.Extension(dist.HalfNormal(1.0), 0.0).neutral == 0.0
+
+
+def test_experiments_without_data_and_windows_of_other_shape_are_refused():
+    with pytest.raises(ValueError, match="other: observed must have a finite value"):
+        experiment(np.full(20, np.nan), "other")
+    window = inference.Window({"stroke": 1}, np.ones(19, bool))
+    with pytest.raises(ValueError, match=r"stroke.*\(19,\), expected \(20,\)"):
+        inference.Experiment(never, np.zeros(20), inference.KnownNoise(0.1), windows=(window,))
+
+
+def other(theta, seeds):
+    raise AssertionError("simulated")
+
+
+def test_experiments_that_the_bank_would_confuse_are_refused():
+    """Of one label and without identities, the second would be given the first one's runs."""
+    first = experiment(np.zeros(20), "recording")
+    second = replace(first, simulate=other, observed=np.ones(20))
+    refused("two experiments 'recording'.*identity", held_out=[first, second])
+    noise = inference.KnownNoise(0.1)
+    proposals = [inference.Proposal(one, noise, (20,)) for one in (never, other)]
+    refused("two experiments 'experiment'.*identity", proposals=proposals)
+
+
+@pytest.mark.parametrize("told_apart", [{"label": "b"}, {"identity": "b"}, {"simulate": never}])
+def test_experiments_that_the_bank_tells_apart_or_may_confuse_are_not_refused(told_apart):
+    """The simulator is reached."""
+    first = experiment(np.zeros(20), "recording")
+    second = replace(first, **{"simulate": other, "observed": np.ones(20), **told_apart})
+    with pytest.raises(RuntimeError, match="AssertionError: simulated"):
+        inference.criticise(experiment(np.arange(20.0)), PRIOR, DRAG, held_out=[first, second])
