@@ -133,8 +133,8 @@ def superseded_sentence(section: Mapping[str, Any]) -> str:
 def gap_sentence(section: Mapping[str, Any]) -> str:
     """How far the stirs and the model are apart, before and after, fitted and held out."""
     gap = section["gap_deg"]
-    noise = f"noise of cameras and simulator would leave {gap['noise']:.2f}°."
-    sentence = f"Recorded and expected inclination differ by {gap['before']:.2f}° RMS"
+    noise = f"the noise of cameras and simulator is {gap['noise']:.2f}°."
+    sentence = f"Beyond noise, recorded and expected inclination differ by {gap['before']:.2f}° RMS"
     if gap["after"] is None:
         return f"{sentence}; {noise}"
     explained = listed(section["accepted"]) if section["accepted"] else "the best explanation"

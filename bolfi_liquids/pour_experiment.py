@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from .inference import Experiment, Prior
     from .models import Cups
 
-WEIGHING = 0.005  # sd of a weighed fraction
+REPEATED = 0.04
+"""Sd of a fraction: what pours repeat to, and what this simulator misses of another's pours."""
 NARROWEST = 0.05  # sd of the log of a parameter, and share of the range of another
 OUTCOMES = ("spilled", "retained")
 
@@ -77,7 +78,7 @@ def pour_experiment(table: PourTable, cups: "Cups", density: float) -> "Experime
     return Experiment(
         pouring.simulate,
         table.observed,
-        KnownNoise(WEIGHING),
+        KnownNoise(REPEATED),
         pouring.identity,
         table.path.name,
         tuple(windows),

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .pour_experiment import OUTCOMES, WEIGHING, Pouring
+from .pour_experiment import OUTCOMES, REPEATED, Pouring
 from .recordings import Gripper, Recording
 from .stirring import Stirring
 from .strokes import speed
@@ -88,7 +88,7 @@ def pour_proposals(cups: "Cups", density: float, tried: int = 2) -> list["Propos
         made.append(
             Proposal(
                 pouring.simulate,
-                KnownNoise(WEIGHING),
+                KnownNoise(REPEATED),
                 (len(OUTCOMES), len(distance)),
                 pouring.identity,
                 f"{label} cm",

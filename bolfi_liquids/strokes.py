@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .inference import Window
     from .stirring import Stirring
 
-MOVING = 0.05  # of the greatest speed, above which the gripper moves
+MOVING = 0.5  # of the greatest speed: corners are too short for samples to see them at rest
 STILL = 1e-4  # m
 PARTS = 8  # of a stir without separate strokes
 SPEEDS = 3  # bins

@@ -92,8 +92,11 @@ def print_criticism(
 
 
 def _gap_lines(gap: Mapping[str, float | None]) -> list[str]:
-    """Before and after, on the data and on those held out."""
-    rows = {"difference": ("before", "after"), "held out": ("held_out_before", "held_out_after")}
+    """Beyond noise, before and after, on the data and on those held out."""
+    rows = {
+        "gap beyond noise": ("before", "after"),
+        "held out": ("held_out_before", "held_out_after"),
+    }
     lines = []
     for label, (before, after) in rows.items():
         if gap[before] is None:

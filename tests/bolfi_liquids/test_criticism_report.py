@@ -68,7 +68,7 @@ def test_chapter_of_a_tie_says_what_to_record_next(criticism_section, made):
     )
     assert len(chapter["results"]) == 1
     assert chapter["coefficient"] == chapter["superseded"] == chapter["held_out"] == ""
-    assert "with the best explanation by 0.31°; noise" in chapter["gap_sentence"]
+    assert "with the best explanation by 0.31°; the noise" in chapter["gap_sentence"]
     assert chapter["suggestion_sentence"] == (
         "To tell camera delay from gripper scale, record the star: a signal-to-noise ratio of 5.5"
         " is expected."
@@ -97,8 +97,8 @@ def test_chapter_of_a_model_that_agrees(criticism_section, made):
     tree = made(after=False, status=["not needed"] * 3)
     chapter = criticism_chapter({**criticism_section, **NONE, "gap_deg": gap}, tree, CALIBRATED)
     assert chapter["gap_sentence"] == (
-        "Recorded and expected inclination differ by 0.30° RMS; noise of cameras and simulator"
-        " would leave 0.33°."
+        "Beyond noise, recorded and expected inclination differ by 0.30° RMS; the noise of cameras"
+        " and simulator is 0.33°."
     )
     assert "In no stroke" in chapter["where_sentence"]
     assert chapter["sources"][0]["rows"][1][4:6] == ["–", "–"]
@@ -160,7 +160,7 @@ def test_the_command_line_says_what_was_found(criticism_section):
     text = printed(criticism_section, None)
     assert "the missing effect is camera delay" in text
     assert "camera delay: 0.05 s (90 %: 0.04 to 0.06)" in text
-    assert "difference: before 1.25 deg RMS, after 0.31 deg\n" in text
+    assert "gap beyond noise: before 1.25 deg RMS, after 0.31 deg\n" in text
     assert "held out: before 1.50 deg RMS, after 0.42 deg (noise: 0.33 deg)" in text
     assert "surest in stroke 1, xz plane, 1.0 to 2.0 s (1-first.nc): 2.50 deg RMS" in text
 

@@ -21,7 +21,7 @@ from bolfi_liquids.hardware import circle, star
 
 from bolfi_liquids import inference, models
 from bolfi_liquids.clean_recordings import Clean, clean_residuals, usual_for
-from bolfi_liquids.pour_experiment import Pouring
+from bolfi_liquids.pour_experiment import REPEATED, Pouring
 from bolfi_liquids.prior import default_prior
 from bolfi_liquids.recordings import Gripper, Recording
 from bolfi_liquids.settings import CriticismSettings
@@ -37,7 +37,7 @@ RIG = {
     "stick_density": 1200.0,
     "liquid_density": 1200.0,
 }
-MODEL, DATA = 300, 450  # particles
+MODEL, DATA = 800, 1000  # particles
 POURED = 900  # particles of the pours that are data; the model has its usual number
 NOISE, CORRELATION = np.radians(0.1), 0.5
 NULLS, SETS, CLEAN = 20, 5, 4
@@ -196,7 +196,7 @@ def _poured(actions: np.ndarray, truth: dict, rng: np.random.Generator) -> infer
         effects={"adhesion": truth["adhesion"]},
     )
     observed = np.stack([made.spilled, made.retained]) + 0.005 * rng.normal(size=(2, len(rate)))
-    noise = inference.KnownNoise(0.005)
+    noise = inference.KnownNoise(REPEATED)
     return inference.Experiment(pouring.simulate, observed, noise, pouring.identity, "pours")
 
 

@@ -1,0 +1,84 @@
+"""Criticism of a run: what it is given, and the whole way on few simulations."""
+
+import numpy as np
+import numpyro.distributions as dist
+import pytest
+from bolfi_liquids.inference import Prior
+
+import bolfi_liquids as bl
+from bolfi_liquids.errors import InputError
+from bolfi_liquids.pour_experiment import as_prior
+from bolfi_liquids.prior import default_prior, describe_prior, read_prior
+from bolfi_liquids.recordings_kept import kept_recordings
+
+
+def test_a_prior_survives_its_description():
+    for prior in (
+        default_prior(),
+        Prior({"viscosity": dist.LogNormal(-1.0, 0.3), "cohesion": dist.Beta(2.0, 3.0)}),
+    ):
+        again = read_prior(describe_prior(prior))
+        u = np.random.default_rng(0).random((16, 2))
+        for name, values in prior.from_unit(u).items():
+            np.testing.assert_allclose(again.from_unit(u)[name], values, rtol=1e-6)
+
+
+def test_a_prior_that_nothing_describes_is_refused():
+    with pytest.raises(ValueError, match="viscosity is 'Mine"):
+        read_prior({"viscosity": "Mine(low=1)"})
+
+
+def test_what_stirs_taught_becomes_a_prior_of_the_same_mean_and_spread():
+    rng = np.random.default_rng(1)
+    theta = {
+        "viscosity": np.exp(rng.normal(-2.0, 0.4, 4000)),
+        "cohesion": rng.uniform(0.0, 1.0, 4000),
+    }
+    learned = as_prior(theta, np.full(4000, 1 / 4000), default_prior())
+    median = learned.from_unit(np.full((1, 2), 0.5))
+    assert abs(np.log(median["viscosity"][0]) + 2.0) < 0.05
+    upper = learned.from_unit(np.full((1, 2), 0.841))
+    assert abs(np.log(upper["viscosity"][0]) + 1.6) < 0.05
+    ends = learned.from_unit(np.array([[0.0, 0.0], [1.0, 1.0]]))["cohesion"]
+    np.testing.assert_allclose(ends, [0.0, 1.0], atol=1e-6)
+
+
+def test_a_run_keeps_its_recordings(calibration):
+    (kept,) = kept_recordings(calibration.path, dict(calibration.record))
+    assert [kept.hash] == calibration.record["inputs"]["sha256"]
+
+
+def test_a_changed_copy_is_refused(calibration, tmp_path):
+    (kept,) = kept_recordings(calibration.path, dict(calibration.record))
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    (folder / kept.path.name).write_bytes(kept.path.read_bytes())
+    record = {**calibration.record, "inputs": {"sha256": ["another"]}}
+    with pytest.raises(InputError, match="not the recording that this run was calibrated on"):
+        kept_recordings(tmp_path, record)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"effects": ["magic"]}, "there is no effect magic"),
+        ({"pours": "nowhere.csv"}, "nowhere.csv: no such file"),
+        ({"held_out": "nowhere.nc"}, "nowhere.nc: no such file"),
+        ({"seed": -1}, "--seed: -1"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_before_anything_is_simulated(calibration, options, said):
+    with pytest.raises(InputError) as refused:
+        bl.criticise(calibration, progress=False, **options)
+    assert said in str(refused.value)
+
+
+def test_data_that_were_fitted_prove_nothing(calibration):
+    (kept,) = kept_recordings(calibration.path, dict(calibration.record))
+    with pytest.raises(InputError, match="is what the run was calibrated on"):
+        bl.criticise(calibration, held_out=kept, progress=False)
+
+
+def test_a_run_without_criticism_says_so(calibration):
+    with pytest.raises(InputError, match="bolfi-liquids criticise"):
+        bl.Criticism.open(calibration.path)

@@ -1,0 +1,49 @@
+"""Tables of pours: what is read, and what is refused."""
+
+import numpy as np
+import pytest
+
+from bolfi_liquids.errors import InputError
+from bolfi_liquids.pour_table import open_pours
+
+HEADER = "liquid,angular_velocity_deg_s,distance_cm,received,retained,spilled\n"
+ROWS = ["water,45,1.5,90,5,5", "water,90,1.5,80,0,20", "water,90,3,10,10,0", "oil,45,1.5,1,1,2"]
+
+
+def written(tmp_path, rows, header=HEADER):
+    path = tmp_path / "pours.csv"
+    path.write_text(header + "".join(f"{row}\n" for row in rows))
+    return path
+
+
+def test_amounts_in_any_unit_become_fractions(tmp_path):
+    table = open_pours(written(tmp_path, ROWS), liquid="water")
+    np.testing.assert_allclose(table.fractions[0], [0.05, 0.9, 0.05])
+    np.testing.assert_allclose(table.fractions.sum(1), 1.0)
+    np.testing.assert_allclose(table.observed, [[0.05, 0.2, 0.0], [0.05, 0.0, 0.5]])
+    np.testing.assert_allclose(table.angular_velocity, np.radians([45.0, 90.0, 90.0]))
+    np.testing.assert_allclose(table.distance, [0.015, 0.015, 0.03])
+
+
+def test_one_liquid_needs_no_name(tmp_path):
+    assert open_pours(written(tmp_path, ROWS[:3])).liquid == "water"
+
+
+@pytest.mark.parametrize(
+    ("rows", "header", "liquid", "said"),
+    [
+        (ROWS, HEADER, None, "holds pours of oil, water; say whose to take: --liquid NAME"),
+        (ROWS, HEADER, "gel", "not of gel"),
+        (ROWS, HEADER, "oil", "holds 1 pours; give at least 3"),
+        (ROWS, HEADER.replace("retained", "kept"), None, "has no column retained"),
+        ([*ROWS[:2], "water,90,x,1,1,1"], HEADER, None, "line 4, column distance_cm: 'x'"),
+        ([*ROWS[:2], "water,90,1,1,-1,1"], HEADER, None, "line 4, column retained: -1"),
+        ([*ROWS[:2], "water,90,1,0,0,0"], HEADER, None, "line 4: spilled, received and retained"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_by_name(tmp_path, rows, header, liquid, said):
+    path = written(tmp_path, rows, header)
+    with pytest.raises(InputError) as refused:
+        open_pours(path, liquid)
+    assert said in str(refused.value)
+    assert str(path) in str(refused.value)

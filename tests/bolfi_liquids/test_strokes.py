@@ -1,0 +1,46 @@
+"""Windows of a stir."""
+
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+from bolfi_liquids.hardware import circle, star
+
+from bolfi_liquids.recordings import Gripper, Recording
+from bolfi_liquids.stirring import Stirring
+from bolfi_liquids.strokes import PARTS, resting, speed, strokes, windows
+
+
+def recorded(path) -> Recording:
+    still = np.zeros((len(path.time), 2))
+    return Recording(
+        path.time, Gripper(*path), still, MappingProxyType({}), Path("stir.nc"), "hash"
+    )
+
+
+def test_a_star_of_nine_points_has_its_strokes_and_a_rest_on_each_side():
+    recording = recorded(star(speed=0.1, height=0.2, rest=1.0))
+    found = strokes(recording)
+    # one to the first vertex, nine from vertex to vertex
+    assert [stroke.number for stroke in found] == list(range(12))
+    assert np.sum([stroke.samples for stroke in found], axis=0).tolist() == [1] * len(
+        recording.time
+    )
+    assert abs(recording.time[resting(recording)].max() - 1.0) < 0.1
+
+
+def test_a_circle_has_no_strokes_and_is_cut_evenly():
+    recording = recorded(circle(speed=0.1, height=0.2))
+    assert [stroke.number for stroke in strokes(recording)] == list(range(1, PARTS + 1))
+    assert speed(recording).max() < 0.2
+
+
+def test_windows_cover_every_sample_of_every_recording_once_by_stroke():
+    both = tuple(recorded(star(speed=v, height=0.2)) for v in (0.1, 0.05))
+    stirring = Stirring(both, ())
+    made = windows(stirring)
+    by_stroke = [window.samples for window in made if "stroke" in window.label]
+    assert (np.sum(by_stroke, axis=0) == 1).all()
+    by_speed = np.sum([window.samples for window in made if "speed" in window.label], axis=0)
+    moving = np.concatenate([~resting(recording) for recording in both])
+    assert (by_speed == moving[:, None]).all()
