@@ -1,6 +1,7 @@
 """A run that is killed and resumed is the run that was not."""
 
 import os
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -14,6 +15,7 @@ import bolfi_liquids as bl
 from bolfi_liquids.run_directory import SIMULATIONS
 
 PATIENCE_S = 120
+EFFECTS = ("camera_delay", "camera_tilt")
 STIRRINGS = "SELECT theta, seed, created FROM simulation WHERE theta LIKE '%viscosity%'"
 
 
@@ -21,6 +23,12 @@ def command(recording, out, settings, *more):
     options = [part for name, value in settings.items() for part in (f"--{name}", str(value))]
     code = "from bolfi_liquids.cli import main; main()"
     return [sys.executable, "-c", code, "calibrate", recording, "--out", out, *options, *more]
+
+
+def criticise_command(run):
+    options = [part for name in EFFECTS for part in ("--effects", name)]
+    code = "from bolfi_liquids.cli import main; main()"
+    return [sys.executable, "-c", code, "criticise", str(run), *options]
 
 
 def finished(run):
@@ -80,3 +88,32 @@ def test_another_seed_is_refused_and_changes_nothing(short_recording, calibratio
     with pytest.raises(ValueError, match=r"settings\.seed is 3 in the run, but 4"):
         bl.calibrate(short_recording, out=calibration.path, resume=True, progress=False, **other)
     assert bl.Calibration.open(calibration.path).summary == calibration.summary
+
+
+@pytest.mark.slow
+def test_criticism_killed_and_repeated_equals_undisturbed(calibration, tmp_path):
+    quiet, killed = tmp_path / "quiet", tmp_path / "killed"
+    shutil.copytree(calibration.path, quiet)
+    shutil.copytree(calibration.path, killed)
+    known = finished(killed)
+    whole = bl.criticise(quiet, effects=EFFECTS, progress=False)
+
+    process = subprocess.Popen(criticise_command(killed), stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + PATIENCE_S
+    while len(finished(killed)) < len(known) + 10 and time.monotonic() < deadline:
+        time.sleep(0.02)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    before = finished(killed)
+    assert len(known) < len(before) < len(finished(quiet))
+    assert "criticise" not in (killed / "summary.json").read_text()
+
+    subprocess.run(criticise_command(killed), check=True, capture_output=True)
+    after = finished(killed)
+    assert {key: after[key] for key in before} == before  # none was simulated again
+    assert after.keys() == finished(quiet).keys()
+    again = bl.Criticism.open(killed)
+    for name, draws in whole.tree["posterior"].items():
+        np.testing.assert_array_equal(again.tree["posterior"][name], draws)
+    timeless = [{k: v for k, v in c.summary.items() if k != "seconds"} for c in (whole, again)]
+    assert timeless[0] == timeless[1]
