@@ -12,9 +12,11 @@ from .calibration import Calibration
 from .calibrator import Source
 from .clean_recordings import Clean, clean_residuals, usual_for
 from .criticism import Criticism
-from .criticism_results import Findings, criticism_section, criticism_tree
+from .criticism_results import criticism_tree
+from .criticism_section import criticism_section
 from .cups import bundled_cups
 from .errors import InputError
+from .findings import Findings
 from .pour_experiment import as_prior, pour_experiment
 from .pour_table import PourTable, open_pours
 from .prior import read_prior
@@ -96,9 +98,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         if table is not None:
             cups = bundled_cups() if cups is None else cups
             poured = _pours(calibration, stirs, table, cups, settings, keeping)
-        findings = Findings(
-            calibration, stirring, stirs, poured, table, tuple(clean), settings, usual
-        )
+        findings = Findings(calibration, stirring, stirs, poured, table, tuple(clean), settings)
         tree = criticism_tree(findings)
     write_tree(tree, run / CRITICISM)
     section = criticism_section(findings, tree, time.perf_counter() - started)

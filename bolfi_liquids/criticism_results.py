@@ -1,6 +1,6 @@
-"""criticism.nc and the section "criticise" of summary.json.
+"""criticism.nc: everything that a report shows of a criticism.
 
-Groups of criticism.nc, under `stirs` and, where pours were given, under `pours`:
+Its groups, under `stirs` and, where pours were given, under `pours`:
 
 - `residual`: over the data's own dimensions, `observed`, and with `_before` and `_after` the
   expectation of the base and of the extended model, and the sd of observed less expected;
@@ -13,61 +13,18 @@ Groups of criticism.nc, under `stirs` and, where pours were given, under `pours`
 `posterior` holds the draws of the extended model, or of the base model where there is none.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .findings import Findings
 from .results import PLANE_NAMES
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
     from . import inference
-    from .calibration import Calibration
-    from .clean_recordings import Clean
-    from .pour_table import PourTable
-    from .recordings import Recording
-    from .settings import CriticismSettings
-    from .stirring import Stirring
-
-SURE = 0.05  # p-value of a window that is listed
-QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
-
-
-@dataclass(frozen=True, eq=False)
-class Findings:
-    """All that a criticism came to know."""
-
-    calibration: "Calibration"
-    stirring: "Stirring"
-    stirs: "inference.Criticism"
-    pours: "inference.Criticism | None"
-    table: "PourTable | None"
-    baseline: "tuple[Recording, ...]"
-    settings: "CriticismSettings"
-    clean: "list[Clean]"
-
-    @property
-    def sources(self) -> "dict[str, inference.Criticism]":
-        """By name."""
-        pours = {} if self.pours is None else {"pours": self.pours}
-        return {"stirs": self.stirs, **pours}
-
-    @property
-    def extended(self) -> "inference.Hypothesis":
-        """The last model that was extended, or else the stirs' base model."""
-        for source in reversed(list(self.sources.values())):
-            if source.extended is not None:
-                return source.extended
-        return self.stirs.base.hypothesis
-
-    @property
-    def accepted(self) -> tuple[str, ...]:
-        """Effects that joined the model."""
-        return tuple(name for source in self.sources.values() for name in source.accepted)
 
 
 def criticism_tree(findings: Findings) -> "DataTree":
@@ -224,138 +181,3 @@ def _suggestions(source: "inference.Criticism") -> "Dataset":
         },
         coords={"experiment": [one.label for one in source.suggestions]},
     )
-
-
-def criticism_section(findings: Findings, tree: "DataTree", seconds: float) -> dict[str, Any]:
-    """Numbers of a criticism, in the design's form."""
-    stirs = findings.stirs
-    posterior = tree["posterior"].to_dataset()
-    kind, effects = _together(findings)
-    best = findings.extended.best
-    return {
-        "verdict": kind,
-        "effects": list(effects),
-        "accepted": list(findings.accepted),
-        "accepted_by": tree.attrs["accepted_by"],
-        "reason": " ".join(source.verdict.reason for source in findings.sources.values()),
-        "p_value": min(source.verdict.p_value for source in findings.sources.values()),
-        "where": _sure(stirs),
-        "coefficient": {name: _interval(posterior[name].to_numpy()) for name in findings.accepted},
-        "parameters": {
-            str(name): _interval(values.to_numpy()) for name, values in posterior.items()
-        },
-        "best": best,
-        "n_simulations": sum(source.simulations for source in findings.sources.values())
-        + _clean_runs(findings),
-        "gap_deg": _gap_deg(stirs),
-        "pours": None if findings.pours is None else _pour_gap(findings.pours),
-        "suggestions": [
-            {"experiment": one.label, "between": list(one.between), "snr": one.snr}
-            for source in findings.sources.values()
-            for one in source.suggestions
-        ],
-        "untested": [name for source in findings.sources.values() for name in source.untested],
-        "baseline": len(findings.baseline),
-        "noise": _noise(findings),
-        "seconds": seconds,
-        "seed": findings.settings.seed,
-        "version": version("bolfi-liquids"),
-    }
-
-
-def _together(findings: Findings) -> tuple[str, tuple[str, ...]]:
-    """One verdict on all data: what was named anywhere, or else the gravest."""
-    verdicts = [source.verdict for source in findings.sources.values()]
-    for kind in ("effect", "tie", "unknown"):
-        named = [verdict for verdict in verdicts if verdict.kind == kind]
-        if named:
-            return kind, tuple(name for verdict in named for name in verdict.effects)
-    return "none", ()
-
-
-def _sure(source: "inference.Criticism") -> list[dict[str, Any]]:
-    """The windows in which the base model and the data surely differ, surest first."""
-    sure = [found for found in source.before if found.p_value < SURE]
-    ordered = sorted(sure, key=lambda found: (found.p_value, -abs(found.z)))
-    return [
-        {**found.label, "rms_deg": float(np.degrees(found.rms)), "p_value": found.p_value}
-        for found in ordered
-    ]
-
-
-def _interval(draws: np.ndarray) -> dict[str, float]:
-    quantiles = {name: float(np.quantile(draws, q)) for name, q in QUANTILES.items()}
-    return {"mean": float(draws.mean()), "sd": float(draws.std(ddof=1)), **quantiles}
-
-
-def _rms(hypothesis: "inference.Hypothesis | None") -> float | None:
-    return None if hypothesis is None else float(np.sqrt(np.mean(hypothesis.difference**2)))
-
-
-def _degrees(value: float | None) -> float | None:
-    return None if value is None else float(np.degrees(value))
-
-
-def _gap_deg(source: "inference.Criticism") -> dict[str, float | None]:
-    """The gap before and after, by what was accepted or else by the best of what is tied.
-
-    A gap is the RMS of observed less expected beyond what the cameras and the simulator's own
-    noise would leave of a right model, in quadrature; the RMS itself stands beside it.
-    """
-    best = source.leading
-    base = source.base.hypothesis
-    own = np.diag(base.spread) + np.diag(source.measurement)
-    gaps = () if best is None else source.gaps.get(best.names, ())
-
-    def pooled(values: list[float]) -> float | None:
-        return float(np.sqrt(np.mean(np.square(values)))) if values else None
-
-    after = None if best is None else _rms(best.hypothesis)
-    noise = float(np.sqrt(np.mean(own)))
-    numbers = {
-        "before": _beyond(_rms(base), noise),
-        "after": _beyond(after, noise),
-        "held_out_before": pooled([gap.excess[0] for gap in gaps]),
-        "held_out_after": pooled([gap.excess[1] for gap in gaps]),
-        "noise": noise,
-        "rms_before": _rms(base),
-        "rms_after": after,
-        "held_out_rms_before": pooled([gap.before for gap in gaps]),
-        "held_out_rms_after": pooled([gap.after for gap in gaps]),
-        "held_out_noise": pooled([gap.noise for gap in gaps]),
-    }
-    return {name: _degrees(value) for name, value in numbers.items()}
-
-
-def _beyond(rms: float | None, noise: float) -> float | None:
-    return None if rms is None else max(rms**2 - noise**2, 0.0) ** 0.5
-
-
-def _pour_gap(source: "inference.Criticism") -> dict[str, Any]:
-    """RMS of the spilled and retained fractions, and the verdict on the pours alone."""
-    best = source.leading
-    return {
-        "before": _rms(source.base.hypothesis),
-        "after": _rms(None if best is None else best.hypothesis),
-        "verdict": source.verdict.kind,
-        "effects": list(source.verdict.effects),
-        "p_value": source.verdict.p_value,
-    }
-
-
-def _clean_runs(findings: Findings) -> int:
-    plan = findings.settings.clean_plan
-    return len(findings.baseline) * (plan.start + plan.base)
-
-
-def _noise(findings: Findings) -> Mapping[str, float]:
-    """The cameras' noise as it was learned, and how well."""
-    from .stir_experiment import camera_noise
-
-    noise = camera_noise(findings.stirring.recordings)
-    return {
-        "sd_deg": float(np.degrees(noise.sd.mean())),
-        "sd_uncertainty": float(noise.sd.std() / noise.sd.mean()),
-        "correlation": float(noise.correlation.mean()),
-        "samples": noise.samples,
-    }

@@ -1,0 +1,152 @@
+"""The section "criticise" of summary.json."""
+
+from collections.abc import Mapping
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .findings import Findings
+
+if TYPE_CHECKING:
+    from xarray import DataTree
+
+    from . import inference
+
+SURE = 0.05  # p-value of a window that is listed
+QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
+
+
+def criticism_section(findings: Findings, tree: "DataTree", seconds: float) -> dict[str, Any]:
+    """Numbers of a criticism, in the design's form."""
+    stirs = findings.stirs
+    posterior = tree["posterior"].to_dataset()
+    kind, effects = _together(findings)
+    best = findings.extended.best
+    return {
+        "verdict": kind,
+        "effects": list(effects),
+        "accepted": list(findings.accepted),
+        "accepted_by": tree.attrs["accepted_by"],
+        "reason": " ".join(source.verdict.reason for source in findings.sources.values()),
+        "p_value": min(source.verdict.p_value for source in findings.sources.values()),
+        "where": _sure(stirs),
+        "coefficient": {name: _interval(posterior[name].to_numpy()) for name in findings.accepted},
+        "parameters": {
+            str(name): _interval(values.to_numpy()) for name, values in posterior.items()
+        },
+        "best": best,
+        "n_simulations": sum(source.simulations for source in findings.sources.values())
+        + _clean_runs(findings),
+        "gap_deg": _gap_deg(stirs),
+        "pours": None if findings.pours is None else _pour_gap(findings.pours),
+        "suggestions": [
+            {"experiment": one.label, "between": list(one.between), "snr": one.snr}
+            for source in findings.sources.values()
+            for one in source.suggestions
+        ],
+        "untested": [name for source in findings.sources.values() for name in source.untested],
+        "baseline": len(findings.baseline),
+        "noise": _noise(findings),
+        "seconds": seconds,
+        "seed": findings.settings.seed,
+        "version": version("bolfi-liquids"),
+    }
+
+
+def _together(findings: Findings) -> tuple[str, tuple[str, ...]]:
+    """One verdict on all data: what was named anywhere, or else the gravest."""
+    verdicts = [source.verdict for source in findings.sources.values()]
+    for kind in ("effect", "tie", "unknown"):
+        named = [verdict for verdict in verdicts if verdict.kind == kind]
+        if named:
+            return kind, tuple(name for verdict in named for name in verdict.effects)
+    return "none", ()
+
+
+def _sure(source: "inference.Criticism") -> list[dict[str, Any]]:
+    """The windows in which the base model and the data surely differ, surest first."""
+    sure = [found for found in source.before if found.p_value < SURE]
+    ordered = sorted(sure, key=lambda found: (found.p_value, -abs(found.z)))
+    return [
+        {**found.label, "rms_deg": float(np.degrees(found.rms)), "p_value": found.p_value}
+        for found in ordered
+    ]
+
+
+def _interval(draws: np.ndarray) -> dict[str, float]:
+    quantiles = {name: float(np.quantile(draws, q)) for name, q in QUANTILES.items()}
+    return {"mean": float(draws.mean()), "sd": float(draws.std(ddof=1)), **quantiles}
+
+
+def _rms(hypothesis: "inference.Hypothesis | None") -> float | None:
+    return None if hypothesis is None else float(np.sqrt(np.mean(hypothesis.difference**2)))
+
+
+def _degrees(value: float | None) -> float | None:
+    return None if value is None else float(np.degrees(value))
+
+
+def _gap_deg(source: "inference.Criticism") -> dict[str, float | None]:
+    """The gap before and after, by what was accepted or else by the best of what is tied.
+
+    A gap is the RMS of observed less expected beyond what the cameras and the simulator's own
+    noise would leave of a right model, in quadrature; the RMS itself stands beside it.
+    """
+    best = source.leading
+    base = source.base.hypothesis
+    own = np.diag(base.spread) + np.diag(source.measurement)
+    gaps = () if best is None else source.gaps.get(best.names, ())
+
+    def pooled(values: list[float]) -> float | None:
+        return float(np.sqrt(np.mean(np.square(values)))) if values else None
+
+    after = None if best is None else _rms(best.hypothesis)
+    noise = float(np.sqrt(np.mean(own)))
+    numbers = {
+        "before": _beyond(_rms(base), noise),
+        "after": _beyond(after, noise),
+        "held_out_before": pooled([gap.excess[0] for gap in gaps]),
+        "held_out_after": pooled([gap.excess[1] for gap in gaps]),
+        "noise": noise,
+        "rms_before": _rms(base),
+        "rms_after": after,
+        "held_out_rms_before": pooled([gap.before for gap in gaps]),
+        "held_out_rms_after": pooled([gap.after for gap in gaps]),
+        "held_out_noise": pooled([gap.noise for gap in gaps]),
+    }
+    return {name: _degrees(value) for name, value in numbers.items()}
+
+
+def _beyond(rms: float | None, noise: float) -> float | None:
+    return None if rms is None else max(rms**2 - noise**2, 0.0) ** 0.5
+
+
+def _pour_gap(source: "inference.Criticism") -> dict[str, Any]:
+    """RMS of the spilled and retained fractions, and the verdict on the pours alone."""
+    best = source.leading
+    return {
+        "before": _rms(source.base.hypothesis),
+        "after": _rms(None if best is None else best.hypothesis),
+        "verdict": source.verdict.kind,
+        "effects": list(source.verdict.effects),
+        "p_value": source.verdict.p_value,
+    }
+
+
+def _clean_runs(findings: Findings) -> int:
+    plan = findings.settings.clean_plan
+    return len(findings.baseline) * (plan.start + plan.base)
+
+
+def _noise(findings: Findings) -> Mapping[str, float]:
+    """The cameras' noise as it was learned, and how well."""
+    from .stir_experiment import camera_noise
+
+    noise = camera_noise(findings.stirring.recordings)
+    return {
+        "sd_deg": float(np.degrees(noise.sd.mean())),
+        "sd_uncertainty": float(noise.sd.std() / noise.sd.mean()),
+        "correlation": float(noise.correlation.mean()),
+        "samples": noise.samples,
+    }
