@@ -20,7 +20,7 @@ def own_residual(
         RuntimeError: every simulation failed.
     """
     laboratory = Laboratory(experiment.simulate, prior, extensions, experiment.identity, keeping)
-    study = Study(laboratory, experiment.observed, experiment.noise, plan, keeping.seed)
+    study = Study(laboratory, experiment.observed, experiment.noise, plan)
     best = fit_base(study, None)[0].best
     at_best = {name: np.full(REPEATS, value) for name, value in best.items()}
     mean = laboratory.run("repeat", at_best).signals.mean(0)

@@ -19,7 +19,7 @@ from .posterior import Interval, Weighted, weighted_posterior
 from .search import Base, Plan, Study, examine, explain
 from .signatures import confusion
 from .usual import without_usual
-from .verdict import Candidate, Verdict, conclude, failed, tied
+from .verdict import ALARM, Candidate, Verdict, conclude, tied
 
 
 @dataclass(frozen=True)
@@ -71,14 +71,8 @@ class Criticism:
     @property
     def leading(self) -> Candidate | None:
         """The accepted explanation, or the best of those that are tied."""
-        wanted = [set(self.accepted)] if self.accepted else []
-        if self.verdict.kind == "tie":
-            wanted += [set(names) for names in self.tied]
-        for names in wanted:
-            for candidate in self.candidates:
-                if set(candidate.names) == names:
-                    return candidate
-        return None
+        tied = self.tied[0] if self.verdict.kind == "tie" else None
+        return _among(self.candidates, self.accepted) or _among(self.candidates, tied)
 
     @property
     def measurement(self) -> np.ndarray:
@@ -145,22 +139,20 @@ def criticise(  # noqa: PLR0913  the one call that most users make
 
     seed, counting = kept.seed, replace(kept, report=counted)
     laboratory = Laboratory(experiment.simulate, prior, extensions, experiment.identity, counting)
-    study = Study(laboratory, experiment.observed, experiment.noise, plan or Plan(), seed)
+    study = Study(laboratory, experiment.observed, experiment.noise, plan or Plan())
     before = None if earlier is None else laboratory.table(*earlier)
     base, untested = examine(study, before)
     candidates, members, gaps = [], [], {}
-    if accept is not None or conclude(base.check, []).kind != "none":
-        candidates, members, runs = explain(study, base, accept)
-        gaps = _gaps(study, base, _chosen(candidates, members, accept), held_out)
+    if accept is not None or base.check.p_value < ALARM:
+        candidates, members = explain(study, base, accept)
+        chosen = {c.names: c for c in [*members, _among(candidates, accept)] if c}
+        gaps = _gaps(study, base, list(chosen.values()), held_out)
         candidates = [replace(c, held=_holds(c, gaps)) for c in candidates]
         members = [_judged(member, gaps) for member in members]
-        verdict = conclude(base.check, tied(members)) if members else conclude(base.check, [])
-        if members and not tied(members):
-            verdict = failed(base.check, members)
-    else:
-        verdict = conclude(base.check, [])
+    verdict = conclude(base.check, members)
     accepted = tuple(accept) if accept is not None else _named(verdict)
-    extended = _extended(candidates, accepted)
+    leading = _among(candidates, accepted)
+    extended = leading.hypothesis if leading else None
     windows = list(experiment.windows)
     found = locate(base.hypothesis, windows, base.null) if windows else []
     left = []
@@ -192,19 +184,9 @@ def _named(verdict: Verdict) -> tuple[str, ...]:
     return verdict.effects if verdict.kind == "effect" else ()
 
 
-def _extended(candidates: Sequence[Candidate], accepted: tuple[str, ...]) -> Hypothesis | None:
-    for candidate in candidates:
-        if accepted and set(candidate.names) == set(accepted):
-            return candidate.hypothesis
-    return None
-
-
-def _chosen(
-    candidates: Sequence[Candidate], members: Sequence[Candidate], accept: Sequence[str] | None
-) -> list[Candidate]:
-    """The explanations to be tried on held-out data."""
-    forced = [c for c in candidates if accept and set(c.names) == set(accept)]
-    return list({c.names: c for c in [*members, *forced]}.values())
+def _among(candidates: Sequence[Candidate], names: Sequence[str] | None) -> Candidate | None:
+    """The explanation by just these effects, in whatever order."""
+    return next((c for c in candidates if names and set(c.names) == set(names)), None)
 
 
 def _gaps(

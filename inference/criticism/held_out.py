@@ -9,6 +9,7 @@ from ..output import SERIES
 from .experiment import Experiment
 from .hypothesis import samples
 from .laboratory import Laboratory
+from .noise import gaussian
 from .run_noise import errors_of, smooth_covariance
 from .usual import without_usual
 
@@ -51,13 +52,7 @@ def predict(
     laboratory: Laboratory, experiment: Experiment, phase: str, theta: Mapping[str, np.ndarray]
 ) -> np.ndarray:
     """Simulated outputs of another experiment at posterior draws, finite samples only [k, n]."""
-    elsewhere = Laboratory(
-        experiment.simulate,
-        laboratory.prior,
-        laboratory.extensions,
-        experiment.identity,
-        laboratory.keeping,
-    )
+    elsewhere = laboratory.of(experiment)
     there = np.isfinite(experiment.observed)
     return elsewhere.run(f"{phase} {experiment.label}", theta).signals[:, there]
 
@@ -77,9 +72,7 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
     measured = without_usual(experiment.noise).covariance(at)
     factor = np.linalg.cholesky(covariance)
     rng = np.random.default_rng(seed)
-    values, vectors = np.linalg.eigh(simulated)
-    white = rng.normal(size=(REPLICATES, len(observed)))
-    runs = (white * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    runs = gaussian(rng, simulated, REPLICATES)
     null = experiment.noise.draw(rng, at, REPLICATES) + runs
 
     def density(mean: np.ndarray) -> float:

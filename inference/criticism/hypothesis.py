@@ -26,6 +26,7 @@ from .runs import Runs
 
 COMPONENTS = 10
 STEP = 0.02  # of prior quantiles, for slopes
+END = 1e-4  # quantile of a prior from which a parameter is at its end
 SEPARATE = 1e-8  # relative size below which a slope adds nothing to those before
 
 
@@ -79,9 +80,13 @@ class Hypothesis:
 
     @cached_property
     def tangents(self) -> np.ndarray:
-        """Orthonormal directions of whitened values that the parameters absorb [m, <= d]."""
-        left, size, _ = np.linalg.svd(self.slopes, full_matrices=False)
-        return left[:, size > SEPARATE * max(size[0], 1.0)]
+        """Orthonormal directions of whitened values that the parameters absorb [m, <= d].
+
+        A parameter at an end of its prior would have to leave it to absorb more.
+        """
+        free = (self.u > END) & (self.u < 1.0 - END)
+        left, size, _ = np.linalg.svd(self.slopes[:, free], full_matrices=False)
+        return left[:, size > SEPARATE * size.max(initial=1.0)]
 
     @cached_property
     def sd(self) -> np.ndarray:

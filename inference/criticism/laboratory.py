@@ -1,7 +1,7 @@
 """Runs of a simulator and of its extensions, kept in a bank."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from ..base import Simulator
 from ..prior import Prior
 from ..runner import run_missing
 from ..simulate import Job
+from .experiment import Experiment, Proposal
 from .extension import Extensions
 from .runs import Runs
 
@@ -57,6 +58,10 @@ class Laboratory:
     identity: str
     keeping: Keeping
 
+    def of(self, experiment: Experiment | Proposal) -> "Laboratory":
+        """The same for the simulator of another experiment."""
+        return replace(self, simulate=experiment.simulate, identity=experiment.identity)
+
     def run(self, phase: str, theta: Mapping[str, np.ndarray]) -> Runs:
         """Simulate at theta, name -> [n]; runs that fail are left out.
 
@@ -66,12 +71,7 @@ class Laboratory:
         Raises:
             RuntimeError: all of them failed.
         """
-        count = len(next(iter(theta.values())))
-        seeds = phase_seeds(self.keeping.seed, phase, count)
-        return self.again(phase, theta, seeds)
-
-    def again(self, phase: str, theta: Mapping[str, np.ndarray], seeds: np.ndarray) -> Runs:
-        """The same with seeds [n] of the caller's."""
+        seeds = phase_seeds(self.keeping.seed, phase, len(next(iter(theta.values()))))
         jobs = [
             Job({name: float(column[i]) for name, column in theta.items()}, int(seed))
             for i, seed in enumerate(seeds)
@@ -93,7 +93,7 @@ class Laboratory:
             )
         signals = np.stack([results[i].signal for i in good])
         kept = {name: np.asarray(column, float)[good] for name, column in theta.items()}
-        return self.table(kept, signals, np.asarray(seeds)[good])
+        return self.table(kept, signals, seeds[good])
 
     def table(
         self, theta: Mapping[str, np.ndarray], signals: np.ndarray, seeds: np.ndarray

@@ -8,7 +8,7 @@ import numpy as np
 from .._float64 import in_float64
 from ..noise import Layout
 from .hypothesis import Hypothesis, samples, values_of
-from .noise import Noise
+from .noise import Noise, gaussian
 
 REPLICATES = 999  # of the parametric bootstrap
 MODES = 36  # of each channel: slower than these is what simulators get wrong
@@ -71,9 +71,7 @@ def null_draws(
     """
     observed = hypothesis.fit.observed
     measured = values_of(hypothesis, noise.draw(rng, samples(observed), count))
-    values, vectors = np.linalg.eigh(hypothesis.spread)
-    white = rng.normal(size=(count, len(values)))
-    simulated = (white * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    simulated = gaussian(rng, hypothesis.spread, count)
     return hypothesis.project(hypothesis.whiten(measured + simulated))
 
 

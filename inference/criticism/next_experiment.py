@@ -44,13 +44,7 @@ def suggest(
 def _separation(
     laboratory: Laboratory, proposal: Proposal, rivals: Sequence[Candidate]
 ) -> Suggestion:
-    elsewhere = Laboratory(
-        proposal.simulate,
-        laboratory.prior,
-        laboratory.extensions,
-        proposal.identity,
-        laboratory.keeping,
-    )
+    elsewhere = laboratory.of(proposal)
     names = [" with ".join(rival.names) for rival in rivals]
     signals = []
     for name, rival in zip(names, rivals, strict=True):

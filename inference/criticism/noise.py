@@ -86,6 +86,13 @@ class SumOfNoises:
         return np.sum([part.draw(rng, at, count) for part in self.parts], axis=0)
 
 
+def gaussian(rng: np.random.Generator, covariance: np.ndarray, count: int) -> np.ndarray:
+    """Draws [count, n] of mean zero; the covariance [n, n] may be singular."""
+    values, vectors = np.linalg.eigh(covariance)
+    white = rng.normal(size=(count, len(values)))
+    return (white * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+
+
 def rest_noise(
     rests: list[np.ndarray], seed: int = 0, *, trend: int = 0, draws: int = DRAWS
 ) -> AutoregressiveNoise:

@@ -48,7 +48,10 @@ class Study(NamedTuple):
     observed: np.ndarray
     noise: Noise
     plan: Plan
-    seed: int
+
+    @property
+    def seed(self) -> int:
+        return self.laboratory.keeping.seed
 
     def hypothesis(self, names: tuple[str, ...], runs: Runs) -> Hypothesis:
         """The model in which the named effects act, fitted."""
@@ -67,18 +70,11 @@ class Study(NamedTuple):
         null = null_draws(hypothesis, self.noise, np.random.default_rng(self.seed))
         return check(hypothesis, directions(hypothesis, signatures), null), null
 
-    def candidate(
-        self,
-        base: Hypothesis,
-        names: tuple[str, ...],
-        runs: Runs,
-        signatures: Mapping[str, Signature],
-        refitted: bool = False,
-    ) -> Candidate:
-        """The extended model, fitted and tested."""
-        hypothesis = self.hypothesis(names, runs)
-        gain = 0.5 * (base.misfit(base) - hypothesis.misfit(base))
-        return Candidate(hypothesis, self.check(hypothesis, signatures)[0], gain, refitted)
+    def candidate(self, base: "Base", hypothesis: Hypothesis, refitted: bool = False) -> Candidate:
+        """The extended model, tested."""
+        metric = base.hypothesis
+        gain = 0.5 * (metric.misfit(metric) - hypothesis.misfit(metric))
+        return Candidate(hypothesis, self.check(hypothesis, base.signatures)[0], gain, refitted)
 
 
 class Base(NamedTuple):
@@ -128,19 +124,16 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
 
 def explain(
     study: Study, base: Base, accept: Sequence[str] | None = None
-) -> tuple[list[Candidate], list[Candidate], Runs]:
-    """Every explanation by one effect, or by two where none suffices; those that remain; runs.
+) -> tuple[list[Candidate], list[Candidate]]:
+    """Every explanation by one effect, or by two where none suffices; and those that remain.
 
     Args:
         accept: Effects that are refitted together, whatever their rank.
     """
     plan, runs = study.plan, base.runs
-    first = {
-        name: study.candidate(base.hypothesis, (name,), runs, base.signatures)
-        for name in base.singles
-    }
-    found: dict[tuple[str, ...], Candidate] = {c.names: c for c in first.values()}
-    for one in near_best(list(first.values()), plan.refits):
+    first = [study.candidate(base, single) for single in base.singles.values()]
+    found = {candidate.names: candidate for candidate in first}
+    for one in near_best(first, plan.refits):
         found[one.names], runs = _refit(study, base, one, runs)
     remaining = tied(list(found.values()))
     if not remaining:
@@ -149,9 +142,9 @@ def explain(
         remaining = tied([c for c in found.values() if len(c.names) == 1]) or tied(pairs)
     forced = tuple(accept or ())
     if forced and not (forced in found and found[forced].refitted):
-        unrefined = study.candidate(base.hypothesis, forced, runs, base.signatures)
-        found[forced], runs = _refit(study, base, unrefined, runs)
-    return list(found.values()), remaining, runs
+        unrefined = study.candidate(base, study.hypothesis(forced, runs))
+        found[forced], _ = _refit(study, base, unrefined, runs)
+    return list(found.values()), remaining
 
 
 def _refit(study: Study, base: Base, candidate: Candidate, runs: Runs) -> tuple[Candidate, Runs]:
@@ -161,7 +154,7 @@ def _refit(study: Study, base: Base, candidate: Candidate, runs: Runs) -> tuple[
         box = around(candidate.hypothesis.u, candidate.hypothesis.sd, NARROW)
         phase = f"refit {' '.join(names)} {attempt}"
         runs = joined([runs, study.run(phase, box, names, study.plan.refit)])
-        candidate = study.candidate(base.hypothesis, names, runs, base.signatures, refitted=True)
+        candidate = study.candidate(base, study.hypothesis(names, runs), refitted=True)
         if box.holds(candidate.hypothesis.u):
             break
     return candidate, runs
@@ -175,7 +168,7 @@ def _pairs(
         return [], runs
     best = max(found.values(), key=lambda c: c.gain)
     pairs = [
-        study.candidate(base.hypothesis, (*best.names, other), runs, base.signatures)
+        study.candidate(base, study.hypothesis((*best.names, other), runs))
         for other in base.singles
         if other not in best.names
     ]

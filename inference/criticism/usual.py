@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..noise import Layout
-from .noise import Noise, SumOfNoises
+from .noise import Noise, SumOfNoises, gaussian
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,8 @@ class UsualResidual:
         return stationary + shapes.T @ shapes
 
     def draw(self, rng: np.random.Generator, at: Layout, count: int) -> np.ndarray:
-        values, vectors = np.linalg.eigh(self.covariance(at))
-        white = rng.normal(size=(count, len(values)))
-        size = np.sqrt(self.freedom / rng.chisquare(self.freedom, count))
-        return size[:, None] * (white * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+        drawn = gaussian(rng, self.covariance(at), count)
+        return np.sqrt(self.freedom / rng.chisquare(self.freedom, count))[:, None] * drawn
 
     def _shapes(self, at: Layout) -> np.ndarray:
         flat = self.directions[:, at.sample, at.channel] if self.directions.size else None

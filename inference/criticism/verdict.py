@@ -73,14 +73,13 @@ def tied(candidates: Sequence[Candidate]) -> list[Candidate]:
     return [c for c in accepted if c.gain > accepted[0].gain - MARGIN]
 
 
-def conclude(base: Check, members: Sequence[Candidate]) -> Verdict:
-    """From the base model's test and the explanations that no test tells apart."""
-    p = base.p_value
+def conclude(base: Check, explanations: Sequence[Candidate]) -> Verdict:
+    """From the base model's test and the explanations that were tried, also on held-out data."""
+    p, members = base.p_value, tied(explanations)
     if p >= ALARM:
         return Verdict("none", (), p, f"Model and data agree (p = {p:.2g}).")
     if not members:
-        reason = f"Model and data differ (p = {p:.2g}), and no known effect explains it."
-        return Verdict("unknown", (), p, reason)
+        return Verdict("unknown", (), p, _unexplained(p, explanations))
     if len(members) == 1:
         names = members[0].names
         reason = f"Model and data differ (p = {p:.2g}); {' with '.join(names)} explains it."
@@ -93,13 +92,11 @@ def conclude(base: Check, members: Sequence[Candidate]) -> Verdict:
     return Verdict("tie", names, p, reason)
 
 
-def failed(base: Check, members: Sequence[Candidate]) -> Verdict:
-    """The verdict on explanations that held-out data refute."""
-    if base.p_value >= ALARM:
-        return conclude(base, [])
-    names = " or ".join(" with ".join(member.names) for member in members)
-    reason = (
-        f"Model and data differ (p = {base.p_value:.2g}); {names} explains these data, but not "
+def _unexplained(p: float, explanations: Sequence[Candidate]) -> str:
+    refuted = [" with ".join(one.names) for one in explanations if not one.held]
+    if not refuted:
+        return f"Model and data differ (p = {p:.2g}), and no known effect explains it."
+    return (
+        f"Model and data differ (p = {p:.2g}); {' or '.join(refuted)} explains these data, but not "
         "those held out, so what is missing is not known."
     )
-    return Verdict("unknown", (), base.p_value, reason)

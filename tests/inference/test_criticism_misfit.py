@@ -60,7 +60,7 @@ def observe(simulate, number, bump=0.0):
 def examined(simulate, observed, bank):
     keeping = inference.Keeping(seed=bank, batch=64)
     laboratory = Laboratory(simulate, PRIOR, EXTENSIONS, "", keeping)
-    return examine(Study(laboratory, observed, NOISE, inference.Plan(), bank), None)[0]
+    return examine(Study(laboratory, observed, NOISE, inference.Plan()), None)[0]
 
 
 def on(hypothesis, observed):

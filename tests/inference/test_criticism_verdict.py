@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import numpyro.distributions as dist
 import pytest
-from bolfi_liquids.inference.criticism.verdict import conclude, failed, near_best, tied
+from bolfi_liquids.inference.criticism.verdict import conclude, near_best
 
 from bolfi_liquids import inference
 
@@ -21,7 +21,7 @@ def candidate(*names, gain, p_value=0.4, **more):
 
 
 def verdict(*candidates, base=REJECTED):
-    found = conclude(base, tied(candidates))
+    found = conclude(base, candidates)
     return found.kind, found.effects
 
 
@@ -72,10 +72,10 @@ def test_what_explains_nothing_is_not_named(poor):
 def test_held_out_data_decide_only_where_there_is_something_to_explain():
     """An effect may be tried on data with which the base model agrees, if the user asks."""
     refuted = [candidate("drag", gain=20.0, held=False)]
-    found = failed(REJECTED, refuted)
+    found = conclude(REJECTED, refuted)
     assert (found.kind, found.effects) == ("unknown", ())
     assert "drag explains these data, but not those held out" in found.reason
-    agreeing = failed(FITS, refuted)
+    agreeing = conclude(FITS, refuted)
     assert agreeing.kind == "none" and "differ" not in agreeing.reason
 
 

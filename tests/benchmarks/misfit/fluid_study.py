@@ -9,6 +9,7 @@ simulation and result: a study that was interrupted goes on where it stopped.
 
 import argparse
 import json
+import sys
 import time
 import warnings
 from functools import cache
@@ -18,6 +19,10 @@ from types import MappingProxyType
 import numpy as np
 import numpyro.distributions as dist
 from bolfi_liquids.hardware import circle, star
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from kept import keep, results
 
 from bolfi_liquids import inference, models
 from bolfi_liquids.clean_recordings import Clean, clean_residuals, usual_for
@@ -212,25 +217,18 @@ def _snr(found: inference.Criticism, effect: str, truth: dict) -> float:
     return float(np.linalg.norm(base.project(base.whiten(with_it - without))))
 
 
-def results(folder: Path) -> list[dict]:
-    """What was finished; a half-written last line is none."""
-    path = folder / "results.jsonl"
-    lines = path.read_text().splitlines() if path.exists() else []
-    return [json.loads(line) for line in lines if line.endswith("}")]
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("fluid_study"))
     folder = parser.parse_args().out
     folder.mkdir(exist_ok=True)
-    done = {(r["effect"], r["number"]) for r in results(folder)}
+    kept = folder / "results.jsonl"
+    done = {(r["effect"], r["number"]) for r in results(kept)}
     with inference.SimulationBank(folder / "simulations.sqlite") as bank:
         for one in all_sets():
             if one not in done:
                 result = examine(one, bank)
-                with (folder / "results.jsonl").open("a") as file:
-                    file.write(json.dumps(result) + "\n")
+                keep(kept, result)
                 print(json.dumps(result), flush=True)
 
 

@@ -1,4 +1,4 @@
-"""How often criticism is right: some two thousand data sets of the stand-in simulator.
+"""How often criticism is right: 1420 data sets of the stand-in simulator.
 
     python tests/benchmarks/misfit/study.py --out study.jsonl --workers 2
 
@@ -7,11 +7,9 @@ Each line of the file is one data set; a study that was interrupted goes on wher
 """
 
 import argparse
-import json
 import os
 import sys
 import time
-import warnings
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -23,6 +21,7 @@ from scipy.optimize import least_squares, root_scalar
 sys.path.insert(0, str(Path(__file__).parent))
 
 import stand_in
+from kept import keep, results
 from stand_in import EXTENSIONS, NOISE, PRIOR, REST, UNKNOWN, Stir
 
 from bolfi_liquids import inference
@@ -30,7 +29,8 @@ from bolfi_liquids import inference
 STRENGTHS = (2.5, 6.0)  # RMS of what the effect changes, over the cameras' noise
 NULLS, SETS, OUTSIDE_SETS = 300, 50, 40
 FIRST, SECOND = Stir(), Stir(points=7, radius=0.02, speed=0.08)
-LARGEST = 1e4  # coefficient
+LARGEST = 0.99  # quantile of a coefficient's prior: what is stronger is not looked for
+DRAWS = 8  # of a posterior, for its expectation
 QUIET = int(REST * 30)  # samples before the gripper moves
 
 Set = tuple[str, float, int]
@@ -48,7 +48,6 @@ def all_sets() -> list[Set]:
 
 def examine(one: Set) -> dict:
     """Make a data set, criticise the base model on it, and say how that went."""
-    warnings.simplefilter("ignore", inference.EmulatorWarning)
     started = time.perf_counter()
     effect, strength, number = one
     seed = int(
@@ -91,15 +90,17 @@ def examine(one: Set) -> dict:
 
 
 def _coefficient(base: dict, effect: str, strength: float, rng: np.random.Generator) -> float:
-    """At which the effect changes the inclination by `strength` times the cameras' noise."""
+    """At which the effect changes the inclination by `strength` times the cameras' noise, or the
+    greatest that its prior thinks possible."""
     extension = EXTENSIONS.get(effect)
     two_sided = extension is None or np.isinf(float(extension.prior.icdf(1e-30)))
     sign = float(rng.choice([-1.0, 1.0])) if two_sided and effect != "settling" else 1.0
+    greatest = np.inf if extension is None else float(extension.prior.icdf(LARGEST))
     low, high = 0.0, 1e-4
     while _change(base, effect, sign * high) < strength:
-        low, high = high, 2.0 * high
-        if high > LARGEST:  # it changes no more, however large it is
-            return sign * low
+        if high >= greatest:
+            return sign * greatest
+        low, high = high, min(2.0 * high, greatest)
     size = root_scalar(
         lambda c: _change(base, effect, sign * c) - strength, bracket=(low, high), rtol=1e-3
     ).root
@@ -139,37 +140,18 @@ def _gap(found: inference.Criticism, truth: dict) -> list[float] | None:
     if found.extended is None:
         return None
     seen = _exact(SECOND, truth)
-    models = found.base.hypothesis.best, found.extended.best
-    return [
-        float(np.rad2deg(np.sqrt(np.mean((seen - _exact(SECOND, best)) ** 2)))) for best in models
-    ]
-
-
-def results(path: Path) -> list[dict]:
-    """What was finished; a half-written last line is none."""
-    if not path.exists():
-        return []
-    return [json.loads(line) for line in path.read_bytes()[: _whole(path)].splitlines()]
-
-
-def _whole(path: Path) -> int:
-    """Length of the file's finished lines."""
-    return path.read_bytes().rfind(b"\n") + 1
+    posteriors = inference.weighted_posterior(found.base.hypothesis), found.posterior
+    expected = [SECOND.exact(each.draw(0, DRAWS), DRAWS).mean(0) for each in posteriors]
+    return [float(np.rad2deg(np.sqrt(np.mean((seen - one) ** 2)))) for one in expected]
 
 
 def run(path: Path, workers: int) -> Iterator[dict]:
     """Finish the study; yields each data set's result as it is kept."""
     done = {(r["effect"], r["strength"], r["number"]) for r in results(path)}
     left = [one for one in all_sets() if one not in done]
-    if path.exists():  # or the next result would go on from half a line
-        os.truncate(path, _whole(path))
-    with (
-        ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool,
-        path.open("a") as file,
-    ):
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         for result in pool.map(examine, left, chunksize=4):
-            file.write(json.dumps(result) + "\n")
-            file.flush()
+            keep(path, result)
             yield result
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from kept import results
 from stand_in import EXTENSIONS
-from study import results
 
 BINS = (0.0, 3.0, 5.0, 7.0, 10.0, 15.0, np.inf)
 Result = dict
