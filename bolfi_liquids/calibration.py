@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 
 from .draws import pick_draws
 from .errors import InputError
+from .prior import read_prior
 from .run_directory import POSTERIOR, read_run
 from .summary import read_summary
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
+
+    from .inference import Prior
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +68,11 @@ class Calibration:
     def best(self) -> dict[str, float]:
         """The paper's theta*: the parameters at which the surrogate expects the best fit."""
         return dict(self.summary["best"])
+
+    @property
+    def prior(self) -> "Prior":
+        """Of the parameters."""
+        return read_prior(self.record["settings"]["prior"])
 
     @property
     def liquid_density(self) -> float:

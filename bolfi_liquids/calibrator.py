@@ -11,7 +11,7 @@ from .errors import InputError
 from .prior import check_prior, default_prior
 from .progress import Simulate, progress_bar, reported
 from .provenance import run_record
-from .recordings import Recording, open_recording
+from .recordings import Recording, Source, open_recordings
 from .recordings_kept import keep_recordings
 from .run_directory import POSTERIOR, enter_run, open_bank
 from .settings import MIN_SIMULATIONS, CalibrationSettings
@@ -21,8 +21,6 @@ from .summary import write_section
 if TYPE_CHECKING:
     from .inference import Fit, Prior
     from .kept import Keep
-
-Source = Recording | str | Path
 
 
 def calibrate(  # noqa: PLR0913  the one call that most users make
@@ -145,10 +143,9 @@ def _fit(
 
 
 def _open_all(recordings: Source | Sequence[Source]) -> list[Recording]:
-    sources = [recordings] if isinstance(recordings, Source) else list(recordings)
-    if not sources:
+    opened = open_recordings(recordings)
+    if not opened:
         raise InputError("no recording given", where="recordings", fix="give at least one")
-    opened = [s if isinstance(s, Recording) else open_recording(s) for s in sources]
     if len({recording.hash for recording in opened}) < len(opened):
         names = ", ".join(str(recording.path) for recording in opened)
         raise InputError("the same recording twice", where=names, fix="give each of them once")

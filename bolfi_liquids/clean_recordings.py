@@ -24,10 +24,12 @@ class Clean:
     Attributes:
         recording: The recording.
         residual: Recorded less expected [rad], shape (T, 2), NaN where missing.
+        simulations: Made to learn that.
     """
 
     recording: Recording
     residual: NDArray[np.float64]
+    simulations: int
 
 
 def clean_residuals(
@@ -45,17 +47,19 @@ def clean_residuals(
     """
     from .inference import own_residual
 
-    found = []
-    for recording in recordings:
-        stirring = stirring_of([recording], particles)
-        experiment = stir_experiment(stirring, None, recording.path.name)
+    def learn(recording: Recording) -> Clean:
+        name, made = recording.path.name, []
 
-        def report(phase: str, finished: int, name: str = recording.path.name) -> None:
+        def report(phase: str, finished: int) -> None:
+            made.append(finished)
             keeping.report(f"baseline {name}", finished)
 
+        experiment = stir_experiment(stirring_of([recording], particles), None, name)
         own = replace(keeping, report=report)
-        found.append(Clean(recording, own_residual(experiment, prior, extensions, own, plan)))
-    return found
+        residual = own_residual(experiment, prior, extensions, own, plan)
+        return Clean(recording, residual, sum(made))
+
+    return [learn(recording) for recording in recordings]
 
 
 def usual_for(stirring: "Stirring", clean: Sequence[Clean]) -> "UsualResidual | None":

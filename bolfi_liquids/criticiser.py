@@ -6,29 +6,24 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from .calibration import Calibration
-from .calibrator import Source
 from .clean_recordings import Clean, clean_residuals, usual_for
-from .criticism import Criticism
+from .criticism import Criticism, is_criticised
+from .criticism_inputs import Inputs, open_inputs
 from .criticism_results import criticism_tree
 from .criticism_section import criticism_section
-from .cups import bundled_cups
 from .errors import InputError
 from .findings import Findings
 from .pour_experiment import as_prior, pour_experiment
-from .pour_table import PourTable, open_pours
-from .prior import read_prior
+from .pour_table import PourTable
 from .progress import phases
 from .proposals import pour_proposals, stir_proposals
-from .recordings import Recording, open_recording
-from .recordings_kept import kept_recordings
+from .recordings import Source
 from .results import write_tree
 from .run_directory import CRITICISM, open_bank
 from .settings import CriticismSettings
 from .stir_experiment import camera_noise, effects_of, stir_experiment
-from .stirring import Stirring, stirring_of
+from .stirring import stirring_of
 from .summary import write_section
 
 if TYPE_CHECKING:
@@ -51,7 +46,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     """Find where a calibrated simulator and the data disagree, and which effect it lacks.
 
     Everything that is simulated is kept in the run, so that an interrupted call, repeated,
-    simulates nothing again.
+    simulates nothing again; the same call on a criticised run only opens it.
 
     Args:
         calibration: Of the stirs, or its RUN directory.
@@ -78,27 +73,14 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         accept=None if accept is None else tuple(accept),
         seed=seed,
     )
-    run, record = calibration.path, calibration.record
-    particles = int(record["settings"]["particles"])
-    stirring = stirring_of(kept_recordings(run, dict(record)), particles)
-    kept_back = _open(held_out)
-    clean = _others(_open(baseline), [*stirring.recordings, *kept_back])
-    _check_held_out(stirring, kept_back)
-    table = open_pours(pours) if isinstance(pours, str | Path) else pours
-    prior = read_prior(record["settings"]["prior"])
+    inputs = open_inputs(calibration, held_out, baseline, pours, cups, settings)
+    run = calibration.path
+    if is_criticised(run) and Criticism.open(run).summary["made_from"] == inputs.made_from:
+        return Criticism.open(run)
     with open_bank(run) as bank, phases(shown=progress) as report:
         from .inference import Keeping
 
-        keeping = Keeping(bank, settings.batch, seed, report)
-        usual = clean_residuals(
-            clean, particles, prior, effects_of("stir"), settings.clean_plan, keeping
-        )
-        stirs = _stirs(calibration, stirring, kept_back, usual, settings, keeping)
-        poured = None
-        if table is not None:
-            cups = bundled_cups() if cups is None else cups
-            poured = _pours(calibration, stirs, table, cups, settings, keeping)
-        findings = Findings(calibration, stirring, stirs, poured, table, tuple(clean), settings)
+        findings = _find(calibration, inputs, Keeping(bank, settings.batch, seed, report))
         tree = criticism_tree(findings)
     write_tree(tree, run / CRITICISM)
     section = criticism_section(findings, tree, time.perf_counter() - started)
@@ -106,18 +88,31 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     return Criticism.open(run)
 
 
+def _find(calibration: Calibration, inputs: Inputs, keeping: "inference.Keeping") -> Findings:
+    clean = clean_residuals(
+        inputs.baseline,
+        inputs.stirring.setups[0].particles,
+        calibration.prior,
+        effects_of("stir"),
+        inputs.settings.clean_plan,
+        keeping,
+    )
+    stirs = _stirs(calibration, inputs, clean, keeping)
+    poured = inputs.table and _pours(calibration, stirs, inputs.table, inputs, keeping)
+    return Findings(calibration, inputs, tuple(clean), stirs, poured)
+
+
 def _stirs(
     calibration: Calibration,
-    stirring: Stirring,
-    held_out: Sequence[Recording],
+    inputs: Inputs,
     clean: Sequence[Clean],
-    settings: CriticismSettings,
     keeping: "inference.Keeping",
 ) -> "inference.Criticism":
     from . import inference
 
+    stirring, settings = inputs.stirring, inputs.settings
     particles = stirring.setups[0].particles
-    kept_back = [stirring_of([recording], particles) for recording in held_out]
+    kept_back = [stirring_of([recording], particles) for recording in inputs.held_out]
     extensions = effects_of("stir", settings.effects)
     if not extensions:
         raise InputError(
@@ -127,7 +122,7 @@ def _stirs(
         )
     return inference.criticise(
         stir_experiment(stirring, usual_for(stirring, clean), "stir"),
-        read_prior(calibration.record["settings"]["prior"]),
+        calibration.prior,
         extensions,
         earlier=_learned_from(calibration),
         held_out=[
@@ -145,25 +140,24 @@ def _pours(
     calibration: Calibration,
     stirs: "inference.Criticism",
     table: PourTable,
-    cups: "Cups",
-    settings: CriticismSettings,
+    inputs: Inputs,
     keeping: "inference.Keeping",
 ) -> "inference.Criticism":
     """The same for pours, of a liquid of which the stirs are known to have taught something."""
     from . import inference
 
-    density = calibration.liquid_density
+    density, settings = calibration.liquid_density, inputs.settings
     extensions = effects_of("pour", settings.effects)
     known = stirs.extended or stirs.base.hypothesis
     poured_too = [name for name in stirs.accepted if name in extensions]
     taught = as_prior(stirs.posterior.theta, stirs.posterior.weights, known.fit.prior)
-    names = (*read_prior(calibration.record["settings"]["prior"]).names, *poured_too)
+    names = (*calibration.prior.names, *poured_too)
     base = inference.Prior({name: taught.distributions[name] for name in names})
     return inference.criticise(
-        pour_experiment(table, cups, density),
+        pour_experiment(table, inputs.cups, density),
         base,
         {name: one for name, one in extensions.items() if name not in poured_too},
-        proposals=pour_proposals(cups, density),
+        proposals=pour_proposals(inputs.cups, density),
         accept=_among(settings.accept, extensions),
         plan=settings.pour_plan,
         keeping=replace(keeping, report=lambda phase, n: keeping.report(f"pours, {phase}", n)),
@@ -184,38 +178,3 @@ def _learned_from(calibration: Calibration):
         str(name): made[name].to_numpy()[good] for name in calibration.tree["posterior"].data_vars
     }
     return theta, made["signal"].to_numpy()[good], made["seed"].to_numpy()[good]
-
-
-def _open(sources: Source | Sequence[Source]) -> list[Recording]:
-    listed = [sources] if isinstance(sources, Source) else list(sources)
-    return [s if isinstance(s, Recording) else open_recording(s) for s in listed]
-
-
-def _others(baseline: list[Recording], used: Sequence[Recording]) -> list[Recording]:
-    """The clean recordings that are neither criticised nor held out, each once."""
-    seen = {recording.hash for recording in used}
-    others = []
-    for recording in baseline:
-        if recording.hash not in seen:
-            others.append(recording)
-            seen.add(recording.hash)
-    return others
-
-
-def _check_held_out(stirring: Stirring, held_out: Sequence[Recording]) -> None:
-    fitted = {recording.hash: recording for recording in stirring.recordings}
-    density = stirring.recordings[0].number("liquid_density")
-    for recording in held_out:
-        if recording.hash in fitted:
-            raise InputError(
-                "is what the run was calibrated on",
-                where=f"--held-out {recording.path}",
-                fix="hold out another recording: nothing can be proved on data that were fitted",
-            )
-        if not np.isclose(recording.number("liquid_density"), density, rtol=0.02):
-            raise InputError(
-                f"liquid_density is {recording.number('liquid_density'):g} kg/m3, but "
-                f"{density:g} in the run",
-                where=f"--held-out {recording.path}",
-                fix="hold out a recording of the same liquid",
-            )

@@ -13,7 +13,7 @@ Its groups, under `stirs` and, where pours were given, under `pours`:
 `posterior` holds the draws of the extended model, or of the base model where there is none.
 """
 
-from importlib.metadata import version
+import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,7 +31,7 @@ def criticism_tree(findings: Findings) -> "DataTree":
     """Everything that a report shows."""
     from xarray import DataTree
 
-    settings = findings.settings
+    settings = findings.inputs.settings
     sampled = findings.extended.fit.sample("nuts", chains=4, draws=1000, seed=settings.seed)
     groups: dict[str, Any] = {"/posterior": sampled["posterior"].to_dataset()}
     for name, source in findings.sources.items():
@@ -45,10 +45,8 @@ def criticism_tree(findings: Findings) -> "DataTree":
             groups[f"/{name}/suggestions"] = _suggestions(source)
     tree = DataTree.from_dict(groups)
     tree.attrs.update(
-        version=version("bolfi-liquids"),
-        seed=settings.seed,
-        baseline=[recording.path.name for recording in findings.baseline],
-        baseline_sha256=[recording.hash for recording in findings.baseline],
+        made_from=json.dumps(findings.inputs.made_from),
+        baseline=[clean.recording.path.name for clean in findings.baseline],
         accepted=list(findings.accepted),
         accepted_by="user" if settings.accept else "verdict",
         liquid_density=findings.calibration.liquid_density,
@@ -62,14 +60,14 @@ def _residual(findings: Findings, name: str, source: "inference.Criticism") -> "
     observed = source.base.hypothesis.fit.observed
     if name == "stirs":
         dims = ("frame", "plane")
-        time = findings.stirring.time
+        time = findings.inputs.stirring.time
         coords = {
             "time": ("frame", time, {"units": "s"}),
-            "recording": ("frame", findings.stirring.member),
+            "recording": ("frame", findings.inputs.stirring.member),
             "plane": list(PLANE_NAMES),
         }
     else:
-        table = findings.table
+        table = findings.inputs.table
         assert table is not None
         dims = ("outcome", "pour")
         coords = {

@@ -1,12 +1,13 @@
 """The section "criticise" of summary.json."""
 
 from collections.abc import Mapping
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .calibration_section import parameter_summary
 from .findings import Findings
+from .noise import rms
 
 if TYPE_CHECKING:
     from xarray import DataTree
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     from . import inference
 
 SURE = 0.05  # p-value of a window that is listed
-QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
 
 
 def criticism_section(findings: Findings, tree: "DataTree", seconds: float) -> dict[str, Any]:
@@ -31,13 +31,11 @@ def criticism_section(findings: Findings, tree: "DataTree", seconds: float) -> d
         "reason": " ".join(source.verdict.reason for source in findings.sources.values()),
         "p_value": min(source.verdict.p_value for source in findings.sources.values()),
         "where": _sure(stirs),
-        "coefficient": {name: _interval(posterior[name].to_numpy()) for name in findings.accepted},
-        "parameters": {
-            str(name): _interval(values.to_numpy()) for name, values in posterior.items()
-        },
+        "coefficient": {name: parameter_summary(posterior[name]) for name in findings.accepted},
+        "parameters": {str(name): parameter_summary(draws) for name, draws in posterior.items()},
         "best": best,
         "n_simulations": sum(source.simulations for source in findings.sources.values())
-        + _clean_runs(findings),
+        + sum(clean.simulations for clean in findings.baseline),
         "gap_deg": _gap_deg(stirs),
         "pours": None if findings.pours is None else _pour_gap(findings.pours),
         "suggestions": [
@@ -49,8 +47,7 @@ def criticism_section(findings: Findings, tree: "DataTree", seconds: float) -> d
         "baseline": len(findings.baseline),
         "noise": _noise(findings),
         "seconds": seconds,
-        "seed": findings.settings.seed,
-        "version": version("bolfi-liquids"),
+        "made_from": findings.inputs.made_from,
     }
 
 
@@ -74,13 +71,8 @@ def _sure(source: "inference.Criticism") -> list[dict[str, Any]]:
     ]
 
 
-def _interval(draws: np.ndarray) -> dict[str, float]:
-    quantiles = {name: float(np.quantile(draws, q)) for name, q in QUANTILES.items()}
-    return {"mean": float(draws.mean()), "sd": float(draws.std(ddof=1)), **quantiles}
-
-
 def _rms(hypothesis: "inference.Hypothesis | None") -> float | None:
-    return None if hypothesis is None else float(np.sqrt(np.mean(hypothesis.difference**2)))
+    return None if hypothesis is None else rms(hypothesis.difference)
 
 
 def _degrees(value: float | None) -> float | None:
@@ -99,10 +91,10 @@ def _gap_deg(source: "inference.Criticism") -> dict[str, float | None]:
     gaps = () if best is None else source.gaps.get(best.names, ())
 
     def pooled(values: list[float]) -> float | None:
-        return float(np.sqrt(np.mean(np.square(values)))) if values else None
+        return rms(np.array(values)) if values else None
 
     after = None if best is None else _rms(best.hypothesis)
-    noise = float(np.sqrt(np.mean(own)))
+    noise = rms(np.sqrt(own))
     numbers = {
         "before": _beyond(_rms(base), noise),
         "after": _beyond(after, noise),
@@ -134,16 +126,11 @@ def _pour_gap(source: "inference.Criticism") -> dict[str, Any]:
     }
 
 
-def _clean_runs(findings: Findings) -> int:
-    plan = findings.settings.clean_plan
-    return len(findings.baseline) * (plan.start + plan.base)
-
-
 def _noise(findings: Findings) -> Mapping[str, float]:
     """The cameras' noise as it was learned, and how well."""
     from .stir_experiment import camera_noise
 
-    noise = camera_noise(findings.stirring.recordings)
+    noise = camera_noise(findings.inputs.stirring.recordings)
     return {
         "sd_deg": float(np.degrees(noise.sd.mean())),
         "sd_uncertainty": float(noise.sd.std() / noise.sd.mean()),

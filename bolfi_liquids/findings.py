@@ -6,10 +6,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from . import inference
     from .calibration import Calibration
-    from .pour_table import PourTable
-    from .recordings import Recording
-    from .settings import CriticismSettings
-    from .stirring import Stirring
+    from .clean_recordings import Clean
+    from .criticism_inputs import Inputs
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,12 +15,10 @@ class Findings:
     """All that a criticism came to know."""
 
     calibration: "Calibration"
-    stirring: "Stirring"
+    inputs: "Inputs"
+    baseline: "tuple[Clean, ...]"
     stirs: "inference.Criticism"
     pours: "inference.Criticism | None"
-    table: "PourTable | None"
-    baseline: "tuple[Recording, ...]"
-    settings: "CriticismSettings"
 
     @property
     def sources(self) -> "dict[str, inference.Criticism]":

@@ -1,6 +1,7 @@
 """Tables of pours that were made: what each spilled, caught and kept."""
 
 import csv
+import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ class PourTable:
         angular_velocity: Of the source [rad/s], shape (A,).
         distance: From the lip to the receiver's axis [m], shape (A,).
         fractions: Spilled, received and retained, shape (A, 3); rows sum to 1.
+        hash: SHA-256 of the file's bytes, in hexadecimal.
     """
 
     path: Path
@@ -33,6 +35,7 @@ class PourTable:
     angular_velocity: NDArray[np.float64]
     distance: NDArray[np.float64]
     fractions: NDArray[np.float64]
+    hash: str
 
     @property
     def observed(self) -> NDArray[np.float64]:
@@ -79,7 +82,12 @@ def open_pours(path: str | Path, liquid: str | None = None) -> PourTable:
             fix="weigh what was poured",
         )
     return PourTable(
-        path, liquid, np.radians(numbers[:, 0]), numbers[:, 1] / 100.0, amounts / total
+        path=path,
+        liquid=liquid,
+        angular_velocity=np.radians(numbers[:, 0]),
+        distance=numbers[:, 1] / 100.0,
+        fractions=amounts / total,
+        hash=hashlib.sha256(path.read_bytes()).hexdigest(),
     )
 
 

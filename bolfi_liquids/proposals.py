@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 FASTER, SLOWER, FASTEST = 1.6, 0.5, 0.2  # times the recording's speed; and at most, m/s
 ROOM = 0.8  # of the way from the axis to the wall that the stick may go
-RATE = 30.0  # samples a second
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,14 +24,6 @@ class Planned:
 
     gripper: Gripper
     recording: Recording
-
-    @property
-    def attrs(self):
-        return self.recording.attrs
-
-    @property
-    def time(self):
-        return self.gripper.time
 
     def number(self, name: str) -> float:
         """A numeric attribute of the recording whose rig it repeats."""
@@ -43,7 +34,6 @@ def stir_proposals(stirring: Stirring, noise: "Noise") -> list["Proposal"]:
     """The first recording's rig on other paths."""
     from .hardware import circle, star
     from .inference import Proposal
-    from .models import StirSetup
 
     recording, setup = stirring.recordings[0], stirring.setups[0]
     fast = float(np.quantile(speed(recording), 0.95))
@@ -66,15 +56,14 @@ def stir_proposals(stirring: Stirring, noise: "Noise") -> list["Proposal"]:
     made = []
     for label, path in paths.items():
         planned = Planned(Gripper(path.time, path.position), recording)
-        particles = setup.particles
-        own = Stirring((planned,), (StirSetup.from_recording(planned, particles=particles),))  # type: ignore[arg-type]
+        own = Stirring((planned,), (setup,))  # type: ignore[arg-type]
         shape = (len(path.time), 2)
         made.append(Proposal(own.simulate, noise, shape, own.identity, label))
     return made
 
 
 def pour_proposals(cups: "Cups", density: float, tried: int = 2) -> list["Proposal"]:
-    """Pours at the middle and the ends of what may be chosen."""
+    """Pours at the slowest and at middling angular velocities, from two distances each."""
     from .inference import KnownNoise, Proposal
 
     rates = np.linspace(*cups.angular_velocity_range, tried + 1)[:tried]

@@ -1,7 +1,7 @@
 """Recordings of a stir: the file format, read and checked."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -52,6 +52,9 @@ class Recording:
         return float(self.attrs[name])
 
 
+Source = Recording | str | Path
+
+
 def open_recording(path: str | Path) -> Recording:
     """Read a recording and check that it can be simulated.
 
@@ -66,6 +69,16 @@ def open_recording(path: str | Path) -> Recording:
     recording = _as_recording(_read(path), path)
     check_values(recording)
     return recording
+
+
+def open_recordings(sources: Source | Sequence[Source]) -> list[Recording]:
+    """One or several, those that are opened already as they are.
+
+    Raises:
+        InputError: One of them cannot be used.
+    """
+    listed = [sources] if isinstance(sources, Source) else list(sources)
+    return [s if isinstance(s, Recording) else open_recording(s) for s in listed]
 
 
 def _read(path: Path) -> "Dataset":

@@ -107,6 +107,12 @@ class Stirring:
         return json.dumps([self.settings, densities, paths.hexdigest()], sort_keys=True)
 
 
+def same_liquid(one: Recording, other: Recording) -> bool:
+    """Whether two recordings may be of one liquid, by its weighed density."""
+    density = other.number("liquid_density")
+    return abs(one.number("liquid_density") - density) <= SAME_DENSITY * density
+
+
 def stirring_of(recordings: list[Recording], particles: int) -> Stirring:
     """Set up the simulators of recordings of one liquid.
 
@@ -116,11 +122,11 @@ def stirring_of(recordings: list[Recording], particles: int) -> Stirring:
     from .models import StirSetup
 
     first, *others = recordings
-    density = first.number("liquid_density")
     for other in others:
-        if abs(other.number("liquid_density") - density) > SAME_DENSITY * density:
+        if not same_liquid(other, first):
             raise InputError(
-                f"{other.attrs['liquid_density']} kg/m3, but {first.path} has {density} kg/m3",
+                f"{other.attrs['liquid_density']} kg/m3, but {first.path} has "
+                f"{first.number('liquid_density')} kg/m3",
                 where=f"{other.path}: attribute liquid_density",
                 fix="calibrate each liquid in a run of its own",
             )

@@ -7,12 +7,10 @@ from rich.console import Console
 from rich.table import Column, Table
 
 from . import criticism_narrative as criticism
-from .narrative import floor_sentence, sampler_sentence
+from .narrative import UNITS, floor_sentence, sampler_sentence
 
 if TYPE_CHECKING:
     from xarray import Dataset
-
-UNITS = {"viscosity": "Pa s", "cohesion": ""}
 
 
 def print_calibration(section: Mapping[str, Any], console: Console) -> None:

@@ -40,10 +40,14 @@ def star(  # noqa: PLR0913  a pattern has that many sizes
     Raises:
         ValueError: an argument is not positive and finite, or `points` is even or below 5.
     """
-    lengths = {"speed": speed, "height": height, "radius": radius, "acceleration": acceleration}
-    for name, value in {**lengths, "rest": rest, "rate": rate}.items():
-        if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"{name} must be positive and finite, got {value}")
+    _check_positive(
+        speed=speed,
+        height=height,
+        radius=radius,
+        acceleration=acceleration,
+        rest=rest,
+        rate=rate,
+    )
     if points < 5 or points % 2 == 0:
         raise ValueError(f"points must be odd and at least 5, got {points}; the paper uses 9")
     angles = 2.0 * np.pi * (points // 2) * np.arange(points + 1) / points
@@ -63,6 +67,12 @@ def star(  # noqa: PLR0913  a pattern has that many sizes
     share = _travelled(elapsed, durations[k], ramps[k], peaks[k]) / strokes[k]
     plane = corners[k] + share[:, None] * (corners[k + 1] - corners[k])
     return Path(time, np.column_stack([plane, np.full(len(time), height)]))
+
+
+def _check_positive(**sizes: float) -> None:
+    for name, value in sizes.items():
+        if not (np.isfinite(value) and value > 0):
+            raise ValueError(f"{name} must be positive and finite, got {value}")
 
 
 def _travelled(
@@ -100,10 +110,7 @@ def circle(
     Raises:
         ValueError: an argument is not positive and finite, or there are fewer than 2 turns.
     """
-    given = {"speed": speed, "height": height, "radius": radius, "rest": rest, "rate": rate}
-    for name, value in given.items():
-        if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"{name} must be positive and finite, got {value}")
+    _check_positive(speed=speed, height=height, radius=radius, rest=rest, rate=rate)
     if not (np.isfinite(turns) and turns >= 2):
         raise ValueError(f"turns must be at least 2, got {turns}")
     duration = turns * 2.0 * np.pi * radius / speed

@@ -42,11 +42,11 @@ RIG = {
     "stick_density": 1200.0,
     "liquid_density": 1200.0,
 }
-MODEL, DATA = 800, 1000  # particles
+MODEL, DATA = 600, 1000  # particles
 POURED = 900  # particles of the pours that are data; the model has its usual number
 NOISE, CORRELATION = np.radians(0.1), 0.5
 NULLS, SETS, CLEAN = 20, 5, 4
-VISCOSITY = 0.2, 3.0  # Pa s, of the truths
+VISCOSITY = 0.5, 3.0  # Pa s, of the truths
 EFFECTS = {
     "camera_delay": (0.03, 0.06),
     "camera_tilt": (0.012, 0.02),
