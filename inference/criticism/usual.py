@@ -8,23 +8,27 @@ from ..noise import Layout
 from .noise import Noise, SumOfNoises, gaussian
 
 
+WORTH = 2.0  # clean data sets that the stationary covariance counts for
+LEAST_FREEDOM = 3  # with fewer, draws have no variance and no effect would be found
+
+
 @dataclass(frozen=True)
 class UsualResidual:
     """A simulator's own residual, as a Gaussian process of uncertain size.
 
-    Its covariance has two parts: a stationary one, the clean data's mean autocovariance, and for
-    data made by the same experiment the clean residuals themselves as directions in which the
-    model may be wrong again (Brynjarsdottir and O'Hagan 2014 on why its shape matters).
+    Its covariance is an inverse-Wishart posterior's: a stationary one, the clean data's mean
+    autocovariance, is updated with the clean residuals of the same experiment, which show where
+    on its path the model is wrong (Brynjarsdottir and O'Hagan 2014 on why the shape matters).
 
     Attributes:
         autocovariance: Of clean residuals by lag in samples, shape [lags]; zero beyond.
-        directions: Clean residuals of the same experiment at each sample, shape [k, T, channels];
+        shapes: Clean residuals of the same experiment at each sample, shape [k, T, channels];
             NaN where missing.
         freedom: Clean data sets: the size is known as well as a variance from so many numbers.
     """
 
     autocovariance: np.ndarray
-    directions: np.ndarray
+    shapes: np.ndarray
     freedom: int
 
     def covariance(self, at: Layout) -> np.ndarray:
@@ -34,14 +38,15 @@ class UsualResidual:
         known = positive_autocovariance(np.append(self.autocovariance, np.zeros(missing)))
         stationary = known[apart] * np.equal.outer(at.channel, at.channel)
         shapes = self._shapes(at)
-        return stationary + shapes.T @ shapes
+        return (WORTH * stationary + shapes.T @ shapes) / (WORTH + len(shapes))
 
     def draw(self, rng: np.random.Generator, at: Layout, count: int) -> np.ndarray:
         drawn = gaussian(rng, self.covariance(at), count)
-        return np.sqrt(self.freedom / rng.chisquare(self.freedom, count))[:, None] * drawn
+        freedom = max(self.freedom, LEAST_FREEDOM)
+        return np.sqrt(freedom / rng.chisquare(freedom, count))[:, None] * drawn
 
     def _shapes(self, at: Layout) -> np.ndarray:
-        flat = self.directions[:, at.sample, at.channel] if self.directions.size else None
+        flat = self.shapes[:, at.sample, at.channel] if self.shapes.size else None
         return np.zeros((0, len(at.sample))) if flat is None else np.nan_to_num(flat)
 
 
@@ -65,8 +70,8 @@ def usual_residual(
     mean = np.mean([_autocovariance(residual, lags) for residual in residuals], axis=0)
     mean[0] = max(mean[0] - noise_variance, 0.0)
     kept = [residual for residual, again in zip(residuals, same, strict=True) if again]
-    directions = np.stack(kept) if kept else np.zeros((0, 0, 0))
-    return UsualResidual(positive_autocovariance(mean), directions, len(residuals))
+    shapes = np.stack(kept) if kept else np.zeros((0, 0, 0))
+    return UsualResidual(positive_autocovariance(mean), shapes, len(residuals))
 
 
 def without_usual(noise: Noise) -> Noise:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from bolfi_liquids.inference.criticism.noise import CORRELATIONS
+from bolfi_liquids.inference.criticism.usual import WORTH
 from bolfi_liquids.inference.noise import Layout
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
@@ -162,7 +163,7 @@ def test_the_autocovariance_of_a_stationary_process_is_recovered(clean):
     np.testing.assert_allclose(ignored[0] - found[0], WHITE, atol=0.01)
 
 
-def test_residuals_of_the_same_experiment_are_directions_in_which_it_errs_again(clean):
+def test_residuals_of_the_same_experiment_say_where_it_errs_again(clean):
     at = Layout(np.repeat([0, 1], 40), np.tile(np.arange(40), 2))
     again = [residual[:40].copy() for residual in clean[:3]]
     again[1][7, 0] = np.nan
@@ -170,7 +171,8 @@ def test_residuals_of_the_same_experiment_are_directions_in_which_it_errs_again(
     stationary = np.kron(np.eye(2), toeplitz(learned.autocovariance))
     flat = [np.nan_to_num(residual).T.ravel() for residual in again[1:]]
     shapes = sum(np.outer(residual, residual) for residual in flat)
-    np.testing.assert_allclose(learned.covariance(at), stationary + shapes, atol=1e-12)
+    updated = (WORTH * stationary + shapes) / (WORTH + 2)
+    np.testing.assert_allclose(learned.covariance(at), updated, atol=1e-12)
     other = inference.usual_residual(again, 0.0, [False] * 3)
     np.testing.assert_allclose(other.covariance(at), stationary, atol=1e-12)
 
