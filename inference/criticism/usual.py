@@ -7,7 +7,6 @@ import numpy as np
 from ..noise import Layout
 from .noise import Noise, SumOfNoises, gaussian
 
-
 WORTH = 2.0  # clean data sets that the stationary covariance counts for
 LEAST_FREEDOM = 3  # with fewer, draws have no variance and no effect would be found
 
