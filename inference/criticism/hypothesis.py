@@ -21,7 +21,7 @@ from ..optimise import minimise_in_box
 from ..posterior import Fit
 from ..signal_surrogate import SignalSurrogate
 from .noise import Noise
-from .run_noise import run_noise
+from .run_noise import run_noise, sizes_at
 from .runs import Runs
 
 COMPONENTS = 10
@@ -128,7 +128,8 @@ def hypothesise(
     told = runs.of(names)
     family = SignalFamily(noise=noise.covariance(samples(observed)), components=COMPONENTS)
     engine = Bolfi(prior, observed, surrogate=family, capacity=1)
-    engine.tell({name: told.theta[name] for name in prior.names}, told.signals, told.seeds)
+    theta = {name: told.theta[name] for name in prior.names}
+    engine.tell(theta, told.signals, told.seeds)
     with warnings.catch_warnings():
         # that a model cannot reach the data is what is being looked for
         warnings.simplefilter("ignore", EmulatorWarning)
@@ -136,9 +137,12 @@ def hypothesise(
     surrogate = fit.learned
     assert isinstance(surrogate, SignalSurrogate) and surrogate.known is not None
     emulator = surrogate.emulator
-    own = run_noise(emulator, surrogate.output.layout, surrogate.output.series)
     known = surrogate.known.covariance
-    surrogate = replace(surrogate, reduced=_reduced(surrogate, own + known))
+    counting, _ = _with_own_noise(surrogate, known, np.ones(len(told)))
+    near = minimise_in_box(_squared_distance, counting.state, len(prior))
+    # now that it is known where it fits best, so is how noisy the simulator is there
+    sizes = sizes_at(emulator, prior.to_unit(theta), near)
+    surrogate, own = _with_own_noise(surrogate, known, sizes)
     u = minimise_in_box(_squared_distance, surrogate.state, len(prior))
     return Hypothesis(
         names=names,
@@ -148,6 +152,14 @@ def hypothesise(
         spread=latent_covariance(emulator, u) + own,
         noise=known,
     )
+
+
+def _with_own_noise(
+    surrogate: SignalSurrogate, known: np.ndarray, sizes: np.ndarray
+) -> tuple[SignalSurrogate, np.ndarray]:
+    """The surrogate that counts the simulator's own noise as well, and that noise [m, m]."""
+    own = run_noise(surrogate.emulator, sizes, surrogate.output.layout, surrogate.output.series)
+    return replace(surrogate, reduced=_reduced(surrogate, own + known)), own
 
 
 def _reduced(surrogate: SignalSurrogate, covariance: np.ndarray) -> Reduced:

@@ -9,11 +9,15 @@ from ..emulator import Emulator
 from ..noise import Layout
 from .usual import positive_autocovariance
 
+ALIKE = 0.12  # of prior quantiles, within which a simulator is about as noisy
 SMOOTHED = 15  # samples over which the noise's size varies
 
 
-def run_noise(emulator: Emulator, layout: Layout, series: bool) -> np.ndarray:
+def run_noise(emulator: Emulator, sizes: np.ndarray, layout: Layout, series: bool) -> np.ndarray:
     """Covariance [m, m] of the simulator's own noise.
+
+    Args:
+        sizes: What to multiply each run's error by [n], see `sizes_at`.
 
     Runs are few and the values many, so what the runs show is shrunk (Ledoit and Wolf 2004):
     for a series towards noise of a size that changes slowly and of one autocorrelation, both
@@ -21,7 +25,23 @@ def run_noise(emulator: Emulator, layout: Layout, series: bool) -> np.ndarray:
     target, white noise, would take smooth noise for white: the slow part would be thought
     quieter than it is, and right models be refused for it.
     """
-    return smooth_covariance(own_errors(emulator), layout, series)
+    errors = own_errors(emulator)
+    return smooth_covariance(sizes[:, None] * errors, layout, series)
+
+
+def sizes_at(emulator: Emulator, u: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """How much larger the noise is at a centre [d] than at the runs' prior quantiles u [n, d].
+
+    Thin liquid is noisier than thick: a kernel smoother over the runs says how noisy it is where.
+    """
+    square = np.mean(own_errors(emulator) ** 2, axis=1)
+
+    def smoothed(points: np.ndarray) -> np.ndarray:
+        apart = np.sum(((points[:, None] - u) / ALIKE) ** 2, axis=-1)
+        weights = np.exp(-0.5 * apart)
+        return (weights @ square + square.mean()) / (weights.sum(axis=1) + 1.0)
+
+    return np.sqrt(smoothed(centre[None]) / smoothed(u))
 
 
 def smooth_covariance(errors: np.ndarray, layout: Layout, series: bool) -> np.ndarray:

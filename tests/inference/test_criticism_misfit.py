@@ -9,9 +9,9 @@ from bolfi_liquids.inference._float64 import in_float64
 from bolfi_liquids.inference.criticism.hypothesis import samples
 from bolfi_liquids.inference.criticism.laboratory import Laboratory
 from bolfi_liquids.inference.criticism.misfit import check, locate, null_draws
-from bolfi_liquids.inference.criticism.run_noise import run_noise
 from bolfi_liquids.inference.criticism.search import Study, examine
 from bolfi_liquids.inference.criticism.signatures import directions
+from bolfi_liquids.inference.emulator import latent_covariance
 from scipy.stats import binom, kstest, norm
 
 from bolfi_liquids import inference
@@ -162,7 +162,7 @@ def test_the_simulators_own_noise_is_known_to_be_smooth(banks):
 
 @in_float64
 def own_covariance(hypothesis):
-    return run_noise(hypothesis.surrogate.emulator, hypothesis.layout, True)
+    return hypothesis.spread - latent_covariance(hypothesis.surrogate.emulator, hypothesis.u)
 
 
 def located(banks, bump):

@@ -1,4 +1,4 @@
-"""How often criticism is right: 1300 data sets of the stand-in simulator.
+"""How often criticism is right: 1196 data sets of the stand-in simulator.
 
     python tests/benchmarks/misfit/study.py --out study.jsonl --workers 2
 
@@ -27,7 +27,7 @@ from stand_in import EXTENSIONS, NOISE, PRIOR, REST, UNKNOWN, Stir
 from bolfi_liquids import inference
 
 STRENGTHS = (2.5, 6.0)  # RMS of what the effect changes, over the cameras' noise
-NULLS, SETS, OUTSIDE_SETS = 300, 50, 25
+NULLS, SETS, OUTSIDE_SETS = 300, 50, 12
 FIRST, SECOND = Stir(), Stir(points=7, radius=0.02, speed=0.08)
 LARGEST = 0.99  # quantile of a coefficient's prior: what is stronger is not looked for
 DRAWS = 8  # of a posterior, for its expectation
