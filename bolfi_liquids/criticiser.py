@@ -75,7 +75,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     )
     inputs = open_inputs(calibration, held_out, baseline, pours, cups, settings)
     run = calibration.path
-    if is_criticised(run) and Criticism.open(run).summary["made_from"] == inputs.made_from:
+    if is_criticised(run) and Criticism.open(run).summary.get("made_from") == inputs.made_from:
         return Criticism.open(run)
     with open_bank(run) as bank, phases(shown=progress) as report:
         from .inference import Keeping

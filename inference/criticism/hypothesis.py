@@ -21,7 +21,7 @@ from ..optimise import minimise_in_box
 from ..posterior import Fit
 from ..signal_surrogate import SignalSurrogate
 from .noise import Noise
-from .run_noise import run_noise, sizes_at
+from .run_noise import own_errors, resized, smooth_covariance
 from .runs import Runs
 
 COMPONENTS = 10
@@ -138,11 +138,12 @@ def hypothesise(
     assert isinstance(surrogate, SignalSurrogate) and surrogate.known is not None
     emulator = surrogate.emulator
     known = surrogate.known.covariance
-    counting, _ = _with_own_noise(surrogate, known, np.ones(len(told)))
+    errors = own_errors(emulator)
+    counting, _ = _with_own_noise(surrogate, known, errors)
     near = minimise_in_box(_squared_distance, counting.state, len(prior))
     # now that it is known where it fits best, so is how noisy the simulator is there
-    sizes = sizes_at(emulator, prior.to_unit(theta), near)
-    surrogate, own = _with_own_noise(surrogate, known, sizes)
+    errors = resized(errors, prior.to_unit(theta), near)
+    surrogate, own = _with_own_noise(surrogate, known, errors)
     u = minimise_in_box(_squared_distance, surrogate.state, len(prior))
     return Hypothesis(
         names=names,
@@ -155,10 +156,10 @@ def hypothesise(
 
 
 def _with_own_noise(
-    surrogate: SignalSurrogate, known: np.ndarray, sizes: np.ndarray
+    surrogate: SignalSurrogate, known: np.ndarray, errors: np.ndarray
 ) -> tuple[SignalSurrogate, np.ndarray]:
     """The surrogate that counts the simulator's own noise as well, and that noise [m, m]."""
-    own = run_noise(surrogate.emulator, sizes, surrogate.output.layout, surrogate.output.series)
+    own = smooth_covariance(errors, surrogate.output.layout, surrogate.output.series)
     return replace(surrogate, reduced=_reduced(surrogate, own + known)), own
 
 

@@ -13,11 +13,8 @@ ALIKE = 0.12  # of prior quantiles, within which a simulator is about as noisy
 SMOOTHED = 15  # samples over which the noise's size varies
 
 
-def run_noise(emulator: Emulator, sizes: np.ndarray, layout: Layout, series: bool) -> np.ndarray:
-    """Covariance [m, m] of the simulator's own noise.
-
-    Args:
-        sizes: What to multiply each run's error by [n], see `sizes_at`.
+def smooth_covariance(errors: np.ndarray, layout: Layout, series: bool) -> np.ndarray:
+    """Covariance [m, m] of the simulator's own noise, of which there are draws [n, m].
 
     Runs are few and the values many, so what the runs show is shrunk (Ledoit and Wolf 2004):
     for a series towards noise of a size that changes slowly and of one autocorrelation, both
@@ -25,29 +22,23 @@ def run_noise(emulator: Emulator, sizes: np.ndarray, layout: Layout, series: boo
     target, white noise, would take smooth noise for white: the slow part would be thought
     quieter than it is, and right models be refused for it.
     """
-    errors = own_errors(emulator)
-    return smooth_covariance(sizes[:, None] * errors, layout, series)
+    target = _target(errors, layout) if series else np.diag(np.mean(errors**2, 0))
+    return _shrunk(errors, target)
 
 
-def sizes_at(emulator: Emulator, u: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """How much larger the noise is at a centre [d] than at the runs' prior quantiles u [n, d].
+def resized(errors: np.ndarray, u: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """Errors [n, m] of runs at prior quantiles u [n, d], as large as they would be at a centre [d].
 
     Thin liquid is noisier than thick: a kernel smoother over the runs says how noisy it is where.
     """
-    square = np.mean(own_errors(emulator) ** 2, axis=1)
+    square = np.mean(errors**2, axis=1)
 
     def smoothed(points: np.ndarray) -> np.ndarray:
         apart = np.sum(((points[:, None] - u) / ALIKE) ** 2, axis=-1)
         weights = np.exp(-0.5 * apart)
         return (weights @ square + square.mean()) / (weights.sum(axis=1) + 1.0)
 
-    return np.sqrt(smoothed(centre[None]) / smoothed(u))
-
-
-def smooth_covariance(errors: np.ndarray, layout: Layout, series: bool) -> np.ndarray:
-    """Covariance [m, m] of what few draws [n, m] of noise show, see `run_noise`."""
-    target = _target(errors, layout) if series else np.diag(np.mean(errors**2, 0))
-    return _shrunk(errors, target)
+    return errors * np.sqrt(smoothed(centre[None]) / smoothed(u))[:, None]
 
 
 def errors_of(groups: Sequence[np.ndarray]) -> np.ndarray:

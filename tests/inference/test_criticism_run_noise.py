@@ -5,7 +5,7 @@ import functools
 import numpy as np
 import pytest
 from bolfi_liquids.inference.criticism.misfit import slow_modes
-from bolfi_liquids.inference.criticism.run_noise import errors_of, smooth_covariance
+from bolfi_liquids.inference.criticism.run_noise import errors_of, resized, smooth_covariance
 from bolfi_liquids.inference.noise import Layout, shrunk_covariance
 from scipy.stats import norm
 
@@ -122,3 +122,21 @@ def test_differences_within_groups_are_as_large_as_the_noise():
     errors = errors_of(groups)
     freedom = sum((len(group) - 1) * 50 for group in groups)
     assert abs(np.mean(errors**2) - 1.0) < norm.isf(ALPHA / 2) * np.sqrt(2.5 / freedom)
+
+
+@pytest.mark.parametrize("centre", [0.1, 0.9])
+def test_noise_is_as_large_as_it_is_near_by(centre):
+    """Where it grows tenfold; and where it is of one size, next to nothing changes."""
+    rng = np.random.default_rng(0)
+    u = rng.uniform(size=(60, 1))
+    white = rng.normal(size=(60, SAMPLES))
+    growing = 10.0**u * white
+
+    def size(errors):
+        return np.sqrt(np.mean(errors**2))
+
+    found = size(resized(growing, u, np.array([centre]))) / 10.0**centre
+    assert 0.75 < found < 1.33  # over which the size changes by as much
+    assert not 0.6 < size(growing) / 10.0**centre < 1.67
+    error = norm.isf(ALPHA / 2) * np.sqrt(0.5 / (5 * SAMPLES))  # of five runs near by
+    assert abs(size(resized(white, u, np.array([centre]))) - 1.0) < error
