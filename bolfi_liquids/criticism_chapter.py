@@ -1,5 +1,6 @@
 """What the report shows of a criticism."""
 
+import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -172,15 +173,18 @@ def _pours_part(section: Mapping[str, Any], tree: "DataTree") -> dict[str, Any] 
 
 
 def _made_with(tree: "DataTree") -> list[tuple[str, str]]:
-    """Attributes of criticism.nc; each baseline recording with its hash."""
-    attrs = dict(tree.attrs)
-    names, hashes = (_texts(attrs.pop(key, ())) for key in ("baseline", "baseline_sha256"))
-    rows = [(str(key), ", ".join(_texts(value)) or "none") for key, value in attrs.items()]
-    clean = zip(names, hashes, strict=True)
-    files = [(f"baseline {name}, SHA-256", digest) for name, digest in clean]
-    return [*rows, *(files or [("baseline", "none")])]
+    """Settings of a criticism, and each of its files with its hash."""
+    made_from = json.loads(tree.attrs["made_from"])
+    settings = {"version": made_from["version"], **made_from["settings"]}
+    rows = [(key, _text(value)) for key, value in settings.items()]
+    for group in ("held_out", "baseline", "pours"):
+        files = made_from[group].items()
+        label = narrative.words(group)
+        rows += [(f"{label} {name}, SHA-256", digest) for name, digest in files] or [
+            (label, "none")
+        ]
+    return [*rows, ("accepted by", tree.attrs["accepted_by"])]
 
 
-def _texts(value: Any) -> list[str]:
-    """An attribute as a list; NetCDF gives a list of one text back as the text."""
-    return [str(one) for one in ([value] if np.ndim(value) == 0 else value)]
+def _text(value: Any) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)

@@ -41,15 +41,20 @@ class Inputs:
 
     @property
     def made_from(self) -> dict[str, Any]:
-        """What a result was made from, as it is written into the result."""
-        poured = self.table and {"sha256": self.table.hash, "liquid": self.table.liquid}
+        """What a result was made from, as JSON: settings, and the SHA-256 of every file."""
+        groups = {
+            "recordings": self.stirring.recordings,
+            "held_out": self.held_out,
+            "baseline": self.baseline,
+            "pours": () if self.table is None else (self.table,),
+        }
         return {
             "version": version("bolfi-liquids"),
             "settings": {key: _listed(value) for key, value in asdict(self.settings).items()},
-            "recordings_sha256": [recording.hash for recording in self.stirring.recordings],
-            "held_out_sha256": [recording.hash for recording in self.held_out],
-            "baseline_sha256": [recording.hash for recording in self.baseline],
-            "pours": poured and {**poured, "cups": self.cups.settings()},
+            **{
+                group: {one.path.name: one.hash for one in files} for group, files in groups.items()
+            },
+            "poured": self.table and {"liquid": self.table.liquid, "cups": self.cups.settings()},
         }
 
 

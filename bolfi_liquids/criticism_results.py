@@ -46,7 +46,6 @@ def criticism_tree(findings: Findings) -> "DataTree":
     tree = DataTree.from_dict(groups)
     tree.attrs.update(
         made_from=json.dumps(findings.inputs.made_from),
-        baseline=[clean.recording.path.name for clean in findings.baseline],
         accepted=list(findings.accepted),
         accepted_by="user" if settings.accept else "verdict",
         liquid_density=findings.calibration.liquid_density,

@@ -1,3 +1,4 @@
+import json
 from importlib.resources import files
 from pathlib import Path
 
@@ -92,8 +93,7 @@ def criticism_section():
         "baseline": 2,
         "noise": {"sd_deg": 0.2, "sd_uncertainty": 0.4, "correlation": 0.25, "samples": 32},
         "seconds": 8.0,
-        "seed": 0,
-        "version": bl.__version__,
+        "made_from": {},
     }
 
 
@@ -182,9 +182,15 @@ def _made(*, after=True, held=None, pours=False, status=("accepted", "rejected",
         groups["/pours/effects"], groups["/pours/confusion"] = found, confusion
     tree = xr.DataTree.from_dict(groups)
     tree.attrs.update(
-        version=bl.__version__,
-        baseline=["clean.nc"],
-        baseline_sha256=["abc123"],
+        made_from=json.dumps(
+            {
+                "version": bl.__version__,
+                "settings": {"effects": ["camera_delay", "camera_tilt"], "seed": 3},
+                "held_out": {},
+                "baseline": {"clean.nc": "abc123"},
+                "pours": {},
+            }
+        ),
         accepted=["camera_delay"],
         accepted_by="verdict",
     )

@@ -132,7 +132,8 @@ def test_page_shows_the_criticism_before_the_pour(criticised):
     assert "77 to criticise it with" in how
     assert "baseline clean.nc, SHA-256" in how
     assert "abc123" in how
-    assert "criticism: accepted_by" in how
+    assert "criticism: accepted by" in how
+    assert "camera_delay, camera_tilt" in how and "held out" in how
 
 
 def test_page_without_a_criticism_says_how_to_get_one(calibration):

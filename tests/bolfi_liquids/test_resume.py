@@ -117,3 +117,9 @@ def test_criticism_killed_and_repeated_equals_undisturbed(calibration, tmp_path)
         np.testing.assert_array_equal(again.tree["posterior"][name], draws)
     timeless = [{k: v for k, v in c.summary.items() if k != "seconds"} for c in (whole, again)]
     assert timeless[0] == timeless[1]
+
+    written = (killed / "criticism.nc").stat().st_mtime_ns
+    bl.criticise(killed, effects=EFFECTS, progress=False)  # what is there is opened
+    assert (killed / "criticism.nc").stat().st_mtime_ns == written
+    bl.criticise(killed, effects=EFFECTS[:1], progress=False)  # another question is not
+    assert (killed / "criticism.nc").stat().st_mtime_ns > written
