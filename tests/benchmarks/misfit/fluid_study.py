@@ -46,17 +46,19 @@ MODEL, DATA = 600, 1000  # particles
 POURED = 900  # particles of the pours that are data; the model has its usual number
 NOISE, CORRELATION = np.radians(0.1), 0.5
 NULLS, SETS, CLEAN = 20, 5, 4
-VISCOSITY = 0.5, 3.0  # Pa s, of the truths
+VISCOSITY = 0.4, 1.2  # Pa s, of the truths
 EFFECTS = {
     "camera_delay": (0.03, 0.06),
-    "camera_tilt": (0.012, 0.02),
-    "pivot_friction": (4e-4, 8e-4),
-    "stick_mass": (1.25, 1.4),
-    "yield_stress": (4.0, 10.0),
+    "camera_tilt": (0.015, 0.025),
+    "pivot_friction": (9e-4, 13e-4),
+    "yield_stress": (28.0, 40.0),
+    "gripper_scale": (1.16, 1.25),
 }
-"""Hidden in stirs: sizes, with either sign where an effect has both."""
+"""Hidden in stirs: sizes with which these stirs could show them, with either sign where an effect has
+both. Stick mass, fill level and warming stay below a signal-to-noise ratio of ten here, as large as
+their priors allow."""
 SIGNED = ("camera_delay", "camera_tilt")
-ADHESION = 0.3, 0.8
+ADHESION = 0.3, 0.8  # hidden in pours
 PATHS = {
     "star": star(points=5, radius=0.022, speed=0.12, height=0.235, rest=1.0),
     "circle": circle(radius=0.018, speed=0.1, turns=3.0, height=0.235, rest=1.0),
