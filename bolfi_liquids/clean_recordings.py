@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .noise import sensor_noise
 from .recordings import Recording
-from .stir_experiment import same_experiment, stir_experiment
+from .stir_experiment import camera_noise, same_experiment, stir_experiment
 from .stirring import stirring_of
 
 if TYPE_CHECKING:
@@ -73,5 +72,5 @@ def usual_for(stirring: "Stirring", clean: Sequence[Clean]) -> "UsualResidual | 
         return None
     only = stirring.recordings[0] if len(stirring.recordings) == 1 else None
     same = [only is not None and same_experiment(one.recording, only) for one in clean]
-    noise = float(np.mean([sensor_noise(one.recording.inclination) ** 2 for one in clean]))
-    return usual_residual([one.residual for one in clean], noise, same)
+    noises = [camera_noise([one.recording]) for one in clean]
+    return usual_residual([one.residual for one in clean], noises, same)

@@ -87,7 +87,7 @@ def _gap_deg(source: "inference.Criticism") -> dict[str, float | None]:
     """
     best = source.leading
     base = source.base.hypothesis
-    own = np.diag(base.spread) + np.diag(source.measurement)
+    own = np.diag(base.own) + np.diag(source.measurement)
     gaps = () if best is None else source.gaps.get(best.names, ())
 
     def pooled(values: list[float]) -> float | None:

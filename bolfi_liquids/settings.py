@@ -98,10 +98,13 @@ class CriticismSettings:
 
     @property
     def stir_plan(self) -> "Plan":
-        """Runs of each step for stirs: with six baselines, at most 350 in all."""
+        """Runs of each step for stirs.
+
+        With held-out runs of four models, proposals and six baselines, at most 350 in all.
+        """
         from .inference import Plan
 
-        return Plan(base=24, extension=8, refit=12)
+        return Plan(base=24, extension=8, refit=12, held_out=6, most=168)
 
     @property
     def pour_plan(self) -> "Plan":

@@ -9,7 +9,7 @@ import numpy as np
 from ..prior import Prior
 from .experiment import Experiment, Proposal
 from .extension import Extensions, check_extensions
-from .held_out import Gap, gap, predict
+from .held_out import Gap, gap, holds, predict
 from .hypothesis import Hypothesis, samples
 from .laboratory import Keeping, Laboratory
 from .misfit import Found, locate, null_draws
@@ -37,7 +37,8 @@ class Criticism:
         before, after: Where the data disagree with the base and with the extended model.
         gaps: On held-out data, for each explanation that came so far: names -> gaps.
         suggestions: Experiments that would separate explanations, best first.
-        untested: Effects whose simulations failed.
+        untested: Effects whose simulations failed, or that were not refitted though they might
+            explain the difference.
         noise: The experiment's.
         tied: Names of each explanation that remains, best first.
         simulations: Runs that were asked for, those found in the bank included.
@@ -82,7 +83,7 @@ class Criticism:
     @property
     def confusion(self) -> np.ndarray:
         """Cosines between the effects' signatures [e, e]."""
-        return confusion(self.base.signatures)
+        return confusion(self.base.hypothesis, self.base.signatures)
 
 
 def criticise(  # noqa: PLR0913  the one call that most users make
@@ -94,6 +95,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     held_out: Sequence[Experiment] = (),
     proposals: Sequence[Proposal] = (),
     accept: Sequence[str] | None = None,
+    level: float = ALARM,
     plan: Plan | None = None,
     keeping: Keeping | None = None,
 ) -> Criticism:
@@ -103,7 +105,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     is fitted together with the base parameters; the best are simulated where they fit best,
     fitted again, and must pass the test that the base model failed. Those that no test tells
     apart are a tie; where no one passes, pairs are tried. On held-out data an explanation must
-    leave no more than noise and predict better than the base model, or it is withdrawn.
+    leave no more than noise and predict better than the base model, or it is withdrawn; how much
+    better also tells explanations apart.
 
     All runs are kept in the bank under seeds that derive from one: the same call repeats
     nothing that was finished and concludes the same.
@@ -116,6 +119,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         held_out: Experiments that nothing is fitted to.
         proposals: Experiments that could be made next.
         accept: Effects to accept, whatever the verdict; None accepts what the verdict names.
+        level: p-value below which the base model is rejected.
         plan: How many runs each step may make.
         keeping: Where runs are kept and how they are made; it also holds the seed of everything
             random. None forgets them.
@@ -143,13 +147,13 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     before = None if earlier is None else laboratory.table(*earlier)
     base, untested = examine(study, before)
     candidates, members, gaps = [], [], {}
-    if accept is not None or base.check.p_value < ALARM:
+    if accept is not None or base.check.p_value < level:
         candidates, members = explain(study, base, accept)
         chosen = {c.names: c for c in [*members, _among(candidates, accept)] if c}
         gaps = _gaps(study, base, list(chosen.values()), held_out)
-        candidates = [replace(c, held=_holds(c, gaps)) for c in candidates]
+        candidates = [replace(c, held=holds(gaps.get(c.names, ()))) for c in candidates]
         members = [_judged(member, gaps) for member in members]
-    verdict = conclude(base.check, members)
+    verdict = conclude(base.check, members, level)
     accepted = tuple(accept) if accept is not None else _named(verdict)
     leading = _among(candidates, accepted)
     extended = leading.hypothesis if leading else None
@@ -173,7 +177,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         after=tuple(left),
         gaps=gaps,
         suggestions=tuple(suggest(laboratory, proposals, rivals)),
-        untested=untested,
+        untested=(*untested, *(c.names[0] for c in candidates if c.passes and not c.refitted)),
         noise=experiment.noise,
         tied=tuple(one.names for one in tied(members)),
         simulations=count,
@@ -210,12 +214,9 @@ def _gaps(
 
 def _judged(candidate: Candidate, gaps: Mapping[tuple[str, ...], tuple[Gap, ...]]) -> Candidate:
     """The candidate in view of the held-out data: their evidence counts, and their veto."""
-    gain = candidate.gain + sum(one.lpd_gain for one in gaps.get(candidate.names, ()))
-    return replace(candidate, gain=gain, held=_holds(candidate, gaps))
-
-
-def _holds(candidate: Candidate, gaps: Mapping[tuple[str, ...], tuple[Gap, ...]]) -> bool:
-    return all(one.passes for one in gaps.get(candidate.names, ()))
+    found = gaps.get(candidate.names, ())
+    gain = candidate.gain + sum(one.lpd_gain for one in found)
+    return replace(candidate, gain=gain, held=holds(found))
 
 
 def _check_held_out(experiment: Experiment, held_out: Sequence[Experiment]) -> None:

@@ -1,6 +1,6 @@
 """Whether an explanation holds on data that it was not fitted to."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,12 +9,14 @@ from ..output import SERIES
 from .experiment import Experiment
 from .hypothesis import samples
 from .laboratory import Laboratory
+from .misfit import MODES, exceedance, orthonormal, slow_modes
 from .noise import gaussian
 from .run_noise import errors_of, smooth_covariance
 from .usual import without_usual
+from .verdict import ACCEPTED
 
 FLOOR = 0.99  # quantile of the noise's RMS below which a gap may be noise
-GAIN = 3.0  # log predictive density that an explanation must win
+GAIN = 3.0  # log predictive density that an explanation must win on all held-out data together
 REPLICATES = 999
 
 
@@ -25,7 +27,9 @@ class Gap(NamedTuple):
         label: The experiment's.
         before, after: RMS of observed less expected.
         noise: RMS that measurement and the simulator's own noise would leave of a right model.
-        floor: RMS that these, and what is usual for the simulator, exceed once in a hundred times.
+        floor: RMS that these exceed once in a hundred times.
+        p_value: Of what is left after, by its RMS and by its slow part (Bonferroni), all noise
+            and what is usual for the simulator considered.
         lpd_gain: Log predictive density after less before.
     """
 
@@ -34,6 +38,7 @@ class Gap(NamedTuple):
     after: float
     noise: float
     floor: float
+    p_value: float
     lpd_gain: float
 
     @property
@@ -43,9 +48,14 @@ class Gap(NamedTuple):
         return before, after
 
     @property
-    def passes(self) -> bool:
-        """Whether noise may be all that is left, and the explanation predicts better."""
-        return self.after <= self.floor and self.lpd_gain > GAIN
+    def fits(self) -> bool:
+        """Whether noise, and what is usual, may be all that is left."""
+        return self.p_value > ACCEPTED
+
+
+def holds(gaps: Sequence[Gap]) -> bool:
+    """Whether an explanation leaves no more than noise anywhere, and predicts better in all."""
+    return not gaps or (all(one.fits for one in gaps) and sum(one.lpd_gain for one in gaps) > GAIN)
 
 
 def predict(
@@ -69,22 +79,31 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
     series = len(experiment.observed) >= SERIES
     simulated = fewer * smooth_covariance(errors_of([before, after]), at, series)
     covariance = experiment.noise.covariance(at) + simulated
-    measured = without_usual(experiment.noise).covariance(at)
+    measured = without_usual(experiment.noise)
     factor = np.linalg.cholesky(covariance)
     rng = np.random.default_rng(seed)
     runs = gaussian(rng, simulated, REPLICATES)
     null = experiment.noise.draw(rng, at, REPLICATES) + runs
+    noise = measured.draw(rng, at, REPLICATES) + runs
+    modes = slow_modes(at, MODES) if series else np.eye(len(observed))
+    span = orthonormal(np.linalg.solve(factor, modes))
+
+    def measures(rows: np.ndarray) -> np.ndarray:
+        slow = np.sum((span.T @ np.linalg.solve(factor, rows.T)) ** 2, axis=0)
+        return np.stack([np.mean(rows**2, axis=1), slow])
 
     def density(mean: np.ndarray) -> float:
         return -0.5 * float(np.sum(np.linalg.solve(factor, observed - mean) ** 2))
 
     means = before.mean(0), after.mean(0)
+    left = measures((observed - means[1])[None])[:, 0]
     sizes = [float(np.sqrt(np.mean((observed - mean) ** 2))) for mean in means]
     return Gap(
         label=experiment.label,
         before=sizes[0],
         after=sizes[1],
-        noise=float(np.sqrt(np.trace(measured + simulated) / len(observed))),
-        floor=float(np.quantile(np.sqrt(np.mean(null**2, axis=1)), FLOOR)),
+        noise=float(np.sqrt(np.trace(measured.covariance(at) + simulated) / len(observed))),
+        floor=float(np.quantile(np.sqrt(np.mean(noise**2, axis=1)), FLOOR)),
+        p_value=min(1.0, 2.0 * float(exceedance(measures(null), left).min())),
         lpd_gain=density(means[1]) - density(means[0]),
     )

@@ -39,7 +39,8 @@ class Hypothesis:
         fit: The engine's; its likelihood takes all noise from here.
         u: Where the expected output is nearest to what was observed, prior quantiles [d].
         difference: Observed less expected there [m].
-        spread: Covariance of what the simulator and its emulator add [m, m].
+        latent: Covariance of what the emulator does not know [m, m].
+        own: Covariance of the simulator's own noise [m, m].
         noise: Covariance of the noise between the simulator and the data [m, m].
     """
 
@@ -47,7 +48,8 @@ class Hypothesis:
     fit: Fit
     u: np.ndarray
     difference: np.ndarray
-    spread: np.ndarray
+    latent: np.ndarray
+    own: np.ndarray
     noise: np.ndarray
 
     @property
@@ -63,6 +65,11 @@ class Hypothesis:
     @property
     def layout(self) -> Layout:
         return self.surrogate.output.layout
+
+    @property
+    def spread(self) -> np.ndarray:
+        """Covariance of what the simulator and its emulator add [m, m]."""
+        return self.latent + self.own
 
     @cached_property
     def factor(self) -> np.ndarray:
@@ -150,7 +157,8 @@ def hypothesise(
         fit=replace(fit, learned=surrogate),
         u=u,
         difference=surrogate.observed - predict(emulator, u[None])[0][0],
-        spread=latent_covariance(emulator, u) + own,
+        latent=latent_covariance(emulator, u),
+        own=own,
         noise=known,
     )
 

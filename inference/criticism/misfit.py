@@ -158,6 +158,7 @@ def exceedance(usual: np.ndarray, seen: np.ndarray | list[float]) -> np.ndarray:
 
 
 def _own_exceedance(usual: np.ndarray) -> np.ndarray:
-    """Of each draw among its own kind, [k, n]."""
-    rank = np.argsort(np.argsort(usual, axis=1), axis=1)
-    return (usual.shape[1] - rank) / (usual.shape[1] + 1.0)
+    """Of each draw among its own kind, [k, n]; ties count as in `exceedance`."""
+    count = usual.shape[1]
+    smaller = [np.searchsorted(np.sort(row), row - 1e-12) for row in usual]
+    return (count - np.stack(smaller)) / (count + 1.0)

@@ -14,7 +14,7 @@ from .misfit import MODES, orthonormal, slow_modes
 from .run_noise import errors_of, smooth_covariance
 from .verdict import Candidate
 
-RUNS = 4  # of each explanation in each proposed experiment
+RUNS = 3  # of each explanation in each proposed experiment
 
 
 class Suggestion(NamedTuple):
@@ -71,5 +71,6 @@ def _distance(proposal: Proposal, signals: Sequence[np.ndarray], a: int, b: int)
     span = orthonormal(np.linalg.solve(factor, modes))
     difference = signals[a].mean(0) - signals[b].mean(0)
     length = np.sum((span.T @ np.linalg.solve(factor, difference)) ** 2)
-    noise = span.shape[1] * (1.0 / len(signals[a]) + 1.0 / len(signals[b]))
-    return float(np.sqrt(max(length - noise, 0.0)))
+    white = np.linalg.solve(factor, np.linalg.solve(factor, runs).T)
+    own = np.trace(span.T @ white @ span) * (1.0 / len(signals[a]) + 1.0 / len(signals[b]))
+    return float(np.sqrt(max(length - own, 0.0)))

@@ -9,7 +9,9 @@ from ..emulator import Emulator
 from ..noise import Layout
 from .usual import positive_autocovariance
 
-ALIKE = 0.12  # of prior quantiles, within which a simulator is about as noisy
+ALIKE = 0.2  # of prior quantiles, over which a simulator's noise changes as a power
+FEW = 0.1  # runs
+TINY = 1e-6  # of the largest square
 SMOOTHED = 15  # samples over which the noise's size varies
 
 
@@ -22,6 +24,8 @@ def smooth_covariance(errors: np.ndarray, layout: Layout, series: bool) -> np.nd
     target, white noise, would take smooth noise for white: the slow part would be thought
     quieter than it is, and right models be refused for it.
     """
+    if not errors.any():  # a deterministic simulator
+        return np.zeros((errors.shape[1],) * 2)
     target = _target(errors, layout) if series else np.diag(np.mean(errors**2, 0))
     return _shrunk(errors, target)
 
@@ -29,16 +33,23 @@ def smooth_covariance(errors: np.ndarray, layout: Layout, series: bool) -> np.nd
 def resized(errors: np.ndarray, u: np.ndarray, centre: np.ndarray) -> np.ndarray:
     """Errors [n, m] of runs at prior quantiles u [n, d], as large as they would be at a centre [d].
 
-    Thin liquid is noisier than thick: a kernel smoother over the runs says how noisy it is where.
+    Thin liquid is noisier than thick: a local linear regression of the log of the runs' mean
+    squares (Fan and Gijbels 1996) says how noisy it is where, also at the ends of a prior.
     """
     square = np.mean(errors**2, axis=1)
+    if not square.any():
+        return errors
+    logs = np.log(np.maximum(square, TINY * square.max()))
+    usual = logs.mean()
 
-    def smoothed(points: np.ndarray) -> np.ndarray:
-        apart = np.sum(((points[:, None] - u) / ALIKE) ** 2, axis=-1)
-        weights = np.exp(-0.5 * apart)
-        return (weights @ square + square.mean()) / (weights.sum(axis=1) + 1.0)
+    def smoothed(point: np.ndarray) -> float:
+        x = np.column_stack([np.ones(len(u)), (u - point) / ALIKE])
+        weighted = x * np.exp(-0.5 * np.sum(x[:, 1:] ** 2, axis=1))[:, None]
+        known = np.diag([FEW] + [1.0] * u.shape[1])  # as if a run or less spoke for no change
+        return float(np.linalg.solve(weighted.T @ x + known, weighted.T @ (logs - usual))[0])
 
-    return errors * np.sqrt(smoothed(centre[None]) / smoothed(u))[:, None]
+    there = np.array([smoothed(point) for point in u])
+    return errors * np.exp(0.5 * (smoothed(centre) - there))[:, None]
 
 
 def errors_of(groups: Sequence[np.ndarray]) -> np.ndarray:

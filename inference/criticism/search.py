@@ -14,7 +14,7 @@ from .misfit import Check, check, null_draws
 from .noise import Noise
 from .runs import Runs, joined
 from .signatures import Signature, directions, signature
-from .verdict import Candidate, near_best, tied
+from .verdict import Candidate, near_best
 
 PASSES = 2  # of a refit, the second only if the first moved the best fit out of its box
 SECOND = 6.0  # log likelihood that a second effect must gain
@@ -31,6 +31,7 @@ class Plan:
         refit: Near the best parameters of a near-best explanation.
         refits: Explanations that are refitted, and pairs of effects after them.
         held_out: Of each model for each held-out data set.
+        most: Of all these but the held-out ones; refits beyond are left out.
     """
 
     base: int = 24
@@ -39,6 +40,7 @@ class Plan:
     refit: int = 16
     refits: int = 3
     held_out: int = 8
+    most: int = 400
 
 
 class Study(NamedTuple):
@@ -86,6 +88,7 @@ class Base(NamedTuple):
     signatures: dict[str, Signature]
     singles: dict[str, Hypothesis]
     runs: Runs
+    given: int  # of the runs, made before
 
 
 def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Box]:
@@ -119,13 +122,14 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
         for name, single in singles.items()
     }
     tested, null = study.check(base, signatures)
-    return Base(base, tested, null, signatures, singles, joined(parts)), tuple(untested)
+    given = 0 if earlier is None else len(earlier)
+    return Base(base, tested, null, signatures, singles, joined(parts), given), tuple(untested)
 
 
 def explain(
     study: Study, base: Base, accept: Sequence[str] | None = None
 ) -> tuple[list[Candidate], list[Candidate]]:
-    """Every explanation by one effect, or by two where none suffices; and those that remain.
+    """Every explanation by one effect, or by two where none suffices; and those that are accepted.
 
     Args:
         accept: Effects that are refitted together, whatever their rank.
@@ -134,23 +138,28 @@ def explain(
     first = [study.candidate(base, single) for single in base.singles.values()]
     found = {candidate.names: candidate for candidate in first}
     for one in near_best(first, plan.refits):
-        found[one.names], runs = _refit(study, base, one, runs)
-    remaining = tied(list(found.values()))
-    if not remaining:
+        found[one.names], runs = _refit(study, base, one, runs, plan.most)
+    if not any(one.accepted for one in found.values()):
         pairs, runs = _pairs(study, base, found, runs)
         found |= {pair.names: pair for pair in pairs}
-        remaining = tied([c for c in found.values() if len(c.names) == 1]) or tied(pairs)
+    accepted = [one for one in found.values() if one.accepted]
+    singles = [one for one in accepted if len(one.names) == 1]
     forced = tuple(accept or ())
     if forced and not (forced in found and found[forced].refitted):
         unrefined = study.candidate(base, study.hypothesis(forced, runs))
-        found[forced], _ = _refit(study, base, unrefined, runs)
-    return list(found.values()), remaining
+        found[forced], _ = _refit(study, base, unrefined, runs, most=None)
+    return list(found.values()), singles or accepted
 
 
-def _refit(study: Study, base: Base, candidate: Candidate, runs: Runs) -> tuple[Candidate, Runs]:
-    """The candidate, simulated where it fits best and fitted again, until it stays there."""
+def _refit(
+    study: Study, base: Base, candidate: Candidate, runs: Runs, most: int | None
+) -> tuple[Candidate, Runs]:
+    """The candidate, simulated where it fits best and fitted again, until it stays there or
+    more than `most` runs would be made."""
     names = candidate.names
     for attempt in range(PASSES):
+        if most is not None and len(runs) - base.given + study.plan.refit > most:
+            break
         box = around(candidate.hypothesis.u, candidate.hypothesis.sd, NARROW)
         phase = f"refit {' '.join(names)} {attempt}"
         runs = joined([runs, study.run(phase, box, names, study.plan.refit)])
@@ -174,16 +183,13 @@ def _pairs(
     ]
     tried = []
     for pair in sorted(pairs, key=lambda c: -c.gain)[: study.plan.refits]:
-        again, runs = _refit(study, base, pair, runs)
+        again, runs = _refit(study, base, pair, runs, study.plan.most)
         if again.accepted:
             for name in again.names:
                 if not found[(name,)].refitted:
-                    found[(name,)], runs = _refit(study, base, found[(name,)], runs)
-            alone = max(found[(name,)].gain for name in again.names)
-            again = again if again.gain > alone + SECOND else _refused(again)
+                    alone = found[(name,)]
+                    found[(name,)], runs = _refit(study, base, alone, runs, study.plan.most)
+            best_alone = max(found[(name,)].gain for name in again.names)
+            again = replace(again, needed=again.gain > best_alone + SECOND)
         tried.append(again)
     return tried, runs
-
-
-def _refused(candidate: Candidate) -> Candidate:
-    return replace(candidate, check=candidate.check._replace(p_value=0.0))

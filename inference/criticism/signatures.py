@@ -11,19 +11,22 @@ from .hypothesis import Hypothesis
 
 STEPS = np.array([0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7, 0.9])  # of prior quantiles
 VISIBLE = 5.0  # signal-to-noise ratio at which a signature is taken
-FAINT = 0.3  # length below which what is left of a direction means nothing
+FAINT = 0.3  # share of its visible length below which what is left of a change means nothing
 
 
 class Signature(NamedTuple):
-    """Whitened change of the data, less what the base parameters absorb.
+    """How an effect changes the data.
 
     Attributes:
-        direction: Of length one [m].
+        change: Of the expected values, any size [m].
+        visible: Its length where the base model is fitted: whitened, and less what the base
+            parameters absorb.
         coefficient: Typical of the prior: halfway in quantiles from neutral to its farther end.
         snr: Signal-to-noise ratio of an effect of that size.
     """
 
-    direction: np.ndarray
+    change: np.ndarray
+    visible: float
     coefficient: float
     snr: float
 
@@ -43,46 +46,53 @@ def signature(base: Hypothesis, extended: Hypothesis, extension: Extension) -> S
         u = neutral + side * STEPS
         u = u[(u >= 0.01) & (u <= 0.99)]
         if len(u):
-            white = _changes(base, extended, neutral, u)
-            length = np.maximum(np.linalg.norm(white, axis=0), 1e-12)
+            changes = _changes(base, extended, neutral, u)
+            length = np.maximum(_visible(base, changes), 1e-12)
             nearest = np.argmin(np.abs(np.log(length / VISIBLE)))
-            units.append(side * white[:, nearest] / length[nearest])
-    mean = np.mean(units, axis=0)
+            units.append(side * changes[nearest] / length[nearest])
+    change = np.mean(units, axis=0)
     middle = (neutral + float(neutral <= 0.5)) / 2.0
     typical = _changes(base, extended, neutral, np.array([middle]))
     return Signature(
-        mean / max(float(np.linalg.norm(mean)), 1e-12),
+        change,
+        float(_visible(base, change[None])[0]),
         float(prior.from_unit(np.append(base.u, middle))[name]),
-        float(np.linalg.norm(typical)),
+        float(_visible(base, typical)[0]),
     )
 
 
 def _changes(base: Hypothesis, extended: Hypothesis, neutral: float, u: np.ndarray) -> np.ndarray:
-    """What coefficients at prior quantiles u [n] change, whitened and projected [m, n]."""
+    """What coefficients at prior quantiles u [n] change of the expected values [n, m]."""
     points = np.column_stack([np.tile(base.u, (len(u) + 1, 1)), np.append(neutral, u)])
     expected = extended.expected(points)
-    return base.project(base.whiten(expected[1:] - expected[0]))
+    return expected[1:] - expected[0]
+
+
+def _visible(base: Hypothesis, changes: np.ndarray) -> np.ndarray:
+    """Signal-to-noise ratios of changes [n, m] that the base parameters do not absorb [n]."""
+    return np.linalg.norm(base.project(base.whiten(changes)), axis=0)
 
 
 def directions(
     hypothesis: Hypothesis, signatures: Mapping[str, Signature]
 ) -> dict[str, np.ndarray]:
-    """Signatures of the effects that do not act yet, as far as a hypothesis leaves them:
+    """Whitened signatures of the effects that do not act yet, as far as a hypothesis leaves them:
     name -> unit vector [m]. What it absorbs nearly whole is left out."""
     found = {}
     for name, of in signatures.items():
         if name in hypothesis.names:
             continue
-        left = hypothesis.project(of.direction[:, None])[:, 0]
+        left = hypothesis.project(hypothesis.whiten(of.change))[:, 0]
         length = np.linalg.norm(left)
-        if length > FAINT:
+        if length > FAINT * of.visible:
             found[name] = left / length
     return found
 
 
-def confusion(signatures: Mapping[str, Signature]) -> np.ndarray:
+def confusion(base: Hypothesis, signatures: Mapping[str, Signature]) -> np.ndarray:
     """Cosines between all signatures [e, e]: 1 is the same, 0 nothing in common."""
     if not signatures:
         return np.zeros((0, 0))
-    rows = np.stack([of.direction for of in signatures.values()])
+    white = base.project(base.whiten(np.stack([of.change for of in signatures.values()])))
+    rows = white.T / np.maximum(np.linalg.norm(white, axis=0), 1e-12)[:, None]
     return rows @ rows.T

@@ -50,14 +50,14 @@ class UsualResidual:
 
 
 def usual_residual(
-    residuals: list[np.ndarray], noise_variance: float, same: list[bool]
+    residuals: list[np.ndarray], noises: list[Noise], same: list[bool]
 ) -> UsualResidual:
     """What clean data teach.
 
     Args:
         residuals: Clean data less the calibrated simulator's mean, each [T, channels] with
             samples equally far apart; NaN where missing.
-        noise_variance: Of the measurement, which is not the simulator's fault.
+        noises: Of each one's measurement, which is not the simulator's fault.
         same: Which of them repeat the experiment that will be looked at, sample by sample.
 
     Raises:
@@ -66,9 +66,17 @@ def usual_residual(
     if not residuals:
         raise ValueError("a usual residual needs at least one clean data set")
     lags = max(len(residual) for residual in residuals)
-    mean = np.mean([_autocovariance(residual, lags) for residual in residuals], axis=0)
-    mean[0] = max(mean[0] - noise_variance, 0.0)
-    kept = [residual for residual, again in zip(residuals, same, strict=True) if again]
+    found = [_autocovariance(residual, lags) for residual in residuals]
+    measured = [
+        _expected_of(noise, len(residual), lags)
+        for noise, residual in zip(noises, residuals, strict=True)
+    ]
+    mean = np.mean(found, axis=0) - np.mean(measured, axis=0)
+    kept = [
+        residual * np.sqrt(max(1.0 - noise[0] / max(own[0], noise[0]), 0.0))
+        for residual, own, noise, again in zip(residuals, found, measured, same, strict=True)
+        if again
+    ]
     shapes = np.stack(kept) if kept else np.zeros((0, 0, 0))
     return UsualResidual(positive_autocovariance(mean), shapes, len(residuals))
 
@@ -83,9 +91,18 @@ def without_usual(noise: Noise) -> Noise:
 def _autocovariance(residual: np.ndarray, lags: int) -> np.ndarray:
     """Biased estimate by lag, averaged over channels: it makes no negative variance."""
     filled = np.nan_to_num(residual)
+    seen = max(int(np.isfinite(residual).sum()), 1)
     found = np.zeros(lags)
     for lag in range(len(filled)):
-        found[lag] = np.sum(filled[lag:] * filled[: len(filled) - lag]) / filled.size
+        found[lag] = np.sum(filled[lag:] * filled[: len(filled) - lag]) / seen
+    return found
+
+
+def _expected_of(noise: Noise, samples: int, lags: int) -> np.ndarray:
+    """What `_autocovariance` is expected to find of so many samples of noise alone."""
+    at = Layout(np.zeros(samples, int), np.arange(samples))
+    found = np.zeros(lags)
+    found[:samples] = noise.covariance(at)[0] * (1.0 - np.arange(samples) / samples)
     return found
 
 

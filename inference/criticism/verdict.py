@@ -21,8 +21,9 @@ class Candidate:
         hypothesis: The extended model.
         check: Its own test.
         gain: Log likelihood beyond the base model's, in the base model's metric.
-        refitted: Whether runs near its best parameters were made for it; one that was not is
-            counted as untested unless it was far behind.
+        refitted: Whether runs near its best parameters were made for it; what was not is not
+            accepted.
+        needed: Whether, of several effects, each is needed.
         held: Whether it held on the held-out data, where there were any.
     """
 
@@ -30,6 +31,7 @@ class Candidate:
     check: Check
     gain: float
     refitted: bool = False
+    needed: bool = True
     held: bool = True
 
     @property
@@ -37,8 +39,13 @@ class Candidate:
         return self.hypothesis.names
 
     @property
+    def passes(self) -> bool:
+        """The test that the base model failed, and it explains something."""
+        return self.check.p_value > ACCEPTED and self.gain > LEAST_GAIN
+
+    @property
     def accepted(self) -> bool:
-        return self.check.p_value > ACCEPTED and self.gain > LEAST_GAIN and self.held
+        return self.passes and self.refitted and self.needed and self.held
 
 
 @dataclass(frozen=True)
@@ -61,10 +68,9 @@ class Verdict:
 
 def near_best(candidates: Sequence[Candidate], count: int) -> list[Candidate]:
     """Those worth a refit, best first."""
-    ranked = sorted(candidates, key=lambda c: -c.gain)
-    worth = [c for c in ranked if c.gain > 0.0 or c.accepted]
-    # one that passes already must be looked at, however far behind
-    return sorted(worth[: 2 * count], key=lambda c: (not c.accepted, -c.gain))[:count]
+    ranked = [c for c in sorted(candidates, key=lambda c: -c.gain) if c.gain > 0.0]
+    # after the best, one that passes already must be looked at, however far behind
+    return ranked[:1] + sorted(ranked[1:], key=lambda c: (not c.passes, -c.gain))[: count - 1]
 
 
 def tied(candidates: Sequence[Candidate]) -> list[Candidate]:
@@ -73,10 +79,10 @@ def tied(candidates: Sequence[Candidate]) -> list[Candidate]:
     return [c for c in accepted if c.gain > accepted[0].gain - MARGIN]
 
 
-def conclude(base: Check, explanations: Sequence[Candidate]) -> Verdict:
+def conclude(base: Check, explanations: Sequence[Candidate], level: float = ALARM) -> Verdict:
     """From the base model's test and the explanations that were tried, also on held-out data."""
     p, members = base.p_value, tied(explanations)
-    if p >= ALARM:
+    if p >= level:
         return Verdict("none", (), p, f"Model and data agree (p = {p:.2g}).")
     if not members:
         return Verdict("unknown", (), p, _unexplained(p, explanations))
@@ -97,6 +103,6 @@ def _unexplained(p: float, explanations: Sequence[Candidate]) -> str:
     if not refuted:
         return f"Model and data differ (p = {p:.2g}), and no known effect explains it."
     return (
-        f"Model and data differ (p = {p:.2g}); {' or '.join(refuted)} explains these data, but not "
-        "those held out, so what is missing is not known."
+        f"Model and data differ (p = {p:.2g}); {' or '.join(refuted)} explains these data, but "
+        "those held out do not bear it out, so what is missing is not known."
     )

@@ -12,6 +12,7 @@ import json
 import sys
 import time
 import warnings
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
@@ -54,9 +55,9 @@ EFFECTS = {
     "yield_stress": (28.0, 40.0),
     "gripper_scale": (1.16, 1.25),
 }
-"""Hidden in stirs: sizes with which these stirs could show them, with either sign where an effect has
-both. Stick mass, fill level and warming stay below a signal-to-noise ratio of ten here, as large as
-their priors allow."""
+"""Hidden in stirs: sizes with which these stirs could show them, with either sign where an effect
+has both. Stick mass, fill level and warming stay below a signal-to-noise ratio of ten here, as
+large as their priors allow."""
 SIGNED = ("camera_delay", "camera_tilt")
 ADHESION = 0.3, 0.8  # hidden in pours
 PATHS = {
@@ -112,7 +113,7 @@ def examine(one: Set, bank: inference.SimulationBank) -> dict:
 def _criticised_stirs(
     truth: dict, rng: np.random.Generator, bank: inference.SimulationBank
 ) -> inference.Criticism:
-    usual = _clean(bank)
+    usual, stir_plan = _clean(bank), CriticismSettings().stir_plan
 
     def experiment(path: str) -> inference.Experiment:
         recording = _record(path, truth, rng)
@@ -124,7 +125,7 @@ def _criticised_stirs(
         default_prior(),
         effects_of("stir"),
         held_out=[experiment("circle")],
-        plan=CriticismSettings().stir_plan,
+        plan=replace(stir_plan, most=stir_plan.most + stir_plan.start),
         keeping=inference.Keeping(bank),
     )
 

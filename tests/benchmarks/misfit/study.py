@@ -31,7 +31,8 @@ NULLS, SETS, OUTSIDE_SETS = 300, 50, 12
 FIRST, SECOND = Stir(), Stir(points=7, radius=0.02, speed=0.08)
 LARGEST = 0.99  # quantile of a coefficient's prior: what is stronger is not looked for
 DRAWS = 8  # of a posterior, for its expectation
-QUIET = int(REST * 30)  # samples before the gripper moves
+MOVES = int(REST * 30)  # the first sample of which the gripper moves
+TREND = 2  # degree of what noise at rest is told from, as for recordings
 
 Set = tuple[str, float, int]
 """Effect ("" for none), strength, number."""
@@ -62,7 +63,7 @@ def examine(one: Set) -> dict:
 
     def experiment(stir: Stir, seed: int, label: str) -> inference.Experiment:
         observed = stir.observe(truth, seed)
-        noise = inference.rest_noise([observed[:QUIET]], seed=number)
+        noise = inference.rest_noise([observed[:MOVES]], seed=number, trend=TREND)
         return inference.Experiment(stir.simulate, observed, noise, label, label)
 
     found = inference.criticise(
