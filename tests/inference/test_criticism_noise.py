@@ -102,7 +102,8 @@ def deviation(drawn, covariance):
 AR = inference.AutoregressiveNoise(np.array([0.5, 0.7, 0.6]), np.array([0.2, 0.9, 0.6]))
 SIZES = inference.KnownNoise(np.linspace(0.1, 2.0, 16))
 RESIDUALS = [autoregressive(np.random.default_rng(k), (10, 2), 1.0, 0.8) for k in range(FREEDOM)]
-USUAL = inference.usual_residual(RESIDUALS, 0.0, [k < 2 for k in range(FREEDOM)])
+NOTHING = inference.KnownNoise(0.0)
+USUAL = inference.usual_residual(RESIDUALS, [NOTHING] * FREEDOM, [k < 2 for k in range(FREEDOM)])
 NOISES = {
     "known": (inference.KnownNoise(0.3), 1.0),
     "of each sample": (SIZES, 1.0),
@@ -146,7 +147,8 @@ def clean():
 
 def test_the_autocovariance_of_a_stationary_process_is_recovered(clean):
     """Within Bartlett's errors; measurement noise, and the residuals' own noise, apart."""
-    found = inference.usual_residual(clean, WHITE, [False] * SETS).autocovariance
+    measured = inference.KnownNoise(np.sqrt(WHITE))
+    found = inference.usual_residual(clean, [measured] * SETS, [False] * SETS).autocovariance
     lags = np.arange(25)
     expected = 0.8**lags * (1.0 - lags / LENGTH)
     m = np.arange(-200, 201)
@@ -159,7 +161,7 @@ def test_the_autocovariance_of_a_stationary_process_is_recovered(clean):
     error = np.sqrt(variance / (2 * SETS * LENGTH))
     limit = norm.isf(ALPHA / 2 / len(lags))
     assert np.abs((found[lags] - expected) / error).max() < limit
-    ignored = inference.usual_residual(clean, 0.0, [False] * SETS).autocovariance
+    ignored = inference.usual_residual(clean, [NOTHING] * SETS, [False] * SETS).autocovariance
     np.testing.assert_allclose(ignored[0] - found[0], WHITE, atol=0.01)
 
 
@@ -167,13 +169,13 @@ def test_residuals_of_the_same_experiment_say_where_it_errs_again(clean):
     at = Layout(np.repeat([0, 1], 40), np.tile(np.arange(40), 2))
     again = [residual[:40].copy() for residual in clean[:3]]
     again[1][7, 0] = np.nan
-    learned = inference.usual_residual(again, 0.0, [False, True, True])
+    learned = inference.usual_residual(again, [NOTHING] * 3, [False, True, True])
     stationary = np.kron(np.eye(2), toeplitz(learned.autocovariance))
     flat = [np.nan_to_num(residual).T.ravel() for residual in again[1:]]
     shapes = sum(np.outer(residual, residual) for residual in flat)
     updated = (WORTH * stationary + shapes) / (WORTH + 2)
     np.testing.assert_allclose(learned.covariance(at), updated, atol=1e-12)
-    other = inference.usual_residual(again, 0.0, [False] * 3)
+    other = inference.usual_residual(again, [NOTHING] * 3, [False] * 3)
     np.testing.assert_allclose(other.covariance(at), stationary, atol=1e-12)
 
 
@@ -186,11 +188,12 @@ def test_the_covariance_is_positive_semidefinite(longest):
     lengths = [rng.normal(size=(samples, 2)) for samples in (20, 40)]
     for residuals in ([waves], lengths, [waves, *lengths], [np.cumsum(waves, 0) + 3.0]):
         for noise in (0.0, 0.5, 2.0):
-            learned = inference.usual_residual(residuals, noise, [False] * len(residuals))
+            noises = [inference.KnownNoise(noise)] * len(residuals)
+            learned = inference.usual_residual(residuals, noises, [False] * len(residuals))
             values = np.linalg.eigvalsh(learned.covariance(at))
             assert values[0] > -1e-9 * max(values[-1], 1e-12)
 
 
 def test_no_clean_data_teach_nothing():
     with pytest.raises(ValueError, match="at least one clean data set"):
-        inference.usual_residual([], 0.0, [])
+        inference.usual_residual([], [], [])
