@@ -36,6 +36,7 @@ def clean_residuals(
     particles: int,
     prior: "Prior",
     extensions: "dict[str, Extension]",
+    *,
     plan: "Plan",
     keeping: "Keeping",
 ) -> list[Clean]:
@@ -66,11 +67,20 @@ def usual_for(stirring: "Stirring", clean: Sequence[Clean]) -> "UsualResidual | 
 
     A clean recording of the same path also shows where on it the simulator errs.
     """
+    only = stirring.recordings[0] if len(stirring.recordings) == 1 else None
+    same = [only is not None and same_experiment(one.recording, only) for one in clean]
+    return _usual(clean, same)
+
+
+def usual_elsewhere(clean: Sequence[Clean]) -> "UsualResidual | None":
+    """What is usual on paths of which there is no clean recording; None if there is none at all."""
+    return _usual(clean, [False] * len(clean))
+
+
+def _usual(clean: Sequence[Clean], same: list[bool]) -> "UsualResidual | None":
     from .inference import usual_residual
 
     if not clean:
         return None
-    only = stirring.recordings[0] if len(stirring.recordings) == 1 else None
-    same = [only is not None and same_experiment(one.recording, only) for one in clean]
     noises = [camera_noise([one.recording]) for one in clean]
     return usual_residual([one.residual for one in clean], noises, same)

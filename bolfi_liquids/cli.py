@@ -104,6 +104,9 @@ def criticise(  # noqa: PLR0913  one parameter for each option
     pours: Annotated[
         Path | None, typer.Option(metavar="CSV", help="What pours of the liquid spilled.")
     ] = None,
+    held_out_pours: Annotated[
+        Path | None, typer.Option(metavar="CSV", help="Other pours of the liquid: the proof.")
+    ] = None,
     liquid: Annotated[
         str | None, typer.Option(metavar="NAME", help="Whose pours, if CSV has several.")
     ] = None,
@@ -130,6 +133,7 @@ def criticise(  # noqa: PLR0913  one parameter for each option
         held_out=held_out or (),
         baseline=baseline or (),
         pours=None if pours is None else open_pours(pours, liquid),
+        held_out_pours=None if held_out_pours is None else open_pours(held_out_pours, liquid),
         cups=None if cups is None else open_cups(cups),
         effects=effects or None,
         accept=accept or None,

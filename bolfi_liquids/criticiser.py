@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .calibration import Calibration
-from .clean_recordings import Clean, clean_residuals, usual_for
-from .criticism import Criticism, is_criticised
-from .criticism_inputs import Inputs, open_inputs
+from .clean_recordings import Clean, clean_residuals, usual_elsewhere, usual_for
+from .criticism import Criticism, finished_criticism
+from .criticism_inputs import Inputs, Pours, open_inputs
 from .criticism_results import criticism_tree
 from .criticism_section import criticism_section
 from .errors import InputError
@@ -36,7 +36,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     *,
     held_out: Source | Sequence[Source] = (),
     baseline: Source | Sequence[Source] = (),
-    pours: PourTable | str | Path | None = None,
+    pours: Pours | None = None,
+    held_out_pours: Pours | None = None,
     cups: "Cups | None" = None,
     effects: Sequence[str] | None = None,
     accept: Sequence[str] | None = None,
@@ -55,6 +56,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         baseline: Recordings of the same rig that are believed to lack nothing, of any liquid:
             they teach what the simulator usually gets wrong.
         pours: A table of pours of the liquid, or its path; a second source.
+        held_out_pours: Another, to which nothing is fitted.
         cups: With which they were poured; None takes the bundled ones.
         effects: Names in `models.EFFECTS` to consider; None is all of them.
         accept: Effects that join the model whatever the verdict.
@@ -73,10 +75,18 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         accept=None if accept is None else tuple(accept),
         seed=seed,
     )
-    inputs = open_inputs(calibration, held_out, baseline, pours, cups, settings)
+    inputs = open_inputs(
+        calibration,
+        settings,
+        held_out=held_out,
+        baseline=baseline,
+        pours=pours,
+        held_out_pours=held_out_pours,
+        cups=cups,
+    )
     run = calibration.path
-    if is_criticised(run) and Criticism.open(run).summary.get("made_from") == inputs.made_from:
-        return Criticism.open(run)
+    if finished := finished_criticism(run, inputs.made_from):
+        return finished
     with open_bank(run) as bank, phases(shown=progress) as report:
         from .inference import Keeping
 
@@ -94,8 +104,8 @@ def _find(calibration: Calibration, inputs: Inputs, keeping: "inference.Keeping"
         inputs.stirring.setups[0].particles,
         calibration.prior,
         effects_of("stir"),
-        inputs.settings.clean_plan,
-        keeping,
+        plan=inputs.settings.clean_plan,
+        keeping=keeping,
     )
     stirs = _stirs(calibration, inputs, clean, keeping)
     poured = inputs.table and _pours(calibration, stirs, inputs.table, inputs, keeping)
@@ -129,8 +139,11 @@ def _stirs(
             stir_experiment(one, usual_for(one, clean), one.recordings[0].path.name)
             for one in kept_back
         ],
-        proposals=stir_proposals(stirring, camera_noise(stirring.recordings)),
+        proposals=stir_proposals(
+            stirring, camera_noise(stirring.recordings), usual_elsewhere(clean)
+        ),
         accept=_among(settings.accept, extensions),
+        level=inputs.level,
         plan=settings.stir_plan,
         keeping=keeping,
     )
@@ -147,18 +160,29 @@ def _pours(
     from . import inference
 
     density, settings = calibration.liquid_density, inputs.settings
-    extensions = effects_of("pour", settings.effects)
+    acting = effects_of("pour", settings.effects)
     known = stirs.extended or stirs.base.hypothesis
-    poured_too = [name for name in stirs.accepted if name in extensions]
+    poured_too = [name for name in stirs.accepted if name in acting]
+    extensions = {name: one for name, one in acting.items() if name not in poured_too}
+    if not extensions:
+        raise InputError(
+            f"all effects that act in pours ({', '.join(acting)}) are part of the stirs' model",
+            where="--effects",
+            fix="give further effects to look for in the pours, or no --pours",
+        )
     taught = as_prior(stirs.posterior.theta, stirs.posterior.weights, known.fit.prior)
     names = (*calibration.prior.names, *poured_too)
     base = inference.Prior({name: taught.distributions[name] for name in names})
     return inference.criticise(
         pour_experiment(table, inputs.cups, density),
         base,
-        {name: one for name, one in extensions.items() if name not in poured_too},
+        extensions,
+        held_out=[
+            pour_experiment(one, inputs.cups, density) for one in [inputs.held_out_table] if one
+        ],
         proposals=pour_proposals(inputs.cups, density),
         accept=_among(settings.accept, extensions),
+        level=inputs.level,
         plan=settings.pour_plan,
         keeping=replace(keeping, report=lambda phase, n: keeping.report(f"pours, {phase}", n)),
     )

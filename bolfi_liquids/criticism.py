@@ -1,5 +1,6 @@
 """What a criticism found: verdict, evidence, extended calibration, plots."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -141,6 +142,18 @@ class Criticism:
 def is_criticised(run: Path) -> bool:
     """Whether a run's criticism was finished."""
     return (run / CRITICISM).is_file() and "criticise" in read_summary(run)
+
+
+def finished_criticism(run: Path, made_from: Mapping[str, Any]) -> Criticism | None:
+    """The criticism in a run if it was finished and made from just this; else None."""
+    if not is_criticised(run):
+        return None
+    try:
+        found = Criticism.open(run)
+    except InputError:  # damaged: it is made again
+        return None
+    written = found.summary.get("made_from"), json.loads(found.tree.attrs.get("made_from", "null"))
+    return found if written == (made_from, made_from) else None
 
 
 def latest_calibration(run: str | Path) -> Calibration:

@@ -1,7 +1,7 @@
 """What the report shows of a criticism."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,7 +45,7 @@ def criticism_chapter(
     stirs, accepted = tree.children["stirs"], section["accepted"]
     held = held_out_of(stirs)
     return {
-        "results": _results(section, held, calibrated),
+        "results": _results(section, calibrated),
         "superseded": narrative.superseded_sentence(section),
         "caution": narrative.baseline_sentence(section),
         "gap_sentence": narrative.gap_sentence(section),
@@ -74,12 +74,11 @@ def held_out_of(node: "DataTree") -> "Dataset | None":
     return node["held_out"].to_dataset() if "held_out" in node.children else None
 
 
-def _results(
-    section: Mapping[str, Any], held: "Dataset | None", calibrated: Mapping[str, Any]
-) -> list[str]:
+def _results(section: Mapping[str, Any], calibrated: Mapping[str, Any]) -> list[str]:
     """What the top of the page says beside the verdict, which comes first."""
     sentences = [
-        narrative.verdict_sentence(section, narrative.refuted(held)),
+        narrative.verdict_sentence(section),
+        narrative.stirs_sentence(section),
         narrative.accepted_sentence(section),
         *(narrative.coefficient_sentence(*item) for item in section["coefficient"].items()),
         *narrative.refit_sentences(section, calibrated),
@@ -98,8 +97,9 @@ def _held_rows(held: "Dataset") -> list[list[str]]:
                     narrative.words(str(name)),
                     str(recording),
                     *(f"{angle:.2f}" for angle in angles),
+                    f"{float(gap['p_value']):.2g}",
                     f"{float(gap['lpd_gain']):.1f}",
-                    "yes" if bool(gap["passes"]) else "no",
+                    "yes" if bool(gap["holds"]) else "no",
                 ]
             )
     return rows
@@ -120,7 +120,8 @@ def _suggestion_rows(section: Mapping[str, Any]) -> list[list[str]]:
 def _effects_part(name: str, node: "DataTree") -> dict[str, Any]:
     """Scores, likenesses and the table of effects of a source."""
     effects, confusion = (node[group].to_dataset() for group in ("effects", "confusion"))
-    refuted = narrative.refuted(held_out_of(node))
+    held = held_out_of(node)
+    refuted = [] if held is None else held["explanation"].to_numpy()[~held["holds"].to_numpy()]
     return {
         "name": name,
         "scores": to_svg(score_plot(node), f"scores-{name}"),
@@ -132,7 +133,9 @@ def _effects_part(name: str, node: "DataTree") -> dict[str, Any]:
     }
 
 
-def _effect_row(name: str, found: "Dataset", confusion: "Dataset", refuted: list[str]) -> list[str]:
+def _effect_row(
+    name: str, found: "Dataset", confusion: "Dataset", refuted: Collection[str]
+) -> list[str]:
     status = str(found["status"].item())
     if name in refuted:
         status = "refuted by held-out data"
@@ -177,13 +180,13 @@ def _made_with(tree: "DataTree") -> list[tuple[str, str]]:
     made_from = json.loads(tree.attrs["made_from"])
     settings = {"version": made_from["version"], **made_from["settings"]}
     rows = [(key, _text(value)) for key, value in settings.items()]
-    for group in ("held_out", "baseline", "pours"):
+    for group in ("held_out", "baseline", "pours", "held_out_pours"):
         files = made_from[group].items()
         label = narrative.words(group)
         rows += [(f"{label} {name}, SHA-256", digest) for name, digest in files] or [
             (label, "none")
         ]
-    return [*rows, ("accepted by", tree.attrs["accepted_by"])]
+    return rows
 
 
 def _text(value: Any) -> str:

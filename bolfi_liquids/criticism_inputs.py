@@ -1,10 +1,13 @@
 """What a criticism is given, read and checked."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from .calibration import Calibration
 from .cups import bundled_cups
@@ -13,10 +16,16 @@ from .pour_table import PourTable, open_pours
 from .recordings import Recording, Source, open_recordings
 from .recordings_kept import kept_recordings
 from .settings import CriticismSettings
+from .stir_experiment import effects_of
 from .stirring import Stirring, same_liquid, stirring_of
 
 if TYPE_CHECKING:
     from .models import Cups
+
+Pours = PourTable | str | Path
+RIG = ("cup_radius", "stick_radius", "stick_length")
+ALARM = 0.05  # share of false alarms
+SAME_RIG = 0.02  # relative difference up to which a size or a frame rate is the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +37,7 @@ class Inputs:
         held_out: Recordings of the same liquid that nothing is fitted to.
         baseline: Recordings believed to lack nothing; none of those before.
         table: Pours of the liquid, if there are any.
+        held_out_table: Pours of the liquid that nothing is fitted to, if there are any.
         cups: With which they were poured.
         settings: The rest.
     """
@@ -36,8 +46,14 @@ class Inputs:
     held_out: tuple[Recording, ...]
     baseline: tuple[Recording, ...]
     table: PourTable | None
+    held_out_table: PourTable | None
     cups: "Cups"
     settings: CriticismSettings
+
+    @property
+    def level(self) -> float:
+        """p-value below which a source is rejected, so that all of them share one error rate."""
+        return ALARM if self.table is None else ALARM / 2.0
 
     @property
     def made_from(self) -> dict[str, Any]:
@@ -47,24 +63,28 @@ class Inputs:
             "held_out": self.held_out,
             "baseline": self.baseline,
             "pours": () if self.table is None else (self.table,),
+            "held_out_pours": () if self.held_out_table is None else (self.held_out_table,),
         }
-        return {
+        made_from = {
             "version": version("bolfi-liquids"),
-            "settings": {key: _listed(value) for key, value in asdict(self.settings).items()},
+            "settings": asdict(self.settings),
             **{
                 group: {one.path.name: one.hash for one in files} for group, files in groups.items()
             },
             "poured": self.table and {"liquid": self.table.liquid, "cups": self.cups.settings()},
         }
+        return json.loads(json.dumps(made_from))  # as it will be read
 
 
-def open_inputs(
+def open_inputs(  # noqa: PLR0913  all that a criticism may be given
     calibration: Calibration,
+    settings: CriticismSettings,
+    *,
     held_out: Source | Sequence[Source],
     baseline: Source | Sequence[Source],
-    pours: PourTable | str | Path | None,
+    pours: Pours | None,
+    held_out_pours: Pours | None,
     cups: "Cups | None",
-    settings: CriticismSettings,
 ) -> Inputs:
     """Read what is given as a path, and check all of it.
 
@@ -77,14 +97,23 @@ def open_inputs(
     )
     kept_back = open_recordings(held_out)
     _check_held_out(stirring, kept_back)
+    others = _others(open_recordings(baseline), [*stirring.recordings, *kept_back])
+    _check_baseline(stirring, others)
+    table, held_out_table = _opened(pours), _opened(held_out_pours)
+    _check_pours(table, held_out_table, settings)
     return Inputs(
         stirring=stirring,
         held_out=tuple(kept_back),
-        baseline=_others(open_recordings(baseline), [*stirring.recordings, *kept_back]),
-        table=open_pours(pours) if isinstance(pours, str | Path) else pours,
+        baseline=others,
+        table=table,
+        held_out_table=held_out_table,
         cups=bundled_cups() if cups is None else cups,
         settings=settings,
     )
+
+
+def _opened(pours: Pours | None) -> PourTable | None:
+    return open_pours(pours) if isinstance(pours, str | Path) else pours
 
 
 def _others(baseline: list[Recording], used: Sequence[Recording]) -> tuple[Recording, ...]:
@@ -95,7 +124,15 @@ def _others(baseline: list[Recording], used: Sequence[Recording]) -> tuple[Recor
 
 def _check_held_out(stirring: Stirring, held_out: Sequence[Recording]) -> None:
     fitted = {recording.hash for recording in stirring.recordings}
+    seen: set[str] = set()
     for recording in held_out:
+        if {recording.hash, recording.path.name} & seen:
+            raise InputError(
+                "is held out twice, or has the name of another",
+                where=f"--held-out {recording.path}",
+                fix="give each recording once, and each a name of its own",
+            )
+        seen |= {recording.hash, recording.path.name}
         if recording.hash in fitted:
             raise InputError(
                 "is what the run was calibrated on",
@@ -112,6 +149,46 @@ def _check_held_out(stirring: Stirring, held_out: Sequence[Recording]) -> None:
             )
 
 
-def _listed(value: Any) -> Any:
-    """As JSON gives it back."""
-    return list(value) if isinstance(value, tuple) else value
+def _check_baseline(stirring: Stirring, baseline: Sequence[Recording]) -> None:
+    first = stirring.recordings[0]
+    for recording in baseline:
+        for name in RIG:
+            there, here = recording.number(name), first.number(name)
+            if abs(there - here) > SAME_RIG * abs(here):
+                raise InputError(
+                    f"{name} is {there:g}, but {here:g} in the run",
+                    where=f"--baseline {recording.path}",
+                    fix="give recordings of the same rig",
+                )
+        there, here = (float(np.median(np.diff(r.time))) for r in (recording, first))
+        if abs(there - here) > SAME_RIG * here:
+            raise InputError(
+                f"has {1 / there:.3g} samples a second, but the run's recording {1 / here:.3g}",
+                where=f"--baseline {recording.path}",
+                fix="give recordings of the same frame rate",
+            )
+
+
+def _check_pours(
+    table: PourTable | None, held_out: PourTable | None, settings: CriticismSettings
+) -> None:
+    if table is None:
+        if held_out is not None:
+            raise InputError(
+                "there are no pours to learn from",
+                where=f"--held-out-pours {held_out.path}",
+                fix="give some with --pours",
+            )
+        return
+    if held_out is not None and held_out.hash == table.hash:
+        raise InputError(
+            "holds the pours that are fitted",
+            where=f"--held-out-pours {held_out.path}",
+            fix="hold out other pours: nothing can be proved on data that were fitted",
+        )
+    if not effects_of("pour", settings.effects):
+        raise InputError(
+            "none of the effects acts in a pour",
+            where="--effects",
+            fix=f"choose from {', '.join(effects_of('pour'))}, or give no --pours",
+        )

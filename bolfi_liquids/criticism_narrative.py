@@ -45,13 +45,9 @@ def listed(names: Sequence[str], last: str = "and") -> str:
     return f" {last} ".join(part for part in (", ".join(spoken[:-1]), spoken[-1]) if part)
 
 
-def verdict_sentence(section: Mapping[str, Any], refuted: Sequence[str] = ()) -> str:
-    """The conclusion.
-
-    Args:
-        section: "criticise" of summary.json.
-        refuted: Explanations that failed on held-out data.
-    """
+def verdict_sentence(section: Mapping[str, Any]) -> str:
+    """The conclusion; from the section "criticise" of summary.json, or its entry "pours"."""
+    refuted = section["refuted"]
     kind, effects, p = section["verdict"], section["effects"], f"p = {section['p_value']:.2g}"
     if kind == "none":
         return f"Simulation and data agree ({p}): nothing is known to be missing."
@@ -67,17 +63,26 @@ def verdict_sentence(section: Mapping[str, Any], refuted: Sequence[str] = ()) ->
     if refuted:
         verb = "explains" if len(refuted) == 1 else "explain"
         return (
-            f"{differ}: {listed(refuted)} {verb} these data, but not the recordings held out, so"
-            " what is missing is not known."
+            f"{differ}: {listed(refuted, 'or')} {verb} these data, but data held out do not bear it"
+            " out, so what is missing is not known."
         )
     return f"{differ}, and no known effect explains it: what is missing is not known."
 
 
+def stirs_sentence(section: Mapping[str, Any]) -> str:
+    """The verdict on the stirs alone, where there are pours as well; else empty."""
+    if section["pours"] is None:
+        return ""
+    return verdict_sentence(section["stirs"]).replace(
+        "Simulation and data", "Simulated and real stirs"
+    )
+
+
 def accepted_sentence(section: Mapping[str, Any]) -> str:
     """That someone accepted effects whatever the verdict; empty if nobody did."""
-    if section["accepted_by"] != "user" or not section["accepted"]:
+    if not section["requested"]:
         return ""
-    names = listed(section["accepted"])
+    names = listed(section["requested"])
     return f"{names.capitalize()} joined the model on request (--accept), whatever the verdict."
 
 
@@ -184,29 +189,10 @@ def held_out_sentence(held: "Dataset | None") -> str:
         )
     parts = []
     for name in held["explanation"].to_numpy():
-        passes = held["passes"].sel(explanation=name).to_numpy().astype(bool)
-        failed = held["recording"].to_numpy()[~passes]
-        holds = "does not hold on " + ", ".join(map(str, failed)) if failed.size else "holds"
-        parts.append(f"{words(str(name))} {holds}")
+        holds = bool(held["holds"].sel(explanation=name))
+        parts.append(f"{words(str(name))} {'holds' if holds else 'does not hold'}")
     sentence = "; ".join(parts)
     return f"On the recordings held out, {sentence}."
-
-
-def refuted(held: "Dataset | None") -> list[str]:
-    """Explanations that failed on held-out data."""
-    if held is None:
-        return []
-    holds = held["passes"].to_numpy().astype(bool).all(axis=1)
-    return [str(name) for name in held["explanation"].to_numpy()[~holds]]
-
-
-def refuted_alone(section: Mapping[str, Any], effects: "Dataset") -> list[str]:
-    """Effects that alone explained the data, but did not hold on recordings held out."""
-    if section["verdict"] != "unknown":
-        return []
-    # nothing else turns down what passed its test
-    passed = effects["status"].to_numpy() == "accepted"
-    return [str(name) for name in effects["effect"].to_numpy()[passed]]
 
 
 def unseen_sentence(effects: "Dataset") -> str:
@@ -226,10 +212,13 @@ def unseen_sentence(effects: "Dataset") -> str:
 
 
 def untested_sentence(section: Mapping[str, Any]) -> str:
-    """Which effects could not be simulated; empty if all could."""
+    """Which effects were not tested to the end; empty if all were."""
     if not section["untested"]:
         return ""
-    return f"Simulations with {listed(section['untested'])} failed, so nothing is said about it."
+    return (
+        f"Untested: {listed(section['untested'])}. Its simulations failed, or others came first"
+        " when the best were simulated where they fit best."
+    )
 
 
 def suggestion_sentence(section: Mapping[str, Any]) -> str:

@@ -31,9 +31,7 @@ def criticism_tree(findings: Findings) -> "DataTree":
     """Everything that a report shows."""
     from xarray import DataTree
 
-    settings = findings.inputs.settings
-    sampled = findings.extended.fit.sample("nuts", chains=4, draws=1000, seed=settings.seed)
-    groups: dict[str, Any] = {"/posterior": sampled["posterior"].to_dataset()}
+    groups: dict[str, Any] = {"/posterior": _posterior(findings)}
     for name, source in findings.sources.items():
         groups[f"/{name}/residual"] = _residual(findings, name, source)
         groups[f"/{name}/where"] = _where(source)
@@ -47,10 +45,23 @@ def criticism_tree(findings: Findings) -> "DataTree":
     tree.attrs.update(
         made_from=json.dumps(findings.inputs.made_from),
         accepted=list(findings.accepted),
-        accepted_by="user" if settings.accept else "verdict",
+        requested=list(findings.requested),
         liquid_density=findings.calibration.liquid_density,
     )
     return tree
+
+
+def _posterior(findings: Findings) -> "Dataset":
+    """Draws of all parameters; coefficients that act in stirs alone are those of the stirs."""
+    seed = findings.inputs.settings.seed
+    sampled = [
+        model.fit.sample("nuts", chains=4, draws=1000, seed=seed)["posterior"].to_dataset()
+        for model in findings.models
+    ]
+    known = sampled[0]
+    for other in sampled[1:]:
+        known = known.assign({n: v for n, v in other.items() if n not in known})
+    return known
 
 
 def _residual(findings: Findings, name: str, source: "inference.Criticism") -> "Dataset":
@@ -155,15 +166,18 @@ def _confusion(source: "inference.Criticism") -> "Dataset":
 def _held_out(source: "inference.Criticism") -> "Dataset":
     from xarray import Dataset
 
+    from .inference import holds
+
     names = [" with ".join(explanation) for explanation in source.gaps]
     gaps = list(source.gaps.values())
-    columns = {
+    columns: dict[str, Any] = {
         field: (
             ("explanation", "recording"),
             [[getattr(gap, field) for gap in row] for row in gaps],
         )
-        for field in ("before", "after", "noise", "floor", "lpd_gain", "passes")
+        for field in ("before", "after", "noise", "floor", "p_value", "lpd_gain")
     }
+    columns["holds"] = ("explanation", [holds(row) for row in gaps])
     labels = [gap.label for gap in gaps[0]]
     return Dataset(columns, coords={"explanation": names, "recording": labels})
 

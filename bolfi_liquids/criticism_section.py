@@ -22,21 +22,23 @@ def criticism_section(findings: Findings, tree: "DataTree", seconds: float) -> d
     stirs = findings.stirs
     posterior = tree["posterior"].to_dataset()
     kind, effects = _together(findings)
-    best = findings.extended.best
+    p_values = [source.verdict.p_value for source in findings.sources.values()]
     return {
         "verdict": kind,
         "effects": list(effects),
         "accepted": list(findings.accepted),
-        "accepted_by": tree.attrs["accepted_by"],
+        "requested": list(findings.requested),
+        "refuted": [name for source in findings.sources.values() for name in _refuted(source)],
         "reason": " ".join(source.verdict.reason for source in findings.sources.values()),
-        "p_value": min(source.verdict.p_value for source in findings.sources.values()),
+        "p_value": min(1.0, len(p_values) * min(p_values)),
         "where": _sure(stirs),
         "coefficient": {name: parameter_summary(posterior[name]) for name in findings.accepted},
         "parameters": {str(name): parameter_summary(draws) for name, draws in posterior.items()},
-        "best": best,
+        "best": findings.best,
         "n_simulations": sum(source.simulations for source in findings.sources.values())
         + sum(clean.simulations for clean in findings.baseline),
         "gap_deg": _gap_deg(stirs),
+        "stirs": _verdict(stirs),
         "pours": None if findings.pours is None else _pour_gap(findings.pours),
         "suggestions": [
             {"experiment": one.label, "between": list(one.between), "snr": one.snr}
@@ -59,6 +61,13 @@ def _together(findings: Findings) -> tuple[str, tuple[str, ...]]:
         if named:
             return kind, tuple(name for verdict in named for name in verdict.effects)
     return "none", ()
+
+
+def _refuted(source: "inference.Criticism") -> list[str]:
+    """Explanations that held-out data do not bear out."""
+    from .inference import holds
+
+    return [" with ".join(names) for names, gaps in source.gaps.items() if not holds(gaps)]
 
 
 def _sure(source: "inference.Criticism") -> list[dict[str, Any]]:
@@ -120,9 +129,17 @@ def _pour_gap(source: "inference.Criticism") -> dict[str, Any]:
     return {
         "before": _rms(source.base.hypothesis),
         "after": _rms(None if best is None else best.hypothesis),
+        **_verdict(source),
+    }
+
+
+def _verdict(source: "inference.Criticism") -> dict[str, Any]:
+    """On one kind of data."""
+    return {
         "verdict": source.verdict.kind,
         "effects": list(source.verdict.effects),
         "p_value": source.verdict.p_value,
+        "refuted": _refuted(source),
     }
 
 

@@ -27,12 +27,25 @@ class Findings:
         return {"stirs": self.stirs, **pours}
 
     @property
-    def extended(self) -> "inference.Hypothesis":
-        """The last model that was extended, or else the stirs' base model."""
-        for source in reversed(list(self.sources.values())):
-            if source.extended is not None:
-                return source.extended
-        return self.stirs.base.hypothesis
+    def models(self) -> "tuple[inference.Hypothesis, ...]":
+        """The last model that was extended, or else the stirs' base model; and the stirs' before
+        it, where it knows of effects that do not act in pours."""
+        stirs = self.stirs.extended or self.stirs.base.hypothesis
+        last = self.pours and self.pours.extended
+        if last is None:
+            return (stirs,)
+        return (last,) if set(stirs.names) <= set(last.fit.prior.names) else (last, stirs)
+
+    @property
+    def best(self) -> dict[str, float]:
+        """The most probable parameters and coefficients of these models."""
+        return {name: value for model in self.models[::-1] for name, value in model.best.items()}
+
+    @property
+    def requested(self) -> tuple[str, ...]:
+        """Those of the accepted effects that the user asked for."""
+        asked = self.inputs.settings.accept or ()
+        return tuple(name for name in self.accepted if name in asked)
 
     @property
     def accepted(self) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .pour_noise import PourNoise
 from .pour_table import PourTable
 from .prior import split_parameters
 
@@ -17,9 +18,7 @@ if TYPE_CHECKING:
     from .inference import Experiment, Prior
     from .models import Cups
 
-REPEATED = 0.04
-"""Sd of a fraction: what pours repeat to, and what this simulator misses of another's pours."""
-NARROWEST = 0.05  # sd of the log of a parameter, and share of the range of another
+NARROWEST = 0.05  # sd of the log of a parameter, and share of another's prior interquartile range
 OUTCOMES = ("spilled", "retained")
 
 
@@ -67,7 +66,7 @@ class Pouring:
 
 def pour_experiment(table: PourTable, cups: "Cups", density: float) -> "Experiment":
     """The pours of a table, each outcome a window of its own."""
-    from .inference import Experiment, KnownNoise, Window
+    from .inference import Experiment, Window
 
     pouring = Pouring(table.angular_velocity, table.distance, cups, density)
     every = np.ones(table.observed.shape, bool)
@@ -78,7 +77,7 @@ def pour_experiment(table: PourTable, cups: "Cups", density: float) -> "Experime
     return Experiment(
         pouring.simulate,
         table.observed,
-        KnownNoise(REPEATED),
+        PourNoise(table.angular_velocity, table.distance),
         pouring.identity,
         table.path.name,
         tuple(windows),
@@ -104,14 +103,14 @@ def as_prior(theta: Mapping[str, NDArray], weights: NDArray, prior: "Prior") -> 
         mean = float(np.average(values, weights=weights))
         return mean, float(np.sqrt(np.average((values - mean) ** 2, weights=weights)))
 
-    ends = prior.from_unit(np.array([[0.0] * len(prior), [1.0] * len(prior)]))
+    quantiles = prior.from_unit(np.array([0.0, 0.25, 0.75, 1.0])[:, None] * np.ones(len(prior)))
 
     def learned(name: str, before: "Distribution") -> "Distribution":
         if isinstance(before, dist.LogUniform):
             mean, sd = moments(np.log(theta[name]))
             return dist.LogNormal(mean, max(sd, NARROWEST))
         mean, sd = moments(theta[name])
-        low, high = (float(end) for end in ends[name])
-        return dist.TruncatedNormal(mean, max(sd, NARROWEST * (high - low)), low=low, high=high)
+        low, lower, upper, high = (float(quantile) for quantile in quantiles[name])
+        return dist.TruncatedNormal(mean, max(sd, NARROWEST * (upper - lower)), low=low, high=high)
 
     return Prior({name: learned(name, before) for name, before in prior.distributions.items()})

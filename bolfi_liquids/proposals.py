@@ -5,13 +5,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .pour_experiment import OUTCOMES, REPEATED, Pouring
+from .pour_experiment import OUTCOMES, Pouring
+from .pour_noise import PourNoise
 from .recordings import Gripper, Recording
 from .stirring import Stirring
 from .strokes import speed
 
 if TYPE_CHECKING:
-    from .inference import Noise, Proposal
+    from .inference import Noise, Proposal, UsualResidual
     from .models import Cups
 
 FASTER, SLOWER, FASTEST = 1.6, 0.5, 0.2  # times the recording's speed; and at most, m/s
@@ -30,11 +31,18 @@ class Planned:
         return self.recording.number(name)
 
 
-def stir_proposals(stirring: Stirring, noise: "Noise") -> list["Proposal"]:
-    """The first recording's rig on other paths."""
-    from .hardware import circle, star
-    from .inference import Proposal
+def stir_proposals(
+    stirring: Stirring, noise: "Noise", usual: "UsualResidual | None"
+) -> list["Proposal"]:
+    """The first recording's rig on other paths, seen with the same cameras' noise.
 
+    Args:
+        usual: What is usual for this simulator on other paths, if it is known.
+    """
+    from .hardware import circle, star
+    from .inference import Proposal, SumOfNoises
+
+    all_noise = noise if usual is None else SumOfNoises((noise, usual))
     recording, setup = stirring.recordings[0], stirring.setups[0]
     fast = float(np.quantile(speed(recording), 0.95))
     height = float(recording.gripper.position[0, 2])
@@ -58,13 +66,13 @@ def stir_proposals(stirring: Stirring, noise: "Noise") -> list["Proposal"]:
         planned = Planned(Gripper(path.time, path.position), recording)
         own = Stirring((planned,), (setup,))  # type: ignore[arg-type]
         shape = (len(path.time), 2)
-        made.append(Proposal(own.simulate, noise, shape, own.identity, label))
+        made.append(Proposal(own.simulate, all_noise, shape, own.identity, label))
     return made
 
 
 def pour_proposals(cups: "Cups", density: float, tried: int = 2) -> list["Proposal"]:
     """Pours at the slowest and at middling angular velocities, from two distances each."""
-    from .inference import KnownNoise, Proposal
+    from .inference import Proposal
 
     rates = np.linspace(*cups.angular_velocity_range, tried + 1)[:tried]
     made = []
@@ -77,7 +85,7 @@ def pour_proposals(cups: "Cups", density: float, tried: int = 2) -> list["Propos
         made.append(
             Proposal(
                 pouring.simulate,
-                KnownNoise(REPEATED),
+                PourNoise(pouring.angular_velocity, pouring.distance),
                 (len(OUTCOMES), len(distance)),
                 pouring.identity,
                 f"{label} cm",

@@ -62,8 +62,7 @@ def print_criticism(
         effects: The group of that name; without it, nothing is said of those that nearly explain.
         console: Where to print.
     """
-    refuted = [] if effects is None else criticism.refuted_alone(section, effects)
-    lines = [criticism.verdict_sentence(section, refuted)]
+    lines = [criticism.verdict_sentence(section)]
     if not section["baseline"]:
         lines.append(criticism.NO_BASELINE)
     if accepted := criticism.accepted_sentence(section):
@@ -82,7 +81,7 @@ def print_criticism(
         if nearest := criticism.best_gains(effects):
             lines.append(f"explain most: {'; '.join(nearest)}")
     if section["pours"] is not None:
-        lines.append(criticism.pours_sentence(section["pours"]))
+        lines += [criticism.stirs_sentence(section), criticism.pours_sentence(section["pours"])]
     if section["suggestions"]:
         lines.append(criticism.suggestion_sentence(section))
     for line in lines:

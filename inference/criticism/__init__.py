@@ -4,7 +4,7 @@ from .clean import own_residual
 from .criticise import Criticism, criticise
 from .experiment import Experiment, Proposal
 from .extension import Extension
-from .held_out import Gap
+from .held_out import Gap, holds
 from .hypothesis import Hypothesis
 from .laboratory import Keeping
 from .misfit import Check, Found, Window
@@ -36,6 +36,7 @@ __all__ = [
     "Verdict",
     "Window",
     "criticise",
+    "holds",
     "own_residual",
     "rest_noise",
     "usual_residual",

@@ -1,5 +1,6 @@
 """What a simulator usually gets wrong, learned from data believed to be clean."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,7 +51,7 @@ class UsualResidual:
 
 
 def usual_residual(
-    residuals: list[np.ndarray], noises: list[Noise], same: list[bool]
+    residuals: Sequence[np.ndarray], noises: Sequence[Noise], same: Sequence[bool]
 ) -> UsualResidual:
     """What clean data teach.
 

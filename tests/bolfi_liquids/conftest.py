@@ -69,7 +69,8 @@ def criticism_section():
         "verdict": "effect",
         "effects": ["camera_delay"],
         "accepted": ["camera_delay"],
-        "accepted_by": "verdict",
+        "requested": [],
+        "refuted": [],
         "reason": "",
         "p_value": 0.002,
         "where": [
@@ -137,12 +138,13 @@ def _effects(status):
     return found, xr.Dataset({"cosine": (("effect", "other"), cosine)}, coords=coords)
 
 
-def _held_out(passes):
+def _held_out(holds):
     at = ("explanation", "recording")
-    sizes = {"before": 0.03, "after": 0.01, "noise": 0.008, "floor": 0.012, "lpd_gain": 33.3}
+    sizes = {"before": 0.03, "after": 0.01, "noise": 0.008, "floor": 0.012}
+    sizes |= {"p_value": 0.4, "lpd_gain": 33.3}
     columns = {key: (at, [[value]]) for key, value in sizes.items()}
     return xr.Dataset(
-        {**columns, "passes": (at, [[passes]])},
+        {**columns, "holds": ("explanation", [holds])},
         coords={"explanation": ["camera_delay"], "recording": ["third.nc"]},
     )
 
@@ -189,10 +191,11 @@ def _made(*, after=True, held=None, pours=False, status=("accepted", "rejected",
                 "held_out": {},
                 "baseline": {"clean.nc": "abc123"},
                 "pours": {},
+                "held_out_pours": {},
             }
         ),
         accepted=["camera_delay"],
-        accepted_by="verdict",
+        requested=[],
     )
     return tree
 

@@ -22,6 +22,7 @@ TIED = {
     ],
 }
 UNKNOWN = {"verdict": "unknown", "effects": [], "accepted": [], "coefficient": {}}
+REFUTED = {**UNKNOWN, "refuted": ["camera_delay"]}
 NONE = {**UNKNOWN, "verdict": "none", "p_value": 0.4, "where": []}
 CALIBRATED = {"parameters": {"viscosity": {"q05": 0.8, "q50": 1.0, "q95": 1.2}}}
 
@@ -53,7 +54,7 @@ def test_chapter_of_an_effect_that_was_named(criticism_section, made):
     assert chapter["unseen_sentence"].startswith("At its typical size, stick mass has")
     assert "32 samples" in chapter["noise_sentence"]
     degrees = [f"{np.degrees(value):.2f}" for value in (0.03, 0.01, 0.008, 0.012)]
-    assert chapter["held_rows"] == [["camera delay", "third.nc", *degrees, "33.3", "yes"]]
+    assert chapter["held_rows"] == [["camera delay", "third.nc", *degrees, "0.4", "33.3", "yes"]]
     first = ["camera delay", "0.07 s", "14.0", "stick mass (-0.90)", "286.0", "0.8", "0.05 s"]
     assert chapter["sources"][0]["rows"][0] == [*first, "accepted"]
     assert "camera delay [s]" in chapter["coefficient"]
@@ -85,10 +86,10 @@ def test_next_experiment_that_would_not_help_is_not_recommended(criticism_sectio
 
 def test_chapter_of_an_explanation_that_held_out_data_refute(criticism_section, made):
     chapter = criticism_chapter(
-        {**criticism_section, **UNKNOWN}, made(after=False, held=False), CALIBRATED
+        {**criticism_section, **REFUTED}, made(after=False, held=False), CALIBRATED
     )
-    assert "camera delay explains these data, but not the recordings" in chapter["results"][0]
-    assert "camera delay does not hold on third.nc" in chapter["held_sentence"]
+    assert "camera delay explains these data, but data held out do not" in chapter["results"][0]
+    assert "camera delay does not hold" in chapter["held_sentence"]
     assert chapter["sources"][0]["rows"][0][-1] == "refuted by held-out data"
 
 
@@ -111,21 +112,25 @@ def test_without_clean_recordings_the_reader_is_warned(criticism_section):
 
 
 def test_what_was_accepted_on_request_is_not_said_to_be_found(criticism_section):
-    asked = {**criticism_section, **NONE, "accepted": ["stick_mass"], "accepted_by": "user"}
+    asked = {**criticism_section, **NONE, "accepted": ["stick_mass"], "requested": ["stick_mass"]}
     assert narrative.accepted_sentence(asked).startswith("Stick mass joined the model on request")
     assert narrative.accepted_sentence(criticism_section) == ""
 
 
 def test_effects_that_could_not_be_simulated_are_named(criticism_section):
     assert narrative.untested_sentence(criticism_section) == ""
-    assert "with stick mass failed" in narrative.untested_sentence(
+    assert "Untested: stick mass." in narrative.untested_sentence(
         {**criticism_section, "untested": ["stick_mass"]}
     )
 
 
 def test_pours_have_their_own_verdict(criticism_section, made):
-    pours = {"before": 0.051, "after": None, "p_value": 0.3, "verdict": "none", "effects": []}
-    chapter = criticism_chapter({**criticism_section, "pours": pours}, made(pours=True), CALIBRATED)
+    agree = {"p_value": 0.3, "verdict": "none", "effects": [], "refuted": []}
+    unexplained = {**agree, "p_value": 0.01, "verdict": "unknown"}
+    pours = {"before": 0.051, "after": None, **agree}
+    section = {**criticism_section, "stirs": unexplained, "pours": pours}
+    chapter = criticism_chapter(section, made(pours=True), CALIBRATED)
+    assert "Simulated and real stirs differ (p = 0.01), and no known" in chapter["results"][1]
     assert chapter["pours"]["sentence"] == (
         "Simulated and real pours agree (p = 0.3): nothing is known to be missing. Spilled and"
         " retained fractions differ by 5.1 percentage points RMS."
@@ -171,5 +176,5 @@ def test_the_command_line_says_what_came_near_and_what_to_record(criticism_secti
     assert "explain most: camera delay (gain 286.0, p = 0.8); stick mass (gain 4.0" in text
     assert "gripper scale (gain" not in text
     assert "record the star" in text
-    refuted = printed({**criticism_section, **UNKNOWN}, table(made()))
-    assert "camera delay explains these data, but not" in " ".join(refuted.split())
+    refuted = printed({**criticism_section, **REFUTED}, table(made()))
+    assert "camera delay explains these data, but data held out" in " ".join(refuted.split())

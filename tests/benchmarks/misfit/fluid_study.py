@@ -27,7 +27,8 @@ from kept import keep, results
 
 from bolfi_liquids import inference, models
 from bolfi_liquids.clean_recordings import Clean, clean_residuals, usual_for
-from bolfi_liquids.pour_experiment import REPEATED, Pouring
+from bolfi_liquids.pour_experiment import Pouring
+from bolfi_liquids.pour_noise import REPEATED
 from bolfi_liquids.prior import default_prior
 from bolfi_liquids.recordings import Gripper, Recording
 from bolfi_liquids.settings import CriticismSettings
@@ -165,8 +166,8 @@ def _clean(bank: inference.SimulationBank) -> list[Clean]:
         MODEL,
         default_prior(),
         effects_of("stir"),
-        CriticismSettings().clean_plan,
-        inference.Keeping(bank),
+        plan=CriticismSettings().clean_plan,
+        keeping=inference.Keeping(bank),
     )
 
 
