@@ -195,6 +195,14 @@ def held_out_sentence(held: "Dataset | None") -> str:
     return f"On the recordings held out, {sentence}."
 
 
+def seen_sentence(effects: "Dataset") -> str:
+    """What these data could show at its typical size, most visible first."""
+    snr = effects["snr"].to_numpy()
+    order = [i for i in np.argsort(-np.nan_to_num(snr)) if snr[i] >= SEEN]
+    names = [f"{words(str(effects['effect'].to_numpy()[i]))} ({snr[i]:.0f})" for i in order]
+    return f"could be seen (signal-to-noise ratio): {', '.join(names) or 'none of the effects'}"
+
+
 def unseen_sentence(effects: "Dataset") -> str:
     """Which effects could act without being seen; empty if there are none.
 

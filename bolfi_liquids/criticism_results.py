@@ -132,7 +132,7 @@ def _effects(source: "inference.Criticism") -> "Dataset":
         found = {
             "typical": signatures[name].coefficient,
             "snr": signatures[name].snr,
-            "score": source.base.check.scores.get(name, 0.0),
+            "score": source.base.check.scores.get(name, np.nan),
         }
         candidate = singles.get(name)
         if candidate is None:

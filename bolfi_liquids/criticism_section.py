@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from . import inference
 
+PLACE = ("channel", "start_s", "stop_s", "stroke")  # of a window; null where it has several
 SURE = 0.05  # p-value of a window that is listed
 
 
@@ -75,7 +76,12 @@ def _sure(source: "inference.Criticism") -> list[dict[str, Any]]:
     sure = [found for found in source.before if found.p_value < SURE]
     ordered = sorted(sure, key=lambda found: (found.p_value, -abs(found.z)))
     return [
-        {**found.label, "rms_deg": float(np.degrees(found.rms)), "p_value": found.p_value}
+        {
+            **dict.fromkeys(PLACE),
+            **found.label,
+            "rms_deg": float(np.degrees(found.rms)),
+            "p_value": found.p_value,
+        }
         for found in ordered
     ]
 

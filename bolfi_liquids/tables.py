@@ -77,6 +77,8 @@ def print_criticism(
         f"surest {criticism.window(found)}: {found['rms_deg']:.2f} deg RMS"
         for found in section["where"][: criticism.NAMED]
     ]
+    if effects is not None:
+        lines.append(criticism.seen_sentence(effects))
     if section["verdict"] in ("tie", "unknown") and effects is not None:
         if nearest := criticism.best_gains(effects):
             lines.append(f"explain most: {'; '.join(nearest)}")

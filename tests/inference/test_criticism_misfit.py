@@ -108,6 +108,14 @@ def test_p_values_of_a_right_model_are_uniform(nulls, kind):
     assert not too_many(p_values)
 
 
+def test_where_no_direction_is_left_the_slow_part_alone_decides(banks):
+    """Ties of nothing with nothing are no evidence, for a right model nor against it."""
+    base = banks[0]
+    found = check(on(base.hypothesis, observe(noisy, 7, 1.0)), {}, base.null)
+    assert found.p_score == 1.0
+    assert found.p_value == pytest.approx(found.p_smooth, abs=1.5e-3)  # one draw more or less
+
+
 def test_scores_of_a_right_model_are_standard_normal(nulls):
     scores = np.array([one.scores["bump"] for one in nulls])
     assert kstest(scores, "norm").pvalue > ALPHA

@@ -1,0 +1,164 @@
+"""What a criticism is given: read, checked and written down."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from bolfi_liquids.clean_recordings import Clean, usual_elsewhere, usual_for
+from bolfi_liquids.criticism import finished_criticism
+from bolfi_liquids.criticism_inputs import open_inputs
+from bolfi_liquids.errors import InputError
+from bolfi_liquids.settings import CriticismSettings
+from bolfi_liquids.stir_experiment import camera_noise, stir_experiment
+from bolfi_liquids.stirring import stirring_of
+
+HEADER = "angular_velocity_deg_s,distance_cm,spilled,received,retained"
+ROWS = ["45,1,5,90,5", "90,2,10,85,5", "60,3,20,75,5"]
+AT_REST, RHO, SD = 16, 0.6, np.radians(0.2)
+
+
+def given(calibration, settings=None, **some):
+    nothing = {"held_out": (), "baseline": (), "pours": None, "held_out_pours": None, "cups": None}
+    return open_inputs(calibration, settings or CriticismSettings(), **{**nothing, **some})
+
+
+@pytest.fixture
+def other(dataset, tmp_path):
+    """(name, **attributes) -> path of a recording that is like the bundled one, but for them."""
+
+    def write(name, **attrs):
+        path = tmp_path / name
+        dataset.assign_attrs(attrs, note=name).to_netcdf(path)
+        return path
+
+    return write
+
+
+@pytest.fixture
+def table(tmp_path):
+    def write(name, rows=ROWS):
+        path = tmp_path / name
+        path.write_text("\n".join([HEADER, *rows]) + "\n")
+        return path
+
+    return write
+
+
+def test_what_a_result_was_made_from_names_every_file(calibration, other, table):
+    inputs = given(
+        calibration, baseline=[other("clean.nc")], held_out=other("o.nc"), pours=table("p.csv")
+    )
+    made_from = inputs.made_from
+    assert set(made_from["baseline"]) == {"clean.nc"} and set(made_from["held_out"]) == {"o.nc"}
+    assert set(made_from["pours"]) == {"p.csv"} and made_from["settings"]["seed"] == 0
+    assert made_from["poured"]["cups"]["source"]
+    assert inputs.level == 0.025  # of each of two sources
+
+
+def test_other_settings_files_or_cups_are_another_question(calibration, other, table):
+    asked = [
+        given(calibration),
+        given(calibration, CriticismSettings(seed=1)),
+        given(calibration, baseline=other("clean.nc")),
+        given(calibration, held_out=other("clean.nc")),
+        given(calibration, pours=table("p.csv")),
+        given(calibration, pours=table("p.csv"), held_out_pours=table("q.csv", ROWS[::-1])),
+    ]
+    made_from = [inputs.made_from for inputs in asked]
+    assert all(one != two for i, one in enumerate(made_from) for two in made_from[:i])
+    assert made_from[0] == given(calibration).made_from
+
+
+def test_a_clean_recording_that_is_criticised_or_held_out_is_no_baseline(
+    calibration, other, short_recording
+):
+    held = other("held.nc")
+    inputs = given(calibration, held_out=held, baseline=[short_recording, held, other("c.nc")])
+    assert [recording.path.name for recording in inputs.baseline] == ["c.nc"]
+
+
+def refused(said, calibration, **some):
+    with pytest.raises(InputError) as error:
+        given(calibration, **some)
+    assert said in str(error.value)
+
+
+def test_a_recording_is_held_out_once_and_under_its_own_name(calibration, other, tmp_path):
+    path = other("held.nc")
+    refused("is held out twice", calibration, held_out=[path, path])
+    (tmp_path / "b").mkdir()
+    copy = tmp_path / "b" / "held.nc"
+    xr.load_dataset(path, decode_times=False).assign_attrs(note="b").to_netcdf(copy)
+    refused("or has the name of another", calibration, held_out=[path, copy])
+
+
+def test_a_baseline_of_another_rig_or_frame_rate_is_refused(calibration, other, dataset, tmp_path):
+    refused("cup_radius is 0.05", calibration, baseline=other("wide.nc", cup_radius=0.05))
+    slow = tmp_path / "slow.nc"
+    dataset.isel(time=slice(0, None, 2)).to_netcdf(slow)
+    refused("samples a second", calibration, baseline=slow)
+
+
+def test_held_out_pours_are_other_pours(calibration, table):
+    refused("no pours to learn from", calibration, held_out_pours=table("q.csv"))
+    pours = table("p.csv")
+    refused("the pours that are fitted", calibration, pours=pours, held_out_pours=pours)
+
+
+def test_pours_need_an_effect_that_acts_in_them(calibration, table):
+    refused(
+        "none of the effects acts in a pour",
+        calibration,
+        settings=CriticismSettings(effects=("camera_delay",)),
+        pours=table("p.csv"),
+    )
+
+
+def test_a_run_that_was_not_criticised_or_is_damaged_holds_no_finished_criticism(calibration):
+    assert finished_criticism(calibration.path, {}) is None
+
+
+# What the recordings themselves tell of their noise.
+
+
+def recorded(calibration, rng, sd=SD):
+    """The run's recording, its samples at rest AR(1) noise and the rest a smooth signal."""
+    recording = given(calibration).stirring.recordings[0]
+    noise = sd * rng.normal(size=recording.inclination.shape)
+    for i in range(1, len(noise)):
+        noise[i] = RHO * noise[i - 1] + np.sqrt(1.0 - RHO**2) * noise[i]
+    return replace(recording, inclination=noise)
+
+
+def test_the_cameras_noise_is_that_of_the_rest_and_correlated(calibration):
+    """On average over recordings: one of them knows it to a third only."""
+    rng = np.random.default_rng(0)
+    found = [camera_noise([recorded(calibration, rng)]) for _ in range(40)]
+    assert {one.samples for one in found} == {2 * AT_REST}
+    # the median of the posterior's sizes, and of their correlations, on average
+    sizes = [np.median(one.sd) / SD for one in found]
+    error = np.std(sizes) / np.sqrt(len(sizes))
+    assert abs(np.mean(sizes) - 1.0) < 4.0 * error + 0.1
+    assert np.mean([np.mean(one.correlation) for one in found]) > 0.25
+
+
+def test_a_camera_without_any_noise_is_not_believed(calibration):
+    still = recorded(calibration, np.random.default_rng(0), sd=0.0)
+    with pytest.raises(InputError, match="does not change at all"):
+        camera_noise([still])
+
+
+def test_clean_recordings_of_the_same_path_say_where_it_errs(calibration):
+    rng = np.random.default_rng(0)
+    recording = recorded(calibration, rng)
+    residual = 10.0 * SD * np.sin(np.linspace(0.0, 9.0, len(recording.time)))[:, None] * [1.0, 0.5]
+    clean = [Clean(recording, residual, 1)]
+    stirring = stirring_of([recording], 200)
+    same, elsewhere = usual_for(stirring, clean), usual_elsewhere(clean)
+    assert len(same.shapes) == 1 and len(elsewhere.shapes) == 0
+    noise = stir_experiment(stirring, same, "stir").noise
+    assert [type(part).__name__ for part in noise.parts] == ["AutoregressiveNoise", "UsualResidual"]
+    assert usual_for(stirring, []) is None
+    assert isinstance(stir_experiment(stirring, None, "stir").noise, type(noise.parts[0]))

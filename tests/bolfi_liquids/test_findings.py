@@ -1,0 +1,86 @@
+"""What stirs and pours found, together."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray as xr
+from bolfi_liquids.inference.noise import Layout
+
+from bolfi_liquids.criticism_results import _posterior
+from bolfi_liquids.findings import Findings
+from bolfi_liquids.pour_noise import MISSED, REPEATED, PourNoise
+from bolfi_liquids.settings import CriticismSettings
+
+
+def model(names, value):
+    """Of liquid and effects, all of whose parameters are believed to be `value`."""
+    parameters = ["viscosity", "cohesion", *names]
+    draws = {name: (("chain", "draw"), np.full((2, 3), value)) for name in parameters}
+    posterior = xr.DataTree(xr.Dataset(draws))
+    fit = SimpleNamespace(
+        prior=SimpleNamespace(names=parameters),
+        sample=lambda *_, **__: {"posterior": posterior},
+    )
+    return SimpleNamespace(names=names, fit=fit, best=dict.fromkeys(parameters, value))
+
+
+def source(accepted, extended):
+    base = SimpleNamespace(hypothesis=model((), 0.0))
+    return SimpleNamespace(accepted=accepted, extended=extended, base=base)
+
+
+def findings(stirs, pours, accept=None):
+    inputs = SimpleNamespace(settings=CriticismSettings(accept=accept))
+    return Findings(None, inputs, (), stirs, pours)
+
+
+DELAY = source(("camera_delay",), model(("camera_delay",), 1.0))
+THINNING = source(("shear_thinning",), model(("shear_thinning",), 1.0))
+NOTHING = source((), None)
+
+
+@pytest.mark.parametrize(
+    ("stirs", "pours", "expected"),
+    [
+        (NOTHING, None, {"viscosity": 0.0, "cohesion": 0.0}),
+        (DELAY, None, {"viscosity": 1.0, "cohesion": 1.0, "camera_delay": 1.0}),
+        (DELAY, NOTHING, {"viscosity": 1.0, "cohesion": 1.0, "camera_delay": 1.0}),
+        (
+            DELAY,
+            source(("adhesion",), model(("adhesion",), 2.0)),
+            {"viscosity": 2.0, "cohesion": 2.0, "adhesion": 2.0, "camera_delay": 1.0},
+        ),
+        (
+            THINNING,
+            source(("adhesion",), model(("shear_thinning", "adhesion"), 2.0)),
+            {"viscosity": 2.0, "cohesion": 2.0, "shear_thinning": 2.0, "adhesion": 2.0},
+        ),
+    ],
+    ids=["nothing", "stirs alone", "pours agree", "a sensor's", "a liquid's"],
+)
+def test_the_last_model_says_what_it_knows_and_the_stirs_the_rest(stirs, pours, expected):
+    together = findings(stirs, pours)
+    assert together.best == expected
+    posterior = _posterior(together)
+    assert {name: float(values.mean()) for name, values in posterior.items()} == expected
+    assert set(together.accepted) <= set(expected)
+
+
+def test_what_was_requested_is_told_from_what_was_found():
+    pours = source(("adhesion",), model(("adhesion",), 2.0))
+    assert findings(DELAY, pours, accept=("adhesion",)).requested == ("adhesion",)
+    assert findings(DELAY, pours).requested == ()
+
+
+def test_pours_of_like_actions_are_wrong_together_and_outcomes_apart():
+    noise = PourNoise(np.radians([45.0, 46.0, 170.0]), np.array([0.02, 0.021, 0.06]))
+    at = Layout(np.tile([0, 1, 2], 2), np.repeat([0, 1], 3))  # pours, outcomes
+    covariance = noise.covariance(at)
+    sd = np.sqrt(np.diag(covariance))
+    np.testing.assert_allclose(sd, np.hypot(REPEATED, np.repeat(MISSED, 3)))
+    correlation = covariance / np.outer(sd, sd)
+    assert correlation[0, 1] > 0.9 > 0.2 > correlation[0, 2] >= 0.0
+    assert (correlation[:3, 3:] == 0.0).all()
+    drawn = noise.draw(np.random.default_rng(0), at, 20_000)
+    np.testing.assert_allclose(np.cov(drawn.T), covariance, atol=6.0 * 0.01 * sd.max() ** 2)
