@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from .criticism_narrative import words
 from .drawing import BLUE, GREY, INK, LIGHT, ORANGE, new_figure, styled
+from .settings import ALARM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
 MODELS = {"before": (ORANGE, "before"), "after": (BLUE, "with the missing effect")}
-SURE = 0.05  # p-value of a window that is marked
 BAND = 2.0  # sd
 
 
@@ -61,7 +61,7 @@ def _draw_residual(axes: "Axes", part: "Dataset") -> None:
 
 
 def _shade(axes: "Axes", strokes: "Dataset") -> None:
-    sure = strokes["p_value_before"].to_numpy() < SURE
+    sure = strokes["p_value_before"].to_numpy() < ALARM
     for at in np.flatnonzero(sure):
         start, stop = (float(strokes[edge][at]) for edge in ("start_s", "stop_s"))
         axes.axvspan(start, stop, color=ORANGE, alpha=0.14, linewidth=0, zorder=0)
@@ -121,9 +121,9 @@ def _draw_bars(axes: "Axes", part: "Dataset", ticks: list[str]) -> None:
         shift = (k - (len(drawn) - 1) / 2.0) * width
         height = np.degrees(part[f"rms_{when}"].to_numpy())
         axes.bar(at + shift, height, width, color=colour, label=label)
-    sure = part["p_value_before"].to_numpy() < SURE
+    sure = part["p_value_before"].to_numpy() < ALARM
     top = np.degrees(part["rms_before"].to_numpy())
-    label = f"surely different (p < {SURE:g})"
+    label = f"surely different (p < {ALARM:g})"
     shift = -(len(drawn) - 1) / 2.0 * width
     axes.scatter(at[sure] + shift, 1.05 * top[sure], s=28, marker="*", color=INK, label=label)
     axes.set_xticks(at, ticks)

@@ -15,7 +15,7 @@ from .errors import InputError
 from .pour_table import PourTable, open_pours
 from .recordings import Recording, Source, open_recordings
 from .recordings_kept import kept_recordings
-from .settings import CriticismSettings
+from .settings import ALARM, CriticismSettings
 from .stir_experiment import effects_of
 from .stirring import Stirring, same_liquid, stirring_of
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 Pours = PourTable | str | Path
 RIG = ("cup_radius", "stick_radius", "stick_length")
-ALARM = 0.05  # share of false alarms
 SAME_RIG = 0.02  # relative difference up to which a size or a frame rate is the same
 
 

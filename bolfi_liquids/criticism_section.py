@@ -8,6 +8,7 @@ import numpy as np
 from .calibration_section import parameter_summary
 from .findings import Findings
 from .noise import rms
+from .settings import ALARM
 
 if TYPE_CHECKING:
     from xarray import DataTree
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
     from . import inference
 
 PLACE = ("channel", "start_s", "stop_s", "stroke")  # of a window; null where it has several
-SURE = 0.05  # p-value of a window that is listed
 
 
 def criticism_section(findings: Findings, tree: "DataTree", seconds: float) -> dict[str, Any]:
@@ -73,7 +73,7 @@ def _refuted(source: "inference.Criticism") -> list[str]:
 
 def _sure(source: "inference.Criticism") -> list[dict[str, Any]]:
     """The windows in which the base model and the data surely differ, surest first."""
-    sure = [found for found in source.before if found.p_value < SURE]
+    sure = [found for found in source.before if found.p_value < ALARM]
     ordered = sorted(sure, key=lambda found: (found.p_value, -abs(found.z)))
     return [
         {

@@ -12,6 +12,7 @@ SURROGATES = ("signal", "discrepancy")
 SAMPLERS = ("nuts", "emcee")
 RISKS = ("mean", "cvar")
 
+ALARM = 0.05  # share of false alarms when simulation and data are compared
 MIN_SIMULATIONS = 7  # fewer say next to nothing of two parameters
 MIN_PARTICLES = 100  # with fewer, the stick is thinner than the gaps between them
 _LEAST = {

@@ -32,10 +32,9 @@ def around(centre: np.ndarray, sd: np.ndarray, least: float) -> Box:
     return Box(np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0))
 
 
-def with_coefficients(box: Box, count: int) -> Box:
-    """The box of the base parameters, and the whole prior of `count` coefficients."""
-    ends = np.full(count, END)
-    return Box(np.append(box.low, ends), np.append(box.high, 1.0 - ends))
+def with_coefficient(box: Box) -> Box:
+    """The box of the base parameters, and the whole prior of a coefficient."""
+    return Box(np.append(box.low, END), np.append(box.high, 1.0 - END))
 
 
 def fill(box: Box, prior: Prior, seed: int, count: int) -> dict[str, np.ndarray]:

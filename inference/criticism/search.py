@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .design import NARROW, WIDE, Box, around, fill, with_coefficients
+from .design import NARROW, WIDE, Box, around, fill, with_coefficient
 from .extension import extended
 from .hypothesis import Hypothesis, hypothesise
 from .laboratory import Laboratory
@@ -109,7 +109,7 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
     parts = [runs]
     singles, untested = {}, []
     for name in laboratory.extensions:
-        wide = with_coefficients(box, 1)
+        wide = with_coefficient(box)
         try:
             made = study.run(f"effect {name}", wide, (name,), plan.extension)
         except RuntimeError:
