@@ -177,11 +177,16 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         after=tuple(left),
         gaps=gaps,
         suggestions=tuple(suggest(laboratory, proposals, rivals)),
-        untested=(*untested, *(c.names[0] for c in candidates if c.passes and not c.refitted)),
+        untested=(*untested, *_left_out(candidates)),
         noise=experiment.noise,
         tied=tuple(one.names for one in tied(members)),
         simulations=count,
     )
+
+
+def _left_out(candidates: Sequence[Candidate]) -> list[str]:
+    """Effects that alone would pass the test, but that were not refitted."""
+    return [c.names[0] for c in candidates if len(c.names) == 1 and c.passes and not c.refitted]
 
 
 def _named(verdict: Verdict) -> tuple[str, ...]:

@@ -1,0 +1,36 @@
+"""The expected signal-to-noise ratio of an experiment that was not made."""
+
+import numpy as np
+import pytest
+from bolfi_liquids.inference.criticism.next_experiment import RUNS, _distance
+
+from bolfi_liquids import inference
+
+SAMPLES, NOISE, REPEATS = 120, 0.1, 200
+WAVE = np.sqrt(2.0 / SAMPLES) * np.cos(np.pi * 6 * (np.arange(SAMPLES) + 0.5) / SAMPLES)
+
+
+def found(ratio, own):
+    """Of two explanations that differ by `ratio` times all noise, their runs by `own` of it."""
+    measured = NOISE * np.sqrt(1.0 - own**2)
+    noise = inference.KnownNoise(measured)
+    proposal = inference.Proposal(len, noise, (SAMPLES,))
+
+    def repeat(seed):
+        rng = np.random.default_rng(seed)
+        runs = own * NOISE * rng.normal(size=(2, RUNS, SAMPLES))
+        runs[1] += ratio * NOISE * WAVE
+        return _distance(proposal, list(runs), 0, 1)
+
+    return np.array([repeat(seed) for seed in range(REPEATS)])
+
+
+@pytest.mark.parametrize("own", [0.1, 0.6])
+@pytest.mark.parametrize("ratio", [5.0, 10.0])
+def test_the_ratio_is_found_whatever_part_of_the_noise_the_runs_have(ratio, own):
+    """Within a fifth: so few runs hardly know their own noise."""
+    assert np.mean(found(ratio, own)) == pytest.approx(ratio, rel=0.2)
+
+
+def test_explanations_that_are_the_same_are_not_told_apart():
+    assert np.median(found(0.0, 0.6)) < 3.0
