@@ -16,15 +16,17 @@ LEAST_FREEDOM = 3  # with fewer, draws have no variance and no effect would be f
 class UsualResidual:
     """A simulator's own residual, as a Gaussian process of uncertain size.
 
-    Its covariance is an inverse-Wishart posterior's: a stationary one, the clean data's mean
-    autocovariance, is updated with the clean residuals of the same experiment, which show where
-    on its path the model is wrong (Brynjarsdottir and O'Hagan 2014 on why the shape matters).
+    Its covariance is a compromise of a stationary one, the clean data's mean autocovariance, and
+    the clean residuals of the same experiment, which show where on its path the model is wrong,
+    weighed as in an inverse-Wishart posterior (Brynjarsdottir and O'Hagan 2014 on why the shape
+    matters).
 
     Attributes:
         autocovariance: Of clean residuals by lag in samples, shape [lags]; zero beyond.
         shapes: Clean residuals of the same experiment at each sample, shape [k, T, channels];
             NaN where missing.
-        freedom: Clean data sets: the size is known as well as a variance from so many numbers.
+        freedom: Clean data sets: the size is known as well as a variance from so many numbers, but
+            never less than from LEAST_FREEDOM.
     """
 
     autocovariance: np.ndarray
