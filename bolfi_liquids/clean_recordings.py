@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .noise import sensor_noise
 from .recordings import Recording
-from .stir_experiment import camera_noise, same_experiment, stir_experiment
+from .stir_experiment import same_experiment, stir_experiment
 from .stirring import stirring_of
 
 if TYPE_CHECKING:
@@ -78,9 +79,10 @@ def usual_elsewhere(clean: Sequence[Clean]) -> "UsualResidual | None":
 
 
 def _usual(clean: Sequence[Clean], same: list[bool]) -> "UsualResidual | None":
-    from .inference import usual_residual
+    from .inference import KnownNoise, usual_residual
 
     if not clean:
         return None
-    noises = [camera_noise([one.recording]) for one in clean]
+    # the whole recording tells white noise better than the short rest tells correlated noise
+    noises = [KnownNoise(sensor_noise(one.recording.inclination)) for one in clean]
     return usual_residual([one.residual for one in clean], noises, same)

@@ -157,15 +157,11 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     accepted = tuple(accept) if accept is not None else _named(verdict)
     leading = _among(candidates, accepted)
     extended = leading.hypothesis if leading else None
-    windows = list(experiment.windows)
-    found = locate(base.hypothesis, windows, base.null) if windows else []
+    found = locate(base.hypothesis, experiment.windows, base.null)
     left = []
-    if extended is not None and windows:
+    if extended is not None:
         null = null_draws(extended, study.noise, np.random.default_rng(seed))
-        left = locate(extended, windows, null)
-    rivals = tied(members) if verdict.kind == "tie" else []
-    if verdict.kind == "unknown":
-        rivals = sorted(candidates, key=lambda c: -c.gain)[:2]
+        left = locate(extended, experiment.windows, null)
     return Criticism(
         verdict=verdict,
         accepted=accepted,
@@ -176,12 +172,23 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         before=tuple(found),
         after=tuple(left),
         gaps=gaps,
-        suggestions=tuple(suggest(laboratory, proposals, rivals)),
+        suggestions=tuple(suggest(laboratory, proposals, _rivals(verdict, candidates, members))),
         untested=(*untested, *_left_out(candidates)),
         noise=experiment.noise,
         tied=tuple(one.names for one in tied(members)),
         simulations=count,
     )
+
+
+def _rivals(
+    verdict: Verdict, candidates: Sequence[Candidate], members: Sequence[Candidate]
+) -> list[Candidate]:
+    """Explanations that a further experiment should tell apart."""
+    if verdict.kind == "tie":
+        return tied(members)
+    if verdict.kind == "unknown":
+        return sorted(candidates, key=lambda c: -c.gain)[:2]
+    return []
 
 
 def _left_out(candidates: Sequence[Candidate]) -> list[str]:

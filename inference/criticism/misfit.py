@@ -1,6 +1,6 @@
 """Whether a fitted model and the data disagree, and where."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -99,7 +99,7 @@ def check(hypothesis: Hypothesis, unused: Mapping[str, np.ndarray], null: np.nda
     return Check(float(together), float(p_score), float(p_smooth), scores)
 
 
-def locate(hypothesis: Hypothesis, windows: list[Window], null: np.ndarray) -> list[Found]:
+def locate(hypothesis: Hypothesis, windows: Sequence[Window], null: np.ndarray) -> list[Found]:
     """Where a model and the data disagree, with one error rate for all windows (max statistic).
 
     In each window the slow part of the residual is looked at.

@@ -8,7 +8,6 @@ import numpy as np
 from ..noise import Layout
 from .noise import Noise, SumOfNoises, gaussian
 
-WORTH = 2.0  # clean data sets that the stationary covariance counts for
 LEAST_FREEDOM = 3  # with fewer, draws have no variance and no effect would be found
 
 
@@ -16,10 +15,11 @@ LEAST_FREEDOM = 3  # with fewer, draws have no variance and no effect would be f
 class UsualResidual:
     """A simulator's own residual, as a Gaussian process of uncertain size.
 
-    Its covariance is a compromise of a stationary one, the clean data's mean autocovariance, and
-    the clean residuals of the same experiment, which show where on its path the model is wrong,
-    weighed as in an inverse-Wishart posterior (Brynjarsdottir and O'Hagan 2014 on why the shape
-    matters).
+    Its covariance has two parts: a stationary one, the clean data's mean autocovariance, and for
+    data made by the same experiment the clean residuals themselves, each a direction in which the
+    model may be as wrong again (Brynjarsdottir and O'Hagan 2014 on why the shape matters). They
+    are added up, not averaged: averaged, what the simulator leaves of one liquid was found to be
+    beyond what it leaves of the others.
 
     Attributes:
         autocovariance: Of clean residuals by lag in samples, shape [lags]; zero beyond.
@@ -40,7 +40,7 @@ class UsualResidual:
         known = positive_autocovariance(np.append(self.autocovariance, np.zeros(missing)))
         stationary = known[apart] * np.equal.outer(at.channel, at.channel)
         shapes = self._shapes(at)
-        return (WORTH * stationary + shapes.T @ shapes) / (WORTH + len(shapes))
+        return stationary + shapes.T @ shapes
 
     def draw(self, rng: np.random.Generator, at: Layout, count: int) -> np.ndarray:
         drawn = gaussian(rng, self.covariance(at), count)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from bolfi_liquids.inference.criticism.noise import CORRELATIONS
-from bolfi_liquids.inference.criticism.usual import WORTH
 from bolfi_liquids.inference.noise import Layout
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
@@ -173,8 +172,7 @@ def test_residuals_of_the_same_experiment_say_where_it_errs_again(clean):
     stationary = np.kron(np.eye(2), toeplitz(learned.autocovariance))
     flat = [np.nan_to_num(residual).T.ravel() for residual in again[1:]]
     shapes = sum(np.outer(residual, residual) for residual in flat)
-    updated = (WORTH * stationary + shapes) / (WORTH + 2)
-    np.testing.assert_allclose(learned.covariance(at), updated, atol=1e-12)
+    np.testing.assert_allclose(learned.covariance(at), stationary + shapes, atol=1e-12)
     other = inference.usual_residual(again, [NOTHING] * 3, [False] * 3)
     np.testing.assert_allclose(other.covariance(at), stationary, atol=1e-12)
 
