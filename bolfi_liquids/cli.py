@@ -126,8 +126,9 @@ def criticise(  # noqa: PLR0913  one parameter for each option
     from .cups import open_cups
     from .pour_table import open_pours
 
-    if pours is None and (liquid or cups):
-        raise typer.BadParameter("--liquid and --cups are of --pours, which is missing")
+    for name, given in (("liquid", liquid), ("cups", cups), ("held-out-pours", held_out_pours)):
+        if pours is None and given:
+            raise typer.BadParameter(f"--{name} needs --pours, which is missing")
     criticism = run_criticise(
         run,
         held_out=held_out or (),

@@ -39,8 +39,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     pours: Pours | None = None,
     held_out_pours: Pours | None = None,
     cups: "Cups | None" = None,
-    effects: Sequence[str] | None = None,
-    accept: Sequence[str] | None = None,
+    effects: str | Sequence[str] | None = None,
+    accept: str | Sequence[str] | None = None,
     seed: int = 0,
     progress: bool = True,
 ) -> Criticism:
@@ -71,8 +71,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         calibration = Calibration.open(calibration)
     started = time.perf_counter()
     settings = CriticismSettings(
-        effects=None if effects is None else tuple(effects),
-        accept=None if accept is None else tuple(accept),
+        effects=_names(effects),
+        accept=_names(accept),
         seed=seed,
     )
     inputs = open_inputs(
@@ -96,6 +96,11 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     section = criticism_section(findings, tree, time.perf_counter() - started)
     write_section(run, "criticise", section)
     return Criticism.open(run)
+
+
+def _names(given: str | Sequence[str] | None) -> tuple[str, ...] | None:
+    """One name or several."""
+    return (given,) if isinstance(given, str) else None if given is None else tuple(given)
 
 
 def _find(calibration: Calibration, inputs: Inputs, keeping: "inference.Keeping") -> Findings:

@@ -90,6 +90,7 @@ def open_inputs(  # noqa: PLR0913  all that a criticism may be given
     Raises:
         InputError: Something cannot be used.
     """
+    _check_accept(settings)
     record = dict(calibration.record)
     stirring = stirring_of(
         kept_recordings(calibration.path, record), int(record["settings"]["particles"])
@@ -145,6 +146,18 @@ def _check_held_out(stirring: Stirring, held_out: Sequence[Recording]) -> None:
                 f"{density:g} in the run",
                 where=f"--held-out {recording.path}",
                 fix="hold out a recording of the same liquid",
+            )
+
+
+def _check_accept(settings: CriticismSettings) -> None:
+    considered = settings.effects or tuple(effects_of("stir") | effects_of("pour"))
+    effects_of("stir", settings.effects)  # refuses names that there are not
+    for name in settings.accept or ():
+        if name not in considered:
+            raise InputError(
+                f"{name!r} is none of the effects that are considered",
+                where="--accept",
+                fix=f"choose from {', '.join(considered)}",
             )
 
 

@@ -149,6 +149,7 @@ def gap_sentence(section: Mapping[str, Any]) -> str:
     return (
         f"{sentence}. On recordings held out, to which nothing was fitted, it is"
         f" {gap['held_out_before']:.2f}° before and {gap['held_out_after']:.2f}° after; {noise}"
+        f" On those held out it is {gap['held_out_noise']:.2f}°."
     )
 
 

@@ -14,6 +14,7 @@ from .files import existing_file
 
 ACTIONS = ("angular_velocity_deg_s", "distance_cm")
 AMOUNTS = ("spilled", "received", "retained")
+RANGES = (1.0, 1000.0), (-20.0, 50.0)  # of the actions, in their units
 LEAST = 3  # pours from which anything can be learned
 
 
@@ -59,6 +60,8 @@ def open_pours(path: str | Path, liquid: str | None = None) -> PourTable:
     with path.open(newline="", encoding="utf-8") as file:
         reader = csv.DictReader(file)
         missing = [c for c in (*ACTIONS, *AMOUNTS) if c not in (reader.fieldnames or ())]
+        if not reader.fieldnames:
+            raise InputError("is empty", where=str(path), fix="write a header and a line each pour")
         if missing:
             raise InputError(
                 f"has no column {', '.join(missing)}",
@@ -69,9 +72,10 @@ def open_pours(path: str | Path, liquid: str | None = None) -> PourTable:
     rows, liquid = _of_liquid(path, rows, liquid)
     if len(rows) < LEAST:
         raise InputError(
-            f"holds {len(rows)} pours", where=str(path), fix=f"give at least {LEAST} of them"
+            f"too few pours: {len(rows)}", where=str(path), fix=f"give at least {LEAST} of them"
         )
     numbers = np.array([[_number(path, n, row, c) for c in ACTIONS] for n, row in rows])
+    _check_actions(path, [n for n, _ in rows], numbers)
     amounts = np.array([[_amount(path, n, row, c) for c in AMOUNTS] for n, row in rows])
     total = amounts.sum(axis=1, keepdims=True)
     if (total <= 0.0).any():
@@ -95,6 +99,8 @@ def _of_liquid(path: Path, rows: list[Any], liquid: str | None) -> tuple[list[An
     names = sorted({(row.get("liquid") or "").strip() for _, row in rows})
     if liquid is None and len(names) <= 1:
         return rows, "".join(names)
+    if names == [""]:
+        return rows, ""  # the whole file is of one liquid, whatever its name
     if liquid is None or liquid not in names:
         raise InputError(
             f"holds pours of {', '.join(names)}" + (f", not of {liquid}" if liquid else ""),
@@ -102,6 +108,18 @@ def _of_liquid(path: Path, rows: list[Any], liquid: str | None) -> tuple[list[An
             fix="say whose to take: --liquid NAME",
         )
     return [(n, row) for n, row in rows if (row.get("liquid") or "").strip() == liquid], liquid
+
+
+def _check_actions(path: Path, lines: list[int], actions: NDArray) -> None:
+    """Raise InputError for what no robot could do."""
+    for line, (speed, distance) in zip(lines, actions, strict=True):
+        for column, value, (least, most) in zip(ACTIONS, (speed, distance), RANGES, strict=True):
+            if not least <= value <= most:
+                raise InputError(
+                    f"{value:g} is not between {least:g} and {most:g}",
+                    where=f"{path}: line {line}, column {column}",
+                    fix="mend or remove the line",
+                )
 
 
 def _number(path: Path, line: int, row: dict, column: str) -> float:

@@ -101,8 +101,8 @@ def _gap_lines(gap: Mapping[str, float | None]) -> list[str]:
         if gap[before] is None:
             continue
         then = "" if gap[after] is None else f", after {gap[after]:.2f} deg"
-        lines.append(f"{label}: before {gap[before]:.2f} deg RMS{then}")
-    lines[-1] += f" (noise: {gap['noise']:.2f} deg)"
+        own = gap["held_out_noise" if label == "held out" else "noise"]
+        lines.append(f"{label}: before {gap[before]:.2f} deg RMS{then} (noise: {own:.2f} deg)")
     return lines
 
 

@@ -87,6 +87,7 @@ def criticism_section():
             "held_out_before": 1.5,
             "held_out_after": 0.42,
             "noise": 0.33,
+            "held_out_noise": 0.4,
         },
         "pours": None,
         "suggestions": [],

@@ -65,6 +65,9 @@ def test_a_changed_copy_is_refused(calibration, tmp_path):
         ({"pours": "nowhere.csv"}, "nowhere.csv: no such file"),
         ({"held_out": "nowhere.nc"}, "nowhere.nc: no such file"),
         ({"seed": -1}, "--seed: -1"),
+        ({"effects": "camera_dealy"}, "there is no effect camera_dealy"),
+        ({"accept": "foo"}, "--accept: 'foo' is none of the effects"),
+        ({"effects": "camera_delay", "accept": ["camera_tilt"]}, "choose from camera_delay"),
     ],
 )
 def test_what_cannot_be_used_is_refused_before_anything_is_simulated(calibration, options, said):

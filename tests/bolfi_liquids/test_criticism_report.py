@@ -165,8 +165,8 @@ def test_the_command_line_says_what_was_found(criticism_section):
     text = printed(criticism_section, None)
     assert "the missing effect is camera delay" in text
     assert "camera delay: 0.05 s (90 %: 0.04 to 0.06)" in text
-    assert "gap beyond noise: before 1.25 deg RMS, after 0.31 deg\n" in text
-    assert "held out: before 1.50 deg RMS, after 0.42 deg (noise: 0.33 deg)" in text
+    assert "gap beyond noise: before 1.25 deg RMS, after 0.31 deg (noise: 0.33 deg)" in text
+    assert "held out: before 1.50 deg RMS, after 0.42 deg (noise: 0.40 deg)" in text
     assert "surest in stroke 1, xz plane, 1.0 to 2.0 s (1-first.nc): 2.50 deg RMS" in text
 
 

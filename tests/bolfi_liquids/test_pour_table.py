@@ -25,6 +25,12 @@ def test_amounts_in_any_unit_become_fractions(tmp_path):
     np.testing.assert_allclose(table.distance, [0.015, 0.015, 0.03])
 
 
+def test_a_table_without_names_is_of_one_liquid_whatever_it_is_called(tmp_path):
+    nameless = [row.split(",", 1)[1] for row in ROWS[:3]]
+    path = written(tmp_path, nameless, HEADER.split(",", 1)[1])
+    assert len(open_pours(path, liquid="glycerin").distance) == 3
+
+
 def test_one_liquid_needs_no_name(tmp_path):
     assert open_pours(written(tmp_path, ROWS[:3])).liquid == "water"
 
@@ -34,10 +40,18 @@ def test_one_liquid_needs_no_name(tmp_path):
     [
         (ROWS, HEADER, None, "holds pours of oil, water; say whose to take: --liquid NAME"),
         (ROWS, HEADER, "gel", "not of gel"),
-        (ROWS, HEADER, "oil", "holds 1 pours; give at least 3"),
+        (ROWS, HEADER, "oil", "too few pours: 1; give at least 3"),
         (ROWS, HEADER.replace("retained", "kept"), None, "has no column retained"),
         ([*ROWS[:2], "water,90,x,1,1,1"], HEADER, None, "line 4, column distance_cm: 'x'"),
         ([*ROWS[:2], "water,90,1,1,-1,1"], HEADER, None, "line 4, column retained: -1"),
+        (
+            [*ROWS[:2], "water,-30,1,1,1,1"],
+            HEADER,
+            None,
+            "angular_velocity_deg_s: -30",
+        ),
+        ([*ROWS[:2], "water,90,200,1,1,1"], HEADER, None, "200 is not between -20 and 50"),
+        ([], "", None, "is empty"),
         ([*ROWS[:2], "water,90,1,0,0,0"], HEADER, None, "line 4: spilled, received and retained"),
     ],
 )
