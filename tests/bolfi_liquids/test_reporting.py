@@ -132,7 +132,7 @@ def test_page_shows_the_criticism_before_the_pour(criticised):
     assert "77 to criticise it with" in how
     assert "baseline clean.nc, SHA-256" in how
     assert "abc123" in how
-    assert "criticism: accepted by" in how
+    assert "criticism: effects" in how
     assert "camera_delay, camera_tilt" in how and "held out" in how
 
 
