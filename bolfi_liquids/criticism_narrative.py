@@ -46,7 +46,7 @@ def listed(names: Sequence[str], last: str = "and") -> str:
 
 
 def verdict_sentence(section: Mapping[str, Any]) -> str:
-    """The conclusion; from the section "criticise" of summary.json, or its entry "pours"."""
+    """The conclusion; from the section "criticise" of summary.json, or its "stirs" or "pours"."""
     refuted = section["refuted"]
     kind, effects, p = section["verdict"], section["effects"], f"p = {section['p_value']:.2g}"
     if kind == "none":
