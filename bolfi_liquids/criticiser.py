@@ -129,12 +129,6 @@ def _stirs(
     particles = stirring.setups[0].particles
     kept_back = [stirring_of([recording], particles) for recording in inputs.held_out]
     extensions = effects_of("stir", settings.effects)
-    if not extensions:
-        raise InputError(
-            "none of the effects acts in a stir",
-            where="--effects",
-            fix=f"choose from {', '.join(effects_of('stir'))}",
-        )
     return inference.criticise(
         stir_experiment(stirring, usual_for(stirring, clean), "stir"),
         calibration.prior,

@@ -31,6 +31,10 @@ class Criticism:
     tree: "DataTree"
     summary: Mapping[str, Any]
 
+    def __repr__(self) -> str:
+        found = ", ".join((self.verdict, *self.effects))
+        return f"Criticism({str(self.base.path)!r}: {found}, p = {self.summary['p_value']:.2g})"
+
     @classmethod
     def open(cls, run: str | Path) -> "Criticism":
         """Read a finished criticism.

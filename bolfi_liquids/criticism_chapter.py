@@ -1,7 +1,7 @@
 """What the report shows of a criticism."""
 
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -79,6 +79,7 @@ def _results(section: Mapping[str, Any], calibrated: Mapping[str, Any]) -> list[
     sentences = [
         narrative.verdict_sentence(section),
         narrative.stirs_sentence(section),
+        narrative.considered_sentence(section),
         narrative.accepted_sentence(section),
         *(narrative.coefficient_sentence(*item) for item in section["coefficient"].items()),
         *narrative.refit_sentences(section, calibrated),
@@ -120,25 +121,18 @@ def _suggestion_rows(section: Mapping[str, Any]) -> list[list[str]]:
 def _effects_part(name: str, node: "DataTree") -> dict[str, Any]:
     """Scores, likenesses and the table of effects of a source."""
     effects, confusion = (node[group].to_dataset() for group in ("effects", "confusion"))
-    held = held_out_of(node)
-    refuted = [] if held is None else held["explanation"].to_numpy()[~held["holds"].to_numpy()]
     return {
         "name": name,
         "scores": to_svg(score_plot(node), f"scores-{name}"),
         "confusion": to_svg(confusion_plot(node), f"confusion-{name}"),
         "rows": [
-            _effect_row(str(effect), effects.sel(effect=effect), confusion, refuted)
+            _effect_row(str(effect), effects.sel(effect=effect), confusion)
             for effect in effects["effect"].to_numpy()
         ],
     }
 
 
-def _effect_row(
-    name: str, found: "Dataset", confusion: "Dataset", refuted: Collection[str]
-) -> list[str]:
-    status = str(found["status"].item())
-    if name in refuted:
-        status = "refuted by held-out data"
+def _effect_row(name: str, found: "Dataset", confusion: "Dataset") -> list[str]:
     return [
         narrative.words(name),
         _number(found["typical"].item(), ".3g", narrative.unit_of(name)),
@@ -147,7 +141,7 @@ def _effect_row(
         _number(found["gain"].item(), ".1f"),
         _number(found["p_value"].item(), ".2g"),
         _number(found["coefficient"].item(), ".3g", narrative.unit_of(name)),
-        status,
+        str(found["status"].item()),
     ]
 
 

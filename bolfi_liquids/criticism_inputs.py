@@ -35,6 +35,7 @@ class Inputs:
         stirring: What the run was calibrated on.
         held_out: Recordings of the same liquid that nothing is fitted to.
         baseline: Recordings believed to lack nothing; none of those before.
+        left_out: Names of recordings that were given as clean, but are criticised or held out.
         table: Pours of the liquid, if there are any.
         held_out_table: Pours of the liquid that nothing is fitted to, if there are any.
         cups: With which they were poured.
@@ -44,6 +45,7 @@ class Inputs:
     stirring: Stirring
     held_out: tuple[Recording, ...]
     baseline: tuple[Recording, ...]
+    left_out: tuple[str, ...]
     table: PourTable | None
     held_out_table: PourTable | None
     cups: "Cups"
@@ -90,14 +92,15 @@ def open_inputs(  # noqa: PLR0913  all that a criticism may be given
     Raises:
         InputError: Something cannot be used.
     """
-    _check_accept(settings)
+    _check_effects(settings)
     record = dict(calibration.record)
     stirring = stirring_of(
         kept_recordings(calibration.path, record), int(record["settings"]["particles"])
     )
     kept_back = open_recordings(held_out)
     _check_held_out(stirring, kept_back)
-    others = _others(open_recordings(baseline), [*stirring.recordings, *kept_back])
+    believed = open_recordings(baseline)
+    others = _others(believed, [*stirring.recordings, *kept_back])
     _check_baseline(stirring, others)
     table, held_out_table = _opened(pours), _opened(held_out_pours)
     _check_pours(table, held_out_table, settings)
@@ -105,6 +108,7 @@ def open_inputs(  # noqa: PLR0913  all that a criticism may be given
         stirring=stirring,
         held_out=tuple(kept_back),
         baseline=others,
+        left_out=tuple(r.path.name for r in believed if r.hash not in {o.hash for o in others}),
         table=table,
         held_out_table=held_out_table,
         cups=bundled_cups() if cups is None else cups,
@@ -113,6 +117,12 @@ def open_inputs(  # noqa: PLR0913  all that a criticism may be given
 
 
 def _opened(pours: Pours | None) -> PourTable | None:
+    if pours is not None and not isinstance(pours, Pours):
+        raise InputError(
+            f"{pours!r:.80} is no table of pours",
+            where="pours",
+            fix="give the path of a CSV file, or what open_pours returns",
+        )
     return open_pours(pours) if isinstance(pours, str | Path) else pours
 
 
@@ -149,9 +159,14 @@ def _check_held_out(stirring: Stirring, held_out: Sequence[Recording]) -> None:
             )
 
 
-def _check_accept(settings: CriticismSettings) -> None:
+def _check_effects(settings: CriticismSettings) -> None:
     considered = settings.effects or tuple(effects_of("stir") | effects_of("pour"))
-    effects_of("stir", settings.effects)  # refuses names that there are not
+    if not effects_of("stir", settings.effects):
+        raise InputError(
+            "none of the effects acts in a stir",
+            where="--effects",
+            fix=f"choose from {', '.join(effects_of('stir'))}",
+        )
     for name in settings.accept or ():
         if name not in considered:
             raise InputError(

@@ -53,8 +53,10 @@ def verdict_sentence(section: Mapping[str, Any]) -> str:
         return f"Simulation and data agree ({p}): nothing is known to be missing."
     differ = f"Simulation and data differ ({p})"
     if kind == "effect":
-        missing = "the missing effect is" if len(effects) == 1 else "the missing effects are"
-        return f"{differ}: {missing} {listed(effects)}."
+        missing = "the missing effect" if len(effects) == 1 else "the missing effects"
+        if not section["held_out"]:
+            return f"{differ}: {missing} may be {listed(effects)}; no data held out confirm it."
+        return f"{differ}: {missing} {'is' if len(effects) == 1 else 'are'} {listed(effects)}."
     if kind == "tie":
         return (
             f"{differ}: the missing effect is {listed(effects, 'or')}, and these data cannot say"
@@ -83,19 +85,31 @@ def accepted_sentence(section: Mapping[str, Any]) -> str:
     if not section["requested"]:
         return ""
     names = listed(section["requested"])
-    return f"{names.capitalize()} joined the model on request (--accept), whatever the verdict."
+    sentence = f"{names.capitalize()} joined the model on request (--accept)"
+    if section["unsupported"]:
+        return f"{sentence}, although these data do not bear out {listed(section['unsupported'])}."
+    return f"{sentence}, whatever the verdict."
 
 
 def baseline_sentence(section: Mapping[str, Any]) -> str:
     """What the verdict owes to clean recordings, or a warning where there were none."""
-    count = section["baseline"]
-    if not count:
-        return NO_BASELINE
+    count, left_out = section["baseline"], section["baseline_left_out"]
     recordings = "clean recording" if count == 1 else "clean recordings"
-    return (
+    sentence = (
         f"What the simulator gets wrong on {count} {recordings} as well counts as its own and not"
         " as a missing effect."
+        if count
+        else NO_BASELINE
     )
+    if not left_out:
+        return sentence
+    return f"{sentence} Not counted as clean, as it is looked at itself: {', '.join(left_out)}."
+
+
+def considered_sentence(section: Mapping[str, Any]) -> str:
+    """Which effects alone could be named; empty if all of them."""
+    considered = section["made_from"]["settings"]["effects"]
+    return f"Only {listed(considered)} could be named (--effects)." if considered else ""
 
 
 def coefficient_sentence(name: str, values: Mapping[str, float]) -> str:

@@ -5,7 +5,8 @@ Its groups, under `stirs` and, where pours were given, under `pours`:
 - `residual`: over the data's own dimensions, `observed`, and with `_before` and `_after` the
   expectation of the base and of the extended model, and the sd of observed less expected;
 - `where`: over windows, their labels, and RMS, z and p-value before and after;
-- `effects`: over effects, what was found out about each;
+- `effects`: over effects, what was found out about each; `unit` is that of `typical` and
+  `coefficient`;
 - `confusion`: cosines between the effects' signatures;
 - `held_out`: over explanations and recordings, the gap before and after;
 - `suggestions`: over further experiments, how well each would separate the explanations.
@@ -27,6 +28,10 @@ if TYPE_CHECKING:
     from . import inference
 
 
+UNITS = {"stirs": {"units": "rad"}, "pours": {"units": "1"}}
+ONE = {"units": "1"}
+
+
 def criticism_tree(findings: Findings) -> "DataTree":
     """Everything that a report shows."""
     from xarray import DataTree
@@ -34,11 +39,11 @@ def criticism_tree(findings: Findings) -> "DataTree":
     groups: dict[str, Any] = {"/posterior": _posterior(findings)}
     for name, source in findings.sources.items():
         groups[f"/{name}/residual"] = _residual(findings, name, source)
-        groups[f"/{name}/where"] = _where(source)
+        groups[f"/{name}/where"] = _where(source, UNITS[name])
         groups[f"/{name}/effects"] = _effects(source)
         groups[f"/{name}/confusion"] = _confusion(source)
         if source.gaps:
-            groups[f"/{name}/held_out"] = _held_out(source)
+            groups[f"/{name}/held_out"] = _held_out(source, UNITS[name])
         if source.suggestions:
             groups[f"/{name}/suggestions"] = _suggestions(source)
     tree = DataTree.from_dict(groups)
@@ -91,7 +96,7 @@ def _residual(findings: Findings, name: str, source: "inference.Criticism") -> "
         if hypothesis is not None:
             expected, sd = _expected(hypothesis)
             columns |= {f"expected_{when}": (dims, expected), f"sd_{when}": (dims, sd)}
-    return Dataset(columns, coords=coords)
+    return Dataset({key: (*of, UNITS[name]) for key, of in columns.items()}, coords=coords)
 
 
 def _expected(hypothesis: "inference.Hypothesis") -> tuple[np.ndarray, np.ndarray]:
@@ -101,7 +106,7 @@ def _expected(hypothesis: "inference.Hypothesis") -> tuple[np.ndarray, np.ndarra
     return hypothesis.fit.observed - residual, sd
 
 
-def _where(source: "inference.Criticism") -> "Dataset":
+def _where(source: "inference.Criticism", units: dict[str, str]) -> "Dataset":
     from xarray import Dataset
 
     keys = {key: type(value) for found in source.before for key, value in found.label.items()}
@@ -111,9 +116,9 @@ def _where(source: "inference.Criticism") -> "Dataset":
     }
     for when, windows in (("before", source.before), ("after", source.after)):
         if windows:
-            for field in ("rms", "z", "p_value"):
+            for field, of in (("rms", units), ("z", ONE), ("p_value", ONE)):
                 values = [getattr(found, field) for found in windows]
-                columns[f"{field}_{when}"] = ("window", values)
+                columns[f"{field}_{when}"] = ("window", values, of)
     return Dataset(columns)
 
 
@@ -137,20 +142,33 @@ def _effects(source: "inference.Criticism") -> "Dataset":
         candidate = singles.get(name)
         if candidate is None:
             return {**found, "status": "not needed"}
-        status = "accepted" if candidate.accepted else "rejected"
         return {
             **found,
             "gain": candidate.gain,
             "p_value": candidate.check.p_value,
             "coefficient": candidate.hypothesis.best[name],
-            "status": status if candidate.refitted else f"{status}, untested by a refit",
+            "status": _status(candidate, source),
         }
 
     rows = [of(name) for name in names]
     numbers = ("typical", "snr", "score", "gain", "p_value", "coefficient")
     columns = {key: ("effect", [row.get(key, np.nan) for row in rows]) for key in numbers}
     status = ("effect", [row["status"] for row in rows])
-    return Dataset({**columns, "status": status}, coords={"effect": names})
+    units = ("effect", [source.units[name] for name in names])
+    return Dataset({**columns, "unit": units, "status": status}, coords={"effect": names})
+
+
+def _status(candidate: "inference.Candidate", source: "inference.Criticism") -> str:
+    """What became of an explanation by one effect."""
+    if candidate.names in source.tied:
+        return "named" if source.verdict.kind == "effect" else "possible"
+    if candidate.names in source.refuted:
+        return "refuted by held-out data"
+    if not candidate.passes:
+        return "rejected"
+    if not candidate.refitted:
+        return "untested by a refit"
+    return "less likely"
 
 
 def _confusion(source: "inference.Criticism") -> "Dataset":
@@ -163,10 +181,8 @@ def _confusion(source: "inference.Criticism") -> "Dataset":
     )
 
 
-def _held_out(source: "inference.Criticism") -> "Dataset":
+def _held_out(source: "inference.Criticism", units: dict[str, str]) -> "Dataset":
     from xarray import Dataset
-
-    from .inference import holds
 
     names = [" with ".join(explanation) for explanation in source.gaps]
     gaps = list(source.gaps.values())
@@ -174,10 +190,11 @@ def _held_out(source: "inference.Criticism") -> "Dataset":
         field: (
             ("explanation", "recording"),
             [[getattr(gap, field) for gap in row] for row in gaps],
+            ONE if field in ("p_value", "lpd_gain") else units,
         )
         for field in ("before", "after", "noise", "floor", "p_value", "lpd_gain")
     }
-    columns["holds"] = ("explanation", [holds(row) for row in gaps])
+    columns["holds"] = ("explanation", [key not in source.refuted for key in source.gaps])
     labels = [gap.label for gap in gaps[0]]
     return Dataset(columns, coords={"explanation": names, "recording": labels})
 

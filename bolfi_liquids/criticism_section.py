@@ -29,7 +29,9 @@ def criticism_section(findings: Findings, tree: "DataTree", seconds: float) -> d
         "effects": list(effects),
         "accepted": list(findings.accepted),
         "requested": list(findings.requested),
+        "unsupported": list(findings.unsupported),
         "refuted": [name for source in findings.sources.values() for name in _refuted(source)],
+        "held_out": sum(_held_out(source) for source in findings.sources.values()),
         "reason": " ".join(source.verdict.reason for source in findings.sources.values()),
         "p_value": min(1.0, len(p_values) * min(p_values)),
         "where": _sure(stirs),
@@ -48,6 +50,7 @@ def criticism_section(findings: Findings, tree: "DataTree", seconds: float) -> d
         ],
         "untested": [name for source in findings.sources.values() for name in source.untested],
         "baseline": len(findings.baseline),
+        "baseline_left_out": list(findings.inputs.left_out),
         "noise": _noise(findings),
         "seconds": seconds,
         "made_from": findings.inputs.made_from,
@@ -66,9 +69,12 @@ def _together(findings: Findings) -> tuple[str, tuple[str, ...]]:
 
 def _refuted(source: "inference.Criticism") -> list[str]:
     """Explanations that held-out data do not bear out."""
-    from .inference import holds
+    return [" with ".join(names) for names in source.refuted]
 
-    return [" with ".join(names) for names, gaps in source.gaps.items() if not holds(gaps)]
+
+def _held_out(source: "inference.Criticism") -> int:
+    """Data held out on which something was tried."""
+    return max(map(len, source.gaps.values()), default=0)
 
 
 def _sure(source: "inference.Criticism") -> list[dict[str, Any]]:
@@ -86,8 +92,8 @@ def _sure(source: "inference.Criticism") -> list[dict[str, Any]]:
     ]
 
 
-def _rms(hypothesis: "inference.Hypothesis | None") -> float | None:
-    return None if hypothesis is None else rms(hypothesis.difference)
+def _rms(hypothesis: "inference.Hypothesis") -> float:
+    return rms(hypothesis.difference)
 
 
 def _degrees(value: float | None) -> float | None:
@@ -100,6 +106,8 @@ def _gap_deg(source: "inference.Criticism") -> dict[str, float | None]:
     A gap is the RMS of observed less expected beyond what the cameras and the simulator's own
     noise would leave of a right model, in quadrature; the RMS itself stands beside it.
     """
+    from .inference import beyond
+
     best = source.leading
     base = source.base.hypothesis
     own = np.diag(base.own) + np.diag(source.measurement)
@@ -108,11 +116,11 @@ def _gap_deg(source: "inference.Criticism") -> dict[str, float | None]:
     def pooled(values: list[float]) -> float | None:
         return rms(np.array(values)) if values else None
 
-    after = None if best is None else _rms(best.hypothesis)
+    after = best and _rms(best.hypothesis)
     noise = rms(np.sqrt(own))
     numbers = {
-        "before": _beyond(_rms(base), noise),
-        "after": _beyond(after, noise),
+        "before": beyond(_rms(base), noise),
+        "after": None if after is None else beyond(after, noise),
         "held_out_before": pooled([gap.excess[0] for gap in gaps]),
         "held_out_after": pooled([gap.excess[1] for gap in gaps]),
         "noise": noise,
@@ -125,16 +133,12 @@ def _gap_deg(source: "inference.Criticism") -> dict[str, float | None]:
     return {name: _degrees(value) for name, value in numbers.items()}
 
 
-def _beyond(rms: float | None, noise: float) -> float | None:
-    return None if rms is None else max(rms**2 - noise**2, 0.0) ** 0.5
-
-
 def _pour_gap(source: "inference.Criticism") -> dict[str, Any]:
     """RMS of the spilled and retained fractions, and the verdict on the pours alone."""
     best = source.leading
     return {
         "before": _rms(source.base.hypothesis),
-        "after": _rms(None if best is None else best.hypothesis),
+        "after": best and _rms(best.hypothesis),
         **_verdict(source),
     }
 
@@ -146,6 +150,7 @@ def _verdict(source: "inference.Criticism") -> dict[str, Any]:
         "effects": list(source.verdict.effects),
         "p_value": source.verdict.p_value,
         "refuted": _refuted(source),
+        "held_out": _held_out(source),
     }
 
 

@@ -14,7 +14,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from xarray import DataTree
 
-STATUSES = {"accepted": BLUE, "rejected": ORANGE, "not needed": GREY, "untested": GREY}
+STATUSES = {
+    "named": BLUE,
+    "possible": BLUE,
+    "less likely": LIGHT,
+    "refuted": ORANGE,
+    "rejected": ORANGE,
+    "not needed": GREY,
+    "untested": GREY,
+}
 LINEAR = 4.0  # log likelihood up to which its axis is linear: what one must excel another by
 USUAL = 2.0  # sd within which a score is nothing
 BINS = 40
@@ -84,8 +92,7 @@ def confusion_plot(node: "DataTree") -> "Figure":
         figure = new_figure(0.45 * len(names) + 2.4, 0.36 * len(names) + 1.5)
         axes = figure.subplots()
         image = axes.imshow(cosine, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
-        label = "size of the cosine between signatures"
-        figure.colorbar(image, ax=axes, label=label, shrink=0.8)
+        figure.colorbar(image, ax=axes, label="size of the cosine")
         axes.set_xticks(range(len(names)), names, rotation=45, ha="right", rotation_mode="anchor")
         axes.set_yticks(range(len(names)), names)
         axes.tick_params(length=0)

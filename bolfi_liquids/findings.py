@@ -48,6 +48,17 @@ class Findings:
         return tuple(name for name in self.accepted if name in asked)
 
     @property
+    def unsupported(self) -> tuple[str, ...]:
+        """Those of the requested that do not explain the difference: the test rejects them, or
+        held-out data do."""
+        return tuple(
+            name
+            for source in self.sources.values()
+            if source.leading is not None and not source.leading.accepted
+            for name in source.accepted
+        )
+
+    @property
     def accepted(self) -> tuple[str, ...]:
         """Effects that joined the model."""
         return tuple(name for source in self.sources.values() for name in source.accepted)

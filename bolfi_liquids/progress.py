@@ -42,7 +42,8 @@ def progress_bar(task: str, total: int, *, shown: bool) -> Iterator[Advance]:
 
 @contextmanager
 def phases(*, shown: bool) -> Iterator[Callable[[str, int], None]]:
-    """A line for each phase of long work, with a running count of simulations.
+    """The phase of long work with a running count of simulations; one line for each phase where
+    there is no terminal.
 
     Yields:
         Called with the phase and the simulations finished in it since the last call.
@@ -61,9 +62,9 @@ def phases(*, shown: bool) -> Iterator[Callable[[str, int], None]]:
 
         def report(phase: str, finished: int) -> None:
             nonlocal count, current
-            count += finished
             if phase != current and not console.is_terminal:
-                console.print(phase, highlight=False)
+                console.print(f"{phase} (after {count} simulations)", highlight=False)
+            count += finished
             current = phase
             bar.update(handle, description=f"{phase} ({count} simulations)")
 

@@ -77,7 +77,15 @@ def open_recordings(sources: Source | Sequence[Source]) -> list[Recording]:
     Raises:
         InputError: One of them cannot be used.
     """
-    listed = [sources] if isinstance(sources, Source) else list(sources)
+    listed = list(sources) if isinstance(sources, Sequence) else [sources]
+    listed = [sources] if isinstance(sources, str) else listed
+    for one in listed:
+        if not isinstance(one, Source):
+            raise InputError(
+                f"{one!r:.80} is no recording",
+                where="recordings",
+                fix="give paths of NetCDF files, or what open_recording returns",
+            )
     return [s if isinstance(s, Recording) else open_recording(s) for s in listed]
 
 

@@ -9,7 +9,7 @@ from .errors import InputError
 from .files import write_text
 
 NAME = "summary.json"
-RESTORE = "delete it; calibrate --resume and pour write it again, from what was simulated"
+RESTORE = "delete it; calibrate --resume, criticise and pour write it again from what was simulated"
 
 
 def read_summary(run: Path) -> dict[str, Any]:

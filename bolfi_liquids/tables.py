@@ -62,11 +62,12 @@ def print_criticism(
         effects: The group of that name; without it, nothing is said of those that nearly explain.
         console: Where to print.
     """
-    lines = [criticism.verdict_sentence(section)]
-    if not section["baseline"]:
-        lines.append(criticism.NO_BASELINE)
-    if accepted := criticism.accepted_sentence(section):
-        lines.append(accepted)
+    lines = [
+        criticism.verdict_sentence(section),
+        criticism.baseline_sentence(section),
+        criticism.considered_sentence(section),
+        criticism.accepted_sentence(section),
+    ]
     lines += [
         f"{criticism.words(name)}: {criticism.interval(name, values)}"
         for name, values in section["parameters"].items()
@@ -86,7 +87,7 @@ def print_criticism(
         lines += [criticism.stirs_sentence(section), criticism.pours_sentence(section["pours"])]
     if section["suggestions"]:
         lines.append(criticism.suggestion_sentence(section))
-    for line in lines:
+    for line in filter(None, lines):
         console.print(line, highlight=False, markup=False)
 
 

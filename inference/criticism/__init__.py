@@ -4,7 +4,7 @@ from .clean import own_residual
 from .criticise import Criticism, criticise
 from .experiment import Experiment, Proposal
 from .extension import Extension
-from .held_out import Gap, holds
+from .held_out import Gap, beyond
 from .hypothesis import Hypothesis
 from .laboratory import Keeping
 from .misfit import Check, Found, Window
@@ -35,8 +35,8 @@ __all__ = [
     "UsualResidual",
     "Verdict",
     "Window",
+    "beyond",
     "criticise",
-    "holds",
     "own_residual",
     "rest_noise",
     "usual_residual",

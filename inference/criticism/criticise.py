@@ -40,6 +40,7 @@ class Criticism:
         untested: Effects whose simulations failed, or that were not refitted though they might
             explain the difference.
         noise: The experiment's.
+        units: Of the effects' coefficients.
         tied: Names of each explanation that remains, best first.
         simulations: Runs that were asked for, those found in the bank included.
     """
@@ -56,6 +57,7 @@ class Criticism:
     suggestions: tuple[Suggestion, ...]
     untested: tuple[str, ...]
     noise: Noise
+    units: Mapping[str, str]
     tied: tuple[tuple[str, ...], ...]
     simulations: int
 
@@ -68,6 +70,11 @@ class Criticism:
     def singles(self) -> dict[str, Candidate]:
         """The explanations by one effect."""
         return {one.names[0]: one for one in self.candidates if len(one.names) == 1}
+
+    @property
+    def refuted(self) -> tuple[tuple[str, ...], ...]:
+        """Explanations that the held-out data do not bear out."""
+        return tuple(names for names, found in self.gaps.items() if not holds(found))
 
     @property
     def leading(self) -> Candidate | None:
@@ -175,6 +182,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         suggestions=tuple(suggest(laboratory, proposals, _rivals(verdict, candidates, members))),
         untested=(*untested, *_left_out(candidates)),
         noise=experiment.noise,
+        units={name: one.unit for name, one in extensions.items()},
         tied=tuple(one.names for one in tied(members)),
         simulations=count,
     )

@@ -44,13 +44,17 @@ class Gap(NamedTuple):
     @property
     def excess(self) -> tuple[float, float]:
         """Before and after, less the noise (in quadrature)."""
-        before, after = (max(rms**2 - self.noise**2, 0.0) ** 0.5 for rms in self[1:3])
-        return before, after
+        return beyond(self.before, self.noise), beyond(self.after, self.noise)
 
     @property
     def fits(self) -> bool:
         """Whether noise, and what is usual, may be all that is left."""
         return self.p_value > ACCEPTED
+
+
+def beyond(rms: float, noise: float) -> float:
+    """What of an RMS noise does not explain, in quadrature."""
+    return max(rms**2 - noise**2, 0.0) ** 0.5
 
 
 def holds(gaps: Sequence[Gap]) -> bool:

@@ -51,7 +51,8 @@ class Check(NamedTuple):
             there being two.
         p_score: By the largest score of an effect, corrected for there being several.
         p_smooth: By the slow part of the residual, whatever its shape.
-        scores: Effect -> score, standard normal if it does not act.
+        scores: Effect -> score, standard normal if it does not act; less, where clean data have
+            large scores, too.
     """
 
     p_value: float
@@ -75,28 +76,37 @@ def null_draws(
     return hypothesis.project(hypothesis.whiten(measured + simulated))
 
 
-def check(hypothesis: Hypothesis, unused: Mapping[str, np.ndarray], null: np.ndarray) -> Check:
+def check(
+    hypothesis: Hypothesis,
+    unused: Mapping[str, np.ndarray],
+    null: np.ndarray,
+    clean: Mapping[str, float] | None = None,
+) -> Check:
     """Test a model against the data.
 
     Args:
         unused: Directions [m] of the effects that do not act in it.
         null: Residuals [m, n] if it were right, see `null_draws`.
+        clean: Sizes of these effects' scores on clean data, by which scores are divided: what
+            the simulator seems to need always is not missing here.
     """
     residual = hypothesis.project(hypothesis.whiten(hypothesis.difference))
     series = hypothesis.surrogate.output.series
     modes = slow_modes(hypothesis.layout, MODES) if series else np.eye(len(residual))
     span = orthonormal(hypothesis.project(hypothesis.whiten(modes.T)))
     rows = np.stack(list(unused.values())) if unused else np.zeros((0, len(residual)))
+    sizes = np.array([(clean or {}).get(name, 1.0) for name in unused])
+    scores = (rows @ residual)[:, 0] / sizes
 
-    def measures(white: np.ndarray) -> np.ndarray:
-        largest = np.abs(rows @ white).max(0, initial=0.0)
-        return np.stack([largest, np.sum((span.T @ white) ** 2, 0)])
+    def measures(scores: np.ndarray, white: np.ndarray) -> np.ndarray:
+        slow = np.sum((span.T @ white) ** 2, 0)
+        return np.stack([np.abs(scores).max(0, initial=0.0), slow])
 
-    seen, usual = measures(residual)[:, 0], measures(null)
+    seen, usual = measures(scores[:, None], residual)[:, 0], measures(rows @ null, null)
     p_score, p_smooth = exceedance(usual, seen)
     together = exceedance(-_own_exceedance(usual).min(0)[None], [-min(p_score, p_smooth)])[0]
-    scores = dict(zip(unused, (rows @ residual)[:, 0].tolist(), strict=True))
-    return Check(float(together), float(p_score), float(p_smooth), scores)
+    named = dict(zip(unused, scores.tolist(), strict=True))
+    return Check(float(together), float(p_score), float(p_smooth), named)
 
 
 def locate(hypothesis: Hypothesis, windows: Sequence[Window], null: np.ndarray) -> list[Found]:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .clean_scores import clean_scores
 from .design import NARROW, WIDE, Box, around, fill, with_coefficient
 from .extension import extended
 from .hypothesis import Hypothesis, hypothesise
@@ -66,17 +67,21 @@ class Study(NamedTuple):
         return self.laboratory.run(phase, fill(box, prior, self.seed, count))
 
     def check(
-        self, hypothesis: Hypothesis, signatures: Mapping[str, Signature]
+        self,
+        hypothesis: Hypothesis,
+        signatures: Mapping[str, Signature],
+        clean: Mapping[str, float],
     ) -> tuple[Check, np.ndarray]:
         """Its test, and residuals [m, n] of a right model."""
         null = null_draws(hypothesis, self.noise, np.random.default_rng(self.seed))
-        return check(hypothesis, directions(hypothesis, signatures), null), null
+        return check(hypothesis, directions(hypothesis, signatures), null, clean), null
 
     def candidate(self, base: "Base", hypothesis: Hypothesis, refitted: bool = False) -> Candidate:
         """The extended model, tested."""
         metric = base.hypothesis
         gain = 0.5 * (metric.misfit(metric) - hypothesis.misfit(metric))
-        return Candidate(hypothesis, self.check(hypothesis, base.signatures)[0], gain, refitted)
+        tested, _ = self.check(hypothesis, base.signatures, base.clean)
+        return Candidate(hypothesis, tested, gain, refitted)
 
 
 class Base(NamedTuple):
@@ -86,6 +91,7 @@ class Base(NamedTuple):
     check: Check
     null: np.ndarray  # [m, n], residuals of a right model
     signatures: dict[str, Signature]
+    clean: dict[str, float]  # sizes of the effects' scores on clean data
     singles: dict[str, Hypothesis]
     runs: Runs
     given: int  # of the runs, made before
@@ -121,9 +127,11 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
         name: signature(base, single, laboratory.extensions[name])
         for name, single in singles.items()
     }
-    tested, null = study.check(base, signatures)
+    clean = clean_scores(base, study.noise, signatures)
+    tested, null = study.check(base, signatures, clean)
     given = 0 if earlier is None else len(earlier)
-    return Base(base, tested, null, signatures, singles, joined(parts), given), tuple(untested)
+    found = Base(base, tested, null, signatures, clean, singles, joined(parts), given)
+    return found, tuple(untested)
 
 
 def explain(

@@ -39,7 +39,7 @@ class UsualResidual:
         # over more samples than it was learned from, it must be made positive anew
         known = positive_autocovariance(np.append(self.autocovariance, np.zeros(missing)))
         stationary = known[apart] * np.equal.outer(at.channel, at.channel)
-        shapes = self._shapes(at)
+        shapes = self.shapes_at(at)
         return stationary + shapes.T @ shapes
 
     def draw(self, rng: np.random.Generator, at: Layout, count: int) -> np.ndarray:
@@ -47,7 +47,8 @@ class UsualResidual:
         freedom = max(self.freedom, LEAST_FREEDOM)
         return np.sqrt(freedom / rng.chisquare(freedom, count))[:, None] * drawn
 
-    def _shapes(self, at: Layout) -> np.ndarray:
+    def shapes_at(self, at: Layout) -> np.ndarray:
+        """The clean residuals [k, n] at n samples; missing ones are zero."""
         flat = self.shapes[:, at.sample, at.channel] if self.shapes.size else None
         return np.zeros((0, len(at.sample))) if flat is None else np.nan_to_num(flat)
 
@@ -89,6 +90,12 @@ def without_usual(noise: Noise) -> Noise:
     if not isinstance(noise, SumOfNoises):
         return noise
     return SumOfNoises(tuple(p for p in noise.parts if not isinstance(p, UsualResidual)))
+
+
+def usual_in(noise: Noise) -> UsualResidual | None:
+    """The part of the noise that is the simulator's fault, if any is known."""
+    parts = noise.parts if isinstance(noise, SumOfNoises) else (noise,)
+    return next((part for part in parts if isinstance(part, UsualResidual)), None)
 
 
 def _autocovariance(residual: np.ndarray, lags: int) -> np.ndarray:

@@ -70,7 +70,9 @@ def criticism_section():
         "effects": ["camera_delay"],
         "accepted": ["camera_delay"],
         "requested": [],
+        "unsupported": [],
         "refuted": [],
+        "held_out": 1,
         "reason": "",
         "p_value": 0.002,
         "where": [
@@ -93,9 +95,10 @@ def criticism_section():
         "suggestions": [],
         "untested": [],
         "baseline": 2,
+        "baseline_left_out": [],
         "noise": {"sd_deg": 0.2, "sd_uncertainty": 0.4, "correlation": 0.25, "samples": 32},
         "seconds": 8.0,
-        "made_from": {},
+        "made_from": {"settings": {"effects": None}},
     }
 
 
@@ -150,7 +153,7 @@ def _held_out(holds):
     )
 
 
-def _made(*, after=True, held=None, pours=False, status=("accepted", "rejected", "rejected")):
+def _made(*, after=True, held=None, pours=False, status=("named", "rejected", "rejected")):
     """A tree as `criticise` writes it: two recordings of 2 s, and maybe four pours."""
     rng = np.random.default_rng(0)
     frames, each = ("frame", "plane"), 20

@@ -63,9 +63,7 @@ def test_effects_are_sorted_by_what_they_gain(made):
     labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
     assert labels == ["camera delay", "stick mass", "gripper scale"]
     texts = drawn(figure)
-    assert {"gain in log likelihood", "size of the score [sd]", "accepted", "rejected"} <= set(
-        texts
-    )
+    assert {"gain in log likelihood", "size of the score [sd]", "named", "rejected"} <= set(texts)
 
 
 def test_effects_that_were_not_fitted_are_sorted_by_score(made):

@@ -34,6 +34,7 @@ CALIBRATED = {"parameters": {"viscosity": {"q05": 0.8, "q50": 1.0, "q95": 1.2}}}
         (TIED, "the missing effect is camera delay or gripper scale, and these data cannot"),
         (UNKNOWN, "no known effect explains it: what is missing is not known."),
         (NONE, "agree (p = 0.4): nothing is known to be missing."),
+        ({"held_out": 0}, "the missing effect may be camera delay; no data held out confirm it."),
         ({"effects": EFFECTS}, "effects are camera delay, gripper scale and stick mass."),
     ],
 )
@@ -56,7 +57,7 @@ def test_chapter_of_an_effect_that_was_named(criticism_section, made):
     degrees = [f"{np.degrees(value):.2f}" for value in (0.03, 0.01, 0.008, 0.012)]
     assert chapter["held_rows"] == [["camera delay", "third.nc", *degrees, "0.4", "33.3", "yes"]]
     first = ["camera delay", "0.07 s", "14.0", "stick mass (-0.90)", "286.0", "0.8", "0.05 s"]
-    assert chapter["sources"][0]["rows"][0] == [*first, "accepted"]
+    assert chapter["sources"][0]["rows"][0] == [*first, "named"]
     assert "camera delay [s]" in chapter["coefficient"]
     assert "RMS of observed less expected [deg]" in chapter["held_out"]
     assert chapter["pours"] is None
@@ -86,11 +87,12 @@ def test_next_experiment_that_would_not_help_is_not_recommended(criticism_sectio
 
 def test_chapter_of_an_explanation_that_held_out_data_refute(criticism_section, made):
     chapter = criticism_chapter(
-        {**criticism_section, **REFUTED}, made(after=False, held=False), CALIBRATED
+        {**criticism_section, **REFUTED},
+        made(after=False, held=False, status=["refuted by held-out data", "rejected", "rejected"]),
+        CALIBRATED,
     )
     assert "camera delay explains these data, but data held out do not" in chapter["results"][0]
     assert "camera delay does not hold" in chapter["held_sentence"]
-    assert chapter["sources"][0]["rows"][0][-1] == "refuted by held-out data"
 
 
 def test_chapter_of_a_model_that_agrees(criticism_section, made):
@@ -111,10 +113,27 @@ def test_without_clean_recordings_the_reader_is_warned(criticism_section):
     assert warning not in narrative.baseline_sentence(criticism_section)
 
 
+def test_what_was_given_as_clean_but_not_counted_is_named(criticism_section):
+    section = {**criticism_section, "baseline_left_out": ["stir.nc"]}
+    sentence = narrative.baseline_sentence(section)
+    assert "2 clean recordings" in sentence
+    assert "Not counted as clean, as it is looked at itself: stir.nc." in sentence
+
+
+def test_that_few_effects_were_considered_is_said(criticism_section):
+    assert narrative.considered_sentence(criticism_section) == ""
+    few = {"settings": {"effects": ["camera_delay", "stick_mass"]}}
+    assert narrative.considered_sentence({**criticism_section, "made_from": few}) == (
+        "Only camera delay and stick mass could be named (--effects)."
+    )
+
+
 def test_what_was_accepted_on_request_is_not_said_to_be_found(criticism_section):
     asked = {**criticism_section, **NONE, "accepted": ["stick_mass"], "requested": ["stick_mass"]}
     assert narrative.accepted_sentence(asked).startswith("Stick mass joined the model on request")
     assert narrative.accepted_sentence(criticism_section) == ""
+    worse = {**asked, "unsupported": ["stick_mass"]}
+    assert "although these data do not bear out stick mass" in narrative.accepted_sentence(worse)
 
 
 def test_effects_that_could_not_be_simulated_are_named(criticism_section):
@@ -125,7 +144,7 @@ def test_effects_that_could_not_be_simulated_are_named(criticism_section):
 
 
 def test_pours_have_their_own_verdict(criticism_section, made):
-    agree = {"p_value": 0.3, "verdict": "none", "effects": [], "refuted": []}
+    agree = {"p_value": 0.3, "verdict": "none", "effects": [], "refuted": [], "held_out": 0}
     unexplained = {**agree, "p_value": 0.01, "verdict": "unknown"}
     pours = {"before": 0.051, "after": None, **agree}
     section = {**criticism_section, "stirs": unexplained, "pours": pours}
@@ -153,7 +172,7 @@ def printed(criticism_section, found):
 @pytest.mark.parametrize("changes", [{}, TIED, UNKNOWN, NONE])
 def test_the_command_line_fits_a_terminal(criticism_section, changes, made):
     text = printed(
-        {**criticism_section, **changes, "baseline": 0}, table(made(status=["accepted"] * 3))
+        {**criticism_section, **changes, "baseline": 0}, table(made(status=["named"] * 3))
     )
     lines = text.splitlines()
     assert len(lines) <= 20
