@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .noise import sensor_noise
 from .recordings import Recording
-from .stir_experiment import same_experiment, stir_experiment
+from .stir_experiment import camera_noise, same_experiment, stir_experiment
 from .stirring import stirring_of
 
 if TYPE_CHECKING:
@@ -55,7 +55,8 @@ def clean_residuals(
             made.append(finished)
             keeping.report(f"baseline {name}", finished)
 
-        experiment = stir_experiment(stirring_of([recording], particles), None, name)
+        cameras = camera_noise([recording])
+        experiment = stir_experiment(stirring_of([recording], particles), cameras, None, name)
         own = replace(keeping, report=report)
         residual = own_residual(experiment, prior, extensions, own, plan)
         return Clean(recording, residual, sum(made))

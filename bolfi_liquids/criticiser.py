@@ -18,12 +18,12 @@ from .pour_experiment import as_prior, pour_experiment
 from .pour_table import PourTable
 from .progress import phases
 from .proposals import pour_proposals, stir_proposals
-from .recordings import Source
+from .recordings import Recording, Source
 from .results import write_tree
 from .run_directory import CRITICISM, open_bank
 from .settings import CriticismSettings
-from .stir_experiment import camera_noise, effects_of, stir_experiment
-from .stirring import stirring_of
+from .stir_experiment import camera_noise, effects_of, held_out_noise, stir_experiment
+from .stirring import Stirring, stirring_of
 from .summary import write_section
 
 if TYPE_CHECKING:
@@ -112,40 +112,43 @@ def _find(calibration: Calibration, inputs: Inputs, keeping: "inference.Keeping"
         plan=inputs.settings.clean_plan,
         keeping=keeping,
     )
-    stirs = _stirs(calibration, inputs, clean, keeping)
+    cameras = camera_noise(inputs.stirring.recordings)
+    stirs = _stirs(calibration, inputs, cameras, clean, keeping)
     poured = inputs.table and _pours(calibration, stirs, inputs.table, inputs, keeping)
-    return Findings(calibration, inputs, tuple(clean), stirs, poured)
+    return Findings(calibration, inputs, cameras, tuple(clean), stirs, poured)
 
 
 def _stirs(
     calibration: Calibration,
     inputs: Inputs,
+    cameras: "inference.AutoregressiveNoise",
     clean: Sequence[Clean],
     keeping: "inference.Keeping",
 ) -> "inference.Criticism":
     from . import inference
 
     stirring, settings = inputs.stirring, inputs.settings
-    particles = stirring.setups[0].particles
-    kept_back = [stirring_of([recording], particles) for recording in inputs.held_out]
     extensions = effects_of("stir", settings.effects)
     return inference.criticise(
-        stir_experiment(stirring, usual_for(stirring, clean), "stir"),
+        stir_experiment(stirring, cameras, usual_for(stirring, clean), "stir"),
         calibration.prior,
         extensions,
         earlier=_learned_from(calibration),
-        held_out=[
-            stir_experiment(one, usual_for(one, clean), one.recordings[0].path.name)
-            for one in kept_back
-        ],
-        proposals=stir_proposals(
-            stirring, camera_noise(stirring.recordings), usual_elsewhere(clean)
-        ),
+        held_out=[_kept_back(one, stirring, clean) for one in inputs.held_out],
+        proposals=stir_proposals(stirring, cameras, usual_elsewhere(clean)),
         accept=_among(settings.accept, extensions),
         level=inputs.level,
         plan=settings.stir_plan,
         keeping=keeping,
     )
+
+
+def _kept_back(
+    recording: Recording, fitted: Stirring, clean: Sequence[Clean]
+) -> "inference.Experiment":
+    own = stirring_of([recording], fitted.setups[0].particles)
+    cameras = held_out_noise(recording, fitted.recordings)
+    return stir_experiment(own, cameras, usual_for(own, clean), recording.path.name)
 
 
 def _pours(

@@ -7,8 +7,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from .calibration import Calibration
 from .cups import bundled_cups
 from .errors import InputError
@@ -16,7 +14,7 @@ from .pour_table import PourTable, open_pours
 from .recordings import Recording, Source, open_recordings
 from .recordings_kept import kept_recordings
 from .settings import ALARM, CriticismSettings
-from .stir_experiment import effects_of
+from .stir_experiment import effects_of, frame_interval, same_rate
 from .stirring import Stirring, same_liquid, stirring_of
 
 if TYPE_CHECKING:
@@ -24,7 +22,7 @@ if TYPE_CHECKING:
 
 Pours = PourTable | str | Path
 RIG = ("cup_radius", "stick_radius", "stick_length")
-SAME_RIG = 0.02  # relative difference up to which a size or a frame rate is the same
+SAME_RIG = 0.02  # relative difference up to which a size is the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,10 +185,10 @@ def _check_baseline(stirring: Stirring, baseline: Sequence[Recording]) -> None:
                     where=f"--baseline {recording.path}",
                     fix="give recordings of the same rig",
                 )
-        there, here = (float(np.median(np.diff(r.time))) for r in (recording, first))
-        if abs(there - here) > SAME_RIG * here:
+        if not same_rate(recording, first):
+            there, here = (1.0 / frame_interval(r) for r in (recording, first))
             raise InputError(
-                f"has {1 / there:.3g} samples a second, but the run's recording {1 / here:.3g}",
+                f"has {there:.3g} samples a second, but the run's recording {here:.3g}",
                 where=f"--baseline {recording.path}",
                 fix="give recordings of the same frame rate",
             )

@@ -156,9 +156,7 @@ def _verdict(source: "inference.Criticism") -> dict[str, Any]:
 
 def _noise(findings: Findings) -> Mapping[str, float]:
     """The cameras' noise as it was learned, and how well."""
-    from .stir_experiment import camera_noise
-
-    noise = camera_noise(findings.inputs.stirring.recordings)
+    noise = findings.cameras
     return {
         "sd_deg": float(np.degrees(noise.sd.mean())),
         "sd_uncertainty": float(noise.sd.std() / noise.sd.mean()),

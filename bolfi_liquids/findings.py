@@ -16,6 +16,7 @@ class Findings:
 
     calibration: "Calibration"
     inputs: "Inputs"
+    cameras: "inference.AutoregressiveNoise"
     baseline: "tuple[Clean, ...]"
     stirs: "inference.Criticism"
     pours: "inference.Criticism | None"

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 TREND = 2  # degree of what the hanging stick does by itself in the second before it is moved
 SHORTEST = 8  # samples at rest from which noise can be learned
 SAME_PATH, SAME_TIME = 1e-3, 0.01  # m and s, up to which two paths are the same
+SAME_RATE = 0.02  # relative difference up to which a frame rate is the same
 
 
 def camera_noise(recordings: Sequence[Recording]) -> "AutoregressiveNoise":
@@ -53,12 +54,24 @@ def _longest_seen(rest: np.ndarray) -> np.ndarray:
     return max(rest[: missing[0]], rest[missing[-1] + 1 :], key=len)
 
 
-def stir_experiment(stirring: Stirring, usual: "UsualResidual | None", label: str) -> "Experiment":
+def held_out_noise(one: Recording, fitted: Sequence[Recording]) -> "AutoregressiveNoise":
+    """Noise of the cameras in a recording held out, for which those that are fitted speak, too.
+
+    Not the other way round: what is fitted learns nothing from what is held out.
+
+    Raises:
+        InputError: None of them rests long enough.
+    """
+    return camera_noise([one, *(other for other in fitted if same_rate(one, other))])
+
+
+def stir_experiment(
+    stirring: Stirring, cameras: "AutoregressiveNoise", usual: "UsualResidual | None", label: str
+) -> "Experiment":
     """Recordings of one liquid, with the cameras' noise and what the simulator usually lacks."""
     from .inference import Experiment, SumOfNoises
 
-    measured = camera_noise(stirring.recordings)
-    noise: Noise = measured if usual is None else SumOfNoises((measured, usual))
+    noise: Noise = cameras if usual is None else SumOfNoises((cameras, usual))
     return Experiment(
         stirring.simulate, stirring.observed, noise, stirring.identity, label, windows(stirring)
     )
@@ -85,6 +98,17 @@ def effects_of(scene: str, names: Sequence[str] | None = None) -> dict[str, "Ext
         for name, effect in EFFECTS.items()
         if scene in effect.scenes and (names is None or name in names)
     }
+
+
+def same_rate(one: Recording, other: Recording) -> bool:
+    """Whether two recordings have one frame rate."""
+    there, here = (frame_interval(recording) for recording in (one, other))
+    return abs(there - here) <= SAME_RATE * here
+
+
+def frame_interval(recording: Recording) -> float:
+    """Median time between two samples [s]."""
+    return float(np.median(np.diff(recording.time)))
 
 
 def same_experiment(one: Recording, other: Recording) -> bool:

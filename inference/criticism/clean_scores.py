@@ -7,7 +7,7 @@ import numpy as np
 
 from .hypothesis import Hypothesis, samples, values_of
 from .noise import Noise
-from .signatures import Signature, directions
+from .signatures import Signature
 from .usual import usual_in
 
 
@@ -25,6 +25,8 @@ def clean_scores(
     for shape in values_of(base, np.asarray(shapes)) if len(shapes) else []:
         others = replace(base, noise=base.noise - np.outer(shape, shape))
         left = others.project(others.whiten(shape))[:, 0]
-        for name, direction in directions(others, signatures).items():
-            squares[name].append(float(direction @ left) ** 2)
+        for name, of in signatures.items():
+            change = others.project(others.whiten(of.change))[:, 0]
+            length = max(float(np.linalg.norm(change)), 1e-12)
+            squares[name].append(float(change @ left / length) ** 2)
     return {name: max(1.0, float(np.mean(of)) ** 0.5) for name, of in squares.items()}

@@ -11,7 +11,7 @@ from bolfi_liquids.criticism import finished_criticism
 from bolfi_liquids.criticism_inputs import open_inputs
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.settings import CriticismSettings
-from bolfi_liquids.stir_experiment import camera_noise, stir_experiment
+from bolfi_liquids.stir_experiment import camera_noise, held_out_noise, stir_experiment
 from bolfi_liquids.stirring import stirring_of
 
 HEADER = "angular_velocity_deg_s,distance_cm,spilled,received,retained"
@@ -144,6 +144,14 @@ def test_the_cameras_noise_is_that_of_the_rest_and_correlated(calibration):
     assert np.mean([np.mean(one.correlation) for one in found]) > 0.25
 
 
+def test_fitted_recordings_tell_of_the_cameras_that_saw_those_held_out(calibration):
+    rng = np.random.default_rng(0)
+    one, other = (recorded(calibration, rng) for _ in range(2))
+    assert held_out_noise(one, [other]).samples == 2 * camera_noise([one]).samples
+    slower = replace(other, time=1.1 * other.time)
+    assert held_out_noise(one, [slower]).samples == camera_noise([one]).samples
+
+
 def test_a_camera_without_any_noise_is_not_believed(calibration):
     still = recorded(calibration, np.random.default_rng(0), sd=0.0)
     with pytest.raises(InputError, match="does not change at all"):
@@ -158,7 +166,8 @@ def test_clean_recordings_of_the_same_path_say_where_it_errs(calibration):
     stirring = stirring_of([recording], 200)
     same, elsewhere = usual_for(stirring, clean), usual_elsewhere(clean)
     assert len(same.shapes) == 1 and len(elsewhere.shapes) == 0
-    noise = stir_experiment(stirring, same, "stir").noise
+    cameras = camera_noise([recording])
+    noise = stir_experiment(stirring, cameras, same, "stir").noise
     assert [type(part).__name__ for part in noise.parts] == ["AutoregressiveNoise", "UsualResidual"]
     assert usual_for(stirring, []) is None
-    assert isinstance(stir_experiment(stirring, None, "stir").noise, type(noise.parts[0]))
+    assert stir_experiment(stirring, cameras, None, "stir").noise is cameras

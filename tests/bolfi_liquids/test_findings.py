@@ -32,7 +32,7 @@ def source(accepted, extended):
 
 def findings(stirs, pours, accept=None):
     inputs = SimpleNamespace(settings=CriticismSettings(accept=accept))
-    return Findings(None, inputs, (), stirs, pours)
+    return Findings(None, inputs, None, (), stirs, pours)
 
 
 DELAY = source(("camera_delay",), model(("camera_delay",), 1.0))

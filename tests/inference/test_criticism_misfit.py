@@ -6,6 +6,7 @@ import numpy as np
 import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference._float64 import in_float64
+from bolfi_liquids.inference.criticism.clean_scores import clean_scores
 from bolfi_liquids.inference.criticism.hypothesis import samples
 from bolfi_liquids.inference.criticism.laboratory import Laboratory
 from bolfi_liquids.inference.criticism.misfit import check, locate, null_draws
@@ -194,3 +195,42 @@ def test_the_window_in_which_the_data_differ_is_found(banks):
     assert np.mean(p_values.argmin(1) == 3) > 0.9
     assert np.mean(p_values[:, 3] < LEVEL) > 0.9
     assert not too_many(p_values[:, [0, 1, 5]].min(1))
+
+
+def clean_of(shapes):
+    """What clean residuals of these shapes [k, N] teach."""
+    clean = [shape[:, None] for shape in shapes]
+    return inference.usual_residual(clean, [inference.KnownNoise(0.0)] * len(clean), [True] * 2)
+
+
+def test_clean_data_are_scored_by_what_the_others_teach(banks):
+    """Against generalised least squares, which knows the design and not the emulator."""
+    base = banks[0]
+    usual = clean_of([1.5 * BUMP, 0.3 * np.cos(STEPS / 5.0) - 0.8 * BUMP])
+    noise = inference.SumOfNoises((NOISE, usual))
+    believed = replace(base.hypothesis, noise=noise.covariance(AT))
+    scores = []
+    for shape in usual.shapes[:, :, 0]:
+        others = believed.spread + believed.noise - np.outer(shape, shape)
+        weight = np.linalg.inv(others)
+        absorbed = weight @ DESIGN
+        weight -= absorbed @ np.linalg.solve(DESIGN.T @ absorbed, absorbed.T)
+        change = base.signatures["bump"].change
+        scores.append(change @ weight @ shape / np.sqrt(change @ weight @ change))
+    size = np.sqrt((1.0 + np.sum(np.square(scores))) / 3.0)
+    assert size > 1.5
+    found = clean_scores(believed, noise, base.signatures)
+    assert found["bump"] == pytest.approx(size, rel=0.02)
+    assert clean_scores(base.hypothesis, NOISE, base.signatures) == {"bump": 1.0}
+
+
+def test_what_clean_data_show_as_well_is_no_discovery(banks):
+    base = banks[0]
+    wrong = on(base.hypothesis, observe(noisy, 7, 1.0))
+    rows = directions(base.hypothesis, base.signatures)
+    alone = check(wrong, rows, base.null)
+    beside = check(wrong, rows, base.null, {"bump": abs(alone.scores["bump"])})
+    assert alone.p_score < 0.01
+    assert abs(beside.scores["bump"]) == pytest.approx(1.0)
+    assert beside.p_score == pytest.approx(2.0 * norm.sf(1.0), abs=0.06)  # of 999 draws
+    assert beside.p_smooth == alone.p_smooth

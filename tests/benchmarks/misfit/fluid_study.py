@@ -19,7 +19,8 @@ from types import MappingProxyType
 
 import numpy as np
 import numpyro.distributions as dist
-from bolfi_liquids.hardware import circle, star
+
+from bolfi_liquids import hardware as paths
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -32,7 +33,12 @@ from bolfi_liquids.pour_noise import REPEATED
 from bolfi_liquids.prior import default_prior
 from bolfi_liquids.recordings import Gripper, Recording
 from bolfi_liquids.settings import CriticismSettings
-from bolfi_liquids.stir_experiment import effects_of, stir_experiment
+from bolfi_liquids.stir_experiment import (
+    camera_noise,
+    effects_of,
+    held_out_noise,
+    stir_experiment,
+)
 from bolfi_liquids.stirring import Stirring, stirring_of
 
 RIG = {
@@ -62,8 +68,8 @@ large as their priors allow."""
 SIGNED = ("camera_delay", "camera_tilt")
 ADHESION = 0.3, 0.8  # hidden in pours
 PATHS = {
-    "star": star(points=5, radius=0.022, speed=0.12, height=0.235, rest=1.0),
-    "circle": circle(radius=0.018, speed=0.1, turns=3.0, height=0.235, rest=1.0),
+    "star": paths.star(points=5, radius=0.022, speed=0.12, height=0.235, rest=1.0),
+    "circle": paths.circle(radius=0.018, speed=0.1, turns=3.0, height=0.235, rest=1.0),
 }
 ACTIONS = np.array([(w, d) for w in (45.0, 90.0) for d in (0.5, 1.5, 2.5, 4.0)])
 
@@ -116,16 +122,18 @@ def _criticised_stirs(
 ) -> inference.Criticism:
     usual, stir_plan = _clean(bank), CriticismSettings().stir_plan
 
-    def experiment(path: str) -> inference.Experiment:
-        recording = _record(path, truth, rng)
+    star, circle = (_record(path, truth, rng) for path in PATHS)
+
+    def experiment(recording: Recording, cameras: inference.AutoregressiveNoise):
         stirring = stirring_of([recording], MODEL)
-        return stir_experiment(stirring, usual_for(stirring, usual), path)
+        name = recording.path.stem
+        return stir_experiment(stirring, cameras, usual_for(stirring, usual), name)
 
     return inference.criticise(
-        experiment("star"),
+        experiment(star, camera_noise([star])),
         default_prior(),
         effects_of("stir"),
-        held_out=[experiment("circle")],
+        held_out=[experiment(circle, held_out_noise(circle, [star]))],
         plan=replace(stir_plan, most=stir_plan.most + stir_plan.start),
         keeping=inference.Keeping(bank),
     )

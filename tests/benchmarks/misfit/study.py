@@ -61,16 +61,18 @@ def examine(one: Set) -> dict:
     truth = {**base, effect: coefficient} if effect else base
     seed, *seeds = (int(one) for one in rng.integers(2**31, size=3))
 
-    def experiment(stir: Stir, seed: int, label: str) -> inference.Experiment:
-        observed = stir.observe(truth, seed)
-        noise = inference.rest_noise([observed[:MOVES]], seed=number, trend=TREND)
+    first, second = FIRST.observe(truth, seeds[0]), SECOND.observe(truth, seeds[1])
+
+    def experiment(stir: Stir, label: str, observed: np.ndarray, *more: np.ndarray):
+        rests = [each[:MOVES] for each in (observed, *more)]
+        noise = inference.rest_noise(rests, seed=number, trend=TREND)
         return inference.Experiment(stir.simulate, observed, noise, label, label)
 
     found = inference.criticise(
-        experiment(FIRST, seeds[0], "star"),
+        experiment(FIRST, "star", first),
         PRIOR,
         EXTENSIONS,
-        held_out=[experiment(SECOND, seeds[1], "other star")],
+        held_out=[experiment(SECOND, "other star", second, first)],
         keeping=inference.Keeping(batch=64, seed=seed),
     )
     return {
