@@ -16,6 +16,7 @@ from .usual import without_usual
 from .verdict import ACCEPTED
 
 FLOOR = 0.99  # quantile of the noise's RMS below which a gap may be noise
+SHARE = 0.5  # of a gap beyond noise that an explanation may leave, unless it may be noise
 GAIN = 3.0  # log predictive density that an explanation must win on all held-out data together
 REPLICATES = 999
 
@@ -51,6 +52,12 @@ class Gap(NamedTuple):
         """Whether noise, and what is usual, may be all that is left."""
         return self.p_value > ACCEPTED
 
+    @property
+    def shrinks(self) -> bool:
+        """Whether most of the gap is explained, or what is left may be noise."""
+        before, after = self.excess
+        return self.after <= self.floor or after <= SHARE * before
+
 
 def beyond(rms: float, noise: float) -> float:
     """What of an RMS noise does not explain, in quadrature."""
@@ -58,8 +65,10 @@ def beyond(rms: float, noise: float) -> float:
 
 
 def holds(gaps: Sequence[Gap]) -> bool:
-    """Whether an explanation leaves no more than noise anywhere, and predicts better in all."""
-    return not gaps or (all(one.fits for one in gaps) and sum(one.lpd_gain for one in gaps) > GAIN)
+    """Whether an explanation explains most of every gap, leaves no more than noise and what is
+    usual anywhere, and predicts better in all."""
+    explained = all(one.fits and one.shrinks for one in gaps)
+    return not gaps or (explained and sum(one.lpd_gain for one in gaps) > GAIN)
 
 
 def predict(

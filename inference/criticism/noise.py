@@ -99,9 +99,8 @@ def rest_noise(
     """AR(1) noise of one size in all channels, from stretches in which nothing moved.
 
     The posterior of all that is left after a polynomial in time is taken from each channel
-    (restricted likelihood, Harville 1974), under a prior flat in the log of the size and falling
-    as (1 - correlation)^2: what remembers itself for a second is motion and not noise, and short
-    stretches cannot tell.
+    (restricted likelihood, Harville 1974), under a prior flat in the log of the size and in the
+    correlation up to .97.
 
     Args:
         rests: Stretches [samples, channels].
@@ -119,7 +118,7 @@ def rest_noise(
             "give longer ones"
         )
     log_weight, squares = np.transpose([_restricted(rests, rho, trend) for rho in CORRELATIONS])
-    log_weight = log_weight - 0.5 * freedom * np.log(squares) + 2.0 * np.log1p(-CORRELATIONS)
+    log_weight = log_weight - 0.5 * freedom * np.log(squares)
     weight = np.exp(log_weight - log_weight.max())
     rng = np.random.default_rng(seed)
     which = rng.choice(len(weight), draws, p=weight / weight.sum())
