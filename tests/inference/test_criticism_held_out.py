@@ -116,6 +116,16 @@ def test_gains_of_several_recordings_add_up_and_each_may_veto():
     assert not holds([of(20.0), of(20.0, p_value=0.001)])
 
 
+def test_most_of_a_gap_must_go_unless_it_may_be_noise():
+    """Beyond noise of .3 in quadrature; .4 of noise is rare."""
+    small = inference.Gap("", 0.45, 0.39, 0.3, 0.4, 0.5, 20.0)
+    assert small.excess[1] > 0.5 * small.excess[0]
+    assert holds([small])
+    large = [inference.Gap("", 1.0, after, 0.3, 0.4, 0.5, 20.0) for after in (0.55, 0.6)]
+    assert [one.excess[1] / one.excess[0] < 0.5 for one in large] == [True, False]
+    assert [holds([one]) for one in large] == [True, False]
+
+
 def test_missing_samples_are_left_out():
     observed = EFFECT.copy()
     observed[20:40] = np.nan
