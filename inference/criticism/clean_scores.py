@@ -11,10 +11,10 @@ from .signatures import Signature
 from .usual import usual_in
 
 
-def clean_scores(
+def scored_on_clean(
     base: Hypothesis, noise: Noise, signatures: Mapping[str, Signature]
-) -> dict[str, float]:
-    """Size of each effect's score on clean data of the same experiment, never below 1.
+) -> dict[str, Signature]:
+    """Signatures with the size of their scores on clean data of the same experiment, at least 1.
 
     Each clean residual is scored by what the others teach, or it would excuse itself. One score
     of size 1, as it would be if they taught all, is counted with those of the clean data.
@@ -29,4 +29,5 @@ def clean_scores(
             change = others.project(others.whiten(of.change))[:, 0]
             length = max(float(np.linalg.norm(change)), 1e-12)
             squares[name].append(float(change @ left / length) ** 2)
-    return {name: max(1.0, float(np.mean(of)) ** 0.5) for name, of in squares.items()}
+    sizes = {name: max(1.0, float(np.mean(of)) ** 0.5) for name, of in squares.items()}
+    return {name: of._replace(clean=sizes[name]) for name, of in signatures.items()}

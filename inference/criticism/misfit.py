@@ -9,6 +9,7 @@ from .._float64 import in_float64
 from ..noise import Layout
 from .hypothesis import Hypothesis, samples, values_of
 from .noise import Noise, gaussian
+from .signatures import Signature, directions
 
 REPLICATES = 999  # of the parametric bootstrap
 MODES = 36  # of each channel: slower than these is what simulators get wrong
@@ -51,8 +52,8 @@ class Check(NamedTuple):
             there being two.
         p_score: By the largest score of an effect, corrected for there being several.
         p_smooth: By the slow part of the residual, whatever its shape.
-        scores: Effect -> score, standard normal if it does not act; less, where clean data have
-            large scores, too.
+        scores: Effect -> score, positive for a greater coefficient; standard normal if it does
+            not act, and smaller where clean data have large scores, too.
     """
 
     p_value: float
@@ -76,36 +77,33 @@ def null_draws(
     return hypothesis.project(hypothesis.whiten(measured + simulated))
 
 
-def check(
-    hypothesis: Hypothesis,
-    unused: Mapping[str, np.ndarray],
-    null: np.ndarray,
-    clean: Mapping[str, float] | None = None,
-) -> Check:
+def check(hypothesis: Hypothesis, signatures: Mapping[str, Signature], null: np.ndarray) -> Check:
     """Test a model against the data.
 
+    What the simulator seems to need on clean data as well is not missing here: scores are
+    divided by those. A score on the side on which an effect cannot act speaks for nothing.
+
     Args:
-        unused: Directions [m] of the effects that do not act in it.
+        signatures: Of the effects; those that act in the model already do not count.
         null: Residuals [m, n] if it were right, see `null_draws`.
-        clean: Sizes of these effects' scores on clean data, by which scores are divided: what
-            the simulator seems to need always is not missing here.
     """
     residual = hypothesis.project(hypothesis.whiten(hypothesis.difference))
     series = hypothesis.surrogate.output.series
     modes = slow_modes(hypothesis.layout, MODES) if series else np.eye(len(residual))
     span = orthonormal(hypothesis.project(hypothesis.whiten(modes.T)))
+    unused = directions(hypothesis, signatures)
     rows = np.stack(list(unused.values())) if unused else np.zeros((0, len(residual)))
-    sizes = np.array([(clean or {}).get(name, 1.0) for name in unused])
-    scores = (rows @ residual)[:, 0] / sizes
+    side, clean = np.array([signatures[name][-2:] for name in unused]).reshape(-1, 2).T[:, :, None]
+    scores = rows @ residual / clean
 
     def measures(scores: np.ndarray, white: np.ndarray) -> np.ndarray:
-        slow = np.sum((span.T @ white) ** 2, 0)
-        return np.stack([np.abs(scores).max(0, initial=0.0), slow])
+        credited = np.where(side, side * scores, np.abs(scores))
+        return np.stack([credited.max(0, initial=0.0), np.sum((span.T @ white) ** 2, 0)])
 
-    seen, usual = measures(scores[:, None], residual)[:, 0], measures(rows @ null, null)
+    seen, usual = measures(scores, residual)[:, 0], measures(rows @ null, null)
     p_score, p_smooth = exceedance(usual, seen)
     together = exceedance(-_own_exceedance(usual).min(0)[None], [-min(p_score, p_smooth)])[0]
-    named = dict(zip(unused, scores.tolist(), strict=True))
+    named = dict(zip(unused, scores[:, 0].tolist(), strict=True))
     return Check(float(together), float(p_score), float(p_smooth), named)
 
 

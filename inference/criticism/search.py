@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .clean_scores import clean_scores
+from .clean_scores import scored_on_clean
 from .design import NARROW, WIDE, Box, around, fill, with_coefficient
 from .extension import extended
 from .hypothesis import Hypothesis, hypothesise
@@ -14,7 +14,7 @@ from .laboratory import Laboratory
 from .misfit import Check, check, null_draws
 from .noise import Noise
 from .runs import Runs, joined
-from .signatures import Signature, directions, signature
+from .signatures import Signature, signature
 from .verdict import Candidate, near_best
 
 PASSES = 2  # of a refit, the second only if the first moved the best fit out of its box
@@ -67,21 +67,17 @@ class Study(NamedTuple):
         return self.laboratory.run(phase, fill(box, prior, self.seed, count))
 
     def check(
-        self,
-        hypothesis: Hypothesis,
-        signatures: Mapping[str, Signature],
-        clean: Mapping[str, float],
+        self, hypothesis: Hypothesis, signatures: Mapping[str, Signature]
     ) -> tuple[Check, np.ndarray]:
         """Its test, and residuals [m, n] of a right model."""
         null = null_draws(hypothesis, self.noise, np.random.default_rng(self.seed))
-        return check(hypothesis, directions(hypothesis, signatures), null, clean), null
+        return check(hypothesis, signatures, null), null
 
     def candidate(self, base: "Base", hypothesis: Hypothesis, refitted: bool = False) -> Candidate:
         """The extended model, tested."""
         metric = base.hypothesis
         gain = 0.5 * (metric.misfit(metric) - hypothesis.misfit(metric))
-        tested, _ = self.check(hypothesis, base.signatures, base.clean)
-        return Candidate(hypothesis, tested, gain, refitted)
+        return Candidate(hypothesis, self.check(hypothesis, base.signatures)[0], gain, refitted)
 
 
 class Base(NamedTuple):
@@ -91,7 +87,6 @@ class Base(NamedTuple):
     check: Check
     null: np.ndarray  # [m, n], residuals of a right model
     signatures: dict[str, Signature]
-    clean: dict[str, float]  # sizes of the effects' scores on clean data
     singles: dict[str, Hypothesis]
     runs: Runs
     given: int  # of the runs, made before
@@ -127,11 +122,10 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
         name: signature(base, single, laboratory.extensions[name])
         for name, single in singles.items()
     }
-    clean = clean_scores(base, study.noise, signatures)
-    tested, null = study.check(base, signatures, clean)
+    signatures = scored_on_clean(base, study.noise, signatures)
+    tested, null = study.check(base, signatures)
     given = 0 if earlier is None else len(earlier)
-    found = Base(base, tested, null, signatures, clean, singles, joined(parts), given)
-    return found, tuple(untested)
+    return Base(base, tested, null, signatures, singles, joined(parts), given), tuple(untested)
 
 
 def explain(

@@ -23,12 +23,16 @@ class Signature(NamedTuple):
             parameters absorb.
         coefficient: Typical of the prior: halfway in quantiles from neutral to its farther end.
         snr: Signal-to-noise ratio of an effect of that size.
+        side: 1 or -1 where the coefficient can only be above or below neutral; else 0.
+        clean: Size of the effect's score on clean data, see `scored_on_clean`.
     """
 
     change: np.ndarray
     visible: float
     coefficient: float
     snr: float
+    side: int = 0
+    clean: float = 1.0
 
 
 @in_float64
@@ -41,16 +45,16 @@ def signature(base: Hypothesis, extended: Hypothesis, extension: Extension) -> S
     (name,) = extended.names
     at = {key: np.asarray(value) for key, value in base.best.items()}
     neutral = float(prior.to_unit({**at, name: np.asarray(extension.neutral)})[-1])
-    units = []
-    for side in (-1.0, 1.0):
+    units = {}
+    for side in (-1, 1):
         u = neutral + side * STEPS
         u = u[(u >= 0.01) & (u <= 0.99)]
         if len(u):
             changes = _changes(base, extended, neutral, u)
             length = np.maximum(_visible(base, changes), 1e-12)
             nearest = np.argmin(np.abs(np.log(length / VISIBLE)))
-            units.append(side * changes[nearest] / length[nearest])
-    change = np.mean(units, axis=0)
+            units[side] = side * changes[nearest] / length[nearest]
+    change = np.mean(list(units.values()), axis=0)
     middle = (neutral + float(neutral <= 0.5)) / 2.0
     typical = _changes(base, extended, neutral, np.array([middle]))
     return Signature(
@@ -58,6 +62,7 @@ def signature(base: Hypothesis, extended: Hypothesis, extension: Extension) -> S
         float(_visible(base, change[None])[0]),
         float(prior.from_unit(np.append(base.u, middle))[name]),
         float(_visible(base, typical)[0]),
+        sum(units),
     )
 
 
@@ -77,7 +82,8 @@ def directions(
     hypothesis: Hypothesis, signatures: Mapping[str, Signature]
 ) -> dict[str, np.ndarray]:
     """Whitened signatures of the effects that do not act yet, as far as a hypothesis leaves them:
-    name -> unit vector [m]. What it absorbs nearly whole is left out."""
+    name -> unit vector [m], towards a greater coefficient. What it absorbs nearly whole is left
+    out."""
     found = {}
     for name, of in signatures.items():
         if name in hypothesis.names:

@@ -25,8 +25,8 @@ class UsualResidual:
         autocovariance: Of clean residuals by lag in samples, shape [lags]; zero beyond.
         shapes: Clean residuals of the same experiment at each sample, shape [k, T, channels];
             NaN where missing.
-        freedom: Clean data sets: the size is known as well as a variance from so many numbers, but
-            never less than from LEAST_FREEDOM.
+        freedom: Clean data sets that speak for this experiment: the size is known as well as a
+            variance from so many numbers, but never less than from LEAST_FREEDOM.
     """
 
     autocovariance: np.ndarray
@@ -82,7 +82,7 @@ def usual_residual(
         if again
     ]
     shapes = np.stack(kept) if kept else np.zeros((0, 0, 0))
-    return UsualResidual(positive_autocovariance(mean), shapes, len(residuals))
+    return UsualResidual(positive_autocovariance(mean), shapes, len(kept) or len(residuals))
 
 
 def without_usual(noise: Noise) -> Noise:

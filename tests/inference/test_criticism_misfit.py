@@ -6,12 +6,11 @@ import numpy as np
 import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference._float64 import in_float64
-from bolfi_liquids.inference.criticism.clean_scores import clean_scores
+from bolfi_liquids.inference.criticism.clean_scores import scored_on_clean
 from bolfi_liquids.inference.criticism.hypothesis import samples
 from bolfi_liquids.inference.criticism.laboratory import Laboratory
 from bolfi_liquids.inference.criticism.misfit import check, locate, null_draws
 from bolfi_liquids.inference.criticism.search import Study, examine
-from bolfi_liquids.inference.criticism.signatures import directions
 from bolfi_liquids.inference.emulator import latent_covariance
 from scipy.stats import binom, kstest, norm
 
@@ -84,10 +83,9 @@ def checks(banks, noise, bump=0.0):
     for bank, base in enumerate(banks):
         believed = replace(base.hypothesis, noise=noise.covariance(AT))
         null = null_draws(believed, noise, np.random.default_rng(bank))
-        rows = directions(believed, base.signatures)
         for number in range(SETS):
             observed = observe(noisy, 1000 * (bank + 1) + number, bump)
-            found.append(check(on(believed, observed), rows, null))
+            found.append(check(on(believed, observed), base.signatures, null))
     return found
 
 
@@ -219,18 +217,31 @@ def test_clean_data_are_scored_by_what_the_others_teach(banks):
         scores.append(change @ weight @ shape / np.sqrt(change @ weight @ change))
     size = np.sqrt((1.0 + np.sum(np.square(scores))) / 3.0)
     assert size > 1.5
-    found = clean_scores(believed, noise, base.signatures)
-    assert found["bump"] == pytest.approx(size, rel=0.02)
-    assert clean_scores(base.hypothesis, NOISE, base.signatures) == {"bump": 1.0}
+    found = scored_on_clean(believed, noise, base.signatures)
+    assert found["bump"].clean == pytest.approx(size, rel=0.02)
+    assert scored_on_clean(base.hypothesis, NOISE, base.signatures)["bump"].clean == 1.0
 
 
 def test_what_clean_data_show_as_well_is_no_discovery(banks):
     base = banks[0]
     wrong = on(base.hypothesis, observe(noisy, 7, 1.0))
-    rows = directions(base.hypothesis, base.signatures)
-    alone = check(wrong, rows, base.null)
-    beside = check(wrong, rows, base.null, {"bump": abs(alone.scores["bump"])})
+    alone = check(wrong, base.signatures, base.null)
+    clean = base.signatures["bump"]._replace(clean=abs(alone.scores["bump"]))
+    beside = check(wrong, {"bump": clean}, base.null)
     assert alone.p_score < 0.01
     assert abs(beside.scores["bump"]) == pytest.approx(1.0)
     assert beside.p_score == pytest.approx(2.0 * norm.sf(1.0), abs=0.06)  # of 999 draws
     assert beside.p_smooth == alone.p_smooth
+
+
+@pytest.mark.parametrize("bump", [-1.0, 1.0])
+def test_an_effect_is_scored_on_the_side_on_which_it_can_act(banks, bump):
+    base = banks[0]
+    wrong = on(base.hypothesis, observe(noisy, 7, bump))
+    both = base.signatures["bump"]
+    assert both.side == 0  # the prior allows either
+    p_scores = [
+        check(wrong, {"bump": both._replace(side=side)}, base.null).p_score for side in (-1, 1)
+    ]
+    assert p_scores[bump > 0.0] < 0.01
+    assert p_scores[bump < 0.0] > 0.5
