@@ -102,7 +102,7 @@ AR = inference.AutoregressiveNoise(np.array([0.5, 0.7, 0.6]), np.array([0.2, 0.9
 SIZES = inference.KnownNoise(np.linspace(0.1, 2.0, 16))
 RESIDUALS = [autoregressive(np.random.default_rng(k), (10, 2), 1.0, 0.8) for k in range(FREEDOM)]
 NOTHING = inference.KnownNoise(0.0)
-USUAL = inference.usual_residual(RESIDUALS, [NOTHING] * FREEDOM, [k < 2 for k in range(FREEDOM)])
+USUAL = inference.usual_residual(RESIDUALS, [NOTHING] * FREEDOM, [True] * FREEDOM)
 NOISES = {
     "known": (inference.KnownNoise(0.3), 1.0),
     "of each sample": (SIZES, 1.0),
@@ -175,6 +175,7 @@ def test_residuals_of_the_same_experiment_say_where_it_errs_again(clean):
     np.testing.assert_allclose(learned.covariance(at), stationary + shapes, atol=1e-12)
     other = inference.usual_residual(again, [NOTHING] * 3, [False] * 3)
     np.testing.assert_allclose(other.covariance(at), stationary, atol=1e-12)
+    assert (learned.freedom, other.freedom) == (2, 3)
 
 
 @pytest.mark.parametrize("longest", [12, 40, 70], ids=["shorter", "as long", "longer"])
