@@ -129,7 +129,7 @@ def _effects(source: "inference.Criticism") -> "Dataset":
     from xarray import Dataset
 
     signatures, singles = source.base.signatures, source.singles
-    names = [*signatures, *source.untested]
+    names = list(dict.fromkeys((*signatures, *source.untested)))
 
     def of(name: str) -> dict[str, Any]:
         if name not in signatures:

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 from bolfi_liquids.inference.noise import Layout
 
-from bolfi_liquids.criticism_results import _posterior
+from bolfi_liquids.criticism_results import _effects, _posterior
 from bolfi_liquids.findings import Findings
 from bolfi_liquids.pour_noise import MISSED, REPEATED, PourNoise
 from bolfi_liquids.settings import CriticismSettings
@@ -71,6 +71,48 @@ def test_what_was_requested_is_told_from_what_was_found():
     pours = source(("adhesion",), model(("adhesion",), 2.0))
     assert findings(DELAY, pours, accept=("adhesion",)).requested == ("adhesion",)
     assert findings(DELAY, pours).requested == ()
+
+
+def candidate(name, **changes):
+    """Of an effect that explains the difference, but for `changes`."""
+    check = SimpleNamespace(p_value=0.5)
+    hypothesis = SimpleNamespace(best={name: 1.0})
+    made = {"names": (name,), "gain": 9.0, "passes": True, "refitted": True}
+    return SimpleNamespace(**{**made, **changes}, check=check, hypothesis=hypothesis)
+
+
+def test_each_effect_has_one_row_that_says_what_became_of_it():
+    singles = {
+        "stick_mass": candidate("stick_mass"),
+        "camera_delay": candidate("camera_delay"),
+        "fill_level": candidate("fill_level", passes=False),
+        "gripper_scale": candidate("gripper_scale", refitted=False),
+        "camera_tilt": candidate("camera_tilt"),
+    }
+    names = (*singles, "adhesion")
+    signature = SimpleNamespace(coefficient=1.0, snr=2.0)
+    base = SimpleNamespace(
+        signatures=dict.fromkeys(names[:-1], signature), check=SimpleNamespace(scores={})
+    )
+    found = SimpleNamespace(
+        base=base,
+        singles=singles,
+        units=dict.fromkeys(names, "1"),
+        untested=("gripper_scale", "adhesion"),
+        tied=(("stick_mass",),),
+        refuted=(("camera_delay",),),
+        verdict=SimpleNamespace(kind="effect"),
+    )
+    table = _effects(found)
+    assert dict(zip(table["effect"].to_numpy(), table["status"].to_numpy(), strict=True)) == {
+        "stick_mass": "named",
+        "camera_delay": "refuted by held-out data",
+        "fill_level": "rejected",
+        "gripper_scale": "untested by a refit",
+        "camera_tilt": "less likely",
+        "adhesion": "untested: its simulations failed",
+    }
+    assert table.sizes["effect"] == len(names)
 
 
 def test_pours_of_like_actions_are_wrong_together_and_outcomes_apart():
