@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 STATUSES = {
     "named": BLUE,
     "possible": BLUE,
-    "less likely": LIGHT,
-    "refuted": ORANGE,
+    "less likely": GREY,
+    "refuted": INK,
     "rejected": ORANGE,
     "not needed": GREY,
     "untested": GREY,
