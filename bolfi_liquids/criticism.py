@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from .calibration import Calibration
 from .errors import InputError
-from .run_directory import CRITICISM
+from .run_directory import CRITICISM, CRITICISM_FORMAT
 from .summary import read_summary
 
 if TYPE_CHECKING:
@@ -144,8 +144,10 @@ class Criticism:
 
 
 def is_criticised(run: Path) -> bool:
-    """Whether a run's criticism was finished."""
-    return (run / CRITICISM).is_file() and "criticise" in read_summary(run)
+    """Whether a run holds a finished criticism in today's form."""
+    section = read_summary(run).get("criticise", {})
+    current = section.get("made_from", {}).get("format") == CRITICISM_FORMAT
+    return current and (run / CRITICISM).is_file()
 
 
 def finished_criticism(run: Path, made_from: Mapping[str, Any]) -> Criticism | None:

@@ -1,7 +1,7 @@
 """What a criticism is given, read and checked."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -13,6 +13,7 @@ from .errors import InputError
 from .pour_table import PourTable, open_pours
 from .recordings import Recording, Source, open_recordings
 from .recordings_kept import kept_recordings
+from .run_directory import CRITICISM_FORMAT
 from .settings import ALARM, CriticismSettings
 from .stir_experiment import effects_of, frame_interval, same_rate
 from .stirring import Stirring, same_liquid, stirring_of
@@ -66,10 +67,12 @@ class Inputs:
         }
         made_from = {
             "version": version("bolfi-liquids"),
+            "format": CRITICISM_FORMAT,
             "settings": asdict(self.settings),
             **{
                 group: {one.path.name: one.hash for one in files} for group, files in groups.items()
             },
+            "left_out": list(self.left_out),
             "poured": self.table and {"liquid": self.table.liquid, "cups": self.cups.settings()},
         }
         return json.loads(json.dumps(made_from))  # as it will be read
@@ -95,18 +98,19 @@ def open_inputs(  # noqa: PLR0913  all that a criticism may be given
     stirring = stirring_of(
         kept_recordings(calibration.path, record), int(record["settings"]["particles"])
     )
-    kept_back = open_recordings(held_out)
+    kept_back = open_recordings(held_out, "--held-out")
     _check_held_out(stirring, kept_back)
-    believed = open_recordings(baseline)
+    believed = open_recordings(baseline, "--baseline")
     others = _others(believed, [*stirring.recordings, *kept_back])
     _check_baseline(stirring, others)
-    table, held_out_table = _opened(pours), _opened(held_out_pours)
+    table = _opened(pours, "--pours")
+    held_out_table = _opened(held_out_pours, "--held-out-pours")
     _check_pours(table, held_out_table, settings)
     return Inputs(
         stirring=stirring,
         held_out=tuple(kept_back),
         baseline=others,
-        left_out=tuple(r.path.name for r in believed if r.hash not in {o.hash for o in others}),
+        left_out=_names_of(r for r in believed if r.hash not in {one.hash for one in others}),
         table=table,
         held_out_table=held_out_table,
         cups=bundled_cups() if cups is None else cups,
@@ -114,11 +118,16 @@ def open_inputs(  # noqa: PLR0913  all that a criticism may be given
     )
 
 
-def _opened(pours: Pours | None) -> PourTable | None:
+def _names_of(recordings: Iterable[Recording]) -> tuple[str, ...]:
+    """Each once."""
+    return tuple(dict.fromkeys(recording.path.name for recording in recordings))
+
+
+def _opened(pours: Pours | None, option: str) -> PourTable | None:
     if pours is not None and not isinstance(pours, Pours):
         raise InputError(
             f"{pours!r:.80} is no table of pours",
-            where="pours",
+            where=option,
             fix="give the path of a CSV file, or what open_pours returns",
         )
     return open_pours(pours) if isinstance(pours, str | Path) else pours

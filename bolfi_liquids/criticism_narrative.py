@@ -103,7 +103,7 @@ def baseline_sentence(section: Mapping[str, Any]) -> str:
     )
     if not left_out:
         return sentence
-    return f"{sentence} Not counted as clean, as it is looked at itself: {', '.join(left_out)}."
+    return f"{sentence} Not counted as clean, but looked at: {', '.join(left_out)}."
 
 
 def considered_sentence(section: Mapping[str, Any]) -> str:

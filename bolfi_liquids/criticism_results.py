@@ -6,7 +6,7 @@ Its groups, under `stirs` and, where pours were given, under `pours`:
   expectation of the base and of the extended model, and the sd of observed less expected;
 - `where`: over windows, their labels, and RMS, z and p-value before and after;
 - `effects`: over effects, what was found out about each; `unit` is that of `typical` and
-  `coefficient`;
+  `coefficient`, `side` the sign of the scores that count, 0 where both do;
 - `confusion`: cosines between the effects' signatures;
 - `held_out`: over explanations and recordings, the gap before and after;
 - `suggestions`: over further experiments, how well each would separate the explanations.
@@ -138,6 +138,7 @@ def _effects(source: "inference.Criticism") -> "Dataset":
             "typical": signatures[name].coefficient,
             "snr": signatures[name].snr,
             "score": source.base.check.scores.get(name, np.nan),
+            "side": float(signatures[name].side),
         }
         candidate = singles.get(name)
         if candidate is None:
@@ -151,7 +152,7 @@ def _effects(source: "inference.Criticism") -> "Dataset":
         }
 
     rows = [of(name) for name in names]
-    numbers = ("typical", "snr", "score", "gain", "p_value", "coefficient")
+    numbers = ("typical", "snr", "score", "side", "gain", "p_value", "coefficient")
     columns = {key: ("effect", [row.get(key, np.nan) for row in rows]) for key in numbers}
     status = ("effect", [row["status"] for row in rows])
     units = ("effect", [source.units[name] for name in names])
@@ -160,12 +161,12 @@ def _effects(source: "inference.Criticism") -> "Dataset":
 
 def _status(candidate: "inference.Candidate", source: "inference.Criticism") -> str:
     """What became of an explanation by one effect."""
-    if candidate.names in source.tied:
+    if candidate.names[0] in source.verdict.effects:
         return "named" if source.verdict.kind == "effect" else "possible"
-    if candidate.names in source.refuted:
-        return "refuted by held-out data"
     if not candidate.passes:
         return "rejected"
+    if candidate.names in source.refuted:
+        return "refuted by held-out data"
     if not candidate.refitted:
         return "untested by a refit"
     return "less likely"
@@ -194,7 +195,7 @@ def _held_out(source: "inference.Criticism", units: dict[str, str]) -> "Dataset"
         )
         for field in ("before", "after", "noise", "floor", "p_value", "lpd_gain")
     }
-    columns["holds"] = ("explanation", [key not in source.refuted for key in source.gaps])
+    columns["holds"] = ("explanation", [source.holds(key) for key in source.gaps])
     labels = [gap.label for gap in gaps[0]]
     return Dataset(columns, coords={"explanation": names, "recording": labels})
 

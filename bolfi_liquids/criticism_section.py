@@ -31,7 +31,7 @@ def criticism_section(findings: Findings, tree: "DataTree", seconds: float) -> d
         "requested": list(findings.requested),
         "unsupported": list(findings.unsupported),
         "refuted": [name for source in findings.sources.values() for name in _refuted(source)],
-        "held_out": sum(_held_out(source) for source in findings.sources.values()),
+        "held_out": min(_held_out(source) for source in _saying(kind, findings)),
         "reason": " ".join(source.verdict.reason for source in findings.sources.values()),
         "p_value": min(1.0, len(p_values) * min(p_values)),
         "where": _sure(stirs),
@@ -59,12 +59,15 @@ def criticism_section(findings: Findings, tree: "DataTree", seconds: float) -> d
 
 def _together(findings: Findings) -> tuple[str, tuple[str, ...]]:
     """One verdict on all data: what was named anywhere, or else the gravest."""
-    verdicts = [source.verdict for source in findings.sources.values()]
     for kind in ("effect", "tie", "unknown"):
-        named = [verdict for verdict in verdicts if verdict.kind == kind]
-        if named:
-            return kind, tuple(name for verdict in named for name in verdict.effects)
+        if named := _saying(kind, findings):
+            return kind, tuple(name for source in named for name in source.verdict.effects)
     return "none", ()
+
+
+def _saying(kind: str, findings: Findings) -> "list[inference.Criticism]":
+    """The sources of this verdict."""
+    return [source for source in findings.sources.values() if source.verdict.kind == kind]
 
 
 def _refuted(source: "inference.Criticism") -> list[str]:

@@ -46,9 +46,12 @@ def score_plot(node: "DataTree") -> "Figure":
         left, right = figure.subplots(1, 2, sharey=True, gridspec_kw={"width_ratios": (3, 2)})
         _draw_gains(left, gain[order], states)
         right.axvspan(0.0, USUAL, color=LIGHT, linewidth=0, zorder=0)
-        for at, (value, status) in enumerate(zip(score[order], states, strict=True)):
-            right.plot([0.0, value], [at, at], color=_colour(status), linewidth=1.0)
-            right.plot(value, at, "o", color=_colour(status), markersize=5)
+        counts = effects["score"].to_numpy() * effects["side"].to_numpy() >= 0.0
+        for at, status in enumerate(states):
+            value, colour = score[order[at]], _colour(status)
+            right.plot([0.0, value], [at, at], color=colour, linewidth=1.0)
+            inside = colour if counts[order[at]] else "white"
+            right.plot(value, at, "o", color=colour, markerfacecolor=inside, markersize=5)
         right.set_xlim(left=0.0)
         right.set_xlabel("size of the score [sd]")
         left.set_yticks(range(len(names)), names)

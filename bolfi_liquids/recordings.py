@@ -1,7 +1,7 @@
 """Recordings of a stir: the file format, read and checked."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -71,22 +71,33 @@ def open_recording(path: str | Path) -> Recording:
     return recording
 
 
-def open_recordings(sources: Source | Sequence[Source]) -> list[Recording]:
+def open_recordings(
+    sources: Source | Iterable[Source], option: str = "recordings"
+) -> list[Recording]:
     """One or several, those that are opened already as they are.
+
+    Args:
+        sources: Recordings or their paths.
+        option: What they were given as, for a refusal.
 
     Raises:
         InputError: One of them cannot be used.
     """
-    listed = list(sources) if isinstance(sources, Sequence) else [sources]
-    listed = [sources] if isinstance(sources, str) else listed
-    for one in listed:
-        if not isinstance(one, Source):
-            raise InputError(
-                f"{one!r:.80} is no recording",
-                where="recordings",
-                fix="give paths of NetCDF files, or what open_recording returns",
-            )
-    return [s if isinstance(s, Recording) else open_recording(s) for s in listed]
+    if isinstance(sources, Source) or not isinstance(sources, Iterable):
+        return [_opened(sources, option)]
+    return [_opened(one, option) for one in sources]
+
+
+def _opened(source: object, option: str) -> Recording:
+    if isinstance(source, Recording):
+        return source
+    if isinstance(source, str | Path):
+        return open_recording(source)
+    raise InputError(
+        f"{source!r:.80} is no recording",
+        where=option,
+        fix="give paths of NetCDF files, or what open_recording returns",
+    )
 
 
 def _read(path: Path) -> "Dataset":

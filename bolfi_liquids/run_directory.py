@@ -19,6 +19,7 @@ RUN_TOML = "run.toml"
 SIMULATIONS = "simulations.sqlite"
 POSTERIOR = "posterior.nc"
 CRITICISM = "criticism.nc"
+CRITICISM_FORMAT = 2  # of what a criticism is kept as; another is made again
 POUR = "pour.nc"
 REPORT = "report.html"
 

@@ -27,23 +27,23 @@ def camera_noise(recordings: Sequence[Recording]) -> "AutoregressiveNoise":
     """
     from .inference import rest_noise
 
-    rests = [_longest_seen(recording.inclination[resting(recording)]) for recording in recordings]
-    rests = [rest for rest in rests if len(rest) >= SHORTEST]
+    seen = {r.path.name: _longest_seen(r.inclination[resting(r)]) for r in recordings}
+    rests = {name: rest for name, rest in seen.items() if len(rest) >= SHORTEST}
     if not rests:
-        names = ", ".join(recording.path.name for recording in recordings)
         raise InputError(
             f"fewer than {SHORTEST} samples before the gripper moves, too few to learn the "
             "cameras' noise from",
-            where=names,
+            where=", ".join(seen),
             fix="let the gripper rest for a second before it stirs",
         )
-    if not any(rest.std(axis=0).any() for rest in rests):
-        raise InputError(
-            "the inclination does not change at all before the gripper moves",
-            where=", ".join(recording.path.name for recording in recordings),
-            fix="record what the cameras see, noise included",
-        )
-    return rest_noise(rests, trend=TREND)
+    for name, rest in rests.items():
+        if not rest.std(axis=0).any():
+            raise InputError(
+                "the inclination does not change at all before the gripper moves",
+                where=name,
+                fix="record what the cameras see, noise included",
+            )
+    return rest_noise(list(rests.values()), trend=TREND)
 
 
 def _longest_seen(rest: np.ndarray) -> np.ndarray:
@@ -89,7 +89,7 @@ def effects_of(scene: str, names: Sequence[str] | None = None) -> dict[str, "Ext
     unknown = [name for name in names or () if name not in EFFECTS]
     if unknown:
         raise InputError(
-            f"there is no effect {', '.join(unknown)}",
+            f"there is no effect {', '.join(map(str, unknown))}",
             where="--effects",
             fix=f"choose from {', '.join(EFFECTS)}",
         )
@@ -102,8 +102,8 @@ def effects_of(scene: str, names: Sequence[str] | None = None) -> dict[str, "Ext
 
 def same_rate(one: Recording, other: Recording) -> bool:
     """Whether two recordings have one frame rate."""
-    there, here = (frame_interval(recording) for recording in (one, other))
-    return abs(there - here) <= SAME_RATE * here
+    step, other_step = frame_interval(one), frame_interval(other)
+    return abs(step - other_step) <= SAME_RATE * other_step
 
 
 def frame_interval(recording: Recording) -> float:

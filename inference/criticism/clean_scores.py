@@ -8,7 +8,7 @@ import numpy as np
 from .hypothesis import Hypothesis, samples, values_of
 from .noise import Noise
 from .signatures import Signature
-from .usual import usual_in
+from .usual import usual_in, without_usual
 
 
 def scored_on_clean(
@@ -16,15 +16,21 @@ def scored_on_clean(
 ) -> dict[str, Signature]:
     """Signatures with the size of their scores on clean data of the same experiment, at least 1.
 
-    Each clean residual is scored by what the others teach, or it would excuse itself. One score
-    of size 1, as it would be if they taught all, is counted with those of the clean data.
+    Each clean residual is scored by what the others teach, or it would excuse itself; alone, it
+    says nothing. Scores of either sign count: what errs one way on one liquid may err the other
+    way on another. With K of them the mean square is that of K + 1 scores, one of which is 1.
     """
-    squares = {name: [1.0] for name in signatures}
     usual = usual_in(noise)
-    shapes = [] if usual is None else usual.shapes_at(samples(base.fit.observed))
-    for shape in values_of(base, np.asarray(shapes)) if len(shapes) else []:
-        others = replace(base, noise=base.noise - np.outer(shape, shape))
-        left = others.project(others.whiten(shape))[:, 0]
+    if usual is None:
+        return dict(signatures)
+    at = samples(base.fit.observed)
+    measured = without_usual(noise).covariance(at)
+    squares = {name: [1.0] for name in signatures}
+    # one by one: where there are no others, there is nothing to learn from
+    for shape, taught in zip(usual.shapes_at(at), usual.leave_one_out(), strict=False):
+        covariance = values_of(base, values_of(base, measured + taught.covariance(at)).T)
+        others = replace(base, noise=covariance)
+        left = others.project(others.whiten(values_of(base, shape[None])))[:, 0]
         for name, of in signatures.items():
             change = others.project(others.whiten(of.change))[:, 0]
             length = max(float(np.linalg.norm(change)), 1e-12)

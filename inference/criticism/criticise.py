@@ -73,8 +73,12 @@ class Criticism:
 
     @property
     def refuted(self) -> tuple[tuple[str, ...], ...]:
-        """Explanations that the held-out data do not bear out."""
-        return tuple(names for names, found in self.gaps.items() if not holds(found))
+        """Explanations of the fitted data that the held-out data do not bear out."""
+        return tuple(one.names for one in self.candidates if one.passes and not one.held)
+
+    def holds(self, names: tuple[str, ...]) -> bool:
+        """Whether an explanation holds on the held-out data, see `gaps`."""
+        return holds(self.gaps[names])
 
     @property
     def leading(self) -> Candidate | None:
@@ -112,8 +116,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     is fitted together with the base parameters; the best are simulated where they fit best,
     fitted again, and must pass the test that the base model failed. Those that no test tells
     apart are a tie; where no one passes, pairs are tried. On held-out data an explanation must
-    leave no more than noise and predict better than the base model, or it is withdrawn; how much
-    better also tells explanations apart.
+    leave no more than noise, explain most of the gap, and predict better than the base model, or
+    it is withdrawn; how much better also tells explanations apart.
 
     All runs are kept in the bank under seeds that derive from one: the same call repeats
     nothing that was finished and concludes the same.

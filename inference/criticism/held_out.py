@@ -52,12 +52,6 @@ class Gap(NamedTuple):
         """Whether noise, and what is usual, may be all that is left."""
         return self.p_value > ACCEPTED
 
-    @property
-    def shrinks(self) -> bool:
-        """Whether most of the gap is explained, or what is left may be noise."""
-        before, after = self.excess
-        return self.after <= self.floor or after <= SHARE * before
-
 
 def beyond(rms: float, noise: float) -> float:
     """What of an RMS noise does not explain, in quadrature."""
@@ -65,10 +59,17 @@ def beyond(rms: float, noise: float) -> float:
 
 
 def holds(gaps: Sequence[Gap]) -> bool:
-    """Whether an explanation explains most of every gap, leaves no more than noise and what is
-    usual anywhere, and predicts better in all."""
-    explained = all(one.fits and one.shrinks for one in gaps)
-    return not gaps or (explained and sum(one.lpd_gain for one in gaps) > GAIN)
+    """Whether an explanation leaves no more than noise and what is usual anywhere, predicts better
+    on all data together, and explains most of the gap on them.
+
+    What is usual is no excuse for the gap, or a wrong explanation would hide behind it.
+    """
+    if not gaps:
+        return True
+    before, after = np.sqrt(np.mean(np.square([one.excess for one in gaps]), axis=0))
+    explained = after <= SHARE * before or all(one.after <= one.floor for one in gaps)
+    gained = sum(one.lpd_gain for one in gaps) > GAIN
+    return bool(all(one.fits for one in gaps) and explained and gained)
 
 
 def predict(

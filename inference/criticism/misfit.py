@@ -93,11 +93,12 @@ def check(hypothesis: Hypothesis, signatures: Mapping[str, Signature], null: np.
     span = orthonormal(hypothesis.project(hypothesis.whiten(modes.T)))
     unused = directions(hypothesis, signatures)
     rows = np.stack(list(unused.values())) if unused else np.zeros((0, len(residual)))
-    side, clean = np.array([signatures[name][-2:] for name in unused]).reshape(-1, 2).T[:, :, None]
+    side = np.array([[signatures[name].side] for name in unused]).reshape(-1, 1)
+    clean = np.array([[signatures[name].clean] for name in unused]).reshape(-1, 1)
     scores = rows @ residual / clean
 
-    def measures(scores: np.ndarray, white: np.ndarray) -> np.ndarray:
-        credited = np.where(side, side * scores, np.abs(scores))
+    def measures(found: np.ndarray, white: np.ndarray) -> np.ndarray:
+        credited = np.where(side, side * found, np.abs(found))
         return np.stack([credited.max(0, initial=0.0), np.sum((span.T @ white) ** 2, 0)])
 
     seen, usual = measures(scores, residual)[:, 0], measures(rows @ null, null)

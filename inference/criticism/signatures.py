@@ -62,7 +62,7 @@ def signature(base: Hypothesis, extended: Hypothesis, extension: Extension) -> S
         float(_visible(base, change[None])[0]),
         float(prior.from_unit(np.append(base.u, middle))[name]),
         float(_visible(base, typical)[0]),
-        sum(units),
+        side=sum(units),  # of both sides, 0
     )
 
 

@@ -1,7 +1,7 @@
 """What a simulator usually gets wrong, learned from data believed to be clean."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -27,11 +27,14 @@ class UsualResidual:
             NaN where missing.
         freedom: Clean data sets that speak for this experiment: the size is known as well as a
             variance from so many numbers, but never less than from LEAST_FREEDOM.
+        others: For each shape the autocovariance of all clean data but it, shape [k, lags]; none
+            where there are no other clean data.
     """
 
     autocovariance: np.ndarray
     shapes: np.ndarray
     freedom: int
+    others: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def covariance(self, at: Layout) -> np.ndarray:
         apart = np.abs(np.subtract.outer(at.sample, at.sample))
@@ -41,6 +44,14 @@ class UsualResidual:
         stationary = known[apart] * np.equal.outer(at.channel, at.channel)
         shapes = self.shapes_at(at)
         return stationary + shapes.T @ shapes
+
+    def leave_one_out(self) -> "list[UsualResidual]":
+        """For each shape, what the other clean data teach."""
+        left = [np.delete(self.shapes, k, axis=0) for k in range(len(self.others))]
+        return [
+            replace(self, autocovariance=autocovariance, shapes=shapes, others=self.others[:0])
+            for autocovariance, shapes in zip(self.others, left, strict=True)
+        ]
 
     def draw(self, rng: np.random.Generator, at: Layout, count: int) -> np.ndarray:
         drawn = gaussian(rng, self.covariance(at), count)
@@ -75,14 +86,19 @@ def usual_residual(
         _expected_of(noise, len(residual), lags)
         for noise, residual in zip(noises, residuals, strict=True)
     ]
-    mean = np.mean(found, axis=0) - np.mean(measured, axis=0)
+    each = np.array(found) - np.array(measured)
+    repeated = [k for k, again in enumerate(same) if again]
     kept = [
-        residual * np.sqrt(max(1.0 - noise[0] / max(own[0], noise[0]), 0.0))
-        for residual, own, noise, again in zip(residuals, found, measured, same, strict=True)
-        if again
+        residuals[k] * np.sqrt(max(1.0 - measured[k][0] / max(found[k][0], measured[k][0]), 0.0))
+        for k in repeated
     ]
-    shapes = np.stack(kept) if kept else np.zeros((0, 0, 0))
-    return UsualResidual(positive_autocovariance(mean), shapes, len(kept) or len(residuals))
+    others = [np.delete(each, k, axis=0).mean(0) for k in repeated if len(each) > 1]
+    return UsualResidual(
+        autocovariance=positive_autocovariance(each.mean(0)),
+        shapes=np.stack(kept) if kept else np.zeros((0, 0, 0)),
+        freedom=len(kept) or len(residuals),
+        others=np.reshape([positive_autocovariance(of) for of in others], (len(others), lags)),
+    )
 
 
 def without_usual(noise: Noise) -> Noise:
@@ -94,7 +110,7 @@ def without_usual(noise: Noise) -> Noise:
 
 def usual_in(noise: Noise) -> UsualResidual | None:
     """The part of the noise that is the simulator's fault, if any is known."""
-    parts = noise.parts if isinstance(noise, SumOfNoises) else (noise,)
+    parts = noise.parts if isinstance(noise, SumOfNoises) else ()
     return next((part for part in parts if isinstance(part, UsualResidual)), None)
 
 

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 import bolfi_liquids as bl
+from bolfi_liquids.run_directory import CRITICISM_FORMAT
 
 BUNDLED = Path(str(files("bolfi_liquids.data"))) / "glycerin_v10.nc"
 SHORT = 60  # samples, 2 s: the pause and the first strokes
@@ -98,7 +99,7 @@ def criticism_section():
         "baseline_left_out": [],
         "noise": {"sd_deg": 0.2, "sd_uncertainty": 0.4, "correlation": 0.25, "samples": 32},
         "seconds": 8.0,
-        "made_from": {"settings": {"effects": None}},
+        "made_from": {"settings": {"effects": None}, "format": CRITICISM_FORMAT},
     }
 
 
@@ -131,6 +132,7 @@ def _effects(status):
         "typical": [0.07, 1.07, 1.1],
         "snr": [14.0, 3.5, 0.4],
         "score": [11.0, -4.0, 1.0],
+        "side": [0.0, 0.0, 1.0],
         "gain": [286.0, -20.0, 4.0] if fitted else [np.nan] * 3,
         "p_value": [0.8, 0.003, 0.002] if fitted else [np.nan] * 3,
         "coefficient": [0.05, 0.8, 1.4],

@@ -90,7 +90,7 @@ def test_each_effect_has_one_row_that_says_what_became_of_it():
         "camera_tilt": candidate("camera_tilt"),
     }
     names = (*singles, "adhesion")
-    signature = SimpleNamespace(coefficient=1.0, snr=2.0)
+    signature = SimpleNamespace(coefficient=1.0, snr=2.0, side=0)
     base = SimpleNamespace(
         signatures=dict.fromkeys(names[:-1], signature), check=SimpleNamespace(scores={})
     )
@@ -99,9 +99,8 @@ def test_each_effect_has_one_row_that_says_what_became_of_it():
         singles=singles,
         units=dict.fromkeys(names, "1"),
         untested=("gripper_scale", "adhesion"),
-        tied=(("stick_mass",),),
         refuted=(("camera_delay",),),
-        verdict=SimpleNamespace(kind="effect"),
+        verdict=SimpleNamespace(kind="effect", effects=("stick_mass",)),
     )
     table = _effects(found)
     assert dict(zip(table["effect"].to_numpy(), table["status"].to_numpy(), strict=True)) == {

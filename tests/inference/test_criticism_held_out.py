@@ -124,6 +124,9 @@ def test_most_of_a_gap_must_go_unless_it_may_be_noise():
     large = [inference.Gap("", 1.0, after, 0.3, 0.4, 0.5, 20.0) for after in (0.55, 0.6)]
     assert [one.excess[1] / one.excess[0] < 0.5 for one in large] == [True, False]
     assert [holds([one]) for one in large] == [True, False]
+    # a recording that shows nothing of it takes nothing away
+    indifferent = inference.Gap("", 0.45, 0.45, 0.3, 0.4, 0.5, 0.0)
+    assert holds([large[0]._replace(after=0.4), indifferent]) and not holds([indifferent])
 
 
 def test_missing_samples_are_left_out():

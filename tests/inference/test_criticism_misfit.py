@@ -195,31 +195,37 @@ def test_the_window_in_which_the_data_differ_is_found(banks):
     assert not too_many(p_values[:, [0, 1, 5]].min(1))
 
 
-def clean_of(shapes):
-    """What clean residuals of these shapes [k, N] teach."""
-    clean = [shape[:, None] for shape in shapes]
-    return inference.usual_residual(clean, [inference.KnownNoise(0.0)] * len(clean), [True] * 2)
-
-
 def test_clean_data_are_scored_by_what_the_others_teach(banks):
     """Against generalised least squares, which knows the design and not the emulator."""
     base = banks[0]
-    usual = clean_of([1.5 * BUMP, 0.3 * np.cos(STEPS / 5.0) - 0.8 * BUMP])
-    noise = inference.SumOfNoises((NOISE, usual))
-    believed = replace(base.hypothesis, noise=noise.covariance(AT))
+    silent = inference.KnownNoise(0.0)
+    shapes = [1.5 * BUMP, 0.3 * np.cos(STEPS / 5.0) - 0.8 * BUMP, 0.4 * np.sin(STEPS / 9.0)]
+    clean, repeats = [shape[:, None] for shape in shapes], [True, True, False]
     scores = []
-    for shape in usual.shapes[:, :, 0]:
-        others = believed.spread + believed.noise - np.outer(shape, shape)
-        weight = np.linalg.inv(others)
+    for k in range(2):
+        left, again = np.delete(clean, k, axis=0), np.delete(repeats, k)
+        taught = inference.usual_residual(list(left), [silent] * 2, list(again))
+        weight = np.linalg.inv(
+            base.hypothesis.spread + NOISE.covariance(AT) + taught.covariance(AT)
+        )
         absorbed = weight @ DESIGN
         weight -= absorbed @ np.linalg.solve(DESIGN.T @ absorbed, absorbed.T)
         change = base.signatures["bump"].change
-        scores.append(change @ weight @ shape / np.sqrt(change @ weight @ change))
+        scores.append(change @ weight @ shapes[k] / np.sqrt(change @ weight @ change))
     size = np.sqrt((1.0 + np.sum(np.square(scores))) / 3.0)
     assert size > 1.5
+    usual = inference.usual_residual(clean, [silent] * 3, repeats)
+    noise = inference.SumOfNoises((NOISE, usual))
+    believed = replace(base.hypothesis, noise=noise.covariance(AT))
     found = scored_on_clean(believed, noise, base.signatures)
     assert found["bump"].clean == pytest.approx(size, rel=0.02)
-    assert scored_on_clean(base.hypothesis, NOISE, base.signatures)["bump"].clean == 1.0
+
+
+def test_a_clean_set_alone_says_nothing_of_scores(banks):
+    base = banks[0]
+    usual = inference.usual_residual([BUMP[:, None]], [inference.KnownNoise(0.0)], [True])
+    for noise in (NOISE, inference.SumOfNoises((NOISE, usual))):
+        assert scored_on_clean(base.hypothesis, noise, base.signatures)["bump"].clean == 1.0
 
 
 def test_what_clean_data_show_as_well_is_no_discovery(banks):
@@ -232,6 +238,16 @@ def test_what_clean_data_show_as_well_is_no_discovery(banks):
     assert abs(beside.scores["bump"]) == pytest.approx(1.0)
     assert beside.p_score == pytest.approx(2.0 * norm.sf(1.0), abs=0.06)  # of 999 draws
     assert beside.p_smooth == alone.p_smooth
+
+
+@pytest.mark.parametrize(("low", "high", "side"), [(-2.0, 2.0, 0), (0.0, 2.0, 1), (-2.0, 0.0, -1)])
+def test_a_prior_says_on_which_side_an_effect_can_act(low, high, side):
+    extensions = {"bump": inference.Extension(dist.Uniform(low, high))}
+    laboratory = Laboratory(exact, PRIOR, extensions, "", inference.Keeping(batch=64))
+    observed = observe(exact, 3)
+    found = examine(Study(laboratory, observed, NOISE, inference.Plan()), None)[0].signatures
+    assert found["bump"].side == side
+    assert found["bump"].change @ BUMP > 0.0  # towards a greater coefficient, on either side
 
 
 @pytest.mark.parametrize("bump", [-1.0, 1.0])
