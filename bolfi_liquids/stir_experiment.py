@@ -27,23 +27,23 @@ def camera_noise(recordings: Sequence[Recording]) -> "AutoregressiveNoise":
     """
     from .inference import rest_noise
 
-    seen = {r.path.name: _longest_seen(r.inclination[resting(r)]) for r in recordings}
-    rests = {name: rest for name, rest in seen.items() if len(rest) >= SHORTEST}
+    seen = [(r.path.name, _longest_seen(r.inclination[resting(r)])) for r in recordings]
+    rests = [(name, rest) for name, rest in seen if len(rest) >= SHORTEST]
     if not rests:
         raise InputError(
             f"fewer than {SHORTEST} samples before the gripper moves, too few to learn the "
             "cameras' noise from",
-            where=", ".join(seen),
+            where=", ".join(name for name, _ in seen),
             fix="let the gripper rest for a second before it stirs",
         )
-    for name, rest in rests.items():
+    for name, rest in rests:
         if not rest.std(axis=0).any():
             raise InputError(
                 "the inclination does not change at all before the gripper moves",
                 where=name,
                 fix="record what the cameras see, noise included",
             )
-    return rest_noise(list(rests.values()), trend=TREND)
+    return rest_noise([rest for _, rest in rests], trend=TREND)
 
 
 def _longest_seen(rest: np.ndarray) -> np.ndarray:

@@ -77,12 +77,27 @@ def test_a_clean_recording_that_is_criticised_or_held_out_is_no_baseline(
     held = other("held.nc")
     inputs = given(calibration, held_out=held, baseline=[short_recording, held, other("c.nc")])
     assert [recording.path.name for recording in inputs.baseline] == ["c.nc"]
+    assert set(inputs.left_out) == {short_recording.name, "held.nc"}
+    assert inputs.made_from != given(calibration, held_out=held, baseline=other("c.nc")).made_from
 
 
 def refused(said, calibration, **some):
     with pytest.raises(InputError) as error:
         given(calibration, **some)
     assert said in str(error.value)
+
+
+def test_what_is_no_file_is_refused_by_its_option(calibration, other, table):
+    recordings = (path for path in [other("held.nc")])  # any iterable will do
+    assert [one.path.name for one in given(calibration, held_out=recordings).held_out] == [
+        "held.nc"
+    ]
+    for option in ("held_out", "baseline"):
+        for wrong in (3, [other("a.nc"), None]):
+            refused("is no recording", calibration, **{option: wrong})
+    refused("--baseline", calibration, baseline=3)
+    refused("3 is no table of pours", calibration, pours=3)
+    refused("--held-out-pours", calibration, pours=table("p.csv"), held_out_pours=[1])
 
 
 def test_a_recording_is_held_out_once_and_under_its_own_name(calibration, other, tmp_path):
@@ -156,6 +171,9 @@ def test_a_camera_without_any_noise_is_not_believed(calibration):
     still = recorded(calibration, np.random.default_rng(0), sd=0.0)
     with pytest.raises(InputError, match="does not change at all"):
         camera_noise([still])
+    seen = recorded(calibration, np.random.default_rng(0))
+    with pytest.raises(InputError, match="does not change at all"):
+        held_out_noise(still, [seen])
 
 
 def test_clean_recordings_of_the_same_path_say_where_it_errs(calibration):

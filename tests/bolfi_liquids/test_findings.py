@@ -73,6 +73,13 @@ def test_what_was_requested_is_told_from_what_was_found():
     assert findings(DELAY, pours).requested == ()
 
 
+@pytest.mark.parametrize(("explains", "unsupported"), [(True, ()), (False, ("camera_delay",))])
+def test_what_is_accepted_though_it_explains_nothing_is_told(explains, unsupported):
+    stirs = source(("camera_delay",), model(("camera_delay",), 1.0))
+    stirs.leading = SimpleNamespace(accepted=explains)
+    assert findings(stirs, None, accept=("camera_delay",)).unsupported == unsupported
+
+
 def candidate(name, **changes):
     """Of an effect that explains the difference, but for `changes`."""
     check = SimpleNamespace(p_value=0.5)
