@@ -58,14 +58,14 @@ VISCOSITY = 0.4, 1.2  # Pa s, of the truths
 EFFECTS = {
     "camera_delay": (0.03, 0.06),
     "camera_tilt": (0.015, 0.025),
-    "pivot_friction": (9e-4, 13e-4),
-    "yield_stress": (28.0, 40.0),
+    "camera_rotation": (0.2, 0.28),
+    "pivot_friction": (12e-4, 16e-4),
     "gripper_scale": (1.16, 1.25),
 }
 """Hidden in stirs: sizes with which these stirs could show them, with either sign where an effect
-has both. Stick mass, fill level and warming stay below a signal-to-noise ratio of ten here, as
-large as their priors allow."""
-SIGNED = ("camera_delay", "camera_tilt")
+has both. Stick mass, fill level, warming and yield stress stay below a signal-to-noise ratio of ten
+here, as large as their priors allow."""
+SIGNED = ("camera_delay", "camera_rotation", "camera_tilt")
 ADHESION = 0.3, 0.8  # hidden in pours
 PATHS = {
     "star": paths.star(points=5, radius=0.022, speed=0.12, height=0.235, rest=1.0),
