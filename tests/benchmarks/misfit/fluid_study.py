@@ -55,11 +55,12 @@ POURED = 900  # particles of the pours that are data; the model has its usual nu
 NOISE, CORRELATION = np.radians(0.1), 0.5
 NULLS, SETS, CLEAN = 20, 5, 4
 VISCOSITY = 0.4, 1.2  # Pa s, of the truths
+THIN = {"pivot_friction": (0.1, 0.2)}  # Pa s, where thicker liquid hides an effect
 EFFECTS = {
     "camera_delay": (0.03, 0.06),
     "camera_tilt": (0.015, 0.025),
     "camera_rotation": (0.2, 0.28),
-    "pivot_friction": (12e-4, 16e-4),
+    "pivot_friction": (7e-4, 11e-4),
     "gripper_scale": (1.16, 1.25),
 }
 """Hidden in stirs: sizes with which these stirs could show them, with either sign where an effect
@@ -90,7 +91,7 @@ def examine(one: Set, bank: inference.SimulationBank) -> dict:
     started = time.perf_counter()
     rng = np.random.default_rng([number, *effect.encode()])
     truth = {
-        "viscosity": float(np.exp(rng.uniform(*np.log(VISCOSITY)))),
+        "viscosity": float(np.exp(rng.uniform(*np.log(THIN.get(effect, VISCOSITY))))),
         "cohesion": float(rng.uniform(0.1, 0.9)),
     }
     if effect == "adhesion":
