@@ -55,12 +55,12 @@ POURED = 900  # particles of the pours that are data; the model has its usual nu
 NOISE, CORRELATION = np.radians(0.1), 0.5
 NULLS, SETS, CLEAN = 20, 5, 4
 VISCOSITY = 0.4, 1.2  # Pa s, of the truths
-THIN = {"pivot_friction": (0.1, 0.2)}  # Pa s, where thicker liquid hides an effect
+THIN = {"pivot_friction": (0.06, 0.12)}  # Pa s, where thicker liquid hides an effect
 EFFECTS = {
     "camera_delay": (0.03, 0.06),
     "camera_tilt": (0.015, 0.025),
     "camera_rotation": (0.2, 0.28),
-    "pivot_friction": (7e-4, 11e-4),
+    "pivot_friction": (11e-4, 13e-4),
     "gripper_scale": (1.16, 1.25),
 }
 """Hidden in stirs: sizes with which these stirs could show them, with either sign where an effect
