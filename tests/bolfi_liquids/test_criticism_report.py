@@ -117,7 +117,7 @@ def test_what_was_given_as_clean_but_not_counted_is_named(criticism_section):
     section = {**criticism_section, "baseline_left_out": ["stir.nc"]}
     sentence = narrative.baseline_sentence(section)
     assert "2 clean recordings" in sentence
-    assert "Not counted as clean, as it is looked at itself: stir.nc." in sentence
+    assert "Not counted as clean, but looked at: stir.nc." in sentence
 
 
 def test_that_few_effects_were_considered_is_said(criticism_section):

@@ -71,7 +71,6 @@ def test_adhesion_is_found_in_pours_and_the_next_pour_spills_less(tmp_path):
         progress=False,
     )
     after = bl.choose_pour(criticism.calibration, bundled_cups(), progress=False)
-    print(criticism.summary["reason"], criticism.summary["coefficient"], criticism.summary["pours"])
     assert criticism.verdict == "effect"
     assert criticism.effects == ("adhesion",)
     pours = criticism.summary["pours"]
@@ -79,5 +78,4 @@ def test_adhesion_is_found_in_pours_and_the_next_pour_spills_less(tmp_path):
     coefficient = criticism.summary["coefficient"]["adhesion"]
     assert coefficient["q05"] < ADHESION["adhesion"] < coefficient["q95"]
     spilled = [truly_spilled(pour) for pour in (before, after)]
-    print("truly spilled, before and after:", spilled)
     assert spilled[1] < 0.5 * spilled[0]
