@@ -50,9 +50,7 @@ def star(  # noqa: PLR0913  a pattern has that many sizes
     )
     if points < 5 or points % 2 == 0:
         raise ValueError(f"points must be odd and at least 5, got {points}; the paper uses 9")
-    angles = 2.0 * np.pi * (points // 2) * np.arange(points + 1) / points
-    vertices = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    corners = np.concatenate([np.zeros((1, 2)), vertices])
+    corners = np.concatenate([np.zeros((1, 2)), star_vertices(points, radius)])
 
     strokes = np.linalg.norm(np.diff(corners, axis=0), axis=1)
     # a short stroke never reaches the full speed
@@ -67,6 +65,16 @@ def star(  # noqa: PLR0913  a pattern has that many sizes
     share = _travelled(elapsed, durations[k], ramps[k], peaks[k]) / strokes[k]
     plane = corners[k] + share[:, None] * (corners[k + 1] - corners[k])
     return Path(time, np.column_stack([plane, np.full(len(time), height)]))
+
+
+def star_vertices(points: int, radius: float) -> np.ndarray:
+    """Vertices of a closed star in their order, the first one again at the end.
+
+    Returns:
+        x and y [m], shape (points + 1, 2).
+    """
+    angles = 2.0 * np.pi * (points // 2) * np.arange(points + 1) / points
+    return radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
 def _check_positive(**sizes: float) -> None:

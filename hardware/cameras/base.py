@@ -1,0 +1,36 @@
+"""What every camera gives: frames with the camera's own time and the time of arrival."""
+
+from typing import Protocol
+
+import numpy as np
+
+from ..vision.frame import Frame
+from ..vision.opencv import opencv
+
+
+class CameraError(RuntimeError):
+    """A camera cannot be used; the message names it and says what to do."""
+
+
+class Camera(Protocol):
+    """Anything that delivers frames."""
+
+    def read(self) -> Frame | None:
+        """The next frame; waits for it. None when there will be no more.
+
+        Raises:
+            CameraError: the camera fails.
+        """
+        ...
+
+    def close(self) -> None:
+        """Let the device or file go; harmless when repeated."""
+        ...
+
+
+def grey(image: np.ndarray) -> np.ndarray:
+    """The picture's grey levels, shape (height, width), from grey or OpenCV's BGR."""
+    if image.ndim == 2:
+        return image
+    cv2 = opencv()
+    return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)

@@ -1,0 +1,90 @@
+"""Frames from a video file or a directory of pictures, through the interface of a camera."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ..vision.frame import Frame
+from ..vision.opencv import opencv
+from .base import CameraError, grey
+
+PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+
+
+class FilesCamera:
+    """Reads what was recorded, as fast as it is asked for."""
+
+    def __init__(self, path: str | Path, *, rate: float = 30.0) -> None:
+        """Open a video file, or a directory of pictures that are read in the order of their names.
+
+        Args:
+            path: File or directory.
+            rate: Of a directory's pictures [1/s]; a video file knows its own times.
+
+        Raises:
+            CameraError: there is nothing at `path`, or nothing that can be read.
+            ValueError: `rate` is not positive.
+        """
+        if not rate > 0:
+            raise ValueError(f"rate must be positive, got {rate}")
+        path = Path(path)
+        if path.is_dir():
+            self._frames = _pictures(_names(path), rate)
+        elif path.is_file():
+            self._frames = _video(path)
+        else:
+            raise CameraError(f"there is no video file or directory of pictures at {path}")
+        # the first frame is read now: what cannot be read is refused on opening
+        self._first: Frame | None = next(self._frames, None)
+        if self._first is None:
+            raise CameraError(f"{path} holds no frame that OpenCV can read")
+
+    def read(self) -> Frame | None:
+        """The next frame, None at the end.
+
+        Raises:
+            CameraError: a picture cannot be read.
+        """
+        if self._first is not None:
+            frame, self._first = self._first, None
+            return frame._replace(host=time.monotonic())
+        return next(self._frames, None)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._first = None
+        self._frames = iter(())
+
+
+def _names(directory: Path) -> list[Path]:
+    names = sorted(p for p in directory.iterdir() if p.suffix.lower() in PICTURES)
+    if not names:
+        raise CameraError(f"{directory} holds no pictures ({', '.join(PICTURES)})")
+    return names
+
+
+def _pictures(names: list[Path], rate: float) -> Iterator[Frame]:
+    cv2 = opencv()
+    for index, name in enumerate(names):
+        image = cv2.imread(str(name), cv2.IMREAD_GRAYSCALE)
+        if image is None:
+            raise CameraError(f"{name} is no picture that OpenCV can read; remove it")
+        yield Frame(index, index / rate, time.monotonic(), image)
+
+
+def _video(path: Path) -> Iterator[Frame]:
+    cv2 = opencv()
+    capture = cv2.VideoCapture(str(path))
+    try:
+        index = 0
+        while True:
+            seen, image = capture.read()
+            if not seen:
+                return
+            stamp = 1e-3 * capture.get(cv2.CAP_PROP_POS_MSEC)
+            yield Frame(index, stamp, time.monotonic(), np.ascontiguousarray(grey(image)))
+            index += 1
+    finally:
+        capture.release()

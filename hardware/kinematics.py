@@ -1,0 +1,301 @@
+"""Kinematics of the UR10: where the tool is, which joints put it there, and whole paths.
+
+Standard Denavit-Hartenberg convention: frame i follows frame i-1 by a turn `joint` about z, a
+shift `d` along z, a shift `a` along x and a turn `alpha` about x. Tables: Universal Robots, "DH
+parameters for calculations of kinematics and dynamics". A real arm's calibrated table differs
+from them by up to some millimetres.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from .geometry import Numbers, matrix_pose, pose_matrix
+
+_ALPHA = (0.5 * math.pi, 0.0, 0.0, 0.5 * math.pi, -0.5 * math.pi, 0.0)
+
+
+class DhArm(NamedTuple):
+    """A six-axis arm of the UR family: three parallel axes (2 to 4) and two at right angles.
+
+    Attributes:
+        name: As the manufacturer writes it.
+        d: Shifts along z [m], of which the second and third are zero.
+        a: Shifts along x [m], of which only the second and third are not zero.
+        joint_limit: Greatest turn of each joint either way [rad].
+        joint_speed: Greatest speed of each joint [rad/s].
+    """
+
+    name: str
+    d: tuple[float, float, float, float, float, float]
+    a: tuple[float, float, float, float, float, float]
+    joint_limit: float
+    joint_speed: tuple[float, float, float, float, float, float]
+
+
+# 120 deg/s of the two large joints, 180 deg/s of the others
+_SPEEDS = (2.0 / 3.0 * math.pi, 2.0 / 3.0 * math.pi, math.pi, math.pi, math.pi, math.pi)
+
+UR10 = DhArm(
+    name="UR10",
+    d=(0.1273, 0.0, 0.0, 0.163941, 0.1157, 0.0922),
+    a=(0.0, -0.612, -0.5723, 0.0, 0.0, 0.0),
+    joint_limit=2.0 * math.pi,
+    joint_speed=_SPEEDS,
+)
+UR10E = DhArm(
+    name="UR10e",
+    d=(0.1807, 0.0, 0.0, 0.17415, 0.11985, 0.11655),
+    a=(0.0, -0.6127, -0.57155, 0.0, 0.0, 0.0),
+    joint_limit=2.0 * math.pi,
+    joint_speed=_SPEEDS,
+)
+ARMS = {"ur10": UR10, "ur10e": UR10E}
+
+
+class Inverse(NamedTuple):
+    """Joints [rad], shape [6], for a pose.
+
+    `status` is "ok"; or "singular": the joints are exact, but the wrist's axes 4 and 6 coincide
+    there, so that only their sum is determined and joint 6 was kept; or "unreachable": no
+    solution within the joint limits, or a pose that is not finite; the joints are NaN.
+    """
+
+    joints: np.ndarray
+    status: Literal["ok", "singular", "unreachable"]
+
+
+class Followed(NamedTuple):
+    """Joints along a path of poses.
+
+    Attributes:
+        joints: [rad], shape [T, 6]; NaN from the first pose that cannot be reached.
+        status: "ok"; "unreachable"; "jump": a joint moves further than allowed from one pose to
+            the next, so that the arm would swing to another configuration; or "too fast": a
+            joint exceeds its speed limit.
+        at: Index of the first pose of which that is true; None if all is well.
+        largest_step: Greatest change of a joint from one pose to the next [rad].
+        fastest: Greatest speed of a joint as a share of its limit; NaN without times.
+    """
+
+    joints: np.ndarray
+    status: Literal["ok", "unreachable", "jump", "too fast"]
+    at: int | None
+    largest_step: float
+    fastest: float
+
+
+def forward(arm: DhArm, joints: Numbers, *, tcp: Numbers | None = None) -> np.ndarray:
+    """Pose of the TCP in the base frame, shape [6].
+
+    Args:
+        arm: The Denavit-Hartenberg table.
+        joints: Joint angles [rad], shape [6].
+        tcp: Pose of the TCP in the flange's frame; the flange itself if None.
+    """
+    return matrix_pose(forward_matrix(arm, joints, tcp=tcp))
+
+
+def forward_matrix(arm: DhArm, joints: Numbers, *, tcp: Numbers | None = None) -> np.ndarray:
+    """The same as `forward`, as a homogeneous transform, shape [4, 4]."""
+    flange = _frames(arm, joints)[-1]
+    return flange if tcp is None else flange @ pose_matrix(tcp)
+
+
+def _frames(arm: DhArm, joints: Numbers) -> list[np.ndarray]:
+    """The base and the six frames behind the joints, as transforms."""
+    frames = [np.eye(4)]
+    for i, joint in enumerate(joints):
+        cos, sin = math.cos(joint), math.sin(joint)
+        # alpha is a multiple of a right angle: its cosine and sine are exactly 0 or +-1
+        cos_alpha = 1.0 if _ALPHA[i] == 0.0 else 0.0
+        sin_alpha = 0.0 if _ALPHA[i] == 0.0 else math.copysign(1.0, _ALPHA[i])
+        step = np.array(
+            [
+                [cos, -sin * cos_alpha, sin * sin_alpha, arm.a[i] * cos],
+                [sin, cos * cos_alpha, -cos * sin_alpha, arm.a[i] * sin],
+                [0.0, sin_alpha, cos_alpha, arm.d[i]],
+                [0.0, 0.0, 0.0, 1.0],
+            ]
+        )
+        frames.append(frames[-1] @ step)
+    return frames
+
+
+def jacobian(arm: DhArm, joints: Numbers, *, tcp: Numbers | None = None) -> np.ndarray:
+    """Velocity of the TCP [m/s] and angular velocity [rad/s], base frame, per joint speed.
+
+    Args:
+        arm: The Denavit-Hartenberg table.
+        joints: Joint angles [rad], shape [6].
+        tcp: As for `forward`.
+
+    Returns:
+        Shape [6, 6]: rows vx, vy, vz, wx, wy, wz; columns the joints.
+    """
+    frames = _frames(arm, joints)
+    end = frames[-1] if tcp is None else frames[-1] @ pose_matrix(tcp)
+    stacked = np.array(frames[:6])
+    axes = stacked[:, :3, 2]
+    arms = end[:3, 3] - stacked[:, :3, 3]
+    columns = np.empty((6, 6))
+    columns[0] = axes[:, 1] * arms[:, 2] - axes[:, 2] * arms[:, 1]
+    columns[1] = axes[:, 2] * arms[:, 0] - axes[:, 0] * arms[:, 2]
+    columns[2] = axes[:, 0] * arms[:, 1] - axes[:, 1] * arms[:, 0]
+    columns[3:] = axes.T
+    return columns
+
+
+def inverse(arm: DhArm, pose: Numbers, near: Numbers, *, tcp: Numbers | None = None) -> Inverse:
+    """Joints that put the TCP at a pose: of the up to eight solutions the one nearest to `near`.
+
+    Closed form for the UR family (as in Hawkins, "Analytic inverse kinematics for the universal
+    robots", 2013), exact to rounding also near singular configurations. Each joint is taken on
+    the turn that is nearest to `near` within the arm's limits.
+
+    Args:
+        arm: The Denavit-Hartenberg table.
+        pose: TCP in the base frame: position [m], rotation vector [rad].
+        near: Joints [rad] from which the arm comes, shape [6].
+        tcp: As for `forward`.
+    """
+    target = pose_matrix(pose)
+    if not np.isfinite(target).all():
+        return Inverse(np.full(6, np.nan), "unreachable")
+    if tcp is not None:
+        target = target @ _inverse_transform(pose_matrix(tcp))
+    start = [float(value) for value in near]
+    best, best_distance, best_singular = None, math.inf, False
+    for solution, singular in _solutions(arm, target, start[5]):
+        turned = _nearest_turn(solution, start, arm.joint_limit)
+        distance = sum((x - y) ** 2 for x, y in zip(turned, start, strict=True))
+        if distance < best_distance:
+            best, best_distance, best_singular = turned, distance, singular
+    if best is None:
+        return Inverse(np.full(6, np.nan), "unreachable")
+    return Inverse(np.array(best), "singular" if best_singular else "ok")
+
+
+def _inverse_transform(matrix: np.ndarray) -> np.ndarray:
+    result = np.eye(4)
+    result[:3, :3] = matrix[:3, :3].T
+    result[:3, 3] = -matrix[:3, :3].T @ matrix[:3, 3]
+    return result
+
+
+def _nearest_turn(joints: Sequence[float], near: Sequence[float], limit: float) -> list[float]:
+    turned = []
+    for joint, start in zip(joints, near, strict=True):
+        joint += 2.0 * math.pi * round((start - joint) / (2.0 * math.pi))
+        # the joint limits span two turns, so one of these is always inside
+        if joint > limit:
+            joint -= 2.0 * math.pi
+        elif joint < -limit:
+            joint += 2.0 * math.pi
+        turned.append(joint)
+    return turned
+
+
+def _solutions(arm: DhArm, flange: np.ndarray, kept: float) -> list[tuple[tuple[float, ...], bool]]:
+    """All joints for a flange, each with whether its wrist is singular; joint 6 is then `kept`."""
+    (xx, yx, zx, px), (xy, yy, zy, py), (xz, yz, zz, pz) = flange[:3].tolist()
+    # centre of the wrist; its distance from the plane of the three parallel axes is d4
+    cx, cy, cz = px - arm.d[5] * zx, py - arm.d[5] * zy, pz - arm.d[5] * zz
+    reach = math.hypot(cx, cy)
+    if reach < abs(arm.d[3]):
+        return []
+    bearing, offset = math.atan2(cy, cx), math.asin(arm.d[3] / reach)
+    found = []
+    for one in (bearing + offset, bearing + math.pi - offset):
+        c1, s1 = math.cos(one), math.sin(one)
+        nx, ny, nz = s1 * xx - c1 * xy, s1 * yx - c1 * yy, s1 * zx - c1 * zy
+        tilt = math.hypot(nx, ny)
+        singular = tilt < 1e-9
+        for sign in (1.0,) if singular else (1.0, -1.0):
+            five = math.atan2(sign * tilt, nz)
+            six = kept if singular else math.atan2(-sign * ny, sign * nx)
+            c5, s5, c6, s6 = math.cos(five), math.sin(five), math.cos(six), math.sin(six)
+            # axes of frame 4 and its origin, in the plane of the parallel axes
+            x4x = c5 * (c6 * xx - s6 * yx) - s5 * zx
+            x4y = c5 * (c6 * xy - s6 * yy) - s5 * zy
+            x4z = c5 * (c6 * xz - s6 * yz) - s5 * zz
+            turned = math.atan2(x4z, c1 * x4x + s1 * x4y)
+            along = c1 * (cx + arm.d[4] * (s6 * xx + c6 * yx))
+            along += s1 * (cy + arm.d[4] * (s6 * xy + c6 * yy))
+            up = cz + arm.d[4] * (s6 * xz + c6 * yz) - arm.d[0]
+            for two, three in _elbow(arm.a[1], arm.a[2], along, up):
+                found.append(((one, two, three, turned - two - three, five, six), singular))
+    return found
+
+
+def _elbow(upper: float, fore: float, x: float, y: float) -> list[tuple[float, float]]:
+    """Both pairs of angles with which two links reach (x, y); none if it is too far or near."""
+    cosine = (x * x + y * y - upper**2 - fore**2) / (2.0 * upper * fore)
+    if abs(cosine) > 1.0 + 1e-12:
+        return []
+    bend = math.acos(max(-1.0, min(1.0, cosine)))
+    pairs = []
+    for three in (bend, -bend):
+        inner = math.atan2(fore * math.sin(three), upper + fore * math.cos(three))
+        pairs.append((math.atan2(y, x) - inner, three))
+    return pairs
+
+
+def follow(
+    arm: DhArm,
+    poses: np.ndarray,
+    start: Numbers,
+    *,
+    times: np.ndarray | None = None,
+    tcp: Numbers | None = None,
+    largest_step: float = 0.3,
+) -> Followed:
+    """Joints along a whole path, each nearest to the one before, and whether the arm can go it.
+
+    Call it before any motion: a path of which every pose can be reached may still ask for a jump
+    between configurations or, near a singular one, for joints faster than they are.
+
+    Args:
+        arm: The Denavit-Hartenberg table.
+        poses: TCP in the base frame, shape [T, 6].
+        start: Joints from which the path begins [rad], shape [6]; its first step counts too.
+        times: Of the poses [s], shape [T], rising; joint speeds are checked where given.
+        tcp: As for `forward`.
+        largest_step: A joint that moves further between two poses counts as a jump [rad].
+
+    Raises:
+        ValueError: `poses` or `times` has another shape, or times do not rise.
+    """
+    poses = np.asarray(poses, dtype=float)
+    if poses.ndim != 2 or poses.shape[1] != 6:
+        raise ValueError(f"poses must have shape [T, 6], got {poses.shape}")
+    spans = None if times is None else np.diff(np.asarray(times, dtype=float))
+    if spans is not None and (len(spans) + 1 != len(poses) or not (spans > 0).all()):
+        raise ValueError(f"times must be {len(poses)} rising numbers, one for each pose")
+
+    joints = np.full(poses.shape, np.nan)
+    near = np.asarray(start, dtype=float)
+    reached = len(poses)
+    for k, pose in enumerate(poses):
+        joints[k] = inverse(arm, pose, near, tcp=tcp).joints
+        if np.isnan(joints[k, 0]):
+            reached = k
+            break
+        near = joints[k]
+    done = joints[:reached]
+    steps = np.abs(np.diff(np.vstack([np.asarray(start, dtype=float), done]), axis=0)).max(axis=1)
+    step = float(steps.max(initial=0.0))
+    share = np.zeros(0)
+    if spans is not None and reached > 1:
+        speeds = np.abs(np.diff(done, axis=0)) / spans[: reached - 1, None]
+        share = (speeds / arm.joint_speed).max(axis=1)
+    fastest = float("nan") if spans is None else float(share.max(initial=0.0))
+    if reached < len(poses):
+        return Followed(joints, "unreachable", reached, step, fastest)
+    if step > largest_step:
+        return Followed(joints, "jump", int(np.argmax(steps > largest_step)), step, fastest)
+    if fastest > 1.0:
+        return Followed(joints, "too fast", int(np.argmax(share > 1.0)) + 1, step, fastest)
+    return Followed(joints, "ok", None, step, fastest)

@@ -1,0 +1,49 @@
+"""A process's dealings with a disk that may get full: it stops writing and goes on living."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from ..board import Trouble, host_time
+from .events import EventLog
+
+
+class Disk:
+    """Carries out writes until one fails; tells the reason once, and writes no more.
+
+    Attributes:
+        trouble: What to complain of on the board.
+        slowest: Longest time that a write has taken [s].
+    """
+
+    def __init__(self, log: EventLog):
+        self.trouble = Trouble.NONE
+        self.slowest = 0.0
+        self._log = log
+
+    def write(self, name: str, act: Callable[[], Any]) -> None:
+        """Call `act`, which writes to the file `name`, unless an earlier write has failed."""
+        if self.trouble is Trouble.WRITE_FAILED:
+            return
+        start = host_time()
+        try:
+            act()
+        except OSError as err:
+            self.trouble = Trouble.WRITE_FAILED
+            self.tell("write_failed", file=name, reason=str(err))
+        self.slowest = max(self.slowest, host_time() - start)
+
+    def tell(self, kind: str, **fields: Any) -> None:
+        """Write an event, if it can be written at all; the board tells of trouble besides."""
+        with suppress(OSError):
+            self._log.write(kind, **fields)
+
+
+@contextmanager
+def told_if_fails(disk: Disk) -> Iterator[None]:
+    """Leave the reason in the events when a process ends by an error."""
+    try:
+        yield
+    except Exception as err:
+        disk.tell("failed", reason=f"{type(err).__name__}: {err}")
+        raise

@@ -1,0 +1,116 @@
+"""What a session has left in its directory, as arrays; whatever is missing is said."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RigError
+from ..rig import View
+from ..vision.frame_measurement import FrameMeasurement
+from ..vision.inclination import ViewLines
+from ..vision.series import FrameSeries
+from .csv_file import read_csv
+from .directory import VIEWS, Provenance, read_provenance
+from .names import frames_file
+from .sample import SAMPLES, Sample
+
+LEAST_SAMPLES = 50
+LEAST_FRAMES = 30
+Columns = dict[str, NDArray[np.float64]]
+
+
+class Raw(NamedTuple):
+    """All that was recorded, in the order of the clocks.
+
+    Attributes:
+        provenance: Of the session.
+        samples: Columns of samples.csv, times rising.
+        frames: Columns of each view's frames, stamps rising.
+        lost_samples: Rows that the control process took and samples.csv lacks.
+    """
+
+    provenance: Provenance
+    samples: Columns
+    frames: dict[View, Columns]
+    lost_samples: int
+
+
+def read_raw(directory: Path) -> Raw:
+    """Read what is there.
+
+    Raises:
+        RigError: The robot's samples or a view's frames are missing, or too few.
+    """
+    provenance = read_provenance(directory)
+    rows = _read(directory / SAMPLES, Sample._fields)
+    samples = _rising(rows, "time")
+    frames: dict[View, Columns] = {
+        view: _rising(_read(directory / frames_file(view), FrameMeasurement._fields), "stamp")
+        for view in VIEWS
+    }
+    counts = {SAMPLES: len(samples["time"])}
+    counts |= {frames_file(view): len(frames[view]["stamp"]) for view in VIEWS}
+    _check_enough(directory, counts)
+    return Raw(provenance, samples, frames, lost_rows(rows["index"]))
+
+
+def frame_series(frames: Columns) -> FrameSeries:
+    """A view's frames in the form that the joining takes."""
+    return FrameSeries(
+        stamp=frames["stamp"],
+        marker=np.column_stack([frames["marker_column"], frames["marker_row"]]),
+        lines=ViewLines(*(frames[name] for name in ViewLines._fields)),
+        flags=frames["flags"].astype(np.int64),
+    )
+
+
+def lost_rows(index: NDArray[np.float64]) -> int:
+    """How many rows are missing from a table: what its rising index leaves out, shape (N,)."""
+    return int(index[-1] - index[0] + 1 - len(index))
+
+
+def missed(clock: NDArray[np.float64]) -> int:
+    """How many times a source's clock leaves out: what it sent and nobody fetched.
+
+    A camera's queue drops old pictures, and a controller's client keeps only the newest package:
+    a computer that stands still for longer than their period misses some.
+
+    Args:
+        clock: Times of the rows [s], shape (N,), N at least 2, rising.
+    """
+    steps = np.diff(clock) / np.median(np.diff(clock))
+    return int((np.rint(steps[steps > 1.5]) - 1).sum())
+
+
+def _read(path: Path, fields: tuple[str, ...]) -> Columns:
+    try:
+        return read_csv(path, fields)
+    except FileNotFoundError:
+        return {name: np.empty(0) for name in fields}
+    except ValueError as err:
+        raise RigError(
+            str(err), where=str(path), fix="was it recorded by another version?"
+        ) from err
+
+
+def _rising(columns: Columns, clock: str) -> Columns:
+    """Without the rows whose clock stands still or goes back: a source that repeats itself."""
+    time = columns[clock]
+    before = np.maximum.accumulate(np.concatenate([[-np.inf], time[:-1]]))
+    kept = np.isfinite(time) & (time > before)
+    return {name: values[kept] for name, values in columns.items()}
+
+
+def _check_enough(directory: Path, counts: dict[str, int]) -> None:
+    needed = {SAMPLES: LEAST_SAMPLES} | {frames_file(view): LEAST_FRAMES for view in VIEWS}
+    short = [name for name, count in counts.items() if count < needed[name]]
+    if short:
+        there = ", ".join(f"{name} has {count} rows" for name, count in counts.items())
+        raise RigError(
+            f"{' and '.join(short)} hold too little: {there}",
+            where=str(directory),
+            fix=f"a recording needs {LEAST_SAMPLES} samples and {LEAST_FRAMES} frames of each "
+            "view; record again",
+        )

@@ -1,0 +1,166 @@
+"""The stir in a session's raw data: one table of gripper and stick on the robot's clock."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RigError
+from ..rig import View
+from ..vision.clock import Clock, ClockError, GripperSamples, fit_clock
+from ..vision.frame_measurement import BAD_LINE
+from ..vision.joining import View as JoinedView
+from ..vision.joining import join
+from ..vision.series import FrameSeries
+from .directory import VIEWS
+from .raw import Columns, Raw, frame_series
+
+RATE = 30.0  # of the table [1/s]; the cameras' in "To Stir or Not to Stir"
+AROUND = 1.0  # [s] before and after the stir that the clocks are learned from, too
+LONGEST_GAP = 0.1  # [s] without a sample of the robot, over which nothing is interpolated
+MOST_GAP = 0.2  # [s]; a recording ends at a longer one, since a simulator needs the way
+LEAST_TIME = 1.0  # [s] of a stir
+
+
+class Stir(NamedTuple):
+    """A stir; T samples at `RATE`.
+
+    Attributes:
+        time: From its first sample [s], shape (T,).
+        position: Of the pivot in the cup's frame [m], shape (T, 3).
+        inclination: In the xz and yz planes [rad], shape (T, 2); NaN where it was not seen.
+        error: Standard errors of the inclination [rad], shape (T, 2).
+        flags: Why there is no inclination, as `Flag`; shape (T,).
+        origin: The robot's time at `time` 0 [s].
+        clocks: Of the cameras.
+        cut: Why it ends before the last sample of the stir; empty where it does not.
+    """
+
+    time: NDArray[np.float64]
+    position: NDArray[np.float64]
+    inclination: NDArray[np.float64]
+    error: NDArray[np.float64]
+    flags: NDArray[np.int64]
+    origin: float
+    clocks: dict[View, Clock]
+    cut: str
+
+
+class _Span(NamedTuple):
+    first: float
+    last: float
+    cut: str = ""
+
+
+def extract_stir(raw: Raw, where: str, until: float = np.inf) -> Stir:
+    """Cut out the stir, bring the cameras to the robot's clock, and join both views.
+
+    Args:
+        raw: Of a session.
+        where: Its directory, for a refusal.
+        until: Take nothing after this time of the robot's clock [s].
+
+    Raises:
+        RigError: There is no stir, it is too short, or a camera's clock cannot be found.
+    """
+    span = _stirred(raw.samples, where, until)
+    _check_length(span, where)
+    series = {view: frame_series(raw.frames[view]) for view in VIEWS}
+    clocks: dict[View, Clock] = {view: _clock(raw, view, series[view], span) for view in VIEWS}
+    for view in VIEWS:
+        span = _seen(span, series[view], clocks[view], view)
+    _check_length(span, where)
+    time = np.arange(np.floor((span.last - span.first) * RATE + 1e-6) + 1) / RATE
+    times = span.first + time
+    xz, yz = (JoinedView(series[v], clocks[v], raw.provenance.cameras[v]) for v in VIEWS)
+    joined = join(xz, yz, times)
+    position = [np.interp(times, raw.samples["time"], raw.samples[axis]) for axis in "xyz"]
+    unknown = _in_gap(raw.samples["time"], times)
+    return Stir(
+        time=time,
+        position=np.where(unknown[:, None], np.nan, np.column_stack(position)),
+        inclination=joined.angle,
+        error=joined.error,
+        flags=joined.flags,
+        origin=span.first,
+        clocks=clocks,
+        cut=span.cut,
+    )
+
+
+def _in_gap(time: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which of `times` lie in a gap of `time` that is longer than `LONGEST_GAP`."""
+    after = np.clip(np.searchsorted(time, times), 1, len(time) - 1)
+    return time[after] - time[after - 1] > LONGEST_GAP
+
+
+def _stirred(samples: Columns, where: str, until: float) -> _Span:
+    """From the first to the last sample of the stir, or up to a gap between them."""
+    time = samples["time"]
+    stirring = np.flatnonzero((samples["stirring"] == 1) & (time <= until))
+    if len(stirring) == 0:
+        raise RigError(
+            f"none of its {len(time)} samples belongs to a stir",
+            where=where,
+            fix="the session ended before it; record again",
+        )
+    first, last = int(stirring[0]), int(stirring[-1])
+    gaps = np.flatnonzero(np.diff(time[first : last + 1]) > MOST_GAP)
+    if len(gaps) == 0:
+        return _Span(float(time[first]), float(time[last]))
+    before = first + int(gaps[0])
+    lacking = time[before + 1] - time[before]
+    return _Span(
+        float(time[first]), float(time[before]), f"no samples of the robot for {lacking:.2f} s"
+    )
+
+
+def _clock(raw: Raw, view: View, series: FrameSeries, span: _Span) -> Clock:
+    samples, frames = raw.samples, raw.frames[view]
+    near = (samples["time"] > span.first - AROUND) & (samples["time"] < span.last + AROUND)
+    path = np.column_stack([samples[axis][near] for axis in "xyz"])
+    to_host = float(np.median(samples["time"] - samples["host"]))
+    guess = to_host + float(np.median(frames["host"] - frames["stamp"]))
+    try:
+        return fit_clock(
+            series,
+            GripperSamples(samples["time"][near], path),
+            raw.provenance.cameras[view],
+            raw.provenance.rig.camera(view).marker,
+            guess=guess,
+        )
+    except ClockError as err:
+        raise RigError(
+            str(err), where=f"view {view}", fix="see the video; the marker must be in view"
+        ) from err
+
+
+def _seen(span: _Span, series: FrameSeries, clock: Clock, view: View) -> _Span:
+    """The part of the span in which a view has seen the stick, up to `LONGEST_GAP` at its ends."""
+    good = ((series.flags & int(BAD_LINE)) == 0) & np.isfinite(series.lines.angle)
+    time = clock.to_robot(series.stamp[good])
+    time = time[(time >= span.first) & (time <= span.last)]
+    if len(time) == 0:
+        raise RigError(
+            "the stick is not seen during the stir",
+            where=f"view {view}",
+            fix="see the video; the stick must stand out from what is behind it",
+        )
+    late, early = time[0] - span.first, span.last - time[-1]
+    if early > LONGEST_GAP:
+        cut = f"view {view} has not seen the stick for its last {early:.2f} s"
+        span = _Span(span.first, float(time[-1]), cut)
+    if late > LONGEST_GAP:
+        cut = f"view {view} has not seen the stick for its first {late:.2f} s"
+        span = _Span(float(time[0]), span.last, cut)
+    return span
+
+
+def _check_length(span: _Span, where: str) -> None:
+    if span.last - span.first < LEAST_TIME:
+        reason = f" ({span.cut})" if span.cut else ""
+        raise RigError(
+            f"{max(span.last - span.first, 0.0):.2f} s of a stir{reason}",
+            where=where,
+            fix=f"at least {LEAST_TIME:g} s are needed; record again",
+        )

@@ -1,0 +1,133 @@
+"""What a robot must be able to do, by capability; each driver is a file of its own."""
+
+import math
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+Six = tuple[float, float, float, float, float, float]
+
+
+class ArmState(NamedTuple):
+    """The arm as its controller tells it.
+
+    Attributes:
+        time: The controller's clock [s].
+        pose: Tool's centre in the base frame: position [m], rotation vector [rad].
+        velocity: Of it [m/s, rad/s].
+        wrench: On it, in the base frame [N, Nm].
+        joints: [rad].
+        robot_mode: 7 while it runs.
+        runtime_state: 2 while its program runs.
+        safety_bits: Bit 0 normal, bit 1 reduced, others a stop.
+        speed_scaling: At which the controller carries out motions, 1 at full speed.
+        speed_slider: At which the operator let it, 1 at full speed.
+        connected: Whether all connections have been there since the start.
+    """
+
+    time: float
+    pose: Six
+    velocity: Six
+    wrench: Six
+    joints: Six
+    robot_mode: int
+    runtime_state: int
+    safety_bits: int
+    speed_scaling: float
+    speed_slider: float
+    connected: bool
+
+    @property
+    def speed(self) -> float:
+        """Of the tool's centre [m/s]."""
+        return math.hypot(*self.velocity[:3])
+
+
+class Payload(NamedTuple):
+    """What the controller says hangs on the flange.
+
+    Attributes:
+        mass: [kg].
+        centre: In the flange's frame [m].
+    """
+
+    mass: float
+    centre: tuple[float, float, float]
+
+
+class ArmReader(Protocol):
+    """Tells where the arm is, and can do nothing else."""
+
+    def connect(self) -> None:
+        """Open the connection.
+
+        Raises:
+            RigError: There is no controller, or it refuses.
+        """
+        ...
+
+    def read(self) -> ArmState:
+        """The latest state; never waits."""
+        ...
+
+    def payload(self) -> Payload:
+        """What the controller says hangs on the flange."""
+        ...
+
+    def close(self) -> None:
+        """Let the connection go; harmless when repeated."""
+        ...
+
+
+class PathFollower(ArmReader, Protocol):
+    """Follows set-points, one a period, and refuses those that break its limits."""
+
+    def take_control(self) -> None:
+        """After `connect`: become the one that commands the arm; nothing moves by that.
+
+        Raises:
+            RigError: The controller refuses.
+            LinkLost: It did not take the tool's centre or the payload.
+        """
+        ...
+
+    def tcp(self) -> Six:
+        """Tool's centre in the flange's frame [m, rad]; waits for the controller's answer."""
+        ...
+
+    def allows(self, pose: np.ndarray) -> bool:
+        """Whether the controller's own safety limits allow a pose; waits for its answer."""
+        ...
+
+    def arm_watchdog(self) -> None:
+        """From now on the controller stops the arm unless set-points keep coming."""
+        ...
+
+    def command(self, pose: np.ndarray) -> None:
+        """Go to a pose in the base frame, shape (6,), within one period.
+
+        Raises:
+            MotionRejected: It breaks a limit; nothing was sent.
+            LinkLost: The controller did not take it.
+        """
+        ...
+
+    def stop(self) -> None:
+        """Bring the arm to rest and take no further command; returns at once."""
+        ...
+
+
+class Pourer(PathFollower, Protocol):
+    """A follower whose tool's centre can be set to the lip of a source cup."""
+
+    def mount(self, tcp: Six) -> None:
+        """Set the tool's centre in the flange's frame; at rest only, waits for the answer.
+
+        Raises:
+            LinkLost: The controller did not take it.
+        """
+        ...
+
+
+class LinkLost(RuntimeError):
+    """The controller cannot be commanded any more; where its arm is going is not known."""

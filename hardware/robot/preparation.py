@@ -1,0 +1,114 @@
+"""Before the arm may move: connect, go through the pre-flight list, arm the watchdog."""
+
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ..board import Board, Row, Who, host_time
+from ..errors import RigError
+from ..safety.guards import CAMERAS
+from ..safety.preflight import (
+    Check,
+    arm_checks,
+    disk_check,
+    failures,
+    limits_check,
+    mounted_checks,
+    payload_check,
+    process_checks,
+    program_check,
+)
+from .base import ArmState, LinkLost
+from .orders import Assignment
+from .ur import URArm, URReader
+
+LOOK = 0.3  # s, for which the arm is watched at rest
+WAIT_FOR_OTHERS = 15.0  # s, for recorder and cameras to show signs of life
+
+
+class Prepared(NamedTuple):
+    """What the list said.
+
+    Attributes:
+        arm: Connected, as far as that went: a `URArm` only if the session is armed.
+        checks: The list.
+        states: Of the arm at rest; empty without a connection.
+    """
+
+    arm: URReader
+    checks: list[Check]
+    states: list[ArmState]
+
+    @property
+    def wrench(self) -> tuple[float, ...]:
+        """Mean at rest [N, Nm], shape (6,)."""
+        return tuple(np.mean([state.wrench for state in self.states], axis=0).tolist())
+
+
+def prepare(to: Assignment, rows: Callable[[], Mapping[Who, Row]]) -> Prepared:
+    """Connect and go through the list, down to the first thing that makes going on unsafe.
+
+    Nothing moves. Control of the arm is taken only if all that a look can tell is well, and never
+    in a dry run.
+
+    Args:
+        to: The rig and whether the arm may be commanded.
+        rows: Gives the other processes' signs of life.
+    """
+    rig, checks, states = to.rig, [], []
+    arm = URArm(rig, to.address, to.tool) if to.armed else URReader(to.address, rig.robot.rate)
+    try:
+        arm.connect()
+        states.extend(_look(arm, 1.0 / rig.robot.rate))
+        checks.extend(arm_checks(states, rig))
+        checks.extend(_others(to, rows))
+        checks.append(disk_check(Path(to.directory)))
+        checks.append(payload_check(arm.payload(), rig))
+        if not isinstance(arm, URArm):
+            checks.extend(mounted_checks(states[-1], None, rig, to.tool))
+        elif not failures(checks):
+            states[:] = _take_control(arm, to, checks)
+            if failures(checks):
+                arm.give_up()
+    except (RigError, LinkLost, ImportError, RuntimeError) as err:
+        checks.append(Check("controller", False, str(err)))
+    return Prepared(arm, checks, states)
+
+
+def others(to: Assignment, board: Board) -> dict[Who, Row]:
+    """Signs of life of the processes on which the arm's motion depends."""
+    watched = (Who.RECORDER, *CAMERAS) if to.cameras else (Who.RECORDER,)
+    return {who: board.read(who) for who in watched}
+
+
+def _take_control(arm: URArm, to: Assignment, checks: list[Check]) -> list[ArmState]:
+    arm.take_control()
+    states = _look(arm, 1.0 / to.rig.robot.rate)
+    checks.append(program_check(states[-1]))
+    checks.append(payload_check(arm.payload(), to.rig, ours=True))
+    checks.extend(mounted_checks(states[-1], arm.tcp(), to.rig, to.tool))
+    if len(to.probes):
+        checks.append(limits_check([arm.allows(pose) for pose in to.probes]))
+    return states
+
+
+def _look(arm: URReader, period: float) -> list[ArmState]:
+    states = []
+    end = host_time() + LOOK
+    while host_time() < end:
+        states.append(arm.read())
+        time.sleep(period)
+    return states
+
+
+def _others(to: Assignment, rows: Callable[[], Mapping[Who, Row]]) -> list[Check]:
+    """Waits for the others, since all start at once."""
+    end = host_time() + WAIT_FOR_OTHERS
+    while True:
+        checks = process_checks(rows(), to.rig, host_time())
+        if not failures(checks) or host_time() > end:
+            return checks
+        time.sleep(0.02)

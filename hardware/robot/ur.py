@@ -1,0 +1,234 @@
+"""Universal Robots' arms through ur_rtde: the only file that knows that library.
+
+What it guards against, found in ur_rtde 1.6.5: getters repeat the last value for ever when a link
+is lost; `servoL` says True on a dead link; the control interface reconnects by itself, starts the
+script again without a watchdog, and may crash the process. So a lost connection stays lost here,
+nothing is sent after it, and a process of its own owns the object.
+"""
+
+import sys
+from threading import Thread
+from typing import Any
+
+import numpy as np
+
+from ..errors import RigError, missing_extra
+from ..rig import Rig
+from ..safety.limits import TargetCheck, Tool
+from .base import ArmState, LinkLost, Payload, Six
+
+WATCHDOG_RATE = 10.0  # Hz: the controller stops its program 0.1 s after the last set-point
+# the defaults of the vendor's manual: the arm lags its set-points by about the first
+LOOKAHEAD = 0.1  # s
+GAIN = 300.0
+STOP_DECELERATION = 3.0  # m/s2: from 0.15 m/s at rest within 0.05 s
+PROGRAM_ENDS = 1.0  # s, until the controller's program has ended
+# ur_rtde checks these two of servoL's arguments and the controller ignores them
+UNUSED_SPEED, UNUSED_ACCELERATION = 0.5, 0.5
+FIELDS = [
+    "timestamp",
+    "actual_q",
+    "actual_TCP_pose",
+    "actual_TCP_speed",
+    "actual_TCP_force",
+    "robot_mode",
+    "speed_scaling",
+    "target_speed_fraction",
+    "runtime_state",
+    "safety_status_bits",
+    "payload",
+    "payload_cog",
+]
+_READS = 3  # tries to read all fields of one package
+
+
+class URReader:
+    """Reads the state of an arm; has no connection over which it could move it."""
+
+    def __init__(self, address: str, rate: float):
+        self._address = address
+        self._rate = rate
+        self._receive: Any = None
+        self._lost = False
+
+    def connect(self) -> None:
+        """Open the connection.
+
+        Raises:
+            ImportError: ur-rtde is not installed; the message says how to get it.
+            RigError: There is no controller at the address, or it refuses.
+        """
+        receive = _interface("rtde_receive").RTDEReceiveInterface
+        self._receive = self._opened(receive, self._address, self._rate, FIELDS)
+
+    def read(self) -> ArmState:
+        """The latest state, all of it from one package; never waits."""
+        state = self._read_once()
+        for _ in range(_READS):
+            if self._receive.getTimestamp() == state.time:
+                break
+            state = self._read_once()
+        return state
+
+    def payload(self) -> Payload:
+        """What the controller says hangs on the flange."""
+        return Payload(self._receive.getPayload(), tuple(self._receive.getPayloadCog()))
+
+    def close(self) -> None:
+        """Let the connection go; harmless when repeated.
+
+        An arm's controlling connection is left open: ur_rtde's clean-up of it can hang.
+        """
+        if self._receive is not None:
+            self._receive.disconnect()
+            self._receive = None
+
+    def _read_once(self) -> ArmState:
+        receive = self._receive
+        return ArmState(
+            time=receive.getTimestamp(),
+            pose=tuple(receive.getActualTCPPose()),
+            velocity=tuple(receive.getActualTCPSpeed()),
+            wrench=tuple(receive.getActualTCPForce()),
+            joints=tuple(receive.getActualQ()),
+            robot_mode=receive.getRobotMode(),
+            runtime_state=receive.getRuntimeState(),
+            safety_bits=receive.getSafetyStatusBits(),
+            speed_scaling=receive.getSpeedScaling(),
+            speed_slider=receive.getTargetSpeedFraction(),
+            connected=self._connected(),
+        )
+
+    def _connected(self) -> bool:
+        # it stays lost: the library's own reconnection must not look like health
+        self._lost = self._lost or not self._receive.isConnected()
+        return not self._lost
+
+    def _opened(self, interface: Any, *args: Any) -> Any:
+        try:
+            return interface(*args)
+        except (RuntimeError, ValueError) as err:
+            raise RigError(
+                f"no controller answers ({err})",
+                where=f"robot.host = {self._address}",
+                fix="switch it on, check the address, or start `bolfi-liquids rig emulate`",
+            ) from err
+
+
+class URArm(URReader):
+    """Moves an arm along set-points; its limits come with it and cannot be left out."""
+
+    def __init__(self, rig: Rig, address: str, tool: Tool):
+        super().__init__(address, rig.robot.rate)
+        self._robot = rig.robot
+        self._tcp: Six = getattr(rig.robot, f"{tool}_tcp")
+        self._check = TargetCheck(rig, tool)
+        self._control: Any = None
+        self._previous: np.ndarray | None = None
+        self._guarded = False
+        self._braking: Thread | None = None
+
+    def take_control(self) -> None:
+        """Upload ur_rtde's control script, set the tool's centre and the payload.
+
+        Raises:
+            ImportError: ur-rtde is not installed; the message says how to get it.
+            RigError: The controller refuses.
+            LinkLost: It did not take the tool's centre or the payload.
+        """
+        control = _interface("rtde_control").RTDEControlInterface
+        self._control = self._opened(control, self._address, self._rate)
+        self.mount(self._tcp)
+        if not self._control.setPayload(self._robot.payload, list(self._robot.payload_centre)):
+            raise LinkLost("the controller did not take the payload")
+
+    def mount(self, tcp: Six) -> None:
+        """Set the tool's centre in the flange's frame; at rest only, waits for the answer."""
+        if self._guarded:
+            raise LinkLost("the tool's centre cannot be changed once the watchdog runs")
+        if not self._control.setTcp(list(tcp)):
+            raise LinkLost("the controller did not take the tool's centre")
+        self._previous = None
+
+    def tcp(self) -> Six:
+        """Tool's centre in the flange's frame [m, rad]; waits for the controller's answer."""
+        x, y, z, rx, ry, rz = self._control.getTCPOffset()
+        return x, y, z, rx, ry, rz
+
+    def allows(self, pose: np.ndarray) -> bool:
+        """Whether the controller's own safety limits allow a pose; waits for its answer."""
+        return bool(self._control.isPoseWithinSafetyLimits(list(pose)))
+
+    def arm_watchdog(self) -> None:
+        """From now on the controller ends its program 0.1 s after the last set-point.
+
+        An upload would disarm it; none follows.
+
+        Raises:
+            LinkLost: The controller did not take it.
+        """
+        if not self._control.setWatchdog(WATCHDOG_RATE):
+            raise LinkLost("the controller did not take the watchdog")
+        self._guarded = True
+
+    def command(self, pose: np.ndarray) -> None:
+        """Send a set-point; it also keeps the watchdog quiet, and nothing else does.
+
+        Raises:
+            MotionRejected: It breaks a limit; nothing was sent.
+            LinkLost: The connection is lost, the program has ended, or `stop` was called.
+        """
+        if self._previous is None:
+            self._previous = np.array(self.read().pose)
+        self._check(self._previous, pose)
+        if self._braking is not None:
+            raise LinkLost("the arm was stopped; nothing is sent to its controller any more")
+        if not self._connected():
+            raise LinkLost("the connection to the controller is lost; nothing is sent any more")
+        period = 1.0 / self._rate
+        sent = self._control.servoL(
+            pose.tolist(), UNUSED_SPEED, UNUSED_ACCELERATION, period, LOOKAHEAD, GAIN
+        )
+        if not sent:
+            raise LinkLost("the controller's program does not take set-points any more")
+        self._previous = pose
+
+    def stop(self) -> None:
+        """Bring the arm to rest; returns at once, since waiting for the answer may be for ever.
+
+        On a lost connection nothing is sent: the watchdog ends the program, while a command would
+        make the library reconnect.
+        """
+        if self._braking is None:
+            self._braking = Thread(target=self._brake, name="brake", daemon=True)
+            self._braking.start()
+
+    def give_up(self) -> None:
+        """End the controller's program, on an arm at rest; waits for it, but not for ever."""
+        self.stop()
+        assert self._braking is not None
+        self._braking.join(PROGRAM_ENDS)
+
+    def _brake(self) -> None:
+        # stopL(asynchronous) would leave the script's servo thread in charge of the arm
+        if self._control is not None and self._connected():
+            self._control.servoStop(STOP_DECELERATION)
+        if self._control is not None and self._connected():
+            self._control.stopScript()
+
+    def _connected(self) -> bool:
+        if self._control is not None:
+            self._lost = self._lost or not self._control.isConnected()
+        return super()._connected()
+
+
+def _interface(module: str) -> Any:
+    try:
+        return __import__(module)
+    except ImportError as err:
+        if sys.version_info >= (3, 13):
+            raise ImportError(
+                "the robot needs ur-rtde, which has no wheel for Python 3.13; "
+                "use Python 3.11 or 3.12 and: pip install 'bolfi-liquids[robot]'"
+            ) from err
+        raise missing_extra("ur-rtde", "robot", "the robot") from err

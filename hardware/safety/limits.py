@@ -1,0 +1,303 @@
+"""What a motion must keep before it may begin, and each of its set-points on the way.
+
+A path that breaks a limit is refused as a whole; nothing is clipped.
+"""
+
+from collections.abc import Generator
+from typing import Literal, NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ..errors import MotionRejected
+from ..frames import cup_frame
+from ..kinematics import UR10, UR10E, DhArm, follow, inverse
+from ..motions import PosePath
+from ..rig import Box, Limits, Rig
+
+Tool = Literal["stirring", "pouring"]
+ARMS = {"cb3": UR10, "e-series": UR10E}
+TILT = {"stirring": np.radians(15.0), "pouring": np.radians(150.0)}  # from the rig's orientation
+ROUNDING = 1e-6  # relative, of speeds and accelerations
+AGREEMENT = 0.1  # rad, of the arm's own joints with ours; another configuration is further
+MOST_SAMPLES = 150_000  # 20 minutes
+SLICE = 20  # samples, whose check lasts some thousandths of a second
+
+
+class Workspace(NamedTuple):
+    """Where one tool may go and which arm carries it.
+
+    Attributes:
+        box: Range of the tool's centre, in the cup's frame.
+        tcp: The tool's centre in the flange's frame.
+        orientation: Rotation vector of the tool before it does anything, in the base frame [rad].
+        tilt: Greatest angle from it [rad].
+        arm: Its kinematics.
+        start: Joints near which it works [rad].
+    """
+
+    box: Box
+    tcp: np.ndarray
+    orientation: np.ndarray
+    tilt: float
+    arm: DhArm
+    start: np.ndarray
+
+
+def workspace(rig: Rig, tool: Tool) -> Workspace:
+    """What a rig's file says about one of its two tools."""
+    robot = rig.robot
+    return Workspace(
+        box=getattr(rig.limits, tool),
+        tcp=np.array(getattr(robot, f"{tool}_tcp")),
+        orientation=np.array(getattr(robot, f"{tool}_orientation")),
+        tilt=TILT[tool],
+        arm=ARMS[robot.controller],
+        start=np.array(robot.start),
+    )
+
+
+def check_path(
+    path: PosePath, rig: Rig, tool: Tool, *, joints: np.ndarray | None = None
+) -> np.ndarray:
+    """Refuse a path that is not safe as a whole: S4 of the safety requirements.
+
+    All poses must be finite, on the motion loop's clock, at rest at both ends, slow enough in
+    speed, acceleration and tilt, inside the box by the way that the arm needs to stop, and
+    reachable by joints that neither jump nor exceed their own speeds.
+
+    Args:
+        path: What shall be followed.
+        rig: Its limits, its cup and its arm.
+        tool: Which of the two tools' box and centre count.
+        joints: Of the arm at the start of the path [rad]; where it is not known, the solution
+            nearest to the rig's `start` is taken.
+
+    Returns:
+        The joints at its end [rad], shape (6,).
+
+    Raises:
+        MotionRejected: naming time, field, value and limit.
+    """
+    checks = path_checks(path, rig, tool, joints=joints)
+    while True:
+        try:
+            next(checks)
+        except StopIteration as end:
+            return end.value
+
+
+def path_checks(
+    path: PosePath, rig: Rig, tool: Tool, *, joints: np.ndarray | None = None
+) -> Generator[None, None, np.ndarray]:
+    """`check_path` slice by slice, for who has something else to do in between."""
+    _check_numbers(path, rig.robot.rate)
+    space = workspace(rig, tool)
+    now = np.empty(6)
+    for start in range(0, len(path.time), SLICE):
+        part = _part(path, start)
+        _check_rates(part, rig.limits)
+        _check_turns(part, space, rig.limits)
+        _check_box(part, space.box, rig.limits)
+        if tool == "stirring":
+            _check_tip(part, rig)
+        if start == 0:
+            now = _first_joints(cup_frame(rig.cup).to_base(path.pose[0]), space, joints)
+        now = _check_reach(part, space, rig, now)
+        yield
+    return now
+
+
+class _Part(NamedTuple):
+    """A slice of a path with the two samples before it, which its rates need.
+
+    Attributes:
+        time: Of the samples [s].
+        pose: Likewise.
+        new: The first sample that is not in the slice before.
+        velocity: Between them, and at rest before a path's first and after its last [m/s].
+        between: Times of the velocities [s].
+    """
+
+    time: np.ndarray
+    pose: np.ndarray
+    new: int
+    velocity: np.ndarray
+    between: np.ndarray
+
+
+def _part(path: PosePath, start: int) -> _Part:
+    first, end = max(start - 2, 0), start + SLICE
+    time, pose = path.time[first:end], path.pose[first:end]
+    dt = float(path.time[1])
+    velocity = np.diff(pose[:, :3], axis=0) / dt
+    between = time[1:]
+    still = np.zeros((1, 3))
+    if start == 0:
+        velocity, between = np.concatenate([still, velocity]), time
+    if end >= len(path.time):
+        velocity = np.concatenate([velocity, still])
+        between = np.append(between, time[-1] + dt)
+    return _Part(time, pose, start - first, velocity, between)
+
+
+def margin(speed: np.ndarray | float, limits: Limits) -> np.ndarray | float:
+    """How far the arm still goes after a stop is ordered at `speed` [m/s], in [m]."""
+    return speed**2 / (2.0 * limits.acceleration) + speed * limits.latency
+
+
+class TargetCheck:
+    """The check of each set-point, for a driver: cheap, and the last one before the wire."""
+
+    def __init__(self, rig: Rig, tool: Tool):
+        space, self._dt = workspace(rig, tool), 1.0 / rig.robot.rate
+        self._frame = cup_frame(rig.cup)
+        self._box = space.box
+        self._step = rig.limits.speed * self._dt
+        self._turn = np.radians(rig.limits.tilt_rate_deg_s) * self._dt
+
+    def __call__(self, previous: np.ndarray, target: np.ndarray) -> None:
+        """Refuse a set-point that is not finite, outside the box or too far from the last.
+
+        Args:
+            previous: The last one, or where the tool is; in the base frame, shape (6,).
+            target: The next, one period later.
+
+        Raises:
+            MotionRejected: naming field, value and limit.
+        """
+        if target.shape != (6,) or not np.isfinite(target).all():
+            raise _rejected(f"the pose {target.tolist()} is not six finite numbers", "set-point")
+        position = self._frame.from_base(target)[:3]
+        outside = (position < self._box.low - 1e-9) | (position > self._box.high + 1e-9)
+        if outside.any():
+            axis = int(outside.argmax())
+            low, high = self._box.low[axis], self._box.high[axis]
+            raise _rejected(
+                f"{'xyz'[axis]} = {position[axis]:.4f} m is outside [{low}, {high}] m", "set-point"
+            )
+        step = float(np.linalg.norm(target[:3] - previous[:3]))
+        if step > self._step * (1.0 + ROUNDING) + 1e-9:
+            raise _rejected(f"a step of {step:.5f} m is above {self._step:.5f} m", "set-point")
+        turn = turn_between(previous[3:], target[3:])
+        if turn > self._turn * (1.0 + ROUNDING) + 1e-9:
+            raise _rejected(f"a turn of {turn:.5f} rad is above {self._turn:.5f} rad", "set-point")
+
+
+def turn_between(first: np.ndarray, second: np.ndarray) -> float:
+    """Angle between two orientations [rad], given as rotation vectors."""
+    if np.array_equal(first, second):
+        return 0.0
+    turns = Rotation.from_rotvec(np.stack([first, second]))
+    return float((turns[0].inv() * turns[1]).magnitude())
+
+
+def _check_numbers(path: PosePath, rate: float) -> None:
+    time, pose = path.time, path.pose
+    if pose.ndim != 2 or pose.shape[1] != 6 or time.shape != pose.shape[:1] or len(time) < 2:
+        raise _rejected(f"times of shape {time.shape} and poses of shape {pose.shape}", "path")
+    if len(time) > MOST_SAMPLES:
+        raise _rejected(f"{len(time)} samples are more than {MOST_SAMPLES}", "path")
+    bad = ~np.isfinite(pose).all(axis=1)
+    if bad.any() or not np.isfinite(time).all():
+        k = int(bad.argmax())
+        raise _rejected(f"the pose {pose[k].tolist()} is not finite", f"path at sample {k}")
+    if np.abs(time - np.arange(len(time)) / rate).max() > 1e-6:
+        raise _rejected(f"its times are not those of a {rate:g} Hz clock from 0 s", "path")
+
+
+def _check_rates(part: _Part, limits: Limits) -> None:
+    speed = np.linalg.norm(part.velocity, axis=1)
+    _bound(part.between, speed, limits.speed * (1.0 + ROUNDING), "speed", "m/s")
+    if len(part.velocity) > 1:
+        dt = float(part.between[1] - part.between[0])
+        change = np.linalg.norm(np.diff(part.velocity, axis=0), axis=1) / dt
+        most = limits.acceleration * (1.0 + ROUNDING)
+        _bound(part.between[:-1], change, most, "acceleration", "m/s2")
+
+
+def _check_turns(part: _Part, space: Workspace, limits: Limits) -> None:
+    turns = Rotation.from_rotvec(part.pose[:, 3:])
+    tilt = (Rotation.from_rotvec(space.orientation).inv() * turns).magnitude()
+    _bound(part.time, np.degrees(tilt), float(np.degrees(space.tilt)), "tilt", "deg")
+    if len(part.time) > 1:
+        rate = (turns[:-1].inv() * turns[1:]).magnitude() / np.diff(part.time)
+        most = limits.tilt_rate_deg_s * (1.0 + ROUNDING)
+        _bound(part.time[1:], np.degrees(rate), most, "tilt rate", "deg/s")
+
+
+def _check_box(part: _Part, box: Box, limits: Limits) -> None:
+    speed = np.linalg.norm(np.diff(part.pose[:, :3], axis=0), axis=1) / _period(part.time)
+    fastest = np.maximum(np.append(speed, 0.0), np.insert(speed, 0, 0.0))
+    kept = np.asarray(margin(fastest, limits))
+    for axis, name in enumerate("xyz"):
+        value = part.pose[:, axis]
+        low, high = box.low[axis] + kept, box.high[axis] - kept
+        outside = (value < low - 1e-9) | (value > high + 1e-9)
+        if outside.any():
+            k = int(outside.argmax())
+            raise _rejected(
+                f"{name} = {value[k]:.4f} m is outside [{low[k]:.4f}, {high[k]:.4f}] m "
+                f"(the box less {1e3 * kept[k]:.1f} mm to stop)",
+                _when(part.time[k]),
+            )
+
+
+def _check_tip(part: _Part, rig: Rig) -> None:
+    """The hanging stick must not meet the cup's wall; rig.toml keeps it off the floor."""
+    x, y, z = part.pose[:, :3].T
+    inside = z - rig.stick.length < rig.cup.height
+    away = np.where(inside, np.hypot(x, y) + rig.stick.radius, 0.0)
+    k = int(away.argmax())
+    if away[k] >= rig.cup.radius:
+        raise _rejected(
+            f"the stick is {away[k]:.4f} m from the cup's axis while its tip is in the cup "
+            f"(cup.radius = {rig.cup.radius} m)",
+            _when(part.time[k]),
+        )
+
+
+def _period(time: np.ndarray) -> float:
+    return float(time[1] - time[0]) if len(time) > 1 else 1.0
+
+
+def _first_joints(pose: np.ndarray, space: Workspace, joints: np.ndarray | None) -> np.ndarray:
+    """Joints of a path's first pose: those that the arm has, where that is known."""
+    near = space.start if joints is None else np.asarray(joints)
+    if not np.isfinite(near).all():
+        raise _rejected(f"the arm's joints {near.tolist()} are not finite", _when(0.0))
+    first = inverse(space.arm, pose, near, tcp=space.tcp)
+    if first.status == "unreachable":
+        raise _rejected("no joints reach its first pose", _when(0.0))
+    away = float(np.abs(first.joints - near).max())
+    if joints is not None and not away <= AGREEMENT:
+        raise _rejected(f"its first pose is {away:.2f} rad of a joint from the arm", _when(0.0))
+    return first.joints
+
+
+def _check_reach(part: _Part, space: Workspace, rig: Rig, joints: np.ndarray) -> np.ndarray:
+    """Joints at the part's end, from those at the last sample before its new ones."""
+    begin = max(part.new - 1, 0)
+    poses, times = cup_frame(rig.cup).to_base(part.pose[begin:]), part.time[begin:]
+    found = follow(space.arm, poses, joints, times=times, tcp=space.tcp)
+    if found.status != "ok":
+        raise _rejected(
+            f"joints: {found.status} (largest step {found.largest_step:.3f} rad, "
+            f"fastest {found.fastest:.2f} of a joint's limit)",
+            _when(times[found.at or 0]),
+        )
+    return found.joints[-1]
+
+
+def _bound(time: np.ndarray, value: np.ndarray, most: float, name: str, unit: str) -> None:
+    k = int(value.argmax())
+    if not value[k] <= most:
+        raise _rejected(f"{name} {value[k]:.4f} {unit} is above {most:.4f} {unit}", _when(time[k]))
+
+
+def _when(time: float) -> str:
+    return f"path at {time:.3f} s"
+
+
+def _rejected(what: str, where: str) -> MotionRejected:
+    return MotionRejected(what, where=where, fix="correct the plan or the rig's limits")

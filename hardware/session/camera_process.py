@@ -1,0 +1,201 @@
+"""A camera's process: it writes down each picture, and what the picture tells, at once."""
+
+import os
+from collections.abc import Callable
+from contextlib import closing
+from functools import partial
+from multiprocessing.connection import Connection
+from pathlib import Path
+from threading import Event, Thread
+from typing import NamedTuple
+
+import numpy as np
+
+from ..board import Board, Row, Trouble, Who, host_time
+from ..cameras.base import Camera, CameraError
+from ..priority import come_first
+from ..recorder.csv_file import CsvAppender
+from ..recorder.disk import Disk, told_if_fails
+from ..recorder.events import EventLog
+from ..recorder.names import frames_file, video_file
+from ..recorder.rate import Rate, counted, no_rate
+from ..recorder.video import VideoWriter
+from ..recorder.views import stick_view
+from ..rig import Rig, View
+from ..signals import leave_signals_to_main
+from ..vision.frame import Frame
+from ..vision.frame_measurement import FrameMeasurement, line_is_good
+from ..vision.measuring import FrameMeter
+
+SAME_PICTURES = 3  # in a row; a camera's noise makes no two alike
+PATIENCE = 0.3  # [s]; how long a camera that does not answer may hold up the end
+WHO: dict[View, Who] = {"xz": Who.CAMERA_XZ, "yz": Who.CAMERA_YZ}
+
+
+def run_camera(  # noqa: PLR0913  what a spawned process needs comes as arguments
+    rig: Rig,
+    view: View,
+    make_camera: Callable[[], Camera],
+    board: Board,
+    main: Connection,
+    directory: Path,
+) -> None:
+    """Read a camera until main lets go; write each picture and its measurement.
+
+    Pictures are read, measured and written one after the other. Where that falls behind, the
+    driver's queue holds some and drops others: a camera that counts them leaves their `index`
+    out, and of a webcam, which does not, the stamps tell. The sign of life is given at each
+    picture that differs from the one before, so that a camera that hangs, and one that repeats
+    itself, look dead.
+
+    Args:
+        rig: Its sizes tell what to look for.
+        view: Which of its cameras this is.
+        make_camera: Opens it; called in this process.
+        board: Where to leave signs of life.
+        main: Any message or its end means: finish.
+        directory: Of the session; it exists.
+
+    Raises:
+        OSError: Not even an event can be written at the start.
+        RigError: The camera's lens cannot be used.
+        ImportError: OpenCV or PyAV is not installed.
+    """
+    leave_signals_to_main()
+    come_first()
+    with closing(EventLog(directory, f"camera_{view}")) as log, told_if_fails(disk := Disk(log)):
+        process = _CameraProcess(rig, view, board, disk, directory)
+        leaving, answered = Event(), Event()
+        Thread(target=_wait_for_end, args=(main, leaving, answered, process), daemon=True).start()
+        process.follow(make_camera, leaving)
+        answered.set()
+        process.finish()
+        process.tell_end()
+
+
+def _wait_for_end(
+    main: Connection, leaving: Event, answered: Event, process: "_CameraProcess"
+) -> None:
+    """A camera that blocks cannot be interrupted: its process then ends without it."""
+    main.poll(None)
+    leaving.set()
+    if not answered.wait(PATIENCE):
+        process.tell_end("the camera does not answer")
+        os._exit(1)  # what was written is in the files; the video can be read without its end
+
+
+class _Tally(NamedTuple):
+    """What is remembered of the pictures so far."""
+
+    rate: Rate
+    last: int = -1  # index of the last picture
+    lost: int = 0
+    image: np.ndarray | None = None
+    same: int = 1  # times that the last picture has come in a row
+    beat: float = 0.0  # when the last new one came
+    worst: float = 0.0  # longest time between new ones
+    angle: float = float("nan")
+
+
+def tallied(tally: _Tally, frame: Frame, angle: float, now: float) -> _Tally:
+    """What is remembered after another picture, which came at `now` [s]."""
+    new = tally.image is None or not np.array_equal(frame.image, tally.image)
+    between = now - tally.beat if new and tally.beat else 0.0
+    return tally._replace(
+        rate=counted(tally.rate, 1, now),
+        last=frame.index,
+        lost=tally.lost + max(frame.index - tally.last - 1, 0),
+        image=frame.image,
+        same=1 if new else tally.same + 1,
+        beat=now if new else tally.beat,
+        worst=max(tally.worst, between),
+        angle=angle,
+    )
+
+
+class _CameraProcess:
+    def __init__(self, rig: Rig, view: View, board: Board, disk: Disk, directory: Path):
+        self._view: View = view
+        self._board = board
+        self._disk = disk
+        self._trouble = Trouble.NONE
+        self._tally = _Tally(no_rate(host_time()))
+        self._meter = FrameMeter(stick_view(rig, view))
+        self._table: CsvAppender | None = None
+        self._video: VideoWriter | None = None
+        disk.write(frames_file(view), partial(self._open, rig, directory))
+
+    def follow(self, make_camera: Callable[[], Camera], leaving: Event) -> None:
+        """Take pictures until the end, or until the camera gives no more."""
+        try:
+            with closing(make_camera()) as camera:
+                while not leaving.is_set():
+                    frame = camera.read()
+                    if frame is None:
+                        self._lose("it gives no more pictures")
+                        break
+                    self._take(frame)
+        except (CameraError, ValueError, OSError) as err:
+            self._lose(str(err))
+        leaving.wait()
+
+    def finish(self) -> None:
+        """Bring everything to the disk."""
+        table, video = self._table, self._video
+        if video is not None:
+            self._disk.write(video_file(self._view), video.close)
+        if table is not None:
+            self._disk.write(frames_file(self._view), table.sync)
+            table.close()
+
+    def tell_end(self, reason: str = "") -> None:
+        """Write the last event."""
+        tally = self._tally
+        self._disk.tell("left", frames=tally.rate.total, lost=tally.lost, reason=reason)
+
+    def _open(self, rig: Rig, directory: Path) -> None:
+        camera = rig.camera(self._view)
+        self._table = CsvAppender(directory / frames_file(self._view), FrameMeasurement._fields)
+        size = (camera.width, camera.height)
+        path = directory / video_file(self._view)
+        self._video = VideoWriter(path, size=size, rate=camera.rate)
+
+    def _take(self, frame: Frame) -> None:
+        row = self._meter.measure(frame)
+        self._keep(frame, row)
+        seen = row.angle if line_is_good(row.flags) else float("nan")
+        self._tally = tallied(self._tally, frame, seen, frame.host)
+        if self._tally.same == SAME_PICTURES:
+            reason = f"the same picture came {SAME_PICTURES} times in a row"
+            self._complain(Trouble.SAME_PICTURE, "same_picture", reason=reason, index=frame.index)
+        self._beat()
+
+    def _keep(self, frame: Frame, row: FrameMeasurement) -> None:
+        table, video = self._table, self._video
+        if table is not None:
+            self._disk.write(frames_file(self._view), partial(table.append, [row]))
+        if video is not None:
+            self._disk.write(video_file(self._view), partial(video.write, frame.image, frame.stamp))
+
+    def _lose(self, reason: str) -> None:
+        self._complain(Trouble.SOURCE_LOST, "source_lost", reason=reason)
+        self._beat()
+
+    def _complain(self, trouble: Trouble, kind: str, **fields: float | str) -> None:
+        # it stays on the board: nothing that stopped an arm resumes by itself
+        self._trouble = trouble
+        self._disk.tell(kind, **fields)
+
+    def _beat(self) -> None:
+        tally = self._tally
+        self._board.write(
+            WHO[self._view],
+            Row(
+                beat=tally.beat,
+                trouble=self._disk.trouble or self._trouble,
+                count=tally.rate.total,
+                rate=tally.rate.rate,
+                value=tally.angle,
+                worst=tally.worst,
+            ),
+        )

@@ -1,0 +1,154 @@
+"""A rig whose robot is the emulator and whose cameras are rendered."""
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ..board import check_can_start
+from ..cameras.base import Camera
+from ..emulator.process import EmulatorProcess
+from ..errors import RigError
+from ..frames import cup_frame
+from ..kinematics import inverse
+from ..recorder.views import camera_model
+from ..rig import Rig, View
+from ..safety.limits import Tool, workspace
+
+# what tells the emulated views apart
+_SEEDS: dict[View, int] = {"xz": 1, "yz": 2}
+
+
+@dataclass(frozen=True)
+class HiddenLiquid:
+    """What the emulated stick dips into; its density is the rig's.
+
+    Attributes:
+        viscosity: Dynamic [Pa s].
+        drag: Factor on the published drag of a towed cylinder; recordings of an independent
+            solver, in a cup as narrow, need 4 to 7.
+        seed: Of the pictures' noise and faults.
+    """
+
+    viscosity: float = 1.0
+    drag: float = 5.0
+    seed: int = 0
+
+    def __post_init__(self):
+        for name in ("viscosity", "drag"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0):
+                raise RigError(
+                    f"{value}", where=f"emulated {name}", fix="give a positive, finite number"
+                )
+
+
+class EmulatedRig(NamedTuple):
+    """A running emulator and the cameras that look at it.
+
+    Attributes:
+        emulator: The process.
+        make_cameras: For each view, what opens its camera in the process that reads it.
+    """
+
+    emulator: EmulatorProcess
+    make_cameras: dict[View, Callable[[], Camera]]
+
+
+@contextmanager
+def emulated(  # noqa: PLR0913  what a person may choose
+    rig: Rig,
+    pose: np.ndarray,
+    *,
+    address: str | None = None,
+    tool: Tool = "stirring",
+    liquid: HiddenLiquid | None = None,
+    truth: Path | None = None,
+) -> Iterator[EmulatedRig]:
+    """Run an emulator of the rig's robot, at rest at a pose.
+
+    Args:
+        rig: Whose sizes, robot and cameras are emulated.
+        pose: Of the tool's centre: position in the cup's frame [m], rotation vector in the base
+            frame [rad], shape (6,).
+        address: Where the emulator listens; one that is free if None.
+        tool: What is in the gripper; a stick is seen by the cameras.
+        liquid: Into which the stick dips.
+        truth: Directory for what each frame truly showed, `truth_<view>.csv`; it exists.
+
+    Raises:
+        RigError: The arm does not reach `pose`, or the emulator does not start.
+    """
+    check_can_start()
+    liquid = HiddenLiquid() if liquid is None else liquid
+    stick = {
+        "radius": rig.stick.radius,
+        "length": rig.stick.length,
+        "mass": rig.stick.mass,
+        "liquid_density": rig.liquid.density,
+        "viscosity": liquid.viscosity,
+        "fill": rig.cup.fill,
+        "cup_position": list(rig.cup.position),
+        "drag": liquid.drag,
+    }
+    joints = _joints(rig, pose, tool)
+    with EmulatorProcess.start(
+        address,
+        controller=rig.robot.controller,
+        joints=joints,
+        stick=stick if tool == "stirring" else None,
+        options={"seed": liquid.seed, "tcp": json.dumps(list(workspace(rig, tool).tcp))},
+    ) as emulator:
+        cameras: dict[View, Callable[[], Camera]] = {
+            view: RenderedView(rig, view, emulator.address, liquid.seed, truth) for view in _SEEDS
+        }
+        yield EmulatedRig(emulator, cameras)
+
+
+class RenderedView(NamedTuple):
+    """Opens the rendered camera of one view; can be sent to another process."""
+
+    rig: Rig
+    view: View
+    address: str
+    seed: int
+    truth: Path | None
+
+    def __call__(self) -> Camera:
+        from ..cameras.rendered import RenderedCamera, Timing
+        from ..rendering import BRIGHT_STICK, CupPlace, Look, Scene, StreamedWorld, prepare
+
+        rig, camera = self.rig, self.rig.camera(self.view)
+        scene = Scene(
+            marker_offset=camera.marker,
+            cup_radius=rig.cup.radius,
+            cup_height=rig.cup.height,
+            fill=rig.cup.fill,
+            stick_radius=rig.stick.radius,
+            stick_length=rig.stick.length,
+            marker_radius=camera.marker_radius,
+        )
+        look = Look() if rig.stick.colour == "dark" else BRIGHT_STICK
+        seed = 10 * self.seed + _SEEDS[self.view]
+        stage = prepare(scene, camera_model(camera), look, seed)
+        place = CupPlace(rig.cup.position, float(np.radians(rig.cup.yaw_deg)))
+        # webcams start when they like
+        timing = Timing(rate=camera.rate, offset=1000.0 * _SEEDS[self.view], seed=seed)
+        truth = None if self.truth is None else self.truth / f"truth_{self.view}.csv"
+        return RenderedCamera(stage, StreamedWorld(self.address, place), timing, truth=truth)
+
+
+def _joints(rig: Rig, pose: np.ndarray, tool: Tool) -> list[float]:
+    space = workspace(rig, tool)
+    found = inverse(space.arm, cup_frame(rig.cup).to_base(pose), space.start, tcp=space.tcp)
+    if found.status == "unreachable":
+        raise RigError(
+            f"the arm does not reach {np.round(pose, 3).tolist()} of the cup's frame",
+            where="rig.toml: cup.position",
+            fix="place the cup nearer to the robot",
+        )
+    return [float(angle) for angle in found.joints]

@@ -1,0 +1,91 @@
+"""What an operator sees while the arm moves."""
+
+from typing import NamedTuple
+
+import numpy as np
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+from ..board import Row, Trouble, Who
+from ..safety.guards import TROUBLE, Reading
+
+BAR_WIDTH = 30
+LITTLE = 0.2  # of a guard's limit: less margin is shown in yellow
+FRESH = 0.5  # [s]; an older sign of life is shown in red
+NAMES = {
+    Who.CONTROL: "robot",
+    Who.RECORDER: "recorder",
+    Who.CAMERA_XZ: "camera xz",
+    Who.CAMERA_YZ: "camera yz",
+}
+COUNTED = {Who.CONTROL: "ticks", Who.RECORDER: "rows"}
+
+
+class LiveStatus(NamedTuple):
+    """What the view shows.
+
+    Attributes:
+        title: What is going on, such as "dry run: star, cycle 1 of 3".
+        now: Host time [s].
+        rows: The board's rows, in the order of `Who`.
+        guards: The latest readings.
+        message: Why the arm stopped; empty while it moves.
+    """
+
+    title: str
+    now: float
+    rows: tuple[Row, ...]
+    guards: tuple[Reading, ...] = ()
+    message: str = ""
+
+
+def live_table(status: LiveStatus) -> Table:
+    """The view as a table that fits into 80 columns."""
+    table = Table.grid(padding=(0, 2))
+    table.title = status.title
+    table.add_row("path", _progress(status.rows[Who.CONTROL].value))
+    table.add_row("stick", _inclination(status.rows))
+    table.add_row("loop", f"at most {1e3 * status.rows[Who.CONTROL].worst:.1f} ms late")
+    for who in Who:
+        table.add_row(NAMES[who], _alive(who, status.rows[who], status.now))
+    for guard in filter(lambda one: one.unit, status.guards):  # the others are yes or no
+        table.add_row(guard.name, _guard(guard))
+    if status.message:
+        table.add_row("stopped", Text(status.message, style="bold red"))
+    return table
+
+
+def _progress(share: float) -> Table:
+    done = share if np.isfinite(share) else 0.0
+    line = Table.grid(padding=(0, 1))
+    line.add_row(ProgressBar(total=1.0, completed=done, width=BAR_WIDTH), f"{100 * done:.0f} %")
+    return line
+
+
+def _inclination(rows: tuple[Row, ...]) -> str:
+    return "   ".join(
+        f"{plane} {_degrees(rows[who].value)}"
+        for plane, who in (("xz", Who.CAMERA_XZ), ("yz", Who.CAMERA_YZ))
+    )
+
+
+def _degrees(angle: float) -> str:
+    return f"{np.degrees(angle):+6.2f}°" if np.isfinite(angle) else "not seen"
+
+
+def _alive(who: Who, row: Row, now: float) -> Text:
+    trouble = TROUBLE[Trouble(int(row.trouble))]
+    if trouble:
+        return Text(trouble, style="bold red")
+    if not row.beat:
+        return Text("no sign yet", style="yellow")
+    unit = COUNTED.get(who, "pictures")
+    text = f"{row.rate:6.1f} /s {row.count:9.0f} {unit:<9} {1e3 * row.age(now):5.0f} ms ago"
+    return Text(text, style="red" if row.age(now) > FRESH else "green")
+
+
+def _guard(guard: Reading) -> Text:
+    style = "red" if guard.margin <= 0 else "yellow" if guard.margin < LITTLE else "green"
+    left = f"{100 * guard.margin:.0f} % left" if guard.margin > 0 else "passed"
+    return Text(f"{guard.value:8.3g} of {guard.limit:.3g} {guard.unit}, {left}", style=style)

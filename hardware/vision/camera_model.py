@@ -1,0 +1,223 @@
+"""A calibrated camera: where it stands, and how it maps points of the cup frame to pixels."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+UNDISTORT_ROUNDS = 20
+UNDISTORT_TOLERANCE = 1e-9  # normalised coordinates; a millionth of a pixel
+
+
+class CameraModelError(ValueError):
+    """A camera's numbers cannot describe a camera."""
+
+
+@dataclass(frozen=True, eq=False)
+class CameraModel:
+    """Pinhole with the five distortion coefficients of OpenCV.
+
+    The camera frame has x to the right, y down and z forward.
+
+    Attributes:
+        focal: fx and fy [px].
+        centre: cx and cy [px].
+        size: Width and height of the image [px].
+        rotation: Turns vectors of the cup frame into the camera frame, shape (3, 3).
+        position: Of the lens in the cup frame [m], shape (3,).
+        distortion: k1, k2, p1, p2, k3.
+
+    Raises:
+        CameraModelError: a number is not finite, the focal length not positive, or `rotation` is
+            no rotation.
+    """
+
+    focal: tuple[float, float]
+    centre: tuple[float, float]
+    size: tuple[int, int]
+    rotation: np.ndarray
+    position: np.ndarray
+    distortion: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name, shape in (
+            ("focal", (2,)),
+            ("centre", (2,)),
+            ("size", (2,)),
+            ("rotation", (3, 3)),
+            ("position", (3,)),
+            ("distortion", (5,)),
+        ):
+            value = np.array(getattr(self, name), dtype=float)
+            if value.shape != shape or not np.isfinite(value).all():
+                raise CameraModelError(
+                    f"the camera's {name} must be finite with shape {shape}, got {value.tolist()}"
+                )
+            if name in ("rotation", "position"):
+                value.setflags(write=False)
+                object.__setattr__(self, name, value)
+        if min(self.focal) <= 0 or min(self.size) <= 0:
+            raise CameraModelError(
+                f"focal length and image size must be positive, got {self.focal} and {self.size}"
+            )
+        _check_rotation(self.rotation)
+
+    def to_camera(self, points: np.ndarray) -> np.ndarray:
+        """Points of the cup frame [m], shape (..., 3), in the camera frame."""
+        return (np.asarray(points, dtype=float) - self.position) @ self.rotation.T
+
+    def project(self, points: np.ndarray) -> np.ndarray:
+        """Pixels of points of the cup frame.
+
+        Args:
+            points: In the cup frame [m], shape (N, 3).
+
+        Returns:
+            Columns and rows [px], shape (N, 2); NaN for points behind the camera.
+        """
+        camera = self.to_camera(points)
+        depth = np.where(camera[..., 2] > 0, camera[..., 2], np.nan)
+        return self.to_pixels(camera[..., :2] / depth[..., None])
+
+    def to_pixels(self, normalised: np.ndarray) -> np.ndarray:
+        """Pixels [px] of undistorted normalised coordinates, both of shape (..., 2)."""
+        return _distorted(normalised, self.distortion) * self.focal + self.centre
+
+    def undistort(self, pixels: np.ndarray) -> np.ndarray:
+        """Undistorted normalised coordinates (x / z, y / z) of pixels, both of shape (..., 2)."""
+        seen = (np.asarray(pixels, dtype=float) - self.centre) / self.focal
+        if not any(self.distortion):
+            return seen
+        guess = seen
+        for _ in range(UNDISTORT_ROUNDS):
+            step = seen - _distorted(guess, self.distortion)
+            guess = guess + step
+            if not (np.abs(step) > UNDISTORT_TOLERANCE).any():
+                break
+        return guess
+
+    def place(self, pixel: np.ndarray, depth: float) -> np.ndarray:
+        """The point [m], shape (3,), of the cup frame at a pixel and a depth in front [m]."""
+        x, y = self.undistort(pixel)
+        return self.position + depth * (np.array([x, y, 1.0]) @ self.rotation)
+
+    def depth(self, point: np.ndarray) -> float:
+        """Distance of a point of the cup frame along the line of sight [m]."""
+        return float(self.rotation[2] @ (np.asarray(point) - self.position))
+
+    def turned(self, rotation_vector: np.ndarray, shift: np.ndarray) -> "CameraModel":
+        """The camera turned about its own axes [rad] and moved in the cup frame [m]."""
+        return replace(
+            self,
+            rotation=rotation_matrix(-np.asarray(rotation_vector)) @ self.rotation,
+            position=self.position + shift,
+        )
+
+
+def look_at(position: np.ndarray, target: np.ndarray, roll: float = 0.0) -> np.ndarray:
+    """Orientation of a camera that looks from one point of the cup frame at another.
+
+    Args:
+        position: Of the lens [m], shape (3,).
+        target: In the middle of the picture [m], shape (3,).
+        roll: Of the camera about its line of sight, clockwise as the camera sees it [rad]; an
+            upright thing then leans to the left in the picture.
+
+    Raises:
+        CameraModelError: the line of sight is vertical or has no length.
+    """
+    forward = np.asarray(target, dtype=float) - np.asarray(position, dtype=float)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    if not np.linalg.norm(right) > 1e-9:
+        raise CameraModelError(
+            f"a camera at {position} cannot look at {target}: move it away from the vertical "
+            "through its target"
+        )
+    right, forward = right / np.linalg.norm(right), forward / np.linalg.norm(forward)
+    level = np.stack([right, np.cross(forward, right), forward])
+    return rotation_matrix(np.array([0.0, 0.0, -roll])) @ level
+
+
+def rotation_matrix(vector: np.ndarray) -> np.ndarray:
+    """Rotation about `vector` by its length [rad] (Rodrigues' formula), shape (3, 3)."""
+    angle = float(np.linalg.norm(vector))
+    if angle < 1e-15:
+        return np.eye(3)
+    x, y, z = np.asarray(vector) / angle
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+
+
+def as_fields(camera: CameraModel) -> dict[str, Any]:
+    """A camera as JSON can hold it."""
+    return {
+        "focal": list(camera.focal),
+        "centre": list(camera.centre),
+        "size": list(camera.size),
+        "rotation": camera.rotation.tolist(),
+        "position": camera.position.tolist(),
+        "distortion": list(camera.distortion),
+    }
+
+
+def from_fields(fields: Mapping[str, Any]) -> CameraModel:
+    """Undoes `as_fields`.
+
+    Raises:
+        KeyError, TypeError, ValueError: They describe no camera.
+    """
+    return CameraModel(
+        focal=tuple(fields["focal"]),
+        centre=tuple(fields["centre"]),
+        size=tuple(fields["size"]),
+        rotation=np.array(fields["rotation"], dtype=float),
+        position=np.array(fields["position"], dtype=float),
+        distortion=tuple(fields["distortion"]),
+    )
+
+
+def write_camera(camera: CameraModel, path: Path) -> None:
+    """Write a camera as JSON."""
+    path.write_text(json.dumps(as_fields(camera), indent=1) + "\n")
+
+
+def read_camera(path: Path) -> CameraModel:
+    """Read a camera that `write_camera` wrote.
+
+    Raises:
+        CameraModelError: the file is no JSON, a field is missing, or it describes no camera.
+        OSError: the file cannot be read.
+    """
+    try:
+        return from_fields(json.loads(path.read_text()))
+    except (KeyError, TypeError, ValueError) as err:
+        raise CameraModelError(
+            f"{path} describes no camera ({err}); calibrate this camera again"
+        ) from err
+
+
+def _distorted(normalised: np.ndarray, distortion: tuple[float, ...]) -> np.ndarray:
+    """OpenCV's model: k1, k2, k3 radial, p1, p2 tangential."""
+    k1, k2, p1, p2, k3 = distortion
+    x, y = normalised[..., 0], normalised[..., 1]
+    square = x * x + y * y
+    radial = 1.0 + square * (k1 + square * (k2 + square * k3))
+    product = 2.0 * x * y
+    return np.stack(
+        [
+            x * radial + p1 * product + p2 * (square + 2.0 * x * x),
+            y * radial + p2 * product + p1 * (square + 2.0 * y * y),
+        ],
+        axis=-1,
+    )
+
+
+def _check_rotation(rotation: np.ndarray) -> None:
+    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6) or np.linalg.det(rotation) < 0:
+        raise CameraModelError(
+            f"the camera's rotation is no rotation matrix: {rotation.tolist()}; "
+            "its rows must be right-handed unit vectors"
+        )

@@ -1,0 +1,180 @@
+"""Intrinsics of a camera from pictures of a ChArUco board."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .camera_model import CameraModel
+from .opencv import opencv
+
+LEAST_VIEWS = 8
+LEAST_CORNERS = 8
+LEAST_TILT = np.radians(15.0)
+LEAST_COVERAGE = 0.5  # of the picture's width and of its height
+MOST_RMS = 1.0  # px
+
+
+class CalibrationError(ValueError):
+    """The pictures do not determine the camera; the message says what to do better."""
+
+
+@dataclass(frozen=True)
+class Board:
+    """A printed ChArUco board, markers of OpenCV's dictionary 5X5_100.
+
+    Attributes:
+        columns, rows: Number of squares.
+        square: Side of a square, as measured on the print [m].
+        marker: Side of a marker [m].
+    """
+
+    columns: int = 8
+    rows: int = 6
+    square: float = 0.025
+    marker: float = 0.018
+
+    def opencv_board(self) -> Any:
+        """The same as OpenCV's `CharucoBoard`."""
+        aruco = opencv().aruco
+        words = aruco.getPredefinedDictionary(aruco.DICT_5X5_100)
+        return aruco.CharucoBoard((self.columns, self.rows), self.square, self.marker, words)
+
+    def print_image(self, square_pixels: int = 100) -> np.ndarray:
+        """The board to be printed, uint8, with no margin."""
+        size = (self.columns * square_pixels, self.rows * square_pixels)
+        return self.opencv_board().generateImage(size, marginSize=0)
+
+
+class Intrinsics(NamedTuple):
+    """What a calibration tells of a camera.
+
+    Attributes:
+        focal: fx and fy [px].
+        centre: cx and cy [px].
+        size: Width and height of the pictures [px].
+        distortion: k1, k2, p1, p2, k3.
+        rms: Root mean square distance between corners seen and corners expected [px].
+        focal_error: Standard errors of `focal` [px].
+        views: Number of pictures used.
+    """
+
+    focal: tuple[float, float]
+    centre: tuple[float, float]
+    size: tuple[int, int]
+    distortion: tuple[float, ...]
+    rms: float
+    focal_error: tuple[float, float]
+    views: int
+
+    def placed(self, rotation: np.ndarray, position: np.ndarray) -> CameraModel:
+        """The camera with these intrinsics at a pose; see `look_at`."""
+        return CameraModel(
+            focal=self.focal,
+            centre=self.centre,
+            size=self.size,
+            rotation=rotation,
+            position=position,
+            distortion=self.distortion,
+        )
+
+
+class _View(NamedTuple):
+    on_board: np.ndarray  # (N, 1, 3) m
+    pixels: np.ndarray  # (N, 1, 2)
+
+
+def calibrate_intrinsics(images: Sequence[np.ndarray], board: Board) -> Intrinsics:
+    """Focal lengths, centre and distortion from pictures of a board.
+
+    Pictures with fewer than 8 corners are left out. The sixth-order distortion k3 stays 0: a
+    webcam does not need it, and few pictures do not determine it.
+
+    Args:
+        images: Grey levels, uint8, all of one size.
+        board: The printed board.
+
+    Raises:
+        CalibrationError: fewer than 8 pictures show enough of the board, all show it from the
+            same side, they cover too little of the picture, or the fit is bad.
+    """
+    sizes = {image.shape for image in images}
+    if len(sizes) != 1:
+        raise CalibrationError(
+            f"the pictures must be one or more and of one size, got {len(images)} of sizes "
+            f"{sorted(sizes)}"
+        )
+    height, width = sizes.pop()
+    found = [_corners(image, board) for image in images]
+    views = [view for view in found if view is not None]
+    if len(views) < LEAST_VIEWS:
+        raise CalibrationError(
+            f"{len(views)} of {len(images)} pictures show at least {LEAST_CORNERS} corners of the "
+            f"board; {LEAST_VIEWS} such pictures are needed. Hold it near, flat, lit and still"
+        )
+    _check_coverage(views, (width, height))
+    intrinsics, turns = _solve(views, (width, height))
+    _check_tilt(turns)
+    if intrinsics.rms > MOST_RMS:
+        raise CalibrationError(
+            f"the corners lie {intrinsics.rms:.2f} px from where they should, more than "
+            f"{MOST_RMS} px: is the board flat, and are its squares {1e3 * board.square:.1f} mm?"
+        )
+    return intrinsics
+
+
+def _corners(image: np.ndarray, board: Board) -> _View | None:
+    printed = board.opencv_board()
+    corners, ids, _, _ = opencv().aruco.CharucoDetector(printed).detectBoard(image)
+    if ids is None or len(ids) < LEAST_CORNERS:
+        return None
+    on_board, pixels = printed.matchImagePoints(corners, ids)
+    return _View(np.asarray(on_board, np.float32), np.asarray(pixels, np.float32))
+
+
+def _solve(views: list[_View], size: tuple[int, int]) -> tuple[Intrinsics, np.ndarray]:
+    """Intrinsics, and the board's rotation vectors [rad] in each view, shape (N, 3)."""
+    cv2 = opencv()
+    rms, matrix, distortion, turns, _, errors, _, _ = cv2.calibrateCameraExtended(
+        [view.on_board for view in views],
+        [view.pixels for view in views],
+        size,
+        None,
+        None,
+        flags=cv2.CALIB_FIX_K3,
+    )
+    k = [float(value) for value in np.ravel(distortion)[:5]]
+    spread = np.ravel(errors)
+    intrinsics = Intrinsics(
+        focal=(float(matrix[0, 0]), float(matrix[1, 1])),
+        centre=(float(matrix[0, 2]), float(matrix[1, 2])),
+        size=size,
+        distortion=tuple(k),
+        rms=float(rms),
+        focal_error=(float(spread[0]), float(spread[1])),
+        views=len(views),
+    )
+    return intrinsics, np.array([np.ravel(turn) for turn in turns])
+
+
+def _check_coverage(views: list[_View], size: tuple[int, int]) -> None:
+    pixels = np.concatenate([view.pixels[:, 0] for view in views])
+    covered = np.ptp(pixels, axis=0) / size
+    if (covered < LEAST_COVERAGE).any():
+        raise CalibrationError(
+            f"the board was seen in {covered[0]:.0%} of the picture's width and {covered[1]:.0%} "
+            f"of its height; at least {LEAST_COVERAGE:.0%} are needed. Move it into the corners"
+        )
+
+
+def _check_tilt(turns: np.ndarray) -> None:
+    """Views must differ in tilt: else distance and focal length cannot be told apart."""
+    normals = np.stack([opencv().Rodrigues(turn)[0][:, 2] for turn in turns])
+    apart = float(np.arccos(np.clip(normals @ normals.T, -1.0, 1.0)).max())
+    if apart < LEAST_TILT:
+        raise CalibrationError(
+            f"all views of the board are alike: their tilts differ by {np.degrees(apart):.0f} "
+            f"degrees at most, {np.degrees(LEAST_TILT):.0f} are needed. Tilt the board to the "
+            "left, right, up and down by about 30 degrees"
+        )

@@ -1,0 +1,21 @@
+"""A picture with its times."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Frame(NamedTuple):
+    """One picture.
+
+    Attributes:
+        index: Counts the camera's frames from 0; a number that is left out is a lost frame.
+        stamp: Time of the exposure on the camera's own clock [s].
+        host: Time of arrival on this computer's clock, `time.monotonic()` [s].
+        image: Grey levels, uint8, shape (height, width).
+    """
+
+    index: int  # pyright: ignore[reportIncompatibleMethodOverride]
+    stamp: float
+    host: float
+    image: np.ndarray
