@@ -10,7 +10,9 @@ if TYPE_CHECKING:
     from .criticiser import criticise
     from .criticism import Criticism
     from .models import Cups
+    from .pour_execution import execute_pour
     from .pouring import choose_pour
+    from .recorder import record
     from .recordings import Recording, open_recording
     from .reporting import report
 
@@ -24,7 +26,9 @@ __all__ = [
     "calibrate",
     "choose_pour",
     "criticise",
+    "execute_pour",
     "open_recording",
+    "record",
     "report",
 ]
 
@@ -37,7 +41,9 @@ _HOME = {
     "calibrate": ".calibrator",
     "choose_pour": ".pouring",
     "criticise": ".criticiser",
+    "execute_pour": ".pour_execution",
     "open_recording": ".recordings",
+    "record": ".recorder",
     "report": ".reporting",
 }
 

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from . import __version__, cli_check
+from . import __version__, cli_check, cli_record, cli_rig
 from .cli_errors import OneLineErrors
+from .cli_rig import RigOption
 from .settings import (
     RISKS,
     SAMPLERS,
@@ -29,6 +30,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.add_typer(cli_check.app, name="check")
+app.add_typer(cli_rig.app, name="rig")
+app.command()(cli_record.record)
 
 
 def _print_version(asked: bool) -> None:
@@ -75,9 +78,11 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
 ) -> None:
     """Learn a liquid's parameters from recordings of it being stirred."""
     from .calibrator import calibrate as run_calibrate
+    from .recordings import aborted_recordings, open_recordings
 
+    opened = open_recordings(recordings)
     run_calibrate(
-        recordings,
+        opened,
         out=out,
         budget=budget,
         surrogate=surrogate,
@@ -88,6 +93,8 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
         resume=resume,
     )
     _print_section(out, "calibrate")
+    for line in aborted_recordings(opened):
+        typer.echo(line, err=True)
 
 
 @app.command()
@@ -144,7 +151,7 @@ def criticise(  # noqa: PLR0913  one parameter for each option
 
 
 @app.command()
-def pour(
+def pour(  # noqa: PLR0913  one parameter for each option
     run: RunArgument,
     cups: Annotated[
         Path | None, typer.Option(metavar="FILE", help="cups.toml; without it, the bundled one.")
@@ -156,11 +163,28 @@ def pour(
             metavar="|".join(RISKS), help="Spillage to keep low: the mean, or the worst tenth's."
         ),
     ] = PourSettings.risk,
+    execute: Annotated[
+        bool, typer.Option("--execute", help="Carry out the pour that RUN has chosen already.")
+    ] = False,
+    rig: RigOption = None,
+    arm: Annotated[
+        bool, typer.Option("--arm", help="With --execute: move the arm, once a sentence is typed.")
+    ] = False,
+    emulator: Annotated[
+        bool, typer.Option("--emulator", help="With --execute: move an emulated arm.")
+    ] = False,
 ) -> None:
     """Choose the pour that spills least over all that the liquid might be.
 
-    What a criticism accepted is part of the liquid.
+    What a criticism accepted is part of the liquid. With --execute nothing is chosen anew: it is
+    a dry run of the chosen pour, unless armed.
     """
+    if execute:
+        cli_record.execute(run, rig, arm=arm, emulator=emulator)
+        return
+    for option, given in (("arm", arm), ("emulator", emulator), ("rig", rig)):
+        if given:
+            raise typer.BadParameter(f"--{option} needs --execute, which is missing")
     from .criticism import latest_calibration
     from .cups import bundled_cups, open_cups
     from .pouring import choose_pour

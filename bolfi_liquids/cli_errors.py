@@ -31,7 +31,7 @@ class OneLineErrors(TyperGroup):
         except TyperException as err:
             _say(f"error: {_one_line(err.format_message())}; see --help")
             raise typer.Exit(USAGE_ERROR) from None
-        except (ValueError, OSError, RuntimeError, sqlite3.Error) as err:
+        except (ValueError, OSError, RuntimeError, ImportError, sqlite3.Error) as err:
             if ctx.params.get("debug"):
                 raise
             _say(f"error: {_explained(err)}")

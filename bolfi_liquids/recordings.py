@@ -88,6 +88,16 @@ def open_recordings(
     return [_opened(one, option) for one in sources]
 
 
+def aborted_recordings(recordings: Iterable[Recording]) -> list[str]:
+    """A warning for each recording that something stopped."""
+    return [
+        f"warning: {one.path}: aborted after {one.time[-1] - one.time[0]:.1f} s of stirring "
+        f"({one.attrs.get('reason') or 'no reason is told'}); a short stir says little"
+        for one in recordings
+        if one.attrs.get("status") == "aborted"
+    ]
+
+
 def _opened(source: object, option: str) -> Recording:
     if isinstance(source, Recording):
         return source

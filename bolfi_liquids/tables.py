@@ -1,9 +1,11 @@
-"""What the command line prints of a calibration, of its criticism and of a pour."""
+"""What the command line prints of a calibration, a criticism, a pour, a rig and a recording."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Column, Table
 
 from . import criticism_narrative as criticism
@@ -11,6 +13,9 @@ from .narrative import UNITS, floor_sentence, sampler_sentence
 
 if TYPE_CHECKING:
     from xarray import Dataset
+
+    from .hardware import Check
+    from .recordings import Recording
 
 
 def print_calibration(section: Mapping[str, Any], console: Console) -> None:
@@ -109,3 +114,26 @@ def _gap_lines(gap: Mapping[str, float | None]) -> list[str]:
 
 def _table(label: str, *numbers: str) -> Table:
     return Table(label, *(Column(heading, justify="right") for heading in numbers))
+
+
+def print_checks(checks: "Sequence[Check]", console: Console) -> None:
+    """What works and what is missing, one line each."""
+    table = Table("what", "", "how")
+    for check in checks:
+        table.add_row(check.name, "ok" if check.ok else "[bold red]no[/]", escape(check.text))
+    console.print(table)
+
+
+def print_recording(recording: "Recording", console: Console) -> None:
+    """How long a recording is, how it went, and what can be done with it."""
+    seen = np.isfinite(recording.inclination).all(axis=1)
+    largest = np.degrees(np.nanmax(np.abs(recording.inclination)))
+    console.print(
+        f"{recording.path}: {recording.attrs['status']}, {recording.time[-1]:.1f} s, "
+        f"{seen.mean():.0%} of the samples with both views, inclination up to {largest:.1f} deg",
+        highlight=False,
+        soft_wrap=True,
+    )
+    console.print(
+        f"next: bolfi-liquids calibrate {recording.path} --out RUN", highlight=False, soft_wrap=True
+    )

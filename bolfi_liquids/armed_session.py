@@ -1,0 +1,103 @@
+"""A session that may move an arm: a person has agreed, or the arm is emulated."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from .errors import InputError
+
+if TYPE_CHECKING:
+    from .hardware import EmulatedRig, PosePath, Rig, Session, Tool
+
+Ask = Callable[[str], str]
+"""Shows a person the plan, and returns what the person typed."""
+
+
+class Task(NamedTuple):
+    """What an arm is to do.
+
+    Attributes:
+        rig: What is there.
+        tool: In the gripper.
+        paths: That will be followed.
+        out: Directory of what is recorded; new or empty.
+        cameras: Whether the rig's cameras look on.
+    """
+
+    rig: "Rig"
+    tool: "Tool"
+    paths: "Sequence[PosePath]"
+    out: Path
+    cameras: bool = False
+
+
+class Emulation(NamedTuple):
+    """What to use in place of a robot.
+
+    Attributes:
+        start: Runs the emulator while it is entered.
+        source: Where the data come from, for the recording.
+    """
+
+    start: "AbstractContextManager[EmulatedRig]"
+    source: str
+
+
+def check_one(ask: Ask | None, emulate: object, where: str) -> None:
+    """Refuse a motion that nobody is asked about, or that is both real and emulated.
+
+    Raises:
+        InputError: `ask` and `emulate` are both given, or neither is.
+    """
+    if (ask is None) == (not emulate):
+        raise InputError(
+            "neither or both of ask and emulate",
+            where=where,
+            fix="give ask= for a real arm, or emulate= for a dry run",
+        )
+
+
+@contextmanager
+def armed_session(
+    task: Task, *, ask: Ask | None = None, emulation: Emulation | None = None
+) -> "Iterator[Session]":
+    """Ask a person, or start an emulator; then a session that may move the arm.
+
+    Args:
+        task: What will be done.
+        ask: Shows the plan; what it returns must be the sentence that the plan asks for.
+        emulation: Used instead; nobody is asked.
+
+    Raises:
+        InputError: Both are given, or neither.
+        RigError: The person did not agree, or something cannot be used.
+    """
+    from .hardware import Session, confirm, confirm_emulated, describe, webcams
+
+    check_one(ask, emulation, "armed_session")
+    text = describe(task.paths, task.rig, task.tool)
+    with ExitStack() as stack:
+        if emulation is not None:
+            running = stack.enter_context(emulation.start)
+            address, source = running.emulator.address, emulation.source
+            make_cameras = running.make_cameras
+            confirmation = confirm_emulated(text, address)
+        else:
+            assert ask is not None
+            address, source = task.rig.robot.host, "robot"
+            make_cameras = webcams(task.rig)
+            confirmation = confirm(text, ask(text), address)
+        session = Session(
+            task.rig,
+            task.out,
+            address,
+            make_cameras if task.cameras else {},
+            tool=task.tool,
+            armed=True,
+            confirmation=confirmation,
+            plan=task.paths,
+            rehearsal=emulation is not None,
+            source=source,
+        )
+        yield stack.enter_context(session)

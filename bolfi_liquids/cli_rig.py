@@ -1,0 +1,91 @@
+"""The command group `rig`: the robot and the cameras, before anything is recorded."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .cli_errors import FAILED
+
+RigOption = Annotated[
+    Path | None, typer.Option("--rig", metavar="FILE", help="rig.toml; without it, the bundled.")
+]
+
+app = typer.Typer(help="The robot and the cameras.", no_args_is_help=True)
+
+
+@app.command()
+def check(rig: RigOption = None) -> None:
+    """Tell what of the rig works and what is missing; moves nothing.
+
+    The exit status is 1 when something is missing.
+    """
+    from rich.console import Console
+
+    from .hardware import check_rig
+    from .rigs import rig_of
+    from .tables import print_checks
+
+    checks = check_rig(rig_of(rig))
+    print_checks(checks, Console())
+    if not all(one.ok for one in checks):
+        raise typer.Exit(FAILED)
+
+
+@app.command("template")
+def template(
+    out: Annotated[Path, typer.Argument(metavar="FILE", help="To be written.")] = Path("rig.toml"),
+) -> None:
+    """Write the bundled rig.toml, to be changed into your own."""
+    from .rigs import write_template
+
+    typer.echo(f"{write_template(out)}: change it, then: bolfi-liquids rig check --rig {out}")
+
+
+@app.command("calibrate-cameras")
+def calibrate_cameras(  # noqa: PLR0913  one parameter for each option
+    rig: RigOption = None,
+    view: Annotated[str, typer.Option(metavar="xz|yz", help="Which camera.")] = "xz",
+    boards: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Pictures of the board; without it, they are taken."),
+    ] = None,
+    plumb_line: Annotated[
+        Path | None,
+        typer.Option(metavar="PICTURE", help="Of a thread that hangs; without it, it is taken."),
+    ] = None,
+    square: Annotated[float, typer.Option(help="Side of a printed square, in cm.")] = 2.5,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Of the lens; without it, camera_VIEW.json."),
+    ] = None,
+    print_board: Annotated[
+        Path | None, typer.Option(metavar="PNG", help="Only write the board, to be printed.")
+    ] = None,
+) -> None:
+    """Learn a camera's lens from a printed board, and its roll from a plumb line."""
+    from .camera_calibration import calibrate_view, write_board
+
+    if print_board is not None:
+        typer.echo(f"{write_board(print_board)}: print it, measure a square, glue it on a plate")
+        return
+    for line in calibrate_view(rig, view, square / 100, boards=boards, plumb=plumb_line, out=out):
+        typer.echo(line)
+
+
+@app.command()
+def emulate(
+    rig: RigOption = None,
+    address: Annotated[
+        str | None, typer.Option(metavar="127.x.y.z", help="Where it listens; else a free one.")
+    ] = None,
+    viscosity: Annotated[float, typer.Option(help="Of the liquid in the cup [Pa s].")] = 1.0,
+) -> None:
+    """Run an emulator of the robot's controller, the stick over the cup, until Ctrl-C.
+
+    Any client of a real controller may connect to it, ours by `host` under `robot` in rig.toml.
+    """
+    from .rigs import emulator_until_interrupted, rig_of
+
+    for line in emulator_until_interrupted(rig_of(rig), address, viscosity):
+        typer.echo(line)

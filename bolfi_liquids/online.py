@@ -1,0 +1,305 @@
+"""Online calibration: inference that runs while the robot stirs (Lopez-Guevara et al. 2018).
+
+The path of the gripper is known before the robot moves. So the plan is simulated before and while
+it is carried out, every simulation once and to its end, and after each stroke all of them are
+compared with the data so far. Two processes do the work; nothing here blocks or disturbs who
+watches the robot: `update` and `poll` return at once, and what goes wrong is a status.
+"""
+
+import multiprocessing
+import time
+from collections.abc import Iterator, Mapping
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .calibrator import calibrate
+from .cups import bundled_cups
+from .errors import InputError
+from .online_learner import learn_online
+from .online_outbox import Outbox
+from .online_plan import SoFar, planned, stroke_ends
+from .online_request import FAILED, GONE, PREPARING, READY, REFUSED, Request, Status
+from .online_settings import OnlineSettings
+from .online_simulator import simulate_plan
+from .prior import check_prior, default_prior, describe_prior, read_prior
+from .recordings import Recording, Source, open_recording
+from .run_directory import RUN_TOML
+from .spillage_map import make_pours
+
+if TYPE_CHECKING:
+    from .inference import Prior
+    from .models import Cups
+    from .models.gripper_path import GripperPath
+    from .online_estimate import OnlineEstimate
+
+__all__ = [
+    "FAILED",
+    "PREPARING",
+    "READY",
+    "REFUSED",
+    "OnlineCalibration",
+    "OnlineSettings",
+    "SoFar",
+    "Status",
+    "replay",
+]
+
+BANK, LOG = "online.sqlite", "online.jsonl"
+POLL = 0.02  # s between looks while somebody waits
+PATIENCE = 2.0  # s that the processes have to end by themselves
+
+
+class OnlineCalibration:
+    """An online calibration under way; made by `start`, closed by `close` or a `with`.
+
+    Attributes:
+        settings: What decides it.
+        plan: The planned stir.
+        ends: When each of its strokes ends [s].
+        out: The RUN directory that `finish` makes.
+        status: How it is doing; `poll` and `update` renew it.
+        estimates: All so far.
+    """
+
+    def __init__(self, request: Request, out: Path):
+        self.settings, self.plan, self.out = request.settings, request.plan(), out
+        self.ends = stroke_ends(self.plan)
+        self.status = Status(PREPARING, "starting")
+        self.estimates: list[OnlineEstimate] = []
+        self._prior = read_prior(request.prior)
+        self._link, self._workers = _launch(request)
+        self._outbox = Outbox(self._link)
+
+    @classmethod
+    def start(  # noqa: PLR0913  the one call that most users make
+        cls,
+        path: "GripperPath",
+        attrs: Mapping[str, float | str],
+        *,
+        out: str | Path,
+        cups: "Cups | None" = None,
+        prior: "Prior | None" = None,
+        settings: OnlineSettings | None = None,
+        bank: str | Path | None = None,
+        progress: bool = True,
+    ) -> "OnlineCalibration":
+        """Make the pours of the spillage map, unless the bank has them, and start to prepare.
+
+        The first time the pours take minutes, in this process; everything after that happens in
+        two others (they are spawned: a script needs `if __name__ == "__main__":`). Let the robot
+        move when `wait_until_ready` says so: then a design all over the prior is simulated, and
+        everything is compiled.
+
+        Args:
+            path: Planned: times [s] and gripper positions [m], sampled about as often as the
+                cameras do, up to the end of the last cycle that may be stirred.
+            attrs: As a recording's: geometry and densities.
+            out: The RUN directory to be made.
+            cups: Of the pour; None are the bundled ones.
+            prior: Over `viscosity` [Pa s] and `cohesion` [1]; None is `default_prior()`.
+            settings: None are the defaults.
+            bank: Simulations to reuse and to keep: pours of the same cups and density, and the
+                design of the same plan, rig and density. None is a file in `out`.
+            progress: Whether to show a bar on stderr while pours are made.
+
+        Raises:
+            InputError: The plan, the prior or `out` cannot be used.
+        """
+        from .inference import SimulationBank
+
+        settings = OnlineSettings() if settings is None else settings
+        prior = default_prior() if prior is None else prior
+        check_prior(prior)
+        cups = bundled_cups() if cups is None else cups
+        plan, out = planned(path.time, path.position, attrs), _fresh(Path(out))
+        bank = out / BANK if bank is None else Path(bank)
+        (out / LOG).unlink(missing_ok=True)
+        density = plan.number("liquid_density")
+        with SimulationBank(bank) as kept:
+            make_pours(cups, density, kept, prior=prior, pours=settings.pours, progress=progress)
+        request = Request(
+            time=plan.gripper.time,
+            position=plan.gripper.position,
+            attrs=dict(attrs),
+            cups=cups,
+            prior=describe_prior(prior),
+            settings=settings,
+            bank=bank,
+            log=out / LOG,
+        )
+        return cls(request, out)
+
+    def wait_until_ready(self, timeout: float | None = None) -> bool:
+        """Wait until data may come, or preparation failed, or `timeout` [s] has passed.
+
+        Returns:
+            Whether it is ready; if not, `status` says why.
+        """
+        until = np.inf if timeout is None else time.monotonic() + timeout
+        while self.status.phase == PREPARING and time.monotonic() < until:
+            time.sleep(POLL)
+            self.poll()
+        return self.status.phase == READY
+
+    def update(self, so_far: SoFar) -> "OnlineEstimate | None":
+        """Hand over the recording so far, at best after each stroke; returns at once.
+
+        What was not looked at yet is replaced. Data that are off the plan by more than
+        `online_plan.FARTHEST` or `LATEST` are not learned from: `status` says so.
+
+        Returns:
+            As `poll`.
+        """
+        self._outbox.put(so_far)
+        return self.poll()
+
+    def poll(self) -> "OnlineEstimate | None":
+        """Take what has come from the other processes; returns at once.
+
+        Returns:
+            The newest estimate, if one came since the last call.
+        """
+        before = len(self.estimates)
+        try:
+            while self.status.phase != FAILED and self._link.poll():
+                message = self._link.recv()
+                if isinstance(message, Status):
+                    self.status = message
+                else:
+                    self.estimates.append(message)
+        except (*GONE, OSError):
+            self._workers["learner"].join(POLL)
+            code = self._workers["learner"].exitcode
+            detail = f"the process that learns has died (exit code {code}); the recording goes on"
+            self.status = self.status._replace(phase=FAILED, detail=detail)
+        return self.estimates[-1] if len(self.estimates) > before else None
+
+    def enough(self, estimate: "OnlineEstimate") -> bool:
+        """Whether the pour is known well enough for stirring to end; see `OnlineSettings`."""
+        from .online_estimate import enough
+
+        return enough(estimate, self.settings)
+
+    def finish(self, recording: Source, *, budget: int = 20, progress: bool = True) -> Path:
+        """Calibrate on the finished recording by the ordinary `calibrate`, into `out`.
+
+        It simulates anew, along the path that the gripper really took: the online simulations
+        are of the planned one. Its result can be repeated bit for bit, while how many simulations
+        an online estimate rests on depends on how fast the computer was.
+
+        Returns:
+            The RUN directory; `online.jsonl` in it holds the estimates that led here.
+
+        Raises:
+            InputError: The recording cannot be used.
+        """
+        self.close()
+        calibration = calibrate(
+            recording,
+            out=self.out,
+            prior=self._prior,
+            budget=budget,
+            seed=self.settings.seed,
+            surrogate=self.settings.surrogate,
+            particles=self.settings.particles,
+            progress=progress,
+        )
+        return calibration.path
+
+    def close(self) -> None:
+        """End the other processes; what they have simulated is kept. Closing twice does no harm."""
+        self._link.close()
+        for worker in self._workers.values():
+            worker.join(PATIENCE if worker.name == "learner" else 0.1)
+            worker.terminate()  # a simulation is not worth waiting for
+            worker.join(PATIENCE)
+            if worker.is_alive():
+                worker.kill()
+
+    def __enter__(self) -> "OnlineCalibration":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def replay(
+    recording: Source, online: OnlineCalibration, *, realtime: bool = False
+) -> "Iterator[OnlineEstimate]":
+    """Feed a finished recording stroke by stroke, as if it were just being made.
+
+    Args:
+        recording: Of the stir that was planned.
+        online: Ready.
+        realtime: Whether strokes come as fast as they were made; else each waits for the
+            estimate of the one before.
+
+    Yields:
+        Estimates, until one is good enough, the strokes end, or nothing more will come.
+    """
+    recording = recording if isinstance(recording, Recording) else open_recording(recording)
+    began = time.monotonic() - float(recording.time[0])
+    for end in online.ends:
+        if realtime:
+            yield from _arriving(online, began + end)
+        estimate = online.update(_until(recording, end))
+        while not realtime and estimate is None and online.status.phase == READY:
+            time.sleep(POLL)
+            estimate = online.poll()
+        if estimate is not None:
+            yield estimate
+        if online.status.phase != READY or any(map(online.enough, online.estimates[-1:])):
+            return
+    if realtime:
+        yield from _arriving(online, time.monotonic() + PATIENCE)
+
+
+def _arriving(online: OnlineCalibration, until: float) -> "Iterator[OnlineEstimate]":
+    """Estimates that come before `until`, by `time.monotonic` [s]."""
+    while time.monotonic() < until:
+        time.sleep(POLL)
+        if (estimate := online.poll()) is not None:
+            yield estimate
+            if estimate.strokes == len(online.ends):
+                return
+
+
+def _until(recording: Recording, end: float) -> SoFar:
+    """The recording up to a time [s]; taken just now."""
+    seen = recording.time <= end + 1e-9
+    path: NDArray = recording.gripper.position[seen]
+    return SoFar(recording.time[seen], path, recording.inclination[seen], time.monotonic())
+
+
+def _fresh(out: Path) -> Path:
+    if out.exists() and not out.is_dir():
+        raise InputError("not a directory", where=str(out), fix="choose another --out")
+    if (out / RUN_TOML).exists():
+        raise InputError("holds a run already", where=str(out), fix="choose another --out")
+    out.mkdir(parents=True, exist_ok=True)
+    return out
+
+
+def _launch(request: Request) -> tuple[Connection, dict[str, BaseProcess]]:
+    """Start both processes; they end when the returned connection closes."""
+    context = multiprocessing.get_context("spawn")  # neither JAX nor Taichi survives a fork
+    link, theirs = context.Pipe()
+    to_simulator, simulators = context.Pipe()
+    workers: dict[str, BaseProcess] = {
+        "learner": context.Process(
+            target=learn_online, args=(theirs, to_simulator, request), name="learner", daemon=True
+        ),
+        "simulator": context.Process(
+            target=simulate_plan, args=(simulators, request), name="simulator", daemon=True
+        ),
+    }
+    for worker in workers.values():
+        worker.start()
+    for end in (theirs, to_simulator, simulators):
+        end.close()  # here, so that each process sees the other's end
+    return link, workers

@@ -1,0 +1,248 @@
+"""What is known of a liquid while it is stirred: pure functions of data and simulations so far.
+
+Every simulation is of the whole plan and made once. After a stroke, what was observed is NaN from
+there on, so that the discrepancy is the paper's integral up to that time,
+Delta(t) = int_0^t (y - y~)^2 dt, and no array changes its shape: nothing is compiled anew.
+"""
+
+import time
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kept import fresh_seeds
+from .online_plan import Followed
+from .online_settings import OnlineSettings
+from .settings import MIN_SIMULATIONS
+from .spillage_map import SpillageMap
+from .stirring import Stirring
+
+if TYPE_CHECKING:
+    from .inference import Bolfi, Job, Prior, Simulation
+
+DRAWS = 500  # of each of two chains
+_SIMULATION = 31  # purpose of seeds
+MARGIN = 8  # rows of the engine's arrays beyond the budget, for what is pending
+
+
+class Spread(NamedTuple):
+    """Of a parameter's posterior, in its own unit."""
+
+    mean: float
+    q05: float
+    q50: float
+    q95: float
+
+
+class OnlineEstimate(NamedTuple):
+    """What is known after a stroke.
+
+    Attributes:
+        strokes: Finished.
+        covered: Time of the plan up to which data were used [s].
+        parameters: Name -> posterior.
+        action: Best pour, `angular_velocity` [rad/s] and `distance` [m].
+        expected_spillage: Mean spilled fraction of that pour over the posterior.
+        spillage_q95: Spilled fraction that one such pour in twenty exceeds.
+        simulations: That the engine has learned from.
+        lag: From the end of the stroke until this was known [s].
+        delay: Of the arm behind its plan [s].
+        apart: Greatest distance of the arm from its plan [m].
+        complaints: Of the engine's own checks.
+    """
+
+    strokes: int
+    covered: float
+    parameters: dict[str, Spread]
+    action: dict[str, float]
+    expected_spillage: float
+    spillage_q95: float
+    simulations: int
+    lag: float
+    delay: float
+    apart: float
+    complaints: tuple[str, ...]
+
+
+class Made(NamedTuple):
+    """Finished simulations of the whole plan, n of them; failed ones are rows of NaN."""
+
+    theta: dict[str, NDArray[np.float64]]  # name -> (n,)
+    signals: NDArray[np.float64]  # (n, T, 2) rad
+    seeds: NDArray[np.int64]  # (n,)
+
+    @property
+    def size(self) -> int:
+        """n"""
+        return len(self.seeds)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What stays the same during a stir.
+
+    Attributes:
+        prior: Of the liquid.
+        stirring: The planned stir.
+        settings: Of the online calibration.
+    """
+
+    prior: "Prior"
+    stirring: Stirring
+    settings: OnlineSettings
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Of one signal."""
+        return self.stirring.observed.shape
+
+    @property
+    def nothing(self) -> Made:
+        """No simulation."""
+        none = np.zeros(0)
+        return Made(
+            dict.fromkeys(self.prior.names, none), np.zeros((0, *self.shape)), none.astype(int)
+        )
+
+
+def with_results(made: Made, jobs: "list[Job]", results: "list[Simulation]") -> Made:
+    """What was made, with the results of `jobs` at its end."""
+    blank = np.full(made.signals.shape[1:], np.nan)
+    signals = [blank if result.signal is None else result.signal for result in results]
+    return Made(
+        {name: np.append(v, [job.theta[name] for job in jobs]) for name, v in made.theta.items()},
+        np.concatenate([made.signals, signals]),
+        np.append(made.seeds, [job.seed for job in jobs]),
+    )
+
+
+def design(problem: Problem) -> "list[Job]":
+    """The simulations to make before the robot moves: all over the prior."""
+    engine = _engine(problem, np.zeros(problem.shape), problem.settings.seed)
+    return _jobs(problem, engine.ask(problem.settings.design), 0)
+
+
+def proposals(problem: Problem, made: Made, observed: NDArray, first: int, n: int) -> "list[Job]":
+    """The simulations that the data so far make worth while.
+
+    Args:
+        problem: What stays the same.
+        made: Simulations so far.
+        observed: Of `follow`.
+        first: Number of the first one, counted from the run's start.
+        n: How many.
+    """
+    # the rule's own jitter must differ from one call to the next
+    (seed,) = fresh_seeds(problem.settings.seed, _SIMULATION + 1 + first, 1)
+    return _jobs(problem, _told(problem, made, observed, seed).ask(n), first)
+
+
+def estimate(
+    problem: Problem, made: Made, followed: Followed, spillage: SpillageMap, ended: float
+) -> OnlineEstimate:
+    """Posterior and best pour, given the data so far.
+
+    Args:
+        problem: What stays the same.
+        made: Simulations so far.
+        followed: The data.
+        spillage: Of the pour's cups.
+        ended: When the last finished stroke ended, by `time.monotonic` [s].
+
+    Raises:
+        ValueError: Fewer than three simulations succeeded, or nothing was seen.
+    """
+    from .inference import EmulatorWarning, SamplingWarning
+
+    engine = _told(problem, made, followed.observed, problem.settings.seed)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", EmulatorWarning)  # they are among the complaints
+        warnings.simplefilter("ignore", SamplingWarning)
+        fit = engine.fit()
+        tree = fit.sample("quadrature", chains=2, draws=DRAWS, seed=problem.settings.seed)
+    posterior = tree["posterior"]
+    status = str(posterior.attrs["status"])
+    draws = {name: posterior[name].to_numpy().ravel() for name in problem.prior.names}
+    pour = spillage.best(draws)
+    return OnlineEstimate(
+        strokes=followed.strokes,
+        covered=followed.covered,
+        parameters={name: _spread(values) for name, values in draws.items()},
+        action={"angular_velocity": pour.angular_velocity, "distance": pour.distance},
+        expected_spillage=pour.spillage,
+        spillage_q95=pour.spillage_q95,
+        simulations=engine.succeeded,
+        lag=time.monotonic() - ended,
+        delay=followed.delay,
+        apart=followed.apart,
+        complaints=(*fit.warnings, *([] if status == "converged" else [status])),
+    )
+
+
+def enough(estimate: OnlineEstimate, settings: OnlineSettings) -> bool:
+    """Whether the pour is known well enough for stirring to end."""
+    bound = settings.stop == "bound"
+    spillage = estimate.spillage_q95 if bound else estimate.expected_spillage
+    return estimate.strokes >= settings.least_strokes and spillage < settings.target
+
+
+def warm_up(problem: Problem, spillage: SpillageMap) -> None:
+    """Compile all that estimates and proposals need, on signals made up for that."""
+    rng = np.random.default_rng(0)
+    n = problem.settings.design
+    theta = problem.prior.from_unit(rng.random((n, len(problem.prior))))
+    time_ = problem.stirring.time
+    rate = 1.0 + theta[problem.prior.names[0]] ** 0.1
+    waves = 0.1 * np.sin(np.outer(rate, time_))[..., None] * np.ones(problem.shape[1])
+    made = Made(theta, waves + rng.normal(0.0, 0.01, waves.shape), np.arange(n))
+    for part in (len(time_) // 2, len(time_)):
+        observed = made.signals[0].copy()
+        observed[part:] = np.nan
+        followed = Followed(observed, 1, float(time_[part - 1]), 0.0, 0.0, "")
+        estimate(problem, made, followed, spillage, 0.0)
+        proposals(problem, made, observed, n, problem.settings.batch)
+
+
+def _engine(problem: Problem, observed: NDArray, seed: int) -> "Bolfi":
+    from .inference import Bolfi
+
+    settings = problem.settings
+    # the paper's rules, as in `calibrate`
+    paper: dict[str, Any] = {"acquisition": "lcb", "threshold": "min_mean"}
+    return Bolfi(
+        problem.prior,
+        observed,
+        surrogate=settings.surrogate,
+        seed=seed,
+        initial=MIN_SIMULATIONS,
+        capacity=settings.budget + MARGIN,
+        discrepancy=problem.stirring.discrepancy(),
+        **(paper if settings.surrogate == "discrepancy" else {}),
+    )
+
+
+def _told(problem: Problem, made: Made, observed: NDArray, seed: int) -> "Bolfi":
+    engine = _engine(problem, observed, seed)
+    if made.size:
+        engine.tell(made.theta, made.signals, made.seeds)
+    return engine
+
+
+def _jobs(problem: Problem, theta: Mapping[str, NDArray], first: int) -> "list[Job]":
+    from .inference import Job
+
+    count = len(theta[problem.prior.names[0]])
+    seeds = fresh_seeds(problem.settings.seed, _SIMULATION, first + count)[first:]
+    return [
+        Job({name: float(values[at]) for name, values in theta.items()}, seed)
+        for at, seed in enumerate(seeds)
+    ]
+
+
+def _spread(values: NDArray) -> Spread:
+    q05, q50, q95 = (float(q) for q in np.quantile(values, [0.05, 0.5, 0.95]))
+    return Spread(float(values.mean()), q05, q50, q95)

@@ -1,0 +1,175 @@
+"""The process that learns from simulations of the plan and answers data with estimates."""
+
+import json
+import os
+from multiprocessing.connection import Connection, wait
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .online_plan import SoFar, follow, stroke_ends
+from .online_request import FAILED, GONE, PREPARING, READY, REFUSED, Request, Status
+from .online_simulator import step_back
+from .stirring import stirring_of
+
+if TYPE_CHECKING:
+    from .inference import Job
+    from .online_estimate import OnlineEstimate
+    from .online_plan import Followed
+
+NICENESS = 5  # of this process; an estimate matters more than another simulation
+ALONE = "the process that simulates has died"
+
+
+def learn_online(parent: Connection, simulator: Connection, request: Request) -> None:
+    """Prepare, then answer every `SoFar` with an estimate, until `parent` is closed.
+
+    Sends `OnlineEstimate` and `Status`; whatever goes wrong is a status.
+    """
+    step_back(NICENESS)
+    try:
+        learner = _Learner(parent, simulator, request)
+        if learner.prepare():
+            learner.serve()
+    except GONE:
+        return  # nobody is left to be told
+    except Exception as error:
+        parent.send(Status(FAILED, f"{type(error).__name__}: {error}"))
+        raise
+
+
+class _Learner:
+    """What the process knows."""
+
+    def __init__(self, parent: Connection, simulator: Connection, request: Request):
+        from .online_estimate import Problem
+        from .prior import read_prior
+
+        self.parent, self.simulator, self.request = parent, simulator, request
+        self.plan = request.plan()
+        self.ends = stroke_ends(self.plan)
+        stirring = stirring_of([self.plan], request.settings.particles)
+        self.problem = Problem(read_prior(request.prior), stirring, request.settings)
+        self.made = self.problem.nothing
+        self.flying: list[list[Job]] = []  # in the order sent
+        self.asked = 0
+        self.simulating = True
+        self.followed: Followed | None = None
+
+    def prepare(self) -> bool:
+        """Simulate the design; meanwhile learn the map and compile. Whether all went well."""
+        from .inference import SimulationBank
+        from .online_estimate import design, warm_up
+        from .spillage_map import make_map
+
+        settings, jobs = self.request.settings, design(self.problem)
+        side_by_side = os.cpu_count() or 1  # nothing is urgent before the robot moves
+        for start in range(0, len(jobs), side_by_side):
+            self._send(jobs[start : start + side_by_side])
+        self._tell(PREPARING, "learning the map of spillage")
+        with SimulationBank(self.request.bank) as bank:
+            self.spillage = make_map(
+                self.request.cups,
+                self.plan.number("liquid_density"),
+                bank,
+                prior=self.problem.prior,
+                pours=settings.pours,
+                progress=False,
+            )
+        self._tell(PREPARING, "compiling")
+        warm_up(self.problem, self.spillage)
+        while self.flying:
+            self._tell(PREPARING, "simulating the plan")
+            self._land()
+        if self.made.size < settings.design:
+            self._tell(FAILED, ALONE)
+            return False
+        self._tell(READY, "")
+        return True
+
+    def serve(self) -> None:
+        """Answer data first; simulate what they make worth while in between."""
+        while True:
+            ready = wait([self.parent, *([self.simulator] if self.simulating else [])])
+            if self.parent in ready:
+                self._answer(self._newest())
+            if self.simulator in ready:
+                self._land()
+                self._tell(READY, "")
+            self._go_on()
+
+    def _newest(self) -> SoFar:
+        data = self.parent.recv()
+        while self.parent.poll():
+            data = self.parent.recv()
+        return data
+
+    def _answer(self, so_far: SoFar) -> None:
+        try:
+            followed = follow(self.plan, self.ends, so_far)
+            if followed.refusal:
+                self._tell(REFUSED, followed.refusal)
+            else:
+                later = float(so_far.time[-1]) - followed.covered - followed.delay
+                self._estimate(followed, so_far.ended - later)
+        except ValueError as error:  # from these data nothing follows; from others it may
+            self._tell(REFUSED, str(error))
+
+    def _estimate(self, followed: "Followed", ended: float) -> None:
+        from .online_estimate import estimate
+
+        known = self.followed is not None and followed.strokes <= self.followed.strokes
+        if known or not np.isfinite(followed.observed).any():
+            return
+        self.followed = followed
+        found = estimate(self.problem, self.made, followed, self.spillage, ended)
+        self.parent.send(found)
+        self._tell(READY, "")
+        with self.request.log.open("a", encoding="utf-8") as log:
+            log.write(json.dumps(as_record(found)) + "\n")
+
+    def _go_on(self) -> None:
+        """Keep one batch in flight, from the first stroke on."""
+        from .online_estimate import proposals
+
+        settings = self.request.settings
+        n = min(settings.batch, settings.budget - self.asked)
+        if self.followed is not None and self.simulating and not self.flying and n > 0:
+            observed = self.followed.observed
+            self._send(proposals(self.problem, self.made, observed, self.asked, n))
+
+    def _send(self, jobs: "list[Job]") -> None:
+        self.asked += len(jobs)
+        try:
+            self.simulator.send(jobs)
+        except GONE:
+            self._go_alone()
+        else:
+            self.flying.append(jobs)
+
+    def _land(self) -> None:
+        from .online_estimate import with_results
+
+        try:
+            results = self.simulator.recv()
+        except GONE:
+            self._go_alone()
+        else:
+            self.made = with_results(self.made, self.flying.pop(0), results)
+
+    def _go_alone(self) -> None:
+        """Without the simulator, what it has made must do."""
+        self.simulating = False
+        self.flying.clear()
+
+    def _tell(self, phase: str, detail: str) -> None:
+        if phase == READY and not self.simulating:
+            detail = ALONE
+        in_flight = sum(len(jobs) for jobs in self.flying)
+        self.parent.send(Status(phase, detail, self.made.size, in_flight))
+
+
+def as_record(estimate: "OnlineEstimate") -> dict[str, Any]:
+    """An estimate as JSON writes it."""
+    parameters = {name: spread._asdict() for name, spread in estimate.parameters.items()}
+    return estimate._asdict() | {"parameters": parameters}

@@ -1,0 +1,211 @@
+"""Recording and calibrating at the same time: the arm stirs until the pour is known well enough."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from .armed_session import Ask, check_one
+from .online import FAILED, REFUSED, OnlineCalibration, OnlineSettings, SoFar
+from .recorder import kept
+from .recordings import Recording, open_recording
+from .session_view import SessionView
+from .stir_session import AHEAD, StirPlan, plan_stir, stir_session
+
+if TYPE_CHECKING:
+    from .hardware import HiddenLiquid, PosePath, Rig, Session
+    from .hardware import Path as GripperPath
+    from .models import Cups
+    from .online_estimate import OnlineEstimate
+
+MOST_CYCLES = 5  # unless somebody asks for more
+RATE = 30.0  # Hz, of the simulated plan; the cameras'
+FOLLOWED = 0.2  # s, after which arm, cameras and files have followed a stroke's last set-point
+
+
+class OnlineChoice(NamedTuple):
+    """What to calibrate, and where.
+
+    Attributes:
+        run: The RUN directory to be made.
+        cups: Of the pour; None are the bundled ones.
+        settings: Target and engine.
+        bank: Simulations to keep for other stirs; None is a file in `run`.
+    """
+
+    run: Path
+    cups: "Cups | None" = None
+    settings: OnlineSettings = OnlineSettings()
+    bank: Path | None = None
+
+
+def record_online(  # noqa: PLR0913  as `record`, and what to calibrate
+    rig: "Rig",
+    *,
+    out: str | Path,
+    online: OnlineChoice,
+    ask: Ask | None = None,
+    emulate: "HiddenLiquid | None" = None,
+    cycles: int | None = None,
+    progress: bool = True,
+    told: "Callable[[OnlineEstimate], None] | None" = None,
+) -> Recording:
+    """Stir, record, and infer meanwhile; stop stirring when the pour is known well enough.
+
+    After every stroke the engine gets the data so far; the posterior and the expected spillage
+    of the best pour come back, late by what inference takes. Stirring ends when the spillage is
+    under the target, or after `cycles`. The finished recording is then calibrated on as usual.
+
+    Args:
+        rig: What is there.
+        out: Directory of the recording; new or empty.
+        online: What to calibrate, and where.
+        ask: As of `record`.
+        emulate: As of `record`.
+        cycles: At the most; None are `MOST_CYCLES`.
+        progress: Whether to show progress on stderr.
+        told: Called with each estimate.
+
+    Returns:
+        The recording; the run is in `online.run`.
+
+    Raises:
+        InputError: Something given cannot be used.
+        RigError: The rig, the directory or a device cannot be used, or the person did not agree.
+        RuntimeError: The calibration could not be prepared; nothing has moved.
+        SessionStopped: The arm was stopped.
+    """
+    from .hardware import finalise, rig_attributes
+
+    check_one(ask, emulate, "record")
+    cycles = MOST_CYCLES if cycles is None else cycles
+    plan, out = plan_stir(rig, cycles), Path(out)
+    with OnlineCalibration.start(
+        _simulated(plan),
+        rig_attributes(rig),
+        out=online.run,
+        cups=online.cups,
+        settings=online.settings,
+        bank=online.bank,
+        progress=progress,
+    ) as calibration:
+        if not calibration.wait_until_ready():
+            raise RuntimeError(f"the calibration is not ready: {calibration.status.detail}")
+        with (
+            kept(out),
+            stir_session(rig, plan, out, ask=ask, emulate=emulate) as session,
+            SessionView("stirring and calibrating", shown=progress) as view,
+        ):
+            _Stirring(session, plan, calibration, view, told).carry_out()
+        recording = open_recording(finalise(out))
+        calibration.finish(recording, progress=progress)
+    return recording
+
+
+class _Stirring:
+    """The stir stroke by stroke, with what is learned meanwhile."""
+
+    def __init__(
+        self,
+        session: "Session",
+        plan: StirPlan,
+        calibration: OnlineCalibration,
+        view: SessionView,
+        told: "Callable[[OnlineEstimate], None] | None",
+    ):
+        self._session, self._plan, self._view = session, plan, view
+        self._calibration, self._told = calibration, told
+        self._enough = False
+
+    def carry_out(self) -> None:
+        """To the cup, strokes until it is enough, a rest, and out again."""
+        from .hardware import approach, retract
+
+        session = self._session
+        session.follow(approach(session.rig, session.pose()))
+        self._view.until_done(session, session.follow(self._plan.insert))
+        last = self._stir()
+        # the recording ends with a rest, as the plan's last stroke does
+        place = self._plan.strokes[last].pose[-1]
+        if last + 1 < len(self._plan.strokes):
+            session.follow(_still(session.rig, place))
+        self._view.until_done(session, session.follow(retract(session.rig, place[:3])))
+
+    def _stir(self) -> int:
+        """Follow strokes until it is enough; the last one's place in the plan."""
+        ordered: list[int] = []
+        for at, stroke in enumerate(self._plan.strokes):
+            ordered.append(self._session.follow(stroke))
+            if at >= AHEAD:
+                self._await(ordered[at - AHEAD])
+            if self._enough:
+                break
+        for number in ordered[-AHEAD:]:
+            self._await(number)
+        return len(ordered) - 1
+
+    def _await(self, number: int) -> None:
+        """Wait for a stroke's end, and hand over the data so far."""
+        while not self._session.wait(number, timeout=0.05):
+            self._take(self._calibration.poll())
+        time.sleep(FOLLOWED)
+        if (so_far := _so_far(self._session.directory, time.monotonic())) is not None:
+            self._take(self._calibration.update(so_far))
+
+    def _take(self, estimate: "OnlineEstimate | None") -> None:
+        status = self._calibration.status
+        if status.phase in (FAILED, REFUSED):
+            self._view.say(f"calibration {status.phase}: {status.detail}")
+        if estimate is not None:
+            self._enough = self._calibration.enough(estimate)
+            self._view.say(sentence(estimate))
+            if self._told is not None:
+                self._told(estimate)
+        self._view.show(self._session)
+
+
+def sentence(estimate: "OnlineEstimate") -> str:
+    """An estimate in one line."""
+    parameters = ", ".join(
+        f"{name} {spread.q50:.3g} ({spread.q05:.2g} to {spread.q95:.2g})"
+        for name, spread in estimate.parameters.items()
+    )
+    turn = np.degrees(estimate.action["angular_velocity"])
+    return (
+        f"stroke {estimate.strokes}: {parameters}; best pour {turn:.0f} deg/s at "
+        f"{100 * estimate.action['distance']:.1f} cm spills {estimate.expected_spillage:.1%}, "
+        f"95 % below {estimate.spillage_q95:.1%} ({estimate.simulations} simulations, "
+        f"{estimate.lag:.1f} s late)"
+    )
+
+
+def _simulated(plan: StirPlan) -> "GripperPath":
+    """The plan's stir as often as the cameras see it."""
+    from .hardware import Path as GripperPath
+    from .hardware import joined
+
+    whole = joined(list(plan.strokes))
+    times = np.arange(0.0, whole.duration, 1.0 / RATE)
+    columns = [np.interp(times, whole.time, axis) for axis in whole.pose[:, :3].T]
+    return GripperPath(times, np.column_stack(columns))
+
+
+def _still(rig: "Rig", pose: np.ndarray) -> "PosePath":
+    """The rest at the end of a stir that ends early."""
+    from .hardware import PosePath
+
+    times = np.arange(0.0, rig.stirring.rest, 1.0 / rig.robot.rate)
+    return PosePath(times, np.tile(pose, (len(times), 1)), stirring=True)
+
+
+def _so_far(directory: Path, ended: float) -> SoFar | None:
+    """The data so far; None while they are too few."""
+    from .hardware import RigError, partial
+
+    try:
+        stir = partial(directory)
+    except RigError:
+        return None
+    return SoFar(stir.time, stir.position, stir.inclination, ended)

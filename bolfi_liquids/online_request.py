@@ -1,0 +1,64 @@
+"""What the processes of an online calibration are given, and how they say how it goes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .online_plan import planned
+from .online_settings import OnlineSettings
+from .recordings import Recording
+
+if TYPE_CHECKING:
+    from .models import Cups
+
+PREPARING, READY, REFUSED, FAILED = "preparing", "ready", "refused", "failed"
+GONE = EOFError, BrokenPipeError, ConnectionResetError
+"""What a pipe raises when nobody is at its other end."""
+
+
+class Status(NamedTuple):
+    """How an online calibration is doing.
+
+    Attributes:
+        phase: "preparing"; "ready" for data; "refused", where data are off the plan; "failed".
+        detail: What is being prepared, or what is wrong; "" if nothing is.
+        simulations: Finished, failed ones included.
+        in_flight: Being simulated.
+    """
+
+    phase: str
+    detail: str
+    simulations: int = 0
+    in_flight: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """All that the processes need to start; it can be pickled.
+
+    Attributes:
+        time, position: The plan's path, [s] (T,) and [m] (T, 3).
+        attrs: The plan's attributes.
+        cups: Of the pour.
+        prior: Of the liquid, as `describe_prior` describes it.
+        settings: Of the online calibration.
+        bank: File of the simulation bank.
+        log: File to which every estimate is appended, as a line of JSON.
+    """
+
+    time: NDArray[np.float64]
+    position: NDArray[np.float64]
+    attrs: Mapping[str, float | str]
+    cups: "Cups"
+    prior: Mapping[str, str]
+    settings: OnlineSettings
+    bank: Path
+    log: Path
+
+    def plan(self) -> Recording:
+        """The plan as a recording that has seen nothing."""
+        return planned(self.time, self.position, self.attrs)

@@ -1,0 +1,35 @@
+"""The process that simulates the plan; it loads no JAX."""
+
+import os
+import signal
+from multiprocessing.connection import Connection
+
+from .online_request import GONE, Request
+from .stirring import stirring_of
+
+NICENESS = 10  # of this process; control and cameras come first
+
+
+def simulate_plan(link: Connection, request: Request) -> None:
+    """Simulate the lists of jobs that come through `link` and send their results back.
+
+    Ends when the other end of `link` is closed.
+    """
+    from .inference import SimulationBank, run_missing
+
+    step_back(NICENESS)
+    stirring = stirring_of([request.plan()], request.settings.particles)
+    with SimulationBank(request.bank) as bank:
+        while True:
+            try:
+                jobs = link.recv()
+                link.send(run_missing(stirring.simulate, jobs, None, bank, stirring.identity))
+            except GONE:
+                return
+
+
+def step_back(niceness: int) -> None:
+    """Run at a lower priority, and leave Ctrl-C to who watches the robot."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(os, "nice"):
+        os.nice(niceness)

@@ -1,0 +1,143 @@
+"""The chosen pour carried out: by the robot, or by the emulator."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from .armed_session import Ask, Emulation, Task, armed_session, check_one
+from .errors import InputError
+from .run_directory import POUR, RUN_TOML
+from .session_view import SessionView
+
+if TYPE_CHECKING:
+    from .hardware import Check, PosePath, Rig
+
+POURS = "pours"  # directories of what the arm did, in the RUN
+
+
+class PourPlan(NamedTuple):
+    """A pour as a motion.
+
+    Attributes:
+        angular_velocity: Of the source about its lip [rad/s].
+        distance: Horizontally from the lip to the receiver's axis [m].
+        lip_height: Above the receiver's floor [m].
+        ready: Lip above the place of the pour, in the cup's frame, shape (6,).
+        path: From there, down, the turn, back upright and up again.
+    """
+
+    angular_velocity: float
+    distance: float
+    lip_height: float
+    ready: np.ndarray
+    path: "PosePath"
+
+
+def plan_pour(run: str | Path, rig: "Rig") -> PourPlan:
+    """The motion of the pour that a run has chosen.
+
+    Raises:
+        InputError: The run has chosen none.
+        MotionRejected: The motion breaks one of the rig's limits.
+    """
+    from .hardware import check_path, pour_path, ready_to_pour
+
+    tree, cups = _chosen(Path(run))
+    turn = cups["pour"]
+    action = {
+        "angular_velocity": float(np.radians(tree["angular_velocity_deg_s"])),
+        "distance": float(tree["distance_cm"]) / 100,
+        "lip_height": float(turn["lip_height"]),
+    }
+    path = pour_path(
+        rig,
+        final_angle=float(np.radians(turn["final_angle_deg"])),
+        hold=float(turn["hold"]),
+        **action,
+    )
+    check_path(path, rig, "pouring")
+    ready = ready_to_pour(rig, action["distance"], action["lip_height"])
+    return PourPlan(ready=ready, path=path, **action)
+
+
+def execute_pour(
+    run: str | Path,
+    rig: "Rig",
+    *,
+    ask: Ask | None = None,
+    emulate: bool = False,
+    progress: bool = True,
+) -> Path:
+    """Carry out the pour that a run has chosen.
+
+    The arm moves only if `ask` returns the sentence that the plan asks for; or it is emulated.
+
+    Args:
+        run: Whose pour was chosen.
+        rig: Where source and receiver are.
+        ask: Shows a person the plan, returns what the person typed.
+        emulate: Use an emulator instead.
+        progress: Whether to show a live view on stderr.
+
+    Returns:
+        The directory of what the arm did.
+
+    Raises:
+        InputError: The run has chosen no pour, or neither or both of `ask` and `emulate` are
+            given.
+        MotionRejected: The motion breaks one of the rig's limits.
+        SessionStopped: The arm was stopped.
+    """
+    from .hardware import SessionStopped, approach_pour, emulated
+
+    check_one(ask, emulate, "execute_pour")
+    plan = plan_pour(run, rig)
+    task = Task(rig, "pouring", [plan.path], _next_directory(Path(run)))
+    emulation = None
+    if emulate:
+        start = emulated(rig, plan.ready, tool="pouring")
+        emulation = Emulation(start, source="emulated UR arm")
+    try:
+        with (
+            armed_session(task, ask=ask, emulation=emulation) as session,
+            SessionView("pouring" if ask else "pouring, emulated", shown=progress) as view,
+        ):
+            place = {"distance": plan.distance, "lip_height": plan.lip_height}
+            session.follow(approach_pour(rig, session.pose(), **place))
+            view.until_done(session, session.follow(plan.path))
+    except KeyboardInterrupt:
+        raise SessionStopped(f"interrupted, the arm was stopped; look at {task.out}") from None
+    return task.out
+
+
+def dry_pour(run: str | Path, rig: "Rig", out: Path) -> "tuple[str, list[Check]]":
+    """What the arm would do, and the pre-flight list of a session that cannot move it."""
+    from .hardware import Session, describe
+
+    plan = plan_pour(run, rig)
+    with Session(rig, out, tool="pouring", plan=[plan.path]) as session:
+        return describe([plan.path], rig, "pouring"), session.preflight()
+
+
+def _chosen(run: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The section "pour" of a run, and the cups that it was chosen for."""
+    from .results import read_tree
+    from .summary import read_summary
+
+    if not (run / RUN_TOML).exists() and not (run / POUR).exists():
+        raise InputError(
+            "no run", where=str(run), fix="calibrate first: bolfi-liquids calibrate RECORDING"
+        )
+    if not (run / POUR).exists():
+        raise InputError(
+            "no pour was chosen", where=str(run), fix=f"choose one: bolfi-liquids pour {run}"
+        )
+    tree = read_tree(run / POUR, fix=f"write it again: bolfi-liquids pour {run}")
+    return read_summary(run)["pour"], json.loads(tree.attrs["cups"])
+
+
+def _next_directory(run: Path) -> Path:
+    taken = [int(path.name) for path in (run / POURS).glob("[0-9]*") if path.name.isdigit()]
+    return run / POURS / f"{max(taken, default=0) + 1:03d}"

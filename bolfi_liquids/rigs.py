@@ -1,0 +1,59 @@
+"""Rigs as the command line meets them: read, written as a template, emulated."""
+
+import time
+from collections.abc import Iterator
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .errors import InputError
+
+if TYPE_CHECKING:
+    from .hardware import Rig
+
+
+def rig_of(path: str | Path | None) -> "Rig":
+    """The rig of a file, or the bundled one.
+
+    Raises:
+        RigError: The file cannot be used.
+    """
+    from .hardware import bundled_rig, open_rig
+
+    return bundled_rig() if path is None else open_rig(path)
+
+
+def write_template(path: Path) -> Path:
+    """Write the bundled rig.toml.
+
+    Raises:
+        InputError: There is a file already.
+    """
+    if path.exists():
+        raise InputError("exists already", where=str(path), fix="name a file that does not")
+    text = (files("bolfi_liquids.hardware.data") / "rig.toml").read_text(encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def emulator_until_interrupted(
+    rig: "Rig", address: str | None = None, viscosity: float = 1.0
+) -> Iterator[str]:
+    """Run an emulator of a rig's controller; yields what to tell, ends at Ctrl-C.
+
+    Raises:
+        RigError: It cannot start.
+    """
+    from .hardware import HiddenLiquid, above_cup, emulated
+
+    liquid = HiddenLiquid(viscosity=viscosity)
+    with emulated(rig, above_cup(rig), address=address, liquid=liquid) as running:
+        at = running.emulator.address
+        yield f"emulator of a {rig.robot.controller} controller on {at}; end it with Ctrl-C"
+        yield f'to use it, set host = "{at}" under [robot] in rig.toml'
+        try:
+            while running.emulator.alive:
+                time.sleep(0.2)
+        except KeyboardInterrupt:
+            return
+        raise RuntimeError(f"the emulator ended by itself; it said: {running.emulator.notes()}")

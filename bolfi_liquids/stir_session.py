@@ -1,0 +1,138 @@
+"""A stir carried out: by the robot, or by the emulator with rendered cameras."""
+
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from .armed_session import Ask, Emulation, Task, armed_session
+from .errors import InputError
+from .session_view import SessionView
+
+if TYPE_CHECKING:
+    from .hardware import Check, HiddenLiquid, PosePath, Rig, Session
+
+
+AHEAD = 2  # paths ordered beyond the one that runs, so that the arm need not wait
+
+
+class StirPlan(NamedTuple):
+    """What the arm will do once it is above the cup, all of it within the rig's limits.
+
+    Attributes:
+        insert: Down into the liquid.
+        strokes: Of the stir, each starting where the one before ends.
+        retract: Out of the cup.
+    """
+
+    insert: "PosePath"
+    strokes: tuple["PosePath", ...]
+    retract: "PosePath"
+
+    @property
+    def paths(self) -> tuple["PosePath", ...]:
+        """All of it, in order."""
+        return (self.insert, *self.strokes, self.retract)
+
+
+def plan_stir(rig: "Rig", cycles: int | None = None) -> StirPlan:
+    """Plan the stir of a rig's file.
+
+    Args:
+        rig: What is there.
+        cycles: How often the pattern is repeated; None as in the rig's file.
+
+    Raises:
+        InputError: `cycles` is below 1.
+        MotionRejected: The plan breaks one of the rig's limits.
+    """
+    from .hardware import check_path, insert, retract, strokes
+
+    cycles = rig.stirring.cycles if cycles is None else cycles
+    if cycles < 1:
+        raise InputError(f"{cycles}", where="--cycles", fix="give a whole number of at least 1")
+    stir = tuple(strokes(rig, cycles))
+    plan = StirPlan(insert(rig), stir, retract(rig, stir[-1].pose[-1, :3]))
+    joints = None
+    for path in plan.paths:
+        joints = check_path(path, rig, "stirring", joints=joints)
+    return plan
+
+
+def stir_session(
+    rig: "Rig",
+    plan: StirPlan,
+    out: Path,
+    *,
+    ask: Ask | None = None,
+    emulate: "HiddenLiquid | None" = None,
+) -> "AbstractContextManager[Session]":
+    """A session that may move the arm: a person has agreed, or the arm is emulated.
+
+    Args:
+        rig: What is there.
+        plan: That will be followed.
+        out: Directory of the recording; new or empty.
+        ask: Shows the plan; what it returns must be the sentence that the plan asks for.
+        emulate: Start an emulator and rendered cameras instead; nobody is asked.
+
+    Raises:
+        InputError: `ask` and `emulate` are both given, or neither is; or a camera is a file.
+        RigError: The person did not agree, or something cannot be used.
+    """
+    from .hardware import above_cup, emulated
+
+    task = Task(rig, "stirring", plan.paths, out, cameras=True)
+    if emulate is None:
+        _check_devices(rig)
+        return armed_session(task, ask=ask)
+    emulation = Emulation(
+        emulated(rig, above_cup(rig), liquid=emulate, truth=out),
+        source=f"emulated UR arm and rendered cameras, viscosity {emulate.viscosity} Pa s",
+    )
+    return armed_session(task, ask=ask, emulation=emulation)
+
+
+def _check_devices(rig: "Rig") -> None:
+    for camera in rig.cameras:
+        if not camera.is_device:
+            raise InputError(
+                f"source = {camera.source!r} is a file",
+                where=f"rig.toml: camera {camera.view}",
+                fix="a real arm moves only while real cameras look on: name a device",
+            )
+
+
+def dry_run(rig: "Rig", plan: StirPlan, out: Path) -> list["Check"]:
+    """The pre-flight list of a session that cannot move the arm.
+
+    Args:
+        rig: What is there.
+        plan: That would be followed.
+        out: A directory for what is recorded meanwhile; new or empty.
+
+    Raises:
+        RigError: The directory cannot be used.
+    """
+    from .hardware import Session, webcams
+
+    with Session(rig, out, make_cameras=webcams(rig), plan=plan.paths) as session:
+        return session.preflight()
+
+
+def follow_plan(session: "Session", plan: StirPlan, view: SessionView) -> None:
+    """From where the arm is: to the cup, the stir, and out again.
+
+    Raises:
+        RigError: The pre-flight list has failures.
+        SessionStopped: The arm was stopped.
+    """
+    from .hardware import approach
+
+    ordered = []
+    view.motions = 1 + len(plan.paths)
+    for path in (approach(session.rig, session.pose()), *plan.paths):
+        ordered.append(session.follow(path))
+        # all at once would be checked at once, which takes the cameras' time
+        if len(ordered) > AHEAD:
+            view.until_done(session, ordered[-1 - AHEAD])
+    view.until_done(session, ordered[-1])
