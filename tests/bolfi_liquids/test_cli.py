@@ -146,12 +146,14 @@ def test_interruption_says_how_to_go_on(monkeypatch, tmp_path):
     def interrupt(*_, **__):
         raise KeyboardInterrupt
 
-    command = ["calibrate", "stir me.nc", "--out", str(tmp_path)]
+    recording = tmp_path / "stir me.nc"
+    recording.write_bytes((files("bolfi_liquids.data") / "glycerin_v10.nc").read_bytes())
+    command = ["calibrate", str(recording), "--out", str(tmp_path)]
     monkeypatch.setattr("bolfi_liquids.calibrator.calibrate", interrupt)
     monkeypatch.setattr(sys, "argv", ["bolfi-liquids", *command])
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 130
-    assert f"bolfi-liquids calibrate 'stir me.nc' --out {tmp_path} --resume" in result.stderr
+    assert f"bolfi-liquids calibrate '{recording}' --out {tmp_path} --resume" in result.stderr
 
 
 def test_version():

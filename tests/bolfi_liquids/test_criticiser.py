@@ -28,6 +28,7 @@ def test_a_prior_that_nothing_describes_is_refused():
         read_prior({"viscosity": "Mine(low=1)"})
 
 
+@pytest.mark.slow
 def test_what_stirs_taught_becomes_a_prior_of_the_same_mean_and_spread():
     rng = np.random.default_rng(1)
     theta = {

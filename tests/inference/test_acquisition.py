@@ -51,6 +51,7 @@ def test_width_follows_the_papers_schedule():
     np.testing.assert_allclose(exploration_width(20, 2), expected)
 
 
+@pytest.mark.slow
 def test_lcb_minimises_mean_less_width_times_latent_sd():
     surrogate = fitted()
     runs = all_succeed(surrogate)
@@ -84,6 +85,7 @@ def test_jitter_and_share_are_checked():
         inference.PosteriorDraws(share=1.5)
 
 
+@pytest.mark.slow
 def test_second_moment_agrees_with_the_bivariate_normal():
     """E[Phi(..)^2] is the chance that two draws with a common latent mean both pass."""
     surrogate = fitted(noise=0.1, rule=1.2)

@@ -15,6 +15,7 @@ def told(engine, simulate, rounds, n=2):
     return engine
 
 
+@pytest.mark.slow
 def test_asking_depends_only_on_seed_and_history(prior, observed, simulate):
     first = told(inference.Bolfi(prior, observed, seed=3), simulate, 6)
     again = told(inference.Bolfi(prior, observed, seed=3), simulate, 6)
@@ -29,6 +30,7 @@ def test_seeds_change_what_is_asked(prior, observed):
     assert not np.allclose(a, b)
 
 
+@pytest.mark.slow
 def test_pending_points_are_not_asked_again(prior, observed, simulate):
     engine = told(inference.Bolfi(prior, observed), simulate, 5)
     asked = np.concatenate([prior.to_unit(engine.ask(1)) for _ in range(6)])
@@ -57,6 +59,7 @@ def test_foreign_simulations_replace_the_start_design(prior, observed, simulate)
     assert engine.ask(1)["slope"] != start["slope"]
 
 
+@pytest.mark.slow
 def test_a_copy_teaches_nothing(prior, observed, simulate):
     """Copies have equal theta and seed; a replicate, or a run of unknown seed, is none."""
     engine, plain = inference.Bolfi(prior, observed), inference.Bolfi(prior, observed)
@@ -104,6 +107,7 @@ def test_rescaling_a_parameter_changes_nothing(observed, simulate):
     np.testing.assert_allclose(run(1e4), run(1.0), atol=1e-4)  # optimisers stop near 1e-5
 
 
+@pytest.mark.slow
 def test_a_prior_that_fades_out_reaches_the_kernel():
     """A bowl in the parameter itself, least in the prior's tail: over quantiles it is too steep
     there for a stationary kernel."""
@@ -120,7 +124,9 @@ def test_a_prior_that_fades_out_reaches_the_kernel():
     np.testing.assert_allclose(fit.learned.predict(at)[0], [0.01, 0.09, 0.25], atol=0.2)
 
 
-@pytest.mark.parametrize("surrogate", ["signal", "discrepancy"])
+@pytest.mark.parametrize(
+    "surrogate", [pytest.param("signal", marks=pytest.mark.slow), "discrepancy"]
+)
 def test_nothing_is_compiled_anew_up_to_the_capacity(prior, observed, simulate, surrogate):
     """Over refits and another batch in every round."""
     compiled = []

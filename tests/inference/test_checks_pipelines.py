@@ -27,6 +27,7 @@ def test_fit_pipeline_is_fit_and_sample(simulate, prior, observed):
     np.testing.assert_array_equal(log_density(theta), fit.log_prob(theta))
 
 
+@pytest.mark.slow
 def test_a_shared_design_is_simulated_once(simulate, prior):
     calls = []
 

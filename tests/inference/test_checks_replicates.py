@@ -100,6 +100,7 @@ def test_measurement_noise_is_added_to_what_is_simulated():
     assert 5.0 < added.std() < 13.0
 
 
+@pytest.mark.slow
 def test_killed_and_repeated_equals_undisturbed(tmp_path, monkeypatch):
     """SIGKILL after the eighth replicate or later; only what was running is run again."""
 

@@ -25,8 +25,8 @@ def found(ratio, own):
     return np.array([repeat(seed) for seed in range(REPEATS)])
 
 
-@pytest.mark.parametrize("own", [0.1, 0.6])
-@pytest.mark.parametrize("ratio", [5.0, 10.0])
+@pytest.mark.parametrize("own", [pytest.param(0.1, marks=pytest.mark.slow), 0.6])
+@pytest.mark.parametrize("ratio", [5.0, pytest.param(10.0, marks=pytest.mark.slow)])
 def test_the_ratio_is_found_whatever_part_of_the_noise_the_runs_have(ratio, own):
     """Within a fifth: so few runs hardly know their own noise."""
     assert np.mean(found(ratio, own)) == pytest.approx(ratio, rel=0.2)

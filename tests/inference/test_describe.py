@@ -82,6 +82,7 @@ def test_says_no_addresses():
     assert "0x" not in describe(Plain()) + describe(lambda x: x)
 
 
+@pytest.mark.slow
 def test_another_process_says_the_same():
     code = (
         "import numpy as np, numpyro.distributions as dist; from bolfi_liquids import inference;"

@@ -86,6 +86,7 @@ def assert_same(fit, other):
     assert fit.best == other.best
 
 
+@pytest.mark.slow
 def test_threads_that_finish_out_of_order(prior, observed, simulate, by_hand):
     for _ in range(3):
         with ThreadPoolExecutor(3) as pool:

@@ -26,6 +26,7 @@ def test_agrees_with_scipy_with_the_noise_in_sigma():
     np.testing.assert_allclose(value, norm.logcdf((fitted.threshold - mean[0]) / sd[0]), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_finite_and_monotone_with_finite_gradients_over_a_hundred_decades():
     fitted = learn(U, DELTA, ROWS, "identity")
     with jax.enable_x64(True):

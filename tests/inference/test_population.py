@@ -46,7 +46,17 @@ def populations(state, d):
     return found
 
 
-@pytest.mark.parametrize(("d", "sd"), [(1, 0.003), (2, 0.1), (2, 0.003), (3, 0.003), (6, 0.1)])
+@pytest.mark.parametrize(
+    ("d", "sd"),
+    [
+        (1, 0.003),
+        (2, 0.1),
+        *(
+            pytest.param(d, sd, marks=pytest.mark.slow)
+            for d, sd in [(2, 0.003), (3, 0.003), (6, 0.1)]
+        ),
+    ],
+)
 def test_moments_and_evidence_of_a_correlated_gaussian(d, sd):
     """At least 200 effective points: means to 0.3 sd and sds to 25 %, over 4 errors of 0.07
     and 0.05; a population that stopped a temperature too early is twice as wide. The
@@ -60,7 +70,9 @@ def test_moments_and_evidence_of_a_correlated_gaussian(d, sd):
         assert abs(log_evidence) < 0.3
 
 
-@pytest.mark.parametrize(("d", "sd"), [(1, 0.02), (2, 0.02), (6, 0.05)])
+@pytest.mark.parametrize(
+    ("d", "sd"), [(1, 0.02), (2, 0.02), pytest.param(6, 0.05, marks=pytest.mark.slow)]
+)
 def test_weights_of_distant_modes(d, sd):
     """Half a box or more apart: no path leads from one to the other. At least 400 effective
     points: shares to 0.02, tested to 4 times that."""

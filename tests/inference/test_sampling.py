@@ -76,7 +76,7 @@ def assert_means(values, truth):
 
 
 @pytest.mark.parametrize("sampler", ["nuts", "emcee"])
-@pytest.mark.parametrize("d", [1, 2, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("d", [1, *(pytest.param(d, marks=pytest.mark.slow) for d in (2, 4))])
 def test_moments_of_a_correlated_gaussian(sampler, d):
     """Means and variances; a twin shifted by 0.3 sd must fail: with 2000 effective draws it is
     13 standard errors off, where the bound is 4.5."""
@@ -88,7 +88,7 @@ def test_moments_of_a_correlated_gaussian(sampler, d):
 
 
 @pytest.mark.parametrize("sampler", ["nuts", "emcee"])
-@pytest.mark.parametrize("d", [1, 2, 4])
+@pytest.mark.parametrize("d", [1, *(pytest.param(d, marks=pytest.mark.slow) for d in (2, 4))])
 def test_shares_of_modes_that_no_path_connects(sampler, d):
     """Chains that stay in the modes they start in give quarters, and R-hat far above 1.01. The
     twin: modes taken for equally likely are 15 standard errors off with 1000 effective draws."""
@@ -142,6 +142,7 @@ def test_compiles_once_for_all_fits_and_lengths(line_fit, prior, observed, simul
     assert counts[2] == counts[1] == counts[0]
 
 
+@pytest.mark.slow
 def test_same_seed_same_draws():
     for sampler in sampling.SAMPLERS:
         a, b, c = (sample(sampler, gaussian(2), SMALL, seed).chains.u for seed in (0, 0, 1))
@@ -298,6 +299,7 @@ def test_log_prob_is_prior_times_likelihood(line_fit):
     assert line_fit.log_prob({"slope": 0.2, "offset": 0.7}).shape == ()
 
 
+@pytest.mark.slow
 def test_the_global_precision_stays(line_fit):
     before = jax.config.jax_enable_x64
     line_fit.sample("nuts", draws=50, warmup=50)

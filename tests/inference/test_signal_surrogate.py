@@ -115,6 +115,7 @@ def test_the_simulators_own_noise_is_learned_and_not_counted_twice(design, noise
     assert (np.abs(np.log(sd / expected)) < 0.25).all()
 
 
+@pytest.mark.slow
 def test_second_moment_agrees_with_sampling():
     u = sobol(0, 0, 6, 2)
     found = learned(u, outputs(u), outputs(np.array([[0.5, 0.5]]))[0], noise=0.5)
@@ -134,6 +135,7 @@ def test_second_moment_agrees_with_sampling():
     assert abs(second - sample.mean()) < 5.0 * sample.std() / np.sqrt(len(sample))
 
 
+@pytest.mark.slow
 def test_likelihood_and_gradient_are_finite_everywhere(design, noise):
     observed = outputs(np.array([[0.4, 0.6]]))[0] + noise
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0], [1.0, 1.0], [1e-12, 0.3]])

@@ -103,7 +103,9 @@ def test_a_submerged_stick_is_buoyed_as_archimedes_says(glycerin, numerics, tole
     wet = (setup.cup.fill - tip) / np.cos(tilt)
     weight = 1260.0 * 9.81 * np.pi * stick.radius**2 * wet
     expected = weight * np.sin(tilt) * (stick.length - wet / 2)
-    assert np.mean(across) == pytest.approx(expected, rel=tolerance)
+    # another processor rounds otherwise and settles other packings of the same seeds
+    error = np.std(across, ddof=1) / np.sqrt(packings)
+    assert abs(np.mean(across) - expected) < tolerance * expected + 3.0 * error
 
 
 @pytest.mark.parametrize("speed", [0.1, 0.8])

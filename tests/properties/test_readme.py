@@ -16,7 +16,7 @@ def test_the_readme_has_examples():
 @pytest.mark.slow
 def test_blocks_run_one_after_the_other(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    reader = {}
+    reader = {"__name__": "__main__"}
     for block in BLOCKS:
         if "runs/mine" not in block:  # those are of recordings that a reader has
             exec(compile(block, str(README), "exec"), reader)

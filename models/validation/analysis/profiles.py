@@ -4,7 +4,7 @@ Channels reach from z = 0 to z = gap.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -133,7 +133,7 @@ def fit_kinematic_viscosity(
     grid = np.linspace(np.log(low), np.log(high), 41)
     at = int(np.argmin([rms(value) for value in grid]))
     around = grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)]
-    best = minimize_scalar(rms, bounds=around, method="bounded", options={"xatol": 1e-6})
+    best: Any = minimize_scalar(rms, bounds=around, method="bounded", options={"xatol": 1e-6})
     return ViscosityFit(float(np.exp(best.x)), rms(float(best.x)))
 
 

@@ -9,7 +9,7 @@ When the diaphragm is out of the way is uncertain by some tenths of T, and those
 time to make up for it. So compare `front_speed`, which no shift changes, or `fit_time_shift`.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -116,5 +116,5 @@ def fit_time_shift(ours: Track, table: Track, largest: float = LARGEST_SHIFT) ->
     coarse = np.linspace(-largest, largest, 101)
     best = coarse[np.argmin([rms(s) for s in coarse])]
     step = coarse[1] - coarse[0]
-    fine = minimize_scalar(rms, bounds=(best - step, best + step), method="bounded")
+    fine: Any = minimize_scalar(rms, bounds=(best - step, best + step), method="bounded")
     return TimeShift(float(fine.x), rms(float(fine.x)))

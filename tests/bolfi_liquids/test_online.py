@@ -1,0 +1,189 @@
+"""Online calibration in its own processes, fed with recordings as if they were being made."""
+
+import json
+import os
+import signal
+import sqlite3
+import time
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import bolfi_liquids as bl
+from bolfi_liquids import models, online
+from bolfi_liquids.online import FAILED, READY, REFUSED, OnlineCalibration, OnlineSettings, SoFar
+from bolfi_liquids.online_outbox import Outbox
+
+pytestmark = pytest.mark.slow
+
+PATIENCE_S = 120
+SMALL = OnlineSettings(particles=200, pours=64, design=8, budget=24, target=1e-9)
+
+
+def made_up(liquid, action, cups, seeds):
+    """In place of pours: the farther from where the liquid lands, the more is spilled."""
+    lands = 0.03 + 0.005 * np.log10(liquid.viscosity)
+    return SimpleNamespace(spilled=np.clip(20.0 * np.abs(action.distance - lands), 0.0, 1.0))
+
+
+def start(recording, out, settings):
+    """With a map of pours that are made up."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(models, "pour", made_up)
+        return OnlineCalibration.start(
+            recording.gripper, recording.attrs, out=out, settings=settings, progress=False
+        )
+
+
+def until(wanted, of):
+    """Poll until `wanted` says so."""
+    ends = time.monotonic() + PATIENCE_S
+    while not wanted() and time.monotonic() < ends:
+        time.sleep(0.01)
+        of.poll()
+    return wanted()
+
+
+def so_far(recording, end, off=0.0):
+    seen = recording.time <= end
+    path = recording.gripper.position[seen] + off
+    return SoFar(recording.time[seen], path, recording.inclination[seen], time.monotonic())
+
+
+@pytest.fixture(scope="module")
+def story(short_recording, tmp_path_factory):
+    """One stir: as it should be, off the plan, without the simulator, without the learner."""
+    recording = bl.open_recording(short_recording)
+    out = tmp_path_factory.mktemp("online") / "run"
+    started = start(recording, out, SMALL)
+    told = SimpleNamespace(out=out, recording=recording)
+    with started as of:
+        told.early = of.status
+        told.ready = of.wait_until_ready(PATIENCE_S)
+        told.status = of.status
+        for number, end in enumerate(of.ends[:2], start=1):
+            of.update(so_far(recording, end))
+            assert until(lambda number=number: len(of.estimates) == number, of), of.status
+        told.estimates = list(of.estimates)
+        until(lambda: of.status.simulations > SMALL.design, of)
+        told.later = of.status
+        of.update(so_far(recording, of.ends[2], off=0.01))
+        until(lambda: of.status.phase == REFUSED, of)
+        told.refused = of.status
+        os.kill(of._workers["simulator"].pid, signal.SIGKILL)
+        of.update(so_far(recording, of.ends[2]))
+        until(lambda: len(of.estimates) > 2 and "died" in of.status.detail, of)
+        told.alone, told.last = of.status, of.estimates[-1]
+        os.kill(of._workers["learner"].pid, signal.SIGKILL)
+        until(lambda: of.status.phase == FAILED, of)
+        told.dead = of.status
+        told.after = of.update(so_far(recording, of.ends[2]))
+        told.workers = of._workers
+    return told
+
+
+def test_it_prepares_before_the_robot_moves(story):
+    assert story.early.phase == "preparing"
+    assert story.ready and story.status.simulations == SMALL.design
+
+
+def test_every_stroke_is_answered(story):
+    assert [one.strokes for one in story.estimates] == [1, 2]
+    for one in story.estimates:
+        assert set(one.parameters) == {"viscosity", "cohesion"}
+        for spread in one.parameters.values():
+            assert spread.q05 < spread.q50 < spread.q95
+        assert 0.0 <= one.expected_spillage <= one.spillage_q95 <= 1.0
+        assert 0.0 < one.lag < PATIENCE_S
+        assert one.simulations >= SMALL.design
+
+
+def test_simulations_go_on_while_the_robot_stirs(story):
+    assert story.later.simulations > SMALL.design
+
+
+def test_nothing_is_simulated_twice(story):
+    connection = sqlite3.connect(story.out / online.BANK)
+    rows = connection.execute("SELECT theta, seed FROM simulation").fetchall()
+    connection.close()
+    assert len(set(rows)) == len(rows)
+    stirs = [row for row in rows if "distance" not in row[0]]
+    assert story.later.simulations <= len(stirs) <= SMALL.budget
+
+
+def test_estimates_are_logged(story):
+    lines = (story.out / online.LOG).read_text().splitlines()
+    logged = [json.loads(line) for line in lines]
+    assert [one["strokes"] for one in logged] == [1, 2, 3]
+    spread = story.estimates[1].parameters["viscosity"]
+    assert logged[1]["parameters"]["viscosity"] == spread._asdict()
+
+
+def test_data_off_the_plan_are_refused_with_a_reason(story):
+    assert "mm off its plan" in story.refused.detail
+
+
+def test_without_its_simulator_it_goes_on(story):
+    assert story.last.strokes == 3
+    assert (story.alone.phase, story.alone.in_flight) == (READY, 0)
+    assert "simulates has died" in story.alone.detail
+
+
+def test_death_is_a_status_and_disturbs_nobody(story):
+    assert "has died (exit code -9)" in story.dead.detail
+    assert story.after is None
+    assert not any(worker.is_alive() for worker in story.workers.values())
+
+
+def test_a_process_that_never_reads_blocks_nobody():
+    sent = []
+    blocked = SimpleNamespace(send=lambda message: (sent.append(message), time.sleep(0.2)))
+    outbox = Outbox(blocked)
+    began = time.monotonic()
+    for number in range(1000):
+        outbox.put(number)
+    assert time.monotonic() - began < 0.2
+    time.sleep(0.6)
+    assert len(sent) < 4 and sent[-1] == 999
+
+
+def test_a_run_is_not_overwritten(short_recording, tmp_path):
+    recording = bl.open_recording(short_recording)
+    (tmp_path / "run.toml").touch()
+    with pytest.raises(ValueError, match="holds a run already"):
+        OnlineCalibration.start(recording.gripper, recording.attrs, out=tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", [1e-9, 0.9])
+def test_stops_at_the_target_or_at_the_last_stroke(short_recording, tmp_path, target):
+    recording = bl.open_recording(short_recording)
+    settings = replace(SMALL, budget=8, target=target, least_strokes=1)
+    with start(recording, tmp_path / "run", settings) as of:
+        assert of.wait_until_ready(PATIENCE_S), of.status
+        strokes = [one.strokes for one in online.replay(recording, of)]
+        assert strokes == ([1] if target == 0.9 else [1, 2, 3])
+        run = of.finish(recording, budget=8, progress=False)
+    calibration = bl.Calibration.open(run)
+    assert calibration.summary["n_simulations"] == 8
+    pour = bl.choose_pour(calibration, iterations=7, draws=2, progress=False)
+    assert bl.report(run).is_file() and 0.0 <= pour.chosen.expected_spillage <= 1.0
+
+
+@pytest.mark.slow
+def test_the_last_estimate_agrees_with_the_ordinary_calibration(tmp_path):
+    from importlib.resources import as_file, files
+
+    with as_file(files("bolfi_liquids.data") / "glycerin_v10.nc") as path:
+        recording = bl.open_recording(path)
+        with start(recording, tmp_path / "run", OnlineSettings(target=1e-9)) as of:
+            assert of.wait_until_ready(600), of.status
+            estimates = list(online.replay(recording, of, realtime=True))
+            assert until(lambda: of.status.simulations > 16, of)
+            ordinary = bl.Calibration.open(of.finish(recording, progress=False))
+    last = estimates[-1].parameters["viscosity"]
+    other = ordinary.summary["parameters"]["viscosity"]
+    assert estimates[-1].strokes == len(of.ends)
+    assert last.q05 < other["q95"] and other["q05"] < last.q95

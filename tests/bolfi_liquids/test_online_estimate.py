@@ -1,0 +1,188 @@
+"""Estimates from data so far: the paper's integral up to then, and nothing else."""
+
+import numpy as np
+import pytest
+from bolfi_liquids.hardware import star
+from bolfi_liquids.inference import Bolfi, Simulation
+
+import bolfi_liquids as bl
+from bolfi_liquids import models
+from bolfi_liquids.online_estimate import (
+    Made,
+    OnlineEstimate,
+    Problem,
+    design,
+    enough,
+    estimate,
+    proposals,
+    with_results,
+)
+from bolfi_liquids.online_plan import SoFar, follow, planned, stroke_ends
+from bolfi_liquids.online_settings import OnlineSettings
+from bolfi_liquids.prior import default_prior
+from bolfi_liquids.spillage_map import Expected
+from bolfi_liquids.stirring import stirring_of
+
+ATTRS = {
+    "cup_radius": 0.04,
+    "cup_height": 0.075,
+    "fill": 0.05,
+    "stick_radius": 0.0045,
+    "stick_length": 0.22,
+    "stick_density": 1200.0,
+    "liquid_density": 1000.0,
+}
+PATH = star(speed=0.1, height=0.235)
+PLAN = planned(PATH.time, PATH.position, ATTRS)
+ENDS = stroke_ends(PLAN)
+TRUTH = {"viscosity": np.array([0.5]), "cohesion": np.array([0.4])}
+NOISE = 0.01
+
+
+class NoMap:
+    """In the place of a map of spillage: what it was asked."""
+
+    def best(self, liquids):
+        self.liquids = liquids
+        return Expected(1.0, 0.02, float(liquids["cohesion"].mean()), 0.9)
+
+
+def signals(theta, seeds):
+    """The more viscous, the wider the stick swings, in (B, T, 2); NOISE between seeds."""
+    size = 0.05 + 0.02 * np.log10(theta["viscosity"] / 3e-3)
+    wave = np.stack([np.sin(PLAN.time), np.cos(PLAN.time)], axis=1)
+    noise = [np.random.default_rng(seed).normal(0.0, NOISE, wave.shape) for seed in seeds]
+    return size[:, None, None] * wave + noise
+
+
+def problem(surrogate="discrepancy", **settings):
+    stirring = stirring_of([PLAN], 200)
+    return Problem(default_prior(), stirring, OnlineSettings(surrogate=surrogate, **settings))
+
+
+def made(of):
+    jobs = design(of)
+    theta = {name: np.array([job.theta[name] for job in jobs]) for name in of.prior.names}
+    seeds = np.array([job.seed for job in jobs])
+    return Made(theta, signals(theta, seeds), seeds)
+
+
+def followed(strokes, seed=1234):
+    until = PLAN.time <= ENDS[strokes - 1]
+    seen = signals(TRUTH, [seed])[0]
+    return follow(PLAN, ENDS, SoFar(PLAN.time[until], PATH.position[until], seen[until], 0.0))
+
+
+def width(found):
+    spread = found.parameters["viscosity"]
+    return np.log(spread.q95 / spread.q05)
+
+
+@pytest.mark.parametrize(
+    "surrogate", ["discrepancy", pytest.param("signal", marks=pytest.mark.slow)]
+)
+def test_more_strokes_say_more(surrogate):
+    of = problem(surrogate)
+    known = made(of)
+    first, last = (
+        [estimate(of, known, followed(k, seed), NoMap(), 0.0) for seed in range(6)]
+        for k in (1, len(ENDS))
+    )
+    assert np.mean([width(one) for one in last]) < 0.8 * np.mean([width(one) for one in first])
+    assert [one.strokes for one in last] == [len(ENDS)] * 6
+    # 90 % intervals: that two or more of six miss has a chance of 0.11, three or more 0.016
+    inside = [one.parameters["viscosity"] for one in last]
+    assert sum(spread.q05 < 0.5 < spread.q95 for spread in inside) >= 4
+
+
+def test_missing_samples_equal_a_shorter_recording():
+    """What is NaN after a stroke teaches what a recording up to there would have taught."""
+    of = problem()
+    known, seen = made(of), followed(4)
+    samples = int(np.isfinite(seen.observed).all(axis=1).sum())
+    short = planned(PLAN.time[:samples], PATH.position[:samples], ATTRS)
+    stirring = stirring_of([short], 200)
+    engine = Bolfi(
+        of.prior,
+        seen.observed[:samples],
+        discrepancy=stirring.discrepancy(),
+        threshold="min_mean",
+        capacity=64,
+    )
+    engine.tell(known.theta, known.signals[:, :samples], known.seeds)
+    fit = engine.fit()
+    again = fit.sample("quadrature", chains=2, draws=500, seed=0)["posterior"]
+    spillage = NoMap()
+    estimate(of, known, seen, spillage, 0.0)
+    np.testing.assert_array_equal(
+        again["viscosity"].to_numpy().ravel(), spillage.liquids["viscosity"]
+    )
+    # the paper's integral, by another rule than the engine's own
+    square = np.square(seen.observed[:samples] - known.signals[0, :samples]).sum(axis=1)
+    assert fit.history.discrepancy[0] == pytest.approx(np.trapezoid(square, short.time))
+
+
+def test_design_is_the_same_again_and_all_over_the_prior():
+    of = problem(design=32)
+    jobs = design(of)
+    assert jobs == design(of)
+    theta = {name: np.array([job.theta[name] for job in jobs]) for name in of.prior.names}
+    u = of.prior.to_unit(theta)
+    # one point in each of eight stripes, along both axes
+    assert all(np.unique(np.floor(8 * axis)).size == 8 for axis in u.T)
+    assert len({job.seed for job in jobs}) == 32
+
+
+def test_proposals_are_new_points_with_new_seeds():
+    of = problem()
+    known, seen = made(of), followed(6).observed
+    first = proposals(of, known, seen, 16, 2)
+    second = proposals(of, known, seen, 18, 2)
+    assert first == proposals(of, known, seen, 16, 2)
+    jobs = first + second
+    assert len({job.seed for job in jobs} | set(known.seeds.tolist())) == 4 + 16
+    assert len({job.theta["viscosity"] for job in jobs}) == 4
+
+
+def test_failed_simulations_are_kept_as_such_and_teach_nothing():
+    of = problem()
+    known = made(of)
+    jobs = proposals(of, known, followed(6).observed, 16, 2)
+    failed = Simulation(None, "it raised", 0.1)
+    good = Simulation(signals(TRUTH, [7])[0], None, 0.1)
+    more = with_results(known, jobs, [failed, good])
+    assert more.size == 18
+    assert np.isnan(more.signals[16]).all()
+    assert more.theta["viscosity"][16] == jobs[0].theta["viscosity"]
+    assert estimate(of, more, followed(6), NoMap(), 0.0).simulations == 17
+
+
+@pytest.mark.parametrize(
+    ("stop", "target", "strokes", "ends"),
+    [("mean", 0.02, 9, True), ("mean", 0.02, 8, False), ("bound", 0.02, 9, False)]
+    + [("bound", 0.04, 9, True)],
+)
+def test_it_is_enough_when_what_was_asked_for_is_under_the_target(stop, target, strokes, ends):
+    found = OnlineEstimate(strokes, 1.0, {}, {}, 0.01, 0.03, 16, 0.1, 0.0, 0.0, ())
+    assert enough(found, OnlineSettings(stop=stop, target=target)) is ends
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("target", 0.0), ("stop", "never"), ("budget", 3), ("surrogate", "none")]
+)
+def test_bad_setting_is_named(name, value):
+    with pytest.raises(ValueError, match=f"online setting {name}: {value!r}"):
+        OnlineSettings(**{name: value})
+
+
+def test_a_simulation_of_the_plan_begins_like_one_of_its_beginning(short_recording):
+    """Causality: what comes later changes no bit of what came before."""
+    recording = bl.open_recording(short_recording)
+    setup = models.StirSetup.from_recording(recording, particles=200)
+    liquid = models.Liquid([0.02, 1.0], [0.2, 0.7], recording.number("liquid_density"))
+    whole = models.stir(liquid, recording.gripper, setup, [3, 4])
+    for samples in (30, 45):
+        begins = type(recording.gripper)(*(part[:samples] for part in recording.gripper))
+        part = models.stir(liquid, begins, setup, [3, 4])
+        # all but the last: at its substep's end the shorter path stands still
+        np.testing.assert_array_equal(part[:, :-1], whole[:, : samples - 1])

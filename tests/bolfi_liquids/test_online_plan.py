@@ -1,0 +1,109 @@
+"""Data so far are brought onto the plan's times, or refused."""
+
+import numpy as np
+import pytest
+from bolfi_liquids.hardware import star
+
+from bolfi_liquids.online_plan import FARTHEST, LATEST, SoFar, follow, planned, stroke_ends
+
+ATTRS = {"liquid_density": 1000.0}
+PATH = star(speed=0.1, height=0.235)
+PLAN = planned(PATH.time, PATH.position, ATTRS)
+ENDS = stroke_ends(PLAN)
+
+
+def inclination(time):
+    """A smooth signal in each plane."""
+    return np.stack([0.1 * np.sin(3.0 * time), 0.05 * np.cos(2.0 * time)], axis=1)
+
+
+def data(until, *, delay=0.0, off=0.0, rate=125.0):
+    """An arm that does what the plan said `delay` before, `off` metres higher; seen at `rate`."""
+    time = np.arange(0.0, until, 1.0 / rate)
+    position = np.column_stack([np.interp(time - delay, PLAN.time, x) for x in PATH.position.T])
+    return SoFar(time, position + [0.0, 0.0, off], inclination(time - delay), 0.0)
+
+
+def test_strokes_of_a_star_end_where_it_turns():
+    # to the first vertex, then from vertex to vertex: at each the gripper is near the circle,
+    # but for the time in which it speeds up or slows down, 5 mm to each side
+    at = np.stack([np.interp(ENDS, PLAN.time, x) for x in PATH.position.T[:2]])
+    assert len(ENDS) == 10
+    np.testing.assert_allclose(np.hypot(*at), 0.025, atol=5e-3)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.032, -0.02])
+def test_data_are_those_of_the_plan_up_to_the_last_finished_stroke(delay):
+    followed = follow(PLAN, ENDS, data(ENDS[3] + 0.2, delay=delay))
+    assert (followed.strokes, followed.covered, followed.refusal) == (4, ENDS[3], "")
+    assert followed.delay == pytest.approx(delay, abs=1e-3)
+    assert followed.apart < 2e-4
+    truth = inclination(PLAN.time)
+    inside = (PLAN.time <= ENDS[3]) & (PLAN.time > 0.05)
+    # half a millisecond of delay, and what lies between samples
+    np.testing.assert_allclose(followed.observed[inside], truth[inside], atol=3e-4)
+    assert np.isnan(followed.observed[PLAN.time > ENDS[3] + 1e-3]).all()
+
+
+def test_a_recording_of_the_plan_itself_is_left_as_it_is():
+    same = SoFar(PLAN.time, PATH.position, inclination(PLAN.time), 0.0)
+    followed = follow(PLAN, ENDS, same)
+    until = PLAN.time <= ENDS[-1]
+    np.testing.assert_array_equal(followed.observed[until], inclination(PLAN.time)[until])
+    assert followed.delay == 0.0
+
+
+def test_before_the_first_stroke_ends_there_is_nothing():
+    followed = follow(PLAN, ENDS, data(ENDS[0] - 0.1))
+    assert followed.strokes == 0
+    assert np.isnan(followed.observed).all()
+
+
+def test_what_the_cameras_missed_is_missing():
+    seen = data(ENDS[5] + 0.1)
+    blind = (seen.time > 1.0) & (seen.time < 1.5)
+    seen.inclination[blind, 1] = np.nan
+    followed = follow(PLAN, ENDS, seen)
+    missing = np.isnan(followed.observed) & (PLAN.time <= ENDS[5])[:, None]
+    missing[0] = False
+    assert not missing[:, 0].any()
+    wanted = (PLAN.time > 1.0) & (PLAN.time < 1.48)
+    np.testing.assert_array_equal(missing[1:, 1] & wanted[1:], wanted[1:])
+    assert missing[:, 1].sum() <= wanted.sum() + 2
+
+
+@pytest.mark.parametrize(
+    ("fault", "says"),
+    [
+        ({"off": 1.2 * FARTHEST}, "mm off its plan"),
+        ({"delay": 1.2 * LATEST}, "ms behind its plan"),
+        ({"delay": -1.2 * LATEST}, "ms ahead of its plan"),
+    ],
+)
+def test_another_stir_is_refused(fault, says):
+    assert says in follow(PLAN, ENDS, data(ENDS[2] + 0.1, **fault)).refusal
+
+
+@pytest.mark.parametrize("fault", [{"off": 0.7 * FARTHEST}, {"delay": 0.8 * LATEST}])
+def test_tracking_errors_are_not(fault):
+    assert follow(PLAN, ENDS, data(ENDS[2] + 0.1, **fault)).refusal == ""
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"time": np.zeros(250)},
+        {"position": np.zeros((250, 2))},
+        {"position": np.full((250, 3), np.nan)},
+    ],
+)
+def test_arrays_that_are_no_recording_are_named(wrong):
+    with pytest.raises(ValueError, match="data so far"):
+        follow(PLAN, ENDS, data(2.0)._replace(**wrong))
+
+
+def test_a_plan_needs_a_density_and_a_path():
+    with pytest.raises(ValueError, match="attribute liquid_density"):
+        planned(PATH.time, PATH.position, {})
+    with pytest.raises(ValueError, match="planned path"):
+        planned(PATH.time[::-1], PATH.position, ATTRS)

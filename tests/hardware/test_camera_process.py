@@ -1,0 +1,311 @@
+import os
+import resource
+import signal
+import time
+from dataclasses import replace
+from functools import cache, partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline, make_interp_spline
+
+pytest.importorskip("cv2")
+pytest.importorskip("av")
+
+from bolfi_liquids.hardware.board import SPAWN, Board, Trouble, Who, host_time  # noqa: E402
+from bolfi_liquids.hardware.cameras.files import FilesCamera  # noqa: E402
+from bolfi_liquids.hardware.cameras.rendered import RenderedCamera, Timing  # noqa: E402
+from bolfi_liquids.hardware.recorder.csv_file import read_csv  # noqa: E402
+from bolfi_liquids.hardware.recorder.events import read_events  # noqa: E402
+from bolfi_liquids.hardware.recorder.rate import no_rate  # noqa: E402
+from bolfi_liquids.hardware.recorder.video import VideoWriter  # noqa: E402
+from bolfi_liquids.hardware.recorder.views import camera_model, stick_view  # noqa: E402
+from bolfi_liquids.hardware.rendering.drawing import prepare, render  # noqa: E402
+from bolfi_liquids.hardware.rendering.scene import CLEAN, Look, Scene  # noqa: E402
+from bolfi_liquids.hardware.rendering.world import MovingWorld, WorldState  # noqa: E402
+from bolfi_liquids.hardware.rig_file import bundled_rig  # noqa: E402
+from bolfi_liquids.hardware.session.camera_process import _Tally as Tally  # noqa: E402
+from bolfi_liquids.hardware.session.camera_process import run_camera, tallied  # noqa: E402
+from bolfi_liquids.hardware.vision.frame import Frame  # noqa: E402
+from bolfi_liquids.hardware.vision.frame_measurement import FrameMeasurement  # noqa: E402
+from bolfi_liquids.hardware.vision.measuring import FrameMeter  # noqa: E402
+
+RIG = bundled_rig()
+HEIGHT = RIG.stirring.height
+CALM = replace(Look(), faults=0.0)
+
+
+@cache
+def stage(look):
+    camera = RIG.camera("xz")
+    scene = Scene(marker_offset=camera.marker, marker_radius=camera.marker_radius)
+    return prepare(scene, camera_model(camera), look)
+
+
+def swing(time):
+    """Pivot [m] and inclination [rad] of a closed-form motion."""
+    time = np.asarray(time, dtype=float)
+    still = np.zeros_like(time)
+    pivot = np.stack([0.02 * np.sin(3 * time), still, still + HEIGHT], axis=-1)
+    return pivot, np.stack([0.1 * np.sin(3 * time + 1), still], axis=-1)
+
+
+def moving_world(seconds=20.0):
+    """Splines, because a spawned process must be able to read them."""
+    start = host_time()
+    time = start + np.arange(-1.0, seconds, 0.01)
+    pivot, inclination = swing(time)
+    return MovingWorld(CubicSpline(time, pivot), CubicSpline(time, inclination))
+
+
+class Running:
+    """A camera's process, and the end of the pipe that main holds."""
+
+    def __init__(self, directory, make_camera):
+        self.board = Board()
+        theirs, self.main = SPAWN.Pipe()
+        self.process = SPAWN.Process(
+            target=run_camera, args=(RIG, "xz", make_camera, self.board, theirs, directory)
+        )
+        self.process.start()
+        theirs.close()
+
+    def wait(self, what, timeout=15.0):
+        deadline = time.monotonic() + timeout
+        while not what(row := self.board.read(Who.CAMERA_XZ)):
+            assert time.monotonic() < deadline and self.process.is_alive(), row
+            time.sleep(0.002)
+        return row
+
+    def end(self):
+        """Let go as a main process that dies; the time until the camera's has ended [s]."""
+        self.main.close()
+        start = time.monotonic()
+        self.process.join(5)
+        return time.monotonic() - start
+
+
+@pytest.fixture
+def start(tmp_path):
+    running = []
+
+    def start(make_camera):
+        running.append(Running(tmp_path, make_camera))
+        return running[-1]
+
+    yield start
+    for one in running:
+        one.process.kill()
+        one.process.join()
+        one.main.close()
+
+
+def rendered(look=CALM, timing=None, world=None):
+    return partial(RenderedCamera, stage(look), world or moving_world(), timing)
+
+
+def frames(directory):
+    return read_csv(directory / "frames_xz.csv", FrameMeasurement._fields)
+
+
+def pictures(directory):
+    camera, seen = FilesCamera(directory / "xz.mkv"), []
+    while (frame := camera.read()) is not None:
+        seen.append(frame)
+    camera.close()
+    return seen
+
+
+def test_rows_and_pictures_agree_and_main_s_end_ends_the_process(start, tmp_path):
+    running = start(rendered())
+    running.wait(lambda row: row.count >= 30)
+    os.kill(running.process.pid, signal.SIGINT)  # as Ctrl-C sends it to all
+    row = running.wait(lambda row: row.count >= 45)
+    assert row.trouble == Trouble.NONE
+    assert row.rate == pytest.approx(30.0, abs=3.0)
+    assert abs(row.value) < 0.11
+    assert running.end() < 0.5
+    assert running.process.exitcode == 0
+    table, video = frames(tmp_path), pictures(tmp_path)
+    assert len(video) == len(table["index"]) >= 45
+    taken = table["stamp"] - table["stamp"][0]
+    np.testing.assert_allclose([frame.stamp for frame in video], taken, atol=1.1e-3)
+    angle = swing(table["stamp"] - 1000.0)[1][:, 0]
+    good = table["flags"] == 0
+    assert good.mean() > 0.9
+    assert np.abs(table["angle"] - angle)[good].max() < np.radians(0.3)
+    (last,) = read_events(tmp_path)
+    assert (last["source"], last["kind"], last["frames"]) == ("camera_xz", "left", len(video))
+    assert last["lost"] == 0
+
+
+def test_a_killed_camera_process_loses_less_than_a_second(start, tmp_path):
+    running = start(rendered())
+    read = running.wait(lambda row: row.count >= 30).count
+    running.process.kill()
+    running.process.join()
+    table = frames(tmp_path)
+    assert read <= len(table["index"]) <= read + 2
+    assert len(pictures(tmp_path)) >= read - 2
+
+
+def test_a_short_delay_loses_no_picture_and_a_long_one_is_counted(start, tmp_path):
+    running = start(rendered())
+    row = running.wait(lambda row: row.count >= 10)
+    for delay in (0.12, 1.0):
+        os.kill(running.process.pid, signal.SIGSTOP)
+        time.sleep(delay)
+        os.kill(running.process.pid, signal.SIGCONT)
+        row = running.wait(lambda later, before=row: later.count >= before.count + 15)
+    running.end()
+    table = frames(tmp_path)
+    steps = np.diff(table["index"])
+    gaps = steps[steps > 1] - 1
+    assert 15 < gaps.sum() < 32
+    assert len(gaps) == 1
+    assert read_events(tmp_path)[-1]["lost"] == gaps.sum()
+    assert len(pictures(tmp_path)) == len(table["index"])
+
+
+def test_the_line_is_where_it_was_in_the_recorded_video(tmp_path):
+    scenery, rng = stage(CALM), np.random.default_rng(0)
+    live, again = FrameMeter(stick_view(RIG, "xz")), FrameMeter(stick_view(RIG, "xz"))
+    video = VideoWriter(tmp_path / "xz.mkv", size=(640, 480), rate=30.0)
+    angles = []
+    for k in range(40):
+        pivot, inclination = swing(k / 30)
+        image = render(scenery, [WorldState(k / 30, pivot, inclination)], rng)
+        angles.append(live.measure(Frame(k, k / 30, k / 30, image)).angle)
+        video.write(image, k / 30)
+    video.close()
+    recorded = [again.measure(frame).angle for frame in pictures(tmp_path)]
+    assert np.degrees(np.abs(np.subtract(recorded, angles))).max() < 0.02
+
+
+def test_a_video_has_the_times_of_its_pictures(tmp_path):
+    stamps = [100.0, 100.0334, 100.2, 100.2, 100.1, 101.5]
+    video = VideoWriter(tmp_path / "xz.mkv", size=(642, 482), rate=30.0)
+    for k, stamp in enumerate(stamps):
+        video.write(np.full((482, 642), 40 * k, np.uint8), stamp)
+    with pytest.raises(ValueError, match=r"\(480, 640\).*\(482, 642\)"):
+        video.write(np.zeros((480, 640), np.uint8), 102.0)
+    video.close()
+    video.close()
+    seen = pictures(tmp_path)
+    assert [round(1e3 * frame.stamp) for frame in seen] == [0, 33, 200, 201, 202, 1500]
+    assert [int(np.median(frame.image)) for frame in seen] == [0, 40, 80, 120, 160, 200]
+
+
+def test_a_missing_encoder_names_its_extra(tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "av", None)
+    with pytest.raises(ImportError, match=r"bolfi-liquids\[cameras\]"):
+        VideoWriter(tmp_path / "xz.mkv", size=(640, 480), rate=30.0)
+
+
+def test_the_same_picture_again_looks_dead_and_is_recorded(start, tmp_path):
+    stop = host_time() + 2.0
+    time_ = np.arange(stop - 10.0, stop + 20.0, 0.01)
+    pivot, inclination = swing(np.minimum(time_, stop))
+    world = MovingWorld(*(make_interp_spline(time_, y, k=1) for y in (pivot, inclination)))
+    running = start(rendered(CLEAN, world=world))
+    assert running.wait(lambda row: row.count >= 5).trouble == Trouble.NONE
+    row = running.wait(lambda row: row.trouble)
+    assert row.trouble == Trouble.SAME_PICTURE
+    after = running.wait(lambda later: later.count >= row.count + 10)
+    assert after.beat == row.beat
+    running.end()
+    table = frames(tmp_path)
+    assert len(pictures(tmp_path)) == len(table["index"]) >= after.count
+    (same, _) = read_events(tmp_path)
+    assert same["kind"] == "same_picture"
+    shown_since = table["stamp"][table["index"] == same["index"]] - 1000.0 - stop
+    assert 0 < shown_since[0] < 4 / 30
+
+
+def test_a_camera_that_ends_or_cannot_be_opened_is_told(start, tmp_path):
+    video = VideoWriter(tmp_path / "source.mkv", size=(640, 480), rate=30.0)
+    for k in range(10):
+        video.write(np.full((480, 640), 20 * k, np.uint8), k / 30)
+    video.close()
+    running = start(partial(FilesCamera, tmp_path / "source.mkv"))
+    row = running.wait(lambda row: row.trouble)
+    assert row.trouble == Trouble.SOURCE_LOST
+    assert running.end() < 0.5
+    lost, left = read_events(tmp_path)
+    assert (lost["kind"], left["frames"]) == ("source_lost", 10)
+    assert len(pictures(tmp_path)) == 10
+
+
+def test_a_camera_that_is_not_there_is_told(start, tmp_path):
+    running = start(partial(FilesCamera, tmp_path / "nothing.mkv"))
+    row = running.wait(lambda row: row.trouble)
+    assert (row.trouble, row.beat) == (Trouble.SOURCE_LOST, 0.0)
+    running.end()
+    assert "nothing.mkv" in read_events(tmp_path)[0]["reason"]
+
+
+def test_pictures_of_another_size_are_told(start, tmp_path):
+    video = VideoWriter(tmp_path / "source.mkv", size=(320, 240), rate=30.0)
+    video.write(np.zeros((240, 320), np.uint8), 0.0)
+    video.close()
+    running = start(partial(FilesCamera, tmp_path / "source.mkv"))
+    running.wait(lambda row: row.trouble == Trouble.SOURCE_LOST)
+    running.end()
+    assert "(240, 320)" in read_events(tmp_path)[0]["reason"]
+
+
+def test_a_camera_that_never_answers_does_not_keep_its_process(start, tmp_path):
+    running = start(rendered(timing=Timing(latency=100.0)))
+    deadline = time.monotonic() + 10
+    while not (tmp_path / "xz.mkv").exists() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    time.sleep(0.3)
+    assert running.board.read(Who.CAMERA_XZ).beat == 0.0
+    assert running.end() < 0.5
+    (left,) = read_events(tmp_path)
+    assert left["reason"] == "the camera does not answer"
+
+
+@pytest.mark.parametrize("file", ["frames_xz.csv", "xz.mkv"])
+def test_a_file_that_may_not_grow_is_told_and_the_camera_goes_on(start, tmp_path, file):
+    running = start(rendered())
+    running.wait(lambda row: row.count >= 10)
+    size = (tmp_path / file).stat().st_size + 50
+    # the table's limit stops the video too, whichever of them is written first
+    resource.prlimit(running.process.pid, resource.RLIMIT_FSIZE, (size, size))
+    row = running.wait(lambda row: row.trouble)
+    assert row.trouble == Trouble.WRITE_FAILED
+    later = running.wait(lambda later: later.count > row.count + 5)
+    assert later.beat > row.beat
+    assert running.end() < 0.5
+    failed, left = read_events(tmp_path)
+    assert (failed["kind"], left["kind"]) == ("write_failed", "left")
+    assert failed["file"] in ("frames_xz.csv", "xz.mkv")
+    assert len(frames(tmp_path)["index"]) >= 10
+
+
+def test_lost_and_repeated_pictures_are_counted():
+    tally = Tally(no_rate(0.0))
+    for k, index in enumerate([0, 1, 2, 5, 6, 10]):
+        image = np.full((2, 2), min(k, 3), np.uint8)
+        tally = tallied(tally, Frame(index, k / 30, k / 30, image), 0.0, 1.0 + k / 30)
+    assert (tally.rate.total, tally.lost, tally.same) == (6, 5, 3)
+    assert tally.beat == pytest.approx(1.1)
+    assert tally.worst == pytest.approx(1 / 30)
+
+
+@pytest.mark.slow
+def test_memory_and_open_files_do_not_grow(start):
+    running = start(rendered(timing=Timing(rate=60.0), world=moving_world(60.0)))
+    process = Path(f"/proc/{running.process.pid}")
+
+    def used():
+        pages = int((process / "statm").read_text().split()[1])
+        return pages * resource.getpagesize(), len(list((process / "fd").iterdir()))
+
+    running.wait(lambda row: row.count >= 300, timeout=60)
+    memory, files = used()
+    running.wait(lambda row: row.count >= 1500, timeout=60)
+    assert used()[1] == files
+    assert used()[0] - memory < 5e6

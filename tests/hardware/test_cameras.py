@@ -1,0 +1,246 @@
+"""Cameras: files and webcams by OpenCV on real files, rendered ones on a clock of the test."""
+
+import csv
+import dataclasses
+import sys
+
+import numpy as np
+import pytest
+from bolfi_liquids.hardware.cameras import (
+    CameraError,
+    FilesCamera,
+    RenderedCamera,
+    Timing,
+    Webcam,
+    WebcamSettings,
+)
+from bolfi_liquids.hardware.cameras.base import grey
+from bolfi_liquids.hardware.rendering import (
+    CLEAN,
+    Look,
+    MovingWorld,
+    prepare,
+    rehearsal_camera,
+    rehearsal_scene,
+)
+
+cv2 = pytest.importorskip("cv2")
+
+
+def pictures(count: int, size=(64, 48)) -> list[np.ndarray]:
+    rng = np.random.default_rng(0)
+    return [rng.integers(0, 255, size[::-1], dtype=np.uint8) for _ in range(count)]
+
+
+@pytest.fixture
+def video(tmp_path):
+    path = tmp_path / "view.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, (64, 48))
+    for k in range(20):
+        writer.write(np.full((48, 64, 3), 10 * k, np.uint8))
+    writer.release()
+    return path
+
+
+def test_a_directory_of_pictures_is_read_in_order_and_unchanged(tmp_path):
+    images = pictures(12)
+    for k, image in enumerate(images):
+        cv2.imwrite(str(tmp_path / f"{k:04d}.png"), image)
+    (tmp_path / "notes.txt").write_text("no picture")
+    camera = FilesCamera(tmp_path, rate=20.0)
+    for k, image in enumerate(images):
+        frame = camera.read()
+        assert frame is not None
+        assert (frame.index, frame.stamp) == (k, pytest.approx(k / 20.0))
+        np.testing.assert_array_equal(frame.image, image)
+    assert camera.read() is None
+    assert camera.read() is None
+
+
+def test_a_video_has_its_own_times_and_becomes_grey(video):
+    camera, frames = FilesCamera(video), []
+    while (frame := camera.read()) is not None:
+        frames.append(frame)
+    camera.close()
+    assert len(frames) == 20
+    np.testing.assert_allclose([f.stamp for f in frames], np.arange(20) / 25.0, atol=1e-6)
+    assert frames[7].image.shape == (48, 64)
+    assert frames[7].image.mean() == pytest.approx(70.0, abs=2.0)
+
+
+def test_nothing_to_read_is_refused_on_opening(tmp_path):
+    with pytest.raises(CameraError, match="no pictures"):
+        FilesCamera(tmp_path)
+    with pytest.raises(CameraError, match="nowhere"):
+        FilesCamera(tmp_path / "nowhere")
+    (tmp_path / "broken.png").write_bytes(b"no picture")
+    with pytest.raises(CameraError, match=r"broken\.png"):
+        FilesCamera(tmp_path)
+    with pytest.raises(ValueError, match="rate"):
+        FilesCamera(tmp_path, rate=0.0)
+
+
+def test_closing_ends_the_frames(video):
+    camera = FilesCamera(video)
+    camera.close()
+    camera.close()
+    assert camera.read() is None
+
+
+def test_grey_is_the_usual_mixture():
+    colour = np.zeros((1, 3, 3), np.uint8)
+    colour[0, [0, 1, 2], [0, 1, 2]] = 200  # blue, green, red
+    np.testing.assert_allclose(grey(colour)[0], [22.8, 117.4, 59.8], atol=0.6)
+
+
+def test_a_webcam_delivers_frames_and_says_when_it_stops(video):
+    # OpenCV opens a file like a device: this tries all but the driver's settings
+    camera = Webcam(str(video), WebcamSettings(size=(64, 48)))
+    first = camera.read()
+    second = camera.read()
+    assert first is not None and second is not None
+    assert (first.index, second.index) == (0, 1)
+    assert first.image.shape == (48, 64)
+    assert second.host >= first.host
+    # a file's times are no times of this computer, so that of arrival is taken
+    assert first.stamp == first.host
+    with pytest.raises(CameraError, match=r"view\.avi.*no picture after frame 15"):
+        for _ in range(100):
+            camera.read()
+    camera.close()
+
+
+def test_a_webcam_of_another_size_is_refused(video):
+    with pytest.raises(CameraError, match=r"view\.avi.*64x48 instead of 640x480"):
+        Webcam(str(video))
+
+
+def test_without_opencv_the_extra_is_named(monkeypatch):
+    from bolfi_liquids.hardware.vision.opencv import opencv
+
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    opencv.cache_clear()
+    with pytest.raises(ImportError, match=r"bolfi-liquids\[cameras\]"):
+        Webcam(0)
+    opencv.cache_clear()
+
+
+def test_a_webcam_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(CameraError, match="no_camera"):
+        Webcam(str(tmp_path / "no_camera"))
+
+
+class Capture:
+    """A driver that stamps its frames."""
+
+    def __init__(self, stamps):
+        self.stamps = iter(stamps)
+
+    def read(self):
+        self.stamp = next(self.stamps)
+        return True, np.zeros((48, 64, 3), np.uint8)
+
+    def get(self, _):
+        return 1e3 * self.stamp
+
+    def set(self, *_):
+        return True
+
+    def isOpened(self):  # noqa: N802  OpenCV's name
+        return True
+
+    def release(self):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("step", "off", "used"), [(0.03, 0.0, True), (0.0, 0.0, False), (0.03, 9.0, False)]
+)
+def test_a_driver_s_stamps_are_used_if_they_advance_on_this_computer_s_clock(
+    monkeypatch, step, off, used
+):
+    import time
+
+    stamps = (time.monotonic() - off + step * np.arange(9)).tolist()
+    stamps[7] = stamps[6]  # once in between, it gives an old one
+    monkeypatch.setattr(cv2, "VideoCapture", lambda _: Capture(stamps))
+    camera = Webcam(0, WebcamSettings(size=(64, 48)))
+    frames = [camera.read() for _ in range(4)]
+    # never a mixture of two clocks
+    told = stamps[5:] if used else [frame.host for frame in frames]
+    assert [frame.stamp for frame in frames] == pytest.approx(told, abs=1e-9)
+
+
+class Clock:
+    """A computer's clock that only waiting moves."""
+
+    def __init__(self) -> None:
+        self.time = 50.0
+
+    def now(self) -> float:
+        return self.time
+
+    def sleep(self, duration: float) -> None:
+        self.time += duration
+
+
+class Asked:
+    """A world that notes when it was asked."""
+
+    def __init__(self, offset: float) -> None:
+        self.times: list[float] = []
+        self._world = MovingWorld(
+            lambda t: np.array([0.0, 0.0, 0.235]), lambda t: np.array([0.01 * t, 0.0]), offset
+        )
+
+    def state(self, host: float):
+        self.times.append(host)
+        return self._world.state(host)
+
+
+def rendered(timing: Timing, clock: Clock, world, **kwargs) -> RenderedCamera:
+    look = dataclasses.replace(CLEAN, read_noise=1.0)
+    stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), look)
+    return RenderedCamera(stage, world, timing, now=clock.now, sleep=clock.sleep, **kwargs)
+
+
+def test_a_rendered_camera_keeps_its_own_time(tmp_path):
+    clock, world = Clock(), Asked(offset=100.0)
+    timing = Timing(rate=25.0, latency=0.03, offset=-7.0, drift=1e-3)
+    camera = rendered(timing, clock, world, truth=tmp_path / "truth_xz.csv")
+    frames = [camera.read() for _ in range(51)]
+    camera.close()
+    stamps = np.array([f.stamp for f in frames])
+    # even on its own clock, which runs 1e-3 faster than the computer's
+    np.testing.assert_allclose(stamps, 43.0 + np.arange(51) / 25.0, atol=1e-9)
+    np.testing.assert_allclose(world.times, 50.0 + np.arange(51) / 25.025, atol=1e-9)
+    np.testing.assert_allclose([f.host for f in frames], np.array(world.times) + 0.03, atol=1e-9)
+    with (tmp_path / "truth_xz.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["index"]) for row in rows] == list(range(51))
+    np.testing.assert_allclose([float(r["stamp"]) for r in rows], stamps)
+    np.testing.assert_allclose([float(r["time"]) for r in rows], np.array(world.times) + 100.0)
+    xz = [float(r["inclination_xz"]) for r in rows]
+    np.testing.assert_allclose(xz, 0.01 * (np.array(world.times) + 100.0))
+
+
+def test_a_late_frame_shows_its_own_moment_and_only_old_ones_are_lost():
+    clock, world = Clock(), Asked(offset=0.0)
+    camera = rendered(Timing(rate=25.0, latency=0.0, drift=0.0), clock, world)
+    camera.read()
+    clock.time += 0.15
+    late = [camera.read() for _ in range(3)]
+    assert [f.index for f in late if f] == [1, 2, 3]
+    np.testing.assert_allclose(world.times[1:], 50.0 + np.array([1, 2, 3]) / 25.0)
+    clock.time += 1.0
+    assert camera.read().index > 20
+    assert clock.time - world.times[-1] <= 0.2 + 1e-9
+
+
+def test_a_rendered_picture_is_what_a_camera_of_this_project_gives():
+    clock = Clock()
+    stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), Look())
+    camera = RenderedCamera(stage, Asked(0.0), now=clock.now, sleep=clock.sleep)
+    frame = camera.read()
+    assert frame is not None
+    assert (frame.image.dtype, frame.image.shape) == (np.uint8, (480, 640))

@@ -1,0 +1,376 @@
+import json
+import time
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import xarray
+from bolfi_liquids.hardware.errors import RigError
+from bolfi_liquids.hardware.recorder.csv_file import CsvAppender
+from bolfi_liquids.hardware.recorder.directory import (
+    read_provenance,
+    rig_hash,
+    start_directory,
+)
+from bolfi_liquids.hardware.recorder.events import RESERVE
+from bolfi_liquids.hardware.recorder.finalise import finalise, partial
+from bolfi_liquids.hardware.recorder.outcome import outcome
+from bolfi_liquids.hardware.recorder.sample import Sample
+from bolfi_liquids.hardware.recorder.views import camera_model
+from bolfi_liquids.hardware.rig_file import bundled_rig
+from bolfi_liquids.hardware.vision.frame_measurement import Flag, FrameMeasurement
+
+import bolfi_liquids as bl
+
+RIG = bundled_rig()
+WAY = 2.0  # s, down into the cup, and out of it
+HOST = 5000.0  # host time of the robot's time 0
+OFFSET = {"xz": 1000.0123, "yz": 33.0071}  # of the cameras' clocks from the robot's
+DRIFT = {"xz": 2e-5, "yz": -3e-5}
+LATENCY = 0.03
+NOISE = np.radians(0.03)
+MARKER_NOISE = 0.05  # px
+COMPLETED = (
+    {"source": "control", "kind": "began", "number": 0, "stirring": False},
+    {"source": "control", "kind": "done", "number": 0},
+    {"source": "control", "kind": "began", "number": 1, "stirring": True},
+    {"source": "control", "kind": "done", "number": 1},
+    {"source": "control", "kind": "left"},
+)
+
+
+def pivot(robot_time, duration):
+    """Position [m], shape (T, 3): down, an eight with rests at both ends, up."""
+    t = np.asarray(robot_time, dtype=float)
+    stirred = np.clip(t - WAY, 0.0, duration)
+    share = np.sin(np.pi * stirred / duration) ** 2
+    high = np.clip(np.maximum(WAY - t, t - WAY - duration) / WAY, 0.0, 1.0)
+    x, y = np.sin(4.0 * stirred), np.sin(2.7 * stirred)
+    return np.stack(
+        [0.02 * share * x, 0.02 * share * y, RIG.stirring.height + 0.05 * high**2 * (3 - 2 * high)],
+        axis=-1,
+    )
+
+
+def inclination(robot_time):
+    """Of the stick [rad], shape (T, 2)."""
+    t = np.asarray(robot_time, dtype=float)
+    return np.stack([0.15 * np.sin(4.0 * t + 0.3), 0.12 * np.cos(2.7 * t)], axis=-1)
+
+
+def frames_of(view, until, duration, rng, rate=30.0):
+    """What a perfect measurement says of one view, by projecting two points of the stick."""
+    phase = {"xz": 0.0, "yz": 0.013}[view]
+    times = np.arange(phase, until, 1 / rate)
+    camera = camera_model(RIG.camera(view))
+    top = pivot(times, duration)
+    tangent = np.tan(inclination(times))
+    points = [top + s * np.column_stack([tangent, -np.ones(len(times))]) for s in (0.02, 0.15)]
+    (x0, y0), (x1, y1) = (camera.undistort(camera.project(p)).T for p in points)
+    slope = (x1 - x0) / (y1 - y0) + NOISE * rng.standard_normal(len(times))
+    marker = camera.project(top + np.array(RIG.camera(view).marker))
+    marker = marker + MARKER_NOISE * rng.standard_normal(marker.shape)
+    stamp = (times + OFFSET[view]) * (1 + DRIFT[view])
+    return [
+        FrameMeasurement(
+            k,
+            float(stamp[k]),
+            float(times[k] + HOST + LATENCY + 0.004 * rng.random()),
+            *marker[k].tolist(),
+            angle=float(np.arctan(slope[k])),
+            offset=float(x0[k] - slope[k] * y0[k]),
+            angle_error=NOISE,
+            offset_error=NOISE * 0.1,
+            second_angle=float(np.arctan(slope[k])),
+            rows=150,
+            flags=0,
+        )
+        for k in range(len(times))
+    ]
+
+
+def samples_of(until, duration):
+    rows = []
+    for k in range(int(until * 125)):
+        t = k / 125
+        stirring = int(WAY <= t <= WAY + duration)
+        numbers = dict.fromkeys(Sample._fields, 0.0) | {
+            "speed_scaling": 1.0,
+            "late": 1e-4 * (k % 5),
+        }
+        x, y, z = pivot(t, duration)
+        numbers |= {"x": x, "y": y, "z": z, "time": t, "host": HOST + t + 0.001}
+        rows.append(Sample(**numbers | {"index": k, "stirring": stirring, "runtime_state": 2}))
+    return rows
+
+
+@pytest.fixture
+def session(tmp_path):
+    """Writes the directory of a session that was as the closed forms say."""
+
+    def write(*, duration=12.0, events=COMPLETED, change=lambda samples, frames: None):
+        directory = start_directory(tmp_path / "session", RIG, {"source": "a closed form"})
+        rng = np.random.default_rng(1)
+        until = duration + 2 * WAY
+        samples = samples_of(until, duration)
+        frames = {view: frames_of(view, until, duration, rng) for view in OFFSET}
+        change(samples, frames)
+        tables = {"samples": samples} | {f"frames_{v}": rows for v, rows in frames.items()}
+        for name, rows in tables.items():
+            fields = Sample._fields if name == "samples" else FrameMeasurement._fields
+            table = CsvAppender(directory / f"{name}.csv", fields)
+            table.append(rows)
+            table.close()
+        lines = [json.dumps({"host": HOST, **event}) for event in events]
+        (directory / "events.jsonl").write_text("\n".join([*lines, ""]))
+        return directory
+
+    return write
+
+
+def test_a_recording_is_what_the_closed_forms_say(session):
+    directory = session()
+    path = finalise(directory)
+    recording = bl.open_recording(path)
+    assert recording.attrs["status"] == "complete"
+    assert recording.attrs["source"] == "a closed form"
+    assert recording.attrs["rig_hash"] == rig_hash(RIG)
+    assert (recording.attrs["lost_samples"], recording.attrs["camera_xz_lost_frames"]) == (0, 0)
+    assert recording.attrs["camera_yz_frame_rate"] == pytest.approx(30.0, rel=1e-3)
+    assert recording.attrs["loop_late_max_ms"] == pytest.approx(0.4)
+    assert recording.attrs["camera_xz_marker_residual_px"] == pytest.approx(MARKER_NOISE, rel=0.2)
+
+    np.testing.assert_allclose(np.diff(recording.time), 1 / 30, atol=1e-12)
+    assert recording.time[-1] == pytest.approx(12.0, abs=1 / 30)
+    robot_time = WAY + recording.time
+    path_apart = recording.gripper.position - pivot(robot_time, 12.0)
+    assert np.abs(path_apart).max() < 2e-5
+    apart = recording.inclination - inclination(robot_time)
+    assert np.degrees(np.abs(apart)).max() < 0.15  # four times the noise of a frame
+    assert np.degrees(np.sqrt(np.mean(apart**2))) < 0.04
+    with xarray.open_dataset(path) as dataset:
+        error = dataset["inclination_xz_error"].to_numpy()
+        assert np.median(error) == pytest.approx(NOISE, rel=0.5)
+        assert (dataset["flags"] == 0).all()
+    assert not (directory / RESERVE).exists()
+    assert not list(directory.glob(".recording*"))
+
+
+def test_the_cameras_times_are_right_to_two_milliseconds(session):
+    attrs = bl.open_recording(finalise(session())).attrs
+    for view in OFFSET:
+        found = attrs[f"camera_{view}_clock_offset"]
+        middle = WAY + 6.0  # to which the offset belongs, about
+        truth = middle - (middle + OFFSET[view]) * (1 + DRIFT[view])
+        assert abs(found - truth) < 2e-3
+        assert 0 < attrs[f"camera_{view}_clock_offset_error"] < 5e-4
+
+
+def test_a_wrong_truth_would_be_seen(session):
+    """The bars above have power: 5 ms between marker and stick break them."""
+
+    def late(_, frames):
+        rows, share = frames["xz"], 0.005 * 30
+        frames["xz"] = [
+            f._replace(angle=f.angle + share * (g.angle - f.angle)) for g, f in pairwise(rows)
+        ]
+
+    recording = bl.open_recording(finalise(session(change=late)))
+    apart = recording.inclination - inclination(WAY + recording.time)
+    assert np.degrees(np.sqrt(np.mean(apart[:, 0] ** 2))) > 0.08
+
+
+def test_doubtful_frames_are_passed_over_and_long_gaps_are_flagged(session):
+    def spoil(_, frames):
+        rows = frames["yz"]
+        for k in (100, 150, 151):
+            rows[k] = rows[k]._replace(angle=1.0, flags=int(Flag.DISAGREE))
+        for k in range(200, 210):
+            rows[k] = rows[k]._replace(angle=float("nan"), offset=float("nan"), flags=1)
+
+    recording = bl.open_recording(path := finalise(session(change=spoil)))
+    seen = np.isfinite(recording.inclination).all(axis=1)
+    assert 0.27 < (~seen).sum() / 30 < 0.4
+    apart = recording.inclination - inclination(WAY + recording.time)
+    assert np.degrees(np.abs(apart[seen])).max() < 0.3
+    with xarray.open_dataset(path) as dataset:
+        flags = dataset["flags"].to_numpy()
+        assert dataset.attrs["camera_yz_flagged"] == pytest.approx(13 / 480, rel=0.01)
+    assert ((flags & int(Flag.GAP)) != 0).tolist() == (~seen).tolist()
+
+
+@pytest.mark.parametrize("view", ["xz", "yz"])
+def test_a_camera_that_stopped_ends_the_recording_and_is_named(session, view):
+    def stop(_, frames):
+        del frames[view][240:]
+
+    events = ({"source": f"camera_{view}", "kind": "source_lost", "reason": "unplugged"},)
+    recording = bl.open_recording(finalise(session(change=stop, events=events)))
+    assert recording.time[-1] == pytest.approx(240 / 30 - WAY, abs=0.1)
+    assert recording.attrs["status"] == "aborted"
+    assert recording.attrs["reason"] == f"camera_{view}: source lost: unplugged"
+
+
+def test_a_robot_that_fell_silent_ends_the_recording(session):
+    def silent(samples, _):
+        del samples[1000:1100]
+
+    recording = bl.open_recording(finalise(session(change=silent)))
+    assert recording.time[-1] == pytest.approx(8.0 - WAY, abs=0.1)
+    assert (recording.attrs["status"], recording.attrs["lost_samples"]) == ("aborted", 100)
+    assert "no samples of the robot for 0.81 s" in recording.attrs["reason"]
+
+
+def test_what_a_killed_session_left_can_be_used(session):
+    def cut(samples, frames):
+        del samples[1250:], frames["xz"][298:], frames["yz"][296:]
+
+    directory = session(change=cut, events=())
+    for name in ("samples.csv", "frames_xz.csv", "frames_yz.csv"):
+        with (directory / name).open("a") as file:
+            file.write("298,10.0,501")
+    (directory / "events.jsonl").unlink()
+    recording = bl.open_recording(finalise(directory))
+    assert recording.attrs["status"] == "aborted"
+    assert "killed" in recording.attrs["reason"]
+    assert recording.time[-1] == pytest.approx(10.0 - WAY, abs=0.2)
+    apart = recording.inclination - inclination(WAY + recording.time)
+    assert np.degrees(np.nanmax(np.abs(apart))) < 0.15
+
+
+def test_repeated_samples_and_frames_do_no_harm(session):
+    def repeat(samples, frames):
+        samples[700:700] = samples[690:700]
+        frames["xz"][200:200] = [
+            f._replace(flags=int(Flag.REPEATED_IMAGE)) for f in frames["xz"][198:200]
+        ]
+
+    recording = bl.open_recording(finalise(session(change=repeat)))
+    apart = recording.inclination - inclination(WAY + recording.time)
+    assert np.degrees(np.nanmax(np.abs(apart))) < 0.15
+
+
+def no_frames(_, frames):
+    frames["yz"].clear()
+
+
+def no_stir(samples, _):
+    samples[:] = [sample._replace(stirring=0) for sample in samples]
+
+
+def short_stir(samples, frames):
+    for rows, rate in ((samples, 125), *((rows, 30) for rows in frames.values())):
+        del rows[int((WAY + 0.5) * rate) :]
+
+
+def unseen(_, frames):
+    frames["xz"][:] = [f._replace(angle=np.nan, flags=1) for f in frames["xz"]]
+
+
+def no_marker(_, frames):
+    frames["xz"][:] = [f._replace(marker_column=np.nan) for f in frames["xz"]]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (no_frames, "frames_yz.csv hold too little: samples.csv has 2000 rows, frames_xz.csv has"),
+        (no_stir, "none of its 2000 samples belongs to a stir"),
+        (short_stir, r"0.\d+ s of a stir; at least 1 s"),
+        (unseen, "view xz: the stick is not seen during the stir"),
+        (no_marker, "view xz: only 0 frames show the marker"),
+    ],
+)
+def test_too_little_is_refused_and_says_what_is_missing(session, change, message):
+    directory = session(change=change)
+    with pytest.raises(RigError, match=message):
+        finalise(directory)
+    assert not (directory / "recording.nc").exists()
+
+
+def test_a_failed_write_leaves_the_earlier_recording(session, monkeypatch):
+    directory = session()
+    before = finalise(directory).read_bytes()
+
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(xarray.Dataset, "to_netcdf", full)
+    with pytest.raises(OSError, match="No space"):
+        finalise(directory)
+    assert (directory / "recording.nc").read_bytes() == before
+    assert not list(directory.glob(".recording*"))
+
+
+def test_the_stir_so_far_is_the_beginning_of_the_whole(session):
+    directory = session(duration=56.0)
+    whole = partial(directory)
+    start = time.monotonic()
+    so_far = partial(directory, until=WAY + 20.0)
+    assert time.monotonic() - start < 1.0  # 0.1 s alone on a core
+    assert so_far.time[-1] == pytest.approx(20.0, abs=1 / 30)
+    count = len(so_far.time)
+    np.testing.assert_allclose(so_far.time, whole.time[:count])
+    np.testing.assert_allclose(so_far.position, whole.position[:count], atol=1e-9)
+    apart = np.degrees(np.abs(so_far.inclination - whole.inclination[:count]))
+    assert apart[:-4].max() < 0.02
+    with pytest.raises(RigError, match="none of its"):
+        partial(directory, until=WAY - 0.5)
+
+
+@pytest.mark.parametrize(
+    ("events", "cut", "status", "reason"),
+    [
+        (COMPLETED, "", "complete", "the plan was carried out"),
+        (COMPLETED, "no samples", "aborted", "no samples"),
+        (COMPLETED[:-1], "", "aborted", "without a word"),
+        (COMPLETED[:2] + COMPLETED[-1:], "", "aborted", "without a word"),
+        (COMPLETED[:3] + COMPLETED[-1:], "", "aborted", "without a word"),
+        ((), "", "aborted", "without a word"),
+        (
+            (
+                *COMPLETED[:3],
+                {"source": "camera_xz", "kind": "source_lost", "reason": "unplugged"},
+                {"source": "control", "kind": "stopped", "reason": "camera xz is silent"},
+                COMPLETED[-1],
+            ),
+            "view xz",
+            "aborted",
+            "camera xz is silent",
+        ),
+        (tuple(e | {"source": "main"} for e in COMPLETED), "", "aborted", "without a word"),
+    ],
+)
+def test_only_control_s_word_makes_a_recording_complete(events, cut, status, reason):
+    told = outcome(events, cut)
+    assert told.status == status
+    assert reason in told.reason
+
+
+def test_a_directory_is_made_once_and_knows_its_rig(tmp_path):
+    directory = start_directory(tmp_path / "a" / "b", RIG, {"source": "here"})
+    known = read_provenance(directory)
+    assert known.rig == RIG
+    assert known.extra == {"source": "here"}
+    live = camera_model(RIG.camera("yz"))
+    np.testing.assert_array_equal(known.cameras["yz"].rotation, live.rotation)
+    assert known.cameras["yz"].focal == live.focal
+    with pytest.raises(RigError, match="already.*new directory"):
+        start_directory(directory, RIG)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RigError, match="file"):
+        start_directory(tmp_path / "file", RIG)
+
+
+def test_a_disk_with_too_little_room_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("shutil.disk_usage", lambda _: type("Usage", (), {"free": 5_000_000})())
+    with pytest.raises(RigError, match=r"5 MB are free, the recording may need \d+ MB"):
+        start_directory(tmp_path / "a", RIG)
+
+
+def test_a_damaged_rig_file_is_refused(tmp_path):
+    with pytest.raises(RigError, match=r"no rig\.json"):
+        finalise(tmp_path)
+    (tmp_path / "rig.json").write_text('{"rig": ')
+    with pytest.raises(RigError, match=r"rig\.json: cannot be used"):
+        finalise(tmp_path)

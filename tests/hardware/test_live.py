@@ -1,0 +1,69 @@
+import math
+
+import pytest
+from bolfi_liquids.hardware.board import Row, Trouble, Who
+from bolfi_liquids.hardware.session.live import (
+    LiveStatus,
+    Reading,
+    live_table,
+)
+from rich.console import Console
+
+ROWS = (
+    Row(10.0, Trouble.NONE, 1250, 124.9, 0.42, 0.0032),
+    Row(9.97, Trouble.NONE, 1245, 125.1, math.nan, 0.004),
+    Row(9.98, Trouble.NONE, 300, 29.97, 0.05, 0.035),
+    Row(9.96, Trouble.NONE, 301, 29.95, -0.02, 0.035),
+)
+
+
+def shown(status):
+    console = Console(width=80, color_system=None)
+    with console.capture() as capture:
+        console.print(live_table(status))
+    lines = capture.get().splitlines()
+    assert max(map(len, lines)) <= 80
+    return {line.split("  ")[0].strip(): line for line in lines}
+
+
+def test_all_is_shown_in_80_columns():
+    guards = (Reading("force", 4.0, 20.0, "N"), Reading("tracking", 0.02, 0.01, "m"))
+    lines = shown(LiveStatus("star, cycle 1 of 3", 10.0, ROWS, guards))
+    assert any("star, cycle 1 of 3" in line for line in lines.values())
+    assert "42 %" in lines["path"]
+    assert "+2.86°" in lines["stick"] and "-1.15°" in lines["stick"]
+    assert "3.2 ms late" in lines["loop"]
+    assert "30.0 /s" in lines["camera xz"] and "20 ms ago" in lines["camera xz"]
+    assert "1245 rows" in lines["recorder"]
+    assert "80 % left" in lines["force"]
+    assert "passed" in lines["tracking"]
+    assert "stopped" not in lines
+
+
+def test_trouble_takes_the_place_of_numbers():
+    rows = (*ROWS[:3], ROWS[3]._replace(trouble=Trouble.SAME_PICTURE, value=math.nan))
+    lines = shown(LiveStatus("star", 10.0, rows, message="camera yz shows the same picture"))
+    assert "same picture again" in lines["camera yz"]
+    assert "yz not seen" in lines["stick"]
+    assert "camera yz shows" in lines["stopped"]
+
+
+def test_nothing_has_begun():
+    lines = shown(LiveStatus("starting", 10.0, tuple(Row() for _ in Who)))
+    assert "0 %" in lines["path"]
+    assert all("no sign yet" in lines[name] for name in ("robot", "recorder", "camera yz"))
+
+
+@pytest.mark.parametrize(
+    ("value", "style"), [(4.0, "green"), (17.0, "yellow"), (20.0, "red"), (30.0, "red")]
+)
+def test_a_guard_changes_its_colour_before_it_stops_the_arm(value, style):
+    table = live_table(LiveStatus("", 10.0, ROWS, (Reading("force", value, 20.0, "N"),)))
+    cell = list(table.columns[1].cells)[-1]
+    assert cell.style == style
+
+
+def test_an_old_sign_of_life_is_red():
+    rows = (ROWS[0]._replace(beat=9.0), *ROWS[1:])
+    cells = list(live_table(LiveStatus("", 10.0, rows)).columns[1].cells)
+    assert (cells[3].style, cells[4].style) == ("red", "green")

@@ -1,0 +1,206 @@
+"""The renderer, against formulae written out here."""
+
+import dataclasses
+import json
+import socket
+import threading
+
+import numpy as np
+import pytest
+from bolfi_liquids.hardware.rendering import (
+    CLEAN,
+    CupPlace,
+    Look,
+    StreamedWorld,
+    WorldError,
+    WorldState,
+    exposure_times,
+    fault_of,
+    prepare,
+    rehearsal_camera,
+    rehearsal_scene,
+    render,
+)
+
+pytest.importorskip("cv2")
+
+RNG = np.random.default_rng(0)
+
+
+def state(xz_deg: float, yz_deg: float = 0.0, pivot=(0.0, 0.0, 0.235)) -> WorldState:
+    return WorldState(0.0, np.array(pivot, dtype=float), np.radians([xz_deg, yz_deg]))
+
+
+def picture(states, look=CLEAN, *, distortion=(0.0,) * 5, **sizes) -> np.ndarray:
+    scene = dataclasses.replace(rehearsal_scene("xz"), **sizes)
+    stage = prepare(scene, rehearsal_camera("xz", distortion=distortion), look)
+    return render(stage, states, np.random.default_rng(1))
+
+
+def dark_centroids(image: np.ndarray, rows: range, background: float) -> np.ndarray:
+    weight = np.clip(background - image[rows.start : rows.stop].astype(float), 0, None)
+    return weight @ np.arange(image.shape[1]) / weight.sum(axis=1)
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 0.4, 7.3, -21.0, 44.0])
+def test_the_stick_leans_as_much_as_it_should(angle_deg):
+    # a camera that looks horizontally at the stick's plane shows angles in it as they are
+    look = dataclasses.replace(CLEAN, background=200.0)
+    scene = dataclasses.replace(rehearsal_scene("xz"), fill=0.0, cup_height=0.001)
+    camera = dataclasses.replace(
+        rehearsal_camera("xz", height=0.13), position=np.array([0.0, -0.45, 0.13])
+    )
+    image = render(prepare(scene, camera, look), [state(angle_deg)], RNG)
+    rows = range(120, 270)
+    slope = np.polyfit(np.arange(rows.start, rows.stop), dark_centroids(image, rows, 200.0), 1)[0]
+    assert np.degrees(np.arctan(slope)) == pytest.approx(angle_deg, abs=0.01)
+
+
+def test_a_moving_stick_is_smeared_about_the_middle_of_the_exposure():
+    moving = [state(angle) for angle in (3.0, 5.0, 7.0)]
+    sizes = {"fill": 0.0, "cup_height": 0.001}
+    smeared, still = picture(moving, **sizes), picture([state(5.0)], **sizes)
+    rows = range(120, 300)
+    apart = dark_centroids(smeared, rows, 190.0) - dark_centroids(still, rows, 190.0)
+    assert np.abs(apart).max() < 0.15
+    assert (smeared[280] < 180).sum() > (still[280] < 180).sum() + 5
+
+
+def test_a_lens_that_distorts_bends_the_stick():
+    sizes = {"fill": 0.0, "cup_height": 0.001}
+    image = picture([state(30.0)], distortion=(-0.3, 0.0, 0.0, 0.0, 0.0), **sizes)
+    rows = np.arange(120, 330)
+    middle = dark_centroids(image, range(120, 330), 190.0)
+    bent = middle - np.polyval(np.polyfit(rows, middle, 1), rows)
+    # the points of a straight line, by the formula of the radial distortion
+    t = np.linspace(0.02, 0.2, 400)
+    along = np.column_stack([t * np.sin(np.radians(30)), 0 * t, 0.235 - t * np.cos(np.radians(30))])
+    camera = rehearsal_camera("xz")
+    x, y, z = camera.to_camera(along).T
+    radial = 1.0 - 0.3 * ((x / z) ** 2 + (y / z) ** 2)
+    expected = np.interp(rows, 239.5 + 640 * y / z * radial, 319.5 + 640 * x / z * radial)
+    np.testing.assert_allclose(middle, expected, atol=0.1)
+    assert np.ptp(bent) > 0.5
+
+
+def test_the_submerged_part_looks_as_wide_and_as_far_aside_as_the_refractive_index():
+    # on the cup's axis plane a cylinder of liquid magnifies by its refractive index
+    pivot = (0.012, 0.0, 0.235)
+    look = dataclasses.replace(CLEAN, liquid=190.0, glass=190.0)
+    image = picture([state(0.0, pivot=pivot)], look)
+    above, below = image[290].astype(float), image[390].astype(float)
+    shift = []
+    for line in (above, below):
+        weight = np.clip(185.0 - line, 0, None)
+        middle = weight @ np.arange(640) / weight.sum() - 319.5
+        shift.append((middle, (line < 150).sum()))
+    assert shift[1][0] / shift[0][0] == pytest.approx(1.33, rel=0.03)
+    assert shift[1][1] / shift[0][1] == pytest.approx(1.33, rel=0.12)
+
+
+def test_noise_has_the_strength_that_was_asked_for():
+    look = dataclasses.replace(CLEAN, read_noise=2.0, shot_noise=0.05)
+    clean, noisy = picture([state(0.0)]), picture([state(0.0)], look)
+    difference = (noisy.astype(float) - clean)[:100, :150]
+    assert difference.std() == pytest.approx(np.hypot(2.0, np.sqrt(0.05 * 190)), rel=0.05)
+    assert abs(difference.mean()) < 0.1
+
+
+def test_faults_are_as_frequent_as_asked_and_repeat_with_the_seed():
+    stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), Look())
+    drawn = [fault_of(k, 0.1, stage.area, 3) for k in range(9000)]
+    share = np.mean([fault is not None for fault in drawn])
+    # 3000 independent draws of three frames each
+    assert share == pytest.approx(0.1, abs=4 * np.sqrt(0.09 / 3000))
+    assert {fault.kind for fault in drawn if fault} == {"hand", "hose", "glare"}
+    assert fault_of(77, 1.0, stage.area, 3) == fault_of(77, 1.0, stage.area, 3)
+
+
+@pytest.mark.parametrize("kind", ["hand", "hose", "glare"])
+def test_each_fault_changes_the_picture_near_its_place(kind):
+    stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), CLEAN)
+    faults = (fault_of(k, 1.0, stage.area, 0) for k in range(300))
+    fault = next(fault for fault in faults if fault is not None and fault.kind == kind)
+    clean = render(stage, [state(3.0)], RNG)
+    wrong = render(stage, [state(3.0)], RNG, fault)
+    column, row = (int(value) for value in fault.place)
+    near = np.s_[max(row - 5, 0) : row + 6, max(column - 5, 0) : column + 6]
+    assert np.abs(wrong[near].astype(int) - clean[near]).max() > 10
+
+
+def test_exposure_times_surround_the_middle():
+    times = exposure_times(5.0, dataclasses.replace(CLEAN, exposure=0.009))
+    np.testing.assert_allclose(times, [4.997, 5.0, 5.003])
+
+
+def test_a_gripper_out_of_view_leaves_the_backdrop():
+    stage = prepare(rehearsal_scene("xz"), rehearsal_camera("xz"), CLEAN)
+    away = state(0.0, pivot=(0.0, -2.0, 0.3))
+    np.testing.assert_array_equal(render(stage, [away], RNG)[:100], stage.backdrop[:100])
+
+
+class Emulator:
+    """Streams the lines that it is told to, then closes."""
+
+    def __init__(self, lines):
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self.port = self._server.getsockname()[1]
+        self._lines, self.close = lines, threading.Event()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    def _serve(self):
+        with self._server, self._server.accept()[0] as client:
+            assert json.loads(client.makefile().readline()) == {"command": "stream"}
+            for line in self._lines:
+                client.sendall(line)
+            self.close.wait(10.0)
+
+    def stop(self):
+        self.close.set()
+        self._thread.join(10.0)
+
+
+def line(host, x, stick, time=7.0):
+    fields = {"time": time, "pose": [x, 0.2, 0.3, 0, 0, 0], "stick": stick, "host": host}
+    return (json.dumps(fields) + "\n").encode()
+
+
+def wait_for(world, host, x):
+    for _ in range(500):
+        if world.state(host).pivot[0] == pytest.approx(x, abs=1e-9):
+            return True
+        threading.Event().wait(0.01)
+    return False
+
+
+def test_streamed_states_are_interpolated_and_the_last_one_stays():
+    emulator = Emulator([line(10.0, 0.5, [0.1, 0.0], 7.0), line(10.1, 0.6, [0.2, 0.0], 7.2)])
+    world = StreamedWorld("127.0.0.1", CupPlace((0.4, 0.2, 0.1)), port=emulator.port)
+    try:
+        assert wait_for(world, 99.0, 0.2)
+        between = world.state(10.05)
+        np.testing.assert_allclose(between.pivot, [0.15, 0.0, 0.2])
+        np.testing.assert_allclose(between.inclination, [0.15, 0.0], atol=1e-12)
+        assert between.time == pytest.approx(7.1)
+        emulator.stop()
+        assert wait_for(world, 99.0, 0.2)
+    finally:
+        emulator.stop()
+        world.close()
+
+
+def test_the_cup_s_yaw_turns_both_the_pivot_and_the_stick():
+    # the cup's x axis points along the base's y axis
+    place = CupPlace((0.0, 0.0, 0.0), yaw=np.pi / 2)
+    np.testing.assert_allclose(place.pivot(np.array([0.0, 0.3, 0.1])), [0.3, 0.0, 0.1], atol=1e-12)
+    np.testing.assert_allclose(place.inclination(np.array([0.2, 0.1])), [0.1, -0.2], atol=1e-12)
+
+
+def test_a_world_that_nobody_streams_is_refused():
+    with pytest.raises(WorldError, match="start it before"):
+        StreamedWorld("127.0.0.1", CupPlace((0.0, 0.0, 0.0)), port=1, timeout=0.5)
+    silent = Emulator([])
+    with pytest.raises(WorldError, match="no state"):
+        StreamedWorld("127.0.0.1", CupPlace((0, 0, 0)), port=silent.port, timeout=0.2)
+    silent.stop()

@@ -1,0 +1,295 @@
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+
+import numpy as np
+import psutil
+import pytest
+from bolfi_liquids.hardware.emulator.process import EmulatorProcess
+from bolfi_liquids.hardware.errors import MotionRejected, RigError
+from bolfi_liquids.hardware.frames import cup_frame
+from bolfi_liquids.hardware.kinematics import inverse
+from bolfi_liquids.hardware.motions import insert, retract, stir
+from bolfi_liquids.hardware.recorder.events import read_events
+from bolfi_liquids.hardware.recorder.sample import SAMPLES
+from bolfi_liquids.hardware.rig_file import bundled_rig
+from bolfi_liquids.hardware.safety.limits import workspace
+from bolfi_liquids.hardware.safety.preflight import failures
+from bolfi_liquids.hardware.session.confirmation import (
+    SENTENCE,
+    Confirmation,
+    confirm,
+    confirm_emulated,
+    describe,
+)
+from bolfi_liquids.hardware.session.session import Session, SessionStopped
+
+RIG = bundled_rig()
+SHORT = {"rest": 0.1, "points": 5, "radius": 0.02}
+RIG = RIG.model_copy(update={"stirring": RIG.stirring.model_copy(update=SHORT)})
+PLAN = [stir(RIG), retract(RIG)]
+
+
+@pytest.fixture
+def emulator():
+    pytest.importorskip("rtde_control")
+    space = workspace(RIG, "stirring")
+    base = cup_frame(RIG.cup).to_base(PLAN[0].pose[0])
+    joints = inverse(space.arm, base, space.start, tcp=space.tcp).joints
+    options = {"tcp": str(list(RIG.robot.stirring_tcp))}
+    with EmulatorProcess.start(joints=joints, options=options) as process:
+        yield process
+
+
+def armed(emulator, directory):
+    leave = confirm_emulated(describe(PLAN, RIG, "stirring"), emulator.address)
+    return Session(
+        RIG,
+        directory,
+        emulator.address,
+        armed=True,
+        confirmation=leave,
+        plan=PLAN,
+        rehearsal=True,
+    )
+
+
+def lives(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def group_lives(group):
+    """Whether any process of a group runs; orphans that nobody has reaped yet do not."""
+    for one in psutil.process_iter():
+        with suppress(psutil.NoSuchProcess, ProcessLookupError):
+            if os.getpgid(one.pid) == group and one.status() != psutil.STATUS_ZOMBIE:
+                return True
+    return False
+
+
+def kinds(directory, source):
+    return [event["kind"] for event in read_events(directory) if event["source"] == source]
+
+
+@pytest.mark.punctual
+def test_a_session_follows_paths_records_them_and_leaves_nothing_behind(emulator, tmp_path):
+    with armed(emulator, tmp_path) as session:
+        assert failures(session.preflight()) == ""
+        numbers = [session.follow(path) for path in PLAN]
+        assert numbers == [0, 1]
+        assert not session.wait(timeout=0.1)
+        session.status()
+        assert session.wait(0, timeout=20.0)
+        status = session.status()
+        assert len(status.readings) > 10 and status.stopped is None
+        assert status.pose is not None
+        assert session.wait(timeout=20.0)
+        assert [done.number for done in session.status().done] == [0, 1]
+        pids = [child.process.pid for child in session._children]
+        start = time.monotonic()
+    assert time.monotonic() - start < 1.5
+    assert not any(lives(pid) for pid in pids)
+    assert emulator.admin.state().at_rest
+    assert kinds(tmp_path, "control")[-5:] == ["began", "done", "began", "done", "left"]
+    rows = (tmp_path / SAMPLES).read_text().splitlines()
+    assert [int(row.split(",")[0]) for row in rows[1:]] == list(range(len(rows) - 1))
+    # at the end the arm is where the plan ends
+    assert np.array(rows[-1].split(",")[3:6], float) == pytest.approx(
+        PLAN[-1].pose[-1, :3], abs=1e-3
+    )
+    with pytest.raises(SessionStopped):
+        session.follow(PLAN[0])
+
+
+@pytest.mark.punctual
+def test_a_session_is_a_dry_run_unless_it_is_armed_and_records_all_the_same(emulator, tmp_path):
+    with Session(RIG, tmp_path, emulator.address) as session:
+        assert failures(session.preflight()) == ""
+        with pytest.raises(MotionRejected, match="dry run"):
+            session.follow(PLAN[0])
+        time.sleep(0.3)
+    assert len((tmp_path / SAMPLES).read_text().splitlines()) > 20
+    state = emulator.admin.state()
+    assert emulator.admin.motions() == 0 and state.runtime_state == 1
+    assert "program" not in state.reason
+
+
+def test_nobody_is_armed_without_a_confirmation(tmp_path):
+    with pytest.raises(RigError, match="armed without a confirmation"):
+        Session(RIG, tmp_path, "127.0.0.9", armed=True)
+    with pytest.raises(RigError, match="armed without a confirmation"):
+        Session(RIG, tmp_path, "127.0.0.9", armed=True, confirmation="yes")  # type: ignore[arg-type]
+    leave = confirm("plan", SENTENCE, "127.0.0.8")
+    with pytest.raises(RigError, match="is for 127.0.0.8, the controller is at 127.0.0.9"):
+        Session(RIG, tmp_path, "127.0.0.9", armed=True, confirmation=leave)
+
+
+@pytest.mark.parametrize("typed", ["", "y", "yes", SENTENCE.upper(), SENTENCE + "!"])
+def test_only_the_sentence_confirms(typed):
+    with pytest.raises(RigError, match=SENTENCE):
+        confirm("plan", typed, "127.0.0.8")
+    assert confirm("plan", f" {SENTENCE}\n", "127.0.0.8").plan == "plan"
+    with pytest.raises(TypeError):
+        Confirmation(object(), "plan", None)
+
+
+@pytest.mark.parametrize("address", ["192.168.1.10", "robot", "::2", "10.0.0.1"])
+def test_an_emulated_arm_is_on_this_computer(address):
+    with pytest.raises(RigError, match="typed confirmation"):
+        confirm_emulated("plan", address)
+
+
+def test_the_plan_tells_where_how_fast_and_how_long():
+    text = describe([insert(RIG), *PLAN], RIG, "stirring")
+    for words in ("3 motions", "x -1.6 to 2.0 cm", "(allowed -5.0 to 5.0)", "10.0 cm/s", "20 N"):
+        assert words in text
+
+
+def begin(session):
+    session.follow(PLAN[0])
+    end = time.monotonic() + 10.0
+    while not session.status().began and time.monotonic() < end:
+        time.sleep(0.01)
+    time.sleep(0.8)
+
+
+@pytest.mark.punctual
+def test_a_path_that_breaks_a_limit_is_not_ordered(emulator, tmp_path):
+    with armed(emulator, tmp_path) as session:
+        high = PLAN[0]._replace(pose=PLAN[0].pose + [0, 0, 0.25, 0, 0, 0])
+        with pytest.raises(MotionRejected, match="z = "):
+            session.follow(high)
+        # the caller may mend it and go on
+        assert session.follow(PLAN[0]) == 0
+
+
+@pytest.mark.punctual
+def test_an_exception_stops_the_arm_and_is_the_reason(emulator, tmp_path):
+    with pytest.raises(ZeroDivisionError):
+        with armed(emulator, tmp_path) as session:
+            begin(session)
+            assert not emulator.admin.state().at_rest
+            raise ZeroDivisionError("oh")
+    assert emulator.admin.state().at_rest
+    (event,) = [event for event in read_events(tmp_path) if event["kind"] == "stopped"]
+    assert "ZeroDivisionError in the main process: oh" in event["reason"]
+
+
+@pytest.mark.punctual
+def test_a_stop_is_final(emulator, tmp_path):
+    with armed(emulator, tmp_path) as session:
+        begin(session)
+        session.stop("enough")
+        with pytest.raises(SessionStopped, match="enough"):
+            session.wait(timeout=5.0)
+        with pytest.raises(SessionStopped, match="enough"):
+            session.follow(PLAN[0])
+
+
+@pytest.mark.punctual
+@pytest.mark.slow
+def test_a_control_process_that_hangs_is_ended(emulator, tmp_path):
+    with armed(emulator, tmp_path) as session:
+        begin(session)
+        assert session._control is not None
+        os.kill(session._control.process.pid or 0, signal.SIGSTOP)
+        with pytest.raises(SessionStopped, match="no sign of life of the control process"):
+            session.wait(timeout=5.0)
+    assert emulator.admin.state().at_rest
+
+
+def test_no_controller_is_a_line_of_the_list(tmp_path):
+    pytest.importorskip("rtde_control")
+    with Session(RIG, tmp_path, "127.88.77.66") as session:
+        assert "controller: robot.host = 127.88.77.66" in failures(session.preflight())
+        with pytest.raises(RigError, match="pre-flight"):
+            session.pose()
+
+
+# a script that ends in the way that its second argument says, while the arm stirs
+ENDING = """
+import os, signal, sys, time
+from pathlib import Path
+from bolfi_liquids.hardware.motions import stir
+from bolfi_liquids.hardware.rig_file import bundled_rig
+from bolfi_liquids.hardware.session.confirmation import confirm_emulated
+from bolfi_liquids.hardware.session.session import Session
+
+if __name__ == "__main__":
+    address, way, directory = sys.argv[1:]
+    rig = bundled_rig()
+    rig = rig.model_copy(update={"stirring": rig.stirring.model_copy(update={"rest": 0.1})})
+    leave = confirm_emulated("", address)
+    session = Session(
+        rig, Path(directory), address, armed=True, confirmation=leave, rehearsal=True
+    )
+    session.start()
+    session.follow(stir(rig))
+    while not session.status().began:
+        time.sleep(0.01)
+    time.sleep(0.8)
+    if way == "exit":
+        sys.exit(0)
+    os.kill(os.getpid(), signal.Signals[way])
+    time.sleep(5.0)
+"""
+
+
+@pytest.mark.punctual
+@pytest.mark.slow
+@pytest.mark.parametrize("way", ["exit", "SIGTERM", "SIGHUP", "SIGINT", "SIGKILL"])
+def test_however_main_ends_the_arm_stops(emulator, tmp_path, way):
+    script = tmp_path / "main.py"
+    script.write_text(ENDING)
+    recording = tmp_path / "recording"
+    command = [sys.executable, str(script), emulator.address, way, str(recording)]
+    subprocess.run(command, timeout=30.0, stderr=subprocess.DEVNULL, check=False)
+    time.sleep(0.5)
+    assert emulator.admin.motions() > 0
+    assert emulator.admin.state().at_rest
+    assert "stopped" in kinds(recording, "control")
+
+
+IMPATIENT = """
+import sys
+from pathlib import Path
+from bolfi_liquids.hardware.rig_file import bundled_rig
+from bolfi_liquids.hardware.session.session import Session
+
+if __name__ == "__main__":
+    with Session(bundled_rig(), Path(sys.argv[2]), sys.argv[1]) as session:
+        print("started", flush=True)
+        session.preflight()
+        session.wait(0, timeout=20.0)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("delay", [0.0, 0.5, 1.0, 2.0])
+def test_ctrl_c_twice_leaves_no_process_behind_and_shows_no_child_s_inside(
+    emulator, tmp_path, delay
+):
+    script = tmp_path / "main.py"
+    script.write_text(IMPATIENT)
+    command = [sys.executable, str(script), emulator.address, str(tmp_path / "recording")]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as main:
+        assert main.stdout.readline() == "started\n"
+        time.sleep(delay)
+        for _ in range(2):
+            os.killpg(main.pid, signal.SIGINT)  # as a terminal does
+            time.sleep(0.3)
+        _, errors = main.communicate(timeout=10.0)
+    assert errors.count("Traceback") == 1 and errors.rstrip().endswith("KeyboardInterrupt")
+    end = time.monotonic() + 1.0  # Python's own helper ends after main
+    while time.monotonic() < end and group_lives(main.pid):
+        time.sleep(0.02)
+    assert not group_lives(main.pid)

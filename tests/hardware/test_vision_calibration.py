@@ -1,0 +1,131 @@
+"""Intrinsics and roll from synthetic pictures of a known camera."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from bolfi_liquids.hardware.rendering import render_board, render_plumb_line
+from bolfi_liquids.hardware.vision import (
+    Board,
+    CalibrationError,
+    CameraModel,
+    PlumbLineError,
+    calibrate_intrinsics,
+    level_camera,
+    look_at,
+)
+from bolfi_liquids.hardware.vision.camera_model import rotation_matrix
+
+cv2 = pytest.importorskip("cv2")
+
+BOARD = Board()
+TRUTH = CameraModel(
+    focal=(652.0, 648.0),
+    centre=(330.0, 233.0),
+    size=(640, 480),
+    rotation=np.eye(3),
+    position=np.zeros(3),
+    distortion=(-0.11, 0.06, 0.0008, -0.0006, 0.0),
+)
+
+
+def board_picture(turn, place, seed: int) -> np.ndarray:
+    """The board's middle at `place` [m] in the camera frame, turned by a rotation vector."""
+    rotation = rotation_matrix(np.array(turn))
+    middle = 0.5 * BOARD.square * np.array([BOARD.columns, BOARD.rows, 0.0])
+    rng = np.random.default_rng(seed)
+    return render_board(BOARD, TRUTH, rotation, np.array(place) - rotation @ middle, rng)
+
+
+@pytest.fixture(scope="module")
+def pictures() -> list[np.ndarray]:
+    rng = np.random.default_rng(1)
+    return [
+        board_picture(
+            rng.uniform([-0.5, -0.5, -0.2], [0.5, 0.5, 0.2]),
+            rng.uniform([-0.08, -0.06, 0.28], [0.08, 0.06, 0.4]),
+            seed,
+        )
+        for seed in range(12)
+    ]
+
+
+def test_focal_lengths_are_right_to_half_a_percent(pictures):
+    found = calibrate_intrinsics(pictures, BOARD)
+    np.testing.assert_allclose(found.focal, TRUTH.focal, rtol=5e-3)
+    np.testing.assert_allclose(found.centre, TRUTH.centre, atol=3.0)
+    assert found.views == 12
+    assert found.rms < 0.4
+    assert max(found.focal_error) < 3.0
+
+
+def test_the_calibrated_lens_maps_the_picture_like_the_true_one(pictures):
+    found = calibrate_intrinsics(pictures, BOARD).placed(np.eye(3), np.zeros(3))
+    columns, rows = np.meshgrid(np.linspace(60, 580, 9), np.linspace(50, 430, 7))
+    pixels = np.stack([columns, rows], axis=-1)
+    apart = found.to_pixels(TRUTH.undistort(pixels)) - pixels
+    apart -= apart.mean(axis=(0, 1))  # a shifted centre is a turned camera
+    assert np.abs(apart).max() < 1.5
+
+
+def test_too_few_pictures_are_refused(pictures):
+    blank = [np.full((480, 640), 128, np.uint8)] * 6
+    with pytest.raises(CalibrationError, match="5 of 11 pictures"):
+        calibrate_intrinsics(pictures[:5] + blank, BOARD)
+
+
+def test_no_pictures_and_different_sizes_are_refused(pictures):
+    with pytest.raises(CalibrationError, match="got 0"):
+        calibrate_intrinsics([], BOARD)
+    with pytest.raises(CalibrationError, match="one size"):
+        calibrate_intrinsics([pictures[0], pictures[1][:240]], BOARD)
+
+
+def test_views_that_are_all_alike_are_refused():
+    alike = [
+        board_picture((0.0, 0.0, 0.1 * k), (0.01 * k - 0.04, 0.0, 0.3), seed=k) for k in range(9)
+    ]
+    with pytest.raises(CalibrationError, match="alike"):
+        calibrate_intrinsics(alike, BOARD)
+
+
+def test_a_board_that_stays_in_the_middle_is_refused():
+    rng = np.random.default_rng(3)
+    far = [board_picture(rng.uniform(-0.4, 0.4, 3), (0.0, 0.0, 0.5), seed=k) for k in range(9)]
+    with pytest.raises(CalibrationError, match="corners"):
+        calibrate_intrinsics(far, BOARD)
+
+
+POSITION = np.array([0.01, -0.45, 0.2])
+TARGET = np.array([0.0, 0.0, 0.12])
+
+
+def rolled(roll_deg: float) -> CameraModel:
+    return dataclasses.replace(
+        TRUTH,
+        rotation=look_at(POSITION, TARGET, np.radians(roll_deg)),
+        position=POSITION,
+    )
+
+
+@pytest.mark.parametrize("roll_deg", [0.0, 1.5, -4.0])
+@pytest.mark.parametrize("x", [0.0, 0.05, -0.08])
+def test_roll_is_right_to_a_twentieth_of_a_degree(roll_deg, x):
+    rng = np.random.default_rng(0)
+    image = render_plumb_line(rolled(roll_deg), np.array([x, 0.02, 0.4]), 0.5, 0.001, rng)
+    found = level_camera(image, rolled(0.0), width=3.0)
+    assert np.degrees(found.roll) == pytest.approx(roll_deg, abs=0.05)
+    assert np.degrees(found.error) < 0.02
+    np.testing.assert_allclose(found.camera.rotation, rolled(roll_deg).rotation, atol=1e-3)
+
+
+def test_pictures_without_a_plumb_line_are_refused():
+    empty = np.random.default_rng(0).normal(190, 3, (480, 640)).astype(np.uint8)
+    with pytest.raises(PlumbLineError, match="no plumb line"):
+        level_camera(empty, rolled(0.0))
+    short = empty.copy()
+    short[:150, 300:304] = 30
+    with pytest.raises(PlumbLineError):
+        level_camera(short, rolled(0.0))
+    with pytest.raises(PlumbLineError, match="shape"):
+        level_camera(empty[:240], rolled(0.0))

@@ -1,0 +1,122 @@
+"""The camera model, against OpenCV's own functions."""
+
+import numpy as np
+import pytest
+from bolfi_liquids.hardware.vision import (
+    CameraModel,
+    CameraModelError,
+    look_at,
+    read_camera,
+    write_camera,
+)
+
+cv2 = pytest.importorskip("cv2")
+
+BENT = (-0.21, 0.08, 0.0012, -0.0009, -0.01)
+
+
+def camera(**changes) -> CameraModel:
+    position = np.array([0.05, -0.5, 0.2])
+    fields = {
+        "focal": (652.0, 648.0),
+        "centre": (330.0, 233.0),
+        "size": (640, 480),
+        "rotation": look_at(position, np.array([0.0, 0.0, 0.12]), np.radians(2.0)),
+        "position": position,
+        "distortion": BENT,
+    }
+    return CameraModel(**{**fields, **changes})
+
+
+def test_projection_is_that_of_opencv():
+    one, rng = camera(), np.random.default_rng(0)
+    points = rng.uniform([-0.15, -0.15, 0.0], [0.15, 0.15, 0.25], (200, 3))
+    matrix = np.array([[652.0, 0, 330.0], [0, 648.0, 233.0], [0, 0, 1]])
+    turn, _ = cv2.Rodrigues(one.rotation)
+    expected, _ = cv2.projectPoints(
+        points, turn, -one.rotation @ one.position, matrix, np.array(BENT)
+    )
+    np.testing.assert_allclose(one.project(points), expected[:, 0], atol=1e-6)
+
+
+def test_undistort_is_the_inverse_of_the_distortion_over_the_whole_picture():
+    one = camera()
+    columns, rows = np.meshgrid(np.linspace(0, 639, 30), np.linspace(0, 479, 20))
+    pixels = np.stack([columns, rows], axis=-1)
+    np.testing.assert_allclose(one.to_pixels(one.undistort(pixels)), pixels, atol=1e-4)
+
+
+def test_points_behind_the_camera_have_no_pixel():
+    assert np.isnan(camera().project(np.array([[0.05, -0.6, 0.2]]))).all()
+
+
+@pytest.mark.parametrize(
+    ("position", "right"), [((0.0, -0.5, 0.1), (1, 0, 0)), ((0.5, 0.0, 0.1), (0, 1, 0))]
+)
+def test_views_have_the_axes_of_the_contract(position, right):
+    rotation = look_at(np.array(position), np.array([0.0, 0.0, 0.1]))
+    forward = -np.array(position) * [1, 1, 0] / 0.5
+    np.testing.assert_allclose(rotation, [right, (0, 0, -1), forward], atol=1e-12)
+
+
+def test_a_camera_rolled_clockwise_sees_upright_things_lean_to_the_left():
+    position = np.array([0.0, -0.5, 0.1])
+    rolled = camera(
+        position=position,
+        rotation=look_at(position, np.array([0.0, 0.0, 0.1]), np.radians(5.0)),
+        distortion=(0.0,) * 5,
+    )
+    low, high = rolled.project(np.array([[0.0, 0.0, 0.05], [0.0, 0.0, 0.15]]))
+    across, up = (high - low) / rolled.focal * [1, -1]
+    assert np.degrees(np.arctan2(across, up)) == pytest.approx(-5.0, abs=1e-9)
+
+
+def test_place_is_the_inverse_of_project():
+    one, point = camera(), np.array([0.02, 0.03, 0.15])
+    pixel = one.project(point[None])[0]
+    np.testing.assert_allclose(one.place(pixel, one.depth(point)), point, atol=1e-9)
+
+
+def test_turning_a_camera_to_its_right_moves_the_picture_to_the_left():
+    straight = camera(distortion=(0.0,) * 5)
+    turned = straight.turned(np.array([0.0, 0.01, 0.0]), np.zeros(3))
+    point = np.array([[0.0, 0.0, 0.12]])
+    moved = (turned.project(point) - straight.project(point))[0]
+    assert moved[0] == pytest.approx(-6.52, rel=0.02)
+
+
+def test_a_file_gives_the_same_camera_back(tmp_path):
+    one = camera()
+    write_camera(one, tmp_path / "camera_xz.json")
+    again = read_camera(tmp_path / "camera_xz.json")
+    point = np.array([[0.01, 0.02, 0.15]])
+    np.testing.assert_array_equal(again.project(point), one.project(point))
+    assert again.size == one.size
+
+
+@pytest.mark.parametrize("text", ["no json", "{}", '{"focal": [1, 2]}', "[1]"])
+def test_a_file_that_is_no_camera_is_named(tmp_path, text):
+    path = tmp_path / "camera_xz.json"
+    path.write_text(text)
+    with pytest.raises(CameraModelError, match=r"camera_xz\.json"):
+        read_camera(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("focal", (0.0, 640.0)),
+        ("position", np.array([0.0, np.nan, 0.0])),
+        ("rotation", 2.0 * np.eye(3)),
+        ("rotation", np.diag([1.0, 1.0, -1.0])),
+        ("distortion", (0.1,)),
+    ],
+)
+def test_impossible_cameras_are_refused(name, value):
+    with pytest.raises(CameraModelError, match=name):
+        camera(**{name: value})
+
+
+def test_a_camera_cannot_look_straight_down():
+    with pytest.raises(CameraModelError, match="vertical"):
+        look_at(np.array([0.0, 0.0, 1.0]), np.zeros(3))

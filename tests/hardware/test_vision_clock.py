@@ -1,0 +1,243 @@
+"""Clocks and poses from the marker, against known ones."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from bolfi_liquids.hardware import star
+from bolfi_liquids.hardware.cameras import RenderedCamera, Timing
+from bolfi_liquids.hardware.rendering import (
+    Look,
+    MovingWorld,
+    prepare,
+    rehearsal_camera,
+    rehearsal_scene,
+    stick_view,
+)
+from bolfi_liquids.hardware.vision import (
+    Clock,
+    ClockError,
+    FrameMeter,
+    FrameSeries,
+    GripperSamples,
+    PoseError,
+    View,
+    ViewLines,
+    as_series,
+    fit_clock,
+    join,
+    refine_orientation,
+)
+from scipy.interpolate import CubicSpline
+
+cv2 = pytest.importorskip("cv2")
+
+START = 700.0  # s, of the robot's clock
+PATH = star(speed=0.1, height=0.235, rest=1.0, rate=500.0)
+DURATION = float(PATH.time[-1])
+OFFSET, DRIFT = 640.0, 3e-5
+MARKER = rehearsal_scene("xz").marker_offset
+_spline = CubicSpline(PATH.time, PATH.position)
+
+
+def pivot(time):
+    """Where the gripper is at times of the robot's clock."""
+    return _spline(np.clip(time - START, 0.0, DURATION))
+
+
+def samples(rate: float) -> GripperSamples:
+    time = START + np.arange(0.0, DURATION, 1.0 / rate)
+    return GripperSamples(time, pivot(time))
+
+
+def marker_series(camera, noise: float, seed: int = 0) -> FrameSeries:
+    """What a camera would see, without pictures."""
+    rng = np.random.default_rng(seed)
+    stamp = START - OFFSET + np.arange(0.0, DURATION, 1 / 30)
+    robot = stamp + OFFSET + DRIFT * (stamp - stamp.mean())
+    pixels = camera.project(pivot(robot) + np.array(MARKER))
+    pixels += rng.normal(0.0, noise, pixels.shape)
+    nothing = np.full(len(stamp), np.nan)
+    return FrameSeries(stamp, pixels, ViewLines(*[nothing] * 4), np.zeros(len(stamp), int))
+
+
+@pytest.mark.parametrize("rate", [125.0, 30.0])
+@pytest.mark.parametrize("wrong", [0.0, 0.3, -0.3])
+def test_offset_and_drift_are_found(rate, wrong):
+    camera = rehearsal_camera("xz")
+    series = marker_series(camera, noise=0.05)
+    clock = fit_clock(series, samples(rate), camera, MARKER, guess=OFFSET + wrong)
+    middle = series.stamp.mean()
+    assert clock.to_robot(middle) == pytest.approx(middle + OFFSET, abs=3e-4)
+    assert clock.drift == pytest.approx(DRIFT, abs=5 * clock.drift_error)
+    assert clock.residual == pytest.approx(0.05, rel=0.3)
+
+
+def test_standard_errors_of_the_clock_are_those_of_many_recordings():
+    camera, normalised = rehearsal_camera("yz"), []
+    for seed in range(40):
+        series = marker_series(camera, noise=0.1, seed=seed)
+        clock = fit_clock(series, samples(125.0), camera, MARKER, guess=OFFSET)
+        middle = series.stamp.mean()
+        at_reference = OFFSET + DRIFT * (clock.reference - middle)
+        normalised.append((clock.offset - at_reference) / clock.offset_error)
+    # the scatter of 40 draws lies within 0.65 and 1.4 of the truth with probability 0.999
+    assert 0.65 < np.sqrt(np.mean(np.square(normalised))) < 1.4
+
+
+def test_frames_with_another_marker_do_not_move_the_clock():
+    camera = rehearsal_camera("xz")
+    series = marker_series(camera, noise=0.05)
+    series.marker[::9] += [40.0, -25.0]
+    series.marker[5::11] = np.nan
+    clock = fit_clock(series, samples(125.0), camera, MARKER, guess=OFFSET + 0.1)
+    middle = series.stamp.mean()
+    assert clock.to_robot(middle) == pytest.approx(middle + OFFSET, abs=5e-4)
+
+
+def test_a_camera_that_was_moved_is_told_by_the_misfit_and_does_not_shift_the_clock():
+    camera = rehearsal_camera("xz")
+    series = marker_series(camera, noise=0.05)
+    moved = camera.turned(np.radians([0.2, 2.0, 0.5]), np.array([0.005, 0.01, 0.0]))
+    clock = fit_clock(series, samples(125.0), moved, MARKER, guess=OFFSET)
+    middle = series.stamp.mean()
+    assert clock.to_robot(middle) == pytest.approx(middle + OFFSET, abs=5e-4)
+    assert clock.misfit > 10.0 > 20 * clock.residual
+
+
+def test_a_clock_turns_times_back_and_forth():
+    clock = Clock(offset=3.0, drift=1e-3, reference=10.0)
+    times = np.array([5.0, 10.0, 99.0])
+    np.testing.assert_allclose(clock.to_camera(clock.to_robot(times)), times)
+    assert clock.to_robot(np.array(10.0)) == pytest.approx(13.0)
+    assert clock.to_robot(np.array(11.0)) == pytest.approx(14.001)
+
+
+def test_pictures_that_tell_nothing_about_time_are_refused():
+    camera = rehearsal_camera("xz")
+    series = marker_series(camera, noise=0.05)
+    robot = samples(125.0)
+    with pytest.raises(ClockError, match="show the marker"):
+        fit_clock(series, robot, camera, MARKER, guess=OFFSET + 100.0)
+    hidden = series._replace(marker=np.full_like(series.marker, np.nan))
+    with pytest.raises(ClockError, match="only 0 frames"):
+        fit_clock(hidden, robot, camera, MARKER, guess=OFFSET)
+    still = GripperSamples(robot.time, np.tile(robot.position[0], (len(robot.time), 1)))
+    with pytest.raises(ClockError, match="hardly moves"):
+        fit_clock(series, still, camera, MARKER, guess=OFFSET)
+    lost = GripperSamples(robot.time, np.full_like(robot.position, np.nan))
+    with pytest.raises(ClockError, match="0 finite samples"):
+        fit_clock(series, lost, camera, MARKER, guess=OFFSET)
+
+
+def spatial_motion() -> np.ndarray:
+    t = np.linspace(0.0, 2.0 * np.pi, 300)
+    return np.column_stack(
+        [0.04 * np.sin(3 * t), 0.04 * np.sin(4 * t + 1), 0.26 + 0.04 * np.sin(5 * t)]
+    )
+
+
+def test_a_pose_measured_by_hand_is_put_right():
+    true = rehearsal_camera("xz")
+    places = spatial_motion() + np.array(MARKER)
+    pixels = true.project(places) + np.random.default_rng(0).normal(0, 0.05, (300, 2))
+    pixels[::20] += 30.0
+    pixels[7] = np.nan
+    byhand = true.turned(np.radians([1.0, 2.0, -1.0]), np.array([0.006, -0.008, 0.004]))
+    found = refine_orientation(byhand, pixels, places)
+    errors = np.array([*true.rotation[:, 0], *true.rotation[:, 1]]) - np.array(
+        [*found.camera.rotation[:, 0], *found.camera.rotation[:, 1]]
+    )
+    assert np.degrees(np.abs(errors).max()) < 0.15
+    assert np.abs(found.camera.position - true.position).max() < 2e-3
+    assert found.residual < 0.1
+    # turned and moved by the opposite of what was done, within what the pixels tell
+    assert np.abs(found.turned + np.radians([1.0, 2.0, -1.0])).max() < np.radians(0.15)
+    assert (found.turned_error < np.radians(0.2)).all() and (found.shift_error < 3e-3).all()
+
+
+def test_a_pose_needs_frames_that_show_the_marker():
+    camera, places = rehearsal_camera("xz"), spatial_motion()
+    with pytest.raises(PoseError, match="20 frames"):
+        refine_orientation(camera, camera.project(places)[:20], places[:20])
+    behind = places + [0.0, -1.0, 0.0]
+    with pytest.raises(PoseError, match="behind"):
+        refine_orientation(camera, np.zeros((300, 2)), behind)
+
+
+class WaitingClock:
+    """A computer's clock that only waiting moves."""
+
+    def __init__(self) -> None:
+        self.time = 50.0
+
+    def now(self) -> float:
+        return self.time
+
+    def sleep(self, duration: float) -> None:
+        self.time += duration
+
+
+def inclination_of(time):
+    return np.radians([8 * np.sin(6.9 * time) + 3 * np.sin(2.3 * time), 7 * np.sin(8.1 * time + 1)])
+
+
+def filmed(view: str, timing: Timing, frames: int):
+    """Measurements of a rendered stir; robot's clock minus the computer's is START - 50."""
+    world = MovingWorld(pivot, inclination_of, offset=START - 50.0)
+    scene, camera = rehearsal_scene(view), rehearsal_camera(view)
+    waiting = WaitingClock()
+    rendered = RenderedCamera(
+        prepare(scene, camera, Look(), seed=timing.seed),
+        world,
+        timing,
+        now=waiting.now,
+        sleep=waiting.sleep,
+    )
+    meter, found = FrameMeter(stick_view(scene, camera)), []
+    for _ in range(frames):
+        frame = rendered.read()
+        assert frame is not None
+        found.append(meter.measure(frame))
+    return as_series(found), camera, scene.marker_offset
+
+
+def joined_from_pictures(frames: int):
+    """Joined inclination, times, and errors of both clocks [s]."""
+    timings = {
+        "xz": Timing(offset=1000.0, drift=3e-5, seed=1),
+        "yz": Timing(offset=-20.007, drift=-4e-5, seed=2, rate=29.97),
+    }
+    robot, views, late = samples(125.0), [], []
+    for name, timing in timings.items():
+        series, camera, marker = filmed(name, timing, frames)
+        # the latency is not known to the guess
+        guess = START - 50.0 - timing.offset + timing.latency
+        clock = fit_clock(series, robot, camera, marker, guess=guess)
+        host = 50.0 + (clock.reference - timing.offset - 50.0) / (1.0 + timing.drift)
+        late.append(clock.to_robot(np.array(clock.reference)) - (host + START - 50.0))
+        views.append(View(series, clock, camera))
+    times = START + np.arange(0.2, frames / 30 - 0.2, 1 / 30)
+    return join(views[0], views[1], times), times, np.array(late)
+
+
+def check_joined(joined, times, late) -> None:
+    errors = joined.angle - np.array([inclination_of(time) for time in times])
+    good = joined.flags == 0
+    np.testing.assert_array_equal(np.isfinite(errors).all(axis=1), good)
+    assert good.mean() > 0.75
+    assert np.degrees(np.sqrt(np.mean(errors[good] ** 2))) < 0.15
+    assert np.degrees(np.abs(errors[good]).max()) < 3.0
+    assert 0.7 < np.sqrt(np.mean((errors[good] / joined.error[good]) ** 2)) < 1.4
+    assert np.abs(late).max() < 3e-4
+
+
+def test_a_stir_is_recovered_from_its_pictures():
+    check_joined(*joined_from_pictures(200))
+
+
+@pytest.mark.parametrize("name", ["stick_radius", "marker_offset"])
+def test_scene_and_view_agree(name):
+    scene, camera = rehearsal_scene("xz"), rehearsal_camera("xz")
+    assert getattr(stick_view(scene, camera), name) == getattr(scene, name)
+    assert dataclasses.asdict(scene)[name] == getattr(scene, name)

@@ -1,0 +1,27 @@
+"""The notebooks run from top to bottom, with few simulations."""
+
+from pathlib import Path
+
+import pytest
+
+NOTEBOOKS = sorted((Path(__file__).parents[2] / "notebooks").glob("*.ipynb"))
+LONGEST = 180  # s
+
+
+def test_there_are_notebooks_and_they_are_small():
+    assert NOTEBOOKS
+    assert all(path.stat().st_size < 500_000 for path in NOTEBOOKS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+# Jupyter's own, about its event loop
+@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
+def test_notebook_runs(path, tmp_path, monkeypatch):
+    import nbformat
+    from nbclient import NotebookClient
+
+    monkeypatch.setenv("SMOKE", "1")
+    notebook = nbformat.read(path, as_version=4)
+    where = {"metadata": {"path": str(tmp_path)}}
+    NotebookClient(notebook, timeout=LONGEST, kernel_name="python3", resources=where).execute()

@@ -1,0 +1,236 @@
+"""No entry point moves an arm unless it is armed and a person has typed the sentence."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pexpect
+import pytest
+import typer.main
+from bolfi_liquids.hardware.session.confirmation import SENTENCE, Confirmation
+from pexpect.fdpexpect import fdspawn
+
+import bolfi_liquids as bl
+from bolfi_liquids import hardware
+from bolfi_liquids.cli import app
+
+ROOT = Path(__file__).parents[2]
+PARTS = ("bolfi_liquids", "hardware", "inference", "models")
+SOURCES = {str(p.relative_to(ROOT)): p for part in PARTS for p in (ROOT / part).rglob("*.py")}
+REFUSED = 2
+
+# what makes each command that knows of a rig do the most that it can without being armed
+OF_A_RIG = {
+    "record": ["--cycles", "1", "--calibrate", "CALIBRATED"],
+    "pour": ["RUN", "--execute"],
+    "rig check": [],
+    "rig calibrate-cameras": ["--boards", "PICTURES"],
+    "rig emulate": ["--address", "10.0.0.1"],
+}
+
+
+def commands():
+    """Every command's words, with its parameters' names."""
+
+    def walk(command, words):
+        if hasattr(command, "commands"):
+            for name, inner in command.commands.items():
+                yield from walk(inner, [*words, name])
+        else:
+            yield " ".join(words), {parameter.name for parameter in command.params}
+
+    return dict(walk(typer.main.get_command(app), []))
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("pictures")
+    noise = np.random.default_rng(0)
+    for k in range(60):
+        image = noise.integers(90, 110, (480, 640), dtype=np.uint8)
+        cv2.imwrite(str(directory / f"{k:03d}.png"), image)
+    return directory
+
+
+@pytest.fixture(scope="module")
+def emulator():
+    rig = hardware.bundled_rig()
+    with hardware.emulated(rig, hardware.above_cup(rig)) as running:
+        yield running.emulator
+
+
+@pytest.fixture
+def rig_file(tmp_path, emulator, pictures):
+    """The bundled rig, its arm the emulator and its cameras pictures in a directory."""
+    text = (files("bolfi_liquids.hardware.data") / "rig.toml").read_text()
+    text = text.replace('host = "127.0.0.1"', f'host = "{emulator.address}"')
+    text = re.sub(r"source = [01]", f'source = "{pictures}"', text)
+    path = tmp_path / "rig.toml"
+    path.write_text(text)
+    return path
+
+
+@pytest.fixture
+def run_with_a_pour(tmp_path):
+    """A run that has chosen a pour, without its simulations."""
+    import json
+
+    from xarray import DataTree
+
+    from bolfi_liquids.cups import bundled_cups
+    from bolfi_liquids.results import write_tree
+    from bolfi_liquids.summary import write_section
+
+    run = tmp_path / "run"
+    run.mkdir()
+    tree = DataTree()
+    tree.attrs["cups"] = json.dumps(bundled_cups().settings())
+    write_tree(tree, run / "pour.nc")
+    write_section(run, "pour", {"angular_velocity_deg_s": 60.0, "distance_cm": 2.0})
+    return run
+
+
+def bolfi_liquids(*arguments, typed=""):
+    code = "from bolfi_liquids.cli import main; main()"
+    return subprocess.run(
+        [sys.executable, "-c", code, *map(str, arguments)],
+        input=typed,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+def in_a_terminal(*arguments, typed):
+    """Run the command as a person does, who answers the question; its exit status."""
+    words = " ".join(map(str, arguments))
+    code = f"from bolfi_liquids.cli import app; app({words!r}.split())"
+    # not pexpect.spawn, which forks this process with all of its threads
+    ours, its = os.openpty()
+    command = [sys.executable, "-c", code]
+    with subprocess.Popen(command, stdin=its, stdout=its, stderr=its) as process:
+        os.close(its)
+        with fdspawn(ours, timeout=60.0) as terminal:
+            terminal.expect("to go on: ")
+            terminal.sendline(typed)
+            terminal.expect(pexpect.EOF)
+    return process.returncode
+
+
+def test_every_command_is_known_here():
+    with_rig = {words for words, names in commands().items() if "rig" in names}
+    assert with_rig == set(OF_A_RIG)
+    armable = {words for words, names in commands().items() if "arm" in names}
+    assert armable == {"record", "pour"}
+
+
+def test_there_are_no_other_entry_points():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert project["scripts"] == {"bolfi-liquids": "bolfi_liquids.cli:main"}
+    assert {name for name in SOURCES if name.endswith("__main__.py")} == {
+        "hardware/emulator/__main__.py"
+    }
+
+
+def gives(argument, path):
+    """Whether a call in a file gives an argument of that name anything but False."""
+    calls = (node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call))
+    given = (keyword for call in calls for keyword in call.keywords if keyword.arg == argument)
+    return any(not (isinstance(k.value, ast.Constant) and k.value.value is False) for k in given)
+
+
+def sources(pattern):
+    return {name for name, path in SOURCES.items() if re.search(pattern, path.read_text())}
+
+
+def test_one_file_knows_the_library_that_moves_arms():
+    assert sources(r"rtde_control\"\)|import rtde_control") == {"hardware/robot/ur.py"}
+    assert sources(r"\bURArm\(") == {"hardware/robot/ur.py", "hardware/robot/preparation.py"}
+    armed = {name for name, path in SOURCES.items() if gives("armed", path)}
+    # the last two hand it on
+    inside = {"hardware/session/session.py", "hardware/robot/control_process.py"}
+    assert armed == {"bolfi_liquids/armed_session.py", *inside}
+
+
+@pytest.mark.parametrize("words", OF_A_RIG)
+def test_unarmed_command_moves_nothing(words, rig_file, run_with_a_pour, pictures, emulator):
+    before = emulator.admin.motions()
+    names = {"RUN": run_with_a_pour, "PICTURES": pictures, "CALIBRATED": rig_file.parent / "c"}
+    arguments = [names.get(one, one) for one in OF_A_RIG[words]]
+    # the sentence is typed all the same
+    result = bolfi_liquids(*words.split(), *arguments, "--rig", rig_file, typed=f"{SENTENCE}\n")
+    assert "Traceback" not in result.stderr, result.stderr
+    assert emulator.admin.motions() == before
+    if words in ("record", "pour"):
+        assert "nothing was moved" in result.stdout, result.stderr
+
+
+@pytest.mark.parametrize("words", ["record", "pour"])
+def test_a_sentence_through_a_pipe_was_typed_by_nobody(
+    words, rig_file, run_with_a_pour, emulator, tmp_path
+):
+    before = emulator.admin.motions()
+    extra = {"record": ["--out", tmp_path / "out"], "pour": [run_with_a_pour, "--execute"]}[words]
+    command = [words, *extra, "--rig", rig_file, "--arm"]
+    result = bolfi_liquids(*command, typed=f"{SENTENCE}\n")
+    assert result.returncode == REFUSED, result.stderr
+    # cameras that are files are refused even earlier
+    assert ("no terminal" if words == "pour" else "name a device") in result.stderr
+    assert emulator.admin.motions() == before
+
+
+@pytest.mark.parametrize("typed", ["", "yes", SENTENCE.upper()])
+@pytest.mark.parametrize("words", ["record", "pour"])
+def test_armed_without_the_sentence_moves_nothing(
+    words, typed, rig_file, run_with_a_pour, emulator, tmp_path
+):
+    before = emulator.admin.motions()
+    # a real arm asks for real cameras, which nobody opens before the sentence is there
+    rig_file.write_text(re.sub(r'source = ".*"', "source = 0", rig_file.read_text()))
+    extra = {"record": ["--out", tmp_path / "out"], "pour": [run_with_a_pour, "--execute"]}[words]
+    assert in_a_terminal(words, *extra, "--rig", rig_file, "--arm", typed=typed) == REFUSED
+    assert emulator.admin.motions() == before
+
+
+@pytest.mark.slow
+def test_the_sentence_does_move_the_arm(run_with_a_pour, tmp_path):
+    """Without this the tests above could not fail."""
+    rig = hardware.bundled_rig()
+    ready = hardware.ready_to_pour(rig, 0.02, 0.2)
+    with hardware.emulated(rig, ready, tool="pouring") as running:
+        text = (files("bolfi_liquids.hardware.data") / "rig.toml").read_text()
+        path = tmp_path / "rig.toml"
+        address = running.emulator.address
+        path.write_text(text.replace('host = "127.0.0.1"', f'host = "{address}"'))
+        command = ["pour", run_with_a_pour, "--execute", "--rig", path, "--arm"]
+        assert in_a_terminal(*command, typed=SENTENCE) == 0
+        assert running.emulator.admin.motions() > 0
+
+
+def test_python_asks_for_the_same(tmp_path):
+    rig = hardware.bundled_rig()
+    with pytest.raises(ValueError, match="ask="):
+        bl.record(rig, out=tmp_path / "a")
+    with pytest.raises(ValueError, match="armed without a confirmation"):
+        hardware.Session(rig, tmp_path / "b", armed=True)
+    with pytest.raises(ValueError, match="without an emulated arm"):
+        hardware.Session(
+            rig,
+            tmp_path / "c",
+            armed=True,
+            rehearsal=True,
+            confirmation=hardware.confirm("plan", SENTENCE, rig.robot.host),
+        )
+    with pytest.raises(TypeError, match="comes from confirm"):
+        Confirmation(object(), "plan", "127.0.0.1", emulated=False)
+    with pytest.raises(ValueError, match="ask="):
+        bl.execute_pour(tmp_path, rig)
+    with pytest.raises(ValueError, match="no emulator answers"):
+        hardware.confirm_emulated("plan", "192.168.1.10")
