@@ -1,9 +1,10 @@
 """Universal Robots' arms through ur_rtde: the only file that knows that library.
 
 What it guards against, found in ur_rtde 1.6.5: getters repeat the last value for ever when a link
-is lost; `servoL` says True on a dead link; the control interface reconnects by itself, starts the
-script again without a watchdog, and may crash the process. So a lost connection stays lost here,
-nothing is sent after it, and a process of its own owns the object.
+is lost; `servoL` says True on a dead link; the control interface reconnects by itself, again and
+again, starts its script anew without a watchdog, and may crash the process. So a lost connection
+stays lost here, nothing is sent after it, the interface that moves the arm is one that never
+uploads a script, and a process of its own owns the object.
 """
 
 import sys
@@ -137,7 +138,10 @@ class URArm(URReader):
             LinkLost: It did not take the tool's centre or the payload.
         """
         control = _interface("rtde_control").RTDEControlInterface
-        self._control = self._opened(control, self._address, self._rate)
+        starter = self._opened(control, self._address, self._rate, control.FLAG_UPLOAD_SCRIPT)
+        del starter  # which disconnects: input registers have one owner
+        # what it finds running it never starts again, whenever it reconnects
+        self._control = self._opened(control, self._address, self._rate, control.FLAG_NO_WAIT)
         self.mount(self._tcp)
         if not self._control.setPayload(self._robot.payload, list(self._robot.payload_centre)):
             raise LinkLost("the controller did not take the payload")

@@ -155,8 +155,8 @@ def tripped(readings: tuple[Reading, ...], seen: Seen) -> Trip | None:
 def _loop(seen: Seen, rules: Rules) -> tuple[Reading, ...]:
     state, watch, limits = seen.state, seen.watch, rules.limits
     return (
-        Reading("overrun", seen.late, limits.overrun, "s"),
         Reading("link", float(not state.connected), YES, ""),
+        Reading("overrun", seen.late, limits.overrun, "s"),
         Reading("silence", seen.now - watch.fresh, limits.silence, "s"),
         Reading("delay", watch.fresh - watch.time - watch.offset, limits.silence, "s"),
     )

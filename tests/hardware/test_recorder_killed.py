@@ -103,6 +103,10 @@ def test_what_was_recorded_up_to_a_second_before_the_kill_can_be_used(tmp_path, 
             if killed in (name, "all"):
                 process.kill()
         time.sleep(0.5)
+        # as control does before main ends: the recorder waits for the robot's last sample
+        sampler.ended.set()
+        sampler.join()
+        samples.close()
         for main in mains:
             main.close()
         for process in processes.values():
@@ -112,8 +116,6 @@ def test_what_was_recorded_up_to_a_second_before_the_kill_can_be_used(tmp_path, 
         sampler.ended.set()
         for process in processes.values():
             process.kill()
-        sampler.join()
-        samples.close()
 
     recording = bl.open_recording(finalise(directory))
     assert recording.attrs["status"] == "aborted"

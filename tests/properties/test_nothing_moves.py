@@ -109,7 +109,7 @@ def bolfi_liquids(*arguments, typed=""):
 
 
 def in_a_terminal(*arguments, typed):
-    """Run the command as a person does, who answers the question; its exit status."""
+    """Run the command as a person does, who answers the question; exit status and last words."""
     words = " ".join(map(str, arguments))
     code = f"from bolfi_liquids.cli import app; app({words!r}.split())"
     # not pexpect.spawn, which forks this process with all of its threads
@@ -121,7 +121,8 @@ def in_a_terminal(*arguments, typed):
             terminal.expect("to go on: ")
             terminal.sendline(typed)
             terminal.expect(pexpect.EOF)
-    return process.returncode
+            said = terminal.before.decode()
+    return process.returncode, said
 
 
 def test_every_command_is_known_here():
@@ -195,11 +196,13 @@ def test_armed_without_the_sentence_moves_nothing(
     # a real arm asks for real cameras, which nobody opens before the sentence is there
     rig_file.write_text(re.sub(r'source = ".*"', "source = 0", rig_file.read_text()))
     extra = {"record": ["--out", tmp_path / "out"], "pour": [run_with_a_pour, "--execute"]}[words]
-    assert in_a_terminal(words, *extra, "--rig", rig_file, "--arm", typed=typed) == REFUSED
+    status, said = in_a_terminal(words, *extra, "--rig", rig_file, "--arm", typed=typed)
+    assert status == REFUSED, said
     assert emulator.admin.motions() == before
 
 
 @pytest.mark.slow
+@pytest.mark.punctual
 def test_the_sentence_does_move_the_arm(run_with_a_pour, tmp_path):
     """Without this the tests above could not fail."""
     rig = hardware.bundled_rig()
@@ -210,7 +213,8 @@ def test_the_sentence_does_move_the_arm(run_with_a_pour, tmp_path):
         address = running.emulator.address
         path.write_text(text.replace('host = "127.0.0.1"', f'host = "{address}"'))
         command = ["pour", run_with_a_pour, "--execute", "--rig", path, "--arm"]
-        assert in_a_terminal(*command, typed=SENTENCE) == 0
+        status, said = in_a_terminal(*command, typed=SENTENCE)
+        assert status == 0, said
         assert running.emulator.admin.motions() > 0
 
 
