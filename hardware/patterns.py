@@ -48,8 +48,6 @@ def star(  # noqa: PLR0913  a pattern has that many sizes
         rest=rest,
         rate=rate,
     )
-    if points < 5 or points % 2 == 0:
-        raise ValueError(f"points must be odd and at least 5, got {points}; the paper uses 9")
     corners = np.concatenate([np.zeros((1, 2)), star_vertices(points, radius)])
 
     strokes = np.linalg.norm(np.diff(corners, axis=0), axis=1)
@@ -72,7 +70,12 @@ def star_vertices(points: int, radius: float) -> np.ndarray:
 
     Returns:
         x and y [m], shape (points + 1, 2).
+
+    Raises:
+        ValueError: `points` is below 5, or even, of which all strokes would lie on one line.
     """
+    if points < 5 or points % 2 == 0:
+        raise ValueError(f"points must be odd and at least 5, got {points}; the paper uses 9")
     angles = 2.0 * np.pi * (points // 2) * np.arange(points + 1) / points
     return radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
 

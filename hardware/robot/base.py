@@ -70,6 +70,10 @@ class ArmReader(Protocol):
         """The latest state; never waits."""
         ...
 
+    def time(self) -> float:
+        """Controller's clock of the latest state [s]; a look for whether there is a new one."""
+        ...
+
     def payload(self) -> Payload:
         """What the controller says hangs on the flange."""
         ...

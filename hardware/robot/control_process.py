@@ -221,13 +221,13 @@ class _Control:
 
     def _await_package(self, end: float) -> None:
         """Wait for one that is late: it would be missed when the next one comes in time."""
-        while host_time() < end and self._reader.read().time == self._watch.time:
+        while host_time() < end and self._reader.time() == self._watch.time:
             time.sleep(0.05 * self._period)
 
     def _between_packages(self) -> float:
         """Half a period after the next package comes; one period from now if none does."""
-        latest, end = self._reader.read().time, host_time() + self._period
-        while host_time() < end and self._reader.read().time == latest:
+        latest, end = self._reader.time(), host_time() + self._period
+        while host_time() < end and self._reader.time() == latest:
             time.sleep(0.05 * self._period)
         return host_time() + 0.5 * self._period
 

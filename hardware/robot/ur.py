@@ -66,10 +66,14 @@ class URReader:
         """The latest state, all of it from one package; never waits."""
         state = self._read_once()
         for _ in range(_READS):
-            if self._receive.getTimestamp() == state.time:
+            if self.time() == state.time:
                 break
             state = self._read_once()
         return state
+
+    def time(self) -> float:
+        """Controller's clock of the latest state [s]; a look for whether there is a new one."""
+        return self._receive.getTimestamp()
 
     def payload(self) -> Payload:
         """What the controller says hangs on the flange."""
@@ -87,7 +91,7 @@ class URReader:
     def _read_once(self) -> ArmState:
         receive = self._receive
         return ArmState(
-            time=receive.getTimestamp(),
+            time=self.time(),
             pose=tuple(receive.getActualTCPPose()),
             velocity=tuple(receive.getActualTCPSpeed()),
             wrench=tuple(receive.getActualTCPForce()),
