@@ -6,6 +6,10 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
 
+FAST := not slow and not gpu and not hardware and not benchmark
+# tests that must keep time have the computer for themselves, the others share its processors
+SHARED := -n logical --maxprocesses 4 --dist loadfile
+
 PEERS := .venv-peers
 PEERS_SUPPORTED := import sys, ensurepip; sys.exit(not (3, 9) <= sys.version_info[:2] <= (3, 10))
 PYENV_VERSIONS := $(or $(PYENV_ROOT),$(HOME)/.pyenv)/versions
@@ -32,10 +36,12 @@ demo: setup
 	$(BIN)/bolfi-liquids demo --out runs/demo
 
 test: setup
-	$(BIN)/pytest
+	$(BIN)/pytest $(SHARED) -m "$(FAST) and not punctual"
+	$(BIN)/pytest -m "$(FAST) and punctual"
 
 test-slow: setup
-	$(BIN)/pytest -m slow
+	$(BIN)/pytest $(SHARED) --durations 20 -m "slow and not punctual"
+	$(BIN)/pytest -m "slow and punctual"
 
 lint: setup
 	$(BIN)/ruff check

@@ -1,8 +1,11 @@
 import math
 import time
 
+import pytest
 from bolfi_liquids.hardware.board import SPAWN, Board, Row, Trouble, Who, host_time
 from bolfi_liquids.hardware.recorder.process import run_recorder
+
+pytestmark = pytest.mark.punctual
 
 
 def test_rows_are_empty_at_first_and_apart():

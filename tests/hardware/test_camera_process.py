@@ -31,6 +31,8 @@ from bolfi_liquids.hardware.vision.frame import Frame  # noqa: E402
 from bolfi_liquids.hardware.vision.frame_measurement import FrameMeasurement  # noqa: E402
 from bolfi_liquids.hardware.vision.measuring import FrameMeter  # noqa: E402
 
+pytestmark = pytest.mark.punctual
+
 RIG = bundled_rig()
 HEIGHT = RIG.stirring.height
 CALM = replace(Look(), faults=0.0)

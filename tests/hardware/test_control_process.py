@@ -37,6 +37,8 @@ from bolfi_liquids.hardware.safety.preflight import failures
 from bolfi_liquids.hardware.session.patience import patient
 from scipy.spatial.transform import Rotation
 
+pytestmark = pytest.mark.punctual
+
 RIG = patient(bundled_rig())
 SHORT = {"rest": 0.1, "points": 5, "radius": 0.02}
 QUICK = RIG.model_copy(update={"stirring": RIG.stirring.model_copy(update=SHORT)})
@@ -259,7 +261,6 @@ def controlled(tmp_path):
         one.close()
 
 
-@pytest.mark.punctual
 def test_a_path_is_followed_recorded_and_logged(controlled):
     control = controlled()
     checked = control.wait_for(Checked)
@@ -311,7 +312,6 @@ def stops(control):
     return stopped
 
 
-@pytest.mark.punctual
 @pytest.mark.parametrize(
     "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)]
 )
@@ -322,7 +322,6 @@ def test_a_signal_stops_the_arm(controlled, number):
     assert number.name in stops(control).reason
 
 
-@pytest.mark.punctual
 @pytest.mark.slow
 def test_late_packages_stop_the_arm(controlled):
     control = controlled()
@@ -331,7 +330,6 @@ def test_late_packages_stop_the_arm(controlled):
     assert stops(control).guard in ("silence", "delay")
 
 
-@pytest.mark.punctual
 @pytest.mark.slow
 def test_a_silent_recorder_stops_the_arm(controlled):
     control = controlled()
@@ -340,7 +338,6 @@ def test_a_silent_recorder_stops_the_arm(controlled):
     assert stops(control).guard == "recorder"
 
 
-@pytest.mark.punctual
 @pytest.mark.slow
 def test_leaving_during_a_motion_is_a_stop(controlled):
     control = controlled()
@@ -349,7 +346,6 @@ def test_leaving_during_a_motion_is_a_stop(controlled):
     assert "leave" in stops(control).reason
 
 
-@pytest.mark.punctual
 def test_a_dry_run_looks_and_refuses_to_move(controlled):
     control = controlled(armed=False)
     checked = control.wait_for(Checked)
@@ -360,7 +356,6 @@ def test_a_dry_run_looks_and_refuses_to_move(controlled):
     assert control.emulator.admin.state().runtime_state == 1
 
 
-@pytest.mark.punctual
 def test_an_arm_outside_its_box_is_not_armed(controlled):
     high = stir(QUICK).pose[0] + [0, 0, 0.25, 0, 0, 0]
     control = controlled(pose=high)
@@ -371,7 +366,6 @@ def test_an_arm_outside_its_box_is_not_armed(controlled):
     assert control.emulator.admin.motions() == 0
 
 
-@pytest.mark.punctual
 @pytest.mark.slow
 def test_a_source_that_pours_is_turned_back_before_the_arm_stops(controlled):
     pour = pour_path(
@@ -395,7 +389,6 @@ def test_a_source_that_pours_is_turned_back_before_the_arm_stops(controlled):
     assert control.events("turning_back")
 
 
-@pytest.mark.punctual
 @pytest.mark.slow
 def test_a_source_is_not_turned_back_on_a_force(controlled):
     pour = pour_path(
@@ -412,7 +405,6 @@ def test_a_source_is_not_turned_back_on_a_force(controlled):
     assert not control.events("turning_back")
 
 
-@pytest.mark.punctual
 @pytest.mark.slow
 def test_a_source_that_came_tilted_is_not_turned_back_to_that(controlled):
     """A way there that is given up leads back to wherever the arm was jogged to."""

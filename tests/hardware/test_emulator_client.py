@@ -9,6 +9,8 @@ import pytest
 from bolfi_liquids.hardware import geometry, kinematics
 from bolfi_liquids.hardware.emulator import EmulatorProcess
 
+pytestmark = pytest.mark.punctual
+
 rtde_control = pytest.importorskip("rtde_control")
 rtde_receive = pytest.importorskip("rtde_receive")
 rtde_io = pytest.importorskip("rtde_io")

@@ -11,6 +11,8 @@ import pytest
 from bolfi_liquids.hardware.emulator import EmulatorProcess
 from bolfi_liquids.hardware.emulator.admin_client import AdminError
 
+pytestmark = pytest.mark.punctual
+
 HOME = [0.3, -1.4, 1.6, -1.7, -1.5, 0.2]
 
 # control interfaces live in processes of their own: after a lost link they may crash theirs
@@ -217,7 +219,6 @@ def test_receiver_gives_up_a_frozen_link_after_2_5_s(emulator):
     del receive
 
 
-@pytest.mark.punctual
 def test_late_packages_are_late(emulator):
     rtde_receive = pytest.importorskip("rtde_receive")
     receive = rtde_receive.RTDEReceiveInterface(emulator.address)

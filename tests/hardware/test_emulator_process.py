@@ -10,6 +10,8 @@ import pytest
 from bolfi_liquids.hardware.emulator import EmulatorProcess
 from bolfi_liquids.hardware.errors import RigError
 
+pytestmark = pytest.mark.punctual
+
 HOME = [0.3, -1.4, 1.6, -1.7, -1.5, 0.2]
 STICK = {
     "radius": 0.004,

@@ -35,7 +35,8 @@ ANSWERS = {
     ),
     "3": Answer(
         "the control interface reconnects by itself, and crashes",
-        "nothing is sent after a loss; the process ends without the library's clean-up",
+        "nothing is sent after a loss, the interface that moves the arm uploads no script, and the "
+        "process ends without the library's clean-up",
         (
             "ur_driver: nothing_is_sent_though_the_library_reconnects",
             "faults: fault_during_motion",
@@ -53,7 +54,7 @@ ANSWERS = {
     ),
     "6": Answer(
         "an upload disarms the watchdog",
-        "one upload, then the watchdog; no path is ever uploaded, nothing reconnects",
+        "one upload, by an interface that is then closed; no path is ever uploaded",
         ("ur_driver: watchdog_stops_the_arm", "ur_driver: though_the_library_reconnects"),
     ),
     "7": Answer(

@@ -21,6 +21,8 @@ from bolfi_liquids.hardware.recorder.process import run_recorder
 from bolfi_liquids.hardware.recorder.rate import counted, no_rate
 from bolfi_liquids.hardware.recorder.sample import SAMPLES, Sample
 
+pytestmark = pytest.mark.punctual
+
 FIELDS = ("index", "value")
 
 

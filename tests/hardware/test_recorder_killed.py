@@ -26,6 +26,8 @@ from bolfi_liquids.hardware.session.camera_process import WHO, run_camera  # noq
 
 import bolfi_liquids as bl  # noqa: E402
 
+pytestmark = pytest.mark.punctual
+
 RIG = bundled_rig()
 ROBOT = 700.25  # the robot's clock minus this computer's [s]
 STIRRED = 8.0  # s

@@ -27,6 +27,8 @@ from bolfi_liquids.hardware.session.confirmation import (
 )
 from bolfi_liquids.hardware.session.session import Session, SessionStopped
 
+pytestmark = pytest.mark.punctual
+
 RIG = bundled_rig()
 SHORT = {"rest": 0.1, "points": 5, "radius": 0.02}
 RIG = RIG.model_copy(update={"stirring": RIG.stirring.model_copy(update=SHORT)})
@@ -78,7 +80,6 @@ def kinds(directory, source):
     return [event["kind"] for event in read_events(directory) if event["source"] == source]
 
 
-@pytest.mark.punctual
 def test_a_session_follows_paths_records_them_and_leaves_nothing_behind(emulator, tmp_path):
     with armed(emulator, tmp_path) as session:
         assert failures(session.preflight()) == ""
@@ -108,7 +109,6 @@ def test_a_session_follows_paths_records_them_and_leaves_nothing_behind(emulator
         session.follow(PLAN[0])
 
 
-@pytest.mark.punctual
 def test_a_session_is_a_dry_run_unless_it_is_armed_and_records_all_the_same(emulator, tmp_path):
     with Session(RIG, tmp_path, emulator.address) as session:
         assert failures(session.preflight()) == ""
@@ -160,7 +160,6 @@ def begin(session):
     time.sleep(0.8)
 
 
-@pytest.mark.punctual
 def test_a_path_that_breaks_a_limit_is_not_ordered(emulator, tmp_path):
     with armed(emulator, tmp_path) as session:
         high = PLAN[0]._replace(pose=PLAN[0].pose + [0, 0, 0.25, 0, 0, 0])
@@ -170,7 +169,6 @@ def test_a_path_that_breaks_a_limit_is_not_ordered(emulator, tmp_path):
         assert session.follow(PLAN[0]) == 0
 
 
-@pytest.mark.punctual
 def test_an_exception_stops_the_arm_and_is_the_reason(emulator, tmp_path):
     with pytest.raises(ZeroDivisionError):
         with armed(emulator, tmp_path) as session:
@@ -182,7 +180,6 @@ def test_an_exception_stops_the_arm_and_is_the_reason(emulator, tmp_path):
     assert "ZeroDivisionError in the main process: oh" in event["reason"]
 
 
-@pytest.mark.punctual
 def test_a_stop_is_final(emulator, tmp_path):
     with armed(emulator, tmp_path) as session:
         begin(session)
@@ -193,7 +190,6 @@ def test_a_stop_is_final(emulator, tmp_path):
             session.follow(PLAN[0])
 
 
-@pytest.mark.punctual
 @pytest.mark.slow
 def test_a_control_process_that_hangs_is_ended(emulator, tmp_path):
     with armed(emulator, tmp_path) as session:
@@ -242,7 +238,6 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.punctual
 @pytest.mark.slow
 @pytest.mark.parametrize("way", ["exit", "SIGTERM", "SIGHUP", "SIGINT", "SIGKILL"])
 def test_however_main_ends_the_arm_stops(emulator, tmp_path, way):

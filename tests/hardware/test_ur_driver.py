@@ -17,6 +17,8 @@ from bolfi_liquids.hardware.safety.limits import workspace
 
 pytest.importorskip("rtde_control")
 
+pytestmark = pytest.mark.punctual
+
 RIG = bundled_rig()
 PATH = cup_frame(RIG.cup).to_base(stir(RIG).pose)
 PERIOD = 1.0 / 125.0
@@ -55,7 +57,6 @@ def wait_for_rest(emulator, timeout=1.0):
     return emulator.admin.state().at_rest
 
 
-@pytest.mark.punctual
 def test_a_reader_sees_the_arm_and_starts_nothing(emulator):
     reader = URReader(emulator.address, 125.0)
     reader.connect()
@@ -70,7 +71,6 @@ def test_a_reader_sees_the_arm_and_starts_nothing(emulator):
     reader.close()
 
 
-@pytest.mark.punctual
 def test_a_lost_link_is_seen_at_once_and_stays_lost(emulator):
     reader = URReader(emulator.address, 125.0)
     reader.connect()
@@ -85,7 +85,6 @@ def test_a_lost_link_is_seen_at_once_and_stays_lost(emulator):
     reader.close()
 
 
-@pytest.mark.punctual
 def test_taking_control_sets_tool_and_payload_and_moves_nothing(arm, emulator):
     payload = arm.payload()
     assert arm.tcp() == pytest.approx(RIG.robot.stirring_tcp, abs=1e-9)
@@ -96,13 +95,11 @@ def test_taking_control_sets_tool_and_payload_and_moves_nothing(arm, emulator):
     assert emulator.admin.motions() == 0
 
 
-@pytest.mark.punctual
 def test_the_lip_becomes_the_tool_s_centre(arm):
     arm.mount(RIG.robot.pouring_tcp)
     assert arm.tcp() == pytest.approx(RIG.robot.pouring_tcp, abs=1e-9)
 
 
-@pytest.mark.punctual
 def test_the_arm_follows_its_set_points(arm):
     arm.arm_watchdog()
     follow(arm, PATH[250:500])
@@ -110,7 +107,6 @@ def test_the_arm_follows_its_set_points(arm):
     assert np.linalg.norm(np.array(arm.read().pose[:3]) - PATH[499, :3]) < 0.015
 
 
-@pytest.mark.punctual
 def test_a_set_point_that_breaks_a_limit_is_not_sent(arm, emulator):
     arm.arm_watchdog()
     follow(arm, PATH[:5])
@@ -126,13 +122,11 @@ def test_a_set_point_that_breaks_a_limit_is_not_sent(arm, emulator):
     arm.command(PATH[5])
 
 
-@pytest.mark.punctual
 def test_the_first_set_point_must_be_where_the_arm_is(arm):
     with pytest.raises(MotionRejected, match="a step of"):
         arm.command(PATH[0] + [0.003, 0, 0, 0, 0, 0])
 
 
-@pytest.mark.punctual
 def test_the_watchdog_stops_the_arm_when_set_points_cease(arm, emulator):
     arm.arm_watchdog()
     follow(arm, PATH[250:330])
@@ -144,7 +138,6 @@ def test_the_watchdog_stops_the_arm_when_set_points_cease(arm, emulator):
         arm.command(PATH[330])
 
 
-@pytest.mark.punctual
 def test_stop_returns_at_once_and_is_final(arm, emulator):
     arm.arm_watchdog()
     follow(arm, PATH[250:330])
@@ -160,13 +153,11 @@ def test_stop_returns_at_once_and_is_final(arm, emulator):
     assert emulator.admin.state().runtime_state == 1
 
 
-@pytest.mark.punctual
 def test_the_controller_s_own_limits_are_asked(arm):
     assert arm.allows(PATH[0])
     assert not arm.allows(np.array([3.0, 0.0, 0.2, np.pi, 0.0, 0.0]))
 
 
-@pytest.mark.punctual
 def test_a_protective_stop_is_told_and_takes_no_set_point(arm, emulator):
     arm.arm_watchdog()
     follow(arm, PATH[:3])
@@ -210,7 +201,6 @@ os._exit(0)
 """
 
 
-@pytest.mark.punctual
 def test_after_a_dropped_link_nothing_is_sent_though_the_library_reconnects(emulator):
     command = [sys.executable, "-c", DROPPED, emulator.address]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)

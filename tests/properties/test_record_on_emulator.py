@@ -12,6 +12,8 @@ from bolfi_liquids import hardware
 pytest.importorskip("rtde_control")
 pytest.importorskip("cv2")
 
+pytestmark = pytest.mark.punctual
+
 VIEWS = ("xz", "yz")
 TRUTH = ("index", "stamp", "time", "inclination_xz", "inclination_yz")
 
