@@ -14,8 +14,8 @@ from .recordings import Gripper, Recording
 from .strokes import strokes
 
 FARTHEST = 2e-3  # m that the arm may be off its plan; star strokes are 50 mm long
-LATEST = 0.2  # s that the arm may be late, or early; a servoed arm follows by some 0.1 s
-SEARCHED = 0.4  # s, up to which its delay is looked for
+LATEST = 0.2  # s that a stroke may change the delay by; a servoed arm follows by some 0.1 s
+SEARCHED = 0.4  # s, up to which such a change is looked for
 GAP = 2.5  # sampling intervals of the plan; data farther apart are not interpolated between
 MOVED = 5e-3  # m from which the delay shows
 SLACK = 1e-3  # s by which a stroke may seem to lack its end, as the delay is only estimated
@@ -45,8 +45,8 @@ class Followed(NamedTuple):
             stroke and where nothing was seen.
         strokes: Finished.
         covered: When the last of them was to end [s]; -inf where there is none.
-        delay: Of the arm behind its plan [s]; what was observed is shifted by it.
-        apart: Greatest distance of the arm from the plan, the delay allowed for [m].
+        delay: Of the arm behind its plan in the latest stroke [s].
+        apart: Greatest distance of the arm from the plan, each stroke's delay allowed for [m].
         refusal: Why these data are no stir along the plan; "" if they are.
     """
 
@@ -99,6 +99,9 @@ def stroke_ends(plan: Recording) -> NDArray[np.float64]:
 def follow(plan: Recording, ends: NDArray, so_far: SoFar) -> Followed:
     """Bring data onto the plan's times, cut after the last finished stroke.
 
+    Each stroke is shifted by a delay of its own: a control loop that misses periods delays all
+    that is still to come.
+
     Args:
         plan: Of `planned`.
         ends: Of `stroke_ends`.
@@ -108,14 +111,16 @@ def follow(plan: Recording, ends: NDArray, so_far: SoFar) -> Followed:
         InputError: The arrays are no recording.
     """
     _check(so_far)
-    delay = _delay(plan, so_far)
-    time = so_far.time - delay
-    apart = float(np.nanmax(_distance(plan, so_far, delay)))
-    done = int(np.searchsorted(ends, time[-1] + SLACK, side="right"))
+    delays, apart = _delays(plan, ends, so_far)
+    done = len(delays) - 1
     covered = float(ends[done - 1]) if done else float("-inf")
-    observed = np.column_stack([_sampled(plan.time, time, y) for y in so_far.inclination.T])
+    stroke = np.minimum(np.searchsorted(ends, plan.time - SLACK), done)
+    wanted = plan.time + delays[stroke]
+    observed = np.column_stack([_sampled(wanted, so_far.time, y) for y in so_far.inclination.T])
     observed[plan.time > covered + SLACK] = np.nan
-    return Followed(observed, done, covered, delay, apart, _refusal(delay, apart))
+    change = np.diff(delays, prepend=0.0)
+    refusal = _refusal(float(change[np.abs(change).argmax()]), apart)
+    return Followed(observed, done, covered, float(delays[-1]), apart, refusal)
 
 
 def _check(so_far: SoFar) -> None:
@@ -133,27 +138,48 @@ def _check(so_far: SoFar) -> None:
         raise InputError("fewer than two positions", where="data so far", fix="wait for the arm")
 
 
-def _distance(plan: Recording, so_far: SoFar, delay: float) -> NDArray[np.float64]:
-    """Of the arm from where it was to be `delay` before [m], shape (S,), NaN where missing."""
-    time = so_far.time - delay
+def _delays(plan: Recording, ends: NDArray, so_far: SoFar) -> tuple[NDArray[np.float64], float]:
+    """Of each finished stroke and of the one that is not [s], and the arm's greatest distance.
+
+    Returns:
+        Delays, shape (finished + 1,), and the distance from the plan that they leave [m].
+    """
+    seen = np.isfinite(so_far.position).all(axis=1)
+    time, position = so_far.time[seen], so_far.position[seen]
+    delays, apart, delay, start = [], 0.0, 0.0, -np.inf
+    for end in (*ends, np.inf):
+        within = (time > start + delay) & (time <= end + delay)
+        if within.any():
+            delay = _delay(plan, time[within], position[within], delay)
+            distance = _distance(plan, time[within] - delay, position[within])
+            apart = max(apart, float(distance.max()))
+        delays.append(delay)
+        if so_far.time[-1] + SLACK < end + delay:
+            break
+        start = end
+    return np.array(delays), apart
+
+
+def _distance(plan: Recording, time: NDArray, position: NDArray) -> NDArray[np.float64]:
+    """Of the arm from its plan [m], shape (S,)."""
     wanted = np.column_stack([np.interp(time, plan.time, axis) for axis in plan.gripper.position.T])
-    return np.linalg.norm(so_far.position - wanted, axis=1)
+    return np.linalg.norm(position - wanted, axis=1)
 
 
-def _delay(plan: Recording, so_far: SoFar) -> float:
-    """The one with which the arm is nearest to its plan [s]; 0 before it has moved."""
+def _delay(plan: Recording, time: NDArray, position: NDArray, before: float) -> float:
+    """The one with which the arm is nearest to its plan [s]; as before where it does not move."""
     from scipy.optimize import minimize_scalar
 
-    seen = so_far.position[np.isfinite(so_far.position).all(axis=1)]
-    if np.linalg.norm(seen - seen[0], axis=1).max() < MOVED:
-        return 0.0
+    if np.linalg.norm(position - position[0], axis=1).max() < MOVED:
+        return before
 
     def squared(delay: float) -> float:
-        return float(np.nanmean(_distance(plan, so_far, delay) ** 2))
+        return float(np.mean(_distance(plan, time - delay, position) ** 2))
 
-    found = minimize_scalar(squared, bounds=(-SEARCHED, SEARCHED), method="bounded")
+    bounds = (before - SEARCHED, before + SEARCHED)
+    found = float(minimize_scalar(squared, bounds=bounds, method="bounded").x)
     # as recorded, where that is as near as can be
-    return 0.0 if squared(0.0) <= squared(float(found.x)) else float(found.x)
+    return before if squared(before) <= squared(found) else found
 
 
 def _sampled(wanted: NDArray, time: NDArray, values: NDArray) -> NDArray[np.float64]:
@@ -168,11 +194,11 @@ def _sampled(wanted: NDArray, time: NDArray, values: NDArray) -> NDArray[np.floa
     return np.where(near & inside, np.interp(wanted, known, values[seen]), np.nan)
 
 
-def _refusal(delay: float, apart: float) -> str:
-    if abs(delay) > LATEST:
-        side = "behind" if delay > 0 else "ahead of"
+def _refusal(change: float, apart: float) -> str:
+    if abs(change) > LATEST:
+        side = "behind" if change > 0 else "ahead of"
         return (
-            f"the arm is {1e3 * abs(delay):.0f} ms {side} its plan, more than "
+            f"in one stroke the arm got {1e3 * abs(change):.0f} ms {side} its plan, more than "
             f"{1e3 * LATEST:.0f} ms: what is simulated is not what it does"
         )
     if apart > FARTHEST:

@@ -45,6 +45,22 @@ def test_data_are_those_of_the_plan_up_to_the_last_finished_stroke(delay):
     assert np.isnan(followed.observed[PLAN.time > ENDS[3] + 1e-3]).all()
 
 
+def test_an_arm_that_gets_later_and_later_is_followed():
+    """As one whose loop misses a period now and then."""
+    late = 0.04
+    assert late * ENDS[8] > LATEST
+    seen = data(ENDS[8] + late * ENDS[8] + 0.2)
+    time = seen.time / (1.0 + late)
+    position = np.column_stack([np.interp(time, PLAN.time, x) for x in PATH.position.T])
+    followed = follow(PLAN, ENDS, SoFar(seen.time, position, inclination(time), 0.0))
+    assert (followed.strokes, followed.refusal) == (9, "")
+    assert followed.delay == pytest.approx(late * ENDS[8], abs=0.02)
+    inside = (PLAN.time <= ENDS[8]) & (PLAN.time > 0.05)
+    # within a stroke the delay changes by some 25 ms, and the signal by 0.3 rad/s
+    apart = followed.observed[inside] - inclination(PLAN.time)[inside]
+    assert np.abs(apart).max() < 0.3 * 0.025
+
+
 def test_a_recording_of_the_plan_itself_is_left_as_it_is():
     same = SoFar(PLAN.time, PATH.position, inclination(PLAN.time), 0.0)
     followed = follow(PLAN, ENDS, same)
