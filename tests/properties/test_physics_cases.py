@@ -1,13 +1,17 @@
-"""Every validation case runs to its end; whether it passes is for `check physics` to say."""
+"""Validation cases run to their end; whether they pass is for `check physics` to say."""
 
 import pytest
 
 from bolfi_liquids.physics_check import all_cases, check_physics
 
-pytestmark = pytest.mark.slow
+MINUTES = {"adhesion", "couette", "cylinder_drag", "herschel_bulkley", "resolution"}
+CASES = [
+    pytest.param(name, marks=pytest.mark.benchmark if name in MINUTES else pytest.mark.slow)
+    for name in all_cases()
+]
 
 
-@pytest.mark.parametrize("name", all_cases())
+@pytest.mark.parametrize("name", CASES)
 def test_a_case_runs_to_its_end(tmp_path, name):
     check = check_physics(tmp_path, [name], progress=False)
     (record,) = check.records
