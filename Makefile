@@ -8,7 +8,7 @@ SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13)
 
 FAST := not slow and not gpu and not hardware and not benchmark
 # tests that must keep time have the computer for themselves, the others share its processors
-SHARED := -n logical --maxprocesses 4 --dist loadfile
+SHARED := -n logical --maxprocesses 4 --dist worksteal
 
 PEERS := .venv-peers
 PEERS_SUPPORTED := import sys, ensurepip; sys.exit(not (3, 9) <= sys.version_info[:2] <= (3, 10))
