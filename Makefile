@@ -6,15 +6,16 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
 
-FAST := not slow and not gpu and not hardware and not benchmark
+FAST := not slow and not minutes and not gpu and not hardware and not benchmark
 # tests that must keep time have the computer for themselves, the others share its processors
+ALONE := (punctual or alone)
 SHARED := -n logical --maxprocesses 4 --dist worksteal
 
 PEERS := .venv-peers
 PEERS_SUPPORTED := import sys, ensurepip; sys.exit(not (3, 9) <= sys.version_info[:2] <= (3, 10))
 PYENV_VERSIONS := $(or $(PYENV_ROOT),$(HOME)/.pyenv)/versions
 
-.PHONY: setup demo test test-slow lint peers clean
+.PHONY: setup demo test test-slow test-long lint peers clean
 
 setup: $(INSTALLED)
 
@@ -36,12 +37,15 @@ demo: setup
 	$(BIN)/bolfi-liquids demo --out runs/demo
 
 test: setup
-	$(BIN)/pytest $(SHARED) -m "$(FAST) and not punctual"
-	$(BIN)/pytest -m "$(FAST) and punctual"
+	$(BIN)/pytest $(SHARED) -m "$(FAST) and not $(ALONE)"
+	$(BIN)/pytest -m "$(FAST) and $(ALONE)"
 
 test-slow: setup
-	$(BIN)/pytest $(SHARED) --durations 20 -m "slow and not punctual"
-	$(BIN)/pytest -m "slow and punctual"
+	$(BIN)/pytest $(SHARED) --durations 20 -m "slow and not $(ALONE)"
+	$(BIN)/pytest -m "slow and $(ALONE)"
+
+test-long: setup
+	$(BIN)/pytest -m minutes
 
 lint: setup
 	$(BIN)/ruff check

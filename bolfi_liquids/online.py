@@ -149,8 +149,9 @@ class OnlineCalibration:
     def update(self, so_far: SoFar) -> "OnlineEstimate | None":
         """Hand over the recording so far, at best after each stroke; returns at once.
 
-        What was not looked at yet is replaced. Data that are off the plan by more than
-        `online_plan.FARTHEST` or `LATEST` are not learned from: `status` says so.
+        What was not looked at yet is replaced. Data of an arm that is off its plan by more than
+        `online_plan.FARTHEST`, or that lost or gained more than `LATEST` in a stroke, are not
+        learned from: `status` says so.
 
         Returns:
             As `poll`.
@@ -213,7 +214,7 @@ class OnlineCalibration:
 
     def close(self) -> None:
         """End the other processes; what they have simulated is kept. Closing twice does no harm."""
-        self._link.close()
+        self._outbox.close()
         for worker in self._workers.values():
             worker.join(PATIENCE if worker.name == "learner" else 0.1)
             worker.terminate()  # a simulation is not worth waiting for

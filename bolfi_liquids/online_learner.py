@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .online_outbox import newest
 from .online_plan import SoFar, follow, stroke_ends
 from .online_request import FAILED, GONE, PREPARING, READY, REFUSED, Request, Status
 from .online_simulator import step_back
@@ -92,17 +93,11 @@ class _Learner:
         while True:
             ready = wait([self.parent, *([self.simulator] if self.simulating else [])])
             if self.parent in ready:
-                self._answer(self._newest())
+                self._answer(newest(self.parent))
             if self.simulator in ready:
                 self._land()
                 self._tell(READY, "")
             self._go_on()
-
-    def _newest(self) -> SoFar:
-        data = self.parent.recv()
-        while self.parent.poll():
-            data = self.parent.recv()
-        return data
 
     def _answer(self, so_far: SoFar) -> None:
         try:

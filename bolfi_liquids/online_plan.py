@@ -15,7 +15,7 @@ from .strokes import strokes
 
 FARTHEST = 2e-3  # m that the arm may be off its plan; star strokes are 50 mm long
 LATEST = 0.2  # s that a stroke may change the delay by; a servoed arm follows by some 0.1 s
-SEARCHED = 0.4  # s, up to which such a change is looked for
+SEARCHED, STEP = 0.4, 0.02  # s, up to which such a change is looked for, and how finely at first
 GAP = 2.5  # sampling intervals of the plan; data farther apart are not interpolated between
 MOVED = 5e-3  # m from which the delay shows
 SLACK = 1e-3  # s by which a stroke may seem to lack its end, as the delay is only estimated
@@ -45,7 +45,7 @@ class Followed(NamedTuple):
             stroke and where nothing was seen.
         strokes: Finished.
         covered: When the last of them was to end [s]; -inf where there is none.
-        delay: Of the arm behind its plan in the latest stroke [s].
+        delay: Of the arm behind its plan in the last finished stroke, or else in the first [s].
         apart: Greatest distance of the arm from the plan, each stroke's delay allowed for [m].
         refusal: Why these data are no stir along the plan; "" if they are.
     """
@@ -120,7 +120,8 @@ def follow(plan: Recording, ends: NDArray, so_far: SoFar) -> Followed:
     observed[plan.time > covered + SLACK] = np.nan
     change = np.diff(delays, prepend=0.0)
     refusal = _refusal(float(change[np.abs(change).argmax()]), apart)
-    return Followed(observed, done, covered, float(delays[-1]), apart, refusal)
+    delay = float(delays[max(done - 1, 0)])
+    return Followed(observed, done, covered, delay, apart, refusal)
 
 
 def _check(so_far: SoFar) -> None:
@@ -146,17 +147,18 @@ def _delays(plan: Recording, ends: NDArray, so_far: SoFar) -> tuple[NDArray[np.f
     """
     seen = np.isfinite(so_far.position).all(axis=1)
     time, position = so_far.time[seen], so_far.position[seen]
-    delays, apart, delay, start = [], 0.0, 0.0, -np.inf
+    delays, apart, delay, until = [], 0.0, 0.0, -np.inf
     for end in (*ends, np.inf):
-        within = (time > start + delay) & (time <= end + delay)
-        if within.any():
+        since, until = until, end + delay
+        within = (time > since) & (time <= until)
+        # what has hardly moved yet shows neither a delay nor another path
+        if within.any() and np.ptp(position[within], axis=0).max() > MOVED:
             delay = _delay(plan, time[within], position[within], delay)
             distance = _distance(plan, time[within] - delay, position[within])
             apart = max(apart, float(distance.max()))
         delays.append(delay)
         if so_far.time[-1] + SLACK < end + delay:
             break
-        start = end
     return np.array(delays), apart
 
 
@@ -167,19 +169,18 @@ def _distance(plan: Recording, time: NDArray, position: NDArray) -> NDArray[np.f
 
 
 def _delay(plan: Recording, time: NDArray, position: NDArray, before: float) -> float:
-    """The one with which the arm is nearest to its plan [s]; as before where it does not move."""
+    """The one with which the arm is nearest to its plan [s]."""
     from scipy.optimize import minimize_scalar
-
-    if np.linalg.norm(position - position[0], axis=1).max() < MOVED:
-        return before
 
     def squared(delay: float) -> float:
         return float(np.mean(_distance(plan, time - delay, position) ** 2))
 
-    bounds = (before - SEARCHED, before + SEARCHED)
-    found = float(minimize_scalar(squared, bounds=bounds, method="bounded").x)
+    # of a stroke that has just begun, there may be several minima
+    tried = before + np.arange(-SEARCHED, SEARCHED + STEP, STEP)
+    near = float(tried[np.argmin([squared(delay) for delay in tried])])
+    found = minimize_scalar(squared, bounds=(near - STEP, near + STEP), method="bounded").x
     # as recorded, where that is as near as can be
-    return before if squared(before) <= squared(found) else found
+    return before if squared(before) <= squared(found) else float(found)
 
 
 def _sampled(wanted: NDArray, time: NDArray, values: NDArray) -> NDArray[np.float64]:
@@ -196,9 +197,9 @@ def _sampled(wanted: NDArray, time: NDArray, values: NDArray) -> NDArray[np.floa
 
 def _refusal(change: float, apart: float) -> str:
     if abs(change) > LATEST:
-        side = "behind" if change > 0 else "ahead of"
+        what = "lost" if change > 0 else "gained"
         return (
-            f"in one stroke the arm got {1e3 * abs(change):.0f} ms {side} its plan, more than "
+            f"the arm {what} {1e3 * abs(change):.0f} ms on its plan in one stroke, more than "
             f"{1e3 * LATEST:.0f} ms: what is simulated is not what it does"
         )
     if apart > FARTHEST:

@@ -12,9 +12,10 @@ STALL = 0.03  # s; a watchdog of 0.1 s and several processes wait for each other
 
 
 def pytest_configure(config):
+    config.addinivalue_line("markers", "alone: runs after the others, with no test beside it")
     config.addinivalue_line(
         "markers",
-        "punctual: needs a computer that does not stand still; repeated if it did and it failed",
+        "punctual: alone, and repeated if it failed on a computer that stood still meanwhile",
     )
 
 

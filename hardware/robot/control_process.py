@@ -128,6 +128,16 @@ def _late(since: float) -> str:
     )
 
 
+def refused(reason: str, connected: bool, silent: float) -> Trip:
+    """Why a set-point was not taken, `silent` seconds after the one before.
+
+    This process may stand still between a look at the guards and the set-point, too.
+    """
+    if connected and silent > WATCHDOG:
+        return Trip("overrun", f"overrun: {_late(silent)}")
+    return Trip("link", reason)
+
+
 def _nearer(age: float, period: float) -> float:
     """By how much to shift the next tick so that a fresh package waits for it [s].
 
@@ -267,7 +277,8 @@ class _Control:
         except RigError as err:
             return Trip("order", str(err))
         except LinkLost as err:
-            return self._cause() or Trip("link", str(err))
+            silent = host_time() - self._sent
+            return self._cause() or refused(str(err), self._reader.read().connected, silent)
         self._course = course
         self._trail.put(course.hold)
         if self._turning_back is not None:

@@ -75,6 +75,8 @@ def prepare(to: Assignment, rows: Callable[[], Mapping[Who, Row]]) -> Prepared:
                 arm.give_up()
     except (RigError, LinkLost, ImportError, RuntimeError) as err:
         checks.append(Check("controller", False, str(err)))
+        if isinstance(arm, URArm):
+            arm.give_up()
     return Prepared(arm, checks, states)
 
 

@@ -2,9 +2,10 @@
 
 What it guards against, found in ur_rtde 1.6.5: getters repeat the last value for ever when a link
 is lost; `servoL` says True on a dead link; the control interface reconnects by itself, again and
-again, starts its script anew without a watchdog, and may crash the process. So a lost connection
-stays lost here, nothing is sent after it, the interface that moves the arm is one that never
-uploads a script, and a process of its own owns the object.
+again, starts its script anew without a watchdog, and may crash the process. So a connection that
+was once seen lost stays lost here, and nothing is sent after it; the interface that moves the arm
+is one that never uploads a script, so that the one which the watchdog guards is the only one; and
+a process of its own owns the object.
 """
 
 import sys
@@ -82,7 +83,8 @@ class URReader:
     def close(self) -> None:
         """Let the connection go; harmless when repeated.
 
-        An arm's controlling connection is left open: ur_rtde's clean-up of it can hang.
+        An arm's controlling connection is left open: once a link was lost, ur_rtde's clean-up of
+        it can hang.
         """
         if self._receive is not None:
             self._receive.disconnect()
@@ -139,7 +141,8 @@ class URArm(URReader):
         Raises:
             ImportError: ur-rtde is not installed; the message says how to get it.
             RigError: The controller refuses.
-            LinkLost: It did not take the tool's centre or the payload.
+            LinkLost: It did not take the tool's centre or the payload. The script may be left
+                running, and moves nothing: `give_up` ends it.
         """
         control = _interface("rtde_control").RTDEControlInterface
         starter = self._opened(control, self._address, self._rate, control.FLAG_UPLOAD_SCRIPT)

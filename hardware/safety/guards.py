@@ -155,6 +155,7 @@ def tripped(readings: tuple[Reading, ...], seen: Seen) -> Trip | None:
 def _loop(seen: Seen, rules: Rules) -> tuple[Reading, ...]:
     state, watch, limits = seen.state, seen.watch, rules.limits
     return (
+        # first: the library stands still itself while it reconnects, which looks like an overrun
         Reading("link", float(not state.connected), YES, ""),
         Reading("overrun", seen.late, limits.overrun, "s"),
         Reading("silence", seen.now - watch.fresh, limits.silence, "s"),

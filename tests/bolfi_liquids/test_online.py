@@ -1,9 +1,11 @@
 """Online calibration in its own processes, fed with recordings as if they were being made."""
 
 import json
+import multiprocessing
 import os
 import signal
 import sqlite3
+import threading
 import time
 from dataclasses import replace
 from types import SimpleNamespace
@@ -14,7 +16,7 @@ import pytest
 import bolfi_liquids as bl
 from bolfi_liquids import models, online
 from bolfi_liquids.online import FAILED, READY, REFUSED, OnlineCalibration, OnlineSettings, SoFar
-from bolfi_liquids.online_outbox import Outbox
+from bolfi_liquids.online_outbox import Outbox, newest
 
 pytestmark = pytest.mark.slow
 
@@ -149,6 +151,21 @@ def test_a_process_that_never_reads_blocks_nobody():
     assert len(sent) < 4 and sent[-1] == 999
 
 
+def test_closing_ends_a_send_that_nobody_takes():
+    mine, silent = multiprocessing.Pipe()
+    outbox = Outbox(mine)
+    outbox.put(bytes(1 << 24))
+    time.sleep(0.2)
+    closing = threading.Thread(target=outbox.close, daemon=True)
+    closing.start()
+    closing.join(5.0)
+    assert not closing.is_alive() and mine.closed
+    # its reader is told, in the middle of the message
+    with pytest.raises(EOFError):
+        newest(silent)
+    silent.close()
+
+
 def test_a_run_is_not_overwritten(short_recording, tmp_path):
     recording = bl.open_recording(short_recording)
     (tmp_path / "run.toml").touch()
@@ -156,7 +173,6 @@ def test_a_run_is_not_overwritten(short_recording, tmp_path):
         OnlineCalibration.start(recording.gripper, recording.attrs, out=tmp_path)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("target", [1e-9, 0.9])
 def test_stops_at_the_target_or_at_the_last_stroke(short_recording, tmp_path, target):
     recording = bl.open_recording(short_recording)
@@ -172,7 +188,7 @@ def test_stops_at_the_target_or_at_the_last_stroke(short_recording, tmp_path, ta
     assert bl.report(run).is_file() and 0.0 <= pour.chosen.expected_spillage <= 1.0
 
 
-@pytest.mark.slow
+@pytest.mark.alone
 def test_the_last_estimate_agrees_with_the_ordinary_calibration(tmp_path):
     from importlib.resources import as_file, files
 

@@ -61,6 +61,24 @@ def test_an_arm_that_gets_later_and_later_is_followed():
     assert np.abs(apart).max() < 0.3 * 0.025
 
 
+@pytest.mark.parametrize("until", np.arange(ENDS[2] - 0.1, ENDS[3] + 0.1, 0.02))
+def test_a_pause_at_a_corner_is_followed_from_its_first_sample_on(until):
+    near = np.abs(PLAN.time - ENDS[2]) < 0.15
+    corner = PLAN.time[near][np.hypot(*PATH.position[near, :2].T).argmax()]
+    seen = data(until)
+    time = seen.time - np.clip(seen.time - corner, 0.0, 0.05)
+    position = np.column_stack([np.interp(time, PLAN.time, x) for x in PATH.position.T])
+    assert follow(PLAN, ENDS, seen._replace(position=position)).refusal == ""
+
+
+def test_no_sample_falls_between_two_strokes():
+    delay = 0.1
+    seen = data(ENDS[2], delay=delay)
+    away = (seen.time > ENDS[0]) & (seen.time < ENDS[0] + delay)
+    seen.position[away, 2] += 2.0 * FARTHEST
+    assert "mm off its plan" in follow(PLAN, ENDS, seen).refusal
+
+
 def test_a_recording_of_the_plan_itself_is_left_as_it_is():
     same = SoFar(PLAN.time, PATH.position, inclination(PLAN.time), 0.0)
     followed = follow(PLAN, ENDS, same)
@@ -92,8 +110,8 @@ def test_what_the_cameras_missed_is_missing():
     ("fault", "says"),
     [
         ({"off": 1.2 * FARTHEST}, "mm off its plan"),
-        ({"delay": 1.2 * LATEST}, "ms behind its plan"),
-        ({"delay": -1.2 * LATEST}, "ms ahead of its plan"),
+        ({"delay": 1.2 * LATEST}, "the arm lost 240 ms on its plan"),
+        ({"delay": -1.2 * LATEST}, "the arm gained 240 ms on its plan"),
     ],
 )
 def test_another_stir_is_refused(fault, says):

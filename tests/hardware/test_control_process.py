@@ -13,7 +13,7 @@ from bolfi_liquids.hardware.pour_motions import approach_pour, pour_path, ready_
 from bolfi_liquids.hardware.recorder.events import read_events
 from bolfi_liquids.hardware.recorder.sample import Sample
 from bolfi_liquids.hardware.rig_file import bundled_rig
-from bolfi_liquids.hardware.robot.control_process import run_control
+from bolfi_liquids.hardware.robot.control_process import WATCHDOG, refused, run_control
 from bolfi_liquids.hardware.robot.course import Course, Leg, Trail, advanced, queued
 from bolfi_liquids.hardware.robot.inbox import Inbox, Vetting
 from bolfi_liquids.hardware.robot.orders import (
@@ -87,6 +87,13 @@ def test_the_trail_measures_the_distance_from_the_nearest_recent_set_point():
 
 def sample(index):
     return Sample._make([index, *np.linspace(0.1, 1.7, 19).tolist()])
+
+
+def test_a_set_point_refused_after_a_stall_is_an_overrun():
+    lost = "the connection to the controller is lost"
+    assert refused(lost, True, 0.5 * WATCHDOG) == Trip("link", lost)
+    assert refused(lost, False, 2.0 * WATCHDOG) == Trip("link", lost)
+    assert refused(lost, True, 2.0 * WATCHDOG).reason.startswith("overrun: this computer sent")
 
 
 def test_samples_are_handed_on_in_order_and_a_full_pipe_does_not_wait():

@@ -117,6 +117,9 @@ def test_a_cause_is_named_before_its_effects():
     # a process that stood still for 0.3 s finds its program ended and its cameras' rows old
     stood = seen(WELL._replace(runtime_state=1), late=0.3, now=NOW + 0.3)
     assert (reason(stood) or "").startswith("overrun")
+    # the library stands still itself while it reconnects
+    dropped = seen(WELL._replace(connected=False), late=0.3)
+    assert (reason(dropped) or "").startswith("the connection to the controller is lost")
     stopped = seen(WELL._replace(safety_bits=4, runtime_state=1), error=0.02)
     assert (reason(stopped) or "").startswith("safety")
 

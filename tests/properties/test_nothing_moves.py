@@ -21,7 +21,7 @@ import bolfi_liquids as bl
 from bolfi_liquids import hardware
 from bolfi_liquids.cli import app
 
-pytestmark = pytest.mark.punctual
+pytestmark = pytest.mark.alone
 
 ROOT = Path(__file__).parents[2]
 PARTS = ("bolfi_liquids", "hardware", "inference", "models")
@@ -204,6 +204,7 @@ def test_armed_without_the_sentence_moves_nothing(
 
 
 @pytest.mark.slow
+@pytest.mark.punctual
 def test_the_sentence_does_move_the_arm(run_with_a_pour, tmp_path):
     """Without this the tests above could not fail."""
     rig = hardware.bundled_rig()

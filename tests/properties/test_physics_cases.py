@@ -4,10 +4,12 @@ import pytest
 
 from bolfi_liquids.physics_check import all_cases, check_physics
 
-MINUTES = {"adhesion", "couette", "cylinder_drag", "herschel_bulkley", "resolution"}
+# a minute or more each: `make test-long` runs them, and so does `check physics`
+LONG = ("adhesion", "couette", "cylinder_drag", "herschel_bulkley", "resolution")
+OTHERS = sorted(set(all_cases()) - set(LONG))
 CASES = [
-    pytest.param(name, marks=pytest.mark.benchmark if name in MINUTES else pytest.mark.slow)
-    for name in all_cases()
+    *(pytest.param(name, marks=pytest.mark.minutes) for name in LONG),
+    *(pytest.param(name, marks=pytest.mark.slow) for name in OTHERS),
 ]
 
 

@@ -14,6 +14,7 @@ def test_the_readme_has_examples():
 
 
 @pytest.mark.slow
+@pytest.mark.alone  # one of them records on the emulator
 def test_blocks_run_one_after_the_other(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     reader = {"__name__": "__main__"}
