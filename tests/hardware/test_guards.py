@@ -119,7 +119,7 @@ def test_a_cause_is_named_before_its_effects():
     assert (reason(stood) or "").startswith("overrun")
     # the library stands still itself while it reconnects
     dropped = seen(WELL._replace(connected=False), late=0.3)
-    assert (reason(dropped) or "").startswith("the connection to the controller is lost")
+    assert (reason(dropped) or "").startswith("link")
     stopped = seen(WELL._replace(safety_bits=4, runtime_state=1), error=0.02)
     assert (reason(stopped) or "").startswith("safety")
 

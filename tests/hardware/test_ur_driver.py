@@ -206,7 +206,7 @@ def test_after_a_dropped_link_nothing_is_sent_though_the_library_reconnects(emul
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     # none once the loss is seen, unless the library crashed first: then nobody is left to send
     assert re.search(r"taken \+{0,4}-+$", done.stdout) or done.returncode < 0, done.stdout
-    assert emulator.admin.state().at_rest
+    assert wait_for_rest(emulator, 0.3)
     # no program was started anew: the one that the watchdog guards has ended by it
     time.sleep(0.2)
     assert emulator.admin.state().runtime_state == 1
