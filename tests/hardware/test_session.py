@@ -253,12 +253,15 @@ def test_however_main_ends_the_arm_stops(emulator, tmp_path, way):
 
 
 IMPATIENT = """
+import signal
 import sys
 from pathlib import Path
 from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.session.session import Session
 
 if __name__ == "__main__":
+    # a shell's background jobs are started deaf to it
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     with Session(bundled_rig(), Path(sys.argv[2]), sys.argv[1]) as session:
         print("started", flush=True)
         session.preflight()
