@@ -115,6 +115,7 @@ def test_a_fill_is_a_number_of_particles_of_the_same_size(glycerin):
     assert counts[0] == 0 and counts[3] == 1000
 
 
+@pytest.mark.slow
 def test_more_liquid_stands_higher(setup, short):
     """Settled particles' mean height is half the depth, whatever scene they are in."""
     still = SimpleNamespace(time=short.time[:2], position=np.tile(short.position[0], (2, 1)))

@@ -73,6 +73,7 @@ def test_without_liquid_the_stick_is_the_driven_spherical_pendulum(glycerin):
     assert rms_deg(signal - expected) < 0.05 * swing
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("numerics", "tolerance"),
     [(models.Numerics(), 0.2), (models.PUBLISHED_DRAG, 0.1)],
