@@ -14,7 +14,7 @@ from .provenance import run_record
 from .recordings import Recording, Source, open_recordings
 from .recordings_kept import keep_recordings
 from .run_directory import POSTERIOR, enter_run, open_bank
-from .settings import MIN_SIMULATIONS, CalibrationSettings
+from .settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
 from .stirring import Stirring, stirring_of
 from .summary import write_section
 
@@ -121,12 +121,7 @@ def _fit(
 ) -> "Fit":
     from . import inference
 
-    # with the paper's surrogate go its acquisition and threshold, on which results were measured
-    paper: dict[str, Any] = {
-        "acquisition": "lcb",
-        "threshold": "min_mean",
-        "initial": MIN_SIMULATIONS,
-    }
+    paper: dict[str, Any] = {**PAPER_RULES, "initial": MIN_SIMULATIONS}
     return inference.fit(
         simulate,
         prior,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from .kept import fresh_seeds
 from .online_plan import Followed
 from .online_settings import OnlineSettings
-from .settings import MIN_SIMULATIONS
+from .settings import MIN_SIMULATIONS, PAPER_RULES
 from .spillage_map import SpillageMap
 from .stirring import Stirring
 
@@ -211,8 +211,7 @@ def _engine(problem: Problem, observed: NDArray, seed: int) -> "Bolfi":
     from .inference import Bolfi
 
     settings = problem.settings
-    # the paper's rules, as in `calibrate`
-    paper: dict[str, Any] = {"acquisition": "lcb", "threshold": "min_mean"}
+    paper: dict[str, Any] = PAPER_RULES
     return Bolfi(
         problem.prior,
         observed,

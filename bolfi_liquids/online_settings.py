@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from .errors import InputError
-from .settings import MIN_PARTICLES, MIN_SIMULATIONS, SURROGATES
+from .settings import MIN_PARTICLES, MIN_SIMULATIONS, SURROGATES, at_least, one_of
 from .spillage_map import LEAST_POURS, POURS
 
 STOPS = ("bound", "mean")
@@ -41,10 +41,13 @@ class OnlineSettings:
 
     def __post_init__(self):
         if not (isinstance(self.target, int | float) and 0.0 < self.target < 1.0):
-            raise _refused("target", self.target, "give a spilled fraction between 0 and 1")
+            raise InputError(
+                f"{self.target!r}",
+                where=_where("target"),
+                fix="give a spilled fraction between 0 and 1",
+            )
         for name, choices in {"stop": STOPS, "surrogate": SURROGATES}.items():
-            if getattr(self, name) not in choices:
-                raise _refused(name, getattr(self, name), f"choose {' or '.join(choices)}")
+            one_of(choices, _where(name), getattr(self, name))
         least = {
             "least_strokes": 1,
             "design": MIN_SIMULATIONS,
@@ -55,10 +58,8 @@ class OnlineSettings:
             "seed": 0,
         }
         for name, lowest in least.items():
-            value = getattr(self, name)
-            if not isinstance(value, int) or isinstance(value, bool) or value < lowest:
-                raise _refused(name, value, f"give a whole number of at least {lowest}")
+            at_least(lowest, _where(name), getattr(self, name))
 
 
-def _refused(name: str, value: object, fix: str) -> InputError:
-    return InputError(f"{value!r}", where=f"online setting {name}", fix=fix)
+def _where(name: str) -> str:
+    return f"online setting {name}"

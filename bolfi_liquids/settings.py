@@ -12,6 +12,9 @@ SURROGATES = ("signal", "discrepancy")
 SAMPLERS = ("nuts", "emcee")
 RISKS = ("mean", "cvar")
 
+PAPER_RULES = {"acquisition": "lcb", "threshold": "min_mean"}
+"""What goes with the paper's surrogate, and what results were measured on."""
+
 ALARM = 0.05  # share of false alarms when simulation and data are compared
 MIN_SIMULATIONS = 7  # fewer say next to nothing of two parameters
 MIN_PARTICLES = 100  # with fewer, the stick is thinner than the gaps between them
@@ -51,9 +54,9 @@ class CalibrationSettings:
 
     def __post_init__(self):
         for name, least in _LEAST.items():
-            _at_least(least, name, getattr(self, name))
-        _one_of(SURROGATES, "surrogate", self.surrogate)
-        _one_of(SAMPLERS, "sampler", self.sampler)
+            at_least(least, f"--{name}", getattr(self, name))
+        one_of(SURROGATES, "--surrogate", self.surrogate)
+        one_of(SAMPLERS, "--sampler", self.sampler)
 
 
 @dataclass(frozen=True)
@@ -74,8 +77,8 @@ class PourSettings:
 
     def __post_init__(self):
         for name, least in {"iterations": MIN_SIMULATIONS, "draws": 1, "seed": 0}.items():
-            _at_least(least, name, getattr(self, name))
-        _one_of(RISKS, "risk", self.risk)
+            at_least(least, f"--{name}", getattr(self, name))
+        one_of(RISKS, "--risk", self.risk)
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,7 @@ class CriticismSettings:
     batch: int = 8
 
     def __post_init__(self):
-        _at_least(0, "seed", self.seed)
+        at_least(0, "--seed", self.seed)
 
     @property
     def stir_plan(self) -> "Plan":
@@ -122,15 +125,17 @@ class CriticismSettings:
         return Plan(start=8, base=8)
 
 
-def _at_least(lowest: int, name: str, value: object) -> None:
+def at_least(lowest: int, where: str, value: object) -> None:
+    """Raise `InputError` unless `value` is a whole number of at least `lowest`."""
     if not isinstance(value, int) or isinstance(value, bool) or value < lowest:
         raise InputError(
             f"{value!r}",
-            where=f"--{name}",
+            where=where,
             fix=f"give a whole number of at least {lowest}",
         )
 
 
-def _one_of(choices: tuple[str, ...], name: str, value: object) -> None:
+def one_of(choices: tuple[str, ...], where: str, value: object) -> None:
+    """Raise `InputError` unless `value` is one of the choices."""
     if value not in choices:
-        raise InputError(f"{value!r}", where=f"--{name}", fix=f"choose {' or '.join(choices)}")
+        raise InputError(f"{value!r}", where=where, fix=f"choose {' or '.join(choices)}")

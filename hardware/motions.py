@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from .patterns import circle, star_vertices
+from .patterns import circle, star_vertices, travelled
 from .rig import Rig
 
 TURN_RATE = np.radians(30.0)  # rad/s, of the tool between two orientations
@@ -49,11 +49,8 @@ class Profile(NamedTuple):
         """Of the length after `elapsed` [s]; the times may lie before the start or past the end."""
         if self.length == 0.0:
             return np.zeros_like(elapsed)
-        rising = np.clip(elapsed, 0.0, self.ramp)
-        cruising = np.clip(elapsed - self.ramp, 0.0, self.duration - 2.0 * self.ramp)
-        falling = np.clip(elapsed - (self.duration - self.ramp), 0.0, self.ramp)
-        slope = self.peak / self.ramp
-        return 0.5 * slope * rising**2 + self.peak * (cruising + falling) - 0.5 * slope * falling**2
+        within = np.clip(elapsed, 0.0, self.duration)
+        return travelled(within, self.duration, self.ramp, self.peak)
 
 
 def profile(length: float, speed: float, acceleration: float) -> Profile:
@@ -71,7 +68,7 @@ def approach(rig: Rig, pose: np.ndarray) -> PosePath:
     """
     target = above_cup(rig)
     high = max(pose[2], target[2])
-    corners = [pose, _at(pose, z=high), _at(target, z=high), target]
+    corners = [pose, placed(pose, z=high), placed(target, z=high), target]
     return travel(rig, corners, rig.stirring.approach_speed)
 
 
@@ -84,7 +81,7 @@ def insert(rig: Rig) -> PosePath:
     """Straight down along the cup's axis, until the stick is in the liquid."""
     return travel(
         rig,
-        [above_cup(rig), _at(above_cup(rig), z=rig.stirring.height)],
+        [above_cup(rig), placed(above_cup(rig), z=rig.stirring.height)],
         rig.stirring.approach_speed,
     )
 
@@ -97,8 +94,8 @@ def retract(rig: Rig, place: np.ndarray | None = None) -> PosePath:
         place: Where the stir ended, in the cup's frame [m], shape (3,); None for its plan's end.
     """
     x, y, _ = strokes(rig)[-1].pose[-1, :3] if place is None else place
-    low = _at(above_cup(rig), z=rig.stirring.height)
-    corners = [_at(low, x=x, y=y), low, above_cup(rig)]
+    low = placed(above_cup(rig), z=rig.stirring.height)
+    corners = [placed(low, x=x, y=y), low, above_cup(rig)]
     return travel(rig, corners, rig.stirring.approach_speed)
 
 
@@ -129,8 +126,8 @@ def strokes(rig: Rig, cycles: int | None = None) -> list[PosePath]:
     if rig.stirring.pattern == "circle":
         return [_circle(rig)] * count
     plan = rig.stirring
-    low = _at(above_cup(rig), z=plan.height)
-    once = [_at(low, x=x, y=y) for x, y in star_vertices(plan.points, plan.radius)]
+    low = placed(above_cup(rig), z=plan.height)
+    once = [placed(low, x=x, y=y) for x, y in star_vertices(plan.points, plan.radius)]
     corners = [low, once[0], *once[1:] * count]
     lines = [
         travel(rig, [start, end], plan.speed).pose
@@ -212,9 +209,10 @@ def _timed(rig: Rig, pose: np.ndarray, *, stirring: bool = False) -> PosePath:
     return PosePath(np.arange(len(pose)) / rig.robot.rate, pose, stirring)
 
 
-def _at(
+def placed(
     pose: np.ndarray, *, x: float | None = None, y: float | None = None, z: float | None = None
 ) -> np.ndarray:
+    """The pose with some of its coordinates [m] replaced, shape (6,)."""
     moved = np.array(pose, dtype=float)
     for axis, value in enumerate((x, y, z)):
         if value is not None:

@@ -60,7 +60,7 @@ def star(  # noqa: PLR0913  a pattern has that many sizes
     time = np.arange(0.0, ends[-1] + rest, 1.0 / rate)
     k = np.clip(np.searchsorted(ends, time, side="right") - 1, 0, len(strokes) - 1)
     elapsed = np.clip(time - ends[k], 0.0, durations[k])
-    share = _travelled(elapsed, durations[k], ramps[k], peaks[k]) / strokes[k]
+    share = travelled(elapsed, durations[k], ramps[k], peaks[k]) / strokes[k]
     plane = corners[k] + share[:, None] * (corners[k + 1] - corners[k])
     return Path(time, np.column_stack([plane, np.full(len(time), height)]))
 
@@ -86,10 +86,13 @@ def _check_positive(**sizes: float) -> None:
             raise ValueError(f"{name} must be positive and finite, got {value}")
 
 
-def _travelled(
-    elapsed: np.ndarray, duration: np.ndarray, ramp: np.ndarray, peak: np.ndarray
+def travelled(
+    elapsed: np.ndarray,
+    duration: np.ndarray | float,
+    ramp: np.ndarray | float,
+    peak: np.ndarray | float,
 ) -> np.ndarray:
-    """Distance covered `elapsed` into strokes of trapezoidal speed; all of one shape."""
+    """Distance covered `elapsed`, between 0 and `duration`, into strokes of trapezoidal speed."""
     rising = np.minimum(elapsed, ramp)
     falling = np.maximum(elapsed - (duration - ramp), 0.0)
     cruising = np.clip(elapsed - ramp, 0.0, duration - 2.0 * ramp)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .frames import cup_frame
-from .motions import PosePath, profile, travel, turn_rate
+from .motions import PosePath, placed, profile, travel, turn_rate
 from .rig import Rig
 
 RAMP = 0.1  # s, in which the turn reaches its angular velocity, and in which it ends
@@ -44,7 +44,7 @@ def approach_pour(rig: Rig, pose: np.ndarray, *, distance: float, lip_height: fl
     """
     target = ready_to_pour(rig, distance, lip_height)
     high = max(pose[2], target[2])
-    corners = [pose, _raised(pose, high), _raised(target, high), target]
+    corners = [pose, placed(pose, z=high), placed(target, z=high), target]
     return travel(rig, corners, rig.pouring.approach_speed)
 
 
@@ -75,7 +75,7 @@ def pour_path(
     """
     _check(angular_velocity, final_angle, (distance, lip_height, hold))
     ready = ready_to_pour(rig, distance, lip_height)
-    low = _raised(ready, ready[2] - rig.pouring.approach_height)
+    low = placed(ready, z=ready[2] - rig.pouring.approach_height)
     dt = 1.0 / rig.robot.rate
     down = travel(rig, [ready, low], rig.pouring.approach_speed).pose
     over = profile(final_angle, angular_velocity, angular_velocity / RAMP)
@@ -136,9 +136,3 @@ def _tilted(pose: np.ndarray, axis: np.ndarray, angle: np.ndarray) -> np.ndarray
     """A pose turned about its own position by angles [rad], shape (T, 6)."""
     turned = Rotation.from_rotvec(angle[:, None] * axis) * Rotation.from_rotvec(pose[3:])
     return np.column_stack([np.tile(pose[:3], (len(angle), 1)), turned.as_rotvec()])
-
-
-def _raised(pose: np.ndarray, height: float) -> np.ndarray:
-    moved = np.array(pose, dtype=float)
-    moved[2] = height
-    return moved
