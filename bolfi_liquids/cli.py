@@ -156,7 +156,9 @@ def pour(  # noqa: PLR0913  one parameter for each option
     cups: Annotated[
         Path | None, typer.Option(metavar="FILE", help="cups.toml; without it, the bundled one.")
     ] = None,
-    iterations: Annotated[int, typer.Option(help="Actions tried.")] = PourSettings.iterations,
+    iterations: Annotated[
+        int, typer.Option(help="Angular velocities tried.")
+    ] = PourSettings.iterations,
     risk: Annotated[
         str,
         typer.Option(

@@ -22,6 +22,7 @@ class Kept(NamedTuple):
     """Finished simulations."""
 
     signals: NDArray[np.float64]  # (successful simulations, *signal_shape)
+    places: NDArray[np.int64]  # of these among those asked for
     seconds: float  # spent in the simulator, also in an earlier call [s]
 
 
@@ -50,13 +51,18 @@ def simulate_kept(
     for start in range(0, len(jobs), keep.batch):
         part = jobs[start : start + keep.batch]
         results += run_missing(simulate, part, None, keep.bank, keep.identity, None)
-    good = [r.signal for r in results if r.signal is not None and np.isfinite(r.signal).all()]
+    good = {
+        at: r.signal
+        for at, r in enumerate(results)
+        if r.signal is not None and np.isfinite(r.signal).all()
+    }
     if not good:
         raise RuntimeError(
             f"all {len(seeds)} simulations failed, the first at {jobs[0].theta}"
             f" ({results[0].error or 'it diverged'}); use more particles"
         )
-    return Kept(np.stack(good), sum(result.seconds for result in results))
+    seconds = sum(result.seconds for result in results)
+    return Kept(np.stack(list(good.values())), np.array(list(good)), seconds)
 
 
 def fresh_seeds(seed: int, purpose: int, count: int) -> list[int]:

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from xarray import DataTree
 
+LEVELS = (0, 1, 2, 5, 10, 20, 40, 70, 100)  # percent: it matters where little is spilled
 CHOICES = {"chosen": (BLUE, "o", "chosen pour"), "plug_in": (ORANGE, "s", "best at θ* alone")}
 
 
@@ -25,14 +26,14 @@ def pour_figure(tree: "DataTree") -> str:
 
 
 def _draw_actions(figure: "Figure", axes: "Axes", tree: "DataTree") -> None:
-    surface, tried = tree["surface"], tree["tried"]
-    x = np.degrees(surface["angular_velocity"].to_numpy())
-    y = 100.0 * surface["distance"].to_numpy()
-    percent = 100.0 * surface["spillage"].to_numpy().T
-    shades = axes.contourf(x, y, percent, levels=12, cmap="Greys", alpha=0.8)
+    actions = tree["actions"]
+    x = np.degrees(actions["angular_velocity"].to_numpy())
+    y = 100.0 * actions["distance"].to_numpy()
+    percent = 100.0 * actions["risk"].to_numpy().T
+    shades = axes.contourf(x, y, percent, levels=LEVELS, cmap="Greys", alpha=0.8)
     figure.colorbar(shades, ax=axes, label="expected spillage [%]")
-    speed = np.degrees(tried["angular_velocity"].to_numpy())
-    axes.plot(speed, 100.0 * tried["distance"].to_numpy(), ".", color=INK, label="tried")
+    lines = axes.contour(x, y, percent, levels=LEVELS[1:4], colors=INK, linewidths=0.6)
+    axes.clabel(lines, fmt="%g %%", fontsize=7.5)
     for name, (colour, marker, label) in CHOICES.items():
         action = tree[name].attrs
         at = np.degrees(action["angular_velocity"]), 100.0 * action["distance"]
@@ -49,7 +50,7 @@ def _draw_actions(figure: "Figure", axes: "Axes", tree: "DataTree") -> None:
         )
     axes.set_xlabel("angular velocity [deg/s]")
     axes.set_ylabel("distance from lip to receiver's axis [cm]")
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
 
 
 def _draw_outcomes(axes: "Axes", tree: "DataTree") -> None:

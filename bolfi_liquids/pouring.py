@@ -14,15 +14,16 @@ from .cups import bundled_cups
 from .progress import Advance, progress_bar, reported
 from .run_directory import POUR, open_bank
 from .settings import PourSettings
-from .spillage import FRACTIONS, RISK, Outcomes
+from .spillage import FARTHEST, Outcomes, Profiles, Surface, landed, landing_sd, surface
 from .summary import write_section
 
 if TYPE_CHECKING:
-    from .inference import Fit, SimulationBank
+    from .inference import SimulationBank
     from .models import Cups
 
 PLUG_IN_SEEDS = 4  # that each action of the plug-in is tried with; the paper tries one
 JUDGE_DRAWS = 2  # times as many draws judge the two actions as chose them
+LANDINGS = 5  # equally probable ones of each pour that judges
 _SEARCH, _JUDGE = 11, 12  # purposes of seeds
 
 
@@ -33,7 +34,8 @@ class Judged:
     Attributes:
         angular_velocity: Of the source about its lip [rad/s].
         distance: Horizontally from the lip to the receiver's axis [m].
-        fractions: Spilled, received and retained, shape (outcomes, 3); rows sum to 1.
+        fractions: Spilled, received and retained, shape (outcomes, 3); rows sum to 1. Each draw
+            has several outcomes, as the liquid may land elsewhere than simulated.
     """
 
     angular_velocity: float
@@ -78,15 +80,16 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
 ) -> Pour:
     """Choose angular velocity and distance so that little is spilled whatever the liquid is.
 
-    The engine that calibrated searches the actions, with the expected spillage over a fixed
-    set of posterior draws and simulator seeds in the place of the discrepancy. The action at
-    which the surrogate expects least is taken and judged on draws and seeds it was not chosen
-    by, so that the figure is not flattered by the choice. Finished simulations are kept in the run.
+    Every angular velocity of a grid is poured with a fixed set of posterior draws and simulator
+    seeds, each pour for all distances at once. Of all these actions the one is taken whose risk
+    is least, averaged over where the liquid may land, and judged on draws and seeds it was not
+    chosen by, so that the figure is not flattered by the choice. Finished simulations are kept
+    in the run.
 
     Args:
         calibration: Whose posterior is poured.
         cups: Source, receiver and ranges of the action; None are the bundled ones.
-        iterations: Actions tried, as many again for the plug-in.
+        iterations: Angular velocities tried, as many again for the plug-in.
         draws: Posterior draws that each action is tried on.
         risk: "mean", or "cvar": the mean over the worst tenth of the draws.
         seed: Of everything random.
@@ -94,6 +97,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
 
     Raises:
         InputError: A setting cannot be used.
+        RuntimeError: Pours failed at every angular velocity.
     """
     from .pour_results import pour_section, pour_tree
     from .results import write_tree
@@ -110,23 +114,31 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         open_bank(calibration.path) as bank,
         progress_bar("trying actions", 2 * iterations + 2, shown=progress) as advance,
     ):
-        search = _Search(cups, calibration.liquid_density, settings, bank, advance)
-        over_posterior = search.minimise(liquids)
-        at_best = search.minimise(best)
-        chosen, plug_in = (search.judge(fit.best, others) for fit in (over_posterior, at_best))
+        pours = _Pours(cups, calibration.liquid_density, settings, bank, advance)
+        over_posterior, at_best = pours.try_all(liquids), pours.try_all(best)
+        chosen, plug_in = (
+            pours.judge(tried.least(risk), others) for tried in (over_posterior, at_best)
+        )
     pour = Pour(calibration.path, chosen, plug_in)
-    tree = pour_tree(pour, over_posterior, at_best, liquids)
+    tree = pour_tree(pour, over_posterior, at_best, liquids, risk)
     floor = cups.least_viscosity(calibration.liquid_density, chosen.angular_velocity)
-    tree.attrs.update(asdict(settings), cups=json.dumps(cups.settings()), least_viscosity=floor)
+    tree.attrs.update(
+        asdict(settings),
+        cups=json.dumps(cups.settings()),
+        least_viscosity=floor,
+        landing_sd=landing_sd(cups),
+    )
     write_tree(tree, calibration.path / POUR)
-    section = pour_section(pour, settings, (over_posterior, at_best), floor)
+    made = sum(tried.spilled[..., 0].size for tried in (over_posterior, at_best))
+    judged = 2 * JUDGE_DRAWS * draws
+    section = pour_section(pour, settings, n_simulations=made + judged, least_viscosity=floor)
     write_section(calibration.path, "pour", section)
     return pour
 
 
 @dataclass(frozen=True)
-class _Search:
-    """What the two searches, over the posterior and at theta*, share."""
+class _Pours:
+    """What trying and judging, over the posterior and at theta*, share."""
 
     cups: "Cups"
     density: float
@@ -134,47 +146,37 @@ class _Search:
     bank: "SimulationBank"
     advance: Advance
 
-    def outcomes(self, liquids: Mapping[str, NDArray], purpose: int) -> Outcomes:
-        """The liquids with seeds of their own."""
-        from .kept import fresh_seeds
-
-        count = len(next(iter(liquids.values())))
-        seeds = np.array(fresh_seeds(self.settings.seed, purpose, count), np.int64)
-        return Outcomes(liquids, self.density, self.cups, seeds)
-
-    def minimise(self, liquids: Mapping[str, NDArray]) -> "Fit":
-        """Search the actions over these liquids."""
-        import numpyro.distributions as dist
-
-        from . import inference
-
-        outcomes = self.outcomes(liquids, _SEARCH)
-        measure = RISK[self.settings.risk]
-        return inference.fit(
-            reported(outcomes.simulate, self.advance),
-            inference.Prior(
-                {
-                    "angular_velocity": dist.Uniform(*self.cups.angular_velocity_range),
-                    "distance": dist.Uniform(*self.cups.distance_range),
-                }
-            ),
-            np.zeros((len(outcomes.seeds), len(FRACTIONS))),
-            budget=self.settings.iterations,
-            batch=1,  # one action already is several simulations, which run in parallel
-            seed=self.settings.seed,
-            discrepancy=lambda _, fractions: measure(fractions),
-            acquisition="lcb",  # a minimum is sought, not a posterior
-            transform="sqrt",
-            bank=self.bank,
-            identity=outcomes.identity,
-        )
+    def try_all(self, liquids: Mapping[str, NDArray]) -> Surface:
+        """Pour these liquids at every angular velocity of the grid."""
+        low, high = self.cups.angular_velocity_range
+        rates = np.geomspace(low, high, self.settings.iterations)
+        return surface(self._profiles(rates, liquids, _SEARCH), self.cups)
 
     def judge(self, action: Mapping[str, float], liquids: Mapping[str, NDArray]) -> Judged:
         """Pour every liquid, with seeds of their own."""
-        from .kept import Keep, simulate_kept
+        rate, distance = action["angular_velocity"], action["distance"]
+        profiles = self._profiles(np.array([rate]), liquids, _JUDGE)
+        spread = FARTHEST * landing_sd(self.cups)
+        off = np.clip(landing_sd(self.cups) * _normal_scores(LANDINGS), -spread, spread)
+        return Judged(
+            rate, distance, landed(profiles.fractions[0], profiles.distance, distance, off)
+        )
 
-        outcomes = self.outcomes(liquids, _JUDGE)
-        one = {name: np.array([value]) for name, value in action.items()}
-        keep = Keep(self.bank, outcomes.identity, 1)
-        poured = simulate_kept(reported(outcomes.simulate, self.advance), one, [0], keep)
-        return Judged(action["angular_velocity"], action["distance"], poured.signals[0])
+    def _profiles(self, rates: NDArray, liquids: Mapping[str, NDArray], purpose: int) -> Profiles:
+        """Those of the angular velocities at which no pour failed."""
+        from .kept import Keep, fresh_seeds, simulate_kept
+
+        count = len(next(iter(liquids.values())))
+        seeds = np.array(fresh_seeds(self.settings.seed, purpose, count), np.int64)
+        outcomes = Outcomes(liquids, self.density, self.cups, seeds)
+        keep = Keep(self.bank, outcomes.identity, 1)  # each is as many pours as there are liquids
+        simulate = reported(outcomes.simulate, self.advance)
+        made = simulate_kept(simulate, {"angular_velocity": rates}, [0] * len(rates), keep)
+        return Profiles(rates[made.places], outcomes.distances, made.signals)
+
+
+def _normal_scores(count: int) -> NDArray[np.float64]:
+    """Equally probable standard normal values, shape (count,)."""
+    from scipy.special import ndtri
+
+    return ndtri((np.arange(count) + 0.5) / count)

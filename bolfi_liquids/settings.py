@@ -64,7 +64,7 @@ class PourSettings:
     """What decides the choice of a pour besides the posterior and the cups.
 
     Attributes:
-        iterations: Actions that are tried, as in the paper's 15.
+        iterations: Angular velocities that are tried, each with every distance.
         draws: Posterior draws over which spillage is averaged.
         risk: "mean", or "cvar": the mean over the worst tenth of the draws.
         seed: Of everything random.

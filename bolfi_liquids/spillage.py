@@ -1,9 +1,13 @@
-"""Expected spillage of a pour over liquids that might be in the cup."""
+"""What pours spill, over liquids that might be in the cup and receivers at any distance.
+
+Where the receiver stands changes nothing in the fluid, so each pour is simulated once for all
+distances: `Outcomes` simulates, `Profiles` hold what came out.
+"""
 
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,21 +20,104 @@ if TYPE_CHECKING:
 FRACTIONS = ("spilled", "received", "retained")
 ACTION = ("angular_velocity", "distance")
 TAIL = 0.1  # share of the draws that CVaR averages
+MISSED = 0.03  # sd of where liquid lands about where it was simulated, over its fall to the rim
+STEP = 1e-3  # m, between the distances of a profile
+FARTHEST = 5.0  # sd by which liquid may land elsewhere
 
 
-def mean_spillage(fractions: NDArray) -> float:
-    """Mean spilled fraction of an action's outcomes, shape (draws, 3)."""
-    return float(fractions[:, 0].mean())
+def mean_spillage(spilled: NDArray) -> NDArray[np.float64]:
+    """Mean over the draws, along the first axis."""
+    return spilled.mean(axis=0)
 
 
-def tail_spillage(fractions: NDArray) -> float:
-    """Mean spilled fraction of the worst tenth of the outcomes (CVaR at 0.9), (draws, 3)."""
-    worst = int(np.ceil(TAIL * len(fractions)))
-    return float(np.sort(fractions[:, 0])[-worst:].mean())
+def tail_spillage(spilled: NDArray) -> NDArray[np.float64]:
+    """Mean over the worst tenth of the draws (CVaR at 0.9), along the first axis."""
+    worst = int(np.ceil(TAIL * len(spilled)))
+    return np.sort(spilled, axis=0)[-worst:].mean(axis=0)
 
 
-RISK: dict[str, Callable[[NDArray], float]] = {"mean": mean_spillage, "cvar": tail_spillage}
+RISK: dict[str, Callable[[NDArray], NDArray]] = {"mean": mean_spillage, "cvar": tail_spillage}
 """What is minimised, by the name users give."""
+
+
+def landing_sd(cups: "Cups") -> float:
+    """How far from where it was simulated the liquid lands [m].
+
+    The simulator, as every one, misses the speed and direction at which liquid leaves the lip,
+    and the error grows with the fall. Against 90 pours of an independent solver it is 0.03 of
+    the fall, RMS over liquids and angular velocities, from two heights.
+    """
+    return MISSED * (cups.pour.lip_height - cups.receiver.height)
+
+
+class Profiles(NamedTuple):
+    """Fractions spilled, received and retained, at some angular velocities and any distance.
+
+    Attributes:
+        angular_velocity: [rad/s], shape (W,), ascending.
+        distance: [m], shape (D,), `STEP` apart and beyond the range of the decision.
+        fractions: Shape (W, draws, D, 3); the last axis sums to 1.
+    """
+
+    angular_velocity: NDArray[np.float64]
+    distance: NDArray[np.float64]
+    fractions: NDArray[np.float64]
+
+
+class Surface(NamedTuple):
+    """What actions may be expected to spill.
+
+    Attributes:
+        angular_velocity: [rad/s], shape (W,).
+        distance: [m], shape (D,), within the range of the decision.
+        spilled: Of each draw, averaged over where the liquid may land, shape (draws, W, D).
+    """
+
+    angular_velocity: NDArray[np.float64]
+    distance: NDArray[np.float64]
+    spilled: NDArray[np.float64]
+
+    def least(self, risk: str) -> dict[str, float]:
+        """The action at which a measure of `RISK` is least.
+
+        Neighbouring angular velocities spill alike, so averages over them take chance out of
+        the choice.
+        """
+        from scipy.ndimage import gaussian_filter1d
+
+        surface = gaussian_filter1d(RISK[risk](self.spilled), 1.0, axis=0, mode="nearest")
+        row, column = np.unravel_index(np.argmin(surface), surface.shape)
+        chosen = self.angular_velocity[row], self.distance[column]
+        return dict(zip(ACTION, map(float, chosen), strict=True))
+
+
+def surface(profiles: Profiles, cups: "Cups") -> Surface:
+    """What the actions of the decision's range spill, wherever the liquid lands."""
+    from scipy.ndimage import gaussian_filter1d
+
+    spilled = np.moveaxis(profiles.fractions[..., 0], 1, 0)
+    blurred = gaussian_filter1d(
+        spilled, landing_sd(cups) / STEP, axis=-1, mode="nearest", truncate=FARTHEST
+    )
+    low, high = cups.distance_range
+    allowed = (profiles.distance > low - STEP / 2) & (profiles.distance < high + STEP / 2)
+    distance = np.clip(profiles.distance[allowed], low, high)
+    return Surface(profiles.angular_velocity, distance, blurred[..., allowed])
+
+
+def landed(fractions: NDArray, distances: NDArray, distance: float, off: NDArray) -> NDArray:
+    """Fractions (draws * len(off), 3) where the liquid lands `off` [m] from where simulated.
+
+    Args:
+        fractions: Of one angular velocity, shape (draws, D, 3).
+        distances: Theirs [m], shape (D,).
+        distance: Of the receiver [m].
+        off: Positive where it lands beyond, shape (n,).
+    """
+    from scipy.interpolate import make_interp_spline
+
+    at = make_interp_spline(distances, fractions, k=1, axis=1)(distance - off)
+    return at.reshape(-1, len(FRACTIONS))
 
 
 @dataclass(frozen=True)
@@ -52,11 +139,18 @@ class Outcomes:
     cups: "Cups"
     seeds: NDArray[np.int64]
 
+    @property
+    def distances(self) -> NDArray[np.float64]:
+        """Those of the decision [m], and so far beyond as liquid may land elsewhere."""
+        low, high = self.cups.distance_range
+        beyond = int(np.ceil(FARTHEST * landing_sd(self.cups) / STEP))
+        return low + STEP * np.arange(-beyond, round((high - low) / STEP) + beyond + 1)
+
     def simulate(self, action: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
-        """Fractions (actions, draws, 3) spilled, received and retained.
+        """Fractions (actions, draws, D, 3) spilled, received and retained.
 
         Args:
-            action: `angular_velocity` [rad/s] and `distance` [m], shapes (actions,).
+            action: `angular_velocity` [rad/s], shape (actions,).
             seeds: The engine's, not used: see the class.
         """
         from . import models
@@ -64,22 +158,22 @@ class Outcomes:
         draws, actions = len(self.seeds), len(seeds)
         tiled = {name: np.tile(values, actions) for name, values in self.theta.items()}
         liquid, effects = split_parameters(tiled)
-        turned = {name: np.repeat(action[name], draws) for name in ACTION}
-        result = models.pour(
+        landings = models.landings(
             models.Liquid(**liquid, density=self.density),
-            models.PourAction(**turned),
+            np.repeat(action["angular_velocity"], draws),
             self.cups,
             np.tile(self.seeds, actions),
             effects=effects,
         )
-        columns = [np.asarray(getattr(result, name), np.float64) for name in FRACTIONS]
-        return np.stack(columns, axis=-1).reshape(actions, draws, len(FRACTIONS))
+        result = landings.into(self.distances[:, None], self.cups.receiver.radius)
+        fractions = np.stack([getattr(result, name) for name in FRACTIONS], axis=-1)
+        return np.moveaxis(fractions, 0, 1).reshape(actions, draws, -1, len(FRACTIONS))
 
     @property
     def identity(self) -> str:
         """A text that two equal experiments share."""
         liquids = {name: np.asarray(values).tolist() for name, values in self.theta.items()}
+        seeds = np.asarray(self.seeds).tolist()
         return json.dumps(
-            [self.cups.settings(), self.density, liquids, np.asarray(self.seeds).tolist()],
-            sort_keys=True,
+            ["profiles", self.cups.settings(), self.density, liquids, seeds], sort_keys=True
         )

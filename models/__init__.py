@@ -6,7 +6,7 @@ from .effects import EFFECTS, register
 from .faults import FailedSimulation
 from .liquid import Liquid
 from .numerics import MODEL_VERSION, PUBLISHED_DRAG, Numerics
-from .pouring import PourAction, PourResult, pour
+from .pouring import Landings, PourAction, PourResult, landings, pour
 from .rig import Rig
 from .stir_setup import Cup, Stick, StirSetup
 from .stirring import stir
@@ -19,6 +19,7 @@ __all__ = [
     "Cups",
     "Effect",
     "FailedSimulation",
+    "Landings",
     "Liquid",
     "Numerics",
     "PourAction",
@@ -26,6 +27,7 @@ __all__ = [
     "Rig",
     "Stick",
     "StirSetup",
+    "landings",
     "pour",
     "register",
     "stir",

@@ -4,7 +4,7 @@ from dataclasses import asdict, dataclass
 
 from .checks import check_numbers
 
-MODEL_VERSION = "4"  # rises with every change that alters a simulation's bits
+MODEL_VERSION = "5"  # rises with every change that alters a simulation's bits
 COARSE = 0.0065  # m, the particle spacing that `Numerics.rate` is for
 FLOOR_AT_REST = 2.2e-3  # least kinematic viscosity of slow flow, in d² a substep
 FLOOR_OF_SPEED = 0.018  # what flow at a speed U past walls adds to it, in U d
@@ -33,7 +33,9 @@ class Numerics:
         wall_friction: Stress on a pouring cup by the speed at which liquid slips along it, at
             most [Pa s/m], adhesion aside: above 1 Pa s or so liquids slip (Navier 1823). Tuned on
             pours of a gel; plates and the stirred cup have none.
-        outer_wall: Share of the coupling to walls on what runs over a cup's rim and down outside.
+        outer_wall: Factor on the tangential coupling to walls of what runs over a pouring cup's
+            rim and down outside, where nothing presses it on. Tuned, with the next, on pours.
+        outer_viscosity: Kinematic viscosity above which that slips [m²/s].
         stick_drag: Factor on the viscous coupling to the stick, about one particle wide.
         stick_thinner: How much less than its own the stick's radius is to the particles, in
             spacings; see `PUBLISHED_DRAG`.
@@ -53,7 +55,8 @@ class Numerics:
     wall_slip: float = 4.5
     wall_normal: float = 1.0
     wall_friction: float = 900.0
-    outer_wall: float = 0.4
+    outer_wall: float = 1.6
+    outer_viscosity: float = 1e-4
     stick_drag: float = 1.0
     stick_thinner: float = 0.05
     attraction: float = 2.25

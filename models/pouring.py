@@ -1,4 +1,8 @@
-"""Pouring: an action in, the fractions spilled, received and retained out."""
+"""Pouring: an action in; out come the fractions spilled, received and retained.
+
+Nothing that has passed the receiver's rim comes back, so where the receiver stands, and how wide
+it is, changes nothing in the fluid: one simulation tells what any receiver would have caught.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -48,6 +52,41 @@ class PourResult:
     retained: np.ndarray
 
 
+@dataclass(frozen=True)
+class Landings:
+    """Where the liquid of B pours passes the height of the receiver's rim.
+
+    Attributes:
+        position: Of every particle from below the source's lip, towards the receiver and across
+            [m], float32 of shape [B, particles, 2]; NaN for what has not landed: it is in the
+            source, or still in the air.
+        retained: Fraction left in the source, shape [B]; NaN if a pour diverged.
+    """
+
+    position: np.ndarray
+    retained: np.ndarray
+
+    def into(self, distance: ArrayLike, radius: ArrayLike) -> PourResult:
+        """What receivers would have caught, in the shape to which all broadcast.
+
+        Args:
+            distance: From the lip to the receiver's axis [m], broadcast against [B]: of shape
+                [D, 1], it gives every distance for every pour.
+            radius: Of the receiver [m], likewise.
+        """
+        distance, radius, _ = np.broadcast_arrays(
+            np.asarray(distance, np.float32), np.asarray(radius, np.float32), self.retained
+        )
+        ahead, across = np.moveaxis(self.position, -1, 0)
+        reach = np.hypot(ahead - distance[..., None], across)
+        received = (reach < radius[..., None]).mean(axis=-1)  # a NaN is in no receiver
+        received = np.where(np.isnan(self.retained), np.nan, received)
+        retained = np.broadcast_to(self.retained, received.shape)
+        # whole particles, so that what is left of three fractions is not a rounding error
+        spilled = np.round((1.0 - received - retained) * self.position.shape[1])
+        return PourResult(spilled / self.position.shape[1], received, retained)
+
+
 def pour(
     liquid: Liquid,
     action: PourAction,
@@ -74,10 +113,28 @@ def pour(
         FailedSimulation: a pour went wrong; its fractions are NaN.
     """
     seeds = checked_seeds(seeds)
+    distance = _batch("distance", action.distance, len(seeds))
+    landed = landings(liquid, action.angular_velocity, cups, seeds, particles, effects)
+    return landed.into(distance, cups.receiver.radius)
+
+
+def landings(
+    liquid: Liquid,
+    angular_velocity: ArrayLike,
+    cups: Cups,
+    seeds: ArrayLike,
+    particles: int = POUR_PARTICLES,
+    effects: Mapping[str, ArrayLike] | None = None,
+) -> Landings:
+    """Where the liquid lands, for receivers at any distance; arguments and errors of `pour`.
+
+    `Landings.into` makes of them what `pour` would have returned, the receiver's distance and
+    radius in `cups` aside.
+    """
+    seeds = checked_seeds(seeds)
     acting = acting_in("pour", with_adhesion(liquid, effects, len(seeds)), len(seeds))
     liquid = liquid.batch(len(seeds))
-    rate = _batch("angular_velocity", action.angular_velocity, len(seeds))
-    distance = _batch("distance", action.distance, len(seeds))
+    rate = _batch("angular_velocity", angular_velocity, len(seeds))
     if (rate <= 0).any():
         raise ValueError(f"angular_velocity must be positive [rad/s], got {rate.min()}")
     wrong = rate[(rate < SLOWEST) | (rate > FASTEST)]
@@ -87,16 +144,16 @@ def pour(
             "is it in rad/s?"
         )
     check_numbers("pour", particles=particles)
-    counts = np.empty((3, len(seeds)))
+    position = np.empty((len(seeds), particles, 2), np.float32)
+    retained = np.empty(len(seeds))
     with runtime.LOCK:
         for kinds, rows, coefficients in liquid_sets(acting, len(seeds)):
             scene = _scene(cups, particles, kinds)
             for low in range(0, len(rows), scene.slots):
                 part = rows[low : low + scene.slots]
-                held, turned = (liquid[part], coefficients[:, part]), (rate[part], distance[part])
-                counts[:, part] = _run(scene, cups, held, turned, seeds[part])
-    spilled, received, retained = counts / particles
-    return PourResult(spilled, received, retained)
+                held = liquid[part], coefficients[:, part]
+                position[part], retained[part] = _run(scene, cups, held, rate[part], seeds[part])
+    return Landings(position, retained)
 
 
 def _batch(name: str, value: ArrayLike, size: int) -> np.ndarray:
@@ -117,18 +174,17 @@ def _scene(cups: Cups, particles: int, effects: tuple[Effect, ...] = ()):
     )
 
 
-def _run(scene, cups, held, action, seeds) -> np.ndarray:
-    """Particles spilled, received and retained, shape [3, B]; NaN where a pour diverged.
+def _run(scene, cups, held, rate, seeds) -> tuple[np.ndarray, np.ndarray]:
+    """Position and retained fraction as in `Landings`.
 
     `held` are the liquid and the coefficients [effects, B] of the scene's effects.
     """
     size = len(seeds)
-    rate, distance = action
     source = cups.source
     shift = np.array([source.radius, 0.0, source.height], np.float32)
 
     def settle(places: list[int]) -> list[Packing]:
-        scene.place_cups(np.ones(len(places)), np.zeros(len(places)))
+        scene.place_cups(np.ones(len(places)))
         packed = (
             pack_cylinder(source.radius, scene.spacing, scene.particles, int(seeds[k]))
             for k in places
@@ -139,14 +195,17 @@ def _run(scene, cups, held, action, seeds) -> np.ndarray:
     fixed = cups, scene.particles, tuple(effect.name for effect in scene.effects)
     packings = _packings.of([(fixed, seed) for seed in seeds], settle)
     scene.place([p.position for p in packings], [p.multiplier for p in packings])
-    scene.place_cups(rate, distance)
+    scene.place_cups(rate)
     scene.pour_in(*held)
     hold = cups.pour.hold + DRIP
     steps = int((cups.pour.final_angle / rate.min() + hold) * scene.rate)
     for start in range(0, steps, CHUNK):
         scene.pour(size, start, min(start + CHUNK, steps), hold)
     scene.count(size)
-    fields = (scene.spilled, scene.received, scene.retained)
-    counts = np.stack([field.to_numpy()[:size] for field in fields]).astype(float)
-    counts[:, faulty(scene.fault.to_numpy()[:size], seeds)] = np.nan
-    return counts
+    position = scene.landing.to_numpy()[:size]
+    landed = scene.landed.to_numpy()[:size]
+    position[np.arange(scene.particles) >= landed[:, None]] = np.nan
+    retained = scene.retained.to_numpy()[:size] / scene.particles
+    failed = faulty(scene.fault.to_numpy()[:size], seeds)
+    position[failed], retained[failed] = np.nan, np.nan
+    return position, retained

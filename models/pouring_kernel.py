@@ -29,16 +29,15 @@ class PouringScene(Fluid):
         super().__init__(slots, particles, spacing, numerics, extent)
         self.bring(effects)
         self.cup_radius, self.cup_height = source.radius, source.height
-        self.receiver_radius, self.rim = cups.receiver.radius, -drop
+        self.rim = -drop  # of the receiver, below the lip
         self.margin = numerics.contact * spacing
         self.wall_friction = numerics.wall_friction
         self.final_angle = cups.pour.final_angle
-        self.rate_of_turn, self.distance, self.angle, self.turning = (
-            ti.field(ti.f32, slots) for _ in range(4)
-        )
+        self.rate_of_turn, self.angle, self.turning = (ti.field(ti.f32, slots) for _ in range(3))
         self.region = ti.field(ti.i32, (slots, particles))
         self.carry(self.region, ti.field(ti.i32, (slots, particles)))
-        self.received, self.spilled, self.retained = (ti.field(ti.i32, slots) for _ in range(3))
+        self.landed, self.retained = (ti.field(ti.i32, slots) for _ in range(2))
+        self.landing = ti.Vector.field(2, ti.f32, (slots, particles))
 
     @ti.func
     def to_cup(self, b, p):
@@ -85,7 +84,9 @@ class PouringScene(Fluid):
         elif q.z > 0.0 and side[3] > 0.0:
             # what runs over the rim still drags along the wall's edge and outer face
             moving = self.turning[b] * vec3(p.z, 0.0, -p.x)
-            grip = self.numerics.outer_wall * self.wall_grip(side, self.turn(b, outward))
+            slip = ti.min(1.0, self.numerics.outer_viscosity / self.kinematic(b))
+            rub = self.wall_rub(side, self.turn(b, outward))
+            grip = self.numerics.outer_wall * slip * rub
         self.grip_walls(b, i, grip, moving)
         return density
 
@@ -133,16 +134,13 @@ class PouringScene(Fluid):
 
     @ti.func
     def catch(self, b):
-        """Take particles that fell past the receiver's rim out of the simulation, and count."""
+        """Take particles that fell past the receiver's rim out of the simulation, note where."""
         i = 0
         while i < self.alive[b]:
             p = self.position[b, i]
             if p.z < self.rim and self.region[b, i] != INSIDE:
-                x = p.x - self.distance[b]
-                if x * x + p.y * p.y < self.receiver_radius * self.receiver_radius:
-                    self.received[b] = self.received[b] + 1
-                else:
-                    self.spilled[b] = self.spilled[b] + 1
+                self.landing[b, self.landed[b]] = ti.Vector([p.x, p.y])
+                self.landed[b] = self.landed[b] + 1
                 last = self.alive[b] - 1
                 self.alive[b] = last
                 self.position[b, i] = self.position[b, last]
@@ -170,20 +168,17 @@ class PouringScene(Fluid):
 
     @ti.kernel
     def count(self, active: ti.i32):
-        """Count what stayed in the source; what still flies is spilled."""
+        """Count what stayed in the source."""
         for b in range(active):
             self.retained[b] = 0
             for i in range(self.alive[b]):
                 if self.region[b, i] == INSIDE:
                     self.retained[b] = self.retained[b] + 1
-                else:
-                    self.spilled[b] = self.spilled[b] + 1
 
-    def place_cups(self, rate, distance):
-        """Set the cups upright, to turn at `rate` [b] in rad/s, receivers at `distance` [b] m."""
+    def place_cups(self, rate):
+        """Set the cups upright, to turn at `rate` [b] in rad/s."""
         ones = self.padded(rate)
         ones[len(rate) :] = 1.0
         self.rate_of_turn.from_numpy(ones)
-        self.distance.from_numpy(self.padded(distance))
-        for field in (self.angle, self.turning, self.region, self.received, self.spilled):
+        for field in (self.angle, self.turning, self.region, self.landed):
             field.fill(0)

@@ -70,10 +70,13 @@ class Viscous(Rheology):
     def wall_grip(self, row, normal):
         """Friction matrix of a wall in units of 10 nu dt / h^2, from a row of its table."""
         across = normal.outer_product(normal)
-        along = ti.Matrix.identity(ti.f32, 3) - across
-        return (
-            self.numerics.wall_normal * row[2] * across + self.numerics.wall_slip * row[3] * along
-        )
+        return self.numerics.wall_normal * row[2] * across + self.wall_rub(row, normal)
+
+    @ti.func
+    def wall_rub(self, row, normal):
+        """The part of `wall_grip` along the wall."""
+        along = ti.Matrix.identity(ti.f32, 3) - normal.outer_product(normal)
+        return self.numerics.wall_slip * row[3] * along
 
     @ti.func
     def share(self, kinematic):

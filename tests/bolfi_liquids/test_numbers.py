@@ -106,7 +106,6 @@ def test_a_sampler_that_did_not_converge_is_told():
 
 
 def test_risks_of_known_outcomes():
-    fractions = np.zeros((20, 3))
-    fractions[:, 0] = np.linspace(0.0, 0.95, 20)
-    assert mean_spillage(fractions) == pytest.approx(0.475)
-    assert tail_spillage(fractions) == pytest.approx(0.925)
+    spilled = np.linspace(0.0, 0.95, 20)[:, None] * [1.0, 0.5]
+    assert mean_spillage(spilled) == pytest.approx([0.475, 0.2375])
+    assert tail_spillage(spilled) == pytest.approx([0.925, 0.4625])

@@ -107,3 +107,19 @@ def test_bad_cups_files_are_named(tmp_path, old, new, message):
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(ValueError, match=f"cups.toml.*{message}"):
         models.Cups.from_toml(path)
+
+
+def test_landings_serve_every_receiver(cups):
+    """One simulation tells what any distance and radius would have caught."""
+    liquid, rate, seeds = models.Liquid([0.01, 1.0], 0.0, 1000.0), 2.5, [0, 1]
+    landings = models.landings(liquid, rate, cups, seeds)
+    for distance in (0.01, 0.045):
+        whole = models.pour(liquid, models.PourAction(rate, distance), cups, seeds)
+        caught = landings.into(distance, cups.receiver.radius)
+        np.testing.assert_array_equal(whole.received, caught.received)
+    many = landings.into(np.linspace(0.0, 0.07, 8)[:, None], cups.receiver.radius)
+    assert many.spilled.shape == (8, 2)
+    wide = landings.into(0.03, 1.0)
+    assert wide.spilled + wide.retained + wide.received == pytest.approx(1.0)
+    assert (wide.spilled < 0.01).all()
+    np.testing.assert_array_equal(landings.into(0.03, 0.0).received, 0.0)
