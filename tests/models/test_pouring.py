@@ -119,7 +119,8 @@ def test_landings_serve_every_receiver(cups):
         np.testing.assert_array_equal(whole.received, caught.received)
     many = landings.into(np.linspace(0.0, 0.07, 8)[:, None], cups.receiver.radius)
     assert many.spilled.shape == (8, 2)
-    wide = landings.into(0.03, 1.0)
+    wide = landings.into(0.03, 1.0)  # what flies when the pour ends is in no receiver
+    flying = np.isnan(landings.position).any(axis=-1).mean(axis=1) - landings.retained
+    assert wide.spilled == pytest.approx(flying, abs=1e-9)
     assert wide.spilled + wide.retained + wide.received == pytest.approx(1.0)
-    assert (wide.spilled < 0.01).all()
     np.testing.assert_array_equal(landings.into(0.03, 0.0).received, 0.0)
