@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from numpy.typing import NDArray
+
 from .calibration import Calibration, is_calibrated
 from .calibration_section import calibration_section
 from .draws import pick_draws
@@ -101,7 +103,16 @@ def _calibrate(
     ):
         simulate = reported(stirring.simulate, advance)
         keep = Keep(bank, stirring.identity, settings.batch)
-        fit = _fit(simulate, stirring, prior, settings, keep)
+        fit = fit_recordings(
+            stirring,
+            stirring.observed,
+            prior,
+            keep,
+            budget=settings.budget,
+            surrogate=settings.surrogate,
+            seed=settings.seed,
+            simulate=simulate,
+        )
         sampled = fit.sample(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
         )
@@ -112,28 +123,44 @@ def _calibrate(
     write_section(run, "calibrate", calibration_section(tree, fit, stirring, check))
 
 
-def _fit(
-    simulate: Simulate,
+def fit_recordings(  # noqa: PLR0913  what a calibration is made of
     stirring: Stirring,
+    observed: NDArray,
     prior: "Prior",
-    settings: CalibrationSettings,
     keep: "Keep",
+    *,
+    budget: int,
+    surrogate: str,
+    seed: int,
+    simulate: Simulate | None = None,
 ) -> "Fit":
+    """The engine's fit of a stir, with the options that go with the surrogate.
+
+    Args:
+        stirring: The simulator, and how two signals are compared.
+        observed: Inclinations (T, 2) [rad], NaN where missing.
+        prior: Of the parameters.
+        keep: Finished simulations are taken from there and put there.
+        budget: Simulations to learn from.
+        surrogate: One of `settings.SURROGATES`.
+        seed: Of everything random.
+        simulate: In place of the stirring's own, such as one that reports.
+    """
     from . import inference
 
-    paper: dict[str, Any] = {**PAPER_RULES, "initial": MIN_SIMULATIONS}
+    paper: dict[str, Any] = {**PAPER_RULES, "initial": min(MIN_SIMULATIONS, budget)}
     return inference.fit(
-        simulate,
+        simulate or stirring.simulate,
         prior,
-        stirring.observed,
-        budget=settings.budget,
+        observed,
+        budget=budget,
         batch=keep.batch,
-        seed=settings.seed,
-        surrogate=settings.surrogate,
+        seed=seed,
+        surrogate=surrogate,
         discrepancy=stirring.discrepancy(),
         bank=keep.bank,
         identity=keep.identity,
-        **(paper if settings.surrogate == "discrepancy" else {}),
+        **(paper if surrogate == "discrepancy" else {}),
     )
 
 

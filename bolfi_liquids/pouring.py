@@ -11,10 +11,19 @@ from numpy.typing import NDArray
 
 from .calibration import Calibration
 from .cups import bundled_cups
-from .progress import Advance, progress_bar, reported
+from .progress import Advance, progress_bar
 from .run_directory import POUR, open_bank
 from .settings import PourSettings
-from .spillage import FARTHEST, Outcomes, Profiles, Surface, landed, landing_sd, surface
+from .spillage import (
+    FARTHEST,
+    Outcomes,
+    Profiles,
+    Surface,
+    landed,
+    landing_sd,
+    pour_all,
+    surface,
+)
 from .summary import write_section
 
 if TYPE_CHECKING:
@@ -163,16 +172,12 @@ class _Pours:
         )
 
     def _profiles(self, rates: NDArray, liquids: Mapping[str, NDArray], purpose: int) -> Profiles:
-        """Those of the angular velocities at which no pour failed."""
-        from .kept import Keep, fresh_seeds, simulate_kept
+        from .kept import fresh_seeds
 
         count = len(next(iter(liquids.values())))
         seeds = np.array(fresh_seeds(self.settings.seed, purpose, count), np.int64)
         outcomes = Outcomes(liquids, self.density, self.cups, seeds)
-        keep = Keep(self.bank, outcomes.identity, 1)  # each is as many pours as there are liquids
-        simulate = reported(outcomes.simulate, self.advance)
-        made = simulate_kept(simulate, {"angular_velocity": rates}, [0] * len(rates), keep)
-        return Profiles(rates[made.places], outcomes.distances, made.signals)
+        return pour_all(outcomes, rates, self.bank, self.advance)
 
 
 def _normal_scores(count: int) -> NDArray[np.float64]:

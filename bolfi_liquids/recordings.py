@@ -51,6 +51,14 @@ class Recording:
         """A numeric attribute, in SI units."""
         return float(self.attrs[name])
 
+    def __reduce__(self):
+        """Processes that simulate need it, and a mapping proxy cannot be pickled."""
+        return _unpickled, ({**vars(self), "attrs": dict(self.attrs)},)
+
+
+def _unpickled(values: dict[str, Any]) -> Recording:
+    return Recording(**{**values, "attrs": MappingProxyType(values["attrs"])})
+
 
 Source = Recording | str | Path
 

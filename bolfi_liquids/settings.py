@@ -60,6 +60,50 @@ class CalibrationSettings:
 
 
 @dataclass(frozen=True)
+class SbcSettings:
+    """What decides a check of calibrations besides the recording that gives path and rig.
+
+    Attributes:
+        runs: Replicates of the emulator of the inclination, which share one design.
+        sequential: Replicates of the paper's surrogate, each with simulations of its own.
+        design: Simulations of the shared design.
+        budget: Simulations of each of the others.
+        noise_deg: Of the cameras, added to each simulated sample [deg].
+        particles: Of the simulated liquid.
+        seed: Of everything random.
+    """
+
+    runs: int = 200
+    sequential: int = 40
+    design: int = 64
+    budget: int = 20
+    noise_deg: float = 0.1
+    particles: int = 1000
+    seed: int = 0
+
+    def __post_init__(self):
+        least = {"runs": 0, "sequential": 0, "design": MIN_SIMULATIONS, "seed": 0}
+        for name, lowest in least.items():
+            at_least(lowest, f"--{name}", getattr(self, name))
+        if not 0.0 < self.noise_deg < 90.0:
+            raise InputError(
+                f"{self.noise_deg!r}", where="--noise", fix="give degrees above 0, such as 0.1"
+            )
+        self.calibration("discrepancy")
+
+    @property
+    def replicates(self) -> dict[str, int]:
+        """How many, by surrogate."""
+        return {"signal": self.runs, "discrepancy": self.sequential}
+
+    def calibration(self, surrogate: str) -> CalibrationSettings:
+        """Of one replicate: as `calibrate` has it, with as many draws as ranks need."""
+        return CalibrationSettings(
+            budget=self.budget, surrogate=surrogate, particles=self.particles, draws=250
+        )
+
+
+@dataclass(frozen=True)
 class PourSettings:
     """What decides the choice of a pour besides the posterior and the cups.
 

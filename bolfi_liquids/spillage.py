@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .prior import split_parameters
+from .progress import Advance, reported
 
 if TYPE_CHECKING:
+    from .inference import SimulationBank
     from .models import Cups
 
 FRACTIONS = ("spilled", "received", "retained")
@@ -177,3 +179,21 @@ class Outcomes:
         return json.dumps(
             ["profiles", self.cups.settings(), self.density, liquids, seeds], sort_keys=True
         )
+
+
+def pour_all(
+    outcomes: Outcomes, rates: NDArray, bank: "SimulationBank", advance: Advance
+) -> Profiles:
+    """Pour every liquid at every angular velocity [rad/s]; what the bank holds is not repeated.
+
+    Those at which a pour failed are left out.
+
+    Raises:
+        RuntimeError: That is all of them.
+    """
+    from .kept import Keep, simulate_kept
+
+    keep = Keep(bank, outcomes.identity, 1)  # each is as many pours as there are liquids
+    simulate = reported(outcomes.simulate, advance)
+    made = simulate_kept(simulate, {"angular_velocity": rates}, [0] * len(rates), keep)
+    return Profiles(rates[made.places], outcomes.distances, made.signals)

@@ -1,0 +1,82 @@
+"""Profiles of pours for any liquid of the prior, interpolated between those of a grid.
+
+Studies that choose thousands of pours cannot simulate each: a grid of liquids is poured once, at
+every angular velocity, and what lies between is interpolated, linearly in the logarithm of the
+viscosity and in the cohesion.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kept import fresh_seeds
+from .spillage import Outcomes, Profiles, Surface, pour_all, surface
+
+if TYPE_CHECKING:
+    from .inference import Prior, SimulationBank
+    from .models import Cups
+    from .progress import Advance
+
+LIQUIDS = 24, 3  # viscosities and cohesions, which act slowly
+RATES = 12  # angular velocities
+_PURPOSE = 31  # of seeds
+
+
+@dataclass(frozen=True, eq=False)
+class PourGrid:
+    """See the module.
+
+    Attributes:
+        cups: Of the pours.
+        log_viscosity: Of the grid, shape (V,).
+        cohesion: Shape (C,).
+        profiles: Of V * C liquids, cohesion first, in the place of draws.
+    """
+
+    cups: "Cups"
+    log_viscosity: NDArray[np.float64]
+    cohesion: NDArray[np.float64]
+    profiles: Profiles
+
+    def surface(self, liquids: Mapping[str, NDArray]) -> Surface:
+        """What all actions spill of each liquid, `viscosity` [Pa s] and `cohesion`, (draws,)."""
+        from scipy.interpolate import RegularGridInterpolator
+
+        rates, _, distances, kinds = self.profiles.fractions.shape
+        nodes = len(self.log_viscosity), len(self.cohesion)
+        by_liquid = np.moveaxis(self.profiles.fractions, 1, 0)
+        between = RegularGridInterpolator(
+            (self.log_viscosity, self.cohesion), by_liquid.reshape(*nodes, rates, distances, kinds)
+        )
+        at = np.column_stack([np.log(liquids["viscosity"]), liquids["cohesion"]])
+        inside = np.clip(
+            at, [axis[0] for axis in between.grid], [axis[-1] for axis in between.grid]
+        )
+        fractions = np.moveaxis(between(inside), 0, 1)
+        return surface(self.profiles._replace(fractions=fractions), self.cups)
+
+
+def make_grid(
+    cups: "Cups", density: float, prior: "Prior", bank: "SimulationBank", advance: "Advance"
+) -> PourGrid:
+    """Pour the grid's liquids, `RATES` calls of the simulator, each reported to `advance`.
+
+    Args:
+        cups: Of the pours.
+        density: Of every liquid [kg/m3].
+        prior: Its bounds are the grid's.
+        bank: Where the pours are kept.
+        advance: Called after each angular velocity.
+    """
+    ends = prior.from_unit(np.array([[0.0, 0.0], [1.0, 1.0]]))
+    viscosity = np.geomspace(*ends["viscosity"], LIQUIDS[0])
+    cohesion = np.linspace(*ends["cohesion"], LIQUIDS[1])
+    mesh = np.meshgrid(viscosity, cohesion, indexing="ij")
+    theta = dict(zip(("viscosity", "cohesion"), (m.ravel() for m in mesh), strict=True))
+    seeds = np.array(fresh_seeds(0, _PURPOSE, mesh[0].size), np.int64)
+    rates = np.geomspace(*cups.angular_velocity_range, RATES)
+    made = pour_all(Outcomes(theta, density, cups, seeds), rates, bank, advance)
+    return PourGrid(cups, np.log(viscosity), cohesion, made)

@@ -1,0 +1,26 @@
+"""Recordings and pours of the independent solver that come with the package."""
+
+from importlib.resources import as_file, files
+from typing import TYPE_CHECKING
+
+from ..recordings import Recording, open_recording
+
+if TYPE_CHECKING:
+    from ..pour_table import PourTable
+
+RECORDED = ("water", "oil", "glycerin", "gel")
+POURED = ("water", "oil", "glycerin")
+
+
+def bundled_recording(liquid: str) -> Recording:
+    """Stirred at 10 cm/s; one of `RECORDED`."""
+    with as_file(files("bolfi_liquids.data") / f"{liquid}_v10.nc") as path:
+        return open_recording(path)
+
+
+def bundled_pours(liquid: str) -> "PourTable":
+    """Poured with the bundled cups; one of `POURED`."""
+    from ..pour_table import open_pours
+
+    with as_file(files("bolfi_liquids.data") / "pours.csv") as path:
+        return open_pours(path, liquid)

@@ -1,0 +1,155 @@
+"""Calibrating a liquid whose parameters are known: by stirring it, and by pouring it.
+
+Both are simulators to `inference.run_missing`, which keeps what is finished: a truth goes in, what
+was concluded with each budget comes out.
+"""
+
+import json
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibrator import fit_recordings
+from ..draws import pick_draws
+from ..settings import MIN_SIMULATIONS, PAPER_RULES
+from ..stirring import Stirring
+from .truths import DENSITY
+
+if TYPE_CHECKING:
+    from ..inference import Fit, Prior
+    from ..models import Cups
+
+DRAWS = 16  # of each posterior
+BATCH = 4  # simulations at the same time
+NOISE = np.radians(0.1)  # sd of the cameras
+NAMES = ("viscosity", "cohesion")
+
+
+@dataclass(frozen=True)
+class ByStirring:
+    """Stir it once, add camera noise, and calibrate with each budget.
+
+    Attributes:
+        stirring: The simulator.
+        prior: Of the parameters.
+        surrogate: "signal", or "discrepancy": the paper's.
+        budgets: Ascending; a larger one goes on from a smaller one's simulations.
+    """
+
+    stirring: Stirring
+    prior: "Prior"
+    surrogate: str
+    budgets: tuple[int, ...]
+
+    def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
+        """Conclusions (B, budgets, 1 + DRAWS, 2): theta*, then draws, of viscosity and cohesion."""
+        return np.stack([self._one(truth, int(seed)) for truth, seed in _each(theta, seeds)])
+
+    def _one(self, truth: dict[str, NDArray], seed: int) -> NDArray[np.float64]:
+        from ..inference import SimulationBank
+        from ..kept import Keep
+
+        rng = np.random.default_rng(seed)
+        clean = self.stirring.simulate(truth, np.array([seed]))[0]
+        observed = clean + rng.normal(0.0, NOISE, clean.shape)
+        with SimulationBank(":memory:") as bank:
+            keep = Keep(bank, self.stirring.identity, BATCH)
+
+            def fit(budget: int) -> "Fit":
+                return fit_recordings(
+                    self.stirring,
+                    observed,
+                    self.prior,
+                    keep,
+                    budget=budget,
+                    surrogate=self.surrogate,
+                    seed=seed,
+                )
+
+            return np.stack([concluded(fit(budget), seed) for budget in self.budgets])
+
+    @property
+    def identity(self) -> str:
+        """A text that two equal experiments share."""
+        return json.dumps(["stir", self.surrogate, self.budgets, self.stirring.identity])
+
+
+@dataclass(frozen=True)
+class ByPouring:
+    """The paper's reference (Lopez-Guevara et al. 2017): a training pour is observed once, and
+    Bayesian optimisation seeks the liquid that spills as much.
+
+    Attributes:
+        cups: Of training pour and task alike.
+        prior: Of the parameters.
+        angular_velocity, distance: The training pour [rad/s], [m].
+        budgets: See `ByStirring`.
+    """
+
+    cups: "Cups"
+    prior: "Prior"
+    angular_velocity: float
+    distance: float
+    budgets: tuple[int, ...]
+
+    def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
+        """As `ByStirring.simulate`."""
+        return np.stack([self._one(truth, int(seed)) for truth, seed in _each(theta, seeds)])
+
+    def _one(self, truth: dict[str, NDArray], seed: int) -> NDArray[np.float64]:
+        from ..inference import SimulationBank, fit
+
+        observed = self._spilled(truth, np.array([seed]))[0]
+        with SimulationBank(":memory:") as bank:
+
+            def fitted(budget: int) -> "Fit":
+                return fit(
+                    self._spilled,
+                    self.prior,
+                    observed,
+                    budget=budget,
+                    batch=BATCH,
+                    seed=seed,
+                    initial=min(MIN_SIMULATIONS, budget),
+                    discrepancy=_squared,
+                    bank=bank,
+                    **PAPER_RULES,
+                )
+
+            return np.stack([concluded(fitted(budget), seed) for budget in self.budgets])
+
+    def _spilled(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
+        """Fraction that the training pour spills, shape (B, 1)."""
+        from .. import models
+
+        action = models.PourAction(self.angular_velocity, self.distance)
+        made = models.pour(models.Liquid(**theta, density=DENSITY), action, self.cups, seeds)
+        return np.asarray(made.spilled, np.float64)[:, None]
+
+    @property
+    def identity(self) -> str:
+        """A text that two equal experiments share."""
+        action = [self.angular_velocity, self.distance]
+        return json.dumps(["pour", action, self.budgets, self.cups.settings()], sort_keys=True)
+
+
+def concluded(fit: "Fit", seed: int) -> NDArray[np.float64]:
+    """theta* and draws, shape (1 + DRAWS, 2)."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a hundred fits, and nothing here depends on them
+        sampled = fit.sample("quadrature", chains=2, draws=250, seed=seed)
+    drawn = pick_draws(sampled["posterior"].to_dataset(), DRAWS, seed)
+    return np.column_stack([np.append(fit.best[name], drawn[name]) for name in NAMES])
+
+
+def _each(theta: Mapping[str, NDArray], seeds: NDArray) -> Any:
+    for at, seed in enumerate(seeds):
+        yield {name: np.asarray(values)[at : at + 1] for name, values in theta.items()}, seed
+
+
+def _squared(observed: NDArray, simulated: NDArray) -> float:
+    return float((observed[0] - simulated[0]) ** 2)

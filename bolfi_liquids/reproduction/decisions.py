@@ -1,0 +1,73 @@
+"""Pours chosen from conclusions, and what they spill when they are carried out."""
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kept import fresh_seeds
+from ..spillage import STEP, Outcomes, pour_all
+from .calibrations import NAMES
+from .truths import DENSITY, Truths
+
+if TYPE_CHECKING:
+    from ..inference import SimulationBank
+    from ..pour_grid import PourGrid
+    from ..progress import Advance
+
+RULES = ("plug_in", "mean", "cvar")
+"""The best pour if theta* were the truth, as in the paper; least expected spillage over the
+posterior; and its mean over the worst tenth."""
+
+EXECUTIONS = 4  # seeds with which a chosen pour is carried out
+_PURPOSE = 41  # of seeds
+
+Action = Mapping[str, float]
+
+
+def decide(concluded: NDArray, grid: "PourGrid") -> dict[str, Action]:
+    """The action of each rule, from theta* and draws, shape (1 + draws, 2)."""
+    liquids = dict(zip(NAMES, concluded.T, strict=True))
+    best = {name: values[:1] for name, values in liquids.items()}
+    over = grid.surface({name: values[1:] for name, values in liquids.items()})
+    return {
+        "plug_in": grid.surface(best).least("mean"),
+        "mean": over.least("mean"),
+        "cvar": over.least("cvar"),
+    }
+
+
+def execute(
+    truths: Truths,
+    actions: Iterable[Iterable[Action]],
+    grid: "PourGrid",
+    bank: "SimulationBank",
+    advance: "Advance",
+) -> list[NDArray[np.float64]]:
+    """Spilled fraction of each action, the mean over seeds that nothing else uses.
+
+    Args:
+        truths: n liquids.
+        actions: Those of each, with angular velocities of the grid.
+        grid: Its cups are poured.
+        bank: Where pours are kept.
+        advance: Called after each angular velocity of a truth.
+    """
+    spilled = []
+    for at, chosen in enumerate(map(list, actions)):
+        theta = {name: np.full(EXECUTIONS, values[at]) for name, values in truths.theta.items()}
+        seeds = np.array(fresh_seeds(int(truths.seed[at]), _PURPOSE, EXECUTIONS), np.int64)
+        outcomes = Outcomes(theta, DENSITY, grid.cups, seeds)
+        rates = np.unique([action["angular_velocity"] for action in chosen])
+        made = pour_all(outcomes, rates, bank, advance)
+        spilled.append(np.array([_spilled(made, action) for action in chosen]))
+    return spilled
+
+
+def _spilled(made, action: Action) -> float:
+    row = np.flatnonzero(np.isclose(made.angular_velocity, action["angular_velocity"]))
+    column = int(np.argmin(np.abs(made.distance - action["distance"])))
+    if len(row) == 0 or abs(made.distance[column] - action["distance"]) > STEP:
+        return float("nan")  # its pours failed
+    return float(made.fractions[row[0], :, column, 0].mean())

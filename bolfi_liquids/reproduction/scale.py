@@ -1,0 +1,26 @@
+"""How much of everything is simulated."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Of all figures.
+
+    Attributes:
+        repetitions: Truths of each liquid.
+        budgets: Simulations to learn from, ascending.
+        recorded: Simulations for each recording of the other solver.
+        lips: Heights of the lip that are compared.
+        seed: Of everything random.
+    """
+
+    repetitions: int = 5
+    budgets: tuple[int, ...] = (5, 10, 20, 40, 60)
+    recorded: tuple[int, ...] = (10, 20)
+    lips: tuple[float, ...] = (0.10, 0.14, 0.20, 0.26)
+    seed: int = 0
+
+
+FULL = Scale()
+QUICK = Scale(repetitions=2, budgets=(5, 10, 20), recorded=(10,), lips=(0.14, 0.20))
