@@ -11,6 +11,8 @@ if TYPE_CHECKING:
 
 INK, GREY, LIGHT = "#1f2933", "#8a94a0", "#e4e7eb"
 BLUE, ORANGE = "#2463a6", "#d1591a"
+PALETTE = (BLUE, ORANGE, "#2d8659", "#8a4fa3", "#b8860b", "#5b6770")
+"""Told apart also by those who do not see red and green."""
 _STYLE: dict[Any, Any] = {
     "font.family": "sans-serif",
     "font.size": 9.0,

@@ -20,8 +20,9 @@ def posterior_figure(tree: "DataTree") -> str:
     """Contours of the joint posterior with its marginals and those of the prior."""
     surface = tree["surface"].to_dataset()
     first, second = map(str, surface["log_posterior"].dims)
-    axes_of = {name: _coordinate(surface, name) for name in (first, second)}
-    posterior, prior = (_density(surface, name) for name in ("log_posterior", "log_prior"))
+    posterior, coordinates = grid_density(surface)
+    prior, _ = grid_density(surface, "log_prior")
+    axes_of = dict(zip((first, second), coordinates, strict=True))
     with styled():
         figure = new_figure(6.2, 4.8)
         grid = figure.subplots(
@@ -52,15 +53,18 @@ def _coordinate(surface: "Dataset", name: str) -> NDArray[np.float64]:
     return np.log(values) if name in LOGARITHMIC else values
 
 
-def _density(surface: "Dataset", name: str) -> NDArray[np.float64]:
-    """Density over the drawn coordinates, up to a constant; shape of the grid."""
+def grid_density(
+    surface: "Dataset", name: str = "log_posterior"
+) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
+    """Density over the drawn coordinates, up to a constant, in the grid's shape; and these."""
     log_density = surface[name].to_numpy().copy()
     for axis, parameter in enumerate(surface[name].dims):
         if parameter in LOGARITHMIC:
             # Jacobian of the logarithm
             shape = [-1 if axis == at else 1 for at in range(log_density.ndim)]
             log_density = log_density + np.log(surface[parameter].to_numpy()).reshape(shape)
-    return np.exp(log_density - log_density.max())
+    coordinates = [_coordinate(surface, str(name)) for name in surface[name].dims]
+    return np.exp(log_density - log_density.max()), coordinates
 
 
 def marginal(density: NDArray, kept: NDArray, integrated: NDArray) -> NDArray[np.float64]:

@@ -11,6 +11,7 @@ class Scale:
         repetitions: Truths of each liquid.
         budgets: Simulations to learn from, ascending.
         recorded: Simulations for each recording of the other solver.
+        surrogates: That learn from these.
         lips: Heights of the lip that are compared.
         seed: Of everything random.
     """
@@ -18,9 +19,16 @@ class Scale:
     repetitions: int = 5
     budgets: tuple[int, ...] = (5, 10, 20, 40, 60)
     recorded: tuple[int, ...] = (10, 20)
+    surrogates: tuple[str, ...] = ("discrepancy", "signal")
     lips: tuple[float, ...] = (0.10, 0.14, 0.20, 0.26)
     seed: int = 0
 
 
 FULL = Scale()
-QUICK = Scale(repetitions=2, budgets=(5, 10, 20), recorded=(10,), lips=(0.14, 0.20))
+QUICK = Scale(
+    repetitions=2,
+    budgets=(5, 10, 20),
+    recorded=(10,),
+    surrogates=("discrepancy",),
+    lips=(0.14, 0.20),
+)

@@ -1,0 +1,40 @@
+"""A figure with the numbers behind it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..drawing import styled
+from ..files import write_whole
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from xarray import Dataset
+
+RESOLUTION = 150  # dots per inch of the PNG
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """What a figure's function returns.
+
+    Attributes:
+        data: Everything that was drawn.
+        figure: The picture.
+        says: Its numbers, in a few lines.
+    """
+
+    data: "Dataset"
+    figure: "Figure"
+    says: str
+
+    def write(self, out: Path, name: str, made_with: str) -> None:
+        """NAME.nc, NAME.png and NAME.svg; `made_with` goes into the first."""
+        data = self.data.assign_attrs(made_with=made_with, says=self.says)
+        write_whole(out / f"{name}.nc", lambda at: data.to_netcdf(at, engine="h5netcdf"))
+        with styled(name):
+            for kind in ("png", "svg"):
+                write_whole(
+                    out / f"{name}.{kind}",
+                    lambda at, kind=kind: self.figure.savefig(at, format=kind, dpi=RESOLUTION),
+                )

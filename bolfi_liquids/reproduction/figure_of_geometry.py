@@ -1,0 +1,103 @@
+"""Where calibration matters: what the best single pour for all liquids spills too much."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from ..cups import bundled_cups
+from ..drawing import INK, new_figure, styled
+from ..kept import Keep, fresh_seeds, simulate_kept
+from ..progress import progress_bar, reported
+from ..spillage import STEP, landing_sd
+from .figure import Drawn
+from .truths import DENSITY
+from .workshop import Workshop
+
+if TYPE_CHECKING:
+    from ..models import Cups
+
+VISCOSITIES = np.geomspace(5e-3, 15.0, 9)  # Pa s, those of the liquids that come
+RATES = 7
+RADII = np.array([0.020, 0.025, 0.030, 0.035, 0.045])  # m, of the receiver
+COHESION = 0.5
+DISTANCES = np.arange(-0.02, 0.0901, STEP)  # m
+_PURPOSE = 51  # of seeds
+
+
+@dataclass(frozen=True)
+class Poured:
+    """Pours of all liquids into receivers of all radii at all distances.
+
+    Attributes:
+        cups: With the lip's height.
+    """
+
+    cups: "Cups"
+
+    def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
+        """Spilled fractions (rates, radii, liquids, DISTANCES)."""
+        from .. import models
+
+        liquid = models.Liquid(VISCOSITIES, COHESION, DENSITY)
+        own = np.array(fresh_seeds(0, _PURPOSE, len(VISCOSITIES)), np.int64)
+        made = []
+        for rate in theta["angular_velocity"]:
+            landings = models.landings(liquid, rate, self.cups, own)
+            caught = landings.into(DISTANCES[:, None, None], RADII[:, None])
+            made.append(np.moveaxis(caught.spilled, 0, -1))
+        return np.stack(made)
+
+
+def geometry(workshop: Workshop) -> Drawn:
+    """The regret of the best single action, over heights of the lip and radii of the receiver."""
+    from xarray import Dataset
+
+    lips = np.array(workshop.scale.lips)
+    regret = np.empty((len(lips), len(RADII)))
+    total = len(lips) * RATES
+    with progress_bar("pouring from several heights", total, shown=workshop.progress) as advance:
+        for row, lip in enumerate(lips):
+            cups = bundled_cups()
+            cups = cups.model_copy(
+                update={"pour": cups.pour.model_copy(update={"lip_height": float(lip)})}
+            )
+            poured = Poured(cups)
+            rates = np.geomspace(*cups.angular_velocity_range, RATES)
+            keep = Keep(workshop.bank, f"geometry {cups.settings()}", 1)
+            simulate = reported(poured.simulate, advance)
+            made = simulate_kept(simulate, {"angular_velocity": rates}, [0] * RATES, keep)
+            regret[row] = _regret(made.signals, cups)
+    with styled():
+        figure = new_figure(5.6, 3.9)
+        axes = figure.subplots()
+        shown = axes.imshow(100.0 * regret, cmap="Blues", aspect="auto", vmin=0.0, origin="lower")
+        figure.colorbar(shown, ax=axes, label="regret of the best single pour [% spilled]")
+        for (row, column), value in np.ndenumerate(regret):
+            dark = value > 0.6 * regret.max()
+            axes.text(column, row, f"{100 * value:.1f}", ha="center", va="center",
+                      color="white" if dark else INK)  # fmt: skip
+        axes.set_xticks(range(len(RADII)), [f"{100 * radius:.1f}" for radius in RADII])
+        axes.set_yticks(range(len(lips)), [f"{100 * lip:.0f}" for lip in lips])
+        axes.set(xlabel="receiver's radius [cm]", ylabel="lip above the receiver's floor [cm]")
+    most = np.unravel_index(np.argmax(regret), regret.shape)
+    says = (
+        f"one pour for all liquids spills up to {100 * regret.max():.1f} % more than knowing the "
+        f"liquid (lip {100 * lips[most[0]]:.0f} cm, receiver {100 * RADII[most[1]]:.1f} cm), "
+        f"at least {100 * regret.min():.1f} %"
+    )
+    coords = {"lip_height": lips, "radius": RADII}
+    return Drawn(Dataset({"regret": (("lip_height", "radius"), regret)}, coords), figure, says)
+
+
+def _regret(spilled: NDArray, cups: "Cups") -> NDArray[np.float64]:
+    """By radius, from fractions (rates, radii, liquids, distances)."""
+    blurred = gaussian_filter1d(spilled, landing_sd(cups) / STEP, axis=-1, mode="nearest")
+    low, high = cups.distance_range
+    inside = (DISTANCES >= low - STEP / 2) & (DISTANCES <= high + STEP / 2)
+    by_action = np.moveaxis(blurred[..., inside], 1, 0)  # radii, rates, liquids, distances
+    single = by_action.mean(axis=2).min(axis=(1, 2))
+    return single - by_action.min(axis=(1, 3)).mean(axis=1)

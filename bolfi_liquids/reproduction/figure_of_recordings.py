@@ -1,0 +1,127 @@
+"""From recordings of the independent solver to what it spilled itself."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import LinearNDInterpolator
+
+from ..cups import bundled_cups
+from ..drawing import GREY, PALETTE, new_figure, styled
+from ..pour_grid import RATES, make_grid
+from ..pouring import choose_pour
+from ..prior import default_prior
+from ..progress import progress_bar
+from .bundled import POURED, bundled_pours
+from .figure import Drawn
+from .study import UNKNOWING
+from .truths import DENSITY
+from .workshop import Workshop
+
+if TYPE_CHECKING:
+    from ..pour_table import PourTable
+
+CENTIMETRES = 2.5  # of distance that count as a factor e in the angular velocity
+
+
+def between(table: "PourTable", rate: float, distance: float) -> tuple[float, float]:
+    """What the table spilled between its actions, and what that misses.
+
+    Linear over the logarithm of the angular velocity and the distance. The error is the RMS over
+    pours that are left out in turn and lie between others. Beyond the table the nearest action
+    that lies within it is taken.
+
+    Returns:
+        Spilled fraction, and its error.
+    """
+    points = np.column_stack([np.log(table.angular_velocity), 100 * table.distance / CENTIMETRES])
+    spilled = table.fractions[:, 0]
+    at = np.array([np.log(rate), 100 * distance / CENTIMETRES])
+    within = LinearNDInterpolator(points, spilled)
+    value = float(within(at[None])[0])
+    if np.isnan(value):
+        nearest = points[np.argmin(((points - at) ** 2).sum(axis=1))]
+        steps = np.linspace(at, nearest, 400)
+        value = float(next(v for v in within(steps) if np.isfinite(v)))
+    missed = []
+    for left in range(len(points)):
+        rest = np.arange(len(points)) != left
+        guess = LinearNDInterpolator(points[rest], spilled[rest])(points[left : left + 1])[0]
+        missed.append(guess - spilled[left])
+    return value, float(np.sqrt(np.nanmean(np.square(missed))))
+
+
+def recordings(workshop: Workshop) -> Drawn:
+    """Chosen from a recording of stirring alone, spilled by the other solver."""
+    from xarray import Dataset
+
+    scale = workshop.scale
+    unknowing = _unknowing(workshop)
+    columns = [(n, s) for s in scale.surrogates for n in scale.recorded]
+    shape = len(POURED), len(columns)
+    spilled, plug_in, best, blind = np.empty(shape), np.empty(shape), [], []
+    lines = ["spilled by the other solver [%], its table interpolated:"]
+    for row, liquid in enumerate(POURED):
+        table = bundled_pours(liquid)
+        least = int(np.argmin(table.fractions[:, 0]))
+        best.append(float(table.fractions[least, 0]))
+        blind.append(between(table, *unknowing)[0])
+        for column, (budget, surrogate) in enumerate(columns):
+            pour = choose_pour(
+                workshop.calibration(liquid, budget, surrogate),
+                seed=scale.seed,
+                progress=workshop.progress,
+            )
+            spilled[row, column], error = between(
+                table, pour.chosen.angular_velocity, pour.chosen.distance
+            )
+            plug_in[row, column], _ = between(
+                table, pour.plug_in.angular_velocity, pour.plug_in.distance
+            )
+            lines.append(
+                f"  {liquid}, N = {budget}, {surrogate}: {100 * spilled[row, column]:.1f} "
+                f"(error of interpolation {100 * error:.1f}) at "
+                f"{np.degrees(pour.chosen.angular_velocity):.0f} deg/s, "
+                f"{100 * pour.chosen.distance:.1f} cm; at theta* alone "
+                f"{100 * plug_in[row, column]:.1f}; table's best {100 * best[-1]:.1f}; "
+                f"liquid unknown {100 * blind[-1]:.1f}"
+            )
+    labels = [f"{s}, N = {n}" for n, s in columns]
+    with styled():
+        figure = new_figure(7.4, 3.8)
+        axes = figure.subplots()
+        width = 0.8 / (len(columns) + 2)
+        bars = [
+            ("table's best", np.array(best), GREY),
+            ("liquid unknown", np.array(blind), "#c9cfd6"),
+        ]
+        bars += [(f"chosen, {label}", spilled[:, n], PALETTE[n]) for n, label in enumerate(labels)]
+        for at, (label, values, colour) in enumerate(bars):
+            x = np.arange(len(POURED)) + width * (at - (len(bars) - 1) / 2)
+            axes.bar(x, 100 * values, 0.9 * width, color=colour, label=label)
+        axes.set_xticks(range(len(POURED)), POURED)
+        axes.set_ylabel("spilled in the other solver [%]")
+        figure.legend(loc="outside lower center", ncols=3)
+    dims = ("liquid", "run")
+    data = Dataset(
+        {
+            "spilled": (dims, spilled),
+            "plug_in": (dims, plug_in),
+            "best": ("liquid", best),
+            "unknown": ("liquid", blind),
+        },
+        {"liquid": list(POURED), "run": labels},
+    )
+    return Drawn(data, figure, "\n".join(lines))
+
+
+def _unknowing(workshop: Workshop) -> tuple[float, float]:
+    """The pour that is expected to spill least over the prior."""
+    cups, prior = bundled_cups(), default_prior()
+    with progress_bar("pouring a grid of liquids", RATES, shown=workshop.progress) as advance:
+        grid = make_grid(cups, DENSITY, prior, workshop.bank, advance)
+    drawn: dict[str, NDArray] = prior.from_unit(
+        np.random.default_rng(workshop.scale.seed).uniform(size=(UNKNOWING, 2))
+    )
+    action = grid.surface(drawn).least("mean")
+    return action["angular_velocity"], action["distance"]

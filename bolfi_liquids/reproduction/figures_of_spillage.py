@@ -1,0 +1,184 @@
+"""The paper's figure 2, right: spillage against the number of simulations, and by liquid; and what
+it left open: whether deciding over the posterior is better, and which surrogate."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..drawing import GREY, PALETTE, new_figure, styled
+from .figure import Drawn
+from .truths import LIQUIDS
+from .workshop import Workshop
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from xarray import DataArray, Dataset
+
+SHOWN = {
+    ("discrepancy", "plug_in"): "stirring, the paper's: Φ, best at θ*",
+    ("discrepancy", "mean"): "stirring, Φ, least expected",
+    ("signal", "plug_in"): "stirring, signal, best at θ*",
+    ("signal", "mean"): "stirring, signal, least expected",
+    ("signal", "cvar"): "stirring, signal, CVaR",
+    ("pour", "plug_in"): "pouring, best at θ*",
+    ("pour", "mean"): "pouring, least expected",
+}
+"""(method, rule) -> label, in the order of the palette."""
+
+RESAMPLED = 4000  # bootstrap samples
+LEVEL = 0.9
+
+
+def interval(values: NDArray, seed: int = 0) -> tuple[float, float]:
+    """90 % bootstrap interval of the mean of values that are not NaN, shape (n,)."""
+    seen = values[np.isfinite(values)]
+    rng = np.random.default_rng(seed)
+    means = seen[rng.integers(0, len(seen), (RESAMPLED, len(seen)))].mean(axis=1)
+    low, high = np.quantile(means, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    return float(low), float(high)
+
+
+def spillage(workshop: Workshop) -> Drawn:
+    """Spilled percentage against N for calibration by stirring and by pouring."""
+    study = workshop.study
+    budgets = study["budget"].to_numpy()
+    with styled():
+        figure = new_figure(7.4, 4.6)
+        axes = figure.subplots()
+        for ((method, rule), label), colour in zip(SHOWN.items(), _colours(), strict=False):
+            _against_budget(axes, study["spilled"].sel(method=method, rule=rule), label, colour)
+        for name, style in (("known", ":"), ("unknown", "--")):
+            level = 100.0 * float(study[name].mean())
+            axes.axhline(level, color=GREY, ls=style, lw=1.0, label=f"liquid {name}")
+        axes.set(xlabel="simulations N", ylabel="spilled [%]", yscale="log")
+        axes.set_xticks(budgets, [str(n) for n in budgets])
+        figure.legend(loc="outside lower center", ncols=2)
+    return Drawn(study, figure, _table(study))
+
+
+def _colours() -> list[str]:
+    return [*PALETTE, "#c2185b"]
+
+
+def _against_budget(axes: "Axes", spilled: "DataArray", label: str, colour: str) -> None:
+    budgets = spilled["budget"].to_numpy()
+    percent = 100.0 * spilled.transpose("budget", "truth").to_numpy()
+    ends = np.array([interval(row) for row in percent])
+    axes.fill_between(budgets, *np.maximum(ends, 1e-3).T, color=colour, alpha=0.12, lw=0)
+    axes.plot(budgets, np.nanmean(percent, axis=1), "o-", color=colour, ms=4, label=label)
+
+
+def _table(study: "Dataset") -> str:
+    lines = ["spilled [%], mean over liquids and repetitions:"]
+    for (method, rule), label in SHOWN.items():
+        means = 100.0 * study["spilled"].sel(method=method, rule=rule).mean("truth")
+        pairs = (
+            f"N = {int(n)}: {float(m):.2f}" for n, m in zip(means["budget"], means, strict=True)
+        )
+        lines.append(f"  {label}: " + ", ".join(pairs))
+    known, unknown = (100.0 * float(study[name].mean()) for name in ("known", "unknown"))
+    return "\n".join([*lines, f"  liquid known: {known:.2f}, unknown: {unknown:.2f}"])
+
+
+def liquids(workshop: Workshop) -> Drawn:
+    """Spilled percentage by liquid at N = 10 and 20."""
+    study = workshop.study
+    budgets = [n for n in (10, 20) if n in study["budget"]]
+    rules = [
+        ("discrepancy", "plug_in"),
+        ("signal", "plug_in"),
+        ("signal", "mean"),
+        ("pour", "plug_in"),
+    ]
+    with styled():
+        figure = new_figure(8.6, 3.6)
+        panels = figure.subplots(1, len(budgets), sharey=True, squeeze=False)[0]
+        for axes, budget in zip(panels, budgets, strict=True):
+            for at, (method, rule) in enumerate(rules):
+                chosen = study["spilled"].sel(method=method, rule=rule, budget=budget)
+                for place, liquid in enumerate(LIQUIDS):
+                    percent = 100.0 * chosen.to_numpy()[study["liquid"].to_numpy() == liquid]
+                    x = place + 0.2 * (at - (len(rules) - 1) / 2)
+                    label = SHOWN[method, rule] if place == 0 else None
+                    axes.bar(
+                        x, np.nanmean(percent), 0.18, color=PALETTE[at], alpha=0.6, label=label
+                    )
+                    axes.plot(np.full(len(percent), x), percent, ".", color=PALETTE[at], ms=4)
+            axes.set_xticks(range(len(LIQUIDS)), list(LIQUIDS))
+            axes.set_title(f"N = {budget}")
+        panels[0].set_ylabel("spilled [%]")
+        panels[0].set_yscale("symlog", linthresh=1.0)
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    means = {
+        liquid: 100.0 * float(study["spilled"].sel(method="signal", rule="mean", budget=budgets[-1])
+                              .to_numpy()[study["liquid"].to_numpy() == liquid].mean())
+        for liquid in LIQUIDS
+    }  # fmt: skip
+    says = ", ".join(f"{liquid} {mean:.2f} %" for liquid, mean in means.items())
+    return Drawn(study, figure, f"least expected after N = {budgets[-1]} stirs: {says}")
+
+
+def decision(workshop: Workshop) -> Drawn:
+    """What deciding over the posterior saves against the plug-in at theta*, paired by truth."""
+    from xarray import Dataset
+
+    study = workshop.study
+    spilled = 100.0 * study["spilled"]
+    budgets = study["budget"].to_numpy()
+    lines = ["spilled by the rule minus by the plug-in [percentage points], paired, with 90 %:"]
+    saved = {}
+    with styled():
+        figure = new_figure(7.4, 3.8)
+        axes = figure.subplots()
+        pairs = [(m, r) for m in ("discrepancy", "signal", "pour") for r in ("mean", "cvar")]
+        for at, (method, rule) in enumerate(pairs):
+            apart = spilled.sel(method=method, rule=rule) - spilled.sel(
+                method=method, rule="plug_in"
+            )
+            rows = apart.transpose("budget", "truth").to_numpy()
+            saved[f"{method}_{rule}"] = ("budget", np.nanmean(rows, axis=1))
+            ends = np.array([interval(row) for row in rows])
+            x = np.arange(len(budgets)) + 0.12 * (at - (len(pairs) - 1) / 2)
+            means = np.nanmean(rows, axis=1)
+            off = np.abs(ends.T - means)
+            label = f"{method}, {'least expected' if rule == 'mean' else 'CVaR'}"
+            axes.errorbar(x, means, off, fmt="o", ms=4, color=PALETTE[at], label=label)
+            told = (
+                f"N = {n}: {m:+.2f} [{low:+.2f}, {high:+.2f}]"
+                for n, m, (low, high) in zip(budgets, means, ends, strict=True)
+            )
+            lines.append(f"  {label}: " + ", ".join(told))
+        axes.axhline(0.0, color=GREY, lw=0.8)
+        axes.set_xticks(range(len(budgets)), [f"N = {n}" for n in budgets])
+        axes.set_ylabel("spilled more than the plug-in [% points]")
+        axes.set_yscale("symlog", linthresh=1.0)
+        figure.legend(loc="outside lower center", ncols=3)
+    return Drawn(Dataset(saved, {"budget": budgets}), figure, "\n".join(lines))
+
+
+def surrogates(workshop: Workshop) -> Drawn:
+    """Error of the viscosity at equal N: the signal surrogate against the paper's."""
+    from xarray import Dataset
+
+    study = workshop.study
+    drawn = study["concluded"].sel(parameter="viscosity").isel(draw=slice(1, None))
+    error = np.abs(np.log(drawn) - np.log(study["viscosity"])).mean("draw")
+    budgets = study["budget"].to_numpy()
+    lines = ["mean distance of draws from the truth, factor in viscosity:"]
+    with styled():
+        figure = new_figure(6.4, 3.6)
+        axes = figure.subplots()
+        for method, colour in zip(study["method"].to_numpy(), PALETTE, strict=False):
+            rows = error.sel(method=method).transpose("budget", "truth").to_numpy()
+            means = np.nanmean(rows, axis=1)
+            ends = np.array([interval(row) for row in rows])
+            axes.fill_between(budgets, *np.exp(ends.T), color=colour, alpha=0.15, lw=0)
+            label = {"pour": "pouring", "signal": "stirring, signal"}.get(method, "stirring, Φ")
+            axes.plot(budgets, np.exp(means), "o-", ms=4, color=colour, label=label)
+            told = (f"N = {n}: {np.exp(m):.2f}" for n, m in zip(budgets, means, strict=True))
+            lines.append(f"  {label}: " + ", ".join(told))
+        axes.set(xlabel="simulations N", ylabel="factor between draws and truth", yscale="log")
+        axes.set_xticks(budgets, [str(n) for n in budgets])
+        axes.legend()
+    return Drawn(Dataset({"log_error": error.drop_vars("parameter")}), figure, "\n".join(lines))

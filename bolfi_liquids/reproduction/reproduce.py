@@ -1,0 +1,73 @@
+"""`reproduce`: the paper's figures from one command."""
+
+import json
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import asdict
+from pathlib import Path
+
+from ..errors import InputError
+from ..provenance import LIBRARIES, versions
+from ..run_directory import open_bank
+from .figure import Drawn
+from .figure_of_geometry import geometry
+from .figure_of_recordings import recordings
+from .figures_of_fits import inclination, posterior
+from .figures_of_spillage import decision, liquids, spillage, surrogates
+from .scale import FULL, QUICK
+from .workshop import Workshop
+
+FIGURES: dict[str, Callable[[Workshop], Drawn]] = {
+    "inclination": inclination,
+    "posterior": posterior,
+    "recordings": recordings,
+    "geometry": geometry,
+    "spillage": spillage,
+    "liquids": liquids,
+    "decision": decision,
+    "surrogates": surrogates,
+}
+"""By name, in the order in which they are made."""
+
+
+def reproduce(
+    names: Iterable[str],
+    out: str | Path,
+    *,
+    quick: bool = False,
+    progress: bool = True,
+    done: Callable[[str, Drawn], object] = lambda name, drawn: None,
+) -> None:
+    """Make figures: NAME.png, NAME.svg and the numbers in NAME.nc.
+
+    Every finished simulation, and every finished calibration, is kept in `out`: the same call
+    goes on where the last one ended.
+
+    Args:
+        names: Of `FIGURES`; none, or "all", for all of them.
+        out: Directory of the results; made if missing.
+        quick: Fewer repetitions, budgets and recordings.
+        progress: Show bars on stderr.
+        done: Called with each figure.
+
+    Raises:
+        InputError: There is no figure of that name.
+    """
+    wanted = list(dict.fromkeys(names)) or ["all"]
+    chosen = list(FIGURES) if "all" in wanted else wanted
+    for name in chosen:
+        if name not in FIGURES:
+            raise InputError(
+                f"no figure {name!r}", where="reproduce", fix=f"choose all, {', '.join(FIGURES)}"
+            )
+    out = Path(out)
+    out.mkdir(parents=True, exist_ok=True)
+    scale = QUICK if quick else FULL
+    made_with = {"scale": asdict(scale), "versions": versions(LIBRARIES)}
+    with open_bank(out) as bank:
+        workshop = Workshop(out, scale, bank, progress)
+        for name in chosen:
+            began = time.perf_counter()
+            drawn = FIGURES[name](workshop)
+            drawn.write(out, name, json.dumps(made_with | {"seconds": time.perf_counter() - began}))
+            done(name, drawn)

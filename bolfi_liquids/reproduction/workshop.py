@@ -1,0 +1,51 @@
+"""What the figures are made from: simulations that are kept, made once for all figures."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..calibration import Calibration
+from ..calibrator import calibrate
+from .bundled import bundled_recording
+from .scale import Scale
+from .study import spillage_study
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+    from ..inference import SimulationBank
+
+
+@dataclass(frozen=True, eq=False)
+class Workshop:
+    """Where figures find their material.
+
+    Attributes:
+        out: Directory of the results.
+        scale: How much is simulated.
+        bank: Every finished simulation and calibration.
+        progress: Show bars on stderr.
+    """
+
+    out: Path
+    scale: Scale
+    bank: "SimulationBank"
+    progress: bool = True
+
+    @cached_property
+    def study(self) -> "Dataset":
+        """Spillage after stirring and after pouring; see `spillage_study`."""
+        return spillage_study(self.bank, self.scale, progress=self.progress)
+
+    def calibration(self, liquid: str, budget: int, surrogate: str) -> Calibration:
+        """Of a bundled recording, in a run of its own; a finished one is opened."""
+        return calibrate(
+            bundled_recording(liquid),
+            out=self.out / "runs" / f"{liquid}_{budget}_{surrogate}",
+            budget=budget,
+            surrogate=surrogate,
+            seed=self.scale.seed,
+            resume=True,
+            progress=self.progress,
+        )
