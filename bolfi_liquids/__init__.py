@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .recorder import record
     from .recordings import Recording, open_recording
     from .reporting import report
+    from .table_import import import_table
 
 __version__ = version("bolfi-liquids")
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "choose_pour",
     "criticise",
     "execute_pour",
+    "import_table",
     "open_recording",
     "record",
     "report",
@@ -42,6 +44,7 @@ _HOME = {
     "choose_pour": ".pouring",
     "criticise": ".criticiser",
     "execute_pour": ".pour_execution",
+    "import_table": ".table_import",
     "open_recording": ".recordings",
     "record": ".recorder",
     "report": ".reporting",

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from . import __version__, cli_check, cli_record, cli_reproduce, cli_rig
+from . import __version__, cli_check, cli_import, cli_record, cli_reproduce, cli_rig
 from .cli_errors import OneLineErrors
 from .cli_rig import RigOption
 from .settings import (
@@ -33,6 +33,7 @@ app.add_typer(cli_check.app, name="check")
 app.add_typer(cli_rig.app, name="rig")
 app.command()(cli_record.record)
 app.command()(cli_reproduce.reproduce)
+app.command("import")(cli_import.import_table)
 
 
 def _print_version(asked: bool) -> None:

@@ -74,7 +74,7 @@ def open_recording(path: str | Path) -> Recording:
             cannot use; the message names file, field, value and what to do.
     """
     path = existing_file(path)
-    recording = _as_recording(_read(path), path)
+    recording = as_recording(_read(path), path)
     check_values(recording)
     return recording
 
@@ -134,7 +134,14 @@ def _read(path: Path) -> "Dataset":
     return dataset
 
 
-def _as_recording(dataset: "Dataset", path: Path) -> Recording:
+def as_recording(dataset: "Dataset", path: Path) -> Recording:
+    """What the variables and attributes of a recording's file mean; nothing is checked.
+
+    Args:
+        dataset: With the fields and units of the README.
+        path: The file that it was read from.
+    """
+
     def stack(names: tuple[str, ...]) -> NDArray[np.float64]:
         return _frozen(np.stack([dataset[name].to_numpy() for name in names], axis=-1))
 

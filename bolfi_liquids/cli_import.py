@@ -1,0 +1,39 @@
+"""The command `import`: recordings that were made elsewhere."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def import_table(
+    table: Annotated[
+        Path | None, typer.Argument(metavar="TABLE", help="CSV: a header, and a row each sample.")
+    ] = None,
+    columns: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="columns.toml: what stands where.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The recording; without it, TABLE's .nc.")
+    ] = None,
+    template: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Only write a columns.toml to change.")
+    ] = None,
+) -> None:
+    """Make a recording of a table of numbers, whatever its columns and units.
+
+    First `bolfi-liquids import --template columns.toml`; change that file; then
+    `bolfi-liquids import stir.csv --columns columns.toml`.
+    """
+    from .table_import import import_table as run_import
+    from .table_import import outline, write_template
+
+    if template is not None:
+        written = write_template(template)
+        typer.echo(f"{written}: change it, then: bolfi-liquids import TABLE --columns {written}")
+        return
+    if table is None or columns is None:
+        raise typer.BadParameter("give TABLE and --columns FILE, or --template FILE")
+    recording = run_import(table, columns, table.with_suffix(".nc") if out is None else out)
+    typer.echo(outline(recording))
+    typer.echo(f"next: bolfi-liquids calibrate {recording.path} --out RUN")

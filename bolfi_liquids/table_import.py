@@ -1,0 +1,166 @@
+"""Recordings made elsewhere: a table of numbers becomes a NetCDF file that can be simulated."""
+
+import csv
+import hashlib
+from difflib import get_close_matches
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError
+from .files import existing_file, write_text, write_whole
+from .recording_checks import check_values
+from .recording_fields import PLANES
+from .recordings import Recording, as_recording, open_recording
+from .strokes import speed
+from .table_map import ATTRIBUTE_UNITS, COLUMN_UNITS, TableMap, open_table_map
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+TEMPLATE = "columns.toml"
+MISSING = ("", "nan", "na", "n/a", "null", "none", "-")
+SI = {name: next(iter(units)) for name, units in (COLUMN_UNITS | ATTRIBUTE_UNITS).items()}
+
+
+def write_template(path: str | Path) -> Path:
+    """Write a map to be changed into one's own.
+
+    Raises:
+        InputError: There is a file of that name.
+    """
+    path = Path(path)
+    if path.exists():
+        raise InputError("exists already", where=str(path), fix="choose another name")
+    return write_text(path, (files("bolfi_liquids.data") / TEMPLATE).read_text(encoding="utf-8"))
+
+
+def import_table(table: str | Path, columns: str | Path | TableMap, out: str | Path) -> Recording:
+    """Write a recording from a table, once it is sure that it can be simulated.
+
+    Args:
+        table: Text with a header and a row for each sample, such as CSV. Empty cells are missing
+            samples.
+        columns: What its columns mean; a TOML file or what `open_table_map` gives.
+        out: The NetCDF file to write; replaced if it is there.
+
+    Raises:
+        InputError: The table or the map cannot be used; the message names line, column and value.
+            Nothing was written.
+    """
+    table, out = existing_file(table), Path(out)
+    meaning = columns if isinstance(columns, TableMap) else open_table_map(columns)
+    dataset = _dataset(table, meaning)
+    try:
+        check_values(as_recording(dataset, table))
+    except InputError as err:
+        raise InputError(
+            err.what, where=err.where, fix=f"{err.fix} (or the unit, in the map)"
+        ) from err
+    if not out.parent.is_dir():
+        raise InputError("no such directory", where=str(out.parent), fix="make it first")
+    write_whole(out, lambda temporary: dataset.to_netcdf(temporary, engine="h5netcdf"))
+    return open_recording(out)
+
+
+def _dataset(table: Path, meaning: TableMap) -> "Dataset":
+    from xarray import Dataset
+
+    from . import __version__
+
+    cells = _cells(table, meaning)
+    values = {
+        name: column.in_si(name, cells[column.column]) for name, column in meaning.columns.items()
+    }
+    attributes = {
+        name: given.value * ATTRIBUTE_UNITS[name][given.unit]
+        for name, given in meaning.attributes.items()
+    }
+    made = {
+        "Conventions": "CF-1.11",
+        "source": meaning.source,
+        "imported_from": table.name,
+        "imported_sha256": hashlib.sha256(table.read_bytes()).hexdigest(),
+        "imported_with": f"bolfi-liquids {__version__}: {meaning.model_dump_json()}",
+    }
+    return Dataset(
+        {name: ("time", y, {"units": SI[name]}) for name, y in values.items() if name != "time"},
+        coords={"time": ("time", values["time"], {"units": "s"})},
+        attrs=attributes | made,
+    )
+
+
+def _cells(table: Path, meaning: TableMap) -> dict[str, NDArray[np.float64]]:
+    """The columns that the map names, as numbers; missing samples are NaN."""
+    wanted = list(dict.fromkeys(column.column for column in meaning.columns.values()))
+    try:
+        text = table.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as err:
+        raise InputError("not a text file", where=str(table), fix="save it as CSV, UTF-8") from err
+    lines = text.splitlines()[meaning.skip :]
+    reader = csv.reader(lines, delimiter=meaning.delimiter, skipinitialspace=True)
+    header = [name.strip() for name in next(reader, [])]
+    for name in wanted:
+        _check_column(table, name, header, meaning.delimiter)
+    at = {name: header.index(name) for name in wanted}
+    found: dict[str, list[float]] = {name: [] for name in wanted}
+    for number, row in enumerate(reader, start=meaning.skip + 2):
+        if not any(cell.strip() for cell in row):
+            continue
+        for name, k in at.items():
+            cell = row[k].strip() if k < len(row) else ""
+            found[name].append(_number(cell, meaning.decimal, f"{table}: line {number}: {name}"))
+    return {name: np.array(numbers) for name, numbers in found.items()}
+
+
+def _check_column(table: Path, name: str, header: list[str], delimiter: str) -> None:
+    if header.count(name) == 1:
+        return
+    if name in header:
+        raise InputError(
+            f"{header.count(name)} columns are named {name!r}",
+            where=f"{table}: header",
+            fix="give each a name of its own",
+        )
+    near = get_close_matches(name, header, n=1, cutoff=0.6)
+    likely = f"; did you mean {near[0]!r}?" if near else ""
+    raise InputError(
+        f"no column {name!r} among {', '.join(map(repr, header)) or 'none'}{likely}",
+        where=f"{table}: header",
+        fix=f"correct the map: `column`, `skip` or `delimiter` (now {delimiter!r})",
+    )
+
+
+def _number(cell: str, decimal: str, where: str) -> float:
+    if cell.lower() in MISSING:
+        return float("nan")
+    try:
+        return float(cell.replace(decimal, ".") if decimal != "." else cell)
+    except ValueError:
+        raise InputError(
+            f"{cell!r:.40} is no number",
+            where=where,
+            fix="leave the cell empty where a sample is missing, or set `decimal` in the map",
+        ) from None
+
+
+def outline(recording: Recording) -> str:
+    """What was read, in a few lines that show a wrong unit or sign at a glance."""
+    time, path = recording.time, recording.gripper.position
+    reach, fastest = np.nanmax(path, axis=0) - np.nanmin(path, axis=0), np.nanmax(speed(recording))
+    lines = [
+        f"{recording.path}: {len(time)} samples over {time[-1] - time[0]:.2f} s, "
+        f"{1.0 / np.median(np.diff(time)):.1f} Hz",
+        f"gripper: {100 * reach[0]:.1f} x {100 * reach[1]:.1f} cm, "
+        f"{100 * np.nanmean(path[:, 2]):.1f} cm above the cup's floor, "
+        f"up to {100 * fastest:.1f} cm/s",
+    ]
+    for name, angle in zip(PLANES, np.degrees(recording.inclination.T), strict=True):
+        lines.append(
+            f"{name}: {np.nanmin(angle):+.1f} to {np.nanmax(angle):+.1f} deg, "
+            f"seen in {np.isfinite(angle).mean():.1%} of the samples"
+        )
+    return "\n".join(lines)

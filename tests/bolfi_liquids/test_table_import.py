@@ -1,0 +1,140 @@
+"""A table in other columns, units and signs becomes the recording that it was made from."""
+
+from importlib.resources import files
+
+import numpy as np
+import pytest
+
+import bolfi_liquids as bl
+from bolfi_liquids.table_import import import_table, outline, write_template
+from bolfi_liquids.table_map import open_table_map
+
+TRUTH = files("bolfi_liquids.data") / "water_v10.nc"
+OFFSET = 120.0  # mm, of the robot's z above the cup's floor
+
+MAP = """
+delimiter = ";"
+decimal = ","
+skip = 2
+source = "a robot in the cellar"
+
+[columns]
+time = { column = "t (ms)", unit = "ms" }
+x = { column = "X", unit = "mm" }
+y = { column = "Y", unit = "mm", flip = true }
+z = { column = "Z", unit = "mm", offset = -120.0 }
+inclination_xz = { column = "A", unit = "deg" }
+inclination_yz = { column = "B", unit = "mrad", flip = true }
+
+[attributes]
+"""
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return bl.open_recording(TRUTH)
+
+
+@pytest.fixture
+def written(tmp_path, truth):
+    """The table and its map."""
+    (tmp_path / "columns.toml").write_text(MAP + attributes(truth))
+    return table_of(tmp_path / "stir.csv", truth), tmp_path / "columns.toml"
+
+
+def attributes(truth):
+    mm = ("cup_radius", "cup_height", "fill", "stick_radius", "stick_length")
+    lines = [f'{name} = {{ value = {1000 * truth.attrs[name]!r}, unit = "mm" }}' for name in mm]
+    density = truth.attrs["liquid_density"] / 1000
+    lines.append(f'liquid_density = {{ value = {density!r}, unit = "g/cm3" }}')
+    lines.append(f'stick_density = {{ value = {truth.attrs["stick_density"]!r}, unit = "kg/m3" }}')
+    return "\n".join(lines) + "\n"
+
+
+def table_of(path, truth, change=lambda rows: None):
+    x, y, z = truth.gripper.position.T
+    xz, yz = truth.inclination.T
+    columns = (1e3 * truth.time, 1e3 * x, -1e3 * y, 1e3 * z + OFFSET, np.degrees(xz), -1e3 * yz)
+    rows = [["t (ms)", "X", "Y", "Z", "A", "B", "note"]]
+    rows += [
+        [f"{value:.9g}".replace(".", ",") for value in row] + ["ok"]
+        for row in zip(*columns, strict=True)
+    ]
+    change(rows)
+    lines = ["made by hand", "", *(";".join(row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n\n", encoding="utf-8-sig")
+    return path
+
+
+def test_the_recording_is_what_the_table_was_made_from(written, truth, tmp_path):
+    found = import_table(*written, tmp_path / "stir.nc")
+    np.testing.assert_allclose(found.time, truth.time, atol=1e-8)
+    np.testing.assert_allclose(found.gripper.position, truth.gripper.position, atol=1e-8)
+    np.testing.assert_allclose(found.inclination, truth.inclination, atol=1e-8)
+    for name in ("cup_radius", "fill", "stick_density", "liquid_density"):
+        assert found.number(name) == pytest.approx(truth.number(name))
+    assert found.attrs["source"] == "a robot in the cellar"
+    assert found.attrs["imported_from"] == "stir.csv"
+    # whoever has the file alone can repeat it
+    assert '"offset":-120.0' in found.attrs["imported_with"]
+
+
+def test_cells_without_a_number_are_missing_samples(tmp_path, written, truth):
+    def blind(rows):
+        for at, cell in ((40, ""), (41, "NaN"), (42, "n/a")):
+            rows[at][4] = cell
+        del rows[50][5:]
+
+    table = table_of(tmp_path / "blind.csv", truth, blind)
+    found = import_table(table, written[1], tmp_path / "blind.nc")
+    missing = [list(np.flatnonzero(np.isnan(angle))) for angle in found.inclination.T]
+    assert missing == [[39, 40, 41], [49]]
+    assert "seen in" in outline(found)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda rows: rows[7].__setitem__(1, "1.5.2"), r"line 10: X: '1.5.2' is no number"),
+        (lambda rows: rows[0].__setitem__(4, "Angle"), "no column 'A' among"),
+        (lambda rows: rows[0].__setitem__(6, "X"), "2 columns are named 'X'"),
+        (lambda rows: rows.insert(20, rows[21]), "times must increase"),
+        (lambda rows: rows.clear(), "no column"),
+        (lambda rows: rows.__delitem__(slice(5, None)), "4 samples"),
+    ],
+)
+def test_what_cannot_be_used_is_named(tmp_path, written, truth, change, says):
+    table = table_of(tmp_path / "bad.csv", truth, change)
+    with pytest.raises(ValueError, match=says):
+        import_table(table, written[1], tmp_path / "bad.nc")
+    assert not (tmp_path / "bad.nc").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('unit = "deg"', 'unit = "rad"', "looks like degrees.*unit"),
+        ('"Z", unit = "mm", offset = -120.0', '"Z", unit = "mm"', "does not reach|above the"),
+        ('unit = "ms"', 'unit = "hours"', "columns.time.unit = 'hours' is none of s, ms"),
+        ("time = {", "tine = {", "columns.tine is none of time, x"),
+        ('inclination_yz = { column = "B", unit = "mrad", flip = true }', "", "inclination_yz mis"),
+        ("skip = 2", 'skip = "2"', "skip"),
+        ("skip = 2", "skip 2", "not TOML"),
+        ("liquid_density = { value", "liquid_densty = { value", "liquid_densty is none of"),
+    ],
+)
+def test_a_map_that_cannot_be_right_is_named(tmp_path, written, old, new, says):
+    table, columns = written
+    text = columns.read_text()
+    assert old in text
+    columns.write_text(text.replace(old, new))
+    with pytest.raises(ValueError, match=says):
+        import_table(table, columns, tmp_path / "stir.nc")
+    assert not (tmp_path / "stir.nc").exists()
+
+
+def test_the_template_is_a_map_and_overwrites_nothing(tmp_path):
+    path = write_template(tmp_path / "columns.toml")
+    assert open_table_map(path).columns["time"].unit == "ms"
+    with pytest.raises(ValueError, match="exists already"):
+        write_template(path)
