@@ -1,5 +1,6 @@
 """The command line; each command calls the function of the same name."""
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -26,7 +27,6 @@ app = typer.Typer(
     cls=OneLineErrors,
     help="Learn a liquid by stirring it, then pour it without spilling.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 app.add_typer(cli_check.app, name="check")
@@ -97,6 +97,7 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
     _print_section(out, "calibrate")
     for line in aborted_recordings(opened):
         typer.echo(line, err=True)
+    _print_next(out, "criticise", "pour")
 
 
 @app.command()
@@ -150,6 +151,7 @@ def criticise(  # noqa: PLR0913  one parameter for each option
         seed=seed,
     )
     _print_criticism(criticism)
+    _print_next(run, "pour")
 
 
 @app.command()
@@ -196,6 +198,7 @@ def pour(  # noqa: PLR0913  one parameter for each option
     chosen_cups = bundled_cups() if cups is None else open_cups(cups)
     choose_pour(latest_calibration(run), chosen_cups, iterations=iterations, risk=risk)
     _print_section(run, "pour")
+    _print_next(run, "report")
 
 
 @app.command()
@@ -221,6 +224,13 @@ def demo(
     _print_criticism(Criticism.open(out))
     _print_section(out, "pour")
     typer.echo(f"report: {path}")
+
+
+def _print_next(run: Path, *commands: str) -> None:
+    """The commands that may follow, to be copied."""
+    typer.echo(
+        "next: " + " or: ".join(f"bolfi-liquids {c} {shlex.quote(str(run))}" for c in commands)
+    )
 
 
 def _print_section(run: Path, name: str) -> None:

@@ -1,0 +1,57 @@
+"""What the figures' numbers are made of."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bolfi_liquids.reproduction.figure_of_recordings import between
+from bolfi_liquids.reproduction.figures_of_spillage import interval
+from bolfi_liquids.reproduction.reproduce import reproduce
+
+
+def table(spilled):
+    """Pours on a grid of actions, of which a function tells the spillage."""
+    rate, distance = (
+        m.ravel() for m in np.meshgrid(np.geomspace(0.5, 3.0, 5), np.linspace(0, 0.06, 7))
+    )
+    values = spilled(np.log(rate), distance)
+    fractions = np.column_stack([values, 1.0 - values, 0.0 * values])
+    return SimpleNamespace(angular_velocity=rate, distance=distance, fractions=fractions)
+
+
+def test_a_linear_table_is_interpolated_without_error():
+    plane = table(lambda log_rate, distance: 0.3 + 0.1 * log_rate + 2.0 * distance)
+    value, error = between(plane, 1.2, 0.033)
+    assert value == pytest.approx(0.3 + 0.1 * np.log(1.2) + 2.0 * 0.033)
+    assert error == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_curved_table_tells_its_error():
+    value, error = between(
+        table(lambda log_rate, distance: 200.0 * (distance - 0.03) ** 2), 1.2, 0.025
+    )
+    truth = 200.0 * 0.005**2
+    assert abs(value - truth) < 3.0 * error < 0.1
+
+
+def test_beyond_the_table_its_edge_is_taken():
+    rising = table(lambda log_rate, distance: 10.0 * distance)
+    value, _ = between(rising, 1.0, 0.08)
+    assert value == pytest.approx(0.6, abs=0.01)
+
+
+def test_the_interval_covers_the_mean_as_often_as_it_says():
+    rng = np.random.default_rng(0)
+    held = 0
+    for at in range(200):
+        low, high = interval(rng.exponential(size=40), seed=at)
+        held += low <= 1.0 <= high
+    # 90 %, less what the bootstrap of a skewed sample of 40 is known to lose; four standard errors
+    assert held / 200 > 0.87 - 4.0 * np.sqrt(0.1 / 200) * 0.9
+
+
+def test_an_unknown_figure_is_named(tmp_path):
+    with pytest.raises(ValueError, match="no figure 'colour'; choose all, inclination"):
+        reproduce(["colour"], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
