@@ -47,7 +47,7 @@ def spillage(workshop: Workshop) -> Drawn:
         figure = new_figure(7.4, 4.6)
         axes = figure.subplots()
         for ((method, rule), label), colour in zip(SHOWN.items(), _colours(), strict=False):
-            _against_budget(axes, study["spilled"].sel(method=method, rule=rule), label, colour)
+            _against_budget(axes, study["spilled"].sel(learned_by=method, rule=rule), label, colour)
         for name, style in (("known", ":"), ("unknown", "--")):
             level = 100.0 * float(study[name].mean())
             axes.axhline(level, color=GREY, ls=style, lw=1.0, label=f"liquid {name}")
@@ -72,7 +72,7 @@ def _against_budget(axes: "Axes", spilled: "DataArray", label: str, colour: str)
 def _table(study: "Dataset") -> str:
     lines = ["spilled [%], mean over liquids and repetitions:"]
     for (method, rule), label in SHOWN.items():
-        means = 100.0 * study["spilled"].sel(method=method, rule=rule).mean("truth")
+        means = 100.0 * study["spilled"].sel(learned_by=method, rule=rule).mean("truth")
         pairs = (
             f"N = {int(n)}: {float(m):.2f}" for n, m in zip(means["budget"], means, strict=True)
         )
@@ -96,7 +96,7 @@ def liquids(workshop: Workshop) -> Drawn:
         panels = figure.subplots(1, len(budgets), sharey=True, squeeze=False)[0]
         for axes, budget in zip(panels, budgets, strict=True):
             for at, (method, rule) in enumerate(rules):
-                chosen = study["spilled"].sel(method=method, rule=rule, budget=budget)
+                chosen = study["spilled"].sel(learned_by=method, rule=rule, budget=budget)
                 for place, liquid in enumerate(LIQUIDS):
                     percent = 100.0 * chosen.to_numpy()[study["liquid"].to_numpy() == liquid]
                     x = place + 0.2 * (at - (len(rules) - 1) / 2)
@@ -110,11 +110,8 @@ def liquids(workshop: Workshop) -> Drawn:
         panels[0].set_ylabel("spilled [%]")
         panels[0].set_yscale("symlog", linthresh=1.0)
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    means = {
-        liquid: 100.0 * float(study["spilled"].sel(method="signal", rule="mean", budget=budgets[-1])
-                              .to_numpy()[study["liquid"].to_numpy() == liquid].mean())
-        for liquid in LIQUIDS
-    }  # fmt: skip
+    last = study["spilled"].sel(learned_by="signal", rule="mean", budget=budgets[-1])
+    means = {name: 100.0 * float(last[study["liquid"] == name].mean()) for name in LIQUIDS}
     says = ", ".join(f"{liquid} {mean:.2f} %" for liquid, mean in means.items())
     return Drawn(study, figure, f"least expected after N = {budgets[-1]} stirs: {says}")
 
@@ -133,7 +130,7 @@ def decision(workshop: Workshop) -> Drawn:
         axes = figure.subplots()
         pairs = [(m, r) for m in ("discrepancy", "signal", "pour") for r in ("mean", "cvar")]
         for at, (method, rule) in enumerate(pairs):
-            apart = spilled.sel(method=method, rule=rule) - spilled.sel(
+            apart = spilled.sel(learned_by=method, rule=rule) - spilled.sel(
                 method=method, rule="plug_in"
             )
             rows = apart.transpose("budget", "truth").to_numpy()
@@ -169,8 +166,8 @@ def surrogates(workshop: Workshop) -> Drawn:
     with styled():
         figure = new_figure(6.4, 3.6)
         axes = figure.subplots()
-        for method, colour in zip(study["method"].to_numpy(), PALETTE, strict=False):
-            rows = error.sel(method=method).transpose("budget", "truth").to_numpy()
+        for method, colour in zip(study["learned_by"].to_numpy(), PALETTE, strict=False):
+            rows = error.sel(learned_by=method).transpose("budget", "truth").to_numpy()
             means = np.nanmean(rows, axis=1)
             ends = np.array([interval(row) for row in rows])
             axes.fill_between(budgets, *np.exp(ends.T), color=colour, alpha=0.15, lw=0)

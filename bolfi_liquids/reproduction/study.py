@@ -50,7 +50,9 @@ class Tasks:
 
 
 def spillage_study(bank: "SimulationBank", scale: "Scale", *, progress: bool = True) -> "Dataset":
-    """Spilled fractions over (method, rule, truth, budget), and with the liquid known or unknown.
+    """Spilled fractions over (learned_by, rule, truth, budget).
+
+    Beside them `known`, with the liquid known, and `unknown`, without any calibration.
 
     Args:
         bank: Where all simulations and calibrations are kept.
@@ -136,7 +138,7 @@ def _judged(
             values[method, rule, at, n] = fraction
             rates[method, rule, at, n] = action["angular_velocity"]
             distances[method, rule, at, n] = action["distance"]
-    dims = ("method", "rule", "truth", "budget")
+    dims = ("learned_by", "rule", "truth", "budget")
     learned = np.stack([_stacked(concluded[name], shape[3]) for name in METHODS])
     return Dataset(
         {
@@ -145,10 +147,10 @@ def _judged(
             "distance": (dims, distances, {"units": "m"}),
             "known": ("truth", np.array([outcome[0] for outcome in spilled])),
             "unknown": ("truth", np.array([outcome[1] for outcome in spilled])),
-            "concluded": (("method", "truth", "budget", "draw", "parameter"), learned),
+            "concluded": (("learned_by", "truth", "budget", "draw", "parameter"), learned),
         },
         coords={
-            "method": list(METHODS),
+            "learned_by": list(METHODS),
             "rule": list(RULES),
             "budget": list(scale.budgets),
             "liquid": ("truth", truths.liquid.astype(str)),
