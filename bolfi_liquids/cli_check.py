@@ -55,10 +55,10 @@ def sbc(  # noqa: PLR0913  one parameter for each option
         int, typer.Option(help="Replicates of the paper's surrogate.")
     ] = SbcSettings.sequential,
     design: Annotated[
-        int, typer.Option(help="Simulations that the emulator's replicates share.")
+        int, typer.Option(help="Points that the emulator's replicates share, each stirred twice.")
     ] = SbcSettings.design,
     budget: Annotated[
-        int, typer.Option(help="Simulations of each of the paper's replicates.")
+        int, typer.Option(help="Simulations that each replicate learns from.")
     ] = SbcSettings.budget,
     noise: Annotated[float, typer.Option(help="Of the cameras [deg].")] = SbcSettings.noise_deg,
     particles: Annotated[

@@ -6,94 +6,33 @@ one set of simulations for all of them; the paper's surrogate makes its own for 
 """
 
 import os
-import warnings
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .calibrator import fit_recordings
+from .kept import fresh_seeds
 from .prior import default_prior, describe_prior
+from .progress import progress_bar
 from .provenance import LIBRARIES, versions
 from .recordings import Recording, open_recording
 from .run_directory import SIMULATIONS, enter_run
+from .sbc_pipelines import RUNS, Calibrate, CameraNoise, FromBank, Quietly
 from .sbc_results import SurrogateCheck, checked, write_results
-from .settings import SURROGATES, CalibrationSettings, SbcSettings
+from .settings import SURROGATES, SbcSettings
 from .stirring import Stirring, stirring_of
 
 if TYPE_CHECKING:
-    from xarray import DataTree
-
     from .inference import Prior, Replicates
 
 
-@dataclass(frozen=True)
-class CameraNoise:
-    """Independent Gaussian noise in every sample.
-
-    Attributes:
-        sd: [rad].
-    """
-
-    sd: float
-
-    def __call__(self, signal: NDArray, rng: np.random.Generator) -> NDArray[np.float64]:
-        return signal + rng.normal(0.0, self.sd, signal.shape)
-
-
-@dataclass(frozen=True)
-class Calibrate:
-    """What `calibrate` makes of a signal, as a pipeline of `inference.replicates`.
-
-    Attributes:
-        stirring: The simulator; its recording's inclination is not looked at.
-        prior: Of the parameters.
-        settings: Budget, surrogate and sampler; the seed is each replicate's.
-    """
-
-    stirring: Stirring
-    prior: "Prior"
-    settings: CalibrationSettings
-
-    def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
-        from .inference import SimulationBank
-        from .kept import Keep
-
-        with SimulationBank(":memory:") as bank:
-            keep = Keep(bank, self.stirring.identity, self.settings.batch)
-            fit = fit_recordings(
-                self.stirring,
-                observed,
-                self.prior,
-                keep,
-                budget=self.settings.budget,
-                surrogate=self.settings.surrogate,
-                seed=seed,
-            )
-        return fit.sample(seed=seed, **_sampling(self.settings)), fit.log_prob
-
-
-@dataclass(frozen=True)
-class Quietly:
-    """A pipeline whose emulator's complaints are not repeated for every replicate.
-
-    Attributes:
-        pipeline: See `inference.replicates`.
-    """
-
-    pipeline: Any
-
-    def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
-        from .inference import EmulatorWarning
-
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", EmulatorWarning)
-            return self.pipeline(observed, seed)
+AT_ONCE = 16  # stirs in one call
+_PURPOSE = 61  # of seeds
 
 
 def check_sbc(
@@ -152,17 +91,8 @@ def _replicates(  # noqa: PLR0913  what the two surrogates share
 
     calibration = settings.calibration(name)
     if name == "signal":
-        pipeline: Any = inference.shared_design(
-            stirring.simulate,
-            prior,
-            settings.design,
-            seed=settings.seed,
-            options={"surrogate": name},
-            sampling=_sampling(calibration),
-            executor=pool,
-            bank=out / SIMULATIONS,
-            identity=stirring.identity,
-        )
+        shared = stirs_everywhere(stirring, prior, settings, out / SIMULATIONS, pool, progress)
+        pipeline: Any = FromBank(prior, *shared, calibration)
     else:
         pipeline = Calibrate(stirring, prior, calibration)
     return inference.replicates(
@@ -177,10 +107,6 @@ def _replicates(  # noqa: PLR0913  what the two surrogates share
         identity=stirring.identity,
         progress=progress,
     )
-
-
-def _sampling(settings: CalibrationSettings) -> dict[str, Any]:
-    return {"sampler": settings.sampler, "chains": settings.chains, "draws": settings.draws}
 
 
 def _opened(recording: str | Path | Recording | None) -> Recording:
@@ -213,3 +139,38 @@ def _processes(workers: int | None) -> "AbstractContextManager[Executor | None]"
     if count == 1:
         return nullcontext()
     return ProcessPoolExecutor(count, mp_context=get_context("spawn"))
+
+
+def stirs_everywhere(  # noqa: PLR0913  what makes simulations
+    stirring: Stirring,
+    prior: "Prior",
+    settings: SbcSettings,
+    path: Path,
+    pool: Executor | None,
+    progress: bool,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points that fill the prior [n, d], and `RUNS` stirs of each [n, RUNS, T, 2]; failed: NaN."""
+    from scipy.stats import qmc
+
+    from .inference import Job, SimulationBank, run_missing
+
+    u = qmc.Sobol(len(prior), rng=settings.seed).random(settings.design)
+    theta = prior.from_unit(u)
+    count = RUNS * settings.design
+    seeds = fresh_seeds(settings.seed, _PURPOSE, count)
+    jobs = [
+        Job({name: float(values[at // RUNS]) for name, values in theta.items()}, seed)
+        for at, seed in enumerate(seeds)
+    ]
+    made = []
+    with (
+        SimulationBank(path) as bank,
+        progress_bar("simulating stirs for all", count, shown=progress) as advance,
+    ):
+        for start in range(0, count, AT_ONCE):
+            part = jobs[start : start + AT_ONCE]
+            made += run_missing(stirring.simulate, part, None, bank, stirring.identity, pool)
+            advance(len(part))
+    nothing = np.full(stirring.observed.shape, np.nan)
+    signals = np.stack([nothing if one.signal is None else one.signal for one in made])
+    return prior.to_array(theta), signals.reshape(settings.design, RUNS, *nothing.shape)

@@ -64,10 +64,10 @@ class SbcSettings:
     """What decides a check of calibrations besides the recording that gives path and rig.
 
     Attributes:
-        runs: Replicates of the emulator of the inclination, which share one design.
+        runs: Replicates of the emulator of the inclination, which share their simulations.
         sequential: Replicates of the paper's surrogate, each with simulations of its own.
-        design: Simulations of the shared design.
-        budget: Simulations of each of the others.
+        design: Points that the former share, each stirred twice.
+        budget: Simulations that each learns from.
         noise_deg: Of the cameras, added to each simulated sample [deg].
         particles: Of the simulated liquid.
         seed: Of everything random.
@@ -75,7 +75,7 @@ class SbcSettings:
 
     runs: int = 200
     sequential: int = 40
-    design: int = 64
+    design: int = 256
     budget: int = 20
     noise_deg: float = 0.1
     particles: int = 1000

@@ -1,0 +1,144 @@
+"""Calibrations as pipelines of `inference.replicates`."""
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .calibrator import fit_recordings
+from .settings import CalibrationSettings
+from .stirring import Stirring
+
+if TYPE_CHECKING:
+    from xarray import DataTree
+
+    from .inference import Prior
+
+RUNS = 2  # of each point of a shared set: the engine asks for replicates
+
+
+@dataclass(frozen=True)
+class CameraNoise:
+    """Independent Gaussian noise in every sample.
+
+    Attributes:
+        sd: [rad].
+    """
+
+    sd: float
+
+    def __call__(self, signal: NDArray, rng: np.random.Generator) -> NDArray[np.float64]:
+        return signal + rng.normal(0.0, self.sd, signal.shape)
+
+
+@dataclass(frozen=True)
+class Calibrate:
+    """What `calibrate` makes of a signal, as a pipeline of `inference.replicates`.
+
+    Attributes:
+        stirring: The simulator; its recording's inclination is not looked at.
+        prior: Of the parameters.
+        settings: Budget, surrogate and sampler; the seed is each replicate's.
+    """
+
+    stirring: Stirring
+    prior: "Prior"
+    settings: CalibrationSettings
+
+    def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
+        from .inference import SimulationBank
+        from .kept import Keep
+
+        with SimulationBank(":memory:") as bank:
+            keep = Keep(bank, self.stirring.identity, self.settings.batch)
+            fit = fit_recordings(
+                self.stirring,
+                observed,
+                self.prior,
+                keep,
+                budget=self.settings.budget,
+                surrogate=self.settings.surrogate,
+                seed=seed,
+            )
+        return fit.sample(seed=seed, **sampling(self.settings)), fit.log_prob
+
+
+@dataclass(frozen=True)
+class FromBank:
+    """`calibrate` by the emulator of the inclination, with simulations that were made before.
+
+    The engine asks where to simulate; the nearest point that has a run left is told in its place.
+    So many calibrations share one set of simulations, and each still learns most where its own
+    data lead.
+
+    Attributes:
+        prior: Of the parameters.
+        theta: Points of the set [n, d].
+        signals: Of their runs [n, RUNS, T, 2].
+        settings: Of a calibration.
+    """
+
+    prior: "Prior"
+    theta: NDArray[np.float64]
+    signals: NDArray[np.float64]
+    settings: CalibrationSettings
+
+    def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
+        from .inference import Bolfi
+
+        u = self.prior.to_unit(self.prior.to_dict(self.theta))
+        left = np.isfinite(self.signals).all(axis=(2, 3))
+        told: list[tuple[int, int]] = []  # point and run
+
+        def engine() -> Bolfi:
+            """One that was told all so far, and waits for nothing that it asked before."""
+            made = Bolfi(self.prior, observed, surrogate=self.settings.surrogate, seed=seed)
+            if told:
+                point, run = np.array(told).T
+                theta = self.prior.to_dict(self.theta[point])
+                made.tell(theta, self.signals[point, run], RUNS * point + run)
+            return made
+
+        while len(told) < self.settings.budget:
+            asking = engine()
+            wanted = asking.initial if not told else self.settings.batch
+            asked = asking.ask(min(wanted, self.settings.budget - len(told)))
+            told += _nearest(self.prior.to_unit(asked), u, left)
+        fit = engine().fit()
+        return fit.sample(seed=seed, **sampling(self.settings)), fit.log_prob
+
+
+def _nearest(asked: NDArray, points: NDArray, left: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """Point and run for each u asked [n, d]; what is given is no longer `left` [points, RUNS]."""
+    for u in asked:
+        apart = np.where(left.any(axis=1), np.sum((points - u) ** 2, axis=1), np.inf)
+        point = int(np.argmin(apart))
+        run = int(np.argmax(left[point]))
+        left[point, run] = False
+        yield point, run
+
+
+@dataclass(frozen=True)
+class Quietly:
+    """A pipeline whose emulator's complaints are not repeated for every replicate.
+
+    Attributes:
+        pipeline: See `inference.replicates`.
+    """
+
+    pipeline: Any
+
+    def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
+        from .inference import EmulatorWarning
+
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", EmulatorWarning)
+            return self.pipeline(observed, seed)
+
+
+def sampling(settings: CalibrationSettings) -> dict[str, Any]:
+    """Options of `Fit.sample`."""
+    return {"sampler": settings.sampler, "chains": settings.chains, "draws": settings.draws}
