@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..drawing import GREY, PALETTE, new_figure, styled
+from ..drawing import GREY, PALETTE, new_figure, plain_log_ticks, styled
 from .figure import Drawn
 from .truths import LIQUIDS
 from .workshop import Workshop
@@ -26,6 +26,8 @@ SHOWN = {
 }
 """(method, rule) -> label, in the order of the palette."""
 
+COLOURS = (*PALETTE, "#c2185b")
+FEW_PERCENT = (0, 0.5, 1, 2, 5, 10, 20, 50)  # ticks of an axis that is linear up to 1 %
 RESAMPLED = 4000  # bootstrap samples
 LEVEL = 0.9
 
@@ -46,27 +48,28 @@ def spillage(workshop: Workshop) -> Drawn:
     with styled():
         figure = new_figure(7.4, 4.6)
         axes = figure.subplots()
-        for ((method, rule), label), colour in zip(SHOWN.items(), _colours(), strict=False):
-            _against_budget(axes, study["spilled"].sel(learned_by=method, rule=rule), label, colour)
+        for at, ((method, rule), label) in enumerate(SHOWN.items()):
+            chosen = study["spilled"].sel(learned_by=method, rule=rule)
+            _against_budget(axes, chosen, label, at)
         for name, style in (("known", ":"), ("unknown", "--")):
             level = 100.0 * float(study[name].mean())
             axes.axhline(level, color=GREY, ls=style, lw=1.0, label=f"liquid {name}")
-        axes.set(xlabel="simulations N", ylabel="spilled [%]", yscale="log")
-        axes.set_xticks(budgets, [str(n) for n in budgets])
+        axes.set(xlabel="simulations N", ylabel="spilled [%]")
+        plain_log_ticks(axes, "y")
+        axes.set_xticks(range(len(budgets)), [str(n) for n in budgets])
         figure.legend(loc="outside lower center", ncols=2)
     return Drawn(study, figure, _table(study))
 
 
-def _colours() -> list[str]:
-    return [*PALETTE, "#c2185b"]
-
-
-def _against_budget(axes: "Axes", spilled: "DataArray", label: str, colour: str) -> None:
-    budgets = spilled["budget"].to_numpy()
+def _against_budget(axes: "Axes", spilled: "DataArray", label: str, at: int) -> None:
+    """Means, with 90 % intervals, side by side for those that are compared."""
     percent = 100.0 * spilled.transpose("budget", "truth").to_numpy()
-    ends = np.array([interval(row) for row in percent])
-    axes.fill_between(budgets, *np.maximum(ends, 1e-3).T, color=colour, alpha=0.12, lw=0)
-    axes.plot(budgets, np.nanmean(percent, axis=1), "o-", color=colour, ms=4, label=label)
+    means, ends = np.nanmean(percent, axis=1), np.array([interval(row) for row in percent])
+    x = np.arange(len(means)) + 0.06 * (at - (len(SHOWN) - 1) / 2)
+    colour = COLOURS[at]
+    axes.plot(x, means, "-", color=colour, lw=0.8, alpha=0.5)
+    off = np.abs(ends.T - means)
+    axes.errorbar(x, means, off, fmt="o", color=colour, ms=4, elinewidth=1.2, label=label)
 
 
 def _table(study: "Dataset") -> str:
@@ -109,6 +112,7 @@ def liquids(workshop: Workshop) -> Drawn:
             axes.set_title(f"N = {budget}")
         panels[0].set_ylabel("spilled [%]")
         panels[0].set_yscale("symlog", linthresh=1.0)
+        panels[0].set_yticks(FEW_PERCENT, map(str, FEW_PERCENT))
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     last = study["spilled"].sel(learned_by="signal", rule="mean", budget=budgets[-1])
     means = {name: 100.0 * float(last[study["liquid"] == name].mean()) for name in LIQUIDS}
@@ -131,7 +135,7 @@ def decision(workshop: Workshop) -> Drawn:
         pairs = [(m, r) for m in ("discrepancy", "signal", "pour") for r in ("mean", "cvar")]
         for at, (method, rule) in enumerate(pairs):
             apart = spilled.sel(learned_by=method, rule=rule) - spilled.sel(
-                method=method, rule="plug_in"
+                learned_by=method, rule="plug_in"
             )
             rows = apart.transpose("budget", "truth").to_numpy()
             saved[f"{method}_{rule}"] = ("budget", np.nanmean(rows, axis=1))
@@ -150,6 +154,8 @@ def decision(workshop: Workshop) -> Drawn:
         axes.set_xticks(range(len(budgets)), [f"N = {n}" for n in budgets])
         axes.set_ylabel("spilled more than the plug-in [% points]")
         axes.set_yscale("symlog", linthresh=1.0)
+        ticks = [*(-tick for tick in FEW_PERCENT[:0:-1]), *FEW_PERCENT]
+        axes.set_yticks(ticks, [f"{tick:+g}" if tick else "0" for tick in ticks])
         figure.legend(loc="outside lower center", ncols=3)
     return Drawn(Dataset(saved, {"budget": budgets}), figure, "\n".join(lines))
 
@@ -175,7 +181,8 @@ def surrogates(workshop: Workshop) -> Drawn:
             axes.plot(budgets, np.exp(means), "o-", ms=4, color=colour, label=label)
             told = (f"N = {n}: {np.exp(m):.2f}" for n, m in zip(budgets, means, strict=True))
             lines.append(f"  {label}: " + ", ".join(told))
-        axes.set(xlabel="simulations N", ylabel="factor between draws and truth", yscale="log")
+        axes.set(xlabel="simulations N", ylabel="factor between draws and truth")
+        plain_log_ticks(axes, "y")
         axes.set_xticks(budgets, [str(n) for n in budgets])
         axes.legend()
     return Drawn(Dataset({"log_error": error.drop_vars("parameter")}), figure, "\n".join(lines))
