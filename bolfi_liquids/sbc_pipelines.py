@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 
     from .inference import Prior
 
+SAMPLING: dict[str, Any] = {"sampler": "quadrature", "chains": 2, "draws": 250}
+"""Of the posterior: independent draws, which are sooner made; `calibrate` checks its own against
+the same quadrature."""
+
 RUNS = 2  # of each point of a shared set: the engine asks for replicates
 
 
@@ -41,7 +45,7 @@ class Calibrate:
     Attributes:
         stirring: The simulator; its recording's inclination is not looked at.
         prior: Of the parameters.
-        settings: Budget, surrogate and sampler; the seed is each replicate's.
+        settings: Budget and surrogate; the seed is each replicate's.
     """
 
     stirring: Stirring
@@ -63,7 +67,7 @@ class Calibrate:
                 surrogate=self.settings.surrogate,
                 seed=seed,
             )
-        return fit.sample(seed=seed, **sampling(self.settings)), fit.log_prob
+        return fit.sample(seed=seed, **SAMPLING), fit.log_prob
 
 
 @dataclass(frozen=True)
@@ -108,7 +112,7 @@ class FromBank:
             asked = asking.ask(min(wanted, self.settings.budget - len(told)))
             told += _nearest(self.prior.to_unit(asked), u, left)
         fit = engine().fit()
-        return fit.sample(seed=seed, **sampling(self.settings)), fit.log_prob
+        return fit.sample(seed=seed, **SAMPLING), fit.log_prob
 
 
 def _nearest(asked: NDArray, points: NDArray, left: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
@@ -137,8 +141,3 @@ class Quietly:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", EmulatorWarning)
             return self.pipeline(observed, seed)
-
-
-def sampling(settings: CalibrationSettings) -> dict[str, Any]:
-    """Options of `Fit.sample`."""
-    return {"sampler": settings.sampler, "chains": settings.chains, "draws": settings.draws}

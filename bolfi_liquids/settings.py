@@ -97,9 +97,9 @@ class SbcSettings:
         return {"signal": self.runs, "discrepancy": self.sequential}
 
     def calibration(self, surrogate: str) -> CalibrationSettings:
-        """Of one replicate: as `calibrate` has it, with as many draws as ranks need."""
+        """Of one replicate: as `calibrate` has it."""
         return CalibrationSettings(
-            budget=self.budget, surrogate=surrogate, particles=self.particles, draws=250
+            budget=self.budget, surrogate=surrogate, particles=self.particles
         )
 
 
