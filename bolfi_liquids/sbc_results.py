@@ -72,10 +72,11 @@ def _regions(coverage: "Coverage") -> "Dataset":
     inside = 2 * np.abs(coverage.quantiles - 0.5) <= LEVEL
     truths = coverage.replicates.to_dataset()
     names = [name for name in coverage.names if f"{name}_truth" in truths]
-    rate, upper = np.empty((REGIONS, len(names))), np.empty((REGIONS, len(names)))
+    count = min(REGIONS, len(inside))
+    rate, upper = np.empty((count, len(names))), np.empty((count, len(names)))
     for j, name in enumerate(names):
         truth = truths[f"{name}_truth"].to_numpy()
-        parts = np.array_split(np.argsort(truth, kind="stable"), REGIONS)
+        parts = np.array_split(np.argsort(truth, kind="stable"), count)
         column = coverage.names.index(name)
         rate[:, j] = [inside[part, column].mean() for part in parts]
         upper[:, j] = [truth[part].max() for part in parts]

@@ -1,0 +1,69 @@
+"""The check of whole calibrations: resumable, and each run of the shared set told once."""
+
+import sqlite3
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from bolfi_liquids.sbc_check import check_sbc
+from bolfi_liquids.sbc_pipelines import RUNS, CameraNoise, _nearest
+from bolfi_liquids.settings import SbcSettings
+
+SMALL = {"design": 8, "budget": 8, "particles": 100, "seed": 3}
+
+
+def rows(path, table):
+    with sqlite3.connect(path) as connection:
+        return connection.execute(f"SELECT count(*) FROM {table}").fetchone()[0]
+
+
+def test_each_run_is_given_once_and_the_nearest_first():
+    points = np.array([[0.1, 0.1], [0.2, 0.1], [0.9, 0.9]])
+    left = np.ones((3, RUNS), bool)
+    asked = np.array([[0.1, 0.1]] * 5)
+    given = list(_nearest(asked, points, left))
+    assert given == [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0)]
+    assert left.sum() == 1
+
+
+def test_camera_noise_is_as_large_as_it_says():
+    rng = np.random.default_rng(0)
+    noise = CameraNoise(0.3)(np.zeros((400, 2)), rng)
+    # the standard error of a standard deviation is sd / sqrt(2 n)
+    assert noise.std() == pytest.approx(0.3, abs=4 * 0.3 / np.sqrt(2 * noise.size))
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"), [("runs", -1), ("design", 3), ("noise_deg", 0.0), ("budget", 2)]
+)
+def test_bad_settings_are_named(setting, value):
+    with pytest.raises(ValueError, match=repr(value)):
+        SbcSettings(**{setting: value})
+
+
+@pytest.mark.slow
+def test_a_check_goes_on_where_it_ended(tmp_path, short_recording):
+    out = tmp_path / "sbc"
+    few = SbcSettings(runs=3, sequential=1, **SMALL)
+    found = check_sbc(out, short_recording, settings=few, workers=1, progress=False)
+    assert {name: len(one.replicates) for name, one in found.items()} == {
+        "signal": 3,
+        "discrepancy": 1,
+    }
+    assert rows(out / "simulations.sqlite", "simulation") == RUNS * SMALL["design"]
+
+    more = SbcSettings(runs=5, sequential=1, **SMALL)
+    again = check_sbc(out, short_recording, settings=more, workers=1, progress=False)
+    first = [one.replicates.finished[0].draws for one in (found["signal"], again["signal"])]
+    np.testing.assert_array_equal(*first)
+    assert rows(out / "simulations.sqlite", "simulation") == RUNS * SMALL["design"]
+    with xr.open_datatree(out / "sbc.nc", engine="h5netcdf") as tree:
+        assert tree["signal/replicates"].sizes["replicate"] == 5
+        assert tree["signal/regions"]["rate"].dims == ("region", "quantity")
+    for name in ("signal", "discrepancy"):
+        assert (out / f"{name}.png").is_file() and (out / f"{name}.svg").is_file()
+
+    other = SbcSettings(runs=3, sequential=1, **{**SMALL, "seed": 4})
+    with pytest.raises(ValueError, match="settings.seed is 3 in the run, but 4 was asked"):
+        check_sbc(out, short_recording, settings=other, workers=1, progress=False)
