@@ -116,11 +116,11 @@ def test_cohesion_draws_a_poured_stream_together(cups):
     slots, particles, interval = len(seeds), 664, 0.02
     scene = pouring._scene(cups, particles, ())
     shift = np.array([cups.source.radius, 0.0, cups.source.height])
-    scene.place_cups(np.ones(slots), np.zeros(slots))
+    scene.place_cups(np.ones(slots))
     packed = (pack_cylinder(cups.source.radius, scene.spacing, particles, s) for s in seeds)
     packings = scene.settled([points - shift for points in packed], 0.6)
     scene.place([p.position for p in packings], [p.multiplier for p in packings])
-    scene.place_cups(np.full(slots, 3.0), np.full(slots, 0.03))
+    scene.place_cups(np.full(slots, 3.0))
     scene.pour_in(models.Liquid(0.03, cohesion, DENSITY).batch(slots))
     falling, pieces, widths = np.zeros(slots), np.zeros(slots), [[] for _ in seeds]
     every = round(interval * scene.rate)

@@ -156,7 +156,7 @@ def test_adhesion_does_not_heat(cups):
     particles, source = 664, cups.source
     scene = pouring._scene(cups, particles, (adhesion,))
     shift = np.array([source.radius, 0.0, source.height])
-    scene.place_cups(np.ones(1), np.zeros(1))
+    scene.place_cups(np.ones(1))
     points = pack_cylinder(source.radius, scene.spacing, particles, 0) - shift
     (packing,) = scene.settled([points], 0.6)
     scene.place([packing.position], [packing.multiplier])
