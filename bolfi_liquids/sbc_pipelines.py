@@ -94,7 +94,7 @@ class FromBank:
         from .inference import Bolfi
 
         u = self.prior.to_unit(self.prior.to_dict(self.theta))
-        left = np.isfinite(self.signals).all(axis=(2, 3))
+        left = np.asarray(np.isfinite(self.signals).all(axis=(2, 3)))
         told: list[tuple[int, int]] = []  # point and run
 
         def engine() -> Bolfi:

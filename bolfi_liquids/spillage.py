@@ -146,7 +146,8 @@ class Outcomes:
         """Those of the decision [m], and so far beyond as liquid may land elsewhere."""
         low, high = self.cups.distance_range
         beyond = int(np.ceil(FARTHEST * landing_sd(self.cups) / STEP))
-        return low + STEP * np.arange(-beyond, round((high - low) / STEP) + beyond + 1)
+        steps = np.arange(-beyond, round((high - low) / STEP) + beyond + 1)
+        return np.asarray(low + STEP * steps, np.float64)
 
     def simulate(self, action: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         """Fractions (actions, draws, D, 3) spilled, received and retained.

@@ -104,6 +104,7 @@ class ByPouring:
         from ..inference import SimulationBank, fit
 
         observed = self._spilled(truth, np.array([seed]))[0]
+        rules: dict[str, Any] = {**PAPER_RULES}
         with SimulationBank(":memory:") as bank:
 
             def fitted(budget: int) -> "Fit":
@@ -117,7 +118,7 @@ class ByPouring:
                     initial=min(MIN_SIMULATIONS, budget),
                     discrepancy=_squared,
                     bank=bank,
-                    **PAPER_RULES,
+                    **rules,
                 )
 
             return np.stack([concluded(fitted(budget), seed) for budget in self.budgets])

@@ -65,7 +65,7 @@ def posterior(workshop: Workshop) -> Drawn:
             kept.append(concat(found, "liquid").assign_coords(surrogate=surrogate))
         panels[0].set_ylabel(LABELS["cohesion"])
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    data = concat(kept, "surrogate")
+    data: Dataset = concat(kept, "surrogate")
     return Drawn(data, figure, f"posteriors of {', '.join(RECORDED)} after {budget} simulations")
 
 

@@ -166,7 +166,7 @@ def surrogates(workshop: Workshop) -> Drawn:
 
     study = workshop.study
     drawn = study["concluded"].sel(parameter="viscosity").isel(draw=slice(1, None))
-    error = np.abs(np.log(drawn) - np.log(study["viscosity"])).mean("draw")
+    error = abs(np.log(drawn / study["viscosity"])).mean("draw")
     budgets = study["budget"].to_numpy()
     lines = ["mean distance of draws from the truth, factor in viscosity:"]
     with styled():

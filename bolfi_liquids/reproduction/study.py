@@ -17,7 +17,7 @@ from ..prior import default_prior
 from ..progress import progress_bar
 from .bundled import bundled_recording
 from .calibrations import ByPouring, ByStirring
-from .decisions import RULES, decide, execute
+from .decisions import RULES, Action, decide, execute
 from .truths import DENSITY, Truths, draw_truths
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ def _judged(
     ]
     drawn = prior.from_unit(np.random.default_rng(scale.seed).uniform(size=(UNKNOWING, 2)))
     unknowing = grid.surface(drawn).least("mean")
-    actions: list[list[dict]] = []
+    actions: list[list[Action]] = []
     for at in range(len(truths.seed)):
         own = {name: values[at : at + 1] for name, values in truths.theta.items()}
         mine = [action for _, _, truth, _, action in chosen if truth == at]
