@@ -72,10 +72,11 @@ def make_grid(
         advance: Called after each angular velocity.
     """
     ends = prior.from_unit(np.array([[0.0, 0.0], [1.0, 1.0]]))
-    viscosity = np.geomspace(*ends["viscosity"], LIQUIDS[0])
-    cohesion = np.linspace(*ends["cohesion"], LIQUIDS[1])
+    low, high = ({name: float(values[end]) for name, values in ends.items()} for end in (0, 1))
+    viscosity = np.geomspace(low["viscosity"], high["viscosity"], LIQUIDS[0])
+    cohesion = np.linspace(low["cohesion"], high["cohesion"], LIQUIDS[1])
     mesh = np.meshgrid(viscosity, cohesion, indexing="ij")
-    theta = dict(zip(("viscosity", "cohesion"), (m.ravel() for m in mesh), strict=True))
+    theta = {"viscosity": mesh[0].ravel(), "cohesion": mesh[1].ravel()}
     seeds = np.array(fresh_seeds(0, _PURPOSE, mesh[0].size), np.int64)
     rates = np.geomspace(*cups.angular_velocity_range, RATES)
     made = pour_all(Outcomes(theta, density, cups, seeds), rates, bank, advance)

@@ -1,6 +1,6 @@
 """The paper's figure 2, left and middle: the closest hypothesis, and what stirring teaches."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -65,7 +65,7 @@ def posterior(workshop: Workshop) -> Drawn:
             kept.append(concat(found, "liquid").assign_coords(surrogate=surrogate))
         panels[0].set_ylabel(LABELS["cohesion"])
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    data: Dataset = concat(kept, "surrogate")
+    data = cast("Dataset", concat(kept, "surrogate"))
     return Drawn(data, figure, f"posteriors of {', '.join(RECORDED)} after {budget} simulations")
 
 
