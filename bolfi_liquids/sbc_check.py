@@ -5,10 +5,8 @@ added, and each is calibrated as a recording would be. The emulator of the incli
 one set of simulations for all of them; the paper's surrogate makes its own for each.
 """
 
-import os
 from collections.abc import Mapping
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,16 +14,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .bundled import bundled_recording
 from .kept import fresh_seeds
 from .prior import default_prior, describe_prior
 from .progress import progress_bar
 from .provenance import LIBRARIES, versions
-from .recordings import Recording, open_recording
+from .recordings import Recording, open_recordings
 from .run_directory import SIMULATIONS, enter_run
 from .sbc_pipelines import RUNS, Calibrate, CameraNoise, FromBank, Quietly
 from .sbc_results import SurrogateCheck, checked, write_results
 from .settings import SURROGATES, SbcSettings
 from .stirring import Stirring, stirring_of
+from .worker_processes import processes
 
 if TYPE_CHECKING:
     from .inference import Prior, Replicates
@@ -62,12 +62,12 @@ def check_sbc(
         RuntimeError: Of a surrogate, no replicate finished.
     """
     settings = settings or SbcSettings()
-    opened = _opened(recording)
-    stirring = stirring_of([opened], settings.particles)
+    given = bundled_recording("water") if recording is None else recording
+    stirring = stirring_of(open_recordings(given), settings.particles)
     prior, out = default_prior(), Path(out)
     enter_run(out, _record(settings, prior, stirring), resume=True)
     found = {}
-    with _processes(workers) as pool:
+    with processes(workers) as pool:
         for name in SURROGATES:
             count = settings.replicates[name]
             if count:
@@ -109,17 +109,6 @@ def _replicates(  # noqa: PLR0913  what the two surrogates share
     )
 
 
-def _opened(recording: str | Path | Recording | None) -> Recording:
-    if isinstance(recording, Recording):
-        return recording
-    if recording is not None:
-        return open_recording(recording)
-    from importlib.resources import as_file, files
-
-    with as_file(files("bolfi_liquids.data") / "water_v10.nc") as path:
-        return open_recording(path)
-
-
 def _record(settings: SbcSettings, prior: "Prior", stirring: Stirring) -> Mapping[str, Any]:
     return {
         "settings": {k: v for k, v in asdict(settings).items() if k not in ("runs", "sequential")}
@@ -128,17 +117,6 @@ def _record(settings: SbcSettings, prior: "Prior", stirring: Stirring) -> Mappin
         "inputs": {"sha256": [recording.hash for recording in stirring.recordings]},
         "versions": versions(LIBRARIES),
     }
-
-
-def _processes(workers: int | None) -> "AbstractContextManager[Executor | None]":
-    """None for one worker: this process."""
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
-
-    count = workers or os.cpu_count() or 1
-    if count == 1:
-        return nullcontext()
-    return ProcessPoolExecutor(count, mp_context=get_context("spawn"))
 
 
 def stirs_everywhere(  # noqa: PLR0913  what makes simulations

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import LinearNDInterpolator
 
+from ..bundled import POURED, bundled_pours
 from ..cups import bundled_cups
 from ..drawing import GREY, PALETTE, new_figure, styled
 from ..pour_grid import RATES, make_grid
 from ..pouring import choose_pour
 from ..prior import default_prior
 from ..progress import progress_bar
-from .bundled import POURED, bundled_pours
 from .figure import Drawn
 from .study import UNKNOWING
 from .truths import DENSITY

@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from ..bundled import RECORDED
 from ..drawing import GREY, INK, LIGHT, ORANGE, PALETTE, new_figure, plain_log_ticks, styled
 from ..posterior_figure import LABELS, contour_levels, grid_density
-from .bundled import RECORDED
 from .figure import Drawn
 from .workshop import Workshop
 

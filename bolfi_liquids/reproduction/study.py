@@ -1,21 +1,19 @@
 """Spillage after calibrating by stirring and by pouring, on truths that are known."""
 
-import os
-from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
-from multiprocessing import get_context
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..bundled import bundled_recording
 from ..cups import bundled_cups
 from ..pour_grid import RATES, make_grid
 from ..prior import default_prior
 from ..progress import progress_bar
-from .bundled import bundled_recording
+from ..worker_processes import processes, processors
 from .calibrations import ByPouring, ByStirring
 from .decisions import RULES, Action, decide, execute
 from .truths import DENSITY, Truths, draw_truths
@@ -83,7 +81,12 @@ def spillage_study(bank: "SimulationBank", scale: "Scale", *, progress: bool = T
 
 
 def conclusions(
-    learner: ByStirring | ByPouring, name: str, tasks: Tasks, pool: Executor, *, progress: bool
+    learner: ByStirring | ByPouring,
+    name: str,
+    tasks: Tasks,
+    pool: Executor | None,
+    *,
+    progress: bool,
 ) -> list[NDArray | None]:
     """Of each truth; None where its calibration failed."""
     from ..inference import Job, run_missing
@@ -93,7 +96,7 @@ def conclusions(
         Job({key: float(values[at]) for key, values in truths.theta.items()}, int(seed))
         for at, seed in enumerate(truths.seed)
     ]
-    found, at_once = [], 2 * workers()
+    found, at_once = [], 2 * processors()
     with progress_bar(f"calibrating ({name})", len(jobs), shown=progress) as advance:
         for start in range(0, len(jobs), at_once):
             part = jobs[start : start + at_once]
@@ -168,15 +171,3 @@ def _stacked(found: Sequence[NDArray | None], budgets: int) -> NDArray[np.float6
 
     empty = np.full((budgets, 1 + DRAWS, len(NAMES)), np.nan)
     return np.stack([empty if one is None else one for one in found])
-
-
-def workers() -> int:
-    """Processes that share the calibrations."""
-    return os.cpu_count() or 1
-
-
-@contextmanager
-def processes() -> Iterator[Executor]:
-    """Spawned, since JAX does not survive a fork."""
-    with ProcessPoolExecutor(workers(), mp_context=get_context("spawn")) as pool:
-        yield pool

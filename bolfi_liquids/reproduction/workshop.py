@@ -5,9 +5,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..bundled import bundled_recording
 from ..calibration import Calibration
 from ..calibrator import calibrate
-from .bundled import bundled_recording
 from .scale import Scale
 from .study import spillage_study
 

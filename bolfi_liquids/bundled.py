@@ -3,10 +3,10 @@
 from importlib.resources import as_file, files
 from typing import TYPE_CHECKING
 
-from ..recordings import Recording, open_recording
+from .recordings import Recording, open_recording
 
 if TYPE_CHECKING:
-    from ..pour_table import PourTable
+    from .pour_table import PourTable
 
 RECORDED = ("water", "oil", "glycerin", "gel")
 POURED = ("water", "oil", "glycerin")
@@ -20,7 +20,7 @@ def bundled_recording(liquid: str) -> Recording:
 
 def bundled_pours(liquid: str) -> "PourTable":
     """Poured with the bundled cups; one of `POURED`."""
-    from ..pour_table import open_pours
+    from .pour_table import open_pours
 
     with as_file(files("bolfi_liquids.data") / "pours.csv") as path:
         return open_pours(path, liquid)
