@@ -21,6 +21,7 @@ from .spillage import (
     Surface,
     landed,
     landing_sd,
+    normal_scores,
     pour_all,
     surface,
 )
@@ -166,7 +167,7 @@ class _Pours:
         rate, distance = action["angular_velocity"], action["distance"]
         profiles = self._profiles(np.array([rate]), liquids, _JUDGE)
         spread = FARTHEST * landing_sd(self.cups)
-        off = np.clip(landing_sd(self.cups) * _normal_scores(LANDINGS), -spread, spread)
+        off = np.clip(landing_sd(self.cups) * normal_scores(LANDINGS), -spread, spread)
         return Judged(
             rate, distance, landed(profiles.fractions[0], profiles.distance, distance, off)
         )
@@ -178,10 +179,3 @@ class _Pours:
         seeds = np.array(fresh_seeds(self.settings.seed, purpose, count), np.int64)
         outcomes = Outcomes(liquids, self.density, self.cups, seeds)
         return pour_all(outcomes, rates, self.bank, self.advance)
-
-
-def _normal_scores(count: int) -> NDArray[np.float64]:
-    """Equally probable standard normal values, shape (count,)."""
-    from scipy.special import ndtri
-
-    return ndtri((np.arange(count) + 0.5) / count)

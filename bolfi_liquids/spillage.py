@@ -52,6 +52,13 @@ def landing_sd(cups: "Cups") -> float:
     return MISSED * (cups.pour.lip_height - cups.receiver.height)
 
 
+def normal_scores(count: int) -> NDArray[np.float64]:
+    """Equally probable standard normal values, shape (count,)."""
+    from scipy.special import ndtri
+
+    return ndtri((np.arange(count) + 0.5) / count)
+
+
 class Profiles(NamedTuple):
     """Fractions spilled, received and retained, at some angular velocities and any distance.
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from .errors import InputError
 from .prior import PARAMETERS
 from .progress import progress_bar
-from .spillage import ACTION
+from .spillage import ACTION, normal_scores
 
 if TYPE_CHECKING:
     from .inference import Fit, Job, Prior, SimulationBank
@@ -102,7 +102,7 @@ class SpillageMap:
 
         u = self.prior.to_unit(liquids)
         mean, sd = np.moveaxis(RegularGridInterpolator(self.axes, self.moments)(u), 1, 0)
-        predicted = mean[:, None] + sd[:, None] * _normal_scores()[:, None]
+        predicted = mean[:, None] + sd[:, None] * normal_scores(OUTCOMES)[:, None]
         return _fraction(self.inverse, predicted).reshape(-1, len(self.actions))
 
     def best(self, liquids: Mapping[str, NDArray]) -> Expected:
@@ -266,7 +266,9 @@ def _left_out_error(
     seen = left_out & np.isfinite(spilled)
     mean, sd = learned.surrogate.predict({name: values[seen] for name, values in theta.items()})
     transform = learned.surrogate.transform
-    expected = _fraction(transform.inverse, mean[:, None] + sd[:, None] * _normal_scores()).mean(1)
+    expected = _fraction(
+        transform.inverse, mean[:, None] + sd[:, None] * normal_scores(OUTCOMES)
+    ).mean(1)
     missed, little = expected - spilled[seen], expected < LITTLE
     spread = np.sqrt(np.mean(((transform(spilled[seen]) - mean) / sd) ** 2))
 
@@ -296,13 +298,6 @@ def _table(
     moments = np.stack(learned.surrogate.predict(theta))
     shaped = moments.reshape(2, *(len(axis) for axis in axes), len(actions))
     return np.moveaxis(shaped, 0, 2)
-
-
-def _normal_scores() -> NDArray[np.float64]:
-    """Equally probable standard normal values, shape (OUTCOMES,)."""
-    from scipy.special import ndtri
-
-    return ndtri((np.arange(OUTCOMES) + 0.5) / OUTCOMES)
 
 
 def _fraction(inverse: Callable[[NDArray], NDArray], predicted: NDArray) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from .calibrations import NAMES
 from .truths import DENSITY, Truths
 
 if TYPE_CHECKING:
-    from ..inference import SimulationBank
+    from ..inference import Prior, SimulationBank
     from ..pour_grid import PourGrid
     from ..progress import Advance
 
@@ -20,6 +20,7 @@ RULES = ("plug_in", "mean", "cvar")
 """The best pour if theta* were the truth, as in the paper; least expected spillage over the
 posterior; and its mean over the worst tenth."""
 
+UNKNOWING = 64  # draws of the prior over which a pour is chosen without any calibration
 EXECUTIONS = 4  # seeds with which a chosen pour is carried out
 _PURPOSE = 41  # of seeds
 
@@ -36,6 +37,12 @@ def decide(concluded: NDArray, grid: "PourGrid") -> dict[str, Action]:
         "mean": over.least("mean"),
         "cvar": over.least("cvar"),
     }
+
+
+def decide_unknowing(grid: "PourGrid", prior: "Prior", seed: int) -> dict[str, float]:
+    """The action that spills least in expectation over the prior."""
+    drawn = prior.from_unit(np.random.default_rng(seed).uniform(size=(UNKNOWING, len(prior))))
+    return grid.surface(drawn).least("mean")
 
 
 def execute(

@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import LinearNDInterpolator
 
 from ..bundled import POURED, bundled_pours
@@ -13,8 +12,8 @@ from ..pour_grid import RATES, make_grid
 from ..pouring import choose_pour
 from ..prior import default_prior
 from ..progress import progress_bar
+from .decisions import decide_unknowing
 from .figure import Drawn
-from .study import UNKNOWING
 from .truths import DENSITY
 from .workshop import Workshop
 
@@ -120,8 +119,5 @@ def _unknowing(workshop: Workshop) -> tuple[float, float]:
     cups, prior = bundled_cups(), default_prior()
     with progress_bar("pouring a grid of liquids", RATES, shown=workshop.progress) as advance:
         grid = make_grid(cups, DENSITY, prior, workshop.bank, advance)
-    drawn: dict[str, NDArray] = prior.from_unit(
-        np.random.default_rng(workshop.scale.seed).uniform(size=(UNKNOWING, 2))
-    )
-    action = grid.surface(drawn).least("mean")
+    action = decide_unknowing(grid, prior, workshop.scale.seed)
     return action["angular_velocity"], action["distance"]

@@ -15,7 +15,7 @@ from ..prior import default_prior
 from ..progress import progress_bar
 from ..worker_processes import processes, processors
 from .calibrations import ByPouring, ByStirring
-from .decisions import RULES, Action, decide, execute
+from .decisions import RULES, Action, decide, decide_unknowing, execute
 from .truths import DENSITY, Truths, draw_truths
 
 if TYPE_CHECKING:
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 METHODS = ("signal", "discrepancy", "pour")
 """Stirring with either surrogate, and pouring as the paper's reference does."""
 
-UNKNOWING = 64  # draws of the prior over which a pour is chosen without any calibration
 PARTICLES = 1000
 
 
@@ -124,8 +123,7 @@ def _judged(
         for n in range(len(scale.budgets))
         for rule, action in enumerate(decide(found[n], grid).values())
     ]
-    drawn = prior.from_unit(np.random.default_rng(scale.seed).uniform(size=(UNKNOWING, 2)))
-    unknowing = grid.surface(drawn).least("mean")
+    unknowing = decide_unknowing(grid, prior, scale.seed)
     actions: list[list[Action]] = []
     for at in range(len(truths.seed)):
         own = {name: values[at : at + 1] for name, values in truths.theta.items()}
