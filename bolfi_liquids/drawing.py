@@ -1,9 +1,12 @@
-"""Figures as inline SVG: one look, no file outside the page."""
+"""Figures of one look: inline SVG, with no file outside the page, or files of their own."""
 
 import io
 import re
 from contextlib import AbstractContextManager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from .files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,6 +31,7 @@ _STYLE: dict[Any, Any] = {
     "legend.frameon": False,
     "legend.fontsize": 8.5,
 }
+RESOLUTION = 150  # dots per inch of a PNG
 _OUTSIDE = re.compile(r"<metadata>.*?</metadata>|\sxmlns(?::\w+)?=\"[^\"]*\"", re.DOTALL)
 
 
@@ -58,6 +62,16 @@ def to_svg(figure: "Figure", name: str) -> str:
     svg = text.getvalue()
     # HTML needs neither the XML prologue nor namespaces, and readers no links to standards
     return _OUTSIDE.sub("", svg[svg.index("<svg") :]).strip()
+
+
+def write_figure(figure: "Figure", out: Path, name: str) -> None:
+    """NAME.png and NAME.svg in `out`."""
+    with styled(name):
+        for kind in ("png", "svg"):
+            write_whole(
+                out / f"{name}.{kind}",
+                lambda at, kind=kind: figure.savefig(at, format=kind, dpi=RESOLUTION),
+            )
 
 
 def plain_log_ticks(axes: "Axes", which: str) -> None:

@@ -7,6 +7,7 @@ viscosity and in the cohesion.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,8 @@ from .kept import fresh_seeds
 from .spillage import Outcomes, Profiles, Surface, pour_all, surface
 
 if TYPE_CHECKING:
+    from scipy.interpolate import RegularGridInterpolator
+
     from .inference import Prior, SimulationBank
     from .models import Cups
     from .progress import Advance
@@ -41,21 +44,22 @@ class PourGrid:
     cohesion: NDArray[np.float64]
     profiles: Profiles
 
-    def surface(self, liquids: Mapping[str, NDArray]) -> Surface:
-        """What all actions spill of each liquid, `viscosity` [Pa s] and `cohesion`, (draws,)."""
+    @cached_property
+    def _between(self) -> "RegularGridInterpolator":
+        """Fractions (points, rates, D, 3) at points of log viscosity and cohesion."""
         from scipy.interpolate import RegularGridInterpolator
 
-        rates, _, distances, kinds = self.profiles.fractions.shape
-        nodes = len(self.log_viscosity), len(self.cohesion)
         by_liquid = np.moveaxis(self.profiles.fractions, 1, 0)
-        between = RegularGridInterpolator(
-            (self.log_viscosity, self.cohesion), by_liquid.reshape(*nodes, rates, distances, kinds)
-        )
+        nodes = len(self.log_viscosity), len(self.cohesion)
+        axes = self.log_viscosity, self.cohesion
+        return RegularGridInterpolator(axes, by_liquid.reshape(*nodes, *by_liquid.shape[1:]))
+
+    def surface(self, liquids: Mapping[str, NDArray]) -> Surface:
+        """What all actions spill of each liquid, `viscosity` [Pa s] and `cohesion`, (draws,)."""
         at = np.column_stack([np.log(liquids["viscosity"]), liquids["cohesion"]])
-        inside = np.clip(
-            at, [axis[0] for axis in between.grid], [axis[-1] for axis in between.grid]
-        )
-        fractions = np.moveaxis(between(inside), 0, 1)
+        axes = self.log_viscosity, self.cohesion
+        inside = np.clip(at, [axis[0] for axis in axes], [axis[-1] for axis in axes])
+        fractions = np.moveaxis(self._between(inside), 0, 1)
         return surface(self.profiles._replace(fractions=fractions), self.cups)
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .files import write_whole
+from .drawing import new_figure, styled, write_figure
 from .results import write_tree
 
 if TYPE_CHECKING:
@@ -98,18 +98,13 @@ def write_results(
             f"/{name}/coverage": check.coverage.to_dataset(),
             f"/{name}/regions": check.regions,
         }
-        figure = _figure(check)
-        for suffix in ("png", "svg"):
-            path = out / f"{name}.{suffix}"
-            write_whole(path, lambda at, f=figure, s=suffix: f.savefig(at, format=s, dpi=150))
+        write_figure(_figure(check), out, name)
     tree = DataTree.from_dict(groups)
     tree.attrs["made_with"] = json.dumps(record)
     write_tree(tree, out / RESULTS)
 
 
 def _figure(check: SurrogateCheck) -> "Figure":
-    from .drawing import new_figure, styled
-
     with styled():
         figure = new_figure(9.6, 3.8)
         left, right = figure.subplots(1, 2)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..calibrator import fit_recordings
 from ..draws import pick_draws
+from ..sbc_pipelines import CameraNoise
 from ..settings import MIN_SIMULATIONS, PAPER_RULES
 from ..stirring import Stirring
 from .truths import DENSITY
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 DRAWS = 16  # of each posterior
 BATCH = 4  # simulations at the same time
-NOISE = np.radians(0.1)  # sd of the cameras
+NOISE = CameraNoise(np.radians(0.1))
 NAMES = ("viscosity", "cohesion")
 
 
@@ -55,7 +56,7 @@ class ByStirring:
 
         rng = np.random.default_rng(seed)
         clean = self.stirring.simulate(truth, np.array([seed]))[0]
-        observed = clean + rng.normal(0.0, NOISE, clean.shape)
+        observed = NOISE(clean, rng)
         with SimulationBank(":memory:") as bank:
             keep = Keep(bank, self.stirring.identity, BATCH)
 

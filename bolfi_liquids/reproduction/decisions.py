@@ -59,7 +59,7 @@ def execute(
         actions: Those of each, with angular velocities of the grid.
         grid: Its cups are poured.
         bank: Where pours are kept.
-        advance: Called after each angular velocity of a truth.
+        advance: Called after each truth.
     """
     spilled = []
     for at, chosen in enumerate(map(list, actions)):
@@ -67,8 +67,9 @@ def execute(
         seeds = np.array(fresh_seeds(int(truths.seed[at]), _PURPOSE, EXECUTIONS), np.int64)
         outcomes = Outcomes(theta, DENSITY, grid.cups, seeds)
         rates = np.unique([action["angular_velocity"] for action in chosen])
-        made = pour_all(outcomes, rates, bank, advance)
+        made = pour_all(outcomes, rates, bank, lambda steps: None)
         spilled.append(np.array([_spilled(made, action) for action in chosen]))
+        advance(1)
     return spilled
 
 

@@ -4,14 +4,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..drawing import styled
+from ..drawing import write_figure
 from ..files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from xarray import Dataset
-
-RESOLUTION = 150  # dots per inch of the PNG
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,9 +30,4 @@ class Drawn:
         """NAME.nc, NAME.png and NAME.svg; `made_with` goes into the first."""
         data = self.data.assign_attrs(made_with=made_with, says=self.says)
         write_whole(out / f"{name}.nc", lambda at: data.to_netcdf(at, engine="h5netcdf"))
-        with styled(name):
-            for kind in ("png", "svg"):
-                write_whole(
-                    out / f"{name}.{kind}",
-                    lambda at, kind=kind: self.figure.savefig(at, format=kind, dpi=RESOLUTION),
-                )
+        write_figure(self.figure, out, name)

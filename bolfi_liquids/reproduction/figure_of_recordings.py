@@ -6,15 +6,11 @@ import numpy as np
 from scipy.interpolate import LinearNDInterpolator
 
 from ..bundled import POURED, bundled_pours
-from ..cups import bundled_cups
 from ..drawing import GREY, PALETTE, new_figure, styled
-from ..pour_grid import RATES, make_grid
 from ..pouring import choose_pour
 from ..prior import default_prior
-from ..progress import progress_bar
 from .decisions import decide_unknowing
 from .figure import Drawn
-from .truths import DENSITY
 from .workshop import Workshop
 
 if TYPE_CHECKING:
@@ -55,7 +51,8 @@ def recordings(workshop: Workshop) -> Drawn:
     from xarray import Dataset
 
     scale = workshop.scale
-    unknowing = _unknowing(workshop)
+    action = decide_unknowing(workshop.grid, default_prior(), scale.seed)
+    unknowing = action["angular_velocity"], action["distance"]
     columns = [(n, s) for s in scale.surrogates for n in scale.recorded]
     shape = len(POURED), len(columns)
     spilled, plug_in, best, blind = np.empty(shape), np.empty(shape), [], []
@@ -112,12 +109,3 @@ def recordings(workshop: Workshop) -> Drawn:
         {"liquid": list(POURED), "run": labels},
     )
     return Drawn(data, figure, "\n".join(lines))
-
-
-def _unknowing(workshop: Workshop) -> tuple[float, float]:
-    """The pour that is expected to spill least over the prior."""
-    cups, prior = bundled_cups(), default_prior()
-    with progress_bar("pouring a grid of liquids", RATES, shown=workshop.progress) as advance:
-        grid = make_grid(cups, DENSITY, prior, workshop.bank, advance)
-    action = decide_unknowing(grid, prior, workshop.scale.seed)
-    return action["angular_velocity"], action["distance"]

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bundled import bundled_recording
-from ..cups import bundled_cups
-from ..pour_grid import RATES, make_grid
 from ..prior import default_prior
 from ..progress import progress_bar
+from ..stirring import stirring_of
 from ..worker_processes import processes, processors
 from .calibrations import ByPouring, ByStirring
 from .decisions import RULES, Action, decide, decide_unknowing, execute
-from .truths import DENSITY, Truths, draw_truths
+from .truths import Truths, draw_truths
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -46,24 +45,23 @@ class Tasks:
     bank: "SimulationBank"
 
 
-def spillage_study(bank: "SimulationBank", scale: "Scale", *, progress: bool = True) -> "Dataset":
+def spillage_study(
+    bank: "SimulationBank", grid: "PourGrid", scale: "Scale", *, progress: bool = True
+) -> "Dataset":
     """Spilled fractions over (learned_by, rule, truth, budget).
 
     Beside them `known`, with the liquid known, and `unknown`, without any calibration.
 
     Args:
         bank: Where all simulations and calibrations are kept.
+        grid: Of pours, by which actions are chosen, and with whose cups they are carried out.
         scale: How many of what.
         progress: Show bars on stderr.
     """
     prior = default_prior()
     truths = draw_truths(scale.repetitions, scale.seed)
-    cups = bundled_cups()
-    with progress_bar("pouring a grid of liquids", RATES, shown=progress) as advance:
-        grid = make_grid(cups, DENSITY, prior, bank, advance)
+    cups = grid.cups
     tasks = Tasks(truths, grid, bank)
-    from ..stirring import stirring_of
-
     stirring = stirring_of([bundled_recording("water")], PARTICLES)
     middle = np.sqrt(np.prod(cups.angular_velocity_range)), np.mean(cups.distance_range)
     learners = {
@@ -130,8 +128,7 @@ def _judged(
         mine = [action for _, _, truth, _, action in chosen if truth == at]
         actions.append([grid.surface(own).least("mean"), unknowing, *mine])
     with progress_bar("pouring what was chosen", len(truths.seed), shown=progress) as advance:
-        spilled = execute(truths, actions, grid, tasks.bank, lambda steps: None)
-        advance(len(truths.seed))
+        spilled = execute(truths, actions, grid, tasks.bank, advance)
     values, rates, distances = (np.full(shape, np.nan) for _ in range(3))
     for at, outcome in enumerate(spilled):
         mine = [row for row in chosen if row[2] == at]

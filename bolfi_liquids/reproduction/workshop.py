@@ -8,8 +8,13 @@ from typing import TYPE_CHECKING
 from ..bundled import bundled_recording
 from ..calibration import Calibration
 from ..calibrator import calibrate
+from ..cups import bundled_cups
+from ..pour_grid import RATES, PourGrid, make_grid
+from ..prior import default_prior
+from ..progress import progress_bar
 from .scale import Scale
 from .study import spillage_study
+from .truths import DENSITY
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -34,9 +39,15 @@ class Workshop:
     progress: bool = True
 
     @cached_property
+    def grid(self) -> PourGrid:
+        """Of pours with the bundled cups, by which actions are chosen."""
+        with progress_bar("pouring a grid of liquids", RATES, shown=self.progress) as advance:
+            return make_grid(bundled_cups(), DENSITY, default_prior(), self.bank, advance)
+
+    @cached_property
     def study(self) -> "Dataset":
         """Spillage after stirring and after pouring; see `spillage_study`."""
-        return spillage_study(self.bank, self.scale, progress=self.progress)
+        return spillage_study(self.bank, self.grid, self.scale, progress=self.progress)
 
     def calibration(self, liquid: str, budget: int, surrogate: str) -> Calibration:
         """Of a bundled recording, in a run of its own; a finished one is opened."""
