@@ -19,12 +19,13 @@ STICK_WEIGHT = ("stick_density", "stick_mass")
 _SECONDS = ("s", "sec", "second", "seconds")
 _METRES = ("m", "metre", "metres", "meter", "meters")
 _RADIANS = ("rad", "radian", "radians")
-_UNITS = {"time": _SECONDS} | dict.fromkeys(AXES, _METRES) | dict.fromkeys(PLANES, _RADIANS)
+UNITS = {"time": _SECONDS} | dict.fromkeys(AXES, _METRES) | dict.fromkeys(PLANES, _RADIANS)
+"""Spellings of each variable's unit, the one that is written first."""
 
 
 def check_fields(dataset: "Dataset", path: Path) -> None:
     """Raise `InputError` unless every field and attribute is there, in SI units."""
-    for name, units in _UNITS.items():
+    for name, units in UNITS.items():
         _check_variable(dataset, name, units, path)
     for name in LENGTHS + DENSITIES:
         if name not in dataset.attrs:
@@ -46,7 +47,7 @@ def _check_variable(dataset: "Dataset", name: str, units: tuple[str, ...], path:
         raise InputError(
             f"missing (the file holds {held})",
             where=where,
-            fix="a recording needs " + ", ".join(_UNITS),
+            fix="a recording needs " + ", ".join(UNITS),
         )
     variable = dataset[name]
     if variable.dims != ("time",):

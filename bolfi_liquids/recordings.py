@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .errors import InputError
 from .files import existing_file
 from .recording_checks import check_values
-from .recording_fields import AXES, PLANES, check_fields
+from .recording_fields import AXES, PLANES, UNITS, check_fields
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -132,6 +132,19 @@ def _read(path: Path) -> "Dataset":
         ) from err
     check_fields(dataset, path)
     return dataset
+
+
+def recording_dataset(values: Mapping[str, NDArray], attrs: Mapping[str, float | str]) -> "Dataset":
+    """The content of a recording's file; nothing is checked.
+
+    Args:
+        values: `time`, the gripper's axes and the inclinations by the names of the file, (T,).
+        attrs: The file's attributes.
+    """
+    from xarray import Dataset
+
+    samples = {name: ("time", values[name], {"units": units[0]}) for name, units in UNITS.items()}
+    return Dataset(samples, attrs=attrs).set_coords("time")
 
 
 def as_recording(dataset: "Dataset", path: Path) -> Recording:

@@ -1,12 +1,13 @@
 """Windows of a stir: its strokes in each plane, and stretches of like speed."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .recordings import Recording
+from .recordings import Gripper, Recording
 from .results import PLANE_NAMES
 
 if TYPE_CHECKING:
@@ -60,6 +61,25 @@ def strokes(recording: Recording) -> list[Stroke]:
         number[after + 1 :] = count + 1
     numbers = range(int(number.min()), int(number.max()) + 1)
     return [Stroke(k, number == k) for k in numbers if (number == k).any()]
+
+
+def until_stroke(recording: Recording, number: int) -> Recording:
+    """The recording as it would be if stirring had ended after a stroke, counted from 1.
+
+    Raises:
+        ValueError: There are fewer strokes.
+    """
+    found = {stroke.number: stroke.samples for stroke in strokes(recording)}
+    if number not in found:
+        raise ValueError(f"stroke must be one of {', '.join(map(str, found))}, got {number}")
+    end = np.flatnonzero(found[number])[-1] + 1
+    time = recording.time[:end]
+    return replace(
+        recording,
+        time=time,
+        gripper=Gripper(time, recording.gripper.position[:end]),
+        inclination=recording.inclination[:end],
+    )
 
 
 def windows(stirring: "Stirring") -> tuple["Window", ...]:

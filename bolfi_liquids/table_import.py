@@ -14,16 +14,15 @@ from .errors import InputError
 from .files import existing_file, write_text, write_whole
 from .recording_checks import check_values
 from .recording_fields import PLANES
-from .recordings import Recording, as_recording, open_recording
+from .recordings import Recording, as_recording, open_recording, recording_dataset
 from .strokes import speed
-from .table_map import ATTRIBUTE_UNITS, COLUMN_UNITS, TableMap, open_table_map
+from .table_map import ATTRIBUTE_UNITS, TableMap, open_table_map
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
 TEMPLATE = "columns.toml"
 MISSING = ("", "nan", "na", "n/a", "null", "none", "-")
-SI = {name: next(iter(units)) for name, units in (COLUMN_UNITS | ATTRIBUTE_UNITS).items()}
 
 
 def write_template(path: str | Path) -> Path:
@@ -67,8 +66,6 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
 
 
 def _dataset(table: Path, meaning: TableMap) -> "Dataset":
-    from xarray import Dataset
-
     from . import __version__
 
     cells = _cells(table, meaning)
@@ -86,11 +83,7 @@ def _dataset(table: Path, meaning: TableMap) -> "Dataset":
         "imported_sha256": hashlib.sha256(table.read_bytes()).hexdigest(),
         "imported_with": f"bolfi-liquids {__version__}: {meaning.model_dump_json()}",
     }
-    return Dataset(
-        {name: ("time", y, {"units": SI[name]}) for name, y in values.items() if name != "time"},
-        coords={"time": ("time", values["time"], {"units": "s"})},
-        attrs=attributes | made,
-    )
+    return recording_dataset(values, attributes | made)
 
 
 def _cells(table: Path, meaning: TableMap) -> dict[str, NDArray[np.float64]]:

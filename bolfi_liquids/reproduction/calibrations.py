@@ -139,6 +139,9 @@ class ByPouring:
         return json.dumps(["pour", action, self.budgets, self.cups.settings()], sort_keys=True)
 
 
+Learner = ByStirring | ByPouring
+
+
 def concluded(fit: "Fit", seed: int) -> NDArray[np.float64]:
     """theta* and draws, shape (1 + DRAWS, 2)."""
     with warnings.catch_warnings():

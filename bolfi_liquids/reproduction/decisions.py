@@ -1,18 +1,19 @@
 """Pours chosen from conclusions, and what they spill when they are carried out."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..kept import fresh_seeds
-from ..spillage import STEP, Outcomes, pour_all
+from ..spillage import STEP, Outcomes, Profiles, pour_all
 from .calibrations import NAMES
 from .truths import DENSITY, Truths
 
 if TYPE_CHECKING:
     from ..inference import Prior, SimulationBank
+    from ..models import Cups
     from ..pour_grid import PourGrid
     from ..progress import Advance
 
@@ -62,18 +63,38 @@ def execute(
         advance: Called after each truth.
     """
     spilled = []
-    for at, chosen in enumerate(map(list, actions)):
-        theta = {name: np.full(EXECUTIONS, values[at]) for name, values in truths.theta.items()}
-        seeds = np.array(fresh_seeds(int(truths.seed[at]), _PURPOSE, EXECUTIONS), np.int64)
-        outcomes = Outcomes(theta, DENSITY, grid.cups, seeds)
-        rates = np.unique([action["angular_velocity"] for action in chosen])
-        made = pour_all(outcomes, rates, bank, lambda steps: None)
-        spilled.append(np.array([_spilled(made, action) for action in chosen]))
+    for at, chosen in enumerate(actions):
+        theta = {name: float(values[at]) for name, values in truths.theta.items()}
+        outcomes = executions(theta, DENSITY, grid.cups, int(truths.seed[at]))
+        spilled.append(spilled_by(outcomes, list(chosen), bank))
         advance(1)
     return spilled
 
 
-def _spilled(made, action: Action) -> float:
+def executions(theta: Mapping[str, float], density: float, cups: "Cups", seed: int) -> Outcomes:
+    """Pours of one liquid, with seeds that nothing else uses.
+
+    Args:
+        theta: Its parameters, and coefficients of effects.
+        density: [kg/m3].
+        cups: From and into which is poured.
+        seed: Of the truth.
+    """
+    seeds = np.array(fresh_seeds(seed, _PURPOSE, EXECUTIONS), np.int64)
+    tiled = {name: np.full(EXECUTIONS, value) for name, value in theta.items()}
+    return Outcomes(tiled, density, cups, seeds)
+
+
+def spilled_by(
+    outcomes: Outcomes, actions: Sequence[Action], bank: "SimulationBank"
+) -> NDArray[np.float64]:
+    """Spilled fraction of each action, the mean over the outcomes' seeds."""
+    rates = np.unique([action["angular_velocity"] for action in actions])
+    made = pour_all(outcomes, rates, bank, lambda steps: None)
+    return np.array([_spilled(made, action) for action in actions])
+
+
+def _spilled(made: Profiles, action: Action) -> float:
     row = np.flatnonzero(np.isclose(made.angular_velocity, action["angular_velocity"]))
     column = int(np.argmin(np.abs(made.distance - action["distance"])))
     if len(row) == 0 or abs(made.distance[column] - action["distance"]) > STEP:

@@ -10,8 +10,10 @@ from ..errors import InputError
 from ..provenance import LIBRARIES, versions
 from ..run_directory import open_bank
 from .figure import Drawn
+from .figure_of_adhesion import adhesion
 from .figure_of_geometry import geometry
 from .figure_of_recordings import recordings
+from .figure_of_strokes import strokes
 from .figures_of_fits import inclination, posterior
 from .figures_of_spillage import decision, liquids, spillage, surrogates
 from .scale import FULL, QUICK
@@ -26,6 +28,8 @@ FIGURES: dict[str, Callable[[Workshop], Drawn]] = {
     "liquids": liquids,
     "decision": decision,
     "surrogates": surrogates,
+    "strokes": strokes,
+    "adhesion": adhesion,
 }
 """By name, in the order in which they are made."""
 

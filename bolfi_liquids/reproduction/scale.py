@@ -11,6 +11,9 @@ class Scale:
         repetitions: Truths of each liquid.
         budgets: Simulations to learn from, ascending.
         recorded: Simulations for each recording of the other solver.
+        strokes: Of the star, after which is calibrated.
+        few: Simulations with which is calibrated after some strokes.
+        sticky: Repetitions of the liquid that sticks to its cup.
         surrogates: That learn from these.
         lips: Heights of the lip that are compared.
         seed: Of everything random.
@@ -19,6 +22,9 @@ class Scale:
     repetitions: int = 5
     budgets: tuple[int, ...] = (5, 10, 20, 40, 60)
     recorded: tuple[int, ...] = (10, 20)
+    strokes: tuple[int, ...] = (1, 2, 3, 5, 10)
+    few: int = 10
+    sticky: int = 5
     surrogates: tuple[str, ...] = ("discrepancy", "signal")
     lips: tuple[float, ...] = (0.10, 0.14, 0.20, 0.26)
     seed: int = 0
@@ -29,6 +35,8 @@ QUICK = Scale(
     repetitions=2,
     budgets=(5, 10, 20),
     recorded=(10,),
+    strokes=(1, 3, 10),
+    sticky=1,
     surrogates=("discrepancy",),
     lips=(0.14, 0.20),
 )

@@ -1,6 +1,6 @@
-"""Spillage after calibrating by stirring and by pouring, on truths that are known."""
+"""Spillage after calibrating in several ways, on truths that are known."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -8,31 +8,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bundled import bundled_recording
 from ..prior import default_prior
 from ..progress import progress_bar
-from ..stirring import stirring_of
 from ..worker_processes import processes, processors
-from .calibrations import ByPouring, ByStirring
+from .calibrations import Learner
 from .decisions import RULES, Action, decide, decide_unknowing, execute
 from .truths import Truths, draw_truths
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
-    from ..inference import Prior, SimulationBank
+    from ..inference import SimulationBank
     from ..pour_grid import PourGrid
     from .scale import Scale
-
-METHODS = ("signal", "discrepancy", "pour")
-"""Stirring with either surrogate, and pouring as the paper's reference does."""
-
-PARTICLES = 1000
 
 
 @dataclass(frozen=True, eq=False)
 class Tasks:
-    """What all methods share.
+    """What all learners share.
 
     Attributes:
         truths: The liquids.
@@ -46,39 +39,37 @@ class Tasks:
 
 
 def spillage_study(
-    bank: "SimulationBank", grid: "PourGrid", scale: "Scale", *, progress: bool = True
+    learners: Mapping[str, Learner],
+    bank: "SimulationBank",
+    grid: "PourGrid",
+    scale: "Scale",
+    *,
+    progress: bool = True,
 ) -> "Dataset":
     """Spilled fractions over (learned_by, rule, truth, budget).
 
     Beside them `known`, with the liquid known, and `unknown`, without any calibration.
 
     Args:
+        learners: By name, with the same budgets.
         bank: Where all simulations and calibrations are kept.
         grid: Of pours, by which actions are chosen, and with whose cups they are carried out.
         scale: How many of what.
         progress: Show bars on stderr.
     """
-    prior = default_prior()
-    truths = draw_truths(scale.repetitions, scale.seed)
-    cups = grid.cups
-    tasks = Tasks(truths, grid, bank)
-    stirring = stirring_of([bundled_recording("water")], PARTICLES)
-    middle = np.sqrt(np.prod(cups.angular_velocity_range)), np.mean(cups.distance_range)
-    learners = {
-        "signal": ByStirring(stirring, prior, "signal", scale.budgets),
-        "discrepancy": ByStirring(stirring, prior, "discrepancy", scale.budgets),
-        "pour": ByPouring(cups, prior, float(middle[0]), float(middle[1]), scale.budgets),
-    }
+    tasks = Tasks(draw_truths(scale.repetitions, scale.seed), grid, bank)
+    unknowing = decide_unknowing(grid, default_prior(), scale.seed)
     with processes() as pool:
         concluded = {
             name: conclusions(learner, name, tasks, pool, progress=progress)
             for name, learner in learners.items()
         }
-    return _judged(tasks, prior, concluded, scale, progress)
+    (budgets,) = {learner.budgets for learner in learners.values()}
+    return _judged(tasks, unknowing, concluded, budgets, progress)
 
 
 def conclusions(
-    learner: ByStirring | ByPouring,
+    learner: Learner,
     name: str,
     tasks: Tasks,
     pool: Executor | None,
@@ -104,24 +95,23 @@ def conclusions(
 
 def _judged(
     tasks: Tasks,
-    prior: "Prior",
-    concluded: dict[str, list[NDArray | None]],
-    scale: "Scale",
+    unknowing: Action,
+    concluded: Mapping[str, list[NDArray | None]],
+    budgets: tuple[int, ...],
     progress: bool,
 ) -> "Dataset":
     from xarray import Dataset
 
     truths, grid = tasks.truths, tasks.grid
-    shape = len(METHODS), len(RULES), len(truths.seed), len(scale.budgets)
+    shape = len(concluded), len(RULES), len(truths.seed), len(budgets)
     chosen = [
-        (method, rule, at, n, action)
-        for method, name in enumerate(METHODS)
-        for at, found in enumerate(concluded[name])
+        (learner, rule, at, n, action)
+        for learner, made in enumerate(concluded.values())
+        for at, found in enumerate(made)
         if found is not None
-        for n in range(len(scale.budgets))
+        for n in range(len(budgets))
         for rule, action in enumerate(decide(found[n], grid).values())
     ]
-    unknowing = decide_unknowing(grid, prior, scale.seed)
     actions: list[list[Action]] = []
     for at in range(len(truths.seed)):
         own = {name: values[at : at + 1] for name, values in truths.theta.items()}
@@ -132,12 +122,12 @@ def _judged(
     values, rates, distances = (np.full(shape, np.nan) for _ in range(3))
     for at, outcome in enumerate(spilled):
         mine = [row for row in chosen if row[2] == at]
-        for (method, rule, _, n, action), fraction in zip(mine, outcome[2:], strict=True):
-            values[method, rule, at, n] = fraction
-            rates[method, rule, at, n] = action["angular_velocity"]
-            distances[method, rule, at, n] = action["distance"]
+        for (learner, rule, _, n, action), fraction in zip(mine, outcome[2:], strict=True):
+            values[learner, rule, at, n] = fraction
+            rates[learner, rule, at, n] = action["angular_velocity"]
+            distances[learner, rule, at, n] = action["distance"]
     dims = ("learned_by", "rule", "truth", "budget")
-    learned = np.stack([_stacked(concluded[name], shape[3]) for name in METHODS])
+    learned = np.stack([_stacked(made, len(budgets)) for made in concluded.values()])
     return Dataset(
         {
             "spilled": (dims, values),
@@ -148,9 +138,9 @@ def _judged(
             "concluded": (("learned_by", "truth", "budget", "draw", "parameter"), learned),
         },
         coords={
-            "learned_by": list(METHODS),
+            "learned_by": list(concluded),
             "rule": list(RULES),
-            "budget": list(scale.budgets),
+            "budget": list(budgets),
             "liquid": ("truth", truths.liquid.astype(str)),
             "repetition": ("truth", truths.repetition),
             "viscosity": ("truth", truths.viscosity, {"units": "Pa s"}),

@@ -12,6 +12,7 @@ from ..cups import bundled_cups
 from ..pour_grid import RATES, PourGrid, make_grid
 from ..prior import default_prior
 from ..progress import progress_bar
+from .learners import after_strokes, by_stirring_and_pouring
 from .scale import Scale
 from .study import spillage_study
 from .truths import DENSITY
@@ -47,7 +48,14 @@ class Workshop:
     @cached_property
     def study(self) -> "Dataset":
         """Spillage after stirring and after pouring; see `spillage_study`."""
-        return spillage_study(self.bank, self.grid, self.scale, progress=self.progress)
+        learners = by_stirring_and_pouring(self.grid.cups, self.scale)
+        return spillage_study(learners, self.bank, self.grid, self.scale, progress=self.progress)
+
+    @cached_property
+    def strokes(self) -> "Dataset":
+        """The same after stirring for some strokes only."""
+        learners = after_strokes(self.scale)
+        return spillage_study(learners, self.bank, self.grid, self.scale, progress=self.progress)
 
     def calibration(self, liquid: str, budget: int, surrogate: str) -> Calibration:
         """Of a bundled recording, in a run of its own; a finished one is opened."""

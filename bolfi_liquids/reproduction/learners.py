@@ -1,0 +1,43 @@
+"""Who learns the liquids of a study, and from what."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..bundled import bundled_recording
+from ..prior import default_prior
+from ..recordings import Recording
+from ..stirring import Stirring, stirring_of
+from ..strokes import until_stroke
+from .calibrations import ByPouring, ByStirring, Learner
+from .scale import Scale
+
+if TYPE_CHECKING:
+    from ..models import Cups
+
+PARTICLES = 1000
+
+
+def by_stirring_and_pouring(cups: "Cups", scale: Scale) -> dict[str, Learner]:
+    """Stirring with either surrogate, and pouring as the paper's reference does."""
+    prior, stirring = default_prior(), _star(bundled_recording("water"))
+    rate = np.sqrt(np.prod(cups.angular_velocity_range))
+    training = float(rate), float(np.mean(cups.distance_range))
+    return {
+        "signal": ByStirring(stirring, prior, "signal", scale.budgets),
+        "discrepancy": ByStirring(stirring, prior, "discrepancy", scale.budgets),
+        "pour": ByPouring(cups, prior, *training, scale.budgets),
+    }
+
+
+def after_strokes(scale: Scale) -> dict[str, Learner]:
+    """Stirring that ends after each number of strokes."""
+    prior, whole = default_prior(), bundled_recording("water")
+    return {
+        str(number): ByStirring(_star(until_stroke(whole, number)), prior, "signal", (scale.few,))
+        for number in scale.strokes
+    }
+
+
+def _star(recording: Recording) -> Stirring:
+    return stirring_of([recording], PARTICLES)

@@ -1,0 +1,113 @@
+"""A liquid that sticks to its cup, of which stirring shows nothing: the paper's failure."""
+
+import csv
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bundled import bundled_recording
+from ..files import write_whole
+from ..kept import fresh_seeds
+from ..recording_fields import AXES, PLANES
+from ..recordings import Recording, open_recording, recording_dataset
+from .calibrations import NOISE
+from .truths import LIQUIDS, SPREAD
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+    from ..models import Cups
+
+LIKE = "glycerin"
+ADHESION = 0.6, 0.9  # of the truths
+TRAINING = [(w, d) for w in (40.0, 70.0, 110.0) for d in (0.5, 1.5, 2.5, 4.0)]
+"""Pours that are seen after the stirring: deg/s, cm."""
+
+PARTICLES = 1000
+_STIRRED, _POURED = 61, 62  # purposes of seeds
+_COLUMNS = ("angular_velocity_deg_s", "distance_cm", "spilled", "received", "retained")
+
+
+class Sticky(NamedTuple):
+    """A drawn truth.
+
+    Attributes:
+        theta: `viscosity` [Pa s], `cohesion` and `adhesion`.
+        seed: Of what is made of it.
+    """
+
+    theta: Mapping[str, float]
+    seed: int
+
+    @property
+    def liquid(self) -> dict[str, float]:
+        """Without what sticks."""
+        return {name: value for name, value in self.theta.items() if name != "adhesion"}
+
+
+def draw_sticky(repetition: int, seed: int) -> Sticky:
+    """The same whatever the number of repetitions."""
+    rng = np.random.default_rng([seed, 71, repetition])
+    viscosity = LIQUIDS[LIKE] * np.exp(SPREAD * rng.standard_normal())
+    theta = {
+        "viscosity": float(viscosity),
+        "cohesion": float(rng.uniform()),
+        "adhesion": float(rng.uniform(*ADHESION)),
+    }
+    return Sticky(theta, int(rng.integers(2**31)))
+
+
+def stirred(truth: Sticky, path: Path) -> Recording:
+    """A recording of it, written to `path` unless it is there."""
+    if not path.exists():
+        dataset = _dataset(bundled_recording(LIKE), truth)
+        write_whole(path, lambda at: dataset.to_netcdf(at, engine="h5netcdf"))
+    return open_recording(path)
+
+
+def poured(truth: Sticky, density: float, cups: "Cups", path: Path) -> Path:
+    """A table of the pours `TRAINING` of it, each made once, written to `path` unless it is
+    there."""
+    if not path.exists():
+        rows = [_COLUMNS, *_pours(truth, density, cups)]
+        write_whole(path, lambda at: _write_rows(at, rows))
+    return path
+
+
+def _dataset(like: Recording, truth: Sticky) -> "Dataset":
+    from .. import models
+
+    setup = models.StirSetup.from_recording(like, particles=PARTICLES)
+    liquid = models.Liquid(**truth.liquid, density=like.number("liquid_density"))
+    effects = {"adhesion": truth.theta["adhesion"]}
+    own = fresh_seeds(truth.seed, _STIRRED, 1)
+    clean = models.stir(liquid, like.gripper, setup, own, effects)[0]
+    noisy = NOISE(clean, np.random.default_rng(truth.seed))
+    columns = np.concatenate([like.time[:, None], like.gripper.position, noisy], axis=1).T
+    values = dict(zip(("time", *AXES, *PLANES), columns, strict=True))
+    attrs = {**like.attrs, "source": "simulated truth that sticks to its cup"}
+    return recording_dataset(values, attrs)
+
+
+def _pours(truth: Sticky, density: float, cups: "Cups") -> NDArray[np.float64]:
+    """Rows of the table."""
+    from .. import models
+
+    rate, distance = np.array(TRAINING).T
+    own = fresh_seeds(truth.seed, _POURED, len(TRAINING))
+    made = models.pour(
+        models.Liquid(**truth.liquid, density=density),
+        models.PourAction(np.radians(rate), distance / 100.0),
+        cups,
+        own,
+        effects={"adhesion": truth.theta["adhesion"]},
+    )
+    return np.column_stack([rate, distance, made.spilled, made.received, made.retained])
+
+
+def _write_rows(path: Path, rows: list) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows(rows)
