@@ -4,6 +4,7 @@ from .cups import Cups
 from .effect import Effect
 from .effects import EFFECTS, register
 from .faults import FailedSimulation
+from .frames import PourFrames, StirFrames, pour_frames, stir_frames
 from .liquid import Liquid
 from .numerics import MODEL_VERSION, PUBLISHED_DRAG, Numerics
 from .pouring import Landings, PourAction, PourResult, landings, pour
@@ -23,12 +24,16 @@ __all__ = [
     "Liquid",
     "Numerics",
     "PourAction",
+    "PourFrames",
     "PourResult",
     "Rig",
     "Stick",
+    "StirFrames",
     "StirSetup",
     "landings",
     "pour",
+    "pour_frames",
     "register",
     "stir",
+    "stir_frames",
 ]

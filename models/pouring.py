@@ -20,7 +20,7 @@ from .faults import faulty
 from .liquid import Liquid
 from .numerics import POUR_PARTICLES, Numerics
 from .packing import checked_seeds, pack_cylinder
-from .runtime import CHUNK
+from .runtime import Watch
 from .settled import Packing, SettledPackings
 
 SETTLING = 0.6  # s
@@ -131,6 +131,19 @@ def landings(
     `Landings.into` makes of them what `pour` would have returned, the receiver's distance and
     radius in `cups` aside.
     """
+    return watched_landings(liquid, angular_velocity, cups, seeds, particles, effects)
+
+
+def watched_landings(  # noqa: PLR0913  `landings` with one more
+    liquid: Liquid,
+    angular_velocity: ArrayLike,
+    cups: Cups,
+    seeds: ArrayLike,
+    particles: int,
+    effects: Mapping[str, ArrayLike] | None,
+    watch: Watch | None = None,
+) -> Landings:
+    """What `landings` returns, while `watch` looks at each of its scenes."""
     seeds = checked_seeds(seeds)
     acting = acting_in("pour", with_adhesion(liquid, effects, len(seeds)), len(seeds))
     liquid = liquid.batch(len(seeds))
@@ -152,7 +165,9 @@ def landings(
             for low in range(0, len(rows), scene.slots):
                 part = rows[low : low + scene.slots]
                 held = liquid[part], coefficients[:, part]
-                position[part], retained[part] = _run(scene, cups, held, rate[part], seeds[part])
+                position[part], retained[part] = _run(
+                    scene, cups, held, rate[part], seeds[part], watch=watch
+                )
     return Landings(position, retained)
 
 
@@ -174,7 +189,9 @@ def _scene(cups: Cups, particles: int, effects: tuple[Effect, ...] = ()):
     )
 
 
-def _run(scene, cups, held, rate, seeds) -> tuple[np.ndarray, np.ndarray]:
+def _run(
+    scene, cups, held, rate, seeds, *, watch: Watch | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Position and retained fraction as in `Landings`.
 
     `held` are the liquid and the coefficients [effects, B] of the scene's effects.
@@ -199,8 +216,7 @@ def _run(scene, cups, held, rate, seeds) -> tuple[np.ndarray, np.ndarray]:
     scene.pour_in(*held)
     hold = cups.pour.hold + DRIP
     steps = int((cups.pour.final_angle / rate.min() + hold) * scene.rate)
-    for start in range(0, steps, CHUNK):
-        scene.pour(size, start, min(start + CHUNK, steps), hold)
+    runtime.run_chunks(scene, steps, lambda start, stop: scene.pour(size, start, stop, hold), watch)
     scene.count(size)
     position = scene.landing.to_numpy()[:size]
     landed = scene.landed.to_numpy()[:size]

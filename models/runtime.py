@@ -4,13 +4,46 @@ import contextlib
 import io
 import os
 import threading
+from collections.abc import Callable
 from functools import cache
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
 
 SLOTS = max(8, os.cpu_count() or 1)  # simulations of a scene side by side
 CHUNK = 240  # substeps a kernel call, so that Ctrl-C is prompt
 
 LOCK = threading.Lock()
 """Held while a scene runs: Taichi's runtime and a scene's fields serve one thread at a time."""
+
+
+class Watch(NamedTuple):
+    """What looks on while a scene runs; it changes nothing in it.
+
+    Attributes:
+        rate: Looks per second of the simulation, besides those at its start and at its end.
+        look: (scene, substeps done); called between two kernel calls.
+    """
+
+    rate: float
+    look: Callable[[Any, int], None]
+
+
+def run_chunks(scene, steps: int, run: Callable[[int, int], None], watch: Watch | None) -> None:
+    """Call `run(start, stop)` until `steps` substeps of a scene are done.
+
+    Where one call ends and the next begins changes no bit, so neither does a watch.
+    """
+    looks = set[int]()
+    if watch is not None:
+        every = max(scene.rate / watch.rate, 1.0)
+        looks = {steps, *(int(step) for step in np.rint(np.arange(0.0, steps, every)))}
+        watch.look(scene, 0)
+    for begin, end in pairwise(sorted({0, *range(0, steps, CHUNK), *looks, steps})):
+        run(begin, end)
+        if watch is not None and end in looks:
+            watch.look(scene, end)
 
 
 @cache

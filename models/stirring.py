@@ -15,7 +15,7 @@ from .gripper_path import GripperPath, substep_path
 from .liquid import Liquid
 from .packing import checked_seeds, pack_cylinder
 from .rig import Rig, check_rig
-from .runtime import CHUNK
+from .runtime import Watch
 from .settled import Packing, SettledPackings
 from .stir_setup import StirSetup
 
@@ -51,6 +51,18 @@ def stir(
     Warns:
         FailedSimulation: a simulation went wrong; its angles are NaN.
     """
+    return watched_stir(liquid, gripper, setup, seeds, effects)
+
+
+def watched_stir(  # noqa: PLR0913  `stir` with one more
+    liquid: Liquid,
+    gripper: GripperPath,
+    setup: StirSetup,
+    seeds: ArrayLike,
+    effects: Mapping[str, ArrayLike] | None,
+    watch: Watch | None = None,
+) -> np.ndarray:
+    """What `stir` returns, while `watch` looks at each of its scenes."""
     seeds = checked_seeds(seeds)
     size = len(seeds)
     acting = acting_in("stir", with_adhesion(liquid, effects, size), size)
@@ -69,7 +81,7 @@ def stir(
         for kinds, rows, coefficients in liquid_sets(acting, size):
             for scene, part in _parts(setup, rig.fill, rows, kinds):
                 held = liquid[part], coefficients[:, part]
-                directions = _run(scene, setup, held, rig.rows(part), seeds[part])
+                directions = _run(scene, setup, held, rig.rows(part), seeds[part], watch=watch)
                 angles[part] = inclination(directions, gripper.time, setup.rate)
     return changed_signal(gripper.time, angles, acting)
 
@@ -128,7 +140,7 @@ def _roomy_scene(setup: StirSetup, effects: tuple[Effect, ...] = ()):
     return StirringScene(runtime.SLOTS, setup, int(setup.count(setup.deepest)), effects)
 
 
-def _run(scene, setup, held, rig, seeds) -> np.ndarray:
+def _run(scene, setup, held, rig, seeds, *, watch: Watch | None = None) -> np.ndarray:
     """Directions of the sticks, shape [B, substeps + 1, 3]; NaN where a trial diverged.
 
     `held` are the liquid and the coefficients [effects, B] of the scene's effects.
@@ -156,9 +168,12 @@ def _run(scene, setup, held, rig, seeds) -> np.ndarray:
     path = rig.path[:, 1:].astype(np.float32, order="C")
     steps = path.shape[1]
     directions = np.empty((size, steps, 3), np.float32)
-    for start in range(0, steps, CHUNK):
-        stop = min(start + CHUNK, steps)
-        scene.stir(size, start, stop, path, directions, 1.0)
+    runtime.run_chunks(
+        scene,
+        steps,
+        lambda start, stop: scene.stir(size, start, stop, path, directions, 1.0),
+        watch,
+    )
     directions[faulty(scene.fault.to_numpy()[:size], seeds)] = np.nan
     down = np.broadcast_to(np.array([0.0, 0.0, -1.0], np.float32), (size, 1, 3))
     return np.concatenate([down, directions], axis=1).astype(np.float64)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from bolfi_liquids.models import faults, pouring, stirring
+from bolfi_liquids.models import faults, pouring, runtime, stirring
 from jax import random
 
 from bolfi_liquids import models
@@ -116,9 +116,9 @@ def ends(monkeypatch):
     seen = {}
 
     def noting(run):
-        def noted(scene, *given):
+        def noted(scene, *given, **options):
             watched, seeds = Watched(scene), given[-1]
-            result = run(watched, *given)
+            result = run(watched, *given, **options)
             seen.update({int(seed): watched.end(slot) for slot, seed in enumerate(seeds)})
             return result
 
@@ -126,7 +126,7 @@ def ends(monkeypatch):
 
     for module in (stirring, pouring):
         monkeypatch.setattr(module, "_run", noting(module._run))
-        monkeypatch.setattr(module, "CHUNK", LOOK)
+    monkeypatch.setattr(runtime, "CHUNK", LOOK)
     return seen
 
 

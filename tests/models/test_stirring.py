@@ -2,7 +2,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bolfi_liquids.models import gripper_path, stirring
+from bolfi_liquids.models import gripper_path, runtime, stirring
 from scipy.integrate import solve_ivp
 
 from bolfi_liquids import models
@@ -112,7 +112,7 @@ def test_a_submerged_stick_is_buoyed_as_archimedes_says(glycerin, numerics, tole
 @pytest.mark.parametrize("speed", [0.1, 0.8])
 def test_no_particle_is_ever_outside_the_cup(water, speed, monkeypatch):
     """Looked at after every other substep of the first strokes, also of a violent stir."""
-    monkeypatch.setattr(stirring, "CHUNK", 2)
+    monkeypatch.setattr(runtime, "CHUNK", 2)
     x = 0.03 * np.sin(2.0 * np.pi * speed / 0.12 * np.arange(0.0, 1.5, 1 / 30))
     position = np.column_stack([x, 0.0 * x, np.full(len(x), water.gripper.position[0, 2])])
     path = SimpleNamespace(time=np.arange(len(x)) / 30, position=position)

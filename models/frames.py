@@ -1,0 +1,148 @@
+"""Where the particles are while they are stirred or poured: for pictures, and for measuring."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .checks import check_numbers
+from .cups import Cups
+from .gripper_path import GripperPath
+from .liquid import Liquid
+from .numerics import POUR_PARTICLES
+from .pouring import watched_landings
+from .runtime import Watch
+from .stir_setup import StirSetup
+from .stirring import watched_stir
+
+RATE = 25.0  # frames/s
+
+
+@dataclass(frozen=True)
+class StirFrames:
+    """One stir; the cup's frame has its origin on the axis at floor level, z up.
+
+    Attributes:
+        time: Of each frame on the gripper's clock [s], shape [F].
+        position: Of the particles [m], float32 of shape [F, n, 3].
+        pivot: Where the gripper holds the stick [m], shape [F, 3].
+        tip: Lower end of the stick's axis [m], shape [F, 3].
+    """
+
+    time: np.ndarray
+    position: np.ndarray
+    pivot: np.ndarray
+    tip: np.ndarray
+
+
+@dataclass(frozen=True)
+class PourFrames:
+    """One pour; the world's frame has its origin at the lip, x towards the receiver, z up.
+
+    Attributes:
+        time: Of each frame since the source began to turn [s], shape [F].
+        position: Of the particles [m], float32 of shape [F, n, 3]; NaN for what has passed the
+            receiver's rim. A row is not the same particle in every frame.
+        angle: By which the source has turned [rad], shape [F].
+    """
+
+    time: np.ndarray
+    position: np.ndarray
+    angle: np.ndarray
+
+
+Frames = TypeVar("Frames", StirFrames, PourFrames)
+
+
+def stir_frames(  # noqa: PLR0913  as of `stir`
+    liquid: Liquid,
+    gripper: GripperPath,
+    setup: StirSetup,
+    seed: int,
+    *,
+    rate: float = RATE,
+    effects: Mapping[str, ArrayLike] | None = None,
+) -> StirFrames:
+    """Frames of the very simulation that `stir` makes of one liquid and seed.
+
+    They show what is there, so effects in the sensor change nothing.
+
+    Args:
+        liquid: One liquid.
+        gripper, setup, effects: As for `stir`.
+        seed: Decides the initial packing.
+        rate: Frames per second, each at the nearest substep; the last is the end of the path.
+
+    Raises:
+        ValueError: as `stir`, or the rate is not positive.
+    Warns:
+        FailedSimulation: the simulation went wrong; positions and tips are NaN.
+    """
+    check_numbers("frames", rate=rate)
+    start, seen = float(np.asarray(gripper.time)[0]), list[StirFrames]()
+
+    def look(scene: Any, step: int) -> None:
+        pivot = scene.pivot.to_numpy()[0].astype(np.float64)
+        tip = pivot + setup.stick.length * scene.direction.to_numpy()[0].astype(np.float64)
+        time = start + step / scene.rate
+        position = scene.position.to_numpy()[0, : scene.alive.to_numpy()[0]]
+        seen.append(StirFrames(np.array(time), position, pivot, tip))
+
+    angles = watched_stir(liquid, gripper, setup, [seed], effects, Watch(rate, look))
+    frames = _joined(seen)
+    if np.isnan(angles).any():
+        frames.position[:], frames.tip[:] = np.nan, np.nan
+    return frames
+
+
+def pour_frames(  # noqa: PLR0913  as of `landings`
+    liquid: Liquid,
+    angular_velocity: float,
+    cups: Cups,
+    seed: int,
+    *,
+    rate: float = RATE,
+    particles: int = POUR_PARTICLES,
+    effects: Mapping[str, ArrayLike] | None = None,
+) -> PourFrames:
+    """Frames of the very simulation that `landings` makes of one liquid and seed.
+
+    The first rows of `Landings.position` are what has landed by any frame, as many as are NaN in
+    it: there they stand in the order of their landing.
+
+    Args:
+        liquid: One liquid.
+        angular_velocity: Of the source [rad/s].
+        cups, particles, effects: As for `landings`.
+        seed: Decides the initial packing.
+        rate: Frames per second, each at the nearest substep; the last is the end of the pour.
+
+    Raises:
+        ValueError: as `landings`, or the rate is not positive.
+    Warns:
+        FailedSimulation: the simulation went wrong; positions are NaN.
+    """
+    check_numbers("frames", rate=rate)
+    seen = list[PourFrames]()
+
+    def look(scene: Any, step: int) -> None:
+        position = scene.position.to_numpy()[0]
+        position[scene.alive.to_numpy()[0] :] = np.nan
+        seen.append(PourFrames(np.array(step / scene.rate), position, scene.angle.to_numpy()[0]))
+
+    watch = Watch(rate, look)
+    landed = watched_landings(liquid, angular_velocity, cups, [seed], particles, effects, watch)
+    frames = _joined(seen)
+    if np.isnan(landed.retained).any():
+        frames.position[:] = np.nan
+    return frames
+
+
+def _joined(seen: list[Frames]) -> Frames:
+    """Single frames as one series."""
+    kind = type(seen[0])
+    return kind(
+        **{f.name: np.stack([getattr(frame, f.name) for frame in seen]) for f in fields(kind)}
+    )
