@@ -1,14 +1,19 @@
-"""Figures of a calibration: the fit in time, and the discrepancy by iteration."""
+"""Figures of a calibration: the fit in time and by stroke."""
 
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .drawing import BLUE, GREY, INK, LIGHT, ORANGE, new_figure, plain_log_ticks, styled, to_svg
+from .drawing import BLUE, INK, LIGHT, ORANGE, new_figure, styled
+from .readouts import Readout, series, to_chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from xarray import Dataset, DataTree
+
+BAND = 0.9  # of the posterior predictions
+PLANE_COLOURS = (BLUE, ORANGE)
 
 
 def inclination_figure(tree: "DataTree") -> str:
@@ -18,6 +23,7 @@ def inclination_figure(tree: "DataTree") -> str:
     """
     recorded = tree["recorded"].to_dataset()
     members = np.unique(recorded["recording"])
+    readouts = []
     with styled():
         figure = new_figure(8.6, 2.6 * len(members) + 0.4)
         grid = figure.subplots(len(members), 2, sharex="row", sharey=True, squeeze=False)
@@ -28,23 +34,26 @@ def inclination_figure(tree: "DataTree") -> str:
                     name: tree[name].to_dataset().sel(plane=plane).isel(frame=frames)
                     for name in ("recorded", "closest", "posterior_predictive")
                 }
-                _draw_inclination(axes, part)
+                readout = _draw_inclination(axes, part)
+                readout.content.update(plane=str(plane), recording=int(member))
+                readouts.append(readout)
                 axes.set_title(f"{plane} plane", loc="left")
             row[0].set_ylabel("inclination [deg]")
         for axes in grid[-1]:
             axes.set_xlabel("time [s]")
         figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
-        return to_svg(figure, "inclination")
+        return to_chart(figure, "inclination", readouts)
 
 
-def _draw_inclination(axes: "Axes", part: dict[str, "Dataset"]) -> None:
+def _draw_inclination(axes: "Axes", part: dict[str, "Dataset"]) -> Readout:
     time = part["recorded"]["time"].to_numpy()
     degrees = {name: np.degrees(data["inclination"].to_numpy()) for name, data in part.items()}
     predicted = degrees["posterior_predictive"].reshape(-1, len(time))
+    low, high = predicted.min(axis=0), predicted.max(axis=0)
     axes.fill_between(
         time,
-        predicted.min(axis=0),
-        predicted.max(axis=0),
+        low,
+        high,
         color=BLUE,
         alpha=0.25,
         linewidth=0,
@@ -53,36 +62,60 @@ def _draw_inclination(axes: "Axes", part: dict[str, "Dataset"]) -> None:
     axes.plot(time, degrees["closest"], color=ORANGE, linewidth=1.1, label="closest hypothesis")
     axes.plot(time, degrees["recorded"], color=INK, linewidth=0.9, label="recorded")
     axes.axhline(0.0, color=LIGHT, linewidth=0.8, zorder=0)
+    lines = {
+        "recorded": degrees["recorded"],
+        "closest": degrees["closest"],
+        "predicted, least": low,
+        "predicted, most": high,
+    }
+    return series(axes, time, lines)
 
 
-def discrepancy_figure(tree: "DataTree") -> str:
-    """Discrepancy of each simulation in turn, and the least so far; start design hollow."""
-    from matplotlib.ticker import MaxNLocator
-
-    discrepancy = np.degrees(np.degrees(tree["simulations"]["discrepancy"].to_numpy()))
-    iteration = np.arange(1, len(discrepancy) + 1)
-    start = iteration <= int(tree.attrs["initial"])
+def stroke_figure(tree: "DataTree") -> str:
+    """RMS of recorded less predicted inclination by stroke and plane, a row for each recording;
+    beside it what two predictions differ by. Empty if the strokes are not known."""
+    recorded = tree["recorded"].to_dataset()
+    if "stroke" not in recorded:  # of a run that was made before they were kept
+        return ""
+    members = np.unique(recorded["recording"])
+    readouts = []
     with styled():
-        figure = new_figure(6.4, 2.8)
-        axes = figure.subplots()
-        least = np.fmin.accumulate(discrepancy)
-        axes.step(iteration, least, where="post", color=GREY, linewidth=1.0, label="least so far")
-        for chosen, face, label in (
-            (start, "white", "start design"),
-            (~start, BLUE, "engine's choice"),
-        ):
-            axes.plot(
-                iteration[chosen],
-                discrepancy[chosen],
-                "o",
-                markersize=5,
-                color=BLUE,
-                markerfacecolor=face,
-                label=label,
-            )
-        plain_log_ticks(axes, "y")
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-        axes.set_xlabel("simulation")
-        axes.set_ylabel("discrepancy [deg² s]")
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
-        return to_svg(figure, "discrepancy")
+        figure = new_figure(8.6, 2.2 * len(members) + 0.4)
+        grid = figure.subplots(len(members), 1, squeeze=False)[:, 0]
+        for axes, member in zip(grid, members, strict=True):
+            frames = np.flatnonzero(recorded["recording"].to_numpy() == member)
+            parts = (recorded, tree["posterior_predictive"].to_dataset())
+            readouts.append(_draw_strokes(axes, *(part.isel(frame=frames) for part in parts)))
+            axes.set_ylabel("RMS [deg]")
+        grid[-1].set_xlabel("stroke")
+        handles, labels = grid[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=3)
+        return to_chart(figure, "by-stroke", readouts)
+
+
+def _draw_strokes(axes: "Axes", recorded: "Dataset", predicted: "Dataset") -> Readout:
+    numbers = recorded["stroke"].to_numpy()
+    strokes = np.unique(numbers)
+    seen = np.degrees(recorded["inclination"].to_numpy())
+    shown = np.degrees(predicted["inclination"].to_numpy()).reshape(-1, *seen.shape)
+    left, spread = seen - shown.mean(axis=0), shown.std(axis=0, ddof=1)
+    lines = {}
+    for at, plane in enumerate(recorded["plane"].to_numpy()):
+        rms = _rms_by(numbers, left[:, at])
+        place = np.arange(len(strokes)) + 0.4 * (at - 0.5)
+        axes.bar(place, rms, 0.36, color=PLANE_COLOURS[at], label=f"{plane} plane")
+        lines[f"{plane} plane"] = rms
+    usual = _rms_by(numbers, spread)
+    axes.step(np.arange(-1, len(strokes) + 1), np.pad(usual, 1, mode="edge"), where="mid",
+              color=INK, lw=1.0, label="sd of the predictions")  # fmt: skip
+    axes.set_xlim(-0.6, len(strokes) - 0.4)
+    axes.set_xticks(range(len(strokes)), [str(number) for number in strokes])
+    return series(axes, np.arange(len(strokes)), {**lines, "sd of the predictions": usual},
+                  names=[f"stroke {number}" for number in strokes])  # fmt: skip
+
+
+def _rms_by(numbers: NDArray, values: NDArray) -> NDArray[np.float64]:
+    """RMS of values (T,) or (T, planes) in each group of equal numbers (T,)."""
+    return np.array(
+        [np.sqrt(np.nanmean(np.square(values[numbers == number]))) for number in np.unique(numbers)]
+    )

@@ -202,11 +202,20 @@ def pour(  # noqa: PLR0913  one parameter for each option
 
 
 @app.command()
-def report(run: RunArgument) -> None:
+def report(
+    run: RunArgument,
+    moving: Annotated[
+        bool,
+        typer.Option(
+            "--moving/--still",
+            help="With moving pictures of the liquid; the first time they take a minute.",
+        ),
+    ] = True,
+) -> None:
     """Write RUN/report.html, one file that shows it all."""
     from .reporting import report as write_report
 
-    typer.echo(write_report(run))
+    typer.echo(write_report(run, moving=moving))
 
 
 @app.command()

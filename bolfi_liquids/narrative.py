@@ -92,13 +92,20 @@ def floor_sentence(section: Mapping[str, Any]) -> str:
 
 def pour_sentence(section: Mapping[str, Any]) -> str:
     """What to do, and what it is expected to spill."""
-    plug_in = section["plug_in"]
     return (
         f"Turn the source at {section['angular_velocity_deg_s']:.0f}°/s with its lip"
         f" {section['distance_cm']:.1f} cm from the receiver's axis: expected to spill"
         f" {percent(section['expected_spillage'])}, in 19 of 20 cases less than"
-        f" {percent(section['spillage_q95'])}. The best action at θ* alone"
+        f" {percent(section['spillage_q95'])}."
+    )
+
+
+def sure_sentence(section: Mapping[str, Any]) -> str:
+    """What the best action at theta* alone would do instead."""
+    plug_in = section["plug_in"]
+    return (
+        "That is over liquids and landings by which it was not chosen. The best action at θ* alone"
         f" ({plug_in['angular_velocity_deg_s']:.0f}°/s, {plug_in['distance_cm']:.1f} cm) would"
-        f" spill {percent(plug_in['expected_spillage'])} over the same liquids, in 19 of 20 cases"
+        f" spill {percent(plug_in['expected_spillage'])} of the same liquids, in 19 of 20 cases"
         f" less than {percent(plug_in['spillage_q95'])}."
     )

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .drawing import BLUE, GREY, INK, ORANGE, new_figure, plain_log_ticks, styled, to_svg
+from .drawing import BLUE, GREY, INK, ORANGE, new_figure, plain_log_ticks, styled
+from .readouts import Readout, marks, to_chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +36,7 @@ def posterior_figure(tree: "DataTree") -> str:
         joint, top, right = grid[1, 0], grid[0, 0], grid[1, 1]
         grid[0, 1].set_axis_off()
         _draw_joint(joint, surface, posterior, axes_of)
-        _mark(joint, tree, (first, second))
+        simulated = _mark(joint, tree, (first, second))
         for density, style in ((posterior, {"color": BLUE}), (prior, {"color": GREY, "ls": "--"})):
             top.plot(surface[first], marginal(density, *axes_of.values()), **style)
             right.plot(marginal(density.T, *reversed(axes_of.values())), surface[second], **style)
@@ -44,7 +45,7 @@ def posterior_figure(tree: "DataTree") -> str:
         top.set_yticks([])
         right.set_xlim(left=0)
         right.set_xticks([])
-        return to_svg(figure, "posterior")
+        return to_chart(figure, "posterior", [simulated])
 
 
 def _coordinate(surface: "Dataset", name: str) -> NDArray[np.float64]:
@@ -103,12 +104,17 @@ def _draw_joint(
     joint.contour(x, y, density.T, levels=levels, colors=BLUE, linewidths=1.0)
 
 
-def _mark(joint: "Axes", tree: "DataTree", names: tuple[str, str]) -> None:
+def _mark(joint: "Axes", tree: "DataTree", names: tuple[str, str]) -> Readout:
     simulations, closest = tree["simulations"], tree["closest"]
     points = [simulations[name].to_numpy() for name in names]
     joint.plot(*points, ".", color=GREY, markersize=4, label="simulated")
     at = [closest[name].to_numpy() for name in names]
     joint.plot(*at, "*", color=ORANGE, markersize=10, label="closest hypothesis")
+    texts = [
+        f"simulation {number}: {names[0]} {x:.3g}, {names[1]} {y:.3g}"
+        for number, (x, y) in enumerate(zip(*points, strict=True), start=1)
+    ]
+    return marks(joint, *points, texts, parameters=names)
 
 
 def _finish(figure, joint: "Axes", names: tuple[str, str]) -> None:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 AXES = ("x", "y", "z")
 PLANES = ("inclination_xz", "inclination_yz")
+PLANE_NAMES = ("xz", "yz")
 LENGTHS = ("cup_radius", "cup_height", "fill", "stick_radius", "stick_length")
 DENSITIES = ("liquid_density",)
 STICK_WEIGHT = ("stick_density", "stick_mass")

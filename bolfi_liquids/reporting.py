@@ -1,23 +1,37 @@
 """report.html: one file that shows a run, without anything from outside it."""
 
 from collections.abc import Mapping
+from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import narrative
 from .calibration import Calibration
-from .calibration_figures import discrepancy_figure, inclination_figure
+from .calibration_figures import inclination_figure, stroke_figure
 from .criticism_chapter import criticism_context
 from .files import write_text
 from .posterior_figure import posterior_figure
+from .readouts import script_json
+from .results import read_tree
 from .run_directory import POUR, REPORT
+from .search_figure import search_figure
 from .summary import read_summary
+from .worries import worries
+
+if TYPE_CHECKING:
+    from xarray import DataTree
 
 TEMPLATE = "report.html.jinja"
 
 
-def report(run: str | Path) -> Path:
-    """Write RUN/report.html from what the run holds; nothing is simulated.
+def report(run: str | Path, *, moving: bool = True, progress: bool = True) -> Path:
+    """Write RUN/report.html from what the run holds.
+
+    Args:
+        run: A RUN directory with a finished calibration.
+        moving: Whether it has moving pictures, of a few stirs and pours that are simulated for
+            them once and kept in RUN/frames.nc; nothing else is simulated.
+        progress: Whether to show a bar on stderr while they are.
 
     Raises:
         InputError: The directory holds no finished calibration.
@@ -25,6 +39,9 @@ def report(run: str | Path) -> Path:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     calibration = Calibration.open(run)
+    sections = read_summary(calibration.path)
+    pour, criticism = _pour_tree(calibration.path), criticism_context(calibration)
+    pictures = _moving(calibration, progress) if moving else None
     environment = Environment(
         loader=PackageLoader("bolfi_liquids", "data"),
         autoescape=True,
@@ -34,8 +51,18 @@ def report(run: str | Path) -> Path:
     )
     page = environment.get_template(TEMPLATE).render(
         calibration=_calibration_context(calibration),
-        criticism=criticism_context(calibration),
-        pour=_pour_context(calibration.path),
+        criticism=criticism,
+        pour=None if pour is None else _pour_context(sections["pour"], pour),
+        worries=worries(
+            calibration.summary,
+            criticism and criticism["section"],
+            None if pour is None else sections["pour"],
+            pour,
+        ),
+        moving=pictures,
+        moving_json=script_json(pictures),
+        style=_text("report.css"),
+        script=_text("report.js"),
         record=calibration.record,
         run=calibration.path,
     )
@@ -53,11 +80,10 @@ def _calibration_context(calibration: Calibration) -> dict[str, Any]:
         "section": section,
         "sentences": sentences,
         "fit_sentence": narrative.fit_sentence(section),
-        "floor_sentence": narrative.floor_sentence(section),
-        "sampler_sentence": narrative.sampler_sentence(section),
         "inclination": inclination_figure(tree),
+        "by_stroke": stroke_figure(tree),
         "posterior": posterior_figure(tree),
-        "discrepancy": discrepancy_figure(tree),
+        "search": search_figure(tree),
         "start": int(tree.attrs["initial"]),
         "rows": [_row(name, section) for name in section["parameters"]],
     }
@@ -74,18 +100,33 @@ def _row(name: str, section: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _pour_context(run: Path) -> dict[str, Any] | None:
-    section = read_summary(run).get("pour")
-    if section is None or not (run / POUR).is_file():
+def _pour_tree(run: Path) -> "DataTree | None":
+    """pour.nc, where a pour was chosen."""
+    if "pour" not in read_summary(run) or not (run / POUR).is_file():
         return None
-    from .pour_figure import pour_figure
-    from .results import read_tree
+    return read_tree(run / POUR, fix=f"write it again: bolfi-liquids pour {run}")
 
-    tree = read_tree(run / POUR, fix=f"write it again: bolfi-liquids pour {run}")
+
+def _pour_context(section: Mapping[str, Any], tree: "DataTree") -> dict[str, Any]:
+    from .pour_figure import pour_figure
+
     return {
         "section": section,
         "sentence": narrative.pour_sentence(section),
+        "sure_sentence": narrative.sure_sentence(section),
         "figure": pour_figure(tree),
         "made_with": dict(tree.attrs),
         "rows": [("chosen pour", section), ("best at θ* alone", section["plug_in"])],
     }
+
+
+def _moving(calibration: Calibration, progress: bool) -> dict[str, Any]:
+    from .frames import frames_of
+    from .moving_pictures import moving_context
+
+    return moving_context(calibration, frames_of(calibration.path, progress=progress))
+
+
+def _text(name: str) -> str:
+    """Of a file that stands in the page as it is."""
+    return (files("bolfi_liquids.data") / name).read_text(encoding="utf-8")

@@ -3,7 +3,8 @@
 Groups from the engine, in ArviZ's schema: `posterior`, `sample_stats`, `prior`,
 `observed_data`, `constant_data`, `simulations`. Added here:
 
-- `recorded`: inclination over (frame, plane), with `time` and `recording` of each frame;
+- `recorded`: inclination over (frame, plane), with `time`, `recording` and `stroke` of each
+  frame;
 - `posterior_predictive`: inclination over (chain, draw, frame, plane), fresh seeds;
 - `replicates`: inclination over (seed, frame, plane), at theta*;
 - `closest`: inclination over (frame, plane), discrepancy and parameters of the simulated
@@ -19,7 +20,9 @@ import numpy as np
 from .errors import InputError
 from .files import write_whole
 from .predictive import Check
+from .recording_fields import PLANE_NAMES
 from .stirring import Stirring
+from .strokes import stroke_numbers
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
@@ -27,7 +30,6 @@ if TYPE_CHECKING:
     from .inference import Fit, Prior
 
 GRID = 121
-PLANE_NAMES = ("xz", "yz")
 
 
 def results_tree(sampled: "DataTree", fit: "Fit", stirring: Stirring, check: Check) -> "DataTree":
@@ -37,6 +39,7 @@ def results_tree(sampled: "DataTree", fit: "Fit", stirring: Stirring, check: Che
     frames = {
         "time": ("frame", stirring.time, {"units": "s"}),
         "recording": ("frame", stirring.member),
+        "stroke": ("frame", np.concatenate([stroke_numbers(r) for r in stirring.recordings])),
         "plane": list(PLANE_NAMES),
     }
 

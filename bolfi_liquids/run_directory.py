@@ -21,6 +21,7 @@ POSTERIOR = "posterior.nc"
 CRITICISM = "criticism.nc"
 CRITICISM_FORMAT = 2  # of what a criticism is kept as; another is made again
 POUR = "pour.nc"
+FRAMES = "frames.nc"
 REPORT = "report.html"
 
 MUST_AGREE = ("settings", "inputs", "simulator")

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .recording_fields import PLANE_NAMES
 from .recordings import Gripper, Recording
-from .results import PLANE_NAMES
 
 if TYPE_CHECKING:
     from .inference import Window
@@ -61,6 +61,14 @@ def strokes(recording: Recording) -> list[Stroke]:
         number[after + 1 :] = count + 1
     numbers = range(int(number.min()), int(number.max()) + 1)
     return [Stroke(k, number == k) for k in numbers if (number == k).any()]
+
+
+def stroke_numbers(recording: Recording) -> NDArray[np.int64]:
+    """Number of the stroke that each sample belongs to, shape (T,)."""
+    numbers = np.zeros(len(recording.time), np.int64)
+    for stroke in strokes(recording):
+        numbers[stroke.samples] = stroke.number
+    return numbers
 
 
 def until_stroke(recording: Recording, number: int) -> Recording:

@@ -1,0 +1,198 @@
+"""frames.nc: what the stirring and the chosen pour look like, at a few draws of the posterior.
+
+Dimension `draw`, for each of which `stirred` particles (stir_frame, stir_particle, axis) [m] with
+the stick's `pivot` and `tip`, its `inclination` as the cameras would see it (frame, plane) [rad],
+and, where a pour was chosen, `poured` particles (pour_frame, pour_particle, axis) [m], NaN once
+they are past the receiver's rim, with the source's `angle` [rad] and the share `caught` so far.
+"""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .criticism import latest_calibration
+from .kept import fresh_seeds
+from .prior import split_parameters
+from .progress import Advance, progress_bar
+from .recordings import Gripper, Recording
+from .recordings_kept import kept_recordings
+from .results import read_tree, write_tree
+from .run_directory import FRAMES, POUR
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+    from .calibration import Calibration
+    from .models import Cups
+
+DRAWS = 3
+RATE = 15.0  # frames/s
+LONGEST = 10.0  # s of a stir that are shown
+_PURPOSE = 21  # of seeds
+
+
+def frames_of(run: str | Path, *, progress: bool = True) -> "Dataset":
+    """The run's frames; simulated if there are none of this calibration and pour.
+
+    Args:
+        run: A RUN directory with a finished calibration.
+        progress: Whether to show a bar on stderr.
+
+    Raises:
+        InputError: The directory holds no finished calibration, or its recording is missing.
+    """
+    calibration = latest_calibration(run)
+    recording = _beginning(kept_recordings(calibration.path, dict(calibration.record))[0])
+    seed = int(calibration.record["settings"]["seed"])
+    theta = calibration.draws(DRAWS, seed)
+    pour = _chosen(calibration.path)
+    made_from = _digest(theta, recording, pour)
+    path = calibration.path / FRAMES
+    if path.is_file():
+        kept = read_tree(path, fix="delete it: it is made again").to_dataset()
+        if kept.attrs.get("made_from") == made_from:
+            return kept
+    seeds = fresh_seeds(seed, _PURPOSE, DRAWS)
+    steps = DRAWS * (1 if pour is None else 2)
+    with progress_bar("moving pictures", steps, shown=progress) as advance:
+        frames = _stirred(calibration, recording, theta, seeds, advance)
+        if pour is not None:
+            frames.update(_poured(calibration, pour, theta, seeds, advance))
+    return _write(frames, theta, made_from, path)
+
+
+def _write(
+    frames: Mapping[str, Any], theta: Mapping[str, NDArray], made_from: str, path: Path
+) -> "Dataset":
+    from xarray import Dataset, DataTree
+
+    drawn = {name: ("draw", values) for name, values in theta.items()}
+    dataset = Dataset(dict(frames), coords=drawn, attrs={"made_from": made_from})
+    write_tree(DataTree(dataset), path)
+    return dataset
+
+
+def _chosen(run: Path) -> dict[str, Any] | None:
+    """The chosen pour: its angular velocity, distance and cups."""
+    if not (run / POUR).is_file():
+        return None
+    tree = read_tree(run / POUR, fix=f"write it again: bolfi-liquids pour {run}")
+    return {**tree["chosen"].attrs, "cups": json.loads(tree.attrs["cups"])}
+
+
+def _digest(
+    theta: Mapping[str, NDArray], recording: Recording, pour: Mapping[str, Any] | None
+) -> str:
+    from .models import MODEL_VERSION
+
+    liquids = {name: values.tolist() for name, values in theta.items()}
+    told = [MODEL_VERSION, liquids, recording.hash, RATE, LONGEST, pour]
+    return hashlib.sha256(json.dumps(told, sort_keys=True, default=float).encode()).hexdigest()
+
+
+def _beginning(recording: Recording) -> Recording:
+    """What of it is shown."""
+    shown = recording.time - recording.time[0] <= LONGEST
+    time, position = recording.time[shown], recording.gripper.position[shown]
+    return replace(
+        recording,
+        time=time,
+        gripper=Gripper(time, position),
+        inclination=recording.inclination[shown],
+    )
+
+
+def _each(theta: Mapping[str, NDArray]) -> list[tuple[dict[str, float], dict[str, float]]]:
+    """Parameters of the liquid and coefficients of effects, of each draw."""
+    liquid, effects = split_parameters(theta)
+    return [
+        (
+            {name: float(values[at]) for name, values in liquid.items()},
+            {name: float(values[at]) for name, values in effects.items()},
+        )
+        for at in range(DRAWS)
+    ]
+
+
+def _stirred(
+    calibration: "Calibration",
+    recording: Recording,
+    theta: Mapping[str, NDArray],
+    seeds: list[int],
+    advance: Advance,
+) -> dict[str, Any]:
+    from . import models
+    from .stirring import stirring_of
+
+    particles = int(calibration.record["settings"]["particles"])
+    stirring = stirring_of([recording], particles)
+    density = recording.number("liquid_density")
+    made = []
+    for (liquid, effects), seed in zip(_each(theta), seeds, strict=True):
+        one = models.Liquid(**liquid, density=density)
+        made.append(
+            models.stir_frames(
+                one, recording.gripper, stirring.setups[0], seed, rate=RATE, effects=effects
+            )
+        )
+        advance(1)
+    seen = stirring.simulate(dict(theta), np.array(seeds))
+    metres, frame = {"units": "m"}, ("draw", "stir_frame")
+    return {
+        "stir_time": ("stir_frame", made[0].time, {"units": "s"}),
+        "stirred": ((*frame, "stir_particle", "axis"), _stack(made, "position"), metres),
+        "pivot": ((*frame, "axis"), _stack(made, "pivot"), metres),
+        "tip": ((*frame, "axis"), _stack(made, "tip"), metres),
+        "time": ("frame", recording.time, {"units": "s"}),
+        "inclination": (("draw", "frame", "plane"), seen, {"units": "rad"}),
+    }
+
+
+def _poured(
+    calibration: "Calibration",
+    pour: Mapping[str, Any],
+    theta: Mapping[str, NDArray],
+    seeds: list[int],
+    advance: Advance,
+) -> dict[str, Any]:
+    from . import models
+
+    cups = models.Cups.model_validate({key: pour["cups"][key] for key in models.Cups.model_fields})
+    rate, distance = float(pour["angular_velocity"]), float(pour["distance"])
+    density = calibration.liquid_density
+    made, caught, outcomes = [], [], []
+    for (liquid, effects), seed in zip(_each(theta), seeds, strict=True):
+        one = models.Liquid(**liquid, density=density)
+        frames = models.pour_frames(one, rate, cups, seed, rate=RATE, effects=effects)
+        landed = models.landings(one, rate, cups, [seed], effects=effects)
+        made.append(frames)
+        caught.append(_caught(frames.position, landed.position[0], distance, cups))
+        result = landed.into(distance, cups.receiver.radius)
+        outcomes.append([float(part[0]) for part in (result.spilled, result.retained)])
+        advance(1)
+    frame, parts = ("draw", "pour_frame"), np.array(outcomes)
+    return {
+        "pour_time": ("pour_frame", made[0].time, {"units": "s"}),
+        "poured": ((*frame, "pour_particle", "axis"), _stack(made, "position"), {"units": "m"}),
+        "angle": ("pour_frame", made[0].angle, {"units": "rad"}),
+        "caught": (frame, np.stack(caught)),
+        "spilled": ("draw", parts[:, 0]),
+        "retained": ("draw", parts[:, 1]),
+    }
+
+
+def _caught(position: NDArray, landed: NDArray, distance: float, cups: "Cups") -> NDArray:
+    """Share of all particles in the receiver, by frame; they land in the order of `landed`."""
+    gone = np.isnan(position[..., 0]).sum(axis=1)
+    inside = np.hypot(landed[:, 0] - distance, landed[:, 1]) < cups.receiver.radius
+    return np.append(0, np.cumsum(inside))[gone] / len(landed)
+
+
+def _stack(made: list, name: str) -> NDArray[np.float32]:
+    return np.stack([getattr(one, name) for one in made]).astype(np.float32)

@@ -1,0 +1,125 @@
+"""The frames of a run as a page's script draws them."""
+
+import base64
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .calibration import Calibration
+from .narrative import percent, with_unit
+from .recordings_kept import kept_recordings
+from .results import read_tree
+from .run_directory import POUR
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+STEPS = 254  # of a byte that a coordinate is rounded to; the last value marks what has gone
+DIGITS = 4
+
+
+def moving_context(calibration: Calibration, frames: "Dataset") -> dict[str, Any]:
+    """What the template and the script need of `frames.frames_of`.
+
+    Args:
+        calibration: The run's.
+        frames: Its frames.
+    """
+    run = calibration.path
+    scenes = {"stir": _stir_scene(calibration, frames)}
+    if "poured" in frames:
+        scenes["pour"] = _pour_scene(run, frames)
+    draws = [_draw(frames.isel(draw=at)) for at in range(frames.sizes["draw"])]
+    return {"draws": draws, "scenes": scenes}
+
+
+def _draw(one: "Dataset") -> dict[str, Any]:
+    theta = {str(name): float(value) for name, value in one.coords.items()}
+    told = ", ".join(f"{name} {with_unit(name, value)}" for name, value in theta.items())
+    return {
+        "theta": theta,
+        "liquid": told,
+        "outcome": _outcome(one),
+        "time": _short(one["time"]),
+        "inclination": {
+            plane: _short(np.degrees(one["inclination"].isel(plane=at)))
+            for at, plane in enumerate(("xz", "yz"))
+        },
+    }
+
+
+def _outcome(one: "Dataset") -> str:
+    if "spilled" not in one:
+        return ""
+    spilled, retained = float(one["spilled"]), float(one["retained"])
+    return f"{percent(spilled)} is spilled, {percent(retained)} stays in the source"
+
+
+def _stir_scene(calibration: Calibration, frames: "Dataset") -> dict[str, Any]:
+    from .models import StirSetup
+
+    recording = kept_recordings(calibration.path, dict(calibration.record))[0]
+    particles = int(calibration.record["settings"]["particles"])
+    setup = StirSetup.from_recording(recording, particles=particles)
+    radius, top = setup.cup.radius, float(frames["pivot"][..., 2].max())
+    return {
+        **_packed(frames["stirred"].to_numpy()),
+        "time": _short(frames["stir_time"]),
+        "pivot": _short(frames["pivot"]),
+        "tip": _short(frames["tip"]),
+        "cup": {"radius": radius, "height": float(recording.attrs["cup_height"])},
+        "stick": setup.stick.radius,
+        "radius": setup.spacing / 2.0,
+        "seen": [[-1.1 * radius, -radius, 0.0], [1.1 * radius, radius, top]],
+    }
+
+
+def _pour_scene(run: Path, frames: "Dataset") -> dict[str, Any]:
+    from .models import Cups
+
+    tree = read_tree(run / POUR, fix=f"write it again: bolfi-liquids pour {run}")
+    settings = json.loads(tree.attrs["cups"])
+    cups = Cups.model_validate({key: settings[key] for key in Cups.model_fields})
+    source, receiver, lip = cups.source, cups.receiver, cups.pour.lip_height
+    distance = float(tree["chosen"].attrs["distance"])
+    reach = float(np.hypot(2.0 * source.radius, source.height))
+    wide = max(source.radius, receiver.radius)
+    low = [-max(2.0 * source.radius, receiver.radius - distance) - 0.005, -wide, -lip]
+    high = [max(reach, distance + receiver.radius) + 0.005, wide, reach]
+    return {
+        **_packed(frames["poured"].to_numpy()),
+        "time": _short(frames["pour_time"]),
+        "angle": _short(frames["angle"]),
+        "caught": _short(frames["caught"]),
+        "source": {"radius": source.radius, "height": source.height},
+        "receiver": {"radius": receiver.radius, "height": receiver.height},
+        "distance": distance,
+        "lip_height": lip,
+        "depth": cups.liquid_volume / (np.pi * receiver.radius**2),
+        "radius": cups.spacing() / 2.0,
+        "seen": [low, high],
+    }
+
+
+def _packed(position: NDArray) -> dict[str, Any]:
+    """Positions (draws, frames, n, 3) as bytes between the ends of each axis, in base64."""
+    low, high = np.nanmin(position, axis=(0, 1, 2)), np.nanmax(position, axis=(0, 1, 2))
+    scaled = np.round(STEPS * (position - low) / np.maximum(high - low, 1e-9))
+    bytes_ = np.where(np.isnan(scaled), 255, scaled).astype(np.uint8)
+    return {
+        "low": low.tolist(),
+        "high": high.tolist(),
+        "particles": position.shape[2],
+        "positions": [base64.b64encode(one.tobytes()).decode() for one in bytes_],
+    }
+
+
+def _short(values: Any) -> list[Any]:
+    """Nested lists of numbers with a few digits."""
+    array = np.asarray(values, np.float64)
+    if array.ndim == 0:
+        return float(f"{array:.{DIGITS}g}")  # type: ignore[return-value]
+    return [_short(part) for part in array]

@@ -1,0 +1,107 @@
+"""What a page's script needs to say the values under the pointer, beside a figure's SVG."""
+
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .drawing import to_svg
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+POINTS = 72.0  # of an inch: the unit of the SVG
+DIGITS = 4
+
+
+class Readout(NamedTuple):
+    """Values drawn in a figure's axes.
+
+    Attributes:
+        axes: Where they are drawn.
+        content: `kind` and its values, in the axes' units; see `series`, `marks` and `field`.
+    """
+
+    axes: "Axes"
+    content: dict[str, Any]
+
+
+def series(axes: "Axes", x: ArrayLike, lines: dict[str, ArrayLike], **more: Any) -> Readout:
+    """Lines over a common x: all values at the nearest x are said.
+
+    Args:
+        axes: Where they are drawn.
+        x: Shape (n,).
+        lines: Label -> values, shape (n,).
+        more: Further entries for the page's script.
+    """
+    rows = [{"label": label, "y": _short(values)} for label, values in lines.items()]
+    return Readout(axes, {"kind": "series", "at": _short(x), "lines": rows, **more})
+
+
+def marks(axes: "Axes", x: ArrayLike, y: ArrayLike, texts: Sequence[str], **more: Any) -> Readout:
+    """Points: the text of the nearest is said. All of shape (n,)."""
+    rows = zip(_short(x), _short(y), texts, strict=True)
+    return Readout(axes, {"kind": "marks", "marks": [list(row) for row in rows], **more})
+
+
+def field(
+    axes: "Axes", x: ArrayLike, y: ArrayLike, values: dict[str, ArrayLike], unit: str
+) -> Readout:
+    """Values over a grid: those of the nearest node are said.
+
+    Args:
+        axes: Where they are drawn.
+        x, y: The grid's, shapes (n,) and (m,).
+        values: Label -> values, shape (n, m).
+        unit: Theirs.
+    """
+    rows = [
+        {"label": label, "z": [_short(r) for r in np.asarray(z)]} for label, z in values.items()
+    ]
+    content = {"kind": "field", "at": _short(x), "up_at": _short(y), "fields": rows, "unit": unit}
+    return Readout(axes, content)
+
+
+def to_chart(figure: "Figure", name: str, readouts: Sequence[Readout]) -> str:
+    """A figure as SVG, followed by what its script says.
+
+    Args:
+        figure: Drawn under `styled`.
+        name: As of `to_svg`.
+        readouts: Of its axes.
+    """
+    svg = to_svg(figure, name)  # which lays the figure out
+    panels = [_frame(figure, readout.axes) | readout.content for readout in readouts]
+    return f'{svg}\n<script type="application/json">{script_json(panels)}</script>'
+
+
+def script_json(value: Any) -> str:
+    """JSON that may stand in an HTML script element, whatever texts it holds."""
+    return json.dumps(value, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def _frame(figure: "Figure", axes: "Axes") -> dict[str, Any]:
+    """Where the axes lie in the SVG [pt, y downwards], and their limits, scales and labels."""
+    scale = POINTS / figure.dpi
+    height = figure.bbox.height
+    box = axes.bbox
+    edges = (box.x0, height - box.y1, box.x1, height - box.y0)
+    return {
+        "box": _short([scale * edge for edge in edges]),
+        "x": _axis(axes.get_xlim(), axes.get_xscale(), axes.get_xlabel()),
+        "y": _axis(axes.get_ylim(), axes.get_yscale(), axes.get_ylabel()),
+    }
+
+
+def _axis(ends: tuple[float, float], scale: str, label: str) -> dict[str, Any]:
+    return {"ends": _short(ends), "log": scale == "log", "label": label}
+
+
+def _short(values: ArrayLike) -> list[float | None]:
+    """Numbers to a few digits; what is not finite becomes null."""
+    array: NDArray[np.float64] = np.asarray(values, np.float64)
+    return [float(f"{v:.{DIGITS}g}") if np.isfinite(v) else None for v in array.ravel()]

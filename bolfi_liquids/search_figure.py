@@ -1,0 +1,89 @@
+"""The search: what each simulation tried, in turn, and how near it came."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .drawing import BLUE, GREY, new_figure, plain_log_ticks, styled
+from .narrative import with_unit
+from .posterior_figure import LABELS, LOGARITHMIC
+from .readouts import Readout, marks, to_chart
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from xarray import DataTree
+
+INSIDE = 0.05, 0.95  # quantiles of the posterior that are shaded
+
+
+def search_figure(tree: "DataTree") -> str:
+    """Discrepancy of each simulation in turn with the least so far, and below it the parameters
+    that it tried, before the posterior; the start design is hollow."""
+    from matplotlib.ticker import MaxNLocator
+
+    names = list(map(str, tree["posterior"].data_vars))
+    simulations = tree["simulations"]
+    discrepancy = np.degrees(np.degrees(simulations["discrepancy"].to_numpy()))
+    iteration = np.arange(1, len(discrepancy) + 1)
+    start = iteration <= int(tree.attrs["initial"])
+    texts = _texts(names, simulations, discrepancy)
+    with styled():
+        figure = new_figure(6.4, 2.6 + 1.5 * len(names))
+        panels = figure.subplots(
+            1 + len(names), 1, sharex=True, height_ratios=[1.5] + [1.0] * len(names)
+        )
+        least = np.fmin.accumulate(discrepancy)
+        panels[0].step(
+            iteration, least, where="post", color=GREY, linewidth=1.0, label="least so far"
+        )
+        readouts = [_dots(panels[0], iteration, discrepancy, start, texts)]
+        plain_log_ticks(panels[0], "y")
+        panels[0].set_ylabel("discrepancy [deg² s]")
+        for axes, name in zip(panels[1:], names, strict=True):
+            low, high = np.quantile(tree["posterior"][name].to_numpy(), INSIDE)
+            axes.axhspan(low, high, color=BLUE, alpha=0.15, linewidth=0, label="posterior, 90 %")
+            readouts.append(_dots(axes, iteration, simulations[name].to_numpy(), start, texts))
+            axes.set_ylabel(LABELS.get(name, name))
+            if name in LOGARITHMIC:
+                plain_log_ticks(axes, "y")
+        panels[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
+        panels[-1].set_xlabel("simulation")
+        handles, labels = panels[0].get_legend_handles_labels()
+        more, more_labels = panels[1].get_legend_handles_labels()
+        figure.legend([*handles, more[0]], [*labels, more_labels[0]],
+                      loc="outside upper center", ncols=4)  # fmt: skip
+        return to_chart(figure, "search", readouts)
+
+
+def _texts(names: list[str], simulations: "DataTree", discrepancy: NDArray) -> list[str]:
+    """What is said of each simulation."""
+    tried = [simulations[name].to_numpy() for name in names]
+    return [
+        f"simulation {at + 1}: "
+        + ", ".join(
+            f"{name} {with_unit(name, values[at])}"
+            for name, values in zip(names, tried, strict=True)
+        )
+        + f"; discrepancy {off:.3g} deg² s"
+        for at, off in enumerate(discrepancy)
+    ]
+
+
+def _dots(
+    axes: "Axes", iteration: NDArray, values: NDArray, start: NDArray, texts: list[str]
+) -> Readout:
+    for chosen, face, label in (
+        (start, "white", "start design"),
+        (~start, BLUE, "engine's choice"),
+    ):
+        axes.plot(
+            iteration[chosen],
+            values[chosen],
+            "o",
+            markersize=5,
+            color=BLUE,
+            markerfacecolor=face,
+            label=label,
+        )
+    return marks(axes, iteration, values, texts)

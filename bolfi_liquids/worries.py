@@ -1,0 +1,87 @@
+"""What to worry about before a run's pour is trusted, in plain sentences."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import criticism_narrative, narrative
+from .spillage import ACTION
+
+if TYPE_CHECKING:
+    from xarray import DataTree
+
+MUCH = 0.05  # spilled, which a person would mop up
+EDGE = {
+    ("angular_velocity", 0): "the slowest",
+    ("angular_velocity", 1): "the fastest",
+    ("distance", 0): "the nearest",
+    ("distance", 1): "the farthest",
+}
+
+
+def worries(
+    calibrated: Mapping[str, Any],
+    criticised: Mapping[str, Any] | None,
+    poured: Mapping[str, Any] | None,
+    tree: "DataTree | None",
+) -> list[str]:
+    """Sentences, the gravest first; none if nothing is known to be wrong.
+
+    Args:
+        calibrated, criticised, poured: Sections of summary.json; None where there is none.
+        tree: pour.nc.
+    """
+    told = [
+        narrative.sampler_sentence(calibrated),
+        *_of_the_model(calibrated, criticised),
+        narrative.floor_sentence(calibrated),
+        *_of_the_pour(poured, tree),
+    ]
+    return [sentence for sentence in told if sentence]
+
+
+def _of_the_model(calibrated: Mapping[str, Any], criticised: Mapping[str, Any] | None) -> list[str]:
+    if criticised is None:
+        if calibrated["fit_rms_deg"] > narrative.AS_GOOD_AS_NOISE * calibrated["noise_deg"]:
+            return [
+                "The closest hypothesis is farther from the recording than noise explains, and the "
+                "fit was not criticised: which effect the simulator lacks is not known."
+            ]
+        return ["The fit was not criticised: whether the simulator lacks an effect is not known."]
+    told = []
+    if criticised["verdict"] != "none":
+        told.append(criticism_narrative.verdict_sentence(criticised))
+    if not criticised["baseline"]:
+        told.append(criticism_narrative.NO_BASELINE)
+    return told
+
+
+def _of_the_pour(poured: Mapping[str, Any] | None, tree: "DataTree | None") -> list[str]:
+    if poured is None or tree is None:
+        return ["No pour was chosen yet."]
+    told = [_edge_sentence(tree)]
+    if poured["expected_spillage"] > MUCH:
+        share = narrative.percent(poured["expected_spillage"])
+        told.append(
+            f"Even the best pour is expected to spill {share}: stir longer, or bring the cups"
+            " nearer to each other."
+        )
+    return told
+
+
+def _edge_sentence(tree: "DataTree") -> str:
+    """That the chosen pour is at an end of what was allowed, where a better one may be beyond."""
+    actions, chosen = tree["actions"], tree["chosen"].attrs
+    ends = [
+        EDGE[name, end]
+        for name in ACTION
+        for end, limit in enumerate(actions[name].to_numpy()[[0, -1]])
+        if np.isclose(chosen[name], limit)
+    ]
+    if not ends:
+        return ""
+    return (
+        f"The chosen pour is {' and '.join(ends)} that the cups' file allows; a better one may lie "
+        "beyond."
+    )

@@ -1,0 +1,156 @@
+"""The page as a reader has it: in Chromium, without network."""
+
+import base64
+import os
+import shutil
+
+import numpy as np
+import pytest
+
+import bolfi_liquids as bl
+from bolfi_liquids.frames import frames_of
+from bolfi_liquids.moving_pictures import STEPS, _packed
+
+WIDTHS = {"laptop": (1280, 800), "phone": (390, 844)}
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def frames(pour):
+    return frames_of(pour.path, progress=False)
+
+
+@pytest.fixture(scope="module")
+def page(pour, frames):
+    return bl.report(pour.path, progress=False)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    sync = pytest.importorskip("playwright.sync_api")
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if found is None and "CI" not in os.environ:
+        pytest.skip("no Chromium: make browser installs one")
+    with sync.sync_playwright() as playwright:
+        started = playwright.chromium.launch(
+            executable_path=found, args=["--no-sandbox", "--disable-gpu"]
+        )
+        yield started
+        started.close()
+
+
+@pytest.fixture(params=WIDTHS)
+def opened(browser, page, request):
+    """The page, and what its console said and what it asked for."""
+    width, height = WIDTHS[request.param]
+    tab = browser.new_page(viewport={"width": width, "height": height}, offline=True)
+    heard = {"console": [], "requests": []}
+    tab.on("console", lambda message: heard["console"].append(message.text))
+    tab.on("pageerror", lambda error: heard["console"].append(str(error)))
+    tab.on("request", lambda asked: heard["requests"].append(asked.url))
+    tab.goto(page.as_uri())
+    yield tab, heard
+    tab.close()
+
+
+def test_it_is_whole_silent_and_as_wide_as_the_screen(opened, page):
+    tab, heard = opened
+    assert heard == {"console": [], "requests": [page.as_uri()]}
+    assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    sizes = tab.evaluate(
+        "[...document.querySelectorAll('figure svg, canvas')]"
+        ".map((e) => e.getBoundingClientRect()).map((b) => Math.min(b.width, b.height))"
+    )
+    assert len(sizes) == 5 + 2 and min(sizes) > 80
+
+
+def test_the_value_under_the_pointer_is_the_recordings(opened, calibration):
+    tab, heard = opened
+    recorded = calibration.tree["recorded"]
+    sample = recorded.sizes["frame"] // 2
+    chart = tab.locator(".chart").first
+    chart.scroll_into_view_if_needed()
+    at = chart.evaluate(
+        """(chart, time) => {
+            const panel = JSON.parse(chart.querySelector("script").textContent)[0];
+            const [low, high] = panel.x.ends;
+            const x = panel.box[0] + (panel.box[2] - panel.box[0]) * (time - low) / (high - low);
+            const svg = chart.querySelector("svg");
+            const point = new DOMPoint(x, (panel.box[1] + panel.box[3]) / 2);
+            const on = point.matrixTransform(svg.getScreenCTM());
+            return [on.x, on.y];
+        }""",
+        float(recorded["time"][sample]),
+    )
+    tab.mouse.move(*at)
+    said = tab.locator("#tip").inner_text()
+    angle = np.degrees(float(recorded["inclination"][sample, 0]))
+    assert f"recorded: {float(f'{angle:.3g}'):g} deg" in said
+    assert heard["console"] == []
+
+
+def test_a_draw_is_picked_in_all_figures(opened, frames):
+    tab, heard = opened
+    tab.locator("input[name=draw]").nth(2).check()
+    told = tab.locator("[data-draw-text=liquid]").all_inner_texts()
+    assert told == [told[0]] * 2 and f"{float(frames['viscosity'][2]):.3g}" in told[0]
+    points = tab.locator("polyline.drawn").first.get_attribute("points").split()
+    assert len(points) == frames.sizes["frame"]
+    assert heard["console"] == []
+
+
+def test_the_picture_moves(opened):
+    tab, heard = opened
+    figure = tab.locator("[data-movie=pour]")
+    shot = "canvas => canvas.toDataURL()"
+    canvas, slider = figure.locator("canvas"), figure.locator("input")
+    before = canvas.evaluate(shot)
+    slider.evaluate("e => { e.value = e.max / 2; e.dispatchEvent(new Event('input')); }")
+    assert canvas.evaluate(shot) != before
+    figure.locator("button").click()
+    tab.wait_for_function("e => e.value == e.max", arg=slider.element_handle(), timeout=60_000)
+    assert figure.locator("button").inner_text() == "Play"
+    assert heard["console"] == []
+
+
+def test_dragging_enlarges_and_a_double_click_goes_back(opened):
+    tab, _ = opened
+    svg = tab.locator(".chart svg").first
+    svg.scroll_into_view_if_needed()
+    whole, box = svg.get_attribute("viewBox"), svg.bounding_box()
+    middle = box["x"] + box["width"] / 4, box["y"] + box["height"] / 2
+    tab.mouse.move(*middle)
+    tab.mouse.down()
+    tab.mouse.move(middle[0] + 60, middle[1] + 40)
+    tab.mouse.up()
+    _, _, width, height = map(float, svg.get_attribute("viewBox").split())
+    assert width / height == pytest.approx(60 / 40, rel=0.01)
+    svg.dblclick()
+    assert svg.get_attribute("viewBox") == whole
+
+
+def test_the_frames_lose_no_liquid_and_lean_as_the_simulator_says(frames):
+    last = frames["caught"][:, -1]
+    np.testing.assert_allclose(last + frames["spilled"] + frames["retained"], 1.0, atol=1e-9)
+    stick = (frames["tip"] - frames["pivot"]).to_numpy()
+    leaning = np.arctan2(stick[..., :2], -stick[..., 2:])
+    seen = frames["inclination"].to_numpy()
+    for draw in range(frames.sizes["draw"]):
+        for plane in range(2):
+            between = np.interp(frames["stir_time"], frames["time"], seen[draw, :, plane])
+            # both are interpolated, between samples and between substeps
+            assert np.abs(between - leaning[draw, :, plane]).max() < np.radians(0.3)
+
+
+def test_a_packed_position_is_within_half_a_step(rng):
+    position = rng.normal(size=(1, 2, 5, 3)).astype(np.float32)
+    position[0, 1, 3] = np.nan
+    packed = _packed(position)
+    read = np.frombuffer(base64.b64decode(packed["positions"][0]), np.uint8).reshape(2, 5, 3)
+    low, high = np.array(packed["low"]), np.array(packed["high"])
+    back = np.where(read == 255, np.nan, low + (high - low) / STEPS * read)
+    step = (high - low) / STEPS
+    assert np.isnan(back[1, 3]).all() and np.isnan(back).sum() == 3
+    assert np.nanmax(np.abs(back - position[0]) / step) <= 0.5 + 1e-4
