@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from . import __version__, cli_check, cli_import, cli_record, cli_reproduce, cli_rig
+from . import __version__, cli_check, cli_import, cli_record, cli_reproduce, cli_rig, cli_simulate
 from .cli_errors import OneLineErrors
 from .cli_rig import RigOption
 from .settings import (
@@ -31,6 +31,7 @@ app = typer.Typer(
 )
 app.add_typer(cli_check.app, name="check")
 app.add_typer(cli_rig.app, name="rig")
+app.add_typer(cli_simulate.app, name="simulate")
 app.command()(cli_record.record)
 app.command()(cli_reproduce.reproduce)
 app.command("import")(cli_import.import_table)

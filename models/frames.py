@@ -130,7 +130,10 @@ def pour_frames(  # noqa: PLR0913  as of `landings`
     def look(scene: Any, step: int) -> None:
         position = scene.position.to_numpy()[0]
         position[scene.alive.to_numpy()[0] :] = np.nan
-        seen.append(PourFrames(np.array(step / scene.rate), position, scene.angle.to_numpy()[0]))
+        time = step / scene.rate
+        # not the scene's own angle, which stands still once nothing is left to simulate
+        angle = min(float(angular_velocity) * time, cups.pour.final_angle)
+        seen.append(PourFrames(np.array(time), position, np.array(angle)))
 
     watch = Watch(rate, look)
     landed = watched_landings(liquid, angular_velocity, cups, [seed], particles, effects, watch)

@@ -74,8 +74,8 @@ def test_what_is_in_the_source_in_the_end_is_what_landings_retain(cups):
     thick = models.Liquid(5.0, 0.0, 1260.0)
     frames = models.pour_frames(thick, RATE, cups, 0, particles=PARTICLES)
     landed = models.landings(thick, RATE, cups, [0], PARTICLES)
-    assert frames.angle[0] == 0.0
-    assert frames.angle[-1] == pytest.approx(cups.pour.final_angle, rel=1e-6)
+    turned = np.minimum(RATE * frames.time, cups.pour.final_angle)
+    np.testing.assert_allclose(frames.angle, turned)
     x, y, z = frames.position[-1].T
     c, s = np.cos(frames.angle[-1]), np.sin(frames.angle[-1])
     radius, height = cups.source.radius, cups.source.height

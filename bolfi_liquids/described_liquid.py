@@ -1,0 +1,116 @@
+"""A liquid that a person describes by numbers, rather than by a recording."""
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .errors import InputError
+from .settings import MIN_PARTICLES, at_least
+
+if TYPE_CHECKING:
+    from .models import Liquid
+
+
+@dataclass(frozen=True)
+class Described:
+    """A liquid and how it is simulated.
+
+    Attributes:
+        viscosity: [Pa s].
+        cohesion: 0 to 1 as a rule.
+        density: [kg/m³].
+        effects: Coefficients of `models.EFFECTS` by name.
+        particles: Of the simulated liquid.
+        seed: Of the packing.
+
+    Raises:
+        InputError: A value cannot be used.
+    """
+
+    viscosity: float
+    cohesion: float
+    density: float
+    effects: Mapping[str, float] = field(default_factory=dict)
+    particles: int = 1000
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("viscosity", "cohesion", "density"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and (value > 0 or (value == 0 and name != "density"))):
+                rule = "positive" if name == "density" else "0 or more"
+                raise InputError(f"{value}", where=f"--{name}", fix=f"give a number, {rule}")
+        at_least(MIN_PARTICLES, "--particles", self.particles)
+        at_least(0, "--seed", self.seed)
+
+    def liquid(self) -> "Liquid":
+        """The liquid, as the simulator takes it."""
+        from .models import Liquid
+
+        return Liquid(self.viscosity, self.cohesion, self.density)
+
+    def lines(self) -> list[str]:
+        """What it is, for a person."""
+        effects = [f"{name} {value:g}" for name, value in self.effects.items()]
+        return [
+            f"viscosity {self.viscosity:g} Pa s, cohesion {self.cohesion:g}",
+            ", ".join([f"{self.density:g} kg/m³", *effects]),
+            f"{self.particles} particles, seed {self.seed}",
+        ]
+
+    def attributes(self) -> dict[str, float | int | str]:
+        """The same for a file."""
+        from . import __version__
+        from .models import MODEL_VERSION
+
+        return {
+            "source": f"simulated by bolfi-liquids {__version__}, model {MODEL_VERSION}",
+            "viscosity": self.viscosity,
+            "cohesion": self.cohesion,
+            "liquid_density": self.density,
+            "effects": json.dumps(dict(self.effects)),
+            "particles": self.particles,
+            "seed": self.seed,
+        }
+
+
+def read_effects(given: Iterable[str], scene: str) -> dict[str, float]:
+    """Coefficients by name, from texts NAME=VALUE.
+
+    Args:
+        given: The texts.
+        scene: "stir" or "pour".
+
+    Raises:
+        InputError: One is of another form, unknown, given twice, out of its range, or acts in
+            the other scene only.
+    """
+    from .models import EFFECTS
+
+    read: dict[str, float] = {}
+    for text in given:
+        name, _, value = (part.strip() for part in text.partition("="))
+        where = f"--effect {text}"
+        if name not in EFFECTS:
+            raise InputError("unknown", where=where, fix=f"there are {', '.join(sorted(EFFECTS))}")
+        effect = EFFECTS[name]
+        try:
+            number = float(value)
+        except ValueError:
+            number = np.nan
+        if not effect.lowest <= number <= effect.highest or not np.isfinite(number):
+            span = f"{effect.lowest:g} to {effect.highest:g}"
+            raise InputError(
+                f"{value!r} is no coefficient of it",
+                where=where,
+                fix=f"give {name}=NUMBER, from {span} in the unit {effect.unit}",
+            )
+        if name in read:
+            raise InputError("given twice", where=where, fix="give it once")
+        if scene not in effect.scenes:
+            raise InputError(f"does not act in a {scene}", where=where, fix="leave it out")
+        read[name] = number
+    return read

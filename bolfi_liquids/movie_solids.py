@@ -1,0 +1,121 @@
+"""Cups of glass, the stick and the table of a movie."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+from scipy.ndimage import gaussian_filter
+
+from .movie_light import Layer, Picture, over
+from .movie_surface import Glass
+from .movie_view import View
+
+FINER = 2  # times finer are lines drawn than shown
+EDGE, FAINT = (92, 112, 130, 210), (92, 112, 130, 110)
+BODY = (150, 180, 205, 26)
+GLINT = (255, 255, 255, 120)
+STICK = np.array([0.80, 0.52, 0.30], np.float32)
+
+
+class Shape(NamedTuple):
+    """A line, or an area if `width` is 0, through points of the scene [n, 3] in m."""
+
+    points: NDArray
+    colour: tuple[int, int, int, int]
+    width: int = 0  # in pixels of the finer picture
+
+
+def drawn(view: View, below: Picture, shapes: Sequence[Shape]) -> Picture:
+    """A picture with shapes over it, in their order."""
+    if not shapes:
+        return below
+    size = FINER * view.width, FINER * view.height
+    sheet = Image.new("RGBA", size)
+    for shape in shapes:
+        at = [tuple(p) for p in FINER * (view.pixels(shape.points) + 0.5)]
+        own = Image.new("RGBA", size, shape.colour[:3] + (0,)) if not shape.width else None
+        if own is None:
+            ImageDraw.Draw(sheet).line(at, fill=shape.colour, width=shape.width, joint="curve")
+        else:
+            ImageDraw.Draw(own).polygon(at, fill=shape.colour)
+            sheet = Image.alpha_composite(sheet, own)
+    # premultiplied, so that no colour of empty pixels bleeds into the edges
+    small = np.asarray(sheet.convert("RGBa").reduce(FINER), np.float32) / 255.0
+    return below * (1.0 - small[..., 3:]) + small[..., :3]
+
+
+def ring(glass: Glass, height: float, view: View, part: str = "all") -> NDArray:
+    """Points of a cup's circle at `height` above its floor; `part` is all, near or far."""
+    side = np.cross(glass.axis, view.axes[2])
+    side /= max(np.linalg.norm(side), 1e-9)
+    near = np.cross(side, glass.axis)  # of the directions across, the one most towards the camera
+    turn = {"all": (0.0, 2.0), "near": (0.0, 1.0), "far": (1.0, 2.0)}[part]
+    angle = np.pi * np.linspace(*turn, 73)[:, None]
+    circle = np.cos(angle) * side + np.sin(angle) * near
+    return glass.floor + height * glass.axis + glass.radius * circle
+
+
+def glass_behind(glass: Glass, view: View) -> list[Shape]:
+    """What of a cup is farther than its contents."""
+    wall = np.concatenate(
+        [ring(glass, 0.0, view, "far"), ring(glass, glass.height, view, "far")[::-1]]
+    )
+    return [
+        Shape(wall, BODY),
+        Shape(ring(glass, 0.0, view), BODY),
+        Shape(ring(glass, 0.0, view, "far"), FAINT, 3),
+        Shape(ring(glass, glass.height, view, "far"), FAINT, 3),
+    ]
+
+
+def glass_before(glass: Glass, view: View) -> list[Shape]:
+    """What of a cup is nearer than its contents."""
+    rim, floor = ring(glass, glass.height, view, "near"), ring(glass, 0.0, view, "near")
+    glint = [at + share * (to - at) for at, to in [(floor[58], rim[58])] for share in (0.12, 0.9)]
+    return [
+        Shape(np.concatenate([floor, rim[::-1]]), BODY),
+        Shape(np.array(glint), GLINT, 6),
+        Shape(floor, EDGE, 3),
+        Shape(np.stack([floor[0], rim[0]]), EDGE, 3),
+        Shape(np.stack([floor[-1], rim[-1]]), EDGE, 3),
+        Shape(rim, EDGE, 3),
+    ]
+
+
+def stick_layer(view: View, pivot: NDArray, tip: NDArray, radius: float) -> Layer:
+    """A round stick from the pivot to the tip."""
+    start, end = view.camera(np.stack([tip, pivot]))
+    right, up = view.metres()
+    along = end[:2] - start[:2]
+    length = np.linalg.norm(along)
+    along /= length
+    x, y = right - start[0], up - start[1]
+    share = np.clip((x * along[0] + y * along[1]) / length, 0.0, 1.0)
+    dx, dy = x - share * length * along[0], y - share * length * along[1]
+    apart = np.hypot(dx, dy)
+    cover = np.clip((radius - apart) * view.scale + 0.5, 0.0, 1.0)
+    round_off = np.sqrt(np.maximum(1.0 - (apart / radius) ** 2, 0.0))
+    lit = 0.55 + 0.45 * round_off - 0.18 * (dx * along[1] - dy * along[0]) / radius
+    front = start[2] + share * (end[2] - start[2]) + radius * round_off
+    colour = np.clip(lit[..., None] * STICK, 0.0, 1.0)
+    return Layer(*(part.astype(np.float32) for part in (colour, cover, front)))
+
+
+def room(view: View, cups: Sequence[Glass]) -> Picture:
+    """An empty room with the shadows of upright cups on its table."""
+    fade = np.linspace(0.0, 1.0, view.height, dtype=np.float32)[:, None, None]
+    top, bottom = np.array([0.965, 0.975, 0.985]), np.array([0.86, 0.885, 0.91])
+    picture = np.broadcast_to(
+        (top + fade * (bottom - top)).astype(np.float32), (view.height, view.width, 3)
+    )
+    for glass in cups:
+        wide = Glass(1.12 * glass.radius, glass.height, glass.floor, glass.axis)
+        black = (0, 0, 0, 255)
+        dark = (
+            1.0 - drawn(view, np.ones_like(picture), [Shape(ring(wide, 0.0, view), black)])[..., 0]
+        )
+        shade = 0.28 * gaussian_filter(dark, 0.12 * glass.radius * view.scale)
+        picture = over(picture, np.float32([0.35, 0.42, 0.5]) * np.ones_like(picture), shade)
+    return picture

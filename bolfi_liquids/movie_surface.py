@@ -1,0 +1,183 @@
+"""From particles to the surface of the liquid, as a camera sees it.
+
+Particles are smeared over a grid that is aligned with the camera, so that what is seen is the
+first cell along its last axis in which there is liquid enough.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import affine_transform, gaussian_filter, map_coordinates
+
+from .movie_view import View
+
+CELLS = 4.0  # grid cells a particle spacing
+SMEAR = 0.6  # sd of a smeared particle, by the spacing
+LEVEL = 0.4  # of the rest density: here is the surface
+ALONE = 0.7  # least density at a particle, so that a single one is a drop of its own volume
+SOFTER = 1.3  # cells
+LEAST_SHARE = 0.2  # of a smeared particle that is inside the cup's corners
+
+
+@dataclass(frozen=True)
+class Glass:
+    """A cup that holds particles: an open cylinder.
+
+    Attributes:
+        radius, height: Inner ones [m].
+        floor: Centre of its floor in the scene [m], shape [3].
+        axis: Unit vector from there to the opening, shape [3].
+    """
+
+    radius: float
+    height: float
+    floor: NDArray[np.float64]
+    axis: NDArray[np.float64]
+
+    def within(self, points: NDArray) -> tuple[NDArray, NDArray]:
+        """Distance of points [..., 3] from the side, inwards, and from the floor, upwards [m]."""
+        offset = points - self.floor
+        along = offset @ self.axis
+        across = np.sqrt(np.maximum(np.sum(offset * offset, axis=-1) - along * along, 0.0))
+        return self.radius - across, along
+
+
+class Surface(NamedTuple):
+    """What each pixel shows of the liquid, arrays of shape [height, width].
+
+    Attributes:
+        cover: Share of the pixel behind the liquid, 0 to 1.
+        front: How far towards the camera the surface is [m], of the view's centre.
+        normal: Of the surface, [height, width, 3]: right, up and towards the camera.
+        thickness: Of the liquid along the line of sight [m].
+    """
+
+    cover: NDArray[np.float32]
+    front: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    thickness: NDArray[np.float32]
+
+
+class _Grid(NamedTuple):
+    """Cells along right, up and away from the camera; `origin` is the first one's centre [m]."""
+
+    origin: NDArray[np.float64]
+    cell: float
+    shape: tuple[int, int, int]
+
+    @classmethod
+    def around(cls, points: NDArray, spacing: float) -> "_Grid":
+        cell, reach = spacing / CELLS, 3.0 * SMEAR * spacing
+        # at multiples of the cell, so that liquid at rest does not shimmer
+        low = np.floor((points.min(axis=0) - reach) / cell)
+        high = np.ceil((points.max(axis=0) + reach) / cell)
+        return cls(low * cell, cell, tuple(int(n) + 1 for n in high - low))
+
+    def smeared(self, points: NDArray, weights: NDArray, spacing: float) -> NDArray[np.float32]:
+        """Density of weighted particles, 1 where they are `spacing` apart."""
+        at = (points - self.origin) / self.cell
+        first = np.floor(at).astype(int)
+        part = at - first
+        total = np.zeros(int(np.prod(self.shape)))
+        for corner in np.ndindex(2, 2, 2):
+            cells = np.ravel_multi_index(tuple((first + corner).T), self.shape)
+            share = np.prod(np.where(corner, part, 1.0 - part), axis=1)
+            total += np.bincount(cells, share * weights, len(total))
+        density = (spacing / self.cell) ** 3 * total.reshape(self.shape)
+        sd = SMEAR * spacing / self.cell
+        return gaussian_filter(density.astype(np.float32), sd, mode="constant", truncate=3.0)
+
+    def centres(self) -> NDArray[np.float32]:
+        axes = (o + self.cell * np.arange(n) for o, n in zip(self.origin, self.shape, strict=True))
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+
+
+def surface(view: View, points: NDArray, spacing: float, glass: Glass) -> Surface | None:
+    """The liquid's surface.
+
+    Args:
+        view: The camera.
+        points: Particles in the scene [m], shape [n, 3].
+        spacing: Between them [m].
+        glass: The cup that may hold them; at its walls the liquid ends, not before.
+
+    Returns:
+        None if there are no points.
+    """
+    if not len(points):
+        return None
+    seen = view.camera(points) * (1.0, 1.0, -1.0)  # away from the camera
+    grid = _Grid.around(seen, spacing)
+    density = _density(view, points, seen, grid, (spacing, glass))
+    return _looked_at(view, grid, density)
+
+
+def _density(view: View, points, seen, grid: _Grid, given) -> NDArray[np.float32]:
+    """Density over the grid: full up to the glass, and none beyond on account of what is inside."""
+    spacing, glass = given
+    side, up = glass.within(points)
+    inside = (side > 0.0) & (up > 0.0) & (up < glass.height)
+    cell_side, cell_up = glass.within(view.world(grid.centres() * (1.0, 1.0, -1.0)))
+    sd = SMEAR * spacing
+    held = np.clip(0.5 + cell_side / sd / 2.5, 0.0, 1.0) * np.clip(
+        0.5 + cell_up / sd / 2.5, 0.0, 1.0
+    )
+    share = np.where(cell_up < glass.height, np.maximum(held, LEAST_SHARE), 1.0)
+    weights = np.ones(len(points))
+    whole = grid.smeared(seen, weights, spacing) / share
+    places = ((seen - grid.origin) / grid.cell).T
+    found = map_coordinates(whole, places, order=1)
+    weights = np.maximum(1.0, ALONE / np.maximum(found, 1e-3))
+    whole = grid.smeared(seen, weights, spacing) / share
+    within = np.clip(np.minimum(cell_side, cell_up) / grid.cell + 0.5, 0.0, 1.0)
+    if inside.all():
+        beyond = np.zeros((), np.float32)
+    else:
+        beyond = grid.smeared(seen[~inside], weights[~inside], spacing)
+    blended = within * whole + (1.0 - within) * beyond
+    return np.where(cell_up < glass.height, blended, whole).astype(np.float32)
+
+
+def _looked_at(view: View, grid: _Grid, density: NDArray[np.float32]) -> Surface:
+    """The grid's columns, each as one line of sight, brought to the picture's pixels."""
+    solid = density > LEVEL
+    crossing = solid.any(axis=2)
+    first = np.where(crossing, solid.argmax(axis=2), density.argmax(axis=2))
+    before = np.maximum(first - 1, 0)
+
+    def at(values: NDArray, index: NDArray) -> NDArray:
+        return np.take_along_axis(values, index[..., None], axis=2)[..., 0]
+
+    here, there = at(density, first), at(density, before)
+    step = np.where(crossing, (here - LEVEL) / np.maximum(here - there, 1e-6), 0.0)
+    front = -(grid.origin[2] + grid.cell * (first - np.clip(step, 0.0, 1.0)))
+    # smoother than the surface, or light would show the grid
+    soft = gaussian_filter(density, SOFTER, mode="nearest")
+    slope = np.stack([-at(part, first) for part in np.gradient(soft)], axis=-1)
+    slope[..., 2] *= -1.0
+    amount = np.clip(density / (2.0 * LEVEL), 0.0, 1.0)
+    thickness = grid.cell * amount.sum(axis=2)
+    most = density.max(axis=2)
+
+    right, up = view.metres()
+    pixel = 1.0 / view.scale / grid.cell  # in cells
+    offset = np.array([(up[0, 0] - grid.origin[1]), (right[0] - grid.origin[0])]) / grid.cell
+
+    def to_picture(values: NDArray, order: int = 1) -> NDArray[np.float32]:
+        return affine_transform(
+            values.T.astype(np.float32),
+            (-pixel, pixel),
+            offset,
+            (view.height, view.width),
+            order=order,
+        )
+
+    most, front, thickness = to_picture(most, 3), to_picture(front), to_picture(thickness)
+    normal = np.stack([to_picture(slope[..., axis]) for axis in range(3)], axis=-1)
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
+    # a pixel is covered by how far inside the contour its centre is, in pixels
+    steep = np.hypot(*np.gradient(most))
+    cover = np.clip((most - LEVEL) / np.maximum(steep, 1e-3) + 0.5, 0.0, 1.0)
+    return Surface(cover, front, normal, thickness)

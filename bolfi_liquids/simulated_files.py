@@ -1,0 +1,93 @@
+"""What a single simulation leaves: files that are checked before it, and written after it."""
+
+import json
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from numpy.typing import NDArray
+
+from .described_liquid import Described
+from .errors import InputError
+from .files import write_whole
+from .movie_file import check_movie
+from .recording_fields import AXES, PLANES
+from .recordings import Recording
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+    from .models import Cups, Landings
+
+
+def check_targets(movie: Path | None, out: Path | None) -> None:
+    """Refuse files that could not be written, before anything is simulated.
+
+    Raises:
+        InputError, ImportError: Where and why.
+    """
+    if movie is not None:
+        check_movie(movie)
+    if out is not None and out.suffix != ".nc":
+        raise InputError(f"ends in {out.suffix!r}", where=str(out), fix="give a name in .nc")
+    for path in (movie, out):
+        if path is None:
+            continue
+        if not path.parent.is_dir():
+            raise InputError("no such directory", where=str(path.parent), fix="make it first")
+        if path.is_dir():
+            raise InputError("is a directory", where=str(path), fix="give the name of a file")
+        try:
+            tempfile.TemporaryFile(dir=path.parent).close()
+        except OSError as err:
+            fix = "choose a place that can be written"
+            raise InputError(f"{err.strerror}", where=str(path.parent), fix=fix) from err
+
+
+def stir_dataset(described: Described, recording: Recording, angles: NDArray) -> "Dataset":
+    """The simulated stir as a recording: of the same path, without noise."""
+    from xarray import Dataset
+
+    rows = dict(zip(AXES, recording.gripper.position.T, strict=True))
+    columns = dict(zip(PLANES, angles.T, strict=True))
+    units = dict.fromkeys(AXES, "m") | dict.fromkeys(PLANES, "rad")
+    return Dataset(
+        {
+            name: ("time", values, {"units": units[name]})
+            for name, values in (rows | columns).items()
+        },
+        coords={"time": ("time", recording.time, {"units": "s"})},
+        attrs={**recording.attrs, "path_of": recording.path.name, **described.attributes()},
+    )
+
+
+def pour_dataset(
+    described: Described,
+    landings: "Landings",
+    turned: tuple[float, "Cups"],
+    distance: float,
+    fractions: Mapping[str, float],
+) -> "Dataset":
+    """The outcome of a pour, and where each particle passed the height of the receiver's rim."""
+    from xarray import Dataset
+
+    angular_velocity, cups = turned
+    return Dataset(
+        {
+            **{name: ((), value, {"units": "1"}) for name, value in fractions.items()},
+            "landing": (("particle", "axis"), landings.position[0], {"units": "m"}),
+        },
+        coords={"axis": ["ahead", "across"]},
+        attrs={
+            **described.attributes(),
+            "angular_velocity": angular_velocity,
+            "distance": distance,
+            "cups": json.dumps(cups.settings(described.particles)),
+        },
+    )
+
+
+def write_netcdf(path: Path, dataset: "Dataset") -> Path:
+    """Write a dataset whole."""
+    return write_whole(path, lambda at: dataset.to_netcdf(at, engine="h5netcdf"))
