@@ -54,9 +54,11 @@ def through_liquid(view: View, behind: Picture, liquid: Surface | None, stick: L
         return behind if stick is None else over(behind, stick.colour, stick.cover)
     bend = BEND * view.scale * np.minimum(liquid.thickness, DEEPEST) * liquid.cover
     rows, columns = np.indices(liquid.cover.shape, np.float32)
-    rows = np.rint(np.clip(rows + bend * liquid.normal[..., 1], 0, view.height - 1)).astype(int)
-    columns = np.rint(np.clip(columns - bend * liquid.normal[..., 0], 0, view.width - 1)).astype(
-        int
+    # towards the thicker side, as a lens does
+    shifted = rows + bend * liquid.normal[..., 1], columns - bend * liquid.normal[..., 0]
+    rows, columns = (
+        np.rint(np.clip(at, 0, size - 1)).astype(int)
+        for at, size in zip(shifted, liquid.cover.shape, strict=True)
     )
 
     depth = liquid.thickness[..., None]

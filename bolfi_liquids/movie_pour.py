@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
 SIZE = 480, 640
 AZIMUTH, ELEVATION = np.radians(12.0), np.radians(14.0)
-SPREAD = 0.008  # m by which what is spilled runs
+SPREAD = 0.012  # m by which what is spilled runs
 TABLE_CELL = 0.002  # m
+DARKEST = 0.012  # m of liquid
 CAPTION = 0.09  # of the height is left free for it
 DYED, SHINING = (38, 92, 190, 215), (92, 160, 226, 235)
 UP = np.array([0.0, 0.0, 1.0])
@@ -130,6 +131,9 @@ def with_puddle(view: View, below: Picture, lying: Landed, cups: "Cups", count: 
     y = view.centre[1] + right * axes[0, 1] + up * axes[1, 1] + toward * axes[2, 1]
     places = [(p - edge[0]) / (reach / bins) - 0.5 for p, edge in zip((x, y), edges, strict=True)]
     depth = map_coordinates(film, places, order=1)[..., None]
-    dyed = below * np.exp(-3.0 * ABSORBED * depth) + SCATTERED * (1.0 - np.exp(-SCATTER * depth))
+    # light passes it to the table and back, and no colour is darker than that of a full cup
+    dyed = below * np.exp(-2.0 * ABSORBED * np.minimum(depth, DARKEST)) + SCATTERED * (
+        1.0 - np.exp(-SCATTER * depth)
+    )
     edge = np.clip(depth[..., 0] / 3e-4, 0.0, 1.0)
     return over(below, np.clip(dyed, 0.0, 1.0).astype(np.float32), edge.astype(np.float32))

@@ -17,6 +17,8 @@ EDGE, FAINT = (92, 112, 130, 210), (92, 112, 130, 110)
 BODY = (150, 180, 205, 26)
 GLINT = (255, 255, 255, 120)
 STICK = np.array([0.80, 0.52, 0.30], np.float32)
+WALL, TABLE = np.array([[0.965, 0.975, 0.985], [0.86, 0.885, 0.91]], np.float32)
+SHADOW, SHADE = np.array([0.35, 0.42, 0.5], np.float32), 0.28
 
 
 class Shape(NamedTuple):
@@ -59,14 +61,12 @@ def ring(glass: Glass, height: float, view: View, part: str = "all") -> NDArray:
 
 def glass_behind(glass: Glass, view: View) -> list[Shape]:
     """What of a cup is farther than its contents."""
-    wall = np.concatenate(
-        [ring(glass, 0.0, view, "far"), ring(glass, glass.height, view, "far")[::-1]]
-    )
+    floor, rim = ring(glass, 0.0, view, "far"), ring(glass, glass.height, view, "far")
     return [
-        Shape(wall, BODY),
+        Shape(np.concatenate([floor, rim[::-1]]), BODY),
         Shape(ring(glass, 0.0, view), BODY),
-        Shape(ring(glass, 0.0, view, "far"), FAINT, 3),
-        Shape(ring(glass, glass.height, view, "far"), FAINT, 3),
+        Shape(floor, FAINT, 3),
+        Shape(rim, FAINT, 3),
     ]
 
 
@@ -106,16 +106,11 @@ def stick_layer(view: View, pivot: NDArray, tip: NDArray, radius: float) -> Laye
 def room(view: View, cups: Sequence[Glass]) -> Picture:
     """An empty room with the shadows of upright cups on its table."""
     fade = np.linspace(0.0, 1.0, view.height, dtype=np.float32)[:, None, None]
-    top, bottom = np.array([0.965, 0.975, 0.985]), np.array([0.86, 0.885, 0.91])
-    picture = np.broadcast_to(
-        (top + fade * (bottom - top)).astype(np.float32), (view.height, view.width, 3)
-    )
+    picture = np.broadcast_to(WALL + fade * (TABLE - WALL), (view.height, view.width, 3))
     for glass in cups:
         wide = Glass(1.12 * glass.radius, glass.height, glass.floor, glass.axis)
-        black = (0, 0, 0, 255)
-        dark = (
-            1.0 - drawn(view, np.ones_like(picture), [Shape(ring(wide, 0.0, view), black)])[..., 0]
-        )
-        shade = 0.28 * gaussian_filter(dark, 0.12 * glass.radius * view.scale)
-        picture = over(picture, np.float32([0.35, 0.42, 0.5]) * np.ones_like(picture), shade)
+        disc = Shape(ring(wide, 0.0, view), (0, 0, 0, 255))
+        dark = 1.0 - drawn(view, np.ones_like(picture), [disc])[..., 0]
+        shade = SHADE * gaussian_filter(dark, 0.12 * glass.radius * view.scale)
+        picture = over(picture, np.broadcast_to(SHADOW, picture.shape), shade)
     return picture

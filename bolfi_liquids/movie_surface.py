@@ -121,12 +121,10 @@ def _density(view: View, points, seen, grid: _Grid, given) -> NDArray[np.float32
     inside = (side > 0.0) & (up > 0.0) & (up < glass.height)
     cell_side, cell_up = glass.within(view.world(grid.centres() * (1.0, 1.0, -1.0)))
     sd = SMEAR * spacing
-    held = np.clip(0.5 + cell_side / sd / 2.5, 0.0, 1.0) * np.clip(
-        0.5 + cell_up / sd / 2.5, 0.0, 1.0
-    )
-    share = np.where(cell_up < glass.height, np.maximum(held, LEAST_SHARE), 1.0)
-    weights = np.ones(len(points))
-    whole = grid.smeared(seen, weights, spacing) / share
+    held = _share_within(cell_side / sd) * _share_within(cell_up / sd)
+    near = (np.minimum(cell_side, cell_up) > -grid.cell) & (cell_up < glass.height)
+    share = np.where(near, np.maximum(held, LEAST_SHARE), 1.0)
+    whole = grid.smeared(seen, np.ones(len(points)), spacing) / share
     places = ((seen - grid.origin) / grid.cell).T
     found = map_coordinates(whole, places, order=1)
     weights = np.maximum(1.0, ALONE / np.maximum(found, 1e-3))
@@ -138,6 +136,12 @@ def _density(view: View, points, seen, grid: _Grid, given) -> NDArray[np.float32
         beyond = grid.smeared(seen[~inside], weights[~inside], spacing)
     blended = within * whole + (1.0 - within) * beyond
     return np.where(cell_up < glass.height, blended, whole).astype(np.float32)
+
+
+def _share_within(distance: NDArray) -> NDArray:
+    """Share of a smeared particle, `distance` [sd] inside a wall, that is inside it; a ramp near
+    the normal distribution function."""
+    return np.clip(0.5 + distance / 2.5, 0.0, 1.0)
 
 
 def _looked_at(view: View, grid: _Grid, density: NDArray[np.float32]) -> Surface:
@@ -166,13 +170,9 @@ def _looked_at(view: View, grid: _Grid, density: NDArray[np.float32]) -> Surface
     offset = np.array([(up[0, 0] - grid.origin[1]), (right[0] - grid.origin[0])]) / grid.cell
 
     def to_picture(values: NDArray, order: int = 1) -> NDArray[np.float32]:
-        return affine_transform(
-            values.T.astype(np.float32),
-            (-pixel, pixel),
-            offset,
-            (view.height, view.width),
-            order=order,
-        )
+        rows = values.T.astype(np.float32)
+        size = view.height, view.width
+        return affine_transform(rows, (-pixel, pixel), offset, size, order=order)
 
     most, front, thickness = to_picture(most, 3), to_picture(front), to_picture(thickness)
     normal = np.stack([to_picture(slope[..., axis]) for axis in range(3)], axis=-1)

@@ -34,7 +34,7 @@ class View:
         return np.array([[c, s, 0.0], [-s * t, c * t, d], [s * d, -c * d, t]])
 
     def camera(self, points: NDArray) -> NDArray[np.float64]:
-        """Points [..., 3] by how far right, up and towards the camera they are of the centre [m]."""
+        """How far right, up and towards the camera of the centre points [..., 3] are [m]."""
         return (np.asarray(points, np.float64) - self.centre) @ self.axes.T
 
     def world(self, points: NDArray) -> NDArray[np.float64]:
