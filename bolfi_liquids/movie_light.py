@@ -41,7 +41,9 @@ def over(below: Picture, colour: Picture, cover: NDArray) -> Picture:
     return below + cover[..., None] * (colour - below)
 
 
-def through_liquid(view: View, behind: Picture, liquid: Surface | None, stick: Layer | None = None):
+def through_liquid(
+    view: View, behind: Picture, liquid: Surface | None, stick: Layer | None = None
+) -> Picture:
     """The picture with the liquid in it, and a stick that dips into it.
 
     Args:
@@ -50,34 +52,52 @@ def through_liquid(view: View, behind: Picture, liquid: Surface | None, stick: L
         liquid: None if none is seen.
         stick: Seen through half of the liquid where it is behind the surface.
     """
-    if liquid is None:
-        return behind if stick is None else over(behind, stick.colour, stick.cover)
-    bend = BEND * view.scale * np.minimum(liquid.thickness, DEEPEST) * liquid.cover
-    rows, columns = np.indices(liquid.cover.shape, np.float32)
-    # towards the thicker side, as a lens does
-    shifted = rows + bend * liquid.normal[..., 1], columns - bend * liquid.normal[..., 0]
-    rows, columns = (
-        np.rint(np.clip(at, 0, size - 1)).astype(int)
-        for at, size in zip(shifted, liquid.cover.shape, strict=True)
-    )
-
-    depth = liquid.thickness[..., None]
-    passed = behind[rows, columns] * np.exp(-ABSORBED * depth)
-    if stick is not None:
-        dyed = stick.colour[rows, columns] * np.exp(-ABSORBED * depth / 2.0)
-        passed = over(passed, dyed, stick.cover[rows, columns])
-    passed += SCATTERED * (1.0 - np.exp(-SCATTER * depth))
-
-    up, facing = liquid.normal[..., 1:2], np.clip(liquid.normal[..., 2:3], 0.0, 1.0)
-    reflected = LEAST_REFLECTED + (1.0 - LEAST_REFLECTED) * (1.0 - facing) ** 5
-    mirrored = GROUND + (0.5 + 0.5 * up) * (SKY - GROUND)
-    halfway = LAMP / np.linalg.norm(LAMP) + np.array([0.0, 0.0, 1.0], np.float32)
-    halfway /= np.linalg.norm(halfway)
-    glint = np.clip(liquid.normal @ halfway, 0.0, 1.0)[..., None] ** SHINE
-    lit = passed * (0.82 + 0.18 * up) + 0.7 * reflected * (mirrored - passed) + 0.55 * glint
     base = behind if stick is None else over(behind, stick.colour, stick.cover)
-    picture = over(base, np.clip(lit, 0.0, 1.0), liquid.cover)
+    if liquid is None or not liquid.cover.any():
+        return base
+    part = _window(liquid.cover)  # light takes time to work out
+    seen = Surface(*(field[part] for field in liquid))
+    bent = _bent(view, seen, part)
+    depth = seen.thickness[..., None]
+    passed = behind[bent] * np.exp(-ABSORBED * depth)
+    if stick is not None:
+        dyed = stick.colour[bent] * np.exp(-ABSORBED * depth / 2.0)
+        passed = over(passed, dyed, stick.cover[bent])
+    passed += SCATTERED * (1.0 - np.exp(-SCATTER * depth))
+    picture = base.copy()
+    picture[part] = over(base[part], _lit(passed, seen.normal), seen.cover)
     if stick is not None:
         nearer = stick.cover * (stick.front > liquid.front)
         picture = over(picture, stick.colour, nearer)
     return picture
+
+
+def _window(cover: NDArray) -> tuple[slice, slice]:
+    """The rows and columns between the first and the last that are covered."""
+    some = (np.flatnonzero(cover.any(axis=axis)) for axis in (1, 0))
+    rows, columns = (slice(int(at[0]), int(at[-1]) + 1) for at in some)
+    return rows, columns
+
+
+def _bent(view: View, seen: Surface, part: tuple[slice, slice]) -> tuple[NDArray, NDArray]:
+    """Row and column of what is seen through each pixel of a window: towards the thicker side."""
+    bend = BEND * view.scale * np.minimum(seen.thickness, DEEPEST) * seen.cover
+    rows, columns = np.mgrid[part]
+    moved = rows + bend * seen.normal[..., 1], columns - bend * seen.normal[..., 0]
+    row, column = (
+        np.rint(np.clip(at, 0, size - 1)).astype(int)
+        for at, size in zip(moved, (view.height, view.width), strict=True)
+    )
+    return row, column
+
+
+def _lit(passed: Picture, normal: NDArray) -> Picture:
+    """Light that has passed the liquid, with what its surface throws back (Schlick 1994)."""
+    up, facing = normal[..., 1:2], np.clip(normal[..., 2:3], 0.0, 1.0)
+    reflected = LEAST_REFLECTED + (1.0 - LEAST_REFLECTED) * (1.0 - facing) ** 5
+    mirrored = GROUND + (0.5 + 0.5 * up) * (SKY - GROUND)
+    halfway = LAMP / np.linalg.norm(LAMP) + np.array([0.0, 0.0, 1.0], np.float32)
+    halfway /= np.linalg.norm(halfway)
+    glint = np.clip(normal @ halfway, 0.0, 1.0)[..., None] ** SHINE
+    lit = passed * (0.82 + 0.18 * up) + 0.7 * reflected * (mirrored - passed) + 0.55 * glint
+    return np.clip(lit, 0.0, 1.0)

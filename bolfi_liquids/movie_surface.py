@@ -13,11 +13,11 @@ from scipy.ndimage import affine_transform, gaussian_filter, map_coordinates
 
 from .movie_view import View
 
-CELLS = 4.0  # grid cells a particle spacing
+CELLS = 3.5  # grid cells a particle spacing
 SMEAR = 0.6  # sd of a smeared particle, by the spacing
 LEVEL = 0.4  # of the rest density: here is the surface
 ALONE = 0.7  # least density at a particle, so that a single one is a drop of its own volume
-SOFTER = 1.3  # cells
+SOFTER = 1.0  # cells
 LEAST_SHARE = 0.2  # of a smeared particle that is inside the cup's corners
 
 
