@@ -7,7 +7,7 @@ import typer
 
 app = typer.Typer(help="Simulate one stir or one pour, and look at it.", no_args_is_help=True)
 
-Viscosity = Annotated[float, typer.Option(help="Of the liquid [Pa s].")]
+Viscosity = Annotated[float, typer.Option(help="Of the liquid, in Pa s.")]
 Cohesion = Annotated[float, typer.Option(help="Of the liquid, 0 to 1.")]
 Effects = Annotated[
     list[str] | None,
@@ -24,7 +24,7 @@ def stir(  # noqa: PLR0913  one parameter for each option
     viscosity: Viscosity = GLYCERIN["viscosity"],
     cohesion: Cohesion = GLYCERIN["cohesion"],
     density: Annotated[
-        float | None, typer.Option(help="Of the liquid [kg/m³]; else the recording's.")
+        float | None, typer.Option(help="Of the liquid, in kg/m³; else the recording's.")
     ] = None,
     effect: Effects = None,
     particles: Particles = 1000,
@@ -40,8 +40,10 @@ def stir(  # noqa: PLR0913  one parameter for each option
 ) -> None:
     """Stir a liquid along a recorded path.
 
-    Example: `bolfi-liquids simulate stir --viscosity 0.1 --movie oil.mp4`. What --out writes can
-    be calibrated on; it has no noise. Effects in the cameras show there, but not in the movie.
+    Example: `bolfi-liquids simulate stir --viscosity 0.1 --movie oil.mp4`
+
+    What --out writes can be calibrated on; it has no noise. Effects in the
+    cameras show there, but not in the movie.
     """
     import numpy as np
 
@@ -65,15 +67,15 @@ def stir(  # noqa: PLR0913  one parameter for each option
 def pour(  # noqa: PLR0913  one parameter for each option
     viscosity: Viscosity = GLYCERIN["viscosity"],
     cohesion: Cohesion = GLYCERIN["cohesion"],
-    density: Annotated[float, typer.Option(help="Of the liquid [kg/m³].")] = GLYCERIN["density"],
+    density: Annotated[float, typer.Option(help="Of the liquid, in kg/m³.")] = GLYCERIN["density"],
     effect: Effects = None,
     particles: Particles = 664,
     seed: Seed = 0,
     angular_velocity: Annotated[
-        float, typer.Option(help="Of the source about its lip [deg/s].")
+        float, typer.Option(help="Of the source about its lip, in deg/s.")
     ] = 60.0,
     distance: Annotated[
-        float, typer.Option(help="From the lip to the receiver's axis [cm].")
+        float, typer.Option(help="From the lip to the receiver's axis, in cm.")
     ] = 3.0,
     cups: Annotated[
         Path | None, typer.Option(metavar="FILE", help="cups.toml; without it, the bundled one.")
@@ -85,9 +87,10 @@ def pour(  # noqa: PLR0913  one parameter for each option
 ) -> None:
     """Pour a liquid from one cup into another.
 
-    Example: `bolfi-liquids simulate pour --viscosity 20 --angular-velocity 45 --movie gel.gif`.
-    The fluid is simulated down to the receiver's rim; the movie lets it fall on from there, and
-    draws what the receiver holds as a level.
+    Example: `bolfi-liquids simulate pour --viscosity 20 --distance 2 --movie gel.gif`
+
+    The fluid is simulated down to the receiver's rim. The movie lets it fall
+    on from there, and draws what the receiver holds as a level.
     """
     import numpy as np
 

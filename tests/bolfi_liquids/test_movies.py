@@ -290,6 +290,15 @@ def test_what_cannot_be_done_is_told_before_anything_is_simulated(
     assert message in " ".join(result.stderr.split())
 
 
+@pytest.mark.parametrize(
+    ("scene", "units"), [("stir", ["Pa s"]), ("pour", ["Pa s", "deg/s", "cm"])]
+)
+def test_help_tells_the_units_and_an_example(scene, units):
+    said = CliRunner().invoke(app, ["simulate", scene, "--help"]).stdout
+    assert all(f"in {unit}" in said for unit in units)
+    assert f"bolfi-liquids simulate {scene} --viscosity" in said
+
+
 @pytest.mark.slow
 def test_commands_simulate_film_and_write(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
