@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from .movie_surface import Surface
 from .movie_view import View
 
-Picture = NDArray[np.float32]
+Picture = NDArray[np.floating]
 """Red, green and blue from 0 to 1, shape [height, width, 3]."""
 
 ABSORBED = np.array([62.0, 21.0, 7.0], np.float32)  # 1/m: a blue dye, so that depth is seen

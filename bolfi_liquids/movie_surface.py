@@ -33,8 +33,8 @@ class Glass:
 
     radius: float
     height: float
-    floor: NDArray[np.float64]
-    axis: NDArray[np.float64]
+    floor: NDArray
+    axis: NDArray
 
     def within(self, points: NDArray) -> tuple[NDArray, NDArray]:
         """Distance of points [..., 3] from the side, inwards, and from the floor, upwards [m]."""
@@ -54,16 +54,16 @@ class Surface(NamedTuple):
         thickness: Of the liquid along the line of sight [m].
     """
 
-    cover: NDArray[np.float32]
-    front: NDArray[np.float32]
-    normal: NDArray[np.float32]
-    thickness: NDArray[np.float32]
+    cover: NDArray
+    front: NDArray
+    normal: NDArray
+    thickness: NDArray
 
 
 class _Grid(NamedTuple):
     """Cells along right, up and away from the camera; `origin` is the first one's centre [m]."""
 
-    origin: NDArray[np.float64]
+    origin: NDArray
     cell: float
     shape: tuple[int, int, int]
 
@@ -73,9 +73,10 @@ class _Grid(NamedTuple):
         # at multiples of the cell, so that liquid at rest does not shimmer
         low = np.floor((points.min(axis=0) - reach) / cell)
         high = np.ceil((points.max(axis=0) + reach) / cell)
-        return cls(low * cell, cell, tuple(int(n) + 1 for n in high - low))
+        right, up, away = (int(n) + 1 for n in high - low)
+        return cls(low * cell, cell, (right, up, away))
 
-    def smeared(self, points: NDArray, weights: NDArray, spacing: float) -> NDArray[np.float32]:
+    def smeared(self, points: NDArray, weights: NDArray, spacing: float) -> NDArray:
         """Density of weighted particles, 1 where they are `spacing` apart."""
         at = (points - self.origin) / self.cell
         first = np.floor(at).astype(int)
@@ -89,7 +90,7 @@ class _Grid(NamedTuple):
         sd = SMEAR * spacing / self.cell
         return gaussian_filter(density.astype(np.float32), sd, mode="constant", truncate=3.0)
 
-    def centres(self) -> NDArray[np.float32]:
+    def centres(self) -> NDArray:
         axes = (o + self.cell * np.arange(n) for o, n in zip(self.origin, self.shape, strict=True))
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
 
@@ -114,7 +115,7 @@ def surface(view: View, points: NDArray, spacing: float, glass: Glass) -> Surfac
     return _looked_at(view, grid, density)
 
 
-def _density(view: View, points, seen, grid: _Grid, given) -> NDArray[np.float32]:
+def _density(view: View, points, seen, grid: _Grid, given) -> NDArray:
     """Density over the grid: full up to the glass, and none beyond on account of what is inside."""
     spacing, glass = given
     side, up = glass.within(points)
@@ -144,7 +145,7 @@ def _share_within(distance: NDArray) -> NDArray:
     return np.clip(0.5 + distance / 2.5, 0.0, 1.0)
 
 
-def _looked_at(view: View, grid: _Grid, density: NDArray[np.float32]) -> Surface:
+def _looked_at(view: View, grid: _Grid, density: NDArray) -> Surface:
     """The grid's columns, each as one line of sight, brought to the picture's pixels."""
     solid = density > LEVEL
     crossing = solid.any(axis=2)
@@ -159,7 +160,7 @@ def _looked_at(view: View, grid: _Grid, density: NDArray[np.float32]) -> Surface
     front = -(grid.origin[2] + grid.cell * (first - np.clip(step, 0.0, 1.0)))
     # smoother than the surface, or light would show the grid
     soft = gaussian_filter(density, SOFTER, mode="nearest")
-    slope = np.stack([-at(part, first) for part in np.gradient(soft)], axis=-1)
+    slope = np.stack([-at(np.gradient(soft, axis=axis), first) for axis in range(3)], axis=-1)
     slope[..., 2] *= -1.0
     amount = np.clip(density / (2.0 * LEVEL), 0.0, 1.0)
     thickness = grid.cell * amount.sum(axis=2)
@@ -169,15 +170,16 @@ def _looked_at(view: View, grid: _Grid, density: NDArray[np.float32]) -> Surface
     pixel = 1.0 / view.scale / grid.cell  # in cells
     offset = np.array([(up[0, 0] - grid.origin[1]), (right[0] - grid.origin[0])]) / grid.cell
 
-    def to_picture(values: NDArray, order: int = 1) -> NDArray[np.float32]:
+    def to_picture(values: NDArray, order: int = 1) -> NDArray:
         rows = values.T.astype(np.float32)
         size = view.height, view.width
-        return affine_transform(rows, (-pixel, pixel), offset, size, order=order)
+        return affine_transform(rows, (-pixel, pixel), offset, size, order=order)  # type: ignore[arg-type]
 
     most, front, thickness = to_picture(most, 3), to_picture(front), to_picture(thickness)
     normal = np.stack([to_picture(slope[..., axis]) for axis in range(3)], axis=-1)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
     # a pixel is covered by how far inside the contour its centre is, in pixels
-    steep = np.hypot(*np.gradient(most))
+    across, down = np.gradient(most)
+    steep = np.hypot(across, down)
     cover = np.clip((most - LEVEL) / np.maximum(steep, 1e-3) + 0.5, 0.0, 1.0)
     return Surface(cover, front, normal, thickness)

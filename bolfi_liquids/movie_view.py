@@ -48,7 +48,7 @@ class View:
         middle = (self.width - 1) / 2.0, (self.height - 1) / 2.0
         return np.stack([middle[0] + self.scale * right, middle[1] - self.scale * up], axis=-1)
 
-    def metres(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def metres(self) -> tuple[NDArray, NDArray]:
         """How far right [width] and up [height, 1] of the centre each pixel is [m]."""
         right = (np.arange(self.width) - (self.width - 1) / 2.0) / self.scale
         up = ((self.height - 1) / 2.0 - np.arange(self.height)) / self.scale
