@@ -15,7 +15,7 @@ PEERS := .venv-peers
 PEERS_SUPPORTED := import sys, ensurepip; sys.exit(not (3, 9) <= sys.version_info[:2] <= (3, 10))
 PYENV_VERSIONS := $(or $(PYENV_ROOT),$(HOME)/.pyenv)/versions
 
-.PHONY: setup demo test test-slow test-long lint peers clean
+.PHONY: setup demo browser test test-slow test-long lint peers clean
 
 setup: $(INSTALLED)
 
@@ -35,6 +35,12 @@ $(INSTALLED): pyproject.toml constraints.txt
 
 demo: setup
 	$(BIN)/bolfi-liquids demo --out runs/demo
+
+# for the report page's test
+browser: setup
+	@command -v chromium chromium-browser google-chrome >/dev/null \
+	|| { command -v apt-get >/dev/null && apt-get update -qq && apt-get install -y -qq chromium; } \
+	|| $(BIN)/playwright install --with-deps chromium
 
 test: setup
 	$(BIN)/pytest $(SHARED) -m "$(FAST) and not $(ALONE)"
