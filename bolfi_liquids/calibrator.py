@@ -148,7 +148,9 @@ def fit_recordings(  # noqa: PLR0913  what a calibration is made of
     """
     from . import inference
 
-    paper: dict[str, Any] = {**PAPER_RULES, "initial": min(MIN_SIMULATIONS, budget)}
+    options = engine_options(stirring, surrogate)
+    if "initial" in options:
+        options["initial"] = min(options["initial"], budget)
     return inference.fit(
         simulate or stirring.simulate,
         prior,
@@ -156,12 +158,20 @@ def fit_recordings(  # noqa: PLR0913  what a calibration is made of
         budget=budget,
         batch=keep.batch,
         seed=seed,
-        surrogate=surrogate,
-        discrepancy=stirring.discrepancy(),
         bank=keep.bank,
         identity=keep.identity,
-        **(paper if surrogate == "discrepancy" else {}),
+        **options,
     )
+
+
+def engine_options(stirring: Stirring, surrogate: str) -> dict[str, Any]:
+    """Options of `inference.Bolfi` that go with one of `settings.SURROGATES`."""
+    paper = {**PAPER_RULES, "initial": MIN_SIMULATIONS}
+    return {
+        "surrogate": surrogate,
+        "discrepancy": stirring.discrepancy(),
+        **(paper if surrogate == "discrepancy" else {}),
+    }
 
 
 def _open_all(recordings: Source | Sequence[Source]) -> list[Recording]:

@@ -6,22 +6,23 @@ was concluded with each budget comes out.
 
 import json
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrator import fit_recordings
+from ..calibrator import engine_options
 from ..draws import pick_draws
+from ..progress import Simulate
 from ..sbc_pipelines import CameraNoise
 from ..settings import MIN_SIMULATIONS, PAPER_RULES
 from ..stirring import Stirring
 from .truths import DENSITY
 
 if TYPE_CHECKING:
-    from ..inference import Fit, Prior
+    from ..inference import Bolfi, Fit, Prior
     from ..models import Cups
 
 DRAWS = 16  # of each posterior
@@ -51,32 +52,25 @@ class ByStirring:
         return np.stack([self._one(truth, int(seed)) for truth, seed in _each(theta, seeds)])
 
     def _one(self, truth: dict[str, NDArray], seed: int) -> NDArray[np.float64]:
-        from ..inference import SimulationBank
-        from ..kept import Keep
+        from ..inference import Bolfi
 
-        rng = np.random.default_rng(seed)
         clean = self.stirring.simulate(truth, np.array([seed]))[0]
-        observed = NOISE(clean, rng)
-        with SimulationBank(":memory:") as bank:
-            keep = Keep(bank, self.stirring.identity, BATCH)
-
-            def fit(budget: int) -> "Fit":
-                return fit_recordings(
-                    self.stirring,
-                    observed,
-                    self.prior,
-                    keep,
-                    budget=budget,
-                    surrogate=self.surrogate,
-                    seed=seed,
-                )
-
-            return np.stack([concluded(fit(budget), seed) for budget in self.budgets])
+        engine = Bolfi(
+            self.prior,
+            NOISE(clean, np.random.default_rng(seed)),
+            seed=seed,
+            capacity=self.budgets[-1],
+            **engine_options(self.stirring, self.surrogate),
+        )
+        fits = after_each(engine, self.stirring.simulate, self.budgets)
+        return np.stack([concluded(fit, seed) for fit in fits])
 
     @property
     def identity(self) -> str:
         """A text that two equal experiments share."""
-        return json.dumps(["stir", self.surrogate, self.budgets, self.stirring.identity])
+        return json.dumps(
+            ["stir, one search", self.surrogate, self.budgets, self.stirring.identity]
+        )
 
 
 @dataclass(frozen=True)
@@ -102,27 +96,20 @@ class ByPouring:
         return np.stack([self._one(truth, int(seed)) for truth, seed in _each(theta, seeds)])
 
     def _one(self, truth: dict[str, NDArray], seed: int) -> NDArray[np.float64]:
-        from ..inference import SimulationBank, fit
+        from ..inference import Bolfi
 
-        observed = self._spilled(truth, np.array([seed]))[0]
         rules: dict[str, Any] = {**PAPER_RULES}
-        with SimulationBank(":memory:") as bank:
-
-            def fitted(budget: int) -> "Fit":
-                return fit(
-                    self._spilled,
-                    self.prior,
-                    observed,
-                    budget=budget,
-                    batch=BATCH,
-                    seed=seed,
-                    initial=min(MIN_SIMULATIONS, budget),
-                    discrepancy=_squared,
-                    bank=bank,
-                    **rules,
-                )
-
-            return np.stack([concluded(fitted(budget), seed) for budget in self.budgets])
+        engine = Bolfi(
+            self.prior,
+            self._spilled(truth, np.array([seed]))[0],
+            seed=seed,
+            capacity=self.budgets[-1],
+            initial=MIN_SIMULATIONS,
+            discrepancy=_squared,
+            **rules,
+        )
+        fits = after_each(engine, self._spilled, self.budgets)
+        return np.stack([concluded(fit, seed) for fit in fits])
 
     def _spilled(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         """Fraction that the training pour spills, shape (B, 1)."""
@@ -136,10 +123,29 @@ class ByPouring:
     def identity(self) -> str:
         """A text that two equal experiments share."""
         action = [self.angular_velocity, self.distance]
-        return json.dumps(["pour", action, self.budgets, self.cups.settings()], sort_keys=True)
+        return json.dumps(
+            ["pour, one search", action, self.budgets, self.cups.settings()], sort_keys=True
+        )
 
 
 Learner = ByStirring | ByPouring
+
+
+def after_each(engine: "Bolfi", simulate: Simulate, budgets: Sequence[int]) -> "Iterator[Fit]":
+    """What one search concludes after each number of simulations, ascending.
+
+    Args:
+        engine: Told of nothing yet.
+        simulate: Theta and seeds -> signals.
+        budgets: Simulations in all.
+    """
+    rng = np.random.default_rng([engine.seed, 1])
+    for budget in budgets:
+        while (left := budget - engine.told) > 0:
+            theta = engine.ask(min(BATCH, left))
+            seeds = rng.integers(2**31, size=min(BATCH, left))
+            engine.tell(theta, simulate(theta, seeds), seeds)
+        yield engine.fit()
 
 
 def concluded(fit: "Fit", seed: int) -> NDArray[np.float64]:

@@ -40,7 +40,13 @@ def adhesion(workshop: Workshop) -> Drawn:
         for place, (label, colour) in enumerate(CASES.values()):
             own = 100.0 * spilled[:, place]
             axes.bar(place, own.mean(), 0.7, color=colour, alpha=0.6, label=label)
-            axes.plot(place + np.linspace(-0.2, 0.2, len(own)), own, ".", color=colour, ms=6)
+            axes.plot(
+                place + 0.08 * (np.arange(len(own)) - (len(own) - 1) / 2),
+                own,
+                ".",
+                color=colour,
+                ms=6,
+            )
         axes.set_xticks([])
         axes.set_ylabel("spilled [%]")
         figure.legend(loc="outside lower center", ncols=2)

@@ -34,7 +34,7 @@ def strokes(workshop: Workshop) -> Drawn:
         left.set_yticks(FEW_PERCENT, map(str, FEW_PERCENT))
         left.set(ylim=(0, None), ylabel="spilled [%]")
         _by_liquid(right, np.exp(width.to_numpy()), study)
-        right.set(ylim=(1, None), ylabel="sd of the viscosity's posterior, as a factor")
+        right.set(ylim=(1, None), ylabel="posterior sd of the viscosity, a factor")
         figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return Drawn(study, figure, _says(study, spilled.to_numpy(), workshop.scale.few))
 

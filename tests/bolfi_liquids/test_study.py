@@ -1,0 +1,32 @@
+"""One search that is looked at after several numbers of simulations."""
+
+import numpy as np
+import numpyro.distributions as dist
+
+from bolfi_liquids import inference
+from bolfi_liquids.reproduction.calibrations import after_each
+from bolfi_liquids.settings import MIN_SIMULATIONS, PAPER_RULES
+
+
+def line(theta, seeds):
+    """A slope of 2 x, with noise that the seed alone decides."""
+    noise = np.stack([np.random.default_rng(int(seed)).normal(0.0, 0.01, 5) for seed in seeds])
+    return 2.0 * np.asarray(theta["x"])[:, None] * np.linspace(0.0, 1.0, 5) + noise
+
+
+def engine():
+    prior = inference.Prior({"x": dist.Uniform(0.0, 1.0)})
+    observed = 0.6 * np.linspace(0.0, 1.0, 5)
+    return inference.Bolfi(prior, observed, seed=3, capacity=12, initial=MIN_SIMULATIONS,
+                           surrogate="discrepancy", **PAPER_RULES)  # fmt: skip
+
+
+def test_each_budget_concludes_from_as_many_simulations():
+    fits = list(after_each(engine(), line, (5, 9, 12)))
+    assert [fit.simulations.sizes["simulation"] for fit in fits] == [5, 9, 12]
+    assert abs(fits[-1].best["x"] - 0.3) < 0.05
+
+
+def test_a_larger_budget_does_not_change_what_a_smaller_one_concludes():
+    few, many = (list(after_each(engine(), line, budgets))[0] for budgets in ((9,), (9, 12)))
+    assert few.best == many.best
