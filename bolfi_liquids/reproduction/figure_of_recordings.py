@@ -1,14 +1,18 @@
 """From recordings of the independent solver to what it spilled itself."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator
 
 from ..bundled import POURED, bundled_pours
-from ..drawing import GREY, PALETTE, new_figure, styled
+from ..drawing import GREY, INK, PALETTE, new_figure, styled
 from ..pouring import choose_pour
 from ..prior import default_prior
+from ..results import read_tree
+from ..run_directory import POUR
+from ..spillage import Surface
 from .decisions import decide_unknowing
 from .figure import Drawn
 from .workshop import Workshop
@@ -46,6 +50,12 @@ def between(table: "PourTable", rate: float, distance: float) -> tuple[float, fl
     return value, float(np.sqrt(np.nanmean(np.square(missed))))
 
 
+def _least(run: Path, risk: str) -> dict[str, float]:
+    """The action that another measure of risk would have chosen among those that were tried."""
+    actions = read_tree(run / POUR, fix="run the figure again")["actions"]
+    return Surface(*(actions[name].to_numpy() for name in Surface._fields)).least(risk)
+
+
 def recordings(workshop: Workshop) -> Drawn:
     """Chosen from a recording of stirring alone, spilled by the other solver."""
     from xarray import Dataset
@@ -55,7 +65,8 @@ def recordings(workshop: Workshop) -> Drawn:
     unknowing = action["angular_velocity"], action["distance"]
     columns = [(n, s) for s in scale.surrogates for n in scale.recorded]
     shape = len(POURED), len(columns)
-    spilled, plug_in, best, blind = np.empty(shape), np.empty(shape), [], []
+    spilled, plug_in, cautious = np.empty(shape), np.empty(shape), np.empty(shape)
+    best, blind = [], []
     lines = ["spilled by the other solver [%], its table interpolated:"]
     for row, liquid in enumerate(POURED):
         table = bundled_pours(liquid)
@@ -74,12 +85,15 @@ def recordings(workshop: Workshop) -> Drawn:
             plug_in[row, column], _ = between(
                 table, pour.plug_in.angular_velocity, pour.plug_in.distance
             )
+            worst = _least(pour.path, "cvar")
+            cautious[row, column], _ = between(table, worst["angular_velocity"], worst["distance"])
             lines.append(
                 f"  {liquid}, N = {budget}, {surrogate}: {100 * spilled[row, column]:.1f} "
                 f"(error of interpolation {100 * error:.1f}) at "
                 f"{np.degrees(pour.chosen.angular_velocity):.0f} deg/s, "
                 f"{100 * pour.chosen.distance:.1f} cm; at theta* alone "
-                f"{100 * plug_in[row, column]:.1f}; table's best {100 * best[-1]:.1f}; "
+                f"{100 * plug_in[row, column]:.1f}, by CVaR {100 * cautious[row, column]:.1f}; "
+                f"table's best {100 * best[-1]:.1f}; "
                 f"liquid unknown {100 * blind[-1]:.1f}"
             )
     labels = [f"{s}, N = {n}" for n, s in columns]
@@ -95,6 +109,11 @@ def recordings(workshop: Workshop) -> Drawn:
         for at, (label, values, colour) in enumerate(bars):
             x = np.arange(len(POURED)) + width * (at - (len(bars) - 1) / 2)
             axes.bar(x, 100 * values, 0.9 * width, color=colour, label=label)
+            if at >= 2:
+                axes.plot(x, 100 * plug_in[:, at - 2], "x", color=INK, ms=5,
+                          label="best at θ* alone" if at == 2 else None)  # fmt: skip
+                axes.plot(x, 100 * cautious[:, at - 2], "^", color=INK, mfc="none", ms=5,
+                          label="by CVaR" if at == 2 else None)  # fmt: skip
         axes.set_xticks(range(len(POURED)), POURED)
         axes.set_ylabel("spilled in the other solver [%]")
         figure.legend(loc="outside lower center", ncols=3)
@@ -103,6 +122,7 @@ def recordings(workshop: Workshop) -> Drawn:
         {
             "spilled": (dims, spilled),
             "plug_in": (dims, plug_in),
+            "cvar": (dims, cautious),
             "best": ("liquid", best),
             "unknown": ("liquid", blind),
         },

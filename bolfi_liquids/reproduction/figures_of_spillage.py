@@ -92,7 +92,9 @@ def liquids(workshop: Workshop) -> Drawn:
         ("discrepancy", "plug_in"),
         ("signal", "plug_in"),
         ("signal", "mean"),
+        ("signal", "cvar"),
         ("pour", "plug_in"),
+        ("pour", "mean"),
     ]
     with styled():
         figure = new_figure(8.6, 3.6)
@@ -102,10 +104,15 @@ def liquids(workshop: Workshop) -> Drawn:
                 chosen = study["spilled"].sel(learned_by=method, rule=rule, budget=budget)
                 for place, liquid in enumerate(LIQUIDS):
                     percent = 100.0 * chosen.to_numpy()[study["liquid"].to_numpy() == liquid]
-                    x = place + 0.2 * (at - (len(rules) - 1) / 2)
+                    x = place + 0.8 / len(rules) * (at - (len(rules) - 1) / 2)
                     label = SHOWN[method, rule] if place == 0 else None
                     axes.bar(
-                        x, np.nanmean(percent), 0.18, color=PALETTE[at], alpha=0.6, label=label
+                        x,
+                        np.nanmean(percent),
+                        0.7 / len(rules),
+                        color=PALETTE[at],
+                        alpha=0.6,
+                        label=label,
                     )
                     axes.plot(np.full(len(percent), x), percent, ".", color=PALETTE[at], ms=4)
             axes.set_xticks(range(len(LIQUIDS)), list(LIQUIDS))
