@@ -12,6 +12,7 @@ from .criticism import is_criticised
 from .criticism_figures import held_out_plot, pour_residual_plot, residual_plot, stroke_plot
 from .drawing import to_svg
 from .effect_figures import coefficient_plot, confusion_plot, score_plot
+from .readouts import lines_of, to_chart
 from .results import read_tree
 from .run_directory import CRITICISM
 from .summary import read_summary
@@ -43,7 +44,7 @@ def criticism_chapter(
         calibrated: "calibrate" of summary.json.
     """
     stirs, accepted = tree.children["stirs"], section["accepted"]
-    held = held_out_of(stirs)
+    held, residual = held_out_of(stirs), residual_plot(stirs)
     return {
         "results": _results(section, calibrated),
         "superseded": narrative.superseded_sentence(section),
@@ -55,7 +56,7 @@ def criticism_chapter(
         "untested_sentence": narrative.untested_sentence(section),
         "suggestion_sentence": narrative.suggestion_sentence(section),
         "noise_sentence": narrative.noise_sentence(section),
-        "residual": to_svg(residual_plot(stirs), "residual"),
+        "residual": to_chart(residual, "residual", lines_of(residual)),
         "strokes": to_svg(stroke_plot(stirs), "strokes"),
         "coefficient": to_svg(coefficient_plot(tree, accepted), "coefficient") if accepted else "",
         "held_out": "" if held is None else to_svg(held_out_plot(stirs), "held-out"),

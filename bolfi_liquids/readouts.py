@@ -66,6 +66,18 @@ def field(
     return Readout(axes, content)
 
 
+def lines_of(figure: "Figure") -> list[Readout]:
+    """Of every axes the labelled lines that share their x."""
+    found = []
+    for axes in figure.axes:
+        labelled = [line for line in axes.lines if not str(line.get_label()).startswith("_")]
+        if labelled:
+            x = np.asarray(labelled[0].get_xdata())
+            shared = [line for line in labelled if np.array_equal(line.get_xdata(), x)]
+            found.append(series(axes, x, {str(k.get_label()): k.get_ydata() for k in shared}))
+    return found
+
+
 def to_chart(figure: "Figure", name: str, readouts: Sequence[Readout]) -> str:
     """A figure as SVG, followed by what its script says.
 

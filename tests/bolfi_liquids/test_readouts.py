@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bolfi_liquids.drawing import new_figure, plain_log_ticks, styled
-from bolfi_liquids.readouts import field, marks, script_json, series, to_chart
+from bolfi_liquids.readouts import field, lines_of, marks, script_json, series, to_chart
 
 
 def parts(chart):
@@ -44,6 +44,16 @@ def test_a_marks_place_is_where_matplotlib_has_drawn_it(log, nested):
     ((x, y),) = re.findall(r'<use [^>]*x="([\d.]+)" y="([\d.]+)" style="fill: #[^"]*', svg)[-1:]
     assert at(panel, 0.3, 2.0) == pytest.approx((float(x), float(y)), abs=0.05)
     assert panel["marks"] == [[0.3, 2.0, "here"]]
+
+
+def test_labelled_lines_are_said_as_they_are_drawn():
+    figure = new_figure(2.0, 2.0)
+    axes = figure.subplots()
+    axes.plot([0.0, 1.0], [2.0, 3.0], label="seen")
+    axes.axhline(0.0)
+    (readout,) = lines_of(figure)
+    assert readout.content["at"] == [0.0, 1.0]
+    assert readout.content["lines"] == [{"label": "seen", "y": [2.0, 3.0]}]
 
 
 def test_values_that_are_missing_are_null():
