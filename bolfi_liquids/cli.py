@@ -6,8 +6,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from . import __version__, cli_check, cli_import, cli_record, cli_reproduce, cli_rig, cli_simulate
+from . import (
+    __version__,
+    cli_check,
+    cli_guide,
+    cli_import,
+    cli_record,
+    cli_reproduce,
+    cli_rig,
+    cli_simulate,
+)
 from .cli_errors import OneLineErrors
+from .cli_examples import examples, session
 from .cli_rig import RigOption
 from .settings import (
     RISKS,
@@ -26,15 +36,24 @@ RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="Directory of a
 app = typer.Typer(
     cls=OneLineErrors,
     help="Learn a liquid by stirring it, then pour it without spilling.",
+    epilog=session(
+        "calibrate stir.nc --out runs/mine",
+        "pour runs/mine",
+        "report runs/mine",
+        then="Without a recording, try `bolfi-liquids demo`; `bolfi-liquids guide` explains files, "
+        "priors and messages.",
+    ),
+    rich_markup_mode="markdown",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
 app.add_typer(cli_check.app, name="check")
 app.add_typer(cli_rig.app, name="rig")
 app.add_typer(cli_simulate.app, name="simulate")
-app.command()(cli_record.record)
-app.command()(cli_reproduce.reproduce)
-app.command("import")(cli_import.import_table)
+app.command(epilog=cli_record.EPILOG)(cli_record.record)
+app.command(epilog=cli_reproduce.EPILOG)(cli_reproduce.reproduce)
+app.command("import", epilog=cli_import.EPILOG)(cli_import.import_table)
+app.command(epilog=cli_guide.EPILOG)(cli_guide.guide)
 
 
 def _print_version(asked: bool) -> None:
@@ -53,7 +72,12 @@ def _global_options(
     """`--debug` is read by `OneLineErrors`."""
 
 
-@app.command()
+@app.command(
+    epilog=examples(
+        "calibrate stir.nc --budget 20 --out runs/mine",
+        "calibrate stir.nc --budget 20 --out runs/mine --resume",
+    )
+)
 def calibrate(  # noqa: PLR0913  one parameter for each option
     recordings: Annotated[
         list[Path], typer.Argument(metavar="RECORDING...", help="NetCDF files, of one liquid.")
@@ -101,7 +125,12 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
     _print_next(out, "criticise", "pour")
 
 
-@app.command()
+@app.command(
+    epilog=examples(
+        "criticise runs/mine --held-out other_speed.nc --baseline clean.nc",
+        "criticise runs/mine --accept camera_delay",
+    )
+)
 def criticise(  # noqa: PLR0913  one parameter for each option
     run: RunArgument,
     held_out: Annotated[
@@ -155,7 +184,9 @@ def criticise(  # noqa: PLR0913  one parameter for each option
     _print_next(run, "pour")
 
 
-@app.command()
+@app.command(
+    epilog=examples("pour runs/mine --cups cups.toml", "pour runs/mine --execute --emulator")
+)
 def pour(  # noqa: PLR0913  one parameter for each option
     run: RunArgument,
     cups: Annotated[
@@ -202,7 +233,7 @@ def pour(  # noqa: PLR0913  one parameter for each option
     _print_next(run, "report")
 
 
-@app.command()
+@app.command(epilog=examples("report runs/mine", "report runs/mine --still"))
 def report(
     run: RunArgument,
     moving: Annotated[
@@ -219,7 +250,7 @@ def report(
     typer.echo(write_report(run, moving=moving))
 
 
-@app.command()
+@app.command(epilog=examples("demo --out runs/demo"))
 def demo(
     out: Annotated[Path, typer.Option(metavar="RUN", help="Directory of the run.")] = Path(
         "runs/demo"

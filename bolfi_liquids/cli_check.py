@@ -6,12 +6,13 @@ from typing import Annotated
 import typer
 
 from .cli_errors import FAILED
+from .cli_examples import examples
 from .settings import SbcSettings
 
 app = typer.Typer(help="Long validation runs; a killed one goes on.", no_args_is_help=True)
 
 
-@app.command()
+@app.command(epilog=examples("check physics --case couette", "check physics --out runs/physics"))
 def physics(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Directory of the results.")] = Path(
         "runs/physics"
@@ -39,7 +40,9 @@ def physics(
         raise typer.Exit(FAILED)
 
 
-@app.command()
+@app.command(
+    epilog=examples("check sbc --out runs/sbc", "check sbc --runs 20 --sequential 0 --design 64")
+)
 def sbc(  # noqa: PLR0913  one parameter for each option
     out: Annotated[Path, typer.Option(metavar="DIR", help="Directory of the results.")] = Path(
         "runs/sbc"

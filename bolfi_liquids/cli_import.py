@@ -5,6 +5,10 @@ from typing import Annotated
 
 import typer
 
+from .cli_examples import examples
+
+EPILOG = examples("import --template columns.toml", "import stir.csv --columns columns.toml")
+
 
 def import_table(
     table: Annotated[
@@ -22,8 +26,7 @@ def import_table(
 ) -> None:
     """Make a recording of a table of numbers, whatever its columns and units.
 
-    First `bolfi-liquids import --template columns.toml`; change that file; then
-    `bolfi-liquids import stir.csv --columns columns.toml`.
+    First write a template; change it to say what stands where in your table; then import.
     """
     from .table_import import import_table as run_import
     from .table_import import outline, write_template

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .cli_errors import FAILED
+from .cli_examples import examples
 from .cli_rig import RigOption
 from .errors import InputError
 from .online_settings import OnlineSettings
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
     from .online_recorder import OnlineChoice
 
 OUT = Path("runs/recording")
+EPILOG = examples(
+    "record --emulator --out runs/stir",
+    "record --rig rig.toml --out runs/stir --arm",
+)
 
 
 def record(  # noqa: PLR0913  one parameter for each option

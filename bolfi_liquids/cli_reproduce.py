@@ -5,6 +5,10 @@ from typing import Annotated
 
 import typer
 
+from .cli_examples import examples
+
+EPILOG = examples("reproduce --quick", "reproduce inclination posterior --out runs/reproduce")
+
 
 def reproduce(
     figures: Annotated[
@@ -19,12 +23,16 @@ def reproduce(
 ) -> None:
     """Draw the paper's figures, and those of what it left open.
 
-    inclination, posterior: what stirring shows and teaches, on recordings of another solver;
-    recordings: what is chosen from them, and what that solver spilled; geometry: over lip heights
-    and receivers, where knowing the liquid matters; spillage, liquids: against the number of
-    simulations and by liquid, calibrated by stirring and by pouring; decision: expected spillage
-    against the plug-in; surrogates: the signal against the paper's. What has finished in DIR is
-    kept: a killed run goes on with the same command.
+    - `inclination`: recorded stirs, and what the calibrated simulator predicts
+    - `posterior`: what stirring teaches, on recordings of another solver
+    - `recordings`: what is poured after each of them, and what that solver spilled
+    - `geometry`: over lip heights and receivers, where knowing the liquid matters
+    - `spillage`: against the number of simulations, by stirring and by pouring
+    - `liquids`: the same by liquid
+    - `decision`: expected spillage against the plug-in
+    - `surrogates`: the emulated inclination against the paper's discrepancy
+
+    What has finished in DIR is kept: a killed run goes on with the same command.
     """
     from .reproduction.reproduce import reproduce as draw
 

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from .cli_errors import FAILED
+from .cli_examples import examples
 
 RigOption = Annotated[
     Path | None, typer.Option("--rig", metavar="FILE", help="rig.toml; without it, the bundled.")
@@ -14,7 +15,7 @@ RigOption = Annotated[
 app = typer.Typer(help="The robot and the cameras.", no_args_is_help=True)
 
 
-@app.command()
+@app.command(epilog=examples("rig check --rig rig.toml"))
 def check(rig: RigOption = None) -> None:
     """Tell what of the rig works and what is missing; moves nothing.
 
@@ -32,7 +33,7 @@ def check(rig: RigOption = None) -> None:
         raise typer.Exit(FAILED)
 
 
-@app.command("template")
+@app.command("template", epilog=examples("rig template rig.toml"))
 def template(
     out: Annotated[Path, typer.Argument(metavar="FILE", help="To be written.")] = Path("rig.toml"),
 ) -> None:
@@ -42,7 +43,13 @@ def template(
     typer.echo(f"{write_template(out)}: change it, then: bolfi-liquids rig check --rig {out}")
 
 
-@app.command("calibrate-cameras")
+@app.command(
+    "calibrate-cameras",
+    epilog=examples(
+        "rig calibrate-cameras --print-board board.png",
+        "rig calibrate-cameras --rig rig.toml --view xz",
+    ),
+)
 def calibrate_cameras(  # noqa: PLR0913  one parameter for each option
     rig: RigOption = None,
     view: Annotated[str, typer.Option(metavar="xz|yz", help="Which camera.")] = "xz",
@@ -73,7 +80,7 @@ def calibrate_cameras(  # noqa: PLR0913  one parameter for each option
         typer.echo(line)
 
 
-@app.command()
+@app.command(epilog=examples("rig emulate --viscosity 1"))
 def emulate(
     rig: RigOption = None,
     address: Annotated[
