@@ -1,0 +1,204 @@
+"""Messages that troubleshooting.md quotes are those that people get."""
+
+import re
+import shutil
+import sys
+from importlib.resources import files
+
+import numpy as np
+import pytest
+import xarray
+from typer.testing import CliRunner
+
+from bolfi_liquids.cli import app
+from bolfi_liquids.guide import read_page
+
+HEADING = re.compile(r"^### (`+) ?(?P<message>.*?) ?\1$", re.MULTILINE)
+QUOTED = [match["message"] for match in HEADING.finditer(read_page("troubleshooting"))]
+
+
+def shifted(name, offset):
+    return lambda stir: stir.assign({name: stir[name] + offset})
+
+
+def unseen(name, start, stop):
+    def without(stir):
+        stir[name][start:stop] = np.nan
+        return stir
+
+    return without
+
+
+def in_degrees(stir):
+    attributes = stir["inclination_xz"].attrs
+    return stir.assign(inclination_xz=np.degrees(stir["inclination_xz"]).assign_attrs(attributes))
+
+
+def in_millimetres(stir):
+    stir["x"].attrs["units"] = "mm"
+    return stir
+
+
+def in_milliseconds(stir):
+    attributes = stir["time"].attrs
+    return stir.assign_coords(time=(1000.0 * stir["time"]).assign_attrs(attributes))
+
+
+def without_density(stir):
+    del stir.attrs["liquid_density"]
+    return stir
+
+
+SPOILED = {
+    "x: missing": lambda stir: stir.rename(x="px"),
+    "attribute liquid_density: missing": without_density,
+    "looks like degrees": in_degrees,
+    "has units 'mm'": in_millimetres,
+    "looks like milliseconds": in_milliseconds,
+    "does not follow": lambda stir: stir.isel(time=slice(None, None, -1)),
+    "NaN for 1.03 s": unseen("inclination_yz", 40, 70),
+    "NaN in 181 of 201": unseen("inclination_yz", 20, None),
+    "no gripper position": unseen("x", 40, 60),
+    "leaves the cup": shifted("x", 0.05),
+    "through the floor": shifted("z", -0.05),
+    "floats up": lambda stir: stir.assign_attrs(stick_density=300.0),
+    "is not below cup_height": lambda stir: stir.assign_attrs(fill=0.08),
+}
+
+
+@pytest.fixture
+def told(tmp_path, monkeypatch):
+    """Runs a command where a recording stir.nc lies; what it says last."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "stir.nc").write_bytes(
+        (files("bolfi_liquids.data") / "glycerin_v10.nc").read_bytes()
+    )
+
+    def run(command):
+        result = CliRunner().invoke(app, command.split())
+        return (result.stderr.strip().splitlines() or [""])[-1]
+
+    return run
+
+
+@pytest.fixture
+def run(calibration, told, tmp_path):
+    """A copy of a calibrated run, runs/mine."""
+    return shutil.copytree(calibration.path, tmp_path / "runs" / "mine")
+
+
+@pytest.mark.parametrize("part", SPOILED)
+def test_refused_recordings(told, tmp_path, part):
+    whole = xarray.load_dataset(tmp_path / "stir.nc", decode_times=False)
+    SPOILED[part](whole).to_netcdf(tmp_path / "stir.nc")
+    said = told("calibrate stir.nc --out runs/mine")
+    assert part in said
+    assert said in QUOTED
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "calibrate stir.nc",
+        "calibrat",
+        "calibrate stir.nc stir.nc --out runs/mine",
+        "calibrate stir.nc --particles 10 --out runs/mine",
+        "record --arm --out runs/stir --rig video.toml",
+        "record --rig slow.toml",
+        "record --out runs/stir",
+    ],
+)
+def test_refused_commands(told, tmp_path, command):
+    bundled = (files("bolfi_liquids.hardware.data") / "rig.toml").read_text(encoding="utf-8")
+    video = re.sub(r"^source = .*$", 'source = "video.avi"', bundled, flags=re.MULTILINE)
+    (tmp_path / "video.toml").write_text(video, encoding="utf-8")
+    slow = bundled.replace("\nspeed = 0.15", "\nspeed = 0.05")
+    (tmp_path / "slow.toml").write_text(slow, encoding="utf-8")
+    (tmp_path / "runs" / "stir").mkdir(parents=True)
+    if command.endswith("--out runs/stir"):
+        (tmp_path / "runs" / "stir" / "rig.json").touch()
+    assert told(command).replace("slow.toml", "rig.toml") in QUOTED
+
+
+def test_missing_and_damaged_files(told, tmp_path):
+    (tmp_path / "stir.nc").write_text("time,x\n", encoding="utf-8")
+    assert told("calibrate stir.nc --out runs/mine") in QUOTED
+    (tmp_path / "stir.nc").unlink()
+    assert told("calibrate stir.nc --out runs/mine") in QUOTED
+
+
+def test_wrong_maps_of_a_table(told, tmp_path):
+    (tmp_path / "stir.csv").write_text("t,tcp_x,tcp_y,tcp_z,angle_xz,angle_yz\n", encoding="utf-8")
+    assert told("import --template columns.toml") == ""
+    assert told("import --template columns.toml") in QUOTED
+    path = tmp_path / "columns.toml"
+    template = path.read_text(encoding="utf-8")
+    for right, wrong in (
+        ('"tcp_x"', '"tool_x"'),
+        ('"tcp_x", unit = "mm"', '"tcp_x", unit = "inch"'),
+    ):
+        path.write_text(template.replace(right, wrong), encoding="utf-8")
+        assert told("import stir.csv --columns columns.toml") in QUOTED
+
+
+def test_runs_that_cannot_go_on(told, run, calibration):
+    assert told("calibrate stir.nc --out runs/mine") in QUOTED
+    options = "--budget 30 --batch 2 --seed 3 --particles 200 --resume"
+    assert told(f"calibrate stir.nc --out runs/mine {options}") in QUOTED
+    (run / "posterior.nc").write_bytes(b"cut off")
+    assert told("report runs/mine") in QUOTED
+    (run / "posterior.nc").unlink()
+    assert told("report runs/mine") in QUOTED
+    (run / "run.toml").unlink()
+    assert told("report runs/mine") in QUOTED
+    assert told("calibrate stir.nc --out runs/mine") in QUOTED
+
+
+def test_a_run_without_a_pour_executes_none(told, run):
+    (run / "pour.nc").unlink(missing_ok=True)
+    assert told("pour runs/mine --execute") in QUOTED
+
+
+def test_criticism_without_proof_or_with_none(told, run, criticism_section):
+    from bolfi_liquids.criticism_narrative import NO_BASELINE, verdict_sentence
+
+    copy = next((run / "recordings").iterdir())
+    shutil.copy(copy, "stir.nc")
+    assert told("criticise runs/mine --held-out stir.nc") in QUOTED
+    assert NO_BASELINE in QUOTED
+    said = verdict_sentence(criticism_section | {"held_out": 0})
+    assert any(said.endswith(message) for message in QUOTED)
+
+
+def test_cups_in_millimetres(told, run, tmp_path):
+    good = (files("bolfi_liquids.data") / "cups.toml").read_text(encoding="utf-8")
+    (tmp_path / "cups.toml").write_text(
+        good.replace("radius = 0.028", "radius = 28.0"), encoding="utf-8"
+    )
+    assert told("pour runs/mine --cups cups.toml") in QUOTED
+
+
+def test_missing_extra(told, monkeypatch):
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    assert told("rig calibrate-cameras --print-board board.png") in QUOTED
+
+
+def test_warnings_of_the_engine():
+    from bolfi_liquids.inference.emulator_checks import OUTSIDE
+
+    from bolfi_liquids import narrative
+
+    assert f"EmulatorWarning: {OUTSIDE}" in QUOTED
+    section = {"rhat_max": 1.024, "ess_min": 80.0, "divergences": 0, "n_draws": 80}
+    assert narrative.sampler_sentence(section) in QUOTED
+    said = narrative.floor_sentence({"below_least_viscosity": 0.34, "least_viscosity": 0.0494})
+    assert any(said.startswith(message) for message in QUOTED)
+
+
+def test_there_are_causes_and_cures():
+    page = read_page("troubleshooting")
+    assert len(QUOTED) >= 20
+    for before, after in zip(QUOTED, [*QUOTED[1:], None], strict=True):
+        rest = page.split(before, 1)[1]
+        entry = rest if after is None else rest.split(after, 1)[0]
+        assert len(re.sub(r"[`#\s]", "", entry)) > 5, before
