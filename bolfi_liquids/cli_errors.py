@@ -31,6 +31,8 @@ class OneLineErrors(TyperGroup):
         except TyperException as err:
             _say(f"error: {_one_line(err.format_message())}; see --help")
             raise typer.Exit(USAGE_ERROR) from None
+        except BrokenPipeError:  # who reads has read enough, as `head` does: typer ends quietly
+            raise
         except (ValueError, OSError, RuntimeError, ImportError, sqlite3.Error) as err:
             if ctx.params.get("debug"):
                 raise
