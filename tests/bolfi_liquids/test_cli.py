@@ -156,6 +156,15 @@ def test_interruption_says_how_to_go_on(monkeypatch, tmp_path):
     assert f"bolfi-liquids calibrate '{recording}' --out {tmp_path} --resume" in result.stderr
 
 
+@pytest.mark.parametrize("arguments", [["--help"], ["guide"], ["guide", "files"]])
+def test_a_reader_that_has_read_enough_is_no_error(arguments):
+    code = "from bolfi_liquids.cli import main; main()"
+    command = [sys.executable, "-c", code, *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.close()  # as `head` does
+        assert process.stderr.read() == b""
+
+
 def test_version():
     result = CliRunner().invoke(app, ["--version"])
     assert result.stdout == f"bolfi-liquids {bl.__version__}\n"
