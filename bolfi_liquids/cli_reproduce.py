@@ -31,6 +31,8 @@ def reproduce(
     - `liquids`: the same by liquid
     - `decision`: expected spillage against the plug-in
     - `surrogates`: the emulated inclination against the paper's discrepancy
+    - `strokes`: how many strokes of the stirring are enough
+    - `adhesion`: what sticking to the cup costs, and what criticism wins back
 
     What has finished in DIR is kept: a killed run goes on with the same command.
     """

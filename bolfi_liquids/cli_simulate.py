@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from .cli_examples import examples
+
 app = typer.Typer(help="Simulate one stir or one pour, and look at it.", no_args_is_help=True)
 
 Viscosity = Annotated[float, typer.Option(help="Of the liquid, in Pa s.")]
@@ -19,7 +21,7 @@ Movie = Annotated[Path | None, typer.Option(metavar="FILE", help="Show it: .mp4,
 GLYCERIN = {"viscosity": 1.0, "cohesion": 0.2, "density": 1260.0}
 
 
-@app.command()
+@app.command(epilog=examples("simulate stir --viscosity 0.1 --movie oil.mp4"))
 def stir(  # noqa: PLR0913  one parameter for each option
     viscosity: Viscosity = GLYCERIN["viscosity"],
     cohesion: Cohesion = GLYCERIN["cohesion"],
@@ -39,8 +41,6 @@ def stir(  # noqa: PLR0913  one parameter for each option
     ] = None,
 ) -> None:
     """Stir a liquid along a recorded path.
-
-    Example: `bolfi-liquids simulate stir --viscosity 0.1 --movie oil.mp4`
 
     What --out writes can be calibrated on; it has no noise. Effects in the
     cameras show there, but not in the movie.
@@ -63,7 +63,11 @@ def stir(  # noqa: PLR0913  one parameter for each option
     _tell_files(movie, out)
 
 
-@app.command()
+@app.command(
+    epilog=examples(
+        "simulate pour --viscosity 20 --distance 2 --effect adhesion=0.3 --movie gel.gif"
+    )
+)
 def pour(  # noqa: PLR0913  one parameter for each option
     viscosity: Viscosity = GLYCERIN["viscosity"],
     cohesion: Cohesion = GLYCERIN["cohesion"],
@@ -86,8 +90,6 @@ def pour(  # noqa: PLR0913  one parameter for each option
     ] = None,
 ) -> None:
     """Pour a liquid from one cup into another.
-
-    Example: `bolfi-liquids simulate pour --viscosity 20 --distance 2 --movie gel.gif`
 
     The fluid is simulated down to the receiver's rim. The movie lets it fall
     on from there, and draws what the receiver holds as a level.

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from .criticism import latest_calibration
 from .kept import fresh_seeds
+from .narrative import UNITS
 from .prior import split_parameters
 from .progress import Advance, progress_bar
 from .recordings import Gripper, Recording
@@ -72,7 +73,10 @@ def _write(
 ) -> "Dataset":
     from xarray import Dataset, DataTree
 
-    drawn = {name: ("draw", values) for name, values in theta.items()}
+    drawn = {
+        name: ("draw", values, {"units": UNITS[name]} if name in UNITS else {})
+        for name, values in theta.items()
+    }
     dataset = Dataset(dict(frames), coords=drawn, attrs={"made_from": made_from})
     write_tree(DataTree(dataset), path)
     return dataset

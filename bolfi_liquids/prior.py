@@ -58,7 +58,7 @@ def read_prior(described: Mapping[str, str]) -> "Prior":
 
 
 def check_prior(prior: "Prior") -> None:
-    """Raise `InputError` unless the prior is over the simulator's parameters."""
+    """Raise `InputError` unless the prior is over the simulator's parameters, and can be kept."""
     from .inference import Prior
 
     if not isinstance(prior, Prior):
@@ -73,6 +73,15 @@ def check_prior(prior: "Prior") -> None:
             where="prior",
             fix="give one distribution for each of them",
         )
+    for name, text in describe_prior(prior).items():
+        try:
+            read_prior({name: text})
+        except (TypeError, ValueError) as err:
+            raise InputError(
+                f"{text.partition('(')[0]} cannot be written down by its numbers",
+                where=f"prior of {name}",
+                fix="give another, such as LogUniform, Uniform, Normal, LogNormal, Beta or Gamma",
+            ) from err
 
 
 def describe_prior(prior: "Prior") -> dict[str, str]:

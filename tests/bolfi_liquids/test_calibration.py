@@ -101,6 +101,14 @@ def test_prior_with_another_parameter_is_refused(short_recording, tmp_path):
     assert not (tmp_path / "run").exists()
 
 
+def test_a_prior_that_a_run_could_not_be_resumed_with_is_refused(short_recording, tmp_path):
+    viscosity = dist.TruncatedNormal(1.0, 0.5, low=0.1)
+    prior = inference.Prior({"viscosity": viscosity, "cohesion": dist.Uniform(0.0, 1.0)})
+    with pytest.raises(ValueError, match="prior of viscosity: .*cannot be written down"):
+        bl.calibrate(short_recording, out=tmp_path / "run", prior=prior, progress=False)
+    assert not (tmp_path / "run").exists()
+
+
 def test_default_prior_covers_the_fluid_s_floor_to_gel():
     theta = {"viscosity": np.array([1e-3, 4e-3, 12.0, 30.0]), "cohesion": np.full(4, 0.5)}
     np.testing.assert_array_equal(default_prior().contains(theta), [False, True, True, False])

@@ -12,6 +12,7 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 from bolfi_liquids.cli import app
+from bolfi_liquids.frames import frames_of
 from bolfi_liquids.guide import PAGES, read_page
 
 LINE = re.compile(r"^- `(?P<name>[^`]+)`(?: \((?P<dims>[^)]*)\))?(?: \[(?P<unit>[^\]]+)\])?:")
@@ -64,6 +65,15 @@ def test_files_are_told_variable_by_variable(calibration, pour, name):
             assert in_page[what][0] == dims, what
         if unit is not None:
             assert in_page[what][1] == plain.get(unit, unit), what
+
+
+@pytest.mark.slow
+def test_frames_are_told_variable_by_variable(pour):
+    frames_of(pour.path, progress=False)
+    in_page, in_file = told("frames.nc"), held(pour.path / "frames.nc")
+    assert set(in_page) == set(in_file) - {"cohesion"}  # which shares a line with the viscosity
+    for what, entry in in_page.items():
+        assert entry == in_file[what], what
 
 
 def fields(value, path=""):

@@ -5,6 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bolfi_liquids.bundled import bundled_recording
+from bolfi_liquids.cups import bundled_cups
+from bolfi_liquids.pour_table import open_pours
+from bolfi_liquids.reproduction import sticky
 from bolfi_liquids.reproduction.figure_of_recordings import between
 from bolfi_liquids.reproduction.figures_of_spillage import interval
 from bolfi_liquids.reproduction.reproduce import reproduce
@@ -55,3 +59,27 @@ def test_an_unknown_figure_is_named(tmp_path):
     with pytest.raises(ValueError, match="no figure 'colour'; choose all, inclination"):
         reproduce(["colour"], tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_a_sticky_truth_is_made_once(tmp_path, monkeypatch):
+    monkeypatch.setattr(sticky, "PARTICLES", 200)
+    truth = sticky.draw_sticky(3, seed=0)
+    assert truth == sticky.draw_sticky(3, seed=0) != sticky.draw_sticky(4, seed=0)
+    recording = sticky.stirred(truth, tmp_path / "stir.nc")
+    like = bundled_recording(sticky.LIKE)
+    np.testing.assert_array_equal(recording.gripper.position, like.gripper.position)
+    # of the same path, so it leans alike, but no copy
+    off = np.degrees(recording.inclination - like.inclination)
+    assert 0.05 < np.sqrt(np.nanmean(off**2)) < 5.0
+    assert sticky.stirred(truth, tmp_path / "stir.nc").hash == recording.hash
+
+
+def test_a_sticky_truth_keeps_more_in_the_cup_than_one_that_flows(tmp_path):
+    truth = sticky.draw_sticky(0, seed=0)
+    clean = truth._replace(theta={**truth.theta, "adhesion": 0.0})
+    stuck, flown = (
+        open_pours(sticky.poured(one, 1260.0, bundled_cups(), tmp_path / f"{at}.csv"))
+        for at, one in enumerate((truth, clean))
+    )
+    np.testing.assert_allclose(stuck.fractions.sum(axis=1), 1.0, atol=1e-6)
+    assert (stuck.fractions[:, 2] > flown.fractions[:, 2]).all()

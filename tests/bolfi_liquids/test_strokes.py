@@ -4,11 +4,21 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
+import pytest
 from bolfi_liquids.hardware import circle, star
 
+from bolfi_liquids.bundled import bundled_recording
 from bolfi_liquids.recordings import Gripper, Recording
-from bolfi_liquids.stirring import Stirring
-from bolfi_liquids.strokes import PARTS, resting, speed, strokes, windows
+from bolfi_liquids.stirring import Stirring, stirring_of
+from bolfi_liquids.strokes import (
+    PARTS,
+    resting,
+    speed,
+    stroke_numbers,
+    strokes,
+    until_stroke,
+    windows,
+)
 
 
 def recorded(path) -> Recording:
@@ -44,3 +54,26 @@ def test_windows_cover_every_sample_of_every_recording_once_by_stroke():
     by_speed = np.sum([window.samples for window in made if "speed" in window.label], axis=0)
     moving = np.concatenate([~resting(recording) for recording in both])
     assert (by_speed == moving[:, None]).all()
+
+
+def test_numbers_of_samples_are_those_of_their_strokes():
+    recording = bundled_recording("water")
+    numbers = stroke_numbers(recording)
+    assert (np.diff(numbers) >= 0).all()
+    for stroke in strokes(recording):
+        assert (numbers[stroke.samples] == stroke.number).all()
+
+
+def test_stirring_that_ends_early_is_the_beginning_of_the_same_stirring():
+    whole = bundled_recording("water")
+    first = until_stroke(whole, 2)
+    theta = {"viscosity": np.array([0.1]), "cohesion": np.array([0.3])}
+    short, full = (stirring_of([one], 200).simulate(theta, np.array([4])) for one in (first, whole))
+    same = short.shape[1] - 1  # the last lies between substeps, of which there is none beyond
+    assert 20 < same < 60
+    np.testing.assert_array_equal(short[0, :same], full[0, :same])
+
+
+def test_a_stroke_that_is_not_there_is_refused():
+    with pytest.raises(ValueError, match="stroke must be one of 0, 1, .*, got 40"):
+        until_stroke(bundled_recording("water"), 40)
