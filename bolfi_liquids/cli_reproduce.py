@@ -37,10 +37,11 @@ def reproduce(
     What has finished in DIR is kept: a killed run goes on with the same command.
     """
     from .reproduction.reproduce import reproduce as draw
+    from .reproduction.scale import FULL, QUICK
 
     draw(
         figures or (),
         out,
-        quick=quick,
+        scale=QUICK if quick else FULL,
         done=lambda name, drawn: typer.echo(f"{out / name}.png\n{drawn.says}\n"),
     )

@@ -8,7 +8,7 @@ viscosity and in the cohesion.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,18 @@ if TYPE_CHECKING:
     from .models import Cups
     from .progress import Advance
 
-LIQUIDS = 24, 3  # viscosities and cohesions, which act slowly
-RATES = 12  # angular velocities
 _PURPOSE = 31  # of seeds
+
+
+class GridSize(NamedTuple):
+    """How fine a grid of pours is; cohesion acts slowly."""
+
+    viscosities: int = 24
+    cohesions: int = 3
+    rates: int = 12
+
+
+FINE = GridSize()
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +73,15 @@ class PourGrid:
 
 
 def make_grid(
-    cups: "Cups", density: float, prior: "Prior", bank: "SimulationBank", advance: "Advance"
+    cups: "Cups",
+    density: float,
+    prior: "Prior",
+    bank: "SimulationBank",
+    advance: "Advance",
+    *,
+    size: GridSize = FINE,
 ) -> PourGrid:
-    """Pour the grid's liquids, `RATES` calls of the simulator, each reported to `advance`.
+    """Pour the grid's liquids, one call of the simulator for each angular velocity.
 
     Args:
         cups: Of the pours.
@@ -74,14 +89,15 @@ def make_grid(
         prior: Its bounds are the grid's.
         bank: Where the pours are kept.
         advance: Called after each angular velocity.
+        size: Two of each at least.
     """
     ends = prior.from_unit(np.array([[0.0, 0.0], [1.0, 1.0]]))
     low, high = ({name: float(values[end]) for name, values in ends.items()} for end in (0, 1))
-    viscosity = np.geomspace(low["viscosity"], high["viscosity"], LIQUIDS[0])
-    cohesion = np.linspace(low["cohesion"], high["cohesion"], LIQUIDS[1])
+    viscosity = np.geomspace(low["viscosity"], high["viscosity"], size.viscosities)
+    cohesion = np.linspace(low["cohesion"], high["cohesion"], size.cohesions)
     mesh = np.meshgrid(viscosity, cohesion, indexing="ij")
     theta = {"viscosity": mesh[0].ravel(), "cohesion": mesh[1].ravel()}
     seeds = np.array(fresh_seeds(0, _PURPOSE, mesh[0].size), np.int64)
-    rates = np.geomspace(*cups.angular_velocity_range, RATES)
+    rates = np.geomspace(*cups.angular_velocity_range, size.rates)
     made = pour_all(Outcomes(theta, density, cups, seeds), rates, bank, advance)
     return PourGrid(cups, np.log(viscosity), cohesion, made)

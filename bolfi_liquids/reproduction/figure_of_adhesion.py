@@ -77,10 +77,17 @@ def _spilled(workshop: Workshop, number: int) -> tuple[Sticky, list[float], str]
     truth = draw_sticky(number, seed)
     folder = workshop.out / "runs" / f"sticky_{number}"
     folder.mkdir(parents=True, exist_ok=True)
-    recording = stirred(truth, folder / "stir.nc")
+    recording = stirred(truth, workshop.scale.particles, folder / "stir.nc")
     density = recording.number("liquid_density")
     table = poured(truth, density, cups, folder / "pours.csv")
-    calibration = calibrate(recording, out=folder / "run", seed=seed, resume=True, progress=shown)
+    calibration = calibrate(
+        recording,
+        out=folder / "run",
+        particles=workshop.scale.particles,
+        seed=seed,
+        resume=True,
+        progress=shown,
+    )
     before = choose_pour(calibration, cups, seed=seed, progress=shown)
     criticism = criticise(calibration, pours=table, effects=CONSIDERED, seed=seed, progress=shown)
     after = choose_pour(criticism.calibration, cups, seed=seed, progress=shown)
@@ -103,9 +110,7 @@ def _action(pour: Pour) -> Action:
 
 def _best(workshop: Workshop, outcomes: Outcomes) -> Action:
     """The action of least spillage where everything is known."""
-    from ..pour_grid import RATES
-
-    rates = np.geomspace(*outcomes.cups.angular_velocity_range, RATES)
+    rates = np.geomspace(*outcomes.cups.angular_velocity_range, workshop.scale.grid.rates)
     return surface(
         pour_all(outcomes, rates, workshop.bank, lambda steps: None), outcomes.cups
     ).least("mean")

@@ -85,9 +85,10 @@ def _table(study: "Dataset") -> str:
 
 
 def liquids(workshop: Workshop) -> Drawn:
-    """Spilled percentage by liquid at N = 10 and 20."""
+    """Spilled percentage by liquid at N = 10 and 20, or else at the largest N."""
     study = workshop.study
-    budgets = [n for n in (10, 20) if n in study["budget"]]
+    made = study["budget"].to_numpy().tolist()
+    budgets = [n for n in (10, 20) if n in made] or made[-1:]
     rules = [
         ("discrepancy", "plug_in"),
         ("signal", "plug_in"),

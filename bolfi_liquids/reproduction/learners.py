@@ -15,12 +15,10 @@ from .scale import Scale
 if TYPE_CHECKING:
     from ..models import Cups
 
-PARTICLES = 1000
-
 
 def by_stirring_and_pouring(cups: "Cups", scale: Scale) -> dict[str, Learner]:
     """Stirring with either surrogate, and pouring as the paper's reference does."""
-    prior, stirring = default_prior(), _star(bundled_recording("water"))
+    prior, stirring = default_prior(), _star(bundled_recording("water"), scale)
     rate = np.sqrt(np.prod(cups.angular_velocity_range))
     training = float(rate), float(np.mean(cups.distance_range))
     return {
@@ -34,10 +32,12 @@ def after_strokes(scale: Scale) -> dict[str, Learner]:
     """Stirring that ends after each number of strokes."""
     prior, whole = default_prior(), bundled_recording("water")
     return {
-        str(number): ByStirring(_star(until_stroke(whole, number)), prior, "signal", (scale.few,))
+        str(number): ByStirring(
+            _star(until_stroke(whole, number), scale), prior, "signal", (scale.few,)
+        )
         for number in scale.strokes
     }
 
 
-def _star(recording: Recording) -> Stirring:
-    return stirring_of([recording], PARTICLES)
+def _star(recording: Recording, scale: Scale) -> Stirring:
+    return stirring_of([recording], scale.particles)

@@ -16,7 +16,7 @@ from .figure_of_recordings import recordings
 from .figure_of_strokes import strokes
 from .figures_of_fits import inclination, posterior
 from .figures_of_spillage import decision, liquids, spillage, surrogates
-from .scale import FULL, QUICK
+from .scale import FULL, Scale
 from .workshop import Workshop
 
 FIGURES: dict[str, Callable[[Workshop], Drawn]] = {
@@ -38,7 +38,7 @@ def reproduce(
     names: Iterable[str],
     out: str | Path,
     *,
-    quick: bool = False,
+    scale: Scale = FULL,
     progress: bool = True,
     done: Callable[[str, Drawn], object] = lambda name, drawn: None,
 ) -> None:
@@ -50,7 +50,7 @@ def reproduce(
     Args:
         names: Of `FIGURES`; none, or "all", for all of them.
         out: Directory of the results; made if missing.
-        quick: Fewer repetitions, budgets and recordings.
+        scale: How much is simulated: `FULL`, `QUICK`, or one of your own.
         progress: Show bars on stderr.
         done: Called with each figure.
 
@@ -66,7 +66,6 @@ def reproduce(
             )
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
-    scale = QUICK if quick else FULL
     made_with = {"scale": asdict(scale), "versions": versions(LIBRARIES)}
     with open_bank(out) as bank:
         workshop = Workshop(out, scale, bank, progress)

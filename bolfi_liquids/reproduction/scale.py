@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from ..pour_grid import FINE, GridSize
+
 
 @dataclass(frozen=True)
 class Scale:
@@ -16,6 +18,8 @@ class Scale:
         sticky: Repetitions of the liquid that sticks to its cup.
         surrogates: That learn from these.
         lips: Heights of the lip that are compared.
+        particles: Of every stirred liquid.
+        grid: Of the pours by which actions are chosen.
         seed: Of everything random.
     """
 
@@ -27,6 +31,8 @@ class Scale:
     sticky: int = 5
     surrogates: tuple[str, ...] = ("discrepancy", "signal")
     lips: tuple[float, ...] = (0.10, 0.14, 0.20, 0.26)
+    particles: int = 1000
+    grid: GridSize = FINE
     seed: int = 0
 
 

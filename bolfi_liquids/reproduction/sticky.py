@@ -26,7 +26,6 @@ ADHESION = 0.6, 0.9  # of the truths
 TRAINING = [(w, d) for w in (40.0, 70.0, 110.0) for d in (0.5, 1.5, 2.5, 4.0)]
 """Pours that are seen after the stirring: deg/s, cm."""
 
-PARTICLES = 1000
 _STIRRED, _POURED = 61, 62  # purposes of seeds
 _COLUMNS = ("angular_velocity_deg_s", "distance_cm", "spilled", "received", "retained")
 
@@ -60,10 +59,10 @@ def draw_sticky(repetition: int, seed: int) -> Sticky:
     return Sticky(theta, int(rng.integers(2**31)))
 
 
-def stirred(truth: Sticky, path: Path) -> Recording:
-    """A recording of it, written to `path` unless it is there."""
+def stirred(truth: Sticky, particles: int, path: Path) -> Recording:
+    """A recording of it, of so many particles, written to `path` unless it is there."""
     if not path.exists():
-        dataset = _dataset(bundled_recording(LIKE), truth)
+        dataset = _dataset(bundled_recording(LIKE), truth, particles)
         write_whole(path, lambda at: dataset.to_netcdf(at, engine="h5netcdf"))
     return open_recording(path)
 
@@ -77,10 +76,10 @@ def poured(truth: Sticky, density: float, cups: "Cups", path: Path) -> Path:
     return path
 
 
-def _dataset(like: Recording, truth: Sticky) -> "Dataset":
+def _dataset(like: Recording, truth: Sticky, particles: int) -> "Dataset":
     from .. import models
 
-    setup = models.StirSetup.from_recording(like, particles=PARTICLES)
+    setup = models.StirSetup.from_recording(like, particles=particles)
     liquid = models.Liquid(**truth.liquid, density=like.number("liquid_density"))
     effects = {"adhesion": truth.theta["adhesion"]}
     own = fresh_seeds(truth.seed, _STIRRED, 1)

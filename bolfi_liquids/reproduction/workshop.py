@@ -9,7 +9,7 @@ from ..bundled import bundled_recording
 from ..calibration import Calibration
 from ..calibrator import calibrate
 from ..cups import bundled_cups
-from ..pour_grid import RATES, PourGrid, make_grid
+from ..pour_grid import PourGrid, make_grid
 from ..prior import default_prior
 from ..progress import progress_bar
 from .learners import after_strokes, by_stirring_and_pouring
@@ -42,8 +42,11 @@ class Workshop:
     @cached_property
     def grid(self) -> PourGrid:
         """Of pours with the bundled cups, by which actions are chosen."""
-        with progress_bar("pouring a grid of liquids", RATES, shown=self.progress) as advance:
-            return make_grid(bundled_cups(), DENSITY, default_prior(), self.bank, advance)
+        size = self.scale.grid
+        with progress_bar("pouring a grid of liquids", size.rates, shown=self.progress) as advance:
+            return make_grid(
+                bundled_cups(), DENSITY, default_prior(), self.bank, advance, size=size
+            )
 
     @cached_property
     def study(self) -> "Dataset":
@@ -64,6 +67,7 @@ class Workshop:
             out=self.out / "runs" / f"{liquid}_{budget}_{surrogate}",
             budget=budget,
             surrogate=surrogate,
+            particles=self.scale.particles,
             seed=self.scale.seed,
             resume=True,
             progress=self.progress,

@@ -5,7 +5,7 @@ import pytest
 
 from bolfi_liquids import inference, models, spillage
 from bolfi_liquids.cups import bundled_cups
-from bolfi_liquids.pour_grid import make_grid
+from bolfi_liquids.pour_grid import FINE, GridSize, make_grid
 from bolfi_liquids.prior import default_prior
 from bolfi_liquids.reproduction.decisions import decide, execute
 from bolfi_liquids.reproduction.truths import draw_truths
@@ -16,8 +16,11 @@ def best_distance(viscosity):
     return 0.05 - 0.005 * np.log(viscosity / 3e-3)
 
 
-@pytest.fixture
-def grid(monkeypatch):
+COARSE = GridSize(viscosities=5, cohesions=2, rates=4)
+
+
+@pytest.fixture(params=[FINE, COARSE], ids=["fine", "coarse"])
+def grid(request, monkeypatch):
     """Of made-up pours: linear in the log of the viscosity, whatever the angular velocity."""
 
     def poured(self, action, seeds):
@@ -28,7 +31,12 @@ def grid(monkeypatch):
 
     monkeypatch.setattr(spillage.Outcomes, "simulate", poured)
     with inference.SimulationBank(":memory:") as bank:
-        yield make_grid(bundled_cups(), 1000.0, default_prior(), bank, lambda steps: None)
+        made = make_grid(
+            bundled_cups(), 1000.0, default_prior(), bank, lambda steps: None, size=request.param
+        )
+        viscosities, cohesions, rates = request.param
+        assert made.profiles.fractions.shape[:2] == (rates, viscosities * cohesions)
+        yield made
 
 
 def test_between_the_grid_pours_are_between(grid):

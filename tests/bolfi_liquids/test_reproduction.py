@@ -61,17 +61,16 @@ def test_an_unknown_figure_is_named(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_sticky_truth_is_made_once(tmp_path, monkeypatch):
-    monkeypatch.setattr(sticky, "PARTICLES", 200)
+def test_a_sticky_truth_is_made_once(tmp_path):
     truth = sticky.draw_sticky(3, seed=0)
     assert truth == sticky.draw_sticky(3, seed=0) != sticky.draw_sticky(4, seed=0)
-    recording = sticky.stirred(truth, tmp_path / "stir.nc")
+    recording = sticky.stirred(truth, 200, tmp_path / "stir.nc")
     like = bundled_recording(sticky.LIKE)
     np.testing.assert_array_equal(recording.gripper.position, like.gripper.position)
     # of the same path, so it leans alike, but no copy
     off = np.degrees(recording.inclination - like.inclination)
     assert 0.05 < np.sqrt(np.nanmean(off**2)) < 5.0
-    assert sticky.stirred(truth, tmp_path / "stir.nc").hash == recording.hash
+    assert sticky.stirred(truth, 200, tmp_path / "stir.nc").hash == recording.hash
 
 
 def test_a_sticky_truth_keeps_more_in_the_cup_than_one_that_flows(tmp_path):
