@@ -60,7 +60,7 @@ def truly_spilled(pour):
     return float(np.mean(poured(chosen * REPEATS, 9000 + np.arange(REPEATS)).spilled))
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_adhesion_is_found_in_pours_and_the_next_pour_spills_less(tmp_path):
     calibration = bl.calibrate(stirred(tmp_path / "stir.nc"), out=tmp_path / "run", progress=False)
     before = bl.choose_pour(calibration, bundled_cups(), progress=False)
