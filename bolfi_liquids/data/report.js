@@ -161,7 +161,8 @@
     v.pen.beginPath();
     points.forEach((point) => v.pen.lineTo(...v.at(point)));
     Object.assign(v.pen, { lineWidth: 1.2, strokeStyle: "#616e7c", lineCap: "round" }, style);
-    v.pen.stroke();
+    if (style && style.fillStyle) v.pen.fill();
+    else v.pen.stroke();
   }
 
   const TURN = Array.from({ length: 49 }, (_, k) => (2 * Math.PI * k) / 48);
@@ -207,14 +208,12 @@
       };
       const floor = -scene.lip_height;
       const below = ([x, y, z]) => [x + scene.distance, y, z + floor];
+      const level = Math.min(scene.caught[draw][frame] * scene.depth, receiver.height);
+      const disc = (z) => TURN.map((a) => below([receiver.radius * Math.cos(a), receiver.radius * Math.sin(a), z]));
+      for (let z = 0; z < level; z += level / 30) path(v, disc(z), { fillStyle: "hsl(211 55% 50%)" });
+      if (level > 0) path(v, disc(level), { fillStyle: "hsl(211 60% 68%)" });
       cup(v, source.radius, source.height, turned);
       cup(v, receiver.radius, receiver.height, below);
-      const level = Math.min(scene.caught[draw][frame] * scene.depth, receiver.height);
-      if (level > 0) {
-        for (let z = 0; z <= level; z += 0.0015)
-          path(v, TURN.map((a) => below([receiver.radius * Math.cos(a), receiver.radius * Math.sin(a), z])),
-            { lineWidth: 2, strokeStyle: "hsl(211 60% 55% / 55%)" });
-      }
       drops(v, scene.coordinates[draw], scene.particles, 3 * frame * scene.particles, scene.radius);
     },
   };
