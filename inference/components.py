@@ -17,6 +17,16 @@ class Basis(NamedTuple):
     used: int
     explained: float  # share of the variance
 
+    def only(self, kept: np.ndarray) -> "Basis":
+        """With the components `kept`, bool [k], in front and all others empty."""
+        squared = np.sum(self.vectors**2, 0)
+        vectors = np.zeros_like(self.vectors)
+        vectors[:, : kept.sum()] = self.vectors[:, kept]
+        share = squared[kept].sum() / squared.sum() if squared.any() else 1.0
+        return self._replace(
+            vectors=vectors, used=int(kept.sum()), explained=self.explained * float(share)
+        )
+
     def standardise(self, outputs: np.ndarray) -> np.ndarray:
         """[n, m] -> [n, m]."""
         return (outputs - self.centre) / self.scale

@@ -11,12 +11,13 @@ from ._float64 import in_float64
 from .compiled import GROWTH, condition, extend, leave_one_out
 from .compiled import predict as predict_scores
 from .components import Basis, principal_components
-from .gp import GP, Hyper, pad
+from .gp import GP, Data, Hyper, pad
 from .hyper import maximum_a_posteriori
 from .noise import Remainder, shrunk_covariance
 from .own_noise import left_over, own_noise
 
 SHARE = 0.9995  # of the variance, to be explained by components
+PREDICTED = 0.3  # of a component's variance, lest it count as noise
 PRIOR_RUNS = 5.0  # runs that speak for uncorrelated scores
 
 
@@ -40,6 +41,11 @@ class Emulator(NamedTuple):
     outputs: np.ndarray
     learned_at: int
     excess: np.ndarray
+
+    @property
+    def equal(self) -> bool:
+        """Whether all outputs are the same."""
+        return self.basis.used == 0 and self.remainder.total == 0.0
 
 
 @in_float64
@@ -69,9 +75,8 @@ def emulate(  # noqa: PLR0913  what is known, and how to learn from it
         remainder = shrunk_covariance(basis.residuals(outputs), basis.used + 1)
     else:
         basis, learned_at = principal_components(outputs, scale(outputs), components, SHARE), n
+        basis, hyper = _predicted(basis, pad(u, basis.scores(outputs).T, rows, normal))
         remainder = shrunk_covariance(basis.residuals(outputs), basis.used + 1)
-        data = pad(u, basis.scores(outputs).T, rows, normal)
-        hyper = maximum_a_posteriori(data, None if previous is None else previous.gp.hyper)
         excess = own_noise(basis, np.exp(2.0 * np.asarray(hyper.log_noise)), remainder, n)
         smaller = jnp.log1p(-jnp.asarray(excess))
         hyper = Hyper(hyper.log_length, hyper.log_amplitude + smaller, hyper.log_noise + smaller)
@@ -79,6 +84,33 @@ def emulate(  # noqa: PLR0913  what is known, and how to learn from it
     remainder = left_over(basis, np.exp(2.0 * np.asarray(gp.hyper.log_noise)), remainder, excess)
     noise = run_to_run(gp, basis, remainder.white, n)
     return Emulator(gp, basis, remainder, noise, outputs, learned_at, excess)
+
+
+def _predicted(basis: Basis, data: Data) -> tuple[Basis, Hyper]:
+    """The components that the parameters predict, and the hyperparameters of their scores.
+
+    Of a noisy simulator's components most are noise. In few runs it may look like structure, by
+    chance in one component out of several, and the likelihood then has bumps where there is
+    nothing to be seen. So a component whose scores are hardly predicted when their runs are left
+    out is left to the remainder: it could tell little, less than 0.2 nats of the parameters.
+    """
+    hyper = maximum_a_posteriori(data)
+    kept = predicted_share(condition(hyper, data)) > PREDICTED
+    order = np.argsort(~kept, kind="stable")
+    return basis.only(kept), Hyper(*(part[order] for part in hyper))
+
+
+def predicted_share(gp: GP) -> np.ndarray:
+    """Share of each score's variance that is predicted when a run is left out, [k].
+
+    Not above 0 where the mean of the others would do as well, and 0 for empty components.
+    """
+    n = int(gp.data.used)
+    score = np.asarray(gp.data.y)[:, :n]
+    error = score - np.asarray(leave_one_out(gp)[0])[:, :n]
+    from_mean = (score - score.mean(1, keepdims=True)) * n / (n - 1)  # of the other scores
+    total = np.sum(from_mean**2, 1)
+    return np.where(total > 0, 1.0 - np.sum(error**2, 1) / np.where(total > 0, total, 1.0), 0.0)
 
 
 def _goes_on(previous: Emulator, outputs: np.ndarray) -> bool:
@@ -121,11 +153,12 @@ def loo_errors(emulator: Emulator) -> np.ndarray:
 
 
 def noise_share(emulator: Emulator) -> float:
-    """Share of run-to-run noise in the variance of the emulated components."""
-    used = emulator.basis.used
+    """Share of the outputs' variance that no parameter predicts: run-to-run noise."""
+    used, rest = emulator.basis.used, emulator.remainder.total
     weight = np.sum(emulator.basis.vectors[:, :used] ** 2, 0)  # their scores have unit variance
     noise = np.exp(2.0 * np.asarray(emulator.gp.hyper.log_noise)[:used])
-    return float(weight @ np.minimum(noise, 1.0) / weight.sum()) if used else 0.0
+    total = weight.sum() + rest
+    return float((weight @ np.minimum(noise, 1.0) + rest) / total) if total > 0 else 0.0
 
 
 def predict(emulator: Emulator, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -11,6 +11,11 @@ OUTSIDE = (
     "or widen the prior; the posterior says little"
 )
 EQUAL = "all simulations are equal: the data cannot tell parameters apart"
+UNPREDICTED = (
+    "the parameters predict nothing of what was simulated, as far as so few runs can tell from "
+    "chance: simulate more, or choose a summary that averages the noise out; until then the "
+    "posterior is the prior"
+)
 NOISY = (0.9, 0.5, 0.1)  # shares of run-to-run noise in the variance that deserve a word
 
 

@@ -12,7 +12,7 @@ from .base import LogLikelihood, LogSecondMoment
 from .compiled import believe
 from .design import sobol
 from .emulator import Emulator, loo_errors, noise_share, predict, predictive_draws
-from .emulator_checks import EQUAL, OUTSIDE, complaints
+from .emulator_checks import EQUAL, OUTSIDE, UNPREDICTED, complaints
 from .gaussian import SignalState, log_likelihood, log_second_moment, node_log_densities
 from .given_noise import GivenNoise
 from .noise import (
@@ -123,7 +123,7 @@ class SignalSurrogate:
     def warnings(self) -> list[str]:
         """What the emulator's own checks complain of."""
         if self.emulator.basis.used == 0:
-            return [EQUAL]
+            return [EQUAL if self.emulator.equal else UNPREDICTED]
         said = complaints(loo_errors(self.emulator), noise_share(self.emulator), "output")
         return [OUTSIDE, *said] if self._outside() else said
 
@@ -202,11 +202,11 @@ def observe(
         factors = np.column_stack([factors, noise.factors / basis.scale[:, None]])
     if previous is not None:
         nodes = previous.nodes
-    elif noise is not None or not output.series or used == 0:
+    elif noise is not None or not output.series or emulator.equal:
         nodes = NO_MEASUREMENT_NOISE
     else:
         nodes = candidates(residual_size(target, vectors[:, :used]))
-    if used == 0:  # every output is the same: nothing to compare
+    if emulator.equal:  # nothing to compare
         reduced = Reduced(np.zeros((1, 0)), np.zeros((1, 0, 0)), np.zeros(1))
     else:
         reduced = reduce((vectors, target, factors), white, output.layout, nodes)

@@ -12,7 +12,7 @@ from bolfi_liquids.inference.families import Learnable, SignalFamily
 from bolfi_liquids.inference.gaussian import log_likelihood, log_second_moment
 from bolfi_liquids.inference.gp import predict
 from bolfi_liquids.inference.repetition import next_replicate
-from scipy.stats import multivariate_normal
+from scipy.stats import binom, multivariate_normal
 
 from bolfi_liquids import inference
 
@@ -107,7 +107,7 @@ def test_the_simulators_own_noise_is_learned_and_not_counted_twice(design, noise
     """Observed is one output of a noisy simulator: exact with SD once, not sqrt(2) SD."""
     u = np.concatenate([design, design[:4]])
     observed = outputs(np.array([[0.4, 0.6]]))[0] + noise
-    found = learned(u, outputs(u, np.arange(len(u))), observed)
+    found = learned(u, outputs(u, np.arange(len(u))), observed, noise=SD / 100)
     reference = exact(observed, SD**2 * np.eye(40))
     mine = posterior(found)
     assert total_variation(mine, reference) < 0.25
@@ -180,6 +180,54 @@ def test_the_check_speaks_up_where_noise_rules(design):
     assert any("run-to-run noise" in said for said in found.warnings())
     quiet = learned(design, outputs(design), outputs(design)[0])
     assert quiet.warnings() == []
+
+
+MODES = np.sin(np.pi * np.outer(np.arange(1, 9), TIME))
+
+
+def noisy_outputs(u, rng, slope=3.0):
+    """Of a simulator whose second parameter does nothing, with smooth run-to-run noise."""
+    return slope * u[:, :1] * TIME + 0.5 * rng.normal(size=(len(u), len(MODES))) @ MODES
+
+
+def marginals(seed):
+    """Of both parameters [2, 100], from 20 runs and one more as data; and the truth."""
+    rng = np.random.default_rng(seed)
+    truth, u = rng.uniform(size=2), sobol(seed, 0, 20, 2)
+    observed = noisy_outputs(truth[None], rng)[0]
+    found = learned(u, noisy_outputs(u, rng), observed, noise=SD / 100)
+    table = posterior(found).reshape(100, 100)  # rows are the second parameter's
+    return np.stack([table.sum(0), table.sum(1)]), truth
+
+
+def test_a_parameter_that_does_nothing_keeps_its_prior():
+    """Exactly, were the simulator known; were each noisy component emulated, total variation
+    from the prior would be 0.65 on average."""
+    apart = [0.5 * np.abs(marginals(seed)[0][1] - 0.01).sum() for seed in range(10)]
+    assert np.mean(apart) < 0.3
+
+
+@pytest.mark.slow
+def test_intervals_cover_beside_a_parameter_that_does_nothing():
+    """Of 60 data sets, each with runs of its own; with each noisy component emulated 55 % of
+    either parameter's 90 % intervals hold the truth."""
+    found = [marginals(seed) for seed in range(100, 160)]
+    for j, least in enumerate((0.8, 0.9)):  # what 20 runs say of the first's slope is not all
+        below = [np.interp(t[j], AXIS + 0.005, np.cumsum(m[j])) for m, t in found]
+        inside = np.sum(np.abs(np.array(below) - 0.5) < 0.45)
+        print(inside)
+        assert inside >= binom.ppf(1e-3, len(found), least)
+
+
+def test_runs_that_no_parameter_predicts_leave_the_prior(design):
+    rng = np.random.default_rng(0)
+    found = learned(design, noisy_outputs(design, rng, 0.0), noisy_outputs(design, rng, 0.0)[0])
+    assert found.emulator.basis.used == 0
+    np.testing.assert_allclose(posterior(found), 1e-4, rtol=1e-9)
+    assert "predict nothing" in found.warnings()[0]
+    drawn = found.predictive(jax.random.key(0), np.tile(design[:1], (400, 1)))["signal"]
+    expected = 0.5 * np.sqrt(np.sum(MODES**2, 0))
+    np.testing.assert_allclose(drawn.std(0)[5:-5], expected[5:-5], rtol=0.6)
 
 
 def test_predictions_cover_new_runs(design):
