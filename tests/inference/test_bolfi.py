@@ -38,6 +38,7 @@ def test_pending_points_are_not_asked_again(prior, observed, simulate):
     assert distances.min() > 1e-3
 
 
+@pytest.mark.filterwarnings("ignore:run-to-run noise")  # six runs show but one of two components
 def test_told_in_any_order_and_from_elsewhere(prior, observed, simulate):
     engine = inference.Bolfi(prior, observed)
     theta = engine.ask(4)
