@@ -24,7 +24,7 @@ POUR = "pour.nc"
 FRAMES = "frames.nc"
 REPORT = "report.html"
 
-MUST_AGREE = ("settings", "inputs", "simulator")
+MUST_AGREE = ("settings", "inputs", "simulator", "engine")
 """Sections of run.toml that decide the results; versions and dates may differ."""
 
 

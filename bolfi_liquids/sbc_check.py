@@ -110,7 +110,10 @@ def _replicates(  # noqa: PLR0913  what the two surrogates share
 
 
 def _record(settings: SbcSettings, prior: "Prior", stirring: Stirring) -> Mapping[str, Any]:
+    from .inference import ENGINE_VERSION
+
     return {
+        "engine": {"version": ENGINE_VERSION},
         "settings": {k: v for k, v in asdict(settings).items() if k not in ("runs", "sequential")}
         | {"prior": describe_prior(prior)},
         "simulator": stirring.settings,

@@ -61,6 +61,7 @@ if TYPE_CHECKING:
     )
     from .discrepancy import squared_difference
     from .emulator_checks import EmulatorWarning
+    from .engine_version import ENGINE_VERSION
     from .families import DiscrepancyFamily, SignalFamily
     from .likelihood import Predicted, Quantile
     from .loop import fit
@@ -80,6 +81,7 @@ __all__ = [
     "Criticism",
     "Discrepancy",
     "DiscrepancyFamily",
+    "ENGINE_VERSION",
     "EmulatorWarning",
     "ExpectedIntegratedVariance",
     "Experiment",
@@ -138,6 +140,7 @@ __all__ = [
 # loaded on use: a worker that imports `.simulate` to run a simulation must not pay for JAX
 _HOME = {
     "Acquisition": ".base",
+    "ENGINE_VERSION": ".engine_version",
     "AutoregressiveNoise": ".criticism",
     "Bolfi": ".bolfi",
     "Candidate": ".criticism",

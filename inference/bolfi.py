@@ -47,8 +47,9 @@ class Bolfi:
         initial: Points of the Sobol start design; None is 2 d + 6.
         capacity: Simulations for which arrays are reserved, rounded up to a power of two; up
             to there nothing is compiled anew. Small ones are faster, larger runs double it.
-        options: Of the surrogate's family: `summary`, `noise`, `components`, `discrepancy` of
-            "signal"; `discrepancy`, `transform`, `threshold`, `hyper_draws` of "discrepancy".
+        options: Of the surrogate's family: `summary`, `noise`, `components`, `predicted` and
+            `discrepancy` of "signal"; `discrepancy`, `transform`, `threshold` and `hyper_draws`
+            of "discrepancy".
 
     Raises:
         ValueError: an argument is not one of the above.

@@ -17,7 +17,7 @@ from .noise import Remainder, shrunk_covariance
 from .own_noise import left_over, own_noise
 
 SHARE = 0.9995  # of the variance, to be explained by components
-PREDICTED = 0.3  # of a component's variance, lest it count as noise
+PREDICTED = 0.3  # see `_predicted`
 PRIOR_RUNS = 5.0  # runs that speak for uncorrelated scores
 
 
@@ -57,6 +57,7 @@ def emulate(  # noqa: PLR0913  what is known, and how to learn from it
     rows: int,
     previous: Emulator | None = None,
     normal: np.ndarray | None = None,
+    predicted: float | None = PREDICTED,
 ) -> Emulator:
     """Learn outputs [n, m] at u [n, d].
 
@@ -67,6 +68,8 @@ def emulate(  # noqa: PLR0913  what is known, and how to learn from it
         previous: Learned from the first of these data; its components and hyperparameters are
             kept until the data have grown by GROWTH.
         normal: Which parameters the kernels see as normal scores [d], see `gp.coordinates`.
+        predicted: Share of a component's variance that the parameters must predict, lest it
+            count as noise; None emulates every component.
     """
     n = len(u)
     if previous is not None and _goes_on(previous, outputs):
@@ -75,7 +78,10 @@ def emulate(  # noqa: PLR0913  what is known, and how to learn from it
         remainder = shrunk_covariance(basis.residuals(outputs), basis.used + 1)
     else:
         basis, learned_at = principal_components(outputs, scale(outputs), components, SHARE), n
-        basis, hyper = _predicted(basis, pad(u, basis.scores(outputs).T, rows, normal))
+        data = pad(u, basis.scores(outputs).T, rows, normal)
+        hyper = maximum_a_posteriori(data)
+        if predicted is not None:
+            basis, hyper = _predicted(basis, hyper, data, predicted)
         remainder = shrunk_covariance(basis.residuals(outputs), basis.used + 1)
         excess = own_noise(basis, np.exp(2.0 * np.asarray(hyper.log_noise)), remainder, n)
         smaller = jnp.log1p(-jnp.asarray(excess))
@@ -86,7 +92,7 @@ def emulate(  # noqa: PLR0913  what is known, and how to learn from it
     return Emulator(gp, basis, remainder, noise, outputs, learned_at, excess)
 
 
-def _predicted(basis: Basis, data: Data) -> tuple[Basis, Hyper]:
+def _predicted(basis: Basis, hyper: Hyper, data: Data, least: float) -> tuple[Basis, Hyper]:
     """The components that the parameters predict, and the hyperparameters of their scores.
 
     Of a noisy simulator's components most are noise. In few runs it may look like structure, by
@@ -94,8 +100,7 @@ def _predicted(basis: Basis, data: Data) -> tuple[Basis, Hyper]:
     nothing to be seen. So a component whose scores are hardly predicted when their runs are left
     out is left to the remainder: it could tell little, less than 0.2 nats of the parameters.
     """
-    hyper = maximum_a_posteriori(data)
-    kept = predicted_share(condition(hyper, data)) > PREDICTED
+    kept = predicted_share(condition(hyper, data)) > least
     order = np.argsort(~kept, kind="stable")
     return basis.only(kept), Hyper(*(part[order] for part in hyper))
 

@@ -10,7 +10,7 @@ from .arguments import check_callable, checked_integer
 from .base import Discrepancy, Surrogate
 from .discrepancy import evaluate, squared_difference
 from .discrepancy_surrogate import DiscrepancySurrogate, learn, marginalised
-from .emulator import emulate
+from .emulator import PREDICTED, emulate
 from .given_noise import GivenNoise, given_noise
 from .likelihood import Threshold, check_rule
 from .output import Output, Summary, describe
@@ -117,6 +117,9 @@ class SignalFamily:
             process, where the output is a series of at least 16 samples without a summary, and
             takes none elsewhere.
         components: At most.
+        predicted: Share of a component's variance that the parameters must predict where its
+            run is left out; what they predict less counts as run-to-run noise. None emulates
+            every component, and takes some noise for structure if the simulator is noisy.
         discrepancy: As in `DiscrepancyFamily`; it only ranks simulations and finds outputs that
             blew up.
     """
@@ -128,12 +131,15 @@ class SignalFamily:
     summary: Summary | None = None
     noise: ArrayLike | None = None
     components: int = COMPONENTS
+    predicted: float | None = PREDICTED
     discrepancy: Discrepancy | None = None
 
     def __post_init__(self) -> None:
         check_callable("summary", self.summary)
         check_callable("discrepancy", self.discrepancy)
         checked_integer("components", self.components)
+        if self.predicted is not None and not 0.0 <= self.predicted < 1.0:
+            raise ValueError(f"predicted must be None or from 0 to below 1, got {self.predicted}")
 
     def learner(self, observed: np.ndarray) -> "SignalLearner":
         output = describe(observed, self.summary)
@@ -184,7 +190,13 @@ class SignalLearner:
         old = None if previous is None else previous.emulator
         limits = self.family.components, rows
         emulator = emulate(
-            known.u[learnable], features, self.output.scale, *limits, old, known.normal
+            known.u[learnable],
+            features,
+            self.output.scale,
+            *limits,
+            old,
+            known.normal,
+            self.family.predicted,
         )
         kept = previous if old is not None and emulator.learned_at == old.learned_at else None
         return observe(emulator, self.output, self.values, self.noise, kept)

@@ -68,9 +68,10 @@ class ByStirring:
     @property
     def identity(self) -> str:
         """A text that two equal experiments share."""
-        return json.dumps(
-            ["stir, one search", self.surrogate, self.budgets, self.stirring.identity]
-        )
+        from ..inference import ENGINE_VERSION
+
+        made_by = [ENGINE_VERSION, "stir", self.surrogate, self.budgets]
+        return json.dumps([*made_by, self.stirring.identity])
 
 
 @dataclass(frozen=True)
@@ -122,10 +123,11 @@ class ByPouring:
     @property
     def identity(self) -> str:
         """A text that two equal experiments share."""
+        from ..inference import ENGINE_VERSION
+
         action = [self.angular_velocity, self.distance]
-        return json.dumps(
-            ["pour, one search", action, self.budgets, self.cups.settings()], sort_keys=True
-        )
+        made_by = [ENGINE_VERSION, "pour", action, self.budgets]
+        return json.dumps([*made_by, self.cups.settings()], sort_keys=True)
 
 
 Learner = ByStirring | ByPouring

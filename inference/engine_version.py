@@ -1,0 +1,4 @@
+"""What a kept conclusion was made by."""
+
+ENGINE_VERSION = "2"
+"""Raised by a change of what the engine concludes from equal simulations."""
