@@ -73,7 +73,7 @@ def _draw_inclination(axes: "Axes", part: dict[str, "Dataset"]) -> Readout:
 
 def stroke_figure(tree: "DataTree") -> str:
     """RMS of recorded less predicted inclination by stroke and plane, a row for each recording;
-    beside it what two predictions differ by. Empty if the strokes are not known."""
+    beside it the sd of the predictions. Empty if the strokes are not known."""
     recorded = tree["recorded"].to_dataset()
     if "stroke" not in recorded:  # of a run that was made before they were kept
         return ""
@@ -116,6 +116,6 @@ def _draw_strokes(axes: "Axes", recorded: "Dataset", predicted: "Dataset") -> Re
 
 def _rms_by(numbers: NDArray, values: NDArray) -> NDArray[np.float64]:
     """RMS of values (T,) or (T, planes) in each group of equal numbers (T,)."""
-    return np.array(
-        [np.sqrt(np.nanmean(np.square(values[numbers == number]))) for number in np.unique(numbers)]
-    )
+    groups = [values[numbers == number] for number in np.unique(numbers)]
+    seen = [group[np.isfinite(group)] for group in groups]  # none where all samples are missing
+    return np.array([np.sqrt(np.mean(part**2)) if part.size else np.nan for part in seen])

@@ -21,7 +21,7 @@ Movie = Annotated[Path | None, typer.Option(metavar="FILE", help="Show it: .mp4,
 GLYCERIN = {"viscosity": 1.0, "cohesion": 0.2, "density": 1260.0}
 
 
-@app.command(epilog=examples("simulate stir --viscosity 0.1 --movie oil.mp4"))
+@app.command(epilog=examples("simulate stir --viscosity 0.1 --movie oil.webp"))
 def stir(  # noqa: PLR0913  one parameter for each option
     viscosity: Viscosity = GLYCERIN["viscosity"],
     cohesion: Cohesion = GLYCERIN["cohesion"],

@@ -4,8 +4,12 @@ import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .errors import InputError
+
+if TYPE_CHECKING:
+    from xarray import Dataset, DataTree
 
 
 def existing_file(path: str | Path) -> Path:
@@ -39,6 +43,11 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
     finally:
         temporary.unlink(missing_ok=True)
     return path
+
+
+def write_netcdf(data: "Dataset | DataTree", path: Path) -> Path:
+    """Write data by `write_whole`, such that xarray reads them back with h5netcdf."""
+    return write_whole(path, lambda temporary: data.to_netcdf(temporary, engine="h5netcdf"))
 
 
 def write_text(path: Path, text: str) -> Path:

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .criticism import latest_calibration
+from .criticism_narrative import unit_of
 from .kept import fresh_seeds
-from .narrative import UNITS
 from .prior import split_parameters
 from .progress import Advance, progress_bar
 from .recordings import Gripper, Recording
@@ -35,7 +35,8 @@ if TYPE_CHECKING:
 DRAWS = 3
 RATE = 15.0  # frames/s
 LONGEST = 10.0  # s of a stir that are shown
-_PURPOSE = 21  # of seeds
+FORMAT = 1  # of the file
+_PURPOSE = 81  # of seeds
 
 
 def frames_of(run: str | Path, *, progress: bool = True) -> "Dataset":
@@ -53,13 +54,13 @@ def frames_of(run: str | Path, *, progress: bool = True) -> "Dataset":
     seed = int(calibration.record["settings"]["seed"])
     theta = calibration.draws(DRAWS, seed)
     pour = _chosen(calibration.path)
-    made_from = _digest(theta, recording, pour)
+    seeds = fresh_seeds(seed, _PURPOSE, DRAWS)
+    made_from = _digest(theta, seeds, recording, calibration.record["settings"], pour)
     path = calibration.path / FRAMES
     if path.is_file():
         kept = read_tree(path, fix="delete it: it is made again").to_dataset()
         if kept.attrs.get("made_from") == made_from:
             return kept
-    seeds = fresh_seeds(seed, _PURPOSE, DRAWS)
     steps = DRAWS * (1 if pour is None else 2)
     with progress_bar("moving pictures", steps, shown=progress) as advance:
         frames = _stirred(calibration, recording, theta, seeds, advance)
@@ -73,13 +74,17 @@ def _write(
 ) -> "Dataset":
     from xarray import Dataset, DataTree
 
-    drawn = {
-        name: ("draw", values, {"units": UNITS[name]} if name in UNITS else {})
-        for name, values in theta.items()
-    }
-    dataset = Dataset(dict(frames), coords=drawn, attrs={"made_from": made_from})
+    drawn = {name: ("draw", values, _unit(name)) for name, values in theta.items()}
+    named: dict[Any, Any] = {**frames}
+    dataset = Dataset(named, coords=drawn, attrs={"made_from": made_from})
     write_tree(DataTree(dataset), path)
     return dataset
+
+
+def _unit(name: str) -> dict[str, str]:
+    """Attributes of a parameter."""
+    unit = unit_of(name)
+    return {"units": unit} if unit else {}
 
 
 def _chosen(run: Path) -> dict[str, Any] | None:
@@ -91,12 +96,18 @@ def _chosen(run: Path) -> dict[str, Any] | None:
 
 
 def _digest(
-    theta: Mapping[str, NDArray], recording: Recording, pour: Mapping[str, Any] | None
+    theta: Mapping[str, NDArray],
+    seeds: list[int],
+    recording: Recording,
+    settings: Mapping[str, Any],
+    pour: Mapping[str, Any] | None,
 ) -> str:
+    """SHA-256 of all that the frames show."""
     from .models import MODEL_VERSION
 
     liquids = {name: values.tolist() for name, values in theta.items()}
-    told = [MODEL_VERSION, liquids, recording.hash, RATE, LONGEST, pour]
+    shown = [FORMAT, MODEL_VERSION, RATE, LONGEST, settings["particles"]]
+    told = [*shown, liquids, seeds, recording.hash, pour]
     return hashlib.sha256(json.dumps(told, sort_keys=True, default=float).encode()).hexdigest()
 
 
@@ -199,4 +210,13 @@ def _caught(position: NDArray, landed: NDArray, distance: float, cups: "Cups") -
 
 
 def _stack(made: list, name: str) -> NDArray[np.float32]:
-    return np.stack([getattr(one, name) for one in made]).astype(np.float32)
+    """Of each draw; where an effect changes the number of particles, the fewer end in NaN."""
+    parts = [np.asarray(getattr(one, name), np.float32) for one in made]
+    most = max(part.shape[1] for part in parts)
+    rest = [(0, 0)] * (parts[0].ndim - 2)
+    return np.stack(
+        [
+            np.pad(part, [(0, 0), (0, most - part.shape[1]), *rest], constant_values=np.nan)
+            for part in parts
+        ]
+    )

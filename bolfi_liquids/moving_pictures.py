@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .calibration import Calibration
-from .narrative import percent, with_unit
+from .criticism_narrative import with_unit
+from .narrative import percent
+from .readouts import short
 from .recordings_kept import kept_recordings
 from .results import read_tree
 from .run_directory import POUR
@@ -18,22 +20,33 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 STEPS = 254  # of a byte that a coordinate is rounded to; the last value marks what has gone
-DIGITS = 4
 
 
-def moving_context(calibration: Calibration, frames: "Dataset") -> dict[str, Any]:
-    """What the template and the script need of `frames.frames_of`.
+def moving_context(calibration: Calibration, frames: "Dataset") -> dict[str, Any] | None:
+    """What the template and the script need of `frames.frames_of`; None if all of them failed.
 
     Args:
         calibration: The run's.
         frames: Its frames.
     """
     run = calibration.path
+    frames = frames.isel(draw=np.flatnonzero(_sound(frames)))
+    if frames.sizes["draw"] == 0:
+        return None
     scenes = {"stir": _stir_scene(calibration, frames)}
     if "poured" in frames:
         scenes["pour"] = _pour_scene(run, frames)
     draws = [_draw(frames.isel(draw=at)) for at in range(frames.sizes["draw"])]
-    return {"draws": draws, "scenes": scenes}
+    extended = set(draws[0]["theta"]) != set(calibration.summary["parameters"])
+    return {"draws": draws, "scenes": scenes, "extended": extended}
+
+
+def _sound(frames: "Dataset") -> NDArray[np.bool_]:
+    """Draws of which neither the stir nor the pour has diverged."""
+    shown = [frames["tip"].to_numpy().sum(axis=(1, 2))]
+    if "spilled" in frames:
+        shown.append(frames["spilled"].to_numpy())
+    return np.isfinite(shown).all(axis=0)
 
 
 def _draw(one: "Dataset") -> dict[str, Any]:
@@ -43,9 +56,9 @@ def _draw(one: "Dataset") -> dict[str, Any]:
         "theta": theta,
         "liquid": told,
         "outcome": _outcome(one),
-        "time": _short(one["time"]),
+        "time": short(one["time"]),
         "inclination": {
-            plane: _short(np.degrees(one["inclination"].isel(plane=at)))
+            plane: short(np.degrees(one["inclination"].isel(plane=at)))
             for at, plane in enumerate(("xz", "yz"))
         },
     }
@@ -67,9 +80,9 @@ def _stir_scene(calibration: Calibration, frames: "Dataset") -> dict[str, Any]:
     radius, top = setup.cup.radius, float(frames["pivot"][..., 2].max())
     return {
         **_packed(frames["stirred"].to_numpy()),
-        "time": _short(frames["stir_time"]),
-        "pivot": _short(frames["pivot"]),
-        "tip": _short(frames["tip"]),
+        "time": short(frames["stir_time"]),
+        "pivot": short(frames["pivot"]),
+        "tip": short(frames["tip"]),
         "cup": {"radius": radius, "height": float(recording.attrs["cup_height"])},
         "stick": setup.stick.radius,
         "radius": setup.spacing / 2.0,
@@ -91,9 +104,9 @@ def _pour_scene(run: Path, frames: "Dataset") -> dict[str, Any]:
     high = [max(reach, distance + receiver.radius) + 0.005, wide, reach]
     return {
         **_packed(frames["poured"].to_numpy()),
-        "time": _short(frames["pour_time"]),
-        "angle": _short(frames["angle"]),
-        "caught": _short(frames["caught"]),
+        "time": short(frames["pour_time"]),
+        "angle": short(frames["angle"]),
+        "caught": short(frames["caught"]),
         "source": {"radius": source.radius, "height": source.height},
         "receiver": {"radius": receiver.radius, "height": receiver.height},
         "distance": distance,
@@ -106,7 +119,8 @@ def _pour_scene(run: Path, frames: "Dataset") -> dict[str, Any]:
 
 def _packed(position: NDArray) -> dict[str, Any]:
     """Positions (draws, frames, n, 3) as bytes between the ends of each axis, in base64."""
-    low, high = np.nanmin(position, axis=(0, 1, 2)), np.nanmax(position, axis=(0, 1, 2))
+    there = position[np.isfinite(position).all(axis=-1)]
+    low, high = (there.min(axis=0), there.max(axis=0)) if len(there) else (np.zeros(3), np.ones(3))
     scaled = np.round(STEPS * (position - low) / np.maximum(high - low, 1e-9))
     bytes_ = np.where(np.isnan(scaled), 255, scaled).astype(np.uint8)
     return {
@@ -115,11 +129,3 @@ def _packed(position: NDArray) -> dict[str, Any]:
         "particles": position.shape[2],
         "positions": [base64.b64encode(one.tobytes()).decode() for one in bytes_],
     }
-
-
-def _short(values: Any) -> list[Any]:
-    """Nested lists of numbers with a few digits."""
-    array = np.asarray(values, np.float64)
-    if array.ndim == 0:
-        return float(f"{array:.{DIGITS}g}")  # type: ignore[return-value]
-    return [_short(part) for part in array]

@@ -106,15 +106,15 @@ def _draw_joint(
 
 def _mark(joint: "Axes", tree: "DataTree", names: tuple[str, str]) -> Readout:
     simulations, closest = tree["simulations"], tree["closest"]
-    points = [simulations[name].to_numpy() for name in names]
-    joint.plot(*points, ".", color=GREY, markersize=4, label="simulated")
+    x, y = (simulations[name].to_numpy() for name in names)
+    joint.plot(x, y, ".", color=GREY, markersize=4, label="simulated")
     at = [closest[name].to_numpy() for name in names]
     joint.plot(*at, "*", color=ORANGE, markersize=10, label="closest hypothesis")
     texts = [
-        f"simulation {number}: {names[0]} {x:.3g}, {names[1]} {y:.3g}"
-        for number, (x, y) in enumerate(zip(*points, strict=True), start=1)
+        f"simulation {number}: {names[0]} {first:.3g}, {names[1]} {second:.3g}"
+        for number, (first, second) in enumerate(zip(x, y, strict=True), start=1)
     ]
-    return marks(joint, *points, texts, parameters=names)
+    return marks(joint, x, y, texts, parameters=names)
 
 
 def _finish(figure, joint: "Axes", names: tuple[str, str]) -> None:

@@ -7,15 +7,19 @@ from numpy.typing import NDArray
 
 from .drawing import BLUE, INK, ORANGE, new_figure, styled
 from .readouts import Readout, field, to_chart
+from .spillage import ACTION, RISK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.contour import QuadContourSet
     from matplotlib.figure import SubFigure
-    from xarray import DataTree
+    from matplotlib.patches import Patch
+    from xarray import Dataset, DataTree
 
 LEVELS = (0, 1, 2, 5, 10, 20, 40, 70, 100)  # percent: it matters where little is spilled
 BAD = 0.9  # quantile of the draws, of which a map is shown beside that of the expectation
-ALIKE = 2.0  # standard errors of a paired difference within which two actions are alike
+SURE, RESAMPLED = 0.95, 200  # of which differences are sure, and by how many bootstrap samples
+FEW = 8  # draws, of which fewer tell too little
 CHOICES = {"chosen": (BLUE, "o", "chosen pour"), "plug_in": (ORANGE, "s", "best at θ* alone")}
 
 
@@ -32,55 +36,82 @@ def pour_figure(tree: "DataTree") -> str:
 
 
 def _draw_maps(figure: "SubFigure", panels: NDArray, tree: "DataTree") -> list[Readout]:
-    """Expected spillage, with the actions that cannot be told from the chosen one, and a quantile
-    over the draws."""
-    from matplotlib.patches import Patch
-
-    actions = tree["actions"]
-    spilled = 100.0 * actions["spilled"].to_numpy()
-    expected = 100.0 * actions["risk"].to_numpy()
-    bad = np.quantile(spilled, BAD, axis=0)
+    """What is minimised, with the actions that are not surely worse than the chosen one, and a
+    quantile over the draws."""
+    actions = tree["actions"].to_dataset()
     x = np.degrees(actions["angular_velocity"].to_numpy())
     y = 100.0 * actions["distance"].to_numpy()
-    values = {"expected": expected, f"in {100 * BAD:.0f} % of the draws at most": bad}
-    readouts = []
-    for axes, (title, percent) in zip(panels, values.items(), strict=True):
-        shades = axes.contourf(x, y, percent.T, levels=LEVELS, cmap="Greys", alpha=0.8)
-        lines = axes.contour(x, y, percent.T, levels=LEVELS[1:4], colors=INK, linewidths=0.6)
-        axes.clabel(lines, fmt="%g %%", fontsize=7.5)
+    bad = np.quantile(actions["spilled"].to_numpy(), BAD, axis=0)
+    percent = {
+        "expected" if tree.attrs["risk"] == "mean" else "CVaR": 100.0 * actions["risk"].to_numpy(),
+        f"in {100 * BAD:.0f} % of the draws at most": 100.0 * bad,
+    }
+    shades = [
+        _draw_map(axes, x, y, values) for axes, values in zip(panels, percent.values(), strict=True)
+    ]
+    for axes, title in zip(panels, percent, strict=True):
         axes.set_title(title, loc="left")
         axes.set_xlabel("angular velocity [deg/s]")
         _mark_choices(axes, tree)
-        readouts.append(field(axes, x, y, values, "%"))
-    alike = as_good(actions["spilled"].to_numpy(), actions["risk"].to_numpy())
-    panels[0].contourf(
-        x, y, alike.T.astype(float), levels=(0.5, 1.5), colors="none", hatches=["...."]
-    )
     panels[0].set_ylabel("distance from lip to receiver's axis [cm]")
-    figure.colorbar(shades, ax=list(panels), label="spilled [%]")
+    figure.colorbar(shades[0], ax=list(panels), label="spilled [%]")
     handles, labels = panels[0].get_legend_handles_labels()
-    handles.append(Patch(facecolor="none", edgecolor=INK, hatch="....", lw=0.0))
-    figure.legend(handles, [*labels, "as good, as far as these draws tell"],
-                  loc="outside upper center", ncols=3)  # fmt: skip
-    return readouts
+    alike = not_surely_worse(
+        actions["spilled"].to_numpy(), tree.attrs["risk"], _place(actions, tree["chosen"].attrs)
+    )
+    if alike.any():
+        handles.append(_dot(panels[0], x, y, alike))
+        labels.append("not surely worse than the chosen")
+    figure.legend(handles, labels, loc="outside upper center", ncols=3)
+    return [field(axes, x, y, percent, "%") for axes in panels]
 
 
-def as_good(spilled: NDArray, risk: NDArray) -> NDArray[np.bool_]:
-    """Actions that these draws cannot tell from the best one.
+def _draw_map(axes: "Axes", x: NDArray, y: NDArray, percent: NDArray) -> "QuadContourSet":
+    shades = axes.contourf(x, y, percent.T, levels=LEVELS, cmap="Greys", alpha=0.8)
+    lines = axes.contour(x, y, percent.T, levels=LEVELS[1:4], colors=INK, linewidths=0.6)
+    axes.clabel(lines, fmt="%g %%", fontsize=7.5)
+    return shades
 
-    Differences are paired by draw, so what all actions spill of a liquid alike counts for nothing.
+
+def _dot(axes: "Axes", x: NDArray, y: NDArray, where: NDArray) -> "Patch":
+    """Dots over actions, bool (W, D); what stands for them in a legend."""
+    from matplotlib.patches import Patch
+
+    levels = (0.5, 1.5)
+    axes.contourf(x, y, where.T.astype(float), levels=levels, colors="none", hatches=["...."])
+    return Patch(facecolor="none", edgecolor=INK, hatch="....", lw=0.0)
+
+
+def _place(actions: "Dataset", chosen: dict) -> tuple[int, int]:
+    """Row and column of an action."""
+    row, column = (
+        int(np.argmin(np.abs(actions[name].to_numpy() - chosen[name]))) for name in ACTION
+    )
+    return row, column
+
+
+def not_surely_worse(
+    spilled: NDArray, risk: str, chosen: tuple[int, int], seed: int = 0
+) -> NDArray[np.bool_]:
+    """Actions of which these draws do not tell, at `SURE`, that they are worse than the chosen.
+
+    The difference of two actions is paired by draw, so what all actions spill of a liquid alike
+    counts for nothing; its interval is a bootstrap over draws.
 
     Args:
         spilled: Of each draw, shape (draws, W, D).
-        risk: What is least at the best action, shape (W, D).
+        risk: Which measure of `spillage.RISK` is compared.
+        chosen: Row and column of the chosen action.
+        seed: Of the bootstrap.
 
     Returns:
-        Shape (W, D).
+        Shape (W, D); none of them where there are fewer than `FEW` draws.
     """
-    best = np.unravel_index(np.argmin(risk), risk.shape)
-    apart = spilled - spilled[:, *best][:, None, None]
-    error = apart.std(axis=0, ddof=1) / np.sqrt(len(apart))
-    return apart.mean(axis=0) <= ALIKE * error
+    if len(spilled) < FEW:
+        return np.zeros(spilled.shape[1:], bool)
+    again = np.random.default_rng(seed).integers(len(spilled), size=(RESAMPLED, len(spilled)))
+    risks = np.stack([RISK[risk](spilled[draws]) for draws in again])
+    return np.quantile(risks - risks[:, *chosen][:, None, None], 1.0 - SURE, axis=0) <= 0.0
 
 
 def _mark_choices(axes: "Axes", tree: "DataTree") -> None:

@@ -1,7 +1,7 @@
 """What a page's script needs to say the values under the pointer, beside a figure's SVG."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -38,18 +38,18 @@ def series(axes: "Axes", x: ArrayLike, lines: dict[str, ArrayLike], **more: Any)
         lines: Label -> values, shape (n,).
         more: Further entries for the page's script.
     """
-    rows = [{"label": label, "y": _short(values)} for label, values in lines.items()]
-    return Readout(axes, {"kind": "series", "at": _short(x), "lines": rows, **more})
+    rows = [{"label": label, "y": short(values)} for label, values in lines.items()]
+    return Readout(axes, {"kind": "series", "at": short(x), "lines": rows, **more})
 
 
 def marks(axes: "Axes", x: ArrayLike, y: ArrayLike, texts: Sequence[str], **more: Any) -> Readout:
     """Points: the text of the nearest is said. All of shape (n,)."""
-    rows = zip(_short(x), _short(y), texts, strict=True)
+    rows = zip(short(x), short(y), texts, strict=True)
     return Readout(axes, {"kind": "marks", "marks": [list(row) for row in rows], **more})
 
 
 def field(
-    axes: "Axes", x: ArrayLike, y: ArrayLike, values: dict[str, ArrayLike], unit: str
+    axes: "Axes", x: ArrayLike, y: ArrayLike, values: Mapping[str, NDArray], unit: str
 ) -> Readout:
     """Values over a grid: those of the nearest node are said.
 
@@ -59,10 +59,8 @@ def field(
         values: Label -> values, shape (n, m).
         unit: Theirs.
     """
-    rows = [
-        {"label": label, "z": [_short(r) for r in np.asarray(z)]} for label, z in values.items()
-    ]
-    content = {"kind": "field", "at": _short(x), "up_at": _short(y), "fields": rows, "unit": unit}
+    rows = [{"label": label, "z": [short(r) for r in np.asarray(z)]} for label, z in values.items()]
+    content = {"kind": "field", "at": short(x), "up_at": short(y), "fields": rows, "unit": unit}
     return Readout(axes, content)
 
 
@@ -93,7 +91,8 @@ def to_chart(figure: "Figure", name: str, readouts: Sequence[Readout]) -> str:
 
 def script_json(value: Any) -> str:
     """JSON that may stand in an HTML script element, whatever texts it holds."""
-    return json.dumps(value, separators=(",", ":")).replace("<", "\\u003c")
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c")
 
 
 def _frame(figure: "Figure", axes: "Axes") -> dict[str, Any]:
@@ -103,17 +102,19 @@ def _frame(figure: "Figure", axes: "Axes") -> dict[str, Any]:
     box = axes.bbox
     edges = (box.x0, height - box.y1, box.x1, height - box.y0)
     return {
-        "box": _short([scale * edge for edge in edges]),
+        "box": short([scale * edge for edge in edges]),
         "x": _axis(axes.get_xlim(), axes.get_xscale(), axes.get_xlabel()),
         "y": _axis(axes.get_ylim(), axes.get_yscale(), axes.get_ylabel()),
     }
 
 
 def _axis(ends: tuple[float, float], scale: str, label: str) -> dict[str, Any]:
-    return {"ends": _short(ends), "log": scale == "log", "label": label}
+    return {"ends": short(ends), "log": scale == "log", "label": label}
 
 
-def _short(values: ArrayLike) -> list[float | None]:
-    """Numbers to a few digits; what is not finite becomes null."""
+def short(values: ArrayLike) -> Any:
+    """Nested lists of numbers to a few digits; what is not finite becomes null."""
     array: NDArray[np.float64] = np.asarray(values, np.float64)
-    return [float(f"{v:.{DIGITS}g}") if np.isfinite(v) else None for v in array.ravel()]
+    if array.ndim == 0:
+        return float(f"{array:.{DIGITS}g}") if np.isfinite(array) else None
+    return [short(part) for part in array]

@@ -147,6 +147,12 @@ def recording_dataset(values: Mapping[str, NDArray], attrs: Mapping[str, float |
     return Dataset(samples, attrs=attrs).set_coords("time")
 
 
+def along_path(recording: Recording, inclination: NDArray) -> dict[str, NDArray]:
+    """Values of a recording's file: another inclination (T, 2) [rad] on the same path."""
+    columns = [recording.time, *recording.gripper.position.T, *np.asarray(inclination).T]
+    return dict(zip(("time", *AXES, *PLANES), columns, strict=True))
+
+
 def as_recording(dataset: "Dataset", path: Path) -> Recording:
     """What the variables and attributes of a recording's file mean; nothing is checked.
 

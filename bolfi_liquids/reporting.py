@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from . import narrative
 from .calibration import Calibration
 from .calibration_figures import inclination_figure, stroke_figure
+from .criticism import latest_calibration
 from .criticism_chapter import criticism_context
 from .files import write_text
 from .posterior_figure import posterior_figure
@@ -58,6 +59,7 @@ def report(run: str | Path, *, moving: bool = True, progress: bool = True) -> Pa
             criticism and criticism["section"],
             None if pour is None else sections["pour"],
             pour,
+            latest_calibration(calibration.path).posterior,
         ),
         moving=pictures,
         moving_json=script_json(pictures),
@@ -84,7 +86,7 @@ def _calibration_context(calibration: Calibration) -> dict[str, Any]:
         "by_stroke": stroke_figure(tree),
         "posterior": posterior_figure(tree),
         "search": search_figure(tree),
-        "start": int(tree.attrs["initial"]),
+        "start": min(int(tree.attrs["initial"]), section["n_simulations"]),
         "rows": [_row(name, section) for name in section["parameters"]],
     }
 
@@ -120,7 +122,7 @@ def _pour_context(section: Mapping[str, Any], tree: "DataTree") -> dict[str, Any
     }
 
 
-def _moving(calibration: Calibration, progress: bool) -> dict[str, Any]:
+def _moving(calibration: Calibration, progress: bool) -> dict[str, Any] | None:
     from .frames import frames_of
     from .moving_pictures import moving_context
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .errors import InputError
-from .files import write_whole
+from .files import write_netcdf
 from .predictive import Check
 from .recording_fields import PLANE_NAMES
 from .stirring import Stirring
@@ -111,4 +111,4 @@ def read_tree(path: Path, *, fix: str) -> "DataTree":
 
 def write_tree(tree: "DataTree", path: Path) -> None:
     """Write a tree in one piece, such that `xarray.open_datatree` reads it back."""
-    write_whole(path, lambda temporary: tree.to_netcdf(temporary, engine="h5netcdf"))
+    write_netcdf(tree, path)

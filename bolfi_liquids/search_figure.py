@@ -12,7 +12,7 @@ from .readouts import Readout, marks, to_chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from xarray import DataTree
+    from xarray import Dataset, DataTree
 
 INSIDE = 0.05, 0.95  # quantiles of the posterior that are shaded
 
@@ -23,7 +23,7 @@ def search_figure(tree: "DataTree") -> str:
     from matplotlib.ticker import MaxNLocator
 
     names = list(map(str, tree["posterior"].data_vars))
-    simulations = tree["simulations"]
+    simulations = tree["simulations"].to_dataset()
     discrepancy = np.degrees(np.degrees(simulations["discrepancy"].to_numpy()))
     iteration = np.arange(1, len(discrepancy) + 1)
     start = iteration <= int(tree.attrs["initial"])
@@ -56,7 +56,7 @@ def search_figure(tree: "DataTree") -> str:
         return to_chart(figure, "search", readouts)
 
 
-def _texts(names: list[str], simulations: "DataTree", discrepancy: NDArray) -> list[str]:
+def _texts(names: list[str], simulations: "Dataset", discrepancy: NDArray) -> list[str]:
     """What is said of each simulation."""
     tried = [simulations[name].to_numpy() for name in names]
     return [
@@ -65,7 +65,7 @@ def _texts(names: list[str], simulations: "DataTree", discrepancy: NDArray) -> l
             f"{name} {with_unit(name, values[at])}"
             for name, values in zip(names, tried, strict=True)
         )
-        + f"; discrepancy {off:.3g} deg² s"
+        + (f"; discrepancy {off:.3g} deg² s" if np.isfinite(off) else "; failed")
         for at, off in enumerate(discrepancy)
     ]
 

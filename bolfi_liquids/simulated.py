@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from .described_liquid import Described
 from .errors import InputError
+from .files import write_netcdf
 from .movie_file import RATE, write_movie
 from .progress import progress_bar
 from .recordings import Recording
-from .simulated_files import check_targets, pour_dataset, stir_dataset, write_netcdf
+from .simulated_files import check_targets, pour_dataset, stir_dataset
 from .spillage import FRACTIONS
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ def simulate_stir(
     with _failing():
         angles = models.stir(*given, [described.seed], described.effects)[0]
     if out is not None:
-        write_netcdf(out, stir_dataset(described, recording, angles))
+        write_netcdf(stir_dataset(described, recording, angles), out)
     if movie is not None:
         from .movie_stir import stir_pictures
 
@@ -107,7 +108,7 @@ def simulate_pour(  # noqa: PLR0913  one for each option
     result = landings.into(distance, cups.receiver.radius)
     fractions = {name: float(getattr(result, name)[0]) for name in FRACTIONS}
     if out is not None:
-        write_netcdf(out, pour_dataset(described, landings, given[1:], distance, fractions))
+        write_netcdf(pour_dataset(described, landings, given[1:], distance, fractions), out)
     if movie is not None:
         from .movie_pour import pour_pictures
 

@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 
 from .described_liquid import Described
 from .errors import InputError
-from .files import write_whole
 from .movie_file import check_movie
-from .recording_fields import AXES, PLANES
-from .recordings import Recording
+from .recordings import Recording, along_path, recording_dataset
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -47,19 +45,14 @@ def check_targets(movie: Path | None, out: Path | None) -> None:
 
 def stir_dataset(described: Described, recording: Recording, angles: NDArray) -> "Dataset":
     """The simulated stir as a recording: of the same path, without noise."""
-    from xarray import Dataset
-
-    rows = dict(zip(AXES, recording.gripper.position.T, strict=True))
-    columns = dict(zip(PLANES, angles.T, strict=True))
-    units = dict.fromkeys(AXES, "m") | dict.fromkeys(PLANES, "rad")
-    return Dataset(
-        {
-            name: ("time", values, {"units": units[name]})
-            for name, values in (rows | columns).items()
-        },
-        coords={"time": ("time", recording.time, {"units": "s"})},
-        attrs={**recording.attrs, "path_of": recording.path.name, **described.attributes()},
-    )
+    of_the_original = ("status", "reason")
+    rig = {
+        name: value
+        for name, value in recording.attrs.items()
+        if name not in of_the_original and not name.startswith("imported_")
+    }
+    attrs = {**rig, "path_of": recording.path.name, **described.attributes()}
+    return recording_dataset(along_path(recording, angles), attrs)
 
 
 def pour_dataset(
@@ -86,8 +79,3 @@ def pour_dataset(
             "cups": json.dumps(cups.settings(described.particles)),
         },
     )
-
-
-def write_netcdf(path: Path, dataset: "Dataset") -> Path:
-    """Write a dataset whole."""
-    return write_whole(path, lambda at: dataset.to_netcdf(at, engine="h5netcdf"))

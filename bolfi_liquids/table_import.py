@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError
-from .files import existing_file, write_text, write_whole
+from .files import existing_file, write_netcdf, write_text
 from .recording_checks import check_values
 from .recording_fields import PLANES
 from .recordings import Recording, as_recording, open_recording, recording_dataset
@@ -61,7 +61,7 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
         ) from err
     if not out.parent.is_dir():
         raise InputError("no such directory", where=str(out.parent), fix="make it first")
-    write_whole(out, lambda temporary: dataset.to_netcdf(temporary, engine="h5netcdf"))
+    write_netcdf(dataset, out)
     return open_recording(out)
 
 

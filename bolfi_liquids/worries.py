@@ -9,9 +9,13 @@ from . import criticism_narrative, narrative
 from .spillage import ACTION
 
 if TYPE_CHECKING:
-    from xarray import DataTree
+    from xarray import Dataset, DataTree
 
 MUCH = 0.05  # spilled, which a person would mop up
+STALE = (
+    "The pour was chosen over another posterior than that of the latest calibration or criticism:"
+    " choose it again."
+)
 EDGE = {
     ("angular_velocity", 0): "the slowest",
     ("angular_velocity", 1): "the fastest",
@@ -25,20 +29,31 @@ def worries(
     criticised: Mapping[str, Any] | None,
     poured: Mapping[str, Any] | None,
     tree: "DataTree | None",
+    posterior: "Dataset",
 ) -> list[str]:
     """Sentences, the gravest first; none if nothing is known to be wrong.
 
     Args:
         calibrated, criticised, poured: Sections of summary.json; None where there is none.
         tree: pour.nc.
+        posterior: Draws of the latest calibration.
     """
     told = [
         narrative.sampler_sentence(calibrated),
+        "" if tree is None or poured_of(tree, posterior) else STALE,
         *_of_the_model(calibrated, criticised),
         narrative.floor_sentence(calibrated),
         *_of_the_pour(poured, tree),
     ]
     return [sentence for sentence in told if sentence]
+
+
+def poured_of(tree: "DataTree", posterior: "Dataset") -> bool:
+    """Whether a pour was chosen over draws of this posterior."""
+    liquids = tree["liquids"].to_dataset()
+    if set(liquids.data_vars) != set(posterior.data_vars):
+        return False
+    return all(np.isin(liquids[name], posterior[name]).all() for name in liquids.data_vars)
 
 
 def _of_the_model(calibrated: Mapping[str, Any], criticised: Mapping[str, Any] | None) -> list[str]:
@@ -50,7 +65,7 @@ def _of_the_model(calibrated: Mapping[str, Any], criticised: Mapping[str, Any] |
             ]
         return ["The fit was not criticised: whether the simulator lacks an effect is not known."]
     told = []
-    if criticised["verdict"] != "none":
+    if criticised["verdict"] != "none" and not criticised["accepted"]:
         told.append(criticism_narrative.verdict_sentence(criticised))
     if not criticised["baseline"]:
         told.append(criticism_narrative.NO_BASELINE)
@@ -59,7 +74,7 @@ def _of_the_model(calibrated: Mapping[str, Any], criticised: Mapping[str, Any] |
 
 def _of_the_pour(poured: Mapping[str, Any] | None, tree: "DataTree | None") -> list[str]:
     if poured is None or tree is None:
-        return ["No pour was chosen yet."]
+        return []
     told = [_edge_sentence(tree)]
     if poured["expected_spillage"] > MUCH:
         share = narrative.percent(poured["expected_spillage"])

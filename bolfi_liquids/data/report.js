@@ -84,13 +84,8 @@
     let start = null;
     const place = (event) => new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
 
-    svg.addEventListener("pointermove", (event) => {
+    const read = (event) => {
       const point = place(event);
-      if (start) {
-        frame.setAttribute("visibility", "visible");
-        for (const [key, value] of Object.entries(between(start, point))) frame.setAttribute(key, value);
-        return;
-      }
       const under = panels.find((p) => p.holds(point));
       dots.replaceChildren();
       tip.hidden = !under;
@@ -98,18 +93,27 @@
       const found = readers[under.kind](under, point);
       for (const [x, y] of found.dots) add(dots, "circle", { cx: x, cy: y, r: 3 });
       say(found.text, event);
+    };
+
+    svg.addEventListener("pointermove", (event) => {
+      if (!start) return read(event);
+      frame.setAttribute("visibility", "visible");
+      for (const [key, value] of Object.entries(between(start, place(event)))) frame.setAttribute(key, value);
     });
-    svg.addEventListener("pointerleave", () => {
+    svg.addEventListener("pointerleave", (event) => {
+      if (event.pointerType !== "mouse") return; // what a finger has touched stays
       tip.hidden = true;
       dots.replaceChildren();
     });
     svg.addEventListener("pointerdown", (event) => {
-      if (event.pointerType === "mouse" && event.button === 0) {
-        start = place(event);
-        event.preventDefault();
-      }
+      if (event.pointerType !== "mouse") return read(event);
+      if (event.button !== 0) return;
+      start = place(event);
+      svg.setPointerCapture(event.pointerId); // its release counts also outside
+      event.preventDefault();
     });
-    addEventListener("pointerup", (event) => {
+    svg.addEventListener("pointercancel", () => (start = null));
+    svg.addEventListener("pointerup", (event) => {
       if (!start) return;
       const box = between(start, place(event));
       start = null;
@@ -267,9 +271,10 @@
 
   // ---- one draw of the posterior, in all figures
   function follow(script) {
-    const { draws, scenes } = json(script);
+    const { draws, scenes, extended } = json(script);
     const movies = [...document.querySelectorAll("[data-movie]")].map((figure) => movie(figure, scenes[figure.dataset.movie]));
-    const traces = charts.flatMap(({ svg, panels }) =>
+    // what has the missing effect has no place among the figures of a calibration without it
+    const traces = (extended ? [] : charts).flatMap(({ svg, panels }) =>
       panels
         .filter((p) => p.plane || p.parameters)
         .map((p) => ({ p, mark: add(svg, p.plane ? "polyline" : "circle", { class: "drawn", r: 5 }), cursor: p.plane && p.recording === 0 && add(svg, "line", { class: "cursor" }) })),
@@ -299,8 +304,8 @@
         }
       }),
     );
-    document.querySelectorAll(".scripted").forEach((element) => (element.hidden = false));
     show(0);
   }
+  document.querySelectorAll(".scripted").forEach((element) => (element.hidden = false));
   document.querySelectorAll("#draws").forEach(follow);
 })();

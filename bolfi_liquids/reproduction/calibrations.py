@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..calibrator import engine_options
 from ..draws import pick_draws
+from ..prior import describe_prior
 from ..progress import Simulate
 from ..sbc_pipelines import CameraNoise
 from ..settings import MIN_SIMULATIONS, PAPER_RULES
@@ -68,9 +69,7 @@ class ByStirring:
     @property
     def identity(self) -> str:
         """A text that two equal experiments share."""
-        from ..inference import ENGINE_VERSION
-
-        made_by = [ENGINE_VERSION, "stir", self.surrogate, self.budgets]
+        made_by = [*_made_by(self.prior), "stir", self.surrogate, self.budgets]
         return json.dumps([*made_by, self.stirring.identity])
 
 
@@ -123,18 +122,26 @@ class ByPouring:
     @property
     def identity(self) -> str:
         """A text that two equal experiments share."""
-        from ..inference import ENGINE_VERSION
-
         action = [self.angular_velocity, self.distance]
-        made_by = [ENGINE_VERSION, "pour", action, self.budgets]
+        made_by = [*_made_by(self.prior), "pour", action, self.budgets]
         return json.dumps([*made_by, self.cups.settings()], sort_keys=True)
 
 
 Learner = ByStirring | ByPouring
 
 
+def _made_by(prior: "Prior") -> list[Any]:
+    """What the conclusions of all learners depend on."""
+    from ..inference import ENGINE_VERSION
+
+    return [ENGINE_VERSION, describe_prior(prior), BATCH, DRAWS, NOISE.sd]
+
+
 def after_each(engine: "Bolfi", simulate: Simulate, budgets: Sequence[int]) -> "Iterator[Fit]":
     """What one search concludes after each number of simulations, ascending.
+
+    Points are asked in batches that end at each budget, so where a search goes depends a little
+    on when it is looked at.
 
     Args:
         engine: Told of nothing yet.

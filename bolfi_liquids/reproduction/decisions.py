@@ -71,7 +71,9 @@ def execute(
     return spilled
 
 
-def executions(theta: Mapping[str, float], density: float, cups: "Cups", seed: int) -> Outcomes:
+def executions(
+    theta: Mapping[str, float], density: float, cups: "Cups", seed: int, purpose: int = _PURPOSE
+) -> Outcomes:
     """Pours of one liquid, with seeds that nothing else uses.
 
     Args:
@@ -79,8 +81,9 @@ def executions(theta: Mapping[str, float], density: float, cups: "Cups", seed: i
         density: [kg/m3].
         cups: From and into which is poured.
         seed: Of the truth.
+        purpose: Of the seeds; another one lets an action be chosen by other pours.
     """
-    seeds = np.array(fresh_seeds(seed, _PURPOSE, EXECUTIONS), np.int64)
+    seeds = np.array(fresh_seeds(seed, purpose, EXECUTIONS), np.int64)
     tiled = {name: np.full(EXECUTIONS, value) for name, value in theta.items()}
     return Outcomes(tiled, density, cups, seeds)
 

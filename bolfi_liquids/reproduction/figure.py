@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..drawing import write_figure
-from ..files import write_whole
+from ..files import write_netcdf
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,5 +29,5 @@ class Drawn:
     def write(self, out: Path, name: str, made_with: str) -> None:
         """NAME.nc, NAME.png and NAME.svg; `made_with` goes into the first."""
         data = self.data.assign_attrs(made_with=made_with, says=self.says)
-        write_whole(out / f"{name}.nc", lambda at: data.to_netcdf(at, engine="h5netcdf"))
+        write_netcdf(data, out / f"{name}.nc")
         write_figure(self.figure, out, name)

@@ -17,6 +17,8 @@ from .workshop import Workshop
 CONSIDERED = ("adhesion", "shear_thinning", "yield_stress")
 """What may be missing where liquids are poured."""
 
+_REHEARSAL = 73  # purpose of seeds
+
 CASES = {
     "believed": ("the same pour if it did not stick", GREY),
     "before": ("chosen after stirring", ORANGE),
@@ -63,11 +65,12 @@ def adhesion(workshop: Workshop) -> Drawn:
 def _says(means: NDArray, named: list[str]) -> str:
     believed, before, after, known = means
     right = sum(names == "adhesion" for names in named)
+    lost = before - known
+    won = f"{100 * (before - after) / lost:.0f} % of the loss won back; " if lost > 0 else ""
     return (
         f"spilled where the liquid sticks: {before:.1f} % by the pour chosen after stirring "
         f"({believed:.1f} % if it did not stick), {after:.1f} % by the one chosen after criticism, "
-        f"{known:.1f} % with all known: {100 * (before - after) / (before - known):.0f} % of the "
-        f"loss won back; adhesion named alone in {right} of {len(named)}"
+        f"{known:.1f} % with all known: {won}adhesion named alone in {right} of {len(named)}"
     )
 
 
@@ -75,7 +78,7 @@ def _spilled(workshop: Workshop, number: int) -> tuple[Sticky, list[float], str]
     """A truth, what it spilled in each of `CASES`, and the effects that were named."""
     cups, seed, shown = bundled_cups(), workshop.scale.seed, workshop.progress
     truth = draw_sticky(number, seed)
-    folder = workshop.out / "runs" / f"sticky_{number}"
+    folder = workshop.out / "runs" / f"sticky_{number}_{workshop.scale.particles}_{seed}"
     folder.mkdir(parents=True, exist_ok=True)
     recording = stirred(truth, workshop.scale.particles, folder / "stir.nc")
     density = recording.number("liquid_density")
@@ -93,7 +96,8 @@ def _spilled(workshop: Workshop, number: int) -> tuple[Sticky, list[float], str]
     after = choose_pour(criticism.calibration, cups, seed=seed, progress=shown)
     sticks = executions(truth.theta, density, cups, truth.seed)
     flows = executions(truth.liquid, density, cups, truth.seed)
-    actions = [_action(before), _action(after), _best(workshop, sticks)]
+    rehearsed = executions(truth.theta, density, cups, truth.seed, _REHEARSAL)
+    actions = [_action(before), _action(after), _best(workshop, rehearsed)]
     spilled = [
         *spilled_by(flows, actions[:1], workshop.bank),
         *spilled_by(sticks, actions, workshop.bank),

@@ -23,7 +23,7 @@ def strokes(workshop: Workshop) -> Drawn:
     study = study.rename(learned_by="strokes").assign_coords(strokes=list(workshop.scale.strokes))
     spilled = study["spilled"].sel(rule="mean").transpose("truth", "strokes")
     drawn = study["concluded"].sel(parameter="viscosity").isel(draw=slice(1, None))
-    width = np.log(drawn).std("draw").transpose("truth", "strokes")
+    width = np.log(drawn.transpose("truth", "strokes", "draw").to_numpy()).std(axis=-1)
     with styled():
         figure = new_figure(8.6, 3.6)
         left, right = figure.subplots(1, 2)
@@ -33,7 +33,7 @@ def strokes(workshop: Workshop) -> Drawn:
         left.set_yscale("symlog", linthresh=1.0)
         left.set_yticks(FEW_PERCENT, map(str, FEW_PERCENT))
         left.set(ylim=(0, None), ylabel="spilled [%]")
-        _by_liquid(right, np.exp(width.to_numpy()), study)
+        _by_liquid(right, np.exp(width), study)
         right.set(ylim=(1, None), ylabel="posterior sd of the viscosity, a factor")
         figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return Drawn(study, figure, _says(study, spilled.to_numpy(), workshop.scale.few))

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bundled import bundled_recording
-from ..files import write_whole
+from ..files import write_netcdf, write_whole
 from ..kept import fresh_seeds
-from ..recording_fields import AXES, PLANES
-from ..recordings import Recording, open_recording, recording_dataset
+from ..recordings import Recording, along_path, open_recording, recording_dataset
 from .calibrations import NOISE
 from .truths import LIQUIDS, SPREAD
 
@@ -26,7 +25,7 @@ ADHESION = 0.6, 0.9  # of the truths
 TRAINING = [(w, d) for w in (40.0, 70.0, 110.0) for d in (0.5, 1.5, 2.5, 4.0)]
 """Pours that are seen after the stirring: deg/s, cm."""
 
-_STIRRED, _POURED = 61, 62  # purposes of seeds
+_STIRRED, _POURED = 71, 72  # purposes of seeds
 _COLUMNS = ("angular_velocity_deg_s", "distance_cm", "spilled", "received", "retained")
 
 
@@ -49,7 +48,7 @@ class Sticky(NamedTuple):
 
 def draw_sticky(repetition: int, seed: int) -> Sticky:
     """The same whatever the number of repetitions."""
-    rng = np.random.default_rng([seed, 71, repetition])
+    rng = np.random.default_rng([seed, 7, repetition])
     viscosity = LIQUIDS[LIKE] * np.exp(SPREAD * rng.standard_normal())
     theta = {
         "viscosity": float(viscosity),
@@ -63,7 +62,7 @@ def stirred(truth: Sticky, particles: int, path: Path) -> Recording:
     """A recording of it, of so many particles, written to `path` unless it is there."""
     if not path.exists():
         dataset = _dataset(bundled_recording(LIKE), truth, particles)
-        write_whole(path, lambda at: dataset.to_netcdf(at, engine="h5netcdf"))
+        write_netcdf(dataset, path)
     return open_recording(path)
 
 
@@ -85,10 +84,8 @@ def _dataset(like: Recording, truth: Sticky, particles: int) -> "Dataset":
     own = fresh_seeds(truth.seed, _STIRRED, 1)
     clean = models.stir(liquid, like.gripper, setup, own, effects)[0]
     noisy = NOISE(clean, np.random.default_rng(truth.seed))
-    columns = np.concatenate([like.time[:, None], like.gripper.position, noisy], axis=1).T
-    values = dict(zip(("time", *AXES, *PLANES), columns, strict=True))
     attrs = {**like.attrs, "source": "simulated truth that sticks to its cup"}
-    return recording_dataset(values, attrs)
+    return recording_dataset(along_path(like, noisy), attrs)
 
 
 def _pours(truth: Sticky, density: float, cups: "Cups") -> NDArray[np.float64]:

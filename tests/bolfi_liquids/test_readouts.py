@@ -68,6 +68,11 @@ def test_a_field_keeps_its_orientation():
     assert told.content["fields"][0]["z"][1][2] == 5.0  # the last of both axes
 
 
+def test_what_a_browser_could_not_read_is_refused():
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        script_json([float("nan")])
+
+
 def test_no_text_ends_the_script_that_holds_it():
     text = script_json(["</script><script>alert(1)</script>"])
     assert "<" not in text

@@ -2,13 +2,14 @@
 
 import base64
 import shutil
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import bolfi_liquids as bl
-from bolfi_liquids.frames import frames_of
-from bolfi_liquids.moving_pictures import STEPS, _packed
+from bolfi_liquids.frames import _stack, frames_of
+from bolfi_liquids.moving_pictures import STEPS, _packed, moving_context
 
 WIDTHS = {"laptop": (1280, 800), "phone": (390, 844)}
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -45,7 +46,8 @@ def browser():
 def opened(browser, page, request):
     """The page, and what its console said and what it asked for."""
     width, height = WIDTHS[request.param]
-    tab = browser.new_page(viewport={"width": width, "height": height}, offline=True)
+    size, touch = {"width": width, "height": height}, request.param == "phone"
+    tab = browser.new_page(viewport=size, offline=True, has_touch=touch)
     heard = {"console": [], "requests": []}
     tab.on("console", lambda message: heard["console"].append(message.text))
     tab.on("pageerror", lambda error: heard["console"].append(str(error)))
@@ -84,7 +86,10 @@ def test_the_value_under_the_pointer_is_the_recordings(opened, calibration):
         }""",
         float(recorded["time"][sample]),
     )
-    tab.mouse.move(*at)
+    if tab.evaluate("navigator.maxTouchPoints") > 0:
+        tab.touchscreen.tap(*at)
+    else:
+        tab.mouse.move(*at)
     said = tab.locator("#tip").inner_text()
     angle = np.degrees(float(recorded["inclination"][sample, 0]))
     assert f"recorded: {float(f'{angle:.3g}'):g} deg" in said
@@ -144,6 +149,24 @@ def test_the_frames_lose_no_liquid_and_lean_as_the_simulator_says(frames):
             between = np.interp(frames["stir_time"], frames["time"], seen[draw, :, plane])
             # both are interpolated, between samples and between substeps
             assert np.abs(between - leaning[draw, :, plane]).max() < np.radians(0.3)
+
+
+def test_a_draw_that_failed_is_not_shown(calibration, frames):
+    broken = frames.copy(deep=True)
+    broken["tip"][1] = np.nan
+    shown = moving_context(calibration, broken)
+    kept = [draw["theta"]["viscosity"] for draw in shown["draws"]]
+    assert kept == frames["viscosity"].to_numpy()[[0, 2]].tolist()
+    assert len(shown["scenes"]["stir"]["positions"]) == 2
+    broken["spilled"][:] = np.nan
+    assert moving_context(calibration, broken) is None
+
+
+def test_draws_of_unlike_fills_are_stacked():
+    few, many = (SimpleNamespace(position=np.ones((4, n, 3))) for n in (5, 7))
+    stacked = _stack([few, many], "position")
+    assert stacked.shape == (2, 4, 7, 3)
+    assert np.isnan(stacked[0, :, 5:]).all() and np.isfinite(stacked[1]).all()
 
 
 def test_a_packed_position_is_within_half_a_step(rng):

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from bolfi_liquids.calibration_figures import _rms_by
-from bolfi_liquids.pour_figure import as_good
+from bolfi_liquids.pour_figure import not_surely_worse
 from bolfi_liquids.worries import worries
 
 FINE = {
@@ -26,11 +26,15 @@ def poured(rate=1.0, distance=0.03):
         coords={"angular_velocity": [0.5, 1.0, 3.0], "distance": [0.0, 0.03, 0.07]}
     )
     chosen = xr.Dataset(attrs={"angular_velocity": rate, "distance": distance})
-    return xr.DataTree.from_dict({"/actions": actions, "/chosen": chosen})
+    liquids = xr.Dataset({"viscosity": ("draw", [1.0, 3.0])})
+    return xr.DataTree.from_dict({"/actions": actions, "/chosen": chosen, "/liquids": liquids})
+
+
+POSTERIOR = xr.Dataset({"viscosity": (("chain", "draw"), [[1.0, 2.0, 3.0]])})
 
 
 def test_nothing_is_said_where_nothing_is_wrong():
-    assert worries(FINE, AGREES, POURED, poured()) == []
+    assert worries(FINE, AGREES, POURED, poured(), POSTERIOR) == []
 
 
 @pytest.mark.parametrize(
@@ -48,20 +52,41 @@ def test_nothing_is_said_where_nothing_is_wrong():
 )
 def test_each_worry_is_said_alone(calibrated, criticised, spilled, action, told):
     section = {"expected_spillage": spilled}
-    (sentence,) = worries({**FINE, **calibrated}, criticised, section, poured(**action))
+    (sentence,) = worries({**FINE, **calibrated}, criticised, section, poured(**action), POSTERIOR)
     assert told in sentence
 
 
-def test_a_run_without_a_pour_says_so():
-    assert worries(FINE, AGREES, None, None) == ["No pour was chosen yet."]
+@pytest.mark.parametrize(
+    "posterior",
+    [POSTERIOR.assign(adhesion=POSTERIOR["viscosity"]), POSTERIOR + 0.5],
+    ids=["extended", "other"],
+)
+def test_a_pour_of_another_posterior_is_said_to_be_one(posterior):
+    (sentence,) = worries(FINE, AGREES, POURED, poured(), posterior)
+    assert "choose it again" in sentence
 
 
-def test_actions_are_alike_only_as_far_as_paired_draws_tell(rng):
+def test_a_run_without_a_pour_has_nothing_to_worry_about_in_it():
+    assert worries(FINE, AGREES, None, None, POSTERIOR) == []
+
+
+def test_an_action_is_surely_worse_only_as_far_as_paired_draws_tell(rng):
     liquids = rng.uniform(0.0, 0.5, size=(16, 1, 1))  # what all actions spill of a liquid alike
     worse = np.array([[0.0, 0.001, 0.1]])
-    noise = rng.normal(0.0, 0.02, size=(16, 1, 3))
-    spilled = liquids + worse + noise
-    assert as_good(spilled, (0.25 + worse)).tolist() == [[True, True, False]]
+    spilled = liquids + worse + rng.normal(0.0, 0.02, size=(16, 1, 3))
+    assert not_surely_worse(spilled, "mean", (0, 0)).tolist() == [[True, True, False]]
+
+
+def test_what_is_compared_is_the_risk_that_was_minimised():
+    spilled = np.zeros((20, 1, 2))
+    spilled[:, 0, 0] = 0.02  # little of every liquid
+    spilled[:4, 0, 1] = 0.1  # nothing of most, as much on average, and more of the worst tenth
+    assert not_surely_worse(spilled, "mean", (0, 0)).tolist() == [[True, True]]
+    assert not_surely_worse(spilled, "cvar", (0, 0)).tolist() == [[True, False]]
+
+
+def test_few_draws_tell_nothing():
+    assert not not_surely_worse(np.zeros((3, 1, 2)), "mean", (0, 0)).any()
 
 
 def test_the_residual_of_a_stroke_is_its_own():
@@ -69,3 +94,5 @@ def test_the_residual_of_a_stroke_is_its_own():
     values = np.where(numbers == 1, 3.0, 0.0)
     values[2] = np.nan
     assert _rms_by(numbers, values).tolist() == [0.0, 3.0, 0.0]
+    values[numbers == 4] = np.nan
+    assert np.isnan(_rms_by(numbers, values)[2])

@@ -2,6 +2,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bolfi_liquids.models.pouring import watched_landings
+from bolfi_liquids.models.runtime import Watch
 
 from bolfi_liquids import models
 
@@ -59,7 +61,7 @@ def test_what_a_sensor_does_is_not_in_the_frames(oil, setup, path):
 
 
 def test_looking_changes_no_bit(oil, cups):
-    """Whatever the rate of the frames, and as the landings of an unwatched pour."""
+    """Whatever the rate of the frames, and of what lands."""
     some, many = (
         models.pour_frames(oil, RATE, cups, 2, rate=rate, particles=PARTICLES)
         for rate in (10.0, 73.0)
@@ -68,6 +70,9 @@ def test_looking_changes_no_bit(oil, cups):
     np.testing.assert_array_equal(some.position[-1], many.position[-1])
     flying = np.isfinite(some.position[-1]).all(axis=-1).sum()
     assert np.isfinite(landed.position[0]).all(axis=-1).sum() == PARTICLES - flying
+    watch = Watch(10.0, lambda scene, step: None)
+    watched = watched_landings(oil, RATE, cups, [2], PARTICLES, None, watch)
+    np.testing.assert_array_equal(watched.position, landed.position)
 
 
 def test_what_is_in_the_source_in_the_end_is_what_landings_retain(cups):
