@@ -92,7 +92,8 @@ def _chosen(run: Path) -> dict[str, Any] | None:
     if not (run / POUR).is_file():
         return None
     tree = read_tree(run / POUR, fix=f"write it again: bolfi-liquids pour {run}")
-    return {**tree["chosen"].attrs, "cups": json.loads(tree.attrs["cups"])}
+    action = {str(name): float(value) for name, value in tree["chosen"].attrs.items()}
+    return {**action, "cups": json.loads(tree.attrs["cups"])}
 
 
 def _digest(

@@ -46,7 +46,7 @@ def _sound(frames: "Dataset") -> NDArray[np.bool_]:
     shown = [frames["tip"].to_numpy().sum(axis=(1, 2))]
     if "spilled" in frames:
         shown.append(frames["spilled"].to_numpy())
-    return np.isfinite(shown).all(axis=0)
+    return np.all(np.isfinite(shown), axis=0)
 
 
 def _draw(one: "Dataset") -> dict[str, Any]:
