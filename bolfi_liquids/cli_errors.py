@@ -29,7 +29,8 @@ class OneLineErrors(TyperGroup):
         except (typer.Exit, typer.Abort):  # RuntimeErrors by descent, but no errors
             raise
         except TyperException as err:
-            _say(f"error: {_one_line(err.format_message())}; see --help")
+            if told := _one_line(err.format_message()):  # a group without a command shows its help
+                _say(f"error: {told}; see --help")
             raise typer.Exit(USAGE_ERROR) from None
         except BrokenPipeError:  # who reads has read enough, as `head` does: typer ends quietly
             raise

@@ -55,7 +55,8 @@ def fit_sentence(section: Mapping[str, Any]) -> str:
     verdict = (
         "it follows as closely as can be expected"
         if fit <= AS_GOOD_AS_NOISE * noise
-        else "the rest is what the simulator's model of liquid, stick or cameras lacks"
+        else "the rest is what the simulator's model of liquid, stick or cameras lacks, or what"
+        " more simulations would find"
     )
     return (
         f"The closest of {section['n_simulations']} simulated hypotheses differs from the"

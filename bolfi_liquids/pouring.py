@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .calibration import Calibration
+from .criticism import latest_calibration
 from .cups import bundled_cups
 from .progress import Advance, progress_bar
 from .run_directory import POUR, open_bank
@@ -79,7 +80,7 @@ class Pour:
 
 
 def choose_pour(  # noqa: PLR0913  the one call that most users make
-    calibration: Calibration,
+    calibration: Calibration | str | Path,
     cups: "Cups | None" = None,
     *,
     iterations: int = 15,
@@ -97,7 +98,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     in the run.
 
     Args:
-        calibration: Whose posterior is poured.
+        calibration: Whose posterior is poured; or a RUN directory, whose latest is.
         cups: Source, receiver and ranges of the action; None are the bundled ones.
         iterations: Angular velocities tried, as many again for the plug-in.
         draws: Posterior draws that each action is tried on.
@@ -112,6 +113,8 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     from .pour_results import pour_section, pour_tree
     from .results import write_tree
 
+    if not isinstance(calibration, Calibration):
+        calibration = latest_calibration(calibration)
     settings = PourSettings(iterations=iterations, draws=draws, risk=risk, seed=seed)
     cups = bundled_cups() if cups is None else cups
     # distinct strata: none of the draws that judge has chosen

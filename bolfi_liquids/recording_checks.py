@@ -22,6 +22,7 @@ MAX_INTERVAL = 1.0  # between samples [s]; more looks like milliseconds
 MAX_POSITION = 2.0  # of the gripper [m]; more looks like millimetres
 MAX_LENGTH = 1.0  # of cup and stick [m]; more looks like millimetres
 MAX_MASS = 2.0  # of the stick [kg]; more looks like grams
+MAX_SPEED = 5.0  # of the gripper [m/s]; more looks like a time in other units
 MIN_TRAVEL = 1e-3  # of the gripper [m]; a liquid that is not stirred shows nothing
 MIN_DENSITY, MAX_DENSITY = 50.0, 20_000.0  # [kg/m3]; less looks like g/cm3
 
@@ -122,6 +123,15 @@ def _check_gripper(recording: "Recording") -> None:
                 where=where,
                 fix=f"gaps up to {MAX_GRIPPER_GAP} s can be filled: cut the recording before it",
             )
+    seen = np.isfinite(recording.gripper.position).all(axis=1)
+    way, time = recording.gripper.position[seen], recording.time[seen]
+    usual = np.median(np.linalg.norm(np.diff(way, axis=0), axis=1) / np.diff(time))
+    if usual > MAX_SPEED:
+        raise InputError(
+            f"the gripper moves at {usual:.3g} m/s, faster than any arm stirs",
+            where=f"{recording.path}: time",
+            fix="give times in s and positions in m",
+        )
 
 
 def longest_gap(time: NDArray, seen: NDArray[np.bool_]) -> tuple[float, float]:

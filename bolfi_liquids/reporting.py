@@ -60,6 +60,7 @@ def report(run: str | Path, *, moving: bool = True, progress: bool = True) -> Pa
             None if pour is None else sections["pour"],
             pour,
             latest_calibration(calibration.path).posterior,
+            calibration.summary["n_simulations"] - int(calibration.tree.attrs["initial"]),
         ),
         moving=pictures,
         moving_json=script_json(pictures),

@@ -51,6 +51,8 @@ def simulate_stir(
     from . import models
 
     check_targets(movie, out)
+    if out is not None and out.exists() and out.samefile(recording.path):
+        raise InputError("is the recording itself", where=str(out), fix="choose another name")
     setup = models.StirSetup.from_recording(recording, particles=described.particles)
     given = described.liquid(), recording.gripper, setup
     with _failing():

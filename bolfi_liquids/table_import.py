@@ -5,7 +5,7 @@ import hashlib
 from difflib import get_close_matches
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 TEMPLATE = "columns.toml"
+OTHER_NAME = "choose another name"
 MISSING = ("", "nan", "na", "n/a", "null", "none", "-")
 
 
@@ -33,7 +34,7 @@ def write_template(path: str | Path) -> Path:
     """
     path = Path(path)
     if path.exists():
-        raise InputError("exists already", where=str(path), fix="choose another name")
+        raise InputError("exists already", where=str(path), fix=OTHER_NAME)
     return write_text(path, (files("bolfi_liquids.data") / TEMPLATE).read_text(encoding="utf-8"))
 
 
@@ -44,13 +45,14 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
         table: Text with a header and a row for each sample, such as CSV. Empty cells are missing
             samples.
         columns: What its columns mean; a TOML file or what `open_table_map` gives.
-        out: The NetCDF file to write; replaced if it is there.
+        out: The NetCDF file to write; one that an import has made is replaced.
 
     Raises:
         InputError: The table or the map cannot be used; the message names line, column and value.
-            Nothing was written.
+            Or `out` is something else that is there already. Nothing was written.
     """
     table, out = existing_file(table), Path(out)
+    _check_target(out)
     meaning = columns if isinstance(columns, TableMap) else open_table_map(columns)
     dataset = _dataset(table, meaning)
     try:
@@ -63,6 +65,25 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
         raise InputError("no such directory", where=str(out.parent), fix="make it first")
     write_netcdf(dataset, out)
     return open_recording(out)
+
+
+def _check_target(out: Path) -> None:
+    """Refuse to write over anything but an earlier import."""
+    if out.suffix != ".nc":
+        raise InputError(f"ends in {out.suffix!r}", where=str(out), fix="give a name in .nc")
+    if out.exists() and "imported_from" not in _attributes(out):
+        raise InputError("exists already, and is no import", where=str(out), fix=OTHER_NAME)
+
+
+def _attributes(path: Path) -> dict[str, Any]:
+    """Of a NetCDF file; none if it is something else."""
+    from xarray import open_dataset
+
+    try:
+        with open_dataset(path, engine="h5netcdf", decode_times=False) as dataset:
+            return {str(name): value for name, value in dataset.attrs.items()}
+    except (OSError, ValueError):
+        return {}
 
 
 def _dataset(table: Path, meaning: TableMap) -> "Dataset":

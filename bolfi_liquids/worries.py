@@ -11,6 +11,7 @@ from .spillage import ACTION
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
+SEARCHED = 3  # simulations that the engine chose, of which fewer are no search
 MUCH = 0.05  # spilled, which a person would mop up
 STALE = (
     "The pour was chosen over another posterior than that of the latest calibration or criticism:"
@@ -30,6 +31,7 @@ def worries(
     poured: Mapping[str, Any] | None,
     tree: "DataTree | None",
     posterior: "Dataset",
+    searched: int,
 ) -> list[str]:
     """Sentences, the gravest first; none if nothing is known to be wrong.
 
@@ -37,15 +39,26 @@ def worries(
         calibrated, criticised, poured: Sections of summary.json; None where there is none.
         tree: pour.nc.
         posterior: Draws of the latest calibration.
+        searched: Simulations at points that were chosen by what was learned.
     """
     told = [
         narrative.sampler_sentence(calibrated),
+        _search_sentence(calibrated, searched),
         "" if tree is None or poured_of(tree, posterior) else STALE,
         *_of_the_model(calibrated, criticised),
         narrative.floor_sentence(calibrated),
         *_of_the_pour(poured, tree),
     ]
     return [sentence for sentence in told if sentence]
+
+
+def _search_sentence(calibrated: Mapping[str, Any], searched: int) -> str:
+    if searched >= SEARCHED:
+        return ""
+    return (
+        f"Of {calibrated['n_simulations']} simulations only {searched} went where the liquid may"
+        " be: calibrate with a larger --budget before relying on the posterior."
+    )
 
 
 def poured_of(tree: "DataTree", posterior: "Dataset") -> bool:

@@ -109,6 +109,7 @@
       if (event.pointerType !== "mouse") return read(event);
       if (event.button !== 0) return;
       start = place(event);
+      tip.hidden = true;
       svg.setPointerCapture(event.pointerId); // its release counts also outside
       event.preventDefault();
     });

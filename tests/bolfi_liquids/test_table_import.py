@@ -133,6 +133,16 @@ def test_a_map_that_cannot_be_right_is_named(tmp_path, written, old, new, says):
     assert not (tmp_path / "stir.nc").exists()
 
 
+@pytest.mark.parametrize("name", ["stir.csv", "columns.toml", "other.nc"])
+def test_nothing_but_an_import_is_written_over(tmp_path, name):
+    table, columns = tmp_path / "stir.csv", tmp_path / "columns.toml"
+    for path in (table, columns, tmp_path / "other.nc"):
+        path.write_text("mine")
+    with pytest.raises(ValueError, match="ends in|exists already, and is no import"):
+        import_table(table, columns, tmp_path / name)
+    assert (tmp_path / name).read_text() == "mine"
+
+
 def test_the_template_is_a_map_and_overwrites_nothing(tmp_path):
     path = write_template(tmp_path / "columns.toml")
     assert open_table_map(path).columns["time"].unit == "ms"

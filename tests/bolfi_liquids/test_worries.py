@@ -16,6 +16,7 @@ FINE = {
     "ess_min": 2000.0,
     "divergences": 0,
     "n_draws": 4000,
+    "n_simulations": 20,
 }
 AGREES = {"verdict": "none", "baseline": 2}
 POURED = {"expected_spillage": 0.01}
@@ -34,7 +35,7 @@ POSTERIOR = xr.Dataset({"viscosity": (("chain", "draw"), [[1.0, 2.0, 3.0]])})
 
 
 def test_nothing_is_said_where_nothing_is_wrong():
-    assert worries(FINE, AGREES, POURED, poured(), POSTERIOR) == []
+    assert worries(FINE, AGREES, POURED, poured(), POSTERIOR, 13) == []
 
 
 @pytest.mark.parametrize(
@@ -52,7 +53,9 @@ def test_nothing_is_said_where_nothing_is_wrong():
 )
 def test_each_worry_is_said_alone(calibrated, criticised, spilled, action, told):
     section = {"expected_spillage": spilled}
-    (sentence,) = worries({**FINE, **calibrated}, criticised, section, poured(**action), POSTERIOR)
+    (sentence,) = worries(
+        {**FINE, **calibrated}, criticised, section, poured(**action), POSTERIOR, 13
+    )
     assert told in sentence
 
 
@@ -62,18 +65,24 @@ def test_each_worry_is_said_alone(calibrated, criticised, spilled, action, told)
     ids=["extended", "other"],
 )
 def test_a_pour_of_another_posterior_is_said_to_be_one(posterior):
-    (sentence,) = worries(FINE, AGREES, POURED, poured(), posterior)
+    (sentence,) = worries(FINE, AGREES, POURED, poured(), posterior, 13)
     assert "choose it again" in sentence
 
 
+def test_a_search_of_no_more_than_its_start_is_none():
+    (sentence,) = worries(FINE, AGREES, POURED, poured(), POSTERIOR, 1)
+    assert "Of 20 simulations only 1" in sentence
+
+
 def test_a_run_without_a_pour_has_nothing_to_worry_about_in_it():
-    assert worries(FINE, AGREES, None, None, POSTERIOR) == []
+    assert worries(FINE, AGREES, None, None, POSTERIOR, 13) == []
 
 
 def test_an_action_is_surely_worse_only_as_far_as_paired_draws_tell(rng):
     liquids = rng.uniform(0.0, 0.5, size=(16, 1, 1))  # what all actions spill of a liquid alike
-    worse = np.array([[0.0, 0.001, 0.1]])
-    spilled = liquids + worse + rng.normal(0.0, 0.02, size=(16, 1, 3))
+    spilled = np.repeat(liquids, 3, axis=2)
+    spilled[..., 1] += np.tile([[-0.02], [0.022]], (8, 1))  # more by 0.001 on average, se 0.005
+    spilled[..., 2] += 0.1
     assert not_surely_worse(spilled, "mean", (0, 0)).tolist() == [[True, True, False]]
 
 
