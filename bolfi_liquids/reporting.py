@@ -126,7 +126,10 @@ def _pour_context(section: Mapping[str, Any], tree: "DataTree") -> dict[str, Any
 def _moving(calibration: Calibration, progress: bool) -> dict[str, Any] | None:
     from .frames import frames_of
     from .moving_pictures import moving_context
+    from .recordings_kept import FOLDER
 
+    if not (calibration.path / FOLDER).is_dir():  # of a run that was made before they were kept
+        return None
     return moving_context(calibration, frames_of(calibration.path, progress=progress))
 
 

@@ -95,10 +95,18 @@ def simulate_pour(  # noqa: PLR0913  one for each option
         RuntimeError: The simulation went wrong.
     """
     from . import models
+    from .models.pouring import FASTEST, SLOWEST
 
     check_targets(movie, out)
     if not DISTANCES[0] <= distance <= DISTANCES[1]:
         raise InputError(f"{100 * distance:g}", where="--distance", fix="give it in cm")
+    if not SLOWEST <= angular_velocity <= FASTEST:
+        low, high = np.degrees([SLOWEST, FASTEST])
+        raise InputError(
+            f"{np.degrees(angular_velocity):g}",
+            where="--angular-velocity",
+            fix=f"give {low:.2g} to {high:.4g} deg/s",
+        )
     given = described.liquid(), angular_velocity, cups
     with _failing():
         try:

@@ -274,7 +274,7 @@ def test_bad_liquids_are_named(field, value):
         (["pour", "--movie", "here.gif"], "here.gif: is a directory"),
         (["pour", "--out", "a.csv"], "ends in '.csv'"),
         (["pour", "--distance", "300"], "--distance: 300; give it in cm"),
-        (["pour", "--angular-velocity", "-5"], "angular_velocity must be positive"),
+        (["pour", "--angular-velocity", "-5"], "--angular-velocity: -5; give 0.57 to 1719 deg/s"),
         (["stir", "--viscosity", "-5"], "--viscosity: -5.0"),
         (["stir", "--recording", "none.nc"], "none.nc: no such file"),
     ],
