@@ -71,7 +71,7 @@ def test_files_are_told_variable_by_variable(calibration, pour, name):
 def test_frames_are_told_variable_by_variable(pour):
     frames_of(pour.path, progress=False)
     in_page, in_file = told("frames.nc"), held(pour.path / "frames.nc")
-    assert set(in_page) == set(in_file) - {"cohesion"}  # which shares a line with the viscosity
+    assert set(in_page) == set(in_file)
     for what, entry in in_page.items():
         assert entry == in_file[what], what
 
