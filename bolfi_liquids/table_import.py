@@ -52,7 +52,6 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
             Or `out` is something else that is there already. Nothing was written.
     """
     table, out = existing_file(table), Path(out)
-    _check_target(out)
     meaning = columns if isinstance(columns, TableMap) else open_table_map(columns)
     dataset = _dataset(table, meaning)
     try:
@@ -61,14 +60,15 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
         raise InputError(
             err.what, where=err.where, fix=f"{err.fix} (or the unit, in the map)"
         ) from err
-    if not out.parent.is_dir():
-        raise InputError("no such directory", where=str(out.parent), fix="make it first")
+    _check_target(out)
     write_netcdf(dataset, out)
     return open_recording(out)
 
 
 def _check_target(out: Path) -> None:
     """Refuse to write over anything but an earlier import."""
+    if not out.parent.is_dir():
+        raise InputError("no such directory", where=str(out.parent), fix="make it first")
     if out.suffix != ".nc":
         raise InputError(f"ends in {out.suffix!r}", where=str(out), fix="give a name in .nc")
     if out.exists() and "imported_from" not in _attributes(out):

@@ -134,13 +134,17 @@ def test_a_map_that_cannot_be_right_is_named(tmp_path, written, old, new, says):
 
 
 @pytest.mark.parametrize("name", ["stir.csv", "columns.toml", "other.nc"])
-def test_nothing_but_an_import_is_written_over(tmp_path, name):
-    table, columns = tmp_path / "stir.csv", tmp_path / "columns.toml"
-    for path in (table, columns, tmp_path / "other.nc"):
-        path.write_text("mine")
+def test_nothing_but_an_import_is_written_over(tmp_path, written, name):
+    (tmp_path / "other.nc").write_text("mine")
+    before = (tmp_path / name).read_bytes()
     with pytest.raises(ValueError, match="ends in|exists already, and is no import"):
-        import_table(table, columns, tmp_path / name)
-    assert (tmp_path / name).read_text() == "mine"
+        import_table(*written, tmp_path / name)
+    assert (tmp_path / name).read_bytes() == before
+
+
+def test_an_import_may_be_made_again(tmp_path, written):
+    again = [import_table(*written, tmp_path / "stir.nc").hash for _ in range(2)]
+    assert len(set(again)) == 1
 
 
 def test_the_template_is_a_map_and_overwrites_nothing(tmp_path):
