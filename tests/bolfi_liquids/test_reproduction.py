@@ -61,6 +61,7 @@ def test_an_unknown_figure_is_named(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_a_sticky_truth_is_made_once(tmp_path):
     truth = sticky.draw_sticky(3, seed=0)
     assert truth == sticky.draw_sticky(3, seed=0) != sticky.draw_sticky(4, seed=0)
