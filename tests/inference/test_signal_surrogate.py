@@ -215,7 +215,6 @@ def test_intervals_cover_beside_a_parameter_that_does_nothing():
     for j, least in enumerate((0.8, 0.9)):  # what 20 runs say of the first's slope is not all
         below = [np.interp(t[j], AXIS + 0.005, np.cumsum(m[j])) for m, t in found]
         inside = np.sum(np.abs(np.array(below) - 0.5) < 0.45)
-        print(inside)
         assert inside >= binom.ppf(1e-3, len(found), least)
 
 
