@@ -1,8 +1,9 @@
 """The cups a pour is chosen for."""
 
+from collections.abc import Mapping
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .errors import InputError
 from .files import existing_file
@@ -17,6 +18,13 @@ def bundled_cups() -> "Cups":
     """The cups that come with the package."""
     with as_file(files("bolfi_liquids.data") / BUNDLED) as path:
         return open_cups(path)
+
+
+def kept_cups(settings: Mapping[str, Any]) -> "Cups":
+    """Those whose `Cups.settings` a result holds."""
+    from .models import Cups
+
+    return Cups.model_validate({name: settings[name] for name in Cups.model_fields})
 
 
 def open_cups(path: str | Path) -> "Cups":

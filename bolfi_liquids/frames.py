@@ -9,7 +9,6 @@ they are past the receiver's rim, with the source's `angle` [rad] and the share 
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,10 +17,12 @@ from numpy.typing import NDArray
 
 from .criticism import latest_calibration
 from .criticism_narrative import unit_of
+from .cups import kept_cups
 from .kept import fresh_seeds
+from .pour_results import read_pour
 from .prior import split_parameters
 from .progress import Advance, progress_bar
-from .recordings import Gripper, Recording
+from .recordings import Recording
 from .recordings_kept import kept_recordings
 from .results import read_tree, write_tree
 from .run_directory import FRAMES, POUR
@@ -50,7 +51,8 @@ def frames_of(run: str | Path, *, progress: bool = True) -> "Dataset":
         InputError: The directory holds no finished calibration, or its recording is missing.
     """
     calibration = latest_calibration(run)
-    recording = _beginning(kept_recordings(calibration.path, dict(calibration.record))[0])
+    whole = kept_recordings(calibration.path, dict(calibration.record))[0]
+    recording = whole.first(int(np.sum(whole.time - whole.time[0] <= LONGEST)))
     seed = int(calibration.record["settings"]["seed"])
     theta = calibration.draws(DRAWS, seed)
     pour = _chosen(calibration.path)
@@ -91,7 +93,7 @@ def _chosen(run: Path) -> dict[str, Any] | None:
     """The chosen pour: its angular velocity, distance and cups."""
     if not (run / POUR).is_file():
         return None
-    tree = read_tree(run / POUR, fix=f"write it again: bolfi-liquids pour {run}")
+    tree = read_pour(run)
     action = {str(name): float(value) for name, value in tree["chosen"].attrs.items()}
     return {**action, "cups": json.loads(tree.attrs["cups"])}
 
@@ -110,18 +112,6 @@ def _digest(
     shown = [FORMAT, MODEL_VERSION, RATE, LONGEST, settings["particles"]]
     told = [*shown, liquids, seeds, recording.hash, pour]
     return hashlib.sha256(json.dumps(told, sort_keys=True, default=float).encode()).hexdigest()
-
-
-def _beginning(recording: Recording) -> Recording:
-    """What of it is shown."""
-    shown = recording.time - recording.time[0] <= LONGEST
-    time, position = recording.time[shown], recording.gripper.position[shown]
-    return replace(
-        recording,
-        time=time,
-        gripper=Gripper(time, position),
-        inclination=recording.inclination[shown],
-    )
 
 
 def _each(theta: Mapping[str, NDArray]) -> list[tuple[dict[str, float], dict[str, float]]]:
@@ -179,7 +169,7 @@ def _poured(
 ) -> dict[str, Any]:
     from . import models
 
-    cups = models.Cups.model_validate({key: pour["cups"][key] for key in models.Cups.model_fields})
+    cups = kept_cups(pour["cups"])
     rate, distance = float(pour["angular_velocity"]), float(pour["distance"])
     density = calibration.liquid_density
     made, caught, outcomes = [], [], []

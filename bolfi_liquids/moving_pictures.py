@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from .calibration import Calibration
 from .criticism_narrative import with_unit
+from .cups import kept_cups
 from .narrative import percent
+from .pour_results import read_pour
 from .readouts import short
 from .recordings_kept import kept_recordings
-from .results import read_tree
-from .run_directory import POUR
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -91,11 +91,8 @@ def _stir_scene(calibration: Calibration, frames: "Dataset") -> dict[str, Any]:
 
 
 def _pour_scene(run: Path, frames: "Dataset") -> dict[str, Any]:
-    from .models import Cups
-
-    tree = read_tree(run / POUR, fix=f"write it again: bolfi-liquids pour {run}")
-    settings = json.loads(tree.attrs["cups"])
-    cups = Cups.model_validate({key: settings[key] for key in Cups.model_fields})
+    tree = read_pour(run)
+    cups = kept_cups(json.loads(tree.attrs["cups"]))
     source, receiver, lip = cups.source, cups.receiver, cups.pour.lip_height
     distance = float(tree["chosen"].attrs["distance"])
     reach = float(np.hypot(2.0 * source.radius, source.height))

@@ -123,7 +123,7 @@ def dry_pour(run: str | Path, rig: "Rig", out: Path) -> "tuple[str, list[Check]]
 
 def _chosen(run: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """The section "pour" of a run, and the cups that it was chosen for."""
-    from .results import read_tree
+    from .pour_results import read_pour
     from .summary import read_summary
 
     if not (run / RUN_TOML).exists() and not (run / POUR).exists():
@@ -134,7 +134,7 @@ def _chosen(run: Path) -> tuple[dict[str, Any], dict[str, Any]]:
         raise InputError(
             "no pour was chosen", where=str(run), fix=f"choose one: bolfi-liquids pour {run}"
         )
-    tree = read_tree(run / POUR, fix=f"write it again: bolfi-liquids pour {run}")
+    tree = read_pour(run)
     return read_summary(run)["pour"], json.loads(tree.attrs["cups"])
 
 

@@ -6,11 +6,14 @@ over outcomes, fractions with fresh seeds; `liquids`, the posterior draws that w
 """
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .results import read_tree
+from .run_directory import POUR
 from .settings import PourSettings
 from .spillage import ACTION, FRACTIONS, RISK, Surface
 
@@ -47,6 +50,15 @@ def _action(judged: "Judged") -> dict[str, float]:
         "distance_cm": 100.0 * judged.distance,
         "expected_spillage": judged.expected_spillage,
     }
+
+
+def read_pour(run: Path) -> "DataTree":
+    """pour.nc of a run.
+
+    Raises:
+        InputError: The file is damaged.
+    """
+    return read_tree(run / POUR, fix=f"write it again: bolfi-liquids pour {run}")
 
 
 def pour_tree(

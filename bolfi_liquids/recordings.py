@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -50,6 +50,16 @@ class Recording:
     def number(self, name: str) -> float:
         """A numeric attribute, in SI units."""
         return float(self.attrs[name])
+
+    def first(self, count: int) -> "Recording":
+        """As it would be if it had ended after so many samples."""
+        time = self.time[:count]
+        return replace(
+            self,
+            time=time,
+            gripper=Gripper(time, self.gripper.position[:count]),
+            inclination=self.inclination[:count],
+        )
 
     def __reduce__(self):
         """Processes that simulate need it, and a mapping proxy cannot be pickled."""

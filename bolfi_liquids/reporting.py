@@ -12,8 +12,8 @@ from .criticism import latest_calibration
 from .criticism_chapter import criticism_context
 from .files import write_text
 from .posterior_figure import posterior_figure
+from .pour_results import read_pour
 from .readouts import script_json
-from .results import read_tree
 from .run_directory import POUR, REPORT
 from .search_figure import search_figure
 from .summary import read_summary
@@ -107,7 +107,7 @@ def _pour_tree(run: Path) -> "DataTree | None":
     """pour.nc, where a pour was chosen."""
     if "pour" not in read_summary(run) or not (run / POUR).is_file():
         return None
-    return read_tree(run / POUR, fix=f"write it again: bolfi-liquids pour {run}")
+    return read_pour(run)
 
 
 def _pour_context(section: Mapping[str, Any], tree: "DataTree") -> dict[str, Any]:

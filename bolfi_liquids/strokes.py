@@ -1,14 +1,13 @@
 """Windows of a stir: its strokes in each plane, and stretches of like speed."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .recording_fields import PLANE_NAMES
-from .recordings import Gripper, Recording
+from .recordings import Recording
 
 if TYPE_CHECKING:
     from .inference import Window
@@ -80,14 +79,7 @@ def until_stroke(recording: Recording, number: int) -> Recording:
     found = {stroke.number: stroke.samples for stroke in strokes(recording)}
     if number not in found:
         raise ValueError(f"stroke must be one of {', '.join(map(str, found))}, got {number}")
-    end = np.flatnonzero(found[number])[-1] + 1
-    time = recording.time[:end]
-    return replace(
-        recording,
-        time=time,
-        gripper=Gripper(time, recording.gripper.position[:end]),
-        inclination=recording.inclination[:end],
-    )
+    return recording.first(int(np.flatnonzero(found[number])[-1]) + 1)
 
 
 def windows(stirring: "Stirring") -> tuple["Window", ...]:

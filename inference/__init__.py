@@ -140,7 +140,6 @@ __all__ = [
 # loaded on use: a worker that imports `.simulate` to run a simulation must not pay for JAX
 _HOME = {
     "Acquisition": ".base",
-    "ENGINE_VERSION": ".engine_version",
     "AutoregressiveNoise": ".criticism",
     "Bolfi": ".bolfi",
     "Candidate": ".criticism",
@@ -150,6 +149,7 @@ _HOME = {
     "Criticism": ".criticism",
     "Discrepancy": ".base",
     "DiscrepancyFamily": ".families",
+    "ENGINE_VERSION": ".engine_version",
     "EmulatorWarning": ".emulator_checks",
     "ExpectedIntegratedVariance": ".acquisition",
     "Experiment": ".criticism",

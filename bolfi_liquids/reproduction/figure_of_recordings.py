@@ -8,10 +8,9 @@ from scipy.interpolate import LinearNDInterpolator
 
 from ..bundled import POURED, bundled_pours
 from ..drawing import GREY, INK, PALETTE, new_figure, styled
+from ..pour_results import read_pour
 from ..pouring import choose_pour
 from ..prior import default_prior
-from ..results import read_tree
-from ..run_directory import POUR
 from ..spillage import Surface
 from .decisions import decide_unknowing
 from .figure import Drawn
@@ -52,7 +51,7 @@ def between(table: "PourTable", rate: float, distance: float) -> tuple[float, fl
 
 def _least(run: Path, risk: str) -> dict[str, float]:
     """The action that another measure of risk would have chosen among those that were tried."""
-    actions = read_tree(run / POUR, fix="run the figure again")["actions"]
+    actions = read_pour(run)["actions"]
     return Surface(*(actions[name].to_numpy() for name in Surface._fields)).least(risk)
 
 
