@@ -20,7 +20,7 @@ class Described:
 
     Attributes:
         viscosity: [Pa s].
-        cohesion: 0 to 1 as a rule.
+        cohesion: 0 to 1, where the simulator was made for it.
         density: [kg/m³].
         effects: Coefficients of `models.EFFECTS` by name.
         particles: Of the simulated liquid.
@@ -38,10 +38,14 @@ class Described:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("viscosity", "cohesion", "density"):
+        rules = {
+            "viscosity": (self.viscosity >= 0.0, "0 or more"),
+            "cohesion": (0.0 <= self.cohesion <= 1.0, "0 to 1"),
+            "density": (self.density > 0.0, "positive"),
+        }
+        for name, (kept, rule) in rules.items():
             value = getattr(self, name)
-            if not (np.isfinite(value) and (value > 0 or (value == 0 and name != "density"))):
-                rule = "positive" if name == "density" else "0 or more"
+            if not (kept and np.isfinite(value)):
                 raise InputError(f"{value}", where=f"--{name}", fix=f"give a number, {rule}")
         at_least(MIN_PARTICLES, "--particles", self.particles)
         at_least(0, "--seed", self.seed)

@@ -25,6 +25,36 @@ def existing_file(path: str | Path) -> Path:
     return path
 
 
+def new_netcdf(path: str | Path) -> Path:
+    """`path`, which a person gave to be written.
+
+    Raises:
+        InputError: Its name does not end in .nc, or no such file can be made there.
+    """
+    path = Path(path)
+    if path.suffix != ".nc":
+        raise InputError(f"ends in {path.suffix!r}", where=str(path), fix="give a name in .nc")
+    return new_file(path)
+
+
+def new_file(path: Path) -> Path:
+    """`path`, which a person gave to be written; one that is there is replaced.
+
+    Raises:
+        InputError: It is a directory, or no file can be made in its directory.
+    """
+    if not path.parent.is_dir():
+        raise InputError("no such directory", where=str(path.parent), fix="make it first")
+    if path.is_dir():
+        raise InputError("is a directory", where=str(path), fix="give the name of a file")
+    try:
+        tempfile.TemporaryFile(dir=path.parent).close()
+    except OSError as err:
+        fix = "choose a place that can be written"
+        raise InputError(f"{err.strerror}", where=str(path.parent), fix=fix) from err
+    return path
+
+
 def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
     """Let `write` fill a temporary file beside `path`, then move it into place.
 

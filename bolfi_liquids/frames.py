@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
     from .calibration import Calibration
-    from .models import Cups
 
 DRAWS = 3
 RATE = 15.0  # frames/s
@@ -178,7 +177,8 @@ def _poured(
         frames = models.pour_frames(one, rate, cups, seed, rate=RATE, effects=effects)
         landed = models.landings(one, rate, cups, [seed], effects=effects)
         made.append(frames)
-        caught.append(_caught(frames.position, landed.position[0], distance, cups))
+        inside = landed.inside(distance, cups.receiver.radius)[0]
+        caught.append(_caught(frames.position, inside))
         result = landed.into(distance, cups.receiver.radius)
         outcomes.append([float(part[0]) for part in (result.spilled, result.retained)])
         advance(1)
@@ -193,11 +193,10 @@ def _poured(
     }
 
 
-def _caught(position: NDArray, landed: NDArray, distance: float, cups: "Cups") -> NDArray:
-    """Share of all particles in the receiver, by frame; they land in the order of `landed`."""
+def _caught(position: NDArray, inside: NDArray) -> NDArray:
+    """Share of all particles in the receiver, by frame; they land in the order of `inside`."""
     gone = np.isnan(position[..., 0]).sum(axis=1)
-    inside = np.hypot(landed[:, 0] - distance, landed[:, 1]) < cups.receiver.radius
-    return np.append(0, np.cumsum(inside))[gone] / len(landed)
+    return np.append(0, np.cumsum(inside))[gone] / len(inside)
 
 
 def _stack(made: list, name: str) -> NDArray[np.float32]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from .models import Cups
+    from .models import Cups, Landings
 
 GRAVITY = 9.81
 
@@ -26,16 +26,16 @@ class Landed(NamedTuple):
 
 
 def landed(
-    positions: NDArray, before: int, count: int, interval: float, cups: "Cups", distance: float
+    landings: "Landings", before: int, count: int, interval: float, cups: "Cups", distance: float
 ) -> Landed:
-    """What has become of the first `count` particles that passed the rim.
+    """What has become of the first `count` particles that passed the rim, of one pour.
 
     The simulation ends at the rim. From there each falls as a stone that left the lip at rest
     upright and reached the rim where it did; those of the last interval passed it one after
     another.
 
     Args:
-        positions: Of all that pass the rim, in order, towards the receiver and across [m], [n, 2].
+        landings: Of all particles, in the order in which they pass the rim.
         before: How many had passed it one frame ago.
         count: How many have now.
         interval: Between the two frames [s].
@@ -43,8 +43,8 @@ def landed(
         distance: From the lip to the receiver's axis [m].
     """
     drop, rim = cups.pour.lip_height - cups.receiver.height, cups.receiver.height
-    passed = np.asarray(positions[:count], np.float64)
-    inside = np.hypot(passed[:, 0] - distance, passed[:, 1]) < cups.receiver.radius
+    passed = np.asarray(landings.position[0, :count], np.float64)
+    inside = landings.inside(distance, cups.receiver.radius)[0, :count]
     age = np.full(count, np.inf)
     fresh = count - before
     age[before:] = interval * (1.0 - (np.arange(fresh) + 0.5) / max(fresh, 1))
@@ -52,7 +52,7 @@ def landed(
     since = np.minimum(age, (np.sqrt(2.0 * GRAVITY * (drop + rim)) - speed) / GRAVITY)
     # the time of the fall to the rim gives the speed at which it went ahead
     ahead = passed[:, 0] * (1.0 + np.where(inside, 0.0, since * GRAVITY / speed))
-    caught = float(inside.sum() / len(positions)) if len(positions) else 0.0
+    caught = float(inside.sum() / landings.position.shape[1])
     height = rim - since * (speed + GRAVITY * since / 2.0)
     rest = np.where(inside, level(caught, cups), 0.0)
     flying = height > rest + 1e-9

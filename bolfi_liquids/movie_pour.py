@@ -78,14 +78,8 @@ def pour_pictures(
         zip(frames.time, frames.position, frames.angle, strict=True)
     ):
         last = max(at - 1, 0)
-        below = landed(
-            landings.position[0],
-            int(passed[last]),
-            int(passed[at]),
-            float(time - frames.time[last]),
-            cups,
-            distance,
-        )
+        interval = float(time - frames.time[last])
+        below = landed(landings, int(passed[last]), int(passed[at]), interval, cups, distance)
         source = source_glass(cups, float(angle))
         points = np.concatenate([position[: count - passed[at]], below.falling])
         picture = with_puddle(view, empty, below, cups, count)

@@ -1,7 +1,6 @@
 """What a single simulation leaves: files that are checked before it, and written after it."""
 
 import json
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,7 +8,7 @@ from typing import TYPE_CHECKING
 from numpy.typing import NDArray
 
 from .described_liquid import Described
-from .errors import InputError
+from .files import new_file, new_netcdf
 from .movie_file import check_movie
 from .recordings import Recording, along_path, recording_dataset
 
@@ -27,20 +26,9 @@ def check_targets(movie: Path | None, out: Path | None) -> None:
     """
     if movie is not None:
         check_movie(movie)
-    if out is not None and out.suffix != ".nc":
-        raise InputError(f"ends in {out.suffix!r}", where=str(out), fix="give a name in .nc")
-    for path in (movie, out):
-        if path is None:
-            continue
-        if not path.parent.is_dir():
-            raise InputError("no such directory", where=str(path.parent), fix="make it first")
-        if path.is_dir():
-            raise InputError("is a directory", where=str(path), fix="give the name of a file")
-        try:
-            tempfile.TemporaryFile(dir=path.parent).close()
-        except OSError as err:
-            fix = "choose a place that can be written"
-            raise InputError(f"{err.strerror}", where=str(path.parent), fix=fix) from err
+        new_file(movie)
+    if out is not None:
+        new_netcdf(out)
 
 
 def stir_dataset(described: Described, recording: Recording, angles: NDArray) -> "Dataset":

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError
-from .files import existing_file, write_netcdf, write_text
+from .files import existing_file, new_netcdf, write_netcdf, write_text
 from .recording_checks import check_values
 from .recording_fields import PLANES
 from .recordings import Recording, as_recording, open_recording, recording_dataset
@@ -67,10 +67,7 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
 
 def _check_target(out: Path) -> None:
     """Refuse to write over anything but an earlier import."""
-    if not out.parent.is_dir():
-        raise InputError("no such directory", where=str(out.parent), fix="make it first")
-    if out.suffix != ".nc":
-        raise InputError(f"ends in {out.suffix!r}", where=str(out), fix="give a name in .nc")
+    new_netcdf(out)
     if out.exists() and "imported_from" not in _attributes(out):
         raise InputError("exists already, and is no import", where=str(out), fix=OTHER_NAME)
 

@@ -66,8 +66,8 @@ class Landings:
     position: np.ndarray
     retained: np.ndarray
 
-    def into(self, distance: ArrayLike, radius: ArrayLike) -> PourResult:
-        """What receivers would have caught, in the shape to which all broadcast.
+    def inside(self, distance: ArrayLike, radius: ArrayLike) -> np.ndarray:
+        """Whether receivers would have caught the particles, bool [..., particles].
 
         Args:
             distance: From the lip to the receiver's axis [m], broadcast against [B]: of shape
@@ -79,7 +79,15 @@ class Landings:
         )
         ahead, across = np.moveaxis(self.position, -1, 0)
         reach = np.hypot(ahead - distance[..., None], across)
-        received = (reach < radius[..., None]).mean(axis=-1)  # a NaN is in no receiver
+        return reach < radius[..., None]  # a NaN is in no receiver
+
+    def into(self, distance: ArrayLike, radius: ArrayLike) -> PourResult:
+        """What receivers would have caught, in the shape to which all broadcast.
+
+        Args:
+            distance, radius: As for `inside`.
+        """
+        received = self.inside(distance, radius).mean(axis=-1)
         received = np.where(np.isnan(self.retained), np.nan, received)
         retained = np.broadcast_to(self.retained, received.shape)
         # whole particles, so that what is left of three fractions is not a rounding error

@@ -24,9 +24,8 @@ SHOWN = {
     ("pour", "plug_in"): "pouring, best at θ*",
     ("pour", "mean"): "pouring, least expected",
 }
-"""(method, rule) -> label, in the order of the palette."""
-
-COLOURS = (*PALETTE, "#c2185b")
+"""(method, rule) -> label."""
+COLOURS = dict(zip(SHOWN, (*PALETTE, "#c2185b"), strict=True))  # the same in every figure
 FEW_PERCENT = (0, 0.5, 1, 2, 5, 10, 20, 50)  # ticks of an axis that is linear up to 1 %
 RESAMPLED = 4000  # bootstrap samples
 LEVEL = 0.9
@@ -48,9 +47,9 @@ def spillage(workshop: Workshop) -> Drawn:
     with styled():
         figure = new_figure(7.4, 4.6)
         axes = figure.subplots()
-        for at, ((method, rule), label) in enumerate(SHOWN.items()):
+        for at, (method, rule) in enumerate(SHOWN):
             chosen = study["spilled"].sel(learned_by=method, rule=rule)
-            _against_budget(axes, chosen, label, at)
+            _against_budget(axes, chosen, (method, rule), at)
         for name, style in (("known", ":"), ("unknown", "--")):
             level = 100.0 * float(study[name].mean())
             axes.axhline(level, color=GREY, ls=style, lw=1.0, label=f"liquid {name}")
@@ -61,15 +60,15 @@ def spillage(workshop: Workshop) -> Drawn:
     return Drawn(study, figure, _table(study))
 
 
-def _against_budget(axes: "Axes", spilled: "DataArray", label: str, at: int) -> None:
+def _against_budget(axes: "Axes", spilled: "DataArray", way: tuple[str, str], at: int) -> None:
     """Means, with 90 % intervals, side by side for those that are compared."""
     percent = 100.0 * spilled.transpose("budget", "truth").to_numpy()
     means, ends = np.nanmean(percent, axis=1), np.array([interval(row) for row in percent])
     x = np.arange(len(means)) + 0.06 * (at - (len(SHOWN) - 1) / 2)
-    colour = COLOURS[at]
+    colour = COLOURS[way]
     axes.plot(x, means, "-", color=colour, lw=0.8, alpha=0.5)
     off = np.abs(ends.T - means)
-    axes.errorbar(x, means, off, fmt="o", color=colour, ms=4, elinewidth=1.2, label=label)
+    axes.errorbar(x, means, off, fmt="o", color=colour, ms=4, elinewidth=1.2, label=SHOWN[way])
 
 
 def _table(study: "Dataset") -> str:
@@ -107,15 +106,9 @@ def liquids(workshop: Workshop) -> Drawn:
                     percent = 100.0 * chosen.to_numpy()[study["liquid"].to_numpy() == liquid]
                     x = place + 0.8 / len(rules) * (at - (len(rules) - 1) / 2)
                     label = SHOWN[method, rule] if place == 0 else None
-                    axes.bar(
-                        x,
-                        np.nanmean(percent),
-                        0.7 / len(rules),
-                        color=PALETTE[at],
-                        alpha=0.6,
-                        label=label,
-                    )
-                    axes.plot(np.full(len(percent), x), percent, ".", color=PALETTE[at], ms=4)
+                    colour, width = COLOURS[method, rule], 0.7 / len(rules)
+                    axes.bar(x, np.nanmean(percent), width, color=colour, alpha=0.6, label=label)
+                    axes.plot(np.full(len(percent), x), percent, ".", color=colour, ms=4)
             axes.set_xticks(range(len(LIQUIDS)), list(LIQUIDS))
             axes.set_title(f"N = {budget}")
         panels[0].set_ylabel("spilled [%]")

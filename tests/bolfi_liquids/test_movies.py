@@ -106,7 +106,7 @@ def test_the_receiver_s_level_is_its_share_of_the_liquid(cups):
     inside = distance + 0.3 * cups.receiver.radius * rng.uniform(-1, 1, (40, 2)) * [1, 0]
     inside[:, 1] = 0.0
     spots = np.concatenate([inside, np.full((60, 2), 0.2)])
-    now = landed(spots, 100, 100, 0.04, cups, distance)
+    now = landed(models.Landings(spots[None], np.zeros(1)), 100, 100, 0.04, cups, distance)
     assert now.caught == pytest.approx(share)
     volume = level(now.caught, cups) * np.pi * cups.receiver.radius**2
     assert volume == pytest.approx(share * cups.liquid_volume)
@@ -117,7 +117,8 @@ def test_the_receiver_s_level_is_its_share_of_the_liquid(cups):
 def test_what_passed_the_rim_falls_on_as_stones_do(cups):
     """One that passed it half an interval ago, beside the receiver."""
     interval, drop = 0.02, cups.pour.lip_height - cups.receiver.height
-    now = landed(np.array([[0.1, 0.01]]), 0, 1, interval, cups, 0.0)
+    one = models.Landings(np.array([[[0.1, 0.01]]]), np.zeros(1))
+    now = landed(one, 0, 1, interval, cups, 0.0)
     until_rim = np.sqrt(2.0 * drop / GRAVITY)
     fallen = GRAVITY * (until_rim + interval / 2.0) ** 2 / 2.0
     ahead = 0.1 * (until_rim + interval / 2.0) / until_rim
