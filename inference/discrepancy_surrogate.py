@@ -122,7 +122,7 @@ class DiscrepancySurrogate:
         """What the leave-one-out errors complain of."""
         if self.equal:
             return [EQUAL]
-        return complaints(self.checks()["loo_z"], 0.0, "discrepancy")
+        return complaints(self.checks()["loo_z"], "discrepancy")
 
     @in_float64
     def predictive(self, key: jax.Array, u: np.ndarray) -> dict[str, np.ndarray]:

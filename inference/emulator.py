@@ -157,6 +157,16 @@ def loo_errors(emulator: Emulator) -> np.ndarray:
     return ((np.asarray(emulator.gp.data.y)[:used, :n] - mean) / np.sqrt(variance)).T
 
 
+def score_errors(emulator: Emulator, u: np.ndarray, outputs: np.ndarray) -> np.ndarray:
+    """Studentised errors [n, used] in the scores of new outputs [n, m] at u [n, d]."""
+    basis, remainder, used = emulator.basis, emulator.remainder, emulator.basis.used
+    mean, variance = (part.T[:, :used] for part in predict_scores(emulator.gp, u))
+    squared = np.sum(basis.vectors[:, :used] ** 2, 0)
+    across = basis.vectors[:, :used].T @ remainder.factors / squared[:, None]
+    constant = np.diag(emulator.noise)[:used] + np.sum(across**2, 1) + remainder.white / squared
+    return (basis.scores(outputs)[:, :used] - mean) / np.sqrt(variance + constant)
+
+
 def noise_share(emulator: Emulator) -> float:
     """Share of the outputs' variance that no parameter predicts: run-to-run noise."""
     used, rest = emulator.basis.used, emulator.remainder.total

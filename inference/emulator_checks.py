@@ -16,20 +16,20 @@ UNPREDICTED = (
     "chance: simulate more, or choose a summary that averages the noise out; until then the "
     "posterior is the prior"
 )
-NOISY = (0.9, 0.5, 0.1)  # shares of run-to-run noise in the variance that deserve a word
+NOISY = (0.9, 0.5)  # shares of run-to-run noise in the variance that deserve a word
+SURPRISED = 2.0  # mean square of the foretold errors that matters
 
 
 class EmulatorWarning(UserWarning):
     """The surrogate does not follow the simulations as it believes; the message says how."""
 
 
-def complaints(loo_z: np.ndarray, noise_share: float, what: str) -> list[str]:
+def complaints(loo_z: np.ndarray, what: str) -> list[str]:
     """Sentences, none where all is well; of usual complaints the same in every fit, so that a
     study of hundreds is warned once.
 
     Args:
         loo_z: Studentised leave-one-out errors [n, k].
-        noise_share: Of the targets' variance.
         what: Is emulated.
     """
     count = loo_z.size
@@ -41,18 +41,40 @@ def complaints(loo_z: np.ndarray, noise_share: float, what: str) -> list[str]:
             "deviations: it is not Gaussian, or changes faster than the emulator believes; "
             "simulate more, or choose a summary or transform that behaves better"
         )
-    mean_square = float(np.mean(loo_z**2))
-    if mean_square > max(TOO_SURE, chi2.isf(FALSE_ALARMS, count) / count):
+    if _too_large(loo_z, TOO_SURE):
         said.append(
-            f"leave-one-out errors of the {what} are {np.sqrt(mean_square):.1f} times what the "
-            "emulator believes; simulate more"
-        )
-    reached = [share for share in NOISY if noise_share > share]
-    if reached:
-        said.append(
-            f"run-to-run noise makes up more than {reached[0]:.0%} of the {what}'s variance "
-            "between simulations, and the likelihood takes it as Gaussian and equal for all "
-            "parameters; where it is not, as with noise that accumulates, the posterior is off: "
-            "compare the other surrogate, or choose a summary that averages the noise out"
+            f"leave-one-out errors of the {what} are {np.sqrt(np.mean(loo_z**2)):.1f} times what "
+            "the emulator believes; simulate more"
         )
     return said
+
+
+def surprised(foretold_z: np.ndarray) -> list[str]:
+    """A sentence where `foretold_errors` [n, k] are too large, else none."""
+    errors = foretold_z[np.isfinite(foretold_z)]
+    if not (errors.size and _too_large(errors, SURPRISED)):
+        return []
+    return [
+        "the last third of the simulations came out further from what the others had led to "
+        "expect than the emulator believed possible: the output changes faster with the parameters "
+        "than so few simulations show, and the posterior may be too narrow; simulate more"
+    ]
+
+
+def noisy(share: float) -> list[str]:
+    """A sentence where run-to-run noise has that much of the outputs' variance, else none."""
+    reached = [least for least in NOISY if share > least]
+    if not reached:
+        return []
+    return [
+        f"run-to-run noise makes up more than {reached[0]:.0%} of the output's variance "
+        "between simulations, and the likelihood takes it as Gaussian and equal for all "
+        "parameters; where it is not, as with noise that accumulates, the posterior is off: "
+        "compare the other surrogate, or choose a summary that averages the noise out"
+    ]
+
+
+def _too_large(errors: np.ndarray, matters: float) -> bool:
+    """Whether studentised errors are, in the mean square, by more than chance."""
+    count = errors.size
+    return bool(np.mean(errors**2) > max(matters, chi2.isf(FALSE_ALARMS, count) / count))

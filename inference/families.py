@@ -1,6 +1,6 @@
 """The families of surrogates: what a user may choose of each, and how it learns."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -11,6 +11,7 @@ from .base import Discrepancy, Surrogate
 from .discrepancy import evaluate, squared_difference
 from .discrepancy_surrogate import DiscrepancySurrogate, learn, marginalised
 from .emulator import PREDICTED, emulate
+from .foretold import foretold_errors
 from .given_noise import GivenNoise, given_noise
 from .likelihood import Threshold, check_rule
 from .output import Output, Summary, describe
@@ -203,7 +204,9 @@ class SignalLearner:
 
     def finish(self, known: Learnable, rows: int, seed: int) -> Surrogate:
         """The surrogate on which a fit rests."""
-        return self.learn(known, rows, None)
+        learned = self.learn(known, rows, None)
+        errors = foretold_errors(learned.emulator, self.output.scale, self.family.predicted)
+        return replace(learned, foretold=errors)
 
 
 Family = DiscrepancyFamily | SignalFamily

@@ -10,9 +10,9 @@ from .optimise import minimise_many
 
 # Normal priors of the logs: inputs are coordinates of the prior's sd (see `gp.coordinates`) and
 # targets of about unit variance, so one choice fits every parameter, unit and simulator.
-LENGTH = (np.log(0.5), 0.7)  # 95 %: a tenth of the box to twice the box
+LENGTH = (np.log(1.0), 1.5)  # 95 %: a twentieth of the box to 20 times the box: no effect at all
 AMPLITUDE = (np.log(1.0), 0.7)
-NOISE = (np.log(0.1), 1.0)  # 95 %: 1 % to 70 % of the targets' sd
+NOISE = (np.log(0.2), 1.0)  # 95 %: 3 % of the targets' sd to more than all of it
 SCORED, REFINED = 8, 2  # starts that are evaluated, and of these the best to be optimised
 
 

@@ -12,7 +12,7 @@ from .base import LogLikelihood, LogSecondMoment
 from .compiled import believe
 from .design import sobol
 from .emulator import Emulator, loo_errors, noise_share, predict, predictive_draws
-from .emulator_checks import EQUAL, OUTSIDE, UNPREDICTED, complaints
+from .emulator_checks import EQUAL, OUTSIDE, UNPREDICTED, complaints, noisy, surprised
 from .gaussian import SignalState, log_likelihood, log_second_moment, node_log_densities
 from .given_noise import GivenNoise
 from .noise import (
@@ -43,6 +43,7 @@ class SignalSurrogate:
         nodes: Sizes and correlations of the measurement noise, KEPT of them; one where there is
             none, or it is known.
         reduced: The observed scores at each, with the scores' run-to-run noise.
+        foretold: See `foretold_errors` [n, k]; None while simulations are being chosen.
     """
 
     emulator: Emulator
@@ -51,6 +52,7 @@ class SignalSurrogate:
     known: GivenNoise | None
     nodes: Nodes
     reduced: Reduced
+    foretold: np.ndarray | None = None
 
     @property
     def gp(self):
@@ -116,15 +118,19 @@ class SignalSurrogate:
 
     @in_float64
     def checks(self) -> dict[str, np.ndarray]:
-        """Studentised leave-one-out errors `loo_z` [n, components in use]."""
-        return {"loo_z": loo_errors(self.emulator)}
+        """Studentised errors: leave-one-out ones `loo_z` [n, components in use], and `foretold_z`
+        [n, components], see `foretold_errors`."""
+        loo = {"loo_z": loo_errors(self.emulator)}
+        return loo if self.foretold is None else {**loo, "foretold_z": self.foretold}
 
     @in_float64
     def warnings(self) -> list[str]:
         """What the emulator's own checks complain of."""
         if self.emulator.basis.used == 0:
             return [EQUAL if self.emulator.equal else UNPREDICTED]
-        said = complaints(loo_errors(self.emulator), noise_share(self.emulator), "output")
+        said = complaints(loo_errors(self.emulator), "output") + noisy(noise_share(self.emulator))
+        if self.foretold is not None:
+            said += surprised(self.foretold)
         return [OUTSIDE, *said] if self._outside() else said
 
     def _outside(self) -> bool:
