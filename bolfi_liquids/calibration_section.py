@@ -53,6 +53,7 @@ def calibration_section(
         "ess_min": float(min(attrs["ess_bulk_min"], attrs["ess_tail_min"])),
         "n_draws": int(posterior.sizes["chain"] * posterior.sizes["draw"]),
         "divergences": int(attrs["divergences"]),
+        "emulator_warnings": fit.warnings,
         "seconds": {
             "simulator": float(tree.attrs["seconds_simulator"]),
             "engine": float(tree.attrs["seconds_engine"]),

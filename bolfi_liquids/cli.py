@@ -1,6 +1,7 @@
 """The command line; each command calls the function of the same name."""
 
 import shlex
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -105,20 +106,23 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
 ) -> None:
     """Learn a liquid's parameters from recordings of it being stirred."""
     from .calibrator import calibrate as run_calibrate
+    from .inference import EmulatorWarning
     from .recordings import aborted_recordings, open_recordings
 
     opened = open_recordings(recordings)
-    run_calibrate(
-        opened,
-        out=out,
-        budget=budget,
-        surrogate=surrogate,
-        sampler=sampler,
-        seed=seed,
-        particles=particles,
-        batch=batch,
-        resume=resume,
-    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", EmulatorWarning)  # printed with the results
+        run_calibrate(
+            opened,
+            out=out,
+            budget=budget,
+            surrogate=surrogate,
+            sampler=sampler,
+            seed=seed,
+            particles=particles,
+            batch=batch,
+            resume=resume,
+        )
     _print_section(out, "calibrate")
     for line in aborted_recordings(opened):
         typer.echo(line, err=True)

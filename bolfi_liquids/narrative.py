@@ -78,6 +78,11 @@ def sampler_sentence(section: Mapping[str, Any]) -> str:
     )
 
 
+def emulator_sentences(section: Mapping[str, Any]) -> list[str]:
+    """What the surrogate's own checks complain of."""
+    return [f"The surrogate is in doubt: {said}." for said in section.get("emulator_warnings", ())]
+
+
 def floor_sentence(section: Mapping[str, Any]) -> str:
     """That thin liquids look alike, where the liquid may be one of them; else empty."""
     share = section["below_least_viscosity"]

@@ -9,7 +9,7 @@ from rich.markup import escape
 from rich.table import Column, Table
 
 from . import criticism_narrative as criticism
-from .narrative import UNITS, floor_sentence, sampler_sentence
+from .narrative import UNITS, emulator_sentences, floor_sentence, sampler_sentence
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -38,8 +38,8 @@ def print_calibration(section: Mapping[str, Any], console: Console) -> None:
     )
     if floor := floor_sentence(section):
         console.print(floor, highlight=False, soft_wrap=True)
-    if warning := sampler_sentence(section):
-        console.print(f"warning: {warning}", highlight=False, soft_wrap=True)
+    for warning in filter(None, [sampler_sentence(section), *emulator_sentences(section)]):
+        console.print(f"warning: {warning}", highlight=False, markup=False, soft_wrap=True)
 
 
 def print_pour(section: Mapping[str, Any], console: Console) -> None:

@@ -43,6 +43,7 @@ def worries(
     """
     told = [
         narrative.sampler_sentence(calibrated),
+        *narrative.emulator_sentences(calibrated),
         _search_sentence(calibrated, searched),
         "" if tree is None or poured_of(tree, posterior) else STALE,
         *_of_the_model(calibrated, criticised),

@@ -148,13 +148,18 @@ def after_each(engine: "Bolfi", simulate: Simulate, budgets: Sequence[int]) -> "
         simulate: Theta and seeds -> signals.
         budgets: Simulations in all.
     """
+    from ..inference import EmulatorWarning
+
     rng = np.random.default_rng([engine.seed, 1])
     for budget in budgets:
         while (left := budget - engine.told) > 0:
             theta = engine.ask(min(BATCH, left))
             seeds = rng.integers(2**31, size=min(BATCH, left))
             engine.tell(theta, simulate(theta, seeds), seeds)
-        yield engine.fit()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", EmulatorWarning)  # of hundreds of fits
+            fit = engine.fit()
+        yield fit
 
 
 def concluded(fit: "Fit", seed: int) -> NDArray[np.float64]:

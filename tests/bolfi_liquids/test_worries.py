@@ -43,6 +43,7 @@ def test_nothing_is_said_where_nothing_is_wrong():
     [
         ({"rhat_max": 1.2}, AGREES, 0.01, {}, "did not converge"),
         ({"below_least_viscosity": 0.5, "least_viscosity": 0.03}, AGREES, 0.01, {}, "look alike"),
+        ({"emulator_warnings": ["too few runs"]}, AGREES, 0.01, {}, "in doubt: too few runs."),
         ({}, None, 0.01, {}, "was not criticised: whether"),
         ({"fit_rms_deg": 0.9}, None, 0.01, {}, "farther from the recording than noise"),
         ({}, {**AGREES, "baseline": 0}, 0.01, {}, "Without clean recordings"),
