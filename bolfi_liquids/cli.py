@@ -2,6 +2,8 @@
 
 import shlex
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -106,12 +108,10 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
 ) -> None:
     """Learn a liquid's parameters from recordings of it being stirred."""
     from .calibrator import calibrate as run_calibrate
-    from .inference import EmulatorWarning
     from .recordings import aborted_recordings, open_recordings
 
     opened = open_recordings(recordings)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", EmulatorWarning)  # printed with the results
+    with _complaints_among_results():
         run_calibrate(
             opened,
             out=out,
@@ -264,11 +264,22 @@ def demo(
     from .criticism import Criticism
     from .demo import run_demo
 
-    path = run_demo(out)
+    with _complaints_among_results():
+        path = run_demo(out)
     _print_section(out, "calibrate")
     _print_criticism(Criticism.open(out))
     _print_section(out, "pour")
     typer.echo(f"report: {path}")
+
+
+@contextmanager
+def _complaints_among_results() -> Iterator[None]:
+    """What the surrogate's checks complain of is printed with its results, and not before."""
+    from .inference import EmulatorWarning
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", EmulatorWarning)
+        yield
 
 
 def _print_next(run: Path, *commands: str) -> None:

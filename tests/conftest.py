@@ -1,5 +1,6 @@
-"""Tests in which processes must keep time, on computers that may not."""
+"""Tests in which processes must keep time, on computers that may not; what JAX compiled is kept."""
 
+import os
 import time
 from pathlib import Path
 from threading import Event, Thread
@@ -17,6 +18,9 @@ def pytest_configure(config):
         "markers",
         "punctual: alone, and repeated if it failed on a computer that stood still meanwhile",
     )
+    # many processes compile the same functions: half of the time of the engine's tests
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(config.cache.mkdir("jax")))
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.1")
 
 
 def pytest_runtest_protocol(item, nextitem):
