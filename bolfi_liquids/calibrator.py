@@ -15,13 +15,13 @@ from .progress import Simulate, progress_bar, reported
 from .provenance import run_record
 from .recordings import Recording, Source, open_recordings
 from .recordings_kept import keep_recordings
-from .run_directory import POSTERIOR, enter_run, open_bank
+from .run_directory import POSTERIOR, enter_run, open_bank, read_run
 from .settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
 from .stirring import Stirring, stirring_of
 from .summary import write_section
 
 if TYPE_CHECKING:
-    from .inference import Fit, Prior
+    from .inference import Fit, Prior, SimulationBank
     from .kept import Keep
 
 
@@ -45,7 +45,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
 
     Everything is kept in `out` as it is finished, so an interrupted call can be repeated with
     `resume`: it then concludes exactly what it would have concluded, and repeats no finished
-    simulation. The same call on a finished run only opens it.
+    simulation. The same call on a finished run only opens it. With a larger budget it goes on from
+    there, and removes what was concluded from fewer simulations.
 
     Args:
         recordings: One or several of one liquid, opened or as paths. Their discrepancies are
@@ -60,7 +61,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         sampler: "nuts" or "emcee".
         chains: Of the sampler.
         draws: Kept, for each chain.
-        resume: Whether `out` may hold a run of the same settings, to go on with.
+        resume: Whether `out` may hold a run of the same settings, but for a smaller budget, to go
+            on with.
         progress: Whether to show bars on stderr.
 
     Raises:
@@ -82,7 +84,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     check_prior(prior)
     stirring = stirring_of(opened, particles)
     run = Path(out)
-    enter_run(run, run_record(settings, prior, stirring), resume=resume)
+    record = run_record(settings, prior, stirring)
+    enter_run(run, record, resume=resume, growing="settings.budget")
     keep_recordings(run, stirring.recordings)
     if not is_calibrated(run):
         _calibrate(run, stirring, prior, settings, progress)
@@ -93,13 +96,12 @@ def _calibrate(
     run: Path, stirring: Stirring, prior: "Prior", settings: CalibrationSettings, progress: bool
 ) -> None:
     from .kept import Keep
-    from .predictive import PREDICTIVE_DRAWS, REPLICATES, check_by_simulation
+    from .predictive import PREDICTIVE_DRAWS, check_by_simulation
     from .results import results_tree, write_tree
 
-    total = settings.budget + PREDICTIVE_DRAWS + REPLICATES
     with (
         open_bank(run) as bank,
-        progress_bar("simulating stirs", total - len(bank), shown=progress) as advance,
+        progress_bar("simulating stirs", _left(run, settings, bank), shown=progress) as advance,
     ):
         simulate = reported(stirring.simulate, advance)
         keep = Keep(bank, stirring.identity, settings.batch)
@@ -121,6 +123,16 @@ def _calibrate(
     tree = results_tree(sampled, fit, stirring, check)
     write_tree(tree, run / POSTERIOR)
     write_section(run, "calibrate", calibration_section(tree, fit, stirring, check))
+
+
+def _left(run: Path, settings: CalibrationSettings, bank: "SimulationBank") -> int:
+    """Simulations that a run still needs; some of those before it grew were judging, or pours."""
+    from .predictive import PREDICTIVE_DRAWS, REPLICATES
+
+    before = read_run(run).get("grown", {"held": 0, "simulations": 0})
+    learned_from = min(before["held"], before["simulations"])
+    needed = settings.budget - learned_from + PREDICTIVE_DRAWS + REPLICATES
+    return needed - (len(bank) - before["simulations"])
 
 
 def fit_recordings(  # noqa: PLR0913  what a calibration is made of

@@ -78,7 +78,7 @@ def _global_options(
 @app.command(
     epilog=examples(
         "calibrate stir.nc --budget 20 --out runs/mine",
-        "calibrate stir.nc --budget 20 --out runs/mine --resume",
+        "calibrate stir.nc --budget 40 --out runs/mine --resume",
     )
 )
 def calibrate(  # noqa: PLR0913  one parameter for each option
@@ -103,7 +103,10 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
         int, typer.Option(help="Simulations run at the same time.")
     ] = CalibrationSettings.batch,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with the run in RUN, of the same settings.")
+        bool,
+        typer.Option(
+            "--resume", help="Go on with the run in RUN; --budget may be larger than its."
+        ),
     ] = False,
 ) -> None:
     """Learn a liquid's parameters from recordings of it being stirred."""

@@ -11,6 +11,7 @@ import tomli_w
 
 from .errors import InputError
 from .files import write_text
+from .summary import NAME as SUMMARY
 
 if TYPE_CHECKING:
     from .inference import SimulationBank
@@ -27,12 +28,25 @@ REPORT = "report.html"
 MUST_AGREE = ("settings", "inputs", "simulator", "engine")
 """Sections of run.toml that decide the results; versions and dates may differ."""
 
+CONCLUSIONS = (POSTERIOR, CRITICISM, POUR, FRAMES, REPORT, SUMMARY)
+"""What follows from the simulations, in the order in which it goes when these become more."""
 
-def enter_run(run: Path, record: Mapping[str, Any], *, resume: bool) -> None:
+
+def enter_run(
+    run: Path, record: Mapping[str, Any], *, resume: bool, growing: str | None = None
+) -> None:
     """Start a run, or go on with one of the same settings.
 
     `record` is written to run.toml before anything else, so that whatever is found later in
     the directory can be traced to its settings.
+
+    Args:
+        run: The directory.
+        record: Of the run, in the sections that `MUST_AGREE` names and others.
+        resume: Whether the directory may hold a run, to go on with.
+        growing: Field of `record` that may be larger than in the run that is gone on with. All
+            simulations are kept then; what was concluded from fewer is removed. run.toml says
+            in its section `grown` how many simulations there were before.
 
     Raises:
         InputError: The directory holds a run and `resume` is false, or the run in it was made
@@ -48,7 +62,12 @@ def enter_run(run: Path, record: Mapping[str, Any], *, resume: bool) -> None:
                 where=str(run),
                 fix="give --resume to go on with it, or another --out",
             )
-        _check_same(read_run(run), record, run)
+        held = read_run(run)
+        differing = _differences(held, record)
+        if list(differing) == [growing] and _larger(*differing[growing]):
+            _grow(run, record, growing, differing[growing][0])
+        elif differing:
+            raise _refused(differing, run)
         return
     if (run / SIMULATIONS).exists():
         raise InputError(
@@ -108,17 +127,37 @@ def read_run(run: Path) -> dict[str, Any]:
         raise InputError(f"not TOML ({err})", where=str(path), fix="restore the file") from err
 
 
-def _check_same(old: Mapping[str, Any], new: Mapping[str, Any], run: Path) -> None:
+def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+    """Fields that decide the results -> their values in both records, where these differ."""
     # through TOML, so that a tuple compares as what was written
     wanted = dict(_fields({k: tomllib.loads(tomli_w.dumps(new)).get(k) for k in MUST_AGREE}))
     held = dict(_fields({k: old.get(k) for k in MUST_AGREE}))
-    for field in [*wanted, *(held.keys() - wanted.keys())]:
-        if wanted.get(field) != held.get(field):
-            raise InputError(
-                f"{field} is {held.get(field)!r} in the run, but {wanted.get(field)!r} was asked",
-                where=f"{run / RUN_TOML}",
-                fix="resume with the run's own value, or choose another --out",
-            )
+    fields = [*wanted, *(held.keys() - wanted.keys())]
+    both = {field: (held.get(field), wanted.get(field)) for field in fields}
+    return {field: values for field, values in both.items() if values[0] != values[1]}
+
+
+def _refused(differing: Mapping[str, tuple[Any, Any]], run: Path) -> InputError:
+    field, (held, wanted) = next(iter(differing.items()))
+    return InputError(
+        f"{field} is {held!r} in the run, but {wanted!r} was asked",
+        where=f"{run / RUN_TOML}",
+        fix="resume with the run's own value, or choose another --out",
+    )
+
+
+def _larger(held: Any, wanted: Any) -> bool:
+    return isinstance(held, int) and isinstance(wanted, int) and wanted > held
+
+
+def _grow(run: Path, record: Mapping[str, Any], field: str, held: int) -> None:
+    with open_bank(run) as bank:
+        simulations = len(bank)
+    # first what was concluded: a call that is killed here leaves an unfinished run
+    for name in CONCLUSIONS:
+        (run / name).unlink(missing_ok=True)
+    grown = {"grown": {"field": field, "held": held, "simulations": simulations}}
+    write_text(run / RUN_TOML, tomli_w.dumps({**record, **grown}))
 
 
 def _fields(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:

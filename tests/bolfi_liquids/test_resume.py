@@ -91,6 +91,28 @@ def test_another_seed_is_refused_and_changes_nothing(short_recording, calibratio
 
 
 @pytest.mark.slow
+def test_a_larger_budget_goes_on_from_a_smaller_one(
+    short_recording, calibration, settings, tmp_path, capsys
+):
+    grown, larger = tmp_path / "grown", settings | {"budget": 14}
+    shutil.copytree(calibration.path, grown)
+    before = finished(grown)
+    (grown / "pour.nc").write_bytes(b"chosen over what fewer simulations taught")
+    again = bl.calibrate(short_recording, out=grown, resume=True, **larger)
+    after = finished(grown)
+    assert {key: after[key] for key in before} == before  # none was simulated again
+    assert f"simulating stirs: {len(after) - len(before)} to run" in capsys.readouterr().err
+    assert not (grown / "pour.nc").exists()
+
+    whole = bl.calibrate(short_recording, out=tmp_path / "whole", progress=False, **larger)
+    assert after.keys() >= finished(whole.path).keys()
+    for name, draws in whole.posterior.items():
+        np.testing.assert_array_equal(again.posterior[name], draws)
+    with pytest.raises(ValueError, match="budget is 14 in the run, but 8 was asked"):
+        bl.calibrate(short_recording, out=grown, resume=True, progress=False, **settings)
+
+
+@pytest.mark.slow
 def test_criticism_killed_and_repeated_equals_undisturbed(calibration, tmp_path):
     quiet, killed = tmp_path / "quiet", tmp_path / "killed"
     shutil.copytree(calibration.path, quiet)

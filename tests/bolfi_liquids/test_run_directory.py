@@ -47,6 +47,26 @@ def test_resuming_with_another_setting_names_it(tmp_path, section, field, value)
     assert read_run(tmp_path) == RECORD
 
 
+def test_a_run_grows_in_the_field_that_may_grow(tmp_path):
+    enter_run(tmp_path, RECORD, resume=False)
+    write_section(tmp_path, "calibrate", {"seed": 0})
+    larger = copy.deepcopy(RECORD)
+    larger["settings"]["budget"] = 30
+    with pytest.raises(InputError, match=r"settings\.budget is 20 in the run, but 30"):
+        enter_run(tmp_path, larger, resume=True)
+    with pytest.raises(InputError, match="holds a run already"):
+        enter_run(tmp_path, larger, resume=False, growing="settings.budget")
+    assert read_summary(tmp_path)
+    enter_run(tmp_path, larger, resume=True, growing="settings.budget")
+    assert read_run(tmp_path)["settings"] == larger["settings"]
+    assert not read_summary(tmp_path)  # what fewer simulations had taught
+
+    other = copy.deepcopy(larger)
+    other["settings"] |= {"budget": 40, "seed": 1}
+    with pytest.raises(InputError, match=r"settings\.seed"):
+        enter_run(tmp_path, other, resume=True, growing="settings.budget")
+
+
 def test_resuming_ignores_dates_and_versions(tmp_path):
     enter_run(tmp_path, RECORD, resume=False)
     later = RECORD | {"created": "2027-01-01T00:00:00+00:00", "versions": {"numpy": "3.0"}}
