@@ -143,7 +143,7 @@ def test_wrong_maps_of_a_table(told, tmp_path):
 
 def test_runs_that_cannot_go_on(told, run, calibration):
     assert told("calibrate stir.nc --out runs/mine") in QUOTED
-    options = "--budget 30 --batch 2 --seed 3 --particles 200 --resume"
+    options = "--budget 7 --batch 2 --seed 3 --particles 200 --resume"
     assert told(f"calibrate stir.nc --out runs/mine {options}") in QUOTED
     (run / "posterior.nc").write_bytes(b"cut off")
     assert told("report runs/mine") in QUOTED
