@@ -58,6 +58,9 @@ class Inputs:
     @property
     def made_from(self) -> dict[str, Any]:
         """What a result was made from, as JSON: settings, and the SHA-256 of every file."""
+        from .inference import ENGINE_VERSION
+        from .models import MODEL_VERSION
+
         groups = {
             "recordings": self.stirring.recordings,
             "held_out": self.held_out,
@@ -67,6 +70,8 @@ class Inputs:
         }
         made_from = {
             "version": version("bolfi-liquids"),
+            "engine": ENGINE_VERSION,
+            "model": MODEL_VERSION,
             "format": CRITICISM_FORMAT,
             "settings": asdict(self.settings),
             **{

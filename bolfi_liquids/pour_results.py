@@ -1,8 +1,9 @@
 """pour.nc and the section "pour" of summary.json.
 
 Groups of pour.nc: `actions` and `actions_plug_in`, over a grid of actions, the spillage that each
-posterior draw, or theta*, lets expect, and the risk that was minimised; `chosen` and `plug_in`,
-over outcomes, fractions with fresh seeds; `liquids`, the posterior draws that were poured.
+posterior draw, or theta*, lets expect, and the risk that was minimised; `finalists`, the same of
+the most promising ones over more draws; `chosen` and `plug_in`, over outcomes, fractions with
+fresh seeds; `liquids` and `liquids_again`, the posterior draws that chose.
 """
 
 from collections.abc import Mapping
@@ -63,20 +64,21 @@ def read_pour(run: Path) -> "DataTree":
 
 def pour_tree(
     pour: "Pour",
-    over_posterior: Surface,
-    at_best: Surface,
-    liquids: Mapping[str, NDArray],
+    tried: Mapping[str, Surface],
+    liquids: Mapping[str, Mapping[str, NDArray]],
     risk: str,
 ) -> "DataTree":
-    """Everything that a report shows of a pour."""
+    """Everything that a report shows of a pour; `tried` and `liquids` are groups by name."""
     from xarray import Dataset, DataTree
 
     groups = {
-        "actions": _actions(over_posterior, risk),
-        "actions_plug_in": _actions(at_best, risk),
+        **{name: _actions(surface, risk) for name, surface in tried.items()},
         "chosen": _outcomes(pour.chosen),
         "plug_in": _outcomes(pour.plug_in),
-        "liquids": Dataset({name: ("draw", values) for name, values in liquids.items()}),
+        **{
+            group: Dataset({name: ("draw", values) for name, values in drawn.items()})
+            for group, drawn in liquids.items()
+        },
     }
     return DataTree.from_dict({f"/{name}": dataset for name, dataset in groups.items()})
 

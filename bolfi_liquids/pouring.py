@@ -33,9 +33,10 @@ if TYPE_CHECKING:
     from .models import Cups
 
 PLUG_IN_SEEDS = 4  # that each action of the plug-in is tried with; the paper tries one
-JUDGE_DRAWS = 2  # times as many draws judge the two actions as chose them
+FINALISTS = 3  # angular velocities that are tried on as many draws again, and the plug-in's
+JUDGE_DRAWS = 2  # times as many draws judge the two actions as each try takes
 LANDINGS = 5  # equally probable ones of each pour that judges
-_SEARCH, _JUDGE = 11, 12  # purposes of seeds
+_SEARCH, _JUDGE, _AGAIN = 11, 12, 13  # purposes of seeds
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,16 +93,17 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     """Choose angular velocity and distance so that little is spilled whatever the liquid is.
 
     Every angular velocity of a grid is poured with a fixed set of posterior draws and simulator
-    seeds, each pour for all distances at once. Of all these actions the one is taken whose risk
-    is least, averaged over where the liquid may land, and judged on draws and seeds it was not
-    chosen by, so that the figure is not flattered by the choice. Finished simulations are kept
-    in the run.
+    seeds, each pour for all distances at once. The most promising ones, and the one that would be
+    best at theta*, are poured with as many draws again: few draws tell good actions apart by
+    chance. Of these the action is taken whose risk is least, averaged over where the liquid may
+    land, and judged on draws and seeds it was not chosen by, so that the figure is not flattered
+    by the choice. Finished simulations are kept in the run.
 
     Args:
         calibration: Whose posterior is poured; or a RUN directory, whose latest is.
         cups: Source, receiver and ranges of the action; None are the bundled ones.
         iterations: Angular velocities tried, as many again for the plug-in.
-        draws: Posterior draws that each action is tried on.
+        draws: Posterior draws that each action is tried on, and again those that promise most.
         risk: "mean", or "cvar": the mean over the worst tenth of the draws.
         seed: Of everything random.
         progress: Whether to show a bar on stderr.
@@ -118,22 +120,26 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     settings = PourSettings(iterations=iterations, draws=draws, risk=risk, seed=seed)
     cups = bundled_cups() if cups is None else cups
     # distinct strata: none of the draws that judge has chosen
-    drawn = calibration.draws((1 + JUDGE_DRAWS) * draws, seed)
-    chosen_by = np.arange(len(next(iter(drawn.values())))) % (1 + JUDGE_DRAWS) == JUDGE_DRAWS // 2
-    liquids = {name: values[chosen_by] for name, values in drawn.items()}
-    others = {name: values[~chosen_by] for name, values in drawn.items()}
+    drawn = calibration.draws((2 + JUDGE_DRAWS) * draws, seed)
+    stratum = np.arange(len(next(iter(drawn.values())))) % (2 + JUDGE_DRAWS)
+    search, again, others = (
+        {name: values[np.isin(stratum, chosen)] for name, values in drawn.items()}
+        for chosen in (1, 2, (0, 3))
+    )
     best = {name: np.full(PLUG_IN_SEEDS, value) for name, value in calibration.best.items()}
     with (
         open_bank(calibration.path) as bank,
-        progress_bar("trying actions", 2 * iterations + 2, shown=progress) as advance,
+        progress_bar("trying actions", 2 * iterations + FINALISTS + 3, shown=progress) as advance,
     ):
         pours = _Pours(cups, calibration.liquid_density, settings, bank, advance)
-        over_posterior, at_best = pours.try_all(liquids), pours.try_all(best)
-        chosen, plug_in = (
-            pours.judge(tried.least(risk), others) for tried in (over_posterior, at_best)
-        )
+        over_posterior, at_best = pours.try_all(search), pours.try_all(best)
+        if_true = at_best.least(risk)
+        finalists = pours.try_again(over_posterior, if_true["angular_velocity"], again)
+        chosen = pours.judge(finalists.least(risk, neighbours=False), others)
+        plug_in = pours.judge(if_true, others)
     pour = Pour(calibration.path, chosen, plug_in)
-    tree = pour_tree(pour, over_posterior, at_best, liquids, risk)
+    tried = {"actions": over_posterior, "actions_plug_in": at_best, "finalists": finalists}
+    tree = pour_tree(pour, tried, {"liquids": search, "liquids_again": again}, risk)
     floor = cups.least_viscosity(calibration.liquid_density, chosen.angular_velocity)
     tree.attrs.update(
         asdict(settings),
@@ -142,7 +148,8 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         landing_sd=landing_sd(cups),
     )
     write_tree(tree, calibration.path / POUR)
-    made = sum(tried.spilled[..., 0].size for tried in (over_posterior, at_best))
+    made = sum(surface.spilled[..., 0].size for surface in (over_posterior, at_best))
+    made += draws * len(finalists.angular_velocity)
     judged = 2 * JUDGE_DRAWS * draws
     section = pour_section(pour, settings, n_simulations=made + judged, least_viscosity=floor)
     write_section(calibration.path, "pour", section)
@@ -164,6 +171,13 @@ class _Pours:
         low, high = self.cups.angular_velocity_range
         rates = np.geomspace(low, high, self.settings.iterations)
         return surface(self._profiles(rates, liquids, _SEARCH), self.cups)
+
+    def try_again(self, first: Surface, plug_in: float, liquids: Mapping[str, NDArray]) -> Surface:
+        """Pour these liquids too where least was spilled, and at the angular velocity `plug_in`."""
+        by_promise = np.argsort(first.risk(self.settings.risk).min(axis=1), kind="stable")
+        named = [*first.angular_velocity[by_promise[:FINALISTS]], plug_in]
+        rates = np.intersect1d(named, first.angular_velocity)
+        return first.with_draws(surface(self._profiles(rates, liquids, _AGAIN), self.cups))
 
     def judge(self, action: Mapping[str, float], liquids: Mapping[str, NDArray]) -> Judged:
         """Pour every liquid, with seeds of their own."""

@@ -19,9 +19,12 @@ LIBRARIES = ("bolfi-liquids", "numpy", "scipy", "jax", "numpyro", "emcee", "taic
 
 def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring) -> dict[str, Any]:
     """Settings, inputs and versions; see `run_directory.MUST_AGREE` for what must not change."""
+    from .inference import ENGINE_VERSION
+
     return {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "settings": asdict(settings) | {"prior": describe_prior(prior)},
+        "engine": {"version": ENGINE_VERSION},
         "simulator": stirring.settings,
         "inputs": {"sha256": [recording.hash for recording in stirring.recordings]},
         "files": {"recordings": [recording.path.name for recording in stirring.recordings]},

@@ -92,7 +92,7 @@ def _replicates(  # noqa: PLR0913  what the two surrogates share
     calibration = settings.calibration(name)
     if name == "signal":
         shared = stirs_everywhere(stirring, prior, settings, out / SIMULATIONS, pool, progress)
-        pipeline: Any = FromBank(prior, *shared, calibration)
+        pipeline: Any = FromBank(stirring, prior, *shared, calibration)
     else:
         pipeline = Calibrate(stirring, prior, calibration)
     return inference.replicates(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .calibrator import fit_recordings
+from .calibrator import engine_options, fit_recordings
 from .settings import CalibrationSettings
 from .stirring import Stirring
 
@@ -79,12 +79,14 @@ class FromBank:
     data lead.
 
     Attributes:
+        stirring: How two signals are compared.
         prior: Of the parameters.
         theta: Points of the set [n, d].
         signals: Of their runs [n, RUNS, T, 2].
         settings: Of a calibration.
     """
 
+    stirring: Stirring
     prior: "Prior"
     theta: NDArray[np.float64]
     signals: NDArray[np.float64]
@@ -95,11 +97,12 @@ class FromBank:
 
         u = self.prior.to_unit(self.prior.to_dict(self.theta))
         left = np.asarray(np.isfinite(self.signals).all(axis=(2, 3)))
+        options = engine_options(self.stirring, self.settings.surrogate)
         told: list[tuple[int, int]] = []  # point and run
 
         def engine() -> Bolfi:
             """One that was told all so far, and waits for nothing that it asked before."""
-            made = Bolfi(self.prior, observed, surrogate=self.settings.surrogate, seed=seed)
+            made = Bolfi(self.prior, observed, seed=seed, **options)
             if told:
                 point, run = np.array(told).T
                 theta = self.prior.to_dict(self.theta[point])

@@ -86,18 +86,28 @@ class Surface(NamedTuple):
     distance: NDArray[np.float64]
     spilled: NDArray[np.float64]
 
-    def least(self, risk: str) -> dict[str, float]:
-        """The action at which a measure of `RISK` is least.
+    def risk(self, risk: str, *, neighbours: bool = True) -> NDArray[np.float64]:
+        """A measure of `RISK` at every action, shape (W, D).
 
-        Neighbouring angular velocities spill alike, so averages over them take chance out of
-        the choice.
+        Neighbouring angular velocities of a grid spill alike, so averages over them take chance
+        out of a choice.
         """
         from scipy.ndimage import gaussian_filter1d
 
-        surface = gaussian_filter1d(RISK[risk](self.spilled), 1.0, axis=0, mode="nearest")
+        measured = RISK[risk](self.spilled)
+        return gaussian_filter1d(measured, 1.0, axis=0, mode="nearest") if neighbours else measured
+
+    def least(self, risk: str, *, neighbours: bool = True) -> dict[str, float]:
+        """The action at which `risk` is least."""
+        surface = self.risk(risk, neighbours=neighbours)
         row, column = np.unravel_index(np.argmin(surface), surface.shape)
         chosen = self.angular_velocity[row], self.distance[column]
         return dict(zip(ACTION, map(float, chosen), strict=True))
+
+    def with_draws(self, more: "Surface") -> "Surface":
+        """The angular velocities of `more`, which are among these, over the draws of both."""
+        rows = np.isin(self.angular_velocity, more.angular_velocity)
+        return more._replace(spilled=np.concatenate([self.spilled[:, rows], more.spilled]))
 
 
 def surface(profiles: Profiles, cups: "Cups") -> Surface:

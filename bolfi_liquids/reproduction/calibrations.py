@@ -17,7 +17,7 @@ from ..calibrator import engine_options
 from ..draws import pick_draws
 from ..prior import describe_prior
 from ..progress import Simulate
-from ..sbc_pipelines import CameraNoise
+from ..sbc_pipelines import SAMPLING, CameraNoise
 from ..settings import MIN_SIMULATIONS, PAPER_RULES
 from ..stirring import Stirring
 from .truths import DENSITY
@@ -134,7 +134,8 @@ def _made_by(prior: "Prior") -> list[Any]:
     """What the conclusions of all learners depend on."""
     from ..inference import ENGINE_VERSION
 
-    return [ENGINE_VERSION, describe_prior(prior), BATCH, DRAWS, NOISE.sd]
+    learned_by = [ENGINE_VERSION, describe_prior(prior), BATCH, PAPER_RULES, MIN_SIMULATIONS]
+    return [*learned_by, SAMPLING, DRAWS, NOISE.sd, DENSITY]
 
 
 def after_each(engine: "Bolfi", simulate: Simulate, budgets: Sequence[int]) -> "Iterator[Fit]":
@@ -166,7 +167,7 @@ def concluded(fit: "Fit", seed: int) -> NDArray[np.float64]:
     """theta* and draws, shape (1 + DRAWS, 2)."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of a hundred fits, and nothing here depends on them
-        sampled = fit.sample("quadrature", chains=2, draws=250, seed=seed)
+        sampled = fit.sample(seed=seed, **SAMPLING)
     drawn = pick_draws(sampled["posterior"].to_dataset(), DRAWS, seed)
     return np.column_stack([np.append(fit.best[name], drawn[name]) for name in NAMES])
 

@@ -11,7 +11,7 @@ from ..pouring import Pour, choose_pour
 from ..spillage import Outcomes, pour_all, surface
 from .decisions import Action, executions, spilled_by
 from .figure import Drawn
-from .sticky import TRAINING, Sticky, draw_sticky, poured, stirred
+from .sticky import TRAINING, Sticky, draw_sticky, poured, recipe, stirred
 from .workshop import Workshop
 
 CONSIDERED = ("adhesion", "shear_thinning", "yield_stress")
@@ -78,7 +78,7 @@ def _spilled(workshop: Workshop, number: int) -> tuple[Sticky, list[float], str]
     """A truth, what it spilled in each of `CASES`, and the effects that were named."""
     cups, seed, shown = bundled_cups(), workshop.scale.seed, workshop.progress
     truth = draw_sticky(number, seed)
-    folder = workshop.out / "runs" / f"sticky_{number}_{workshop.scale.particles}_{seed}"
+    folder = workshop.runs / f"sticky_{number}_{recipe(cups, workshop.scale.particles, seed)}"
     folder.mkdir(parents=True, exist_ok=True)
     recording = stirred(truth, workshop.scale.particles, folder / "stir.nc")
     density = recording.number("liquid_density")

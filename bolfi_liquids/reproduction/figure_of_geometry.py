@@ -1,5 +1,6 @@
 """Where calibration matters: what the best single pour for all liquids spills too much."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -51,6 +52,13 @@ class Poured:
             made.append(np.moveaxis(caught.spilled, 0, -1))
         return np.stack(made)
 
+    @property
+    def identity(self) -> str:
+        """A text that two equal experiments share."""
+        liquids, receivers = [VISCOSITIES.tolist(), COHESION, DENSITY], [RADII, DISTANCES]
+        made_by = ["geometry", liquids, *(values.tolist() for values in receivers)]
+        return json.dumps([*made_by, self.cups.settings()], sort_keys=True)
+
 
 def geometry(workshop: Workshop) -> Drawn:
     """The regret of the best single action, over heights of the lip and radii of the receiver."""
@@ -67,7 +75,7 @@ def geometry(workshop: Workshop) -> Drawn:
             )
             poured = Poured(cups)
             rates = np.geomspace(*cups.angular_velocity_range, RATES)
-            keep = Keep(workshop.bank, f"geometry {cups.settings()}", 1)
+            keep = Keep(workshop.bank, poured.identity, 1)
             simulate = reported(poured.simulate, advance)
             made = simulate_kept(simulate, {"angular_velocity": rates}, [0] * RATES, keep)
             regret[row] = _regret(made.signals, cups)

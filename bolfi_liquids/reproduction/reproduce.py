@@ -64,9 +64,17 @@ def reproduce(
             raise InputError(
                 f"no figure {name!r}", where="reproduce", fix=f"choose all, {', '.join(FIGURES)}"
             )
+    from ..inference import ENGINE_VERSION
+    from ..models import MODEL_VERSION
+
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
-    made_with = {"scale": asdict(scale), "versions": versions(LIBRARIES)}
+    made_with = {
+        "scale": asdict(scale),
+        "engine": ENGINE_VERSION,
+        "model": MODEL_VERSION,
+        "versions": versions(LIBRARIES),
+    }
     with open_bank(out) as bank:
         workshop = Workshop(out, scale, bank, progress)
         for name in chosen:

@@ -1,7 +1,9 @@
 """A liquid that sticks to its cup, of which stirring shows nothing: the paper's failure."""
 
 import csv
+import json
 from collections.abc import Mapping
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -56,6 +58,13 @@ def draw_sticky(repetition: int, seed: int) -> Sticky:
         "adhesion": float(rng.uniform(*ADHESION)),
     }
     return Sticky(theta, int(rng.integers(2**31)))
+
+
+def recipe(cups: "Cups", particles: int, seed: int) -> str:
+    """Short name of all that decides what is stirred and poured, but for the model's version."""
+    made_by = [LIKE, LIQUIDS[LIKE], SPREAD, ADHESION, TRAINING, NOISE.sd]
+    text = json.dumps([*made_by, cups.settings(), particles, seed], sort_keys=True)
+    return sha256(text.encode()).hexdigest()[:8]
 
 
 def stirred(truth: Sticky, particles: int, path: Path) -> Recording:

@@ -60,11 +60,19 @@ class Workshop:
         learners = after_strokes(self.scale)
         return spillage_study(learners, self.bank, self.grid, self.scale, progress=self.progress)
 
+    @property
+    def runs(self) -> Path:
+        """Where calibrations on recordings are kept; another version's are left alone."""
+        from ..inference import ENGINE_VERSION
+        from ..models import MODEL_VERSION
+
+        return self.out / "runs" / f"engine_{ENGINE_VERSION}_model_{MODEL_VERSION}"
+
     def calibration(self, liquid: str, budget: int, surrogate: str) -> Calibration:
         """Of a bundled recording, in a run of its own; a finished one is opened."""
         return calibrate(
             bundled_recording(liquid),
-            out=self.out / "runs" / f"{liquid}_{budget}_{surrogate}",
+            out=self.runs / f"{liquid}_{budget}_{surrogate}",
             budget=budget,
             surrogate=surrogate,
             particles=self.scale.particles,

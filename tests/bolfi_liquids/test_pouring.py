@@ -79,9 +79,35 @@ def test_no_draw_that_judges_has_chosen(calibration, monkeypatch, tmp_path):
     monkeypatch.setattr(spillage.Outcomes, "simulate", watched)
     pour = bl.choose_pour(run, iterations=7, draws=4, seed=5, progress=False)
     assert pour.chosen.distance == pytest.approx(0.03, abs=1e-3)
-    by_posterior, judging = searched[0], judged[-1]
-    assert not np.isin(judged_draws(judging), judged_draws(by_posterior)).any()
-    assert not np.isin(judging.seeds, by_posterior.seeds).any()
+    chose = searched[0], searched[-1]  # on the grid over the posterior, and among its finalists
+    for one, other in ((judged[-1], chose[0]), (judged[-1], chose[1]), chose):
+        assert not np.isin(judged_draws(one), judged_draws(other)).any()
+        assert not np.isin(one.seeds, other.seeds).any()
+
+
+def test_what_was_lucky_with_the_first_draws_alone_is_not_chosen(
+    calibration, monkeypatch, tmp_path
+):
+    run = bl.Calibration.open(shutil.copytree(calibration.path, tmp_path / "run"))
+    tries = []
+
+    def lucky(self, action, seeds):
+        """In place of pours: the slowest spills nothing, but only of the draws tried first."""
+        if len(self.seeds) == 5 and tuple(self.seeds) not in tries:
+            tries.append(tuple(self.seeds))
+        first = tuple(self.seeds) in tries[:1]
+        slowest = action["angular_velocity"] == bundled_cups().angular_velocity_range[0]
+        spilled = np.where(slowest, 0.0 if first else 0.5, 0.2)[:, None, None]
+        spilled = np.broadcast_to(spilled, (len(slowest), len(self.seeds), len(self.distances)))
+        return np.stack([spilled, 1.0 - spilled, 0.0 * spilled], axis=-1)
+
+    monkeypatch.setattr(spillage.Outcomes, "simulate", lucky)
+    pour = bl.choose_pour(run, iterations=7, draws=5, progress=False)
+    tree = xr.load_datatree(run.path / "pour.nc")
+    assert np.argmin(tree["actions"]["risk"].min("distance")) == 0
+    assert tree["finalists"]["spilled"].sizes["draw"] == 10
+    assert pour.chosen.angular_velocity > bundled_cups().angular_velocity_range[0]
+    assert pour.chosen.expected_spillage == pytest.approx(0.2)
 
 
 def test_section_is_of_the_pour(pour, calibration):
@@ -95,7 +121,8 @@ def test_section_is_of_the_pour(pour, calibration):
     floor = bundled_cups().least_viscosity(calibration.liquid_density, pour.chosen.angular_velocity)
     assert section["least_viscosity"] == floor > 0.0
     assert section["plug_in"]["expected_spillage"] == pour.plug_in.expected_spillage
-    assert section["n_simulations"] == 7 * (4 + 4) + 2 * 8
+    finalists = xr.load_datatree(pour.path / "pour.nc")["finalists"]
+    assert section["n_simulations"] == 7 * (4 + 4) + 4 * len(finalists["angular_velocity"]) + 2 * 8
     assert bl.Calibration.open(pour.path).summary == calibration.summary  # left as it was
 
 
