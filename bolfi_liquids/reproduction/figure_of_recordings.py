@@ -26,8 +26,8 @@ def between(table: "PourTable", rate: float, distance: float) -> tuple[float, fl
     """What the table spilled between its actions, and what that misses.
 
     Linear over the logarithm of the angular velocity and the distance. The error is the RMS over
-    pours that are left out in turn and lie between others. Beyond the table the nearest action
-    that lies within it is taken.
+    pours that are left out in turn and lie between others. Beyond the table its edge is taken,
+    on the way to the nearest pour of the table.
 
     Returns:
         Spilled fraction, and its error.

@@ -32,8 +32,10 @@ LEVEL = 0.9
 
 
 def interval(values: NDArray, seed: int = 0) -> tuple[float, float]:
-    """90 % bootstrap interval of the mean of values that are not NaN, shape (n,)."""
+    """90 % bootstrap interval of the mean of values that are not NaN, shape (n,); NaN of none."""
     seen = values[np.isfinite(values)]
+    if not len(seen):
+        return np.nan, np.nan
     rng = np.random.default_rng(seed)
     means = seen[rng.integers(0, len(seen), (RESAMPLED, len(seen)))].mean(axis=1)
     low, high = np.quantile(means, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
@@ -80,7 +82,12 @@ def _table(study: "Dataset") -> str:
         )
         lines.append(f"  {label}: " + ", ".join(pairs))
     known, unknown = (100.0 * float(study[name].mean()) for name in ("known", "unknown"))
-    return "\n".join([*lines, f"  liquid known: {known:.2f}, unknown: {unknown:.2f}"])
+    lines.append(f"  liquid known: {known:.2f}, unknown: {unknown:.2f}")
+    failed = study["spilled"].isnull().any(["rule", "budget"]).sum("truth")
+    for method in failed["learned_by"].to_numpy()[failed.to_numpy() > 0]:
+        left_out = int(failed.sel(learned_by=method))
+        lines.append(f"  {method}: {left_out} of {study.sizes['truth']} calibrations failed")
+    return "\n".join(lines)
 
 
 def liquids(workshop: Workshop) -> Drawn:

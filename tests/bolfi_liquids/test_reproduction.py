@@ -5,13 +5,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bolfi_liquids import inference, models
 from bolfi_liquids.bundled import bundled_recording
 from bolfi_liquids.cups import bundled_cups
 from bolfi_liquids.pour_table import open_pours
 from bolfi_liquids.reproduction import sticky
 from bolfi_liquids.reproduction.figure_of_recordings import between
 from bolfi_liquids.reproduction.figures_of_spillage import interval
+from bolfi_liquids.reproduction.learners import by_stirring_and_pouring
 from bolfi_liquids.reproduction.reproduce import reproduce
+from bolfi_liquids.reproduction.scale import FULL
+from bolfi_liquids.reproduction.workshop import Workshop
 
 
 def table(spilled):
@@ -47,12 +51,31 @@ def test_beyond_the_table_its_edge_is_taken():
 
 def test_the_interval_covers_the_mean_as_often_as_it_says():
     rng = np.random.default_rng(0)
-    held = 0
-    for at in range(200):
-        low, high = interval(rng.exponential(size=40), seed=at)
-        held += low <= 1.0 <= high
+    samples = rng.exponential(size=(200, 40))
+    ends = np.array([interval(values, seed=at) for at, values in enumerate(samples)])
+    held = (ends[:, 0] <= 1.0) & (ends[:, 1] >= 1.0)
     # 90 %, less what the bootstrap of a skewed sample of 40 is known to lose; four standard errors
-    assert held / 200 > 0.87 - 4.0 * np.sqrt(0.1 / 200) * 0.9
+    least = 0.87 - 4.0 * np.sqrt(0.87 * 0.13 / 200)
+    assert held.mean() > least
+    middle = ends.mean(axis=1)
+    narrow = np.abs(1.0 - middle) <= 0.6 * (ends[:, 1] - middle)  # too narrow ones are found
+    assert narrow.mean() < least
+
+
+def test_an_interval_of_nothing_is_nan():
+    assert np.isnan(interval(np.full(3, np.nan))).all()
+
+
+@pytest.mark.parametrize("part", [inference, models])
+def test_what_another_version_made_is_left_alone(tmp_path, monkeypatch, part):
+    """Kept calibrations go by name; those of another engine or model are others."""
+    workshop = Workshop(tmp_path, FULL, None)
+    learner = by_stirring_and_pouring(bundled_cups(), FULL)["pour"]
+    now = workshop.runs, learner.identity
+    name = "ENGINE_VERSION" if part is inference else "MODEL_VERSION"
+    monkeypatch.setattr(part, name, "another", raising=False)
+    assert workshop.runs != now[0]
+    assert part is models or learner.identity != now[1]
 
 
 def test_an_unknown_figure_is_named(tmp_path):

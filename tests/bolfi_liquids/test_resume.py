@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import bolfi_liquids as bl
+from bolfi_liquids import inference
 from bolfi_liquids.run_directory import SIMULATIONS
 
 PATIENCE_S = 120
@@ -88,6 +89,12 @@ def test_another_seed_is_refused_and_changes_nothing(short_recording, calibratio
     with pytest.raises(ValueError, match=r"settings\.seed is 3 in the run, but 4"):
         bl.calibrate(short_recording, out=calibration.path, resume=True, progress=False, **other)
     assert bl.Calibration.open(calibration.path).summary == calibration.summary
+
+
+def test_another_engine_is_refused(short_recording, calibration, settings, monkeypatch):
+    monkeypatch.setattr(inference, "ENGINE_VERSION", "0")
+    with pytest.raises(ValueError, match=r"engine\.version is '.' in the run, but '0' was asked"):
+        bl.calibrate(short_recording, out=calibration.path, resume=True, progress=False, **settings)
 
 
 @pytest.mark.slow
