@@ -69,7 +69,7 @@ def test_the_first_truths_do_not_depend_on_how_many_there_are():
     assert len(np.unique(many.seed)) == len(many.seed)
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_a_real_grid_says_what_new_pours_spill():
     """Of liquids and seeds that it does not hold, within what chance and interpolation leave."""
     cups, rng = bundled_cups(), np.random.default_rng(5)
