@@ -32,9 +32,7 @@ CONCLUSIONS = (POSTERIOR, CRITICISM, POUR, FRAMES, REPORT, SUMMARY)
 """What follows from the simulations, in the order in which it goes when these become more."""
 
 
-def enter_run(
-    run: Path, record: Mapping[str, Any], *, resume: bool, growing: str | None = None
-) -> None:
+def enter_run(run: Path, record: Mapping[str, Any], *, resume: bool, growing: str = "") -> None:
     """Start a run, or go on with one of the same settings.
 
     `record` is written to run.toml before anything else, so that whatever is found later in
@@ -44,9 +42,9 @@ def enter_run(
         run: The directory.
         record: Of the run, in the sections that `MUST_AGREE` names and others.
         resume: Whether the directory may hold a run, to go on with.
-        growing: Field of `record` that may be larger than in the run that is gone on with. All
-            simulations are kept then; what was concluded from fewer is removed. run.toml says
-            in its section `grown` how many simulations there were before.
+        growing: Field of `record`, if any, that may be larger than in the run that is gone on
+            with. All simulations are kept then; what was concluded from fewer is removed.
+            run.toml says in its section `grown` how many simulations there were before.
 
     Raises:
         InputError: The directory holds a run and `resume` is false, or the run in it was made
