@@ -11,7 +11,7 @@ from ._float64 import in_float64
 from .compiled import GROWTH, condition, extend, leave_one_out
 from .compiled import predict as predict_scores
 from .components import Basis, principal_components
-from .gp import GP, Data, Hyper, pad
+from .gp import GP, Data, Hyper, pad, predict_joint
 from .hyper import maximum_a_posteriori
 from .noise import Remainder, shrunk_covariance
 from .own_noise import left_over, own_noise
@@ -19,6 +19,9 @@ from .own_noise import left_over, own_noise
 SHARE = 0.9995  # of the variance, to be explained by components
 PREDICTED = 0.3  # see `_predicted`
 PRIOR_RUNS = 5.0  # runs that speak for uncorrelated scores
+ROUNDING = 1e-24  # variance of standardised outputs that counts as none
+
+_joint = jax.jit(predict_joint)
 
 
 class Emulator(NamedTuple):
@@ -157,14 +160,32 @@ def loo_errors(emulator: Emulator) -> np.ndarray:
     return ((np.asarray(emulator.gp.data.y)[:used, :n] - mean) / np.sqrt(variance)).T
 
 
-def score_errors(emulator: Emulator, u: np.ndarray, outputs: np.ndarray) -> np.ndarray:
-    """Studentised errors [n, used] in the scores of new outputs [n, m] at u [n, d]."""
-    basis, remainder, used = emulator.basis, emulator.remainder, emulator.basis.used
-    mean, variance = (part.T[:, :used] for part in predict_scores(emulator.gp, u))
+def innovations(emulator: Emulator, u: np.ndarray, outputs: np.ndarray) -> np.ndarray:
+    """Studentised errors [n, used] in the scores of new outputs [n, m] at u [n, d], each foretold
+    from all outputs before it; components and hyperparameters stay. n fits into the reserved rows.
+    """
+    basis, used, n = emulator.basis, emulator.basis.used, len(u)
     squared = np.sum(basis.vectors[:, :used] ** 2, 0)
-    across = basis.vectors[:, :used].T @ remainder.factors / squared[:, None]
-    constant = np.diag(emulator.noise)[:used] + np.sum(across**2, 1) + remainder.white / squared
-    return (basis.scores(outputs)[:, :used] - mean) / np.sqrt(variance + constant)
+    noise = np.diag(emulator.noise)[:used] + emulator.remainder.white / squared
+    mean = predict_scores(emulator.gp, u)[0][:used]
+    padded = jnp.asarray(np.pad(u, ((0, len(emulator.gp.data.u) - n), (0, 0))))  # one shape
+    joint = np.asarray(_joint(emulator.gp, padded, padded))[:used, :n, :n]
+    factor = np.linalg.cholesky(joint + noise[:, None, None] * np.eye(n))
+    error = (basis.scores(outputs)[:, :used].T - mean)[:, :, None]
+    return np.linalg.solve(factor, error)[:, :, 0].T
+
+
+def beyond_components(emulator: Emulator, outputs: np.ndarray) -> np.ndarray:
+    """What the components leave of new outputs [n, m]: its length over the expected one [n].
+
+    The remainder is what is expected, and no less than the share of the variance that the
+    components may leave.
+    """
+    basis, remainder = emulator.basis, emulator.remainder
+    squared = np.sum(basis.vectors**2)
+    there = np.sum(remainder.factors**2) + remainder.white * (len(basis.vectors) - basis.used)
+    least = (1.0 - SHARE) * (squared + remainder.total)
+    return np.linalg.norm(basis.residuals(outputs), axis=1) / np.sqrt(max(there, least, ROUNDING))
 
 
 def noise_share(emulator: Emulator) -> float:

@@ -11,7 +11,7 @@ from .base import Discrepancy, Surrogate
 from .discrepancy import evaluate, squared_difference
 from .discrepancy_surrogate import DiscrepancySurrogate, learn, marginalised
 from .emulator import PREDICTED, emulate
-from .foretold import foretold_errors
+from .foretold import foretold
 from .given_noise import GivenNoise, given_noise
 from .likelihood import Threshold, check_rule
 from .output import Output, Summary, describe
@@ -205,8 +205,8 @@ class SignalLearner:
     def finish(self, known: Learnable, rows: int, seed: int) -> Surrogate:
         """The surrogate on which a fit rests."""
         learned = self.learn(known, rows, None)
-        errors = foretold_errors(learned.emulator, self.output.scale, self.family.predicted)
-        return replace(learned, foretold=errors)
+        last = foretold(learned.emulator, self.output.scale, self.family.predicted)
+        return replace(learned, foretold=last)
 
 
 Family = DiscrepancyFamily | SignalFamily

@@ -13,6 +13,7 @@ from .compiled import believe
 from .design import sobol
 from .emulator import Emulator, loo_errors, noise_share, predict, predictive_draws
 from .emulator_checks import EQUAL, OUTSIDE, UNPREDICTED, complaints, noisy, surprised
+from .foretold import Foretold
 from .gaussian import SignalState, log_likelihood, log_second_moment, node_log_densities
 from .given_noise import GivenNoise
 from .noise import (
@@ -43,7 +44,7 @@ class SignalSurrogate:
         nodes: Sizes and correlations of the measurement noise, KEPT of them; one where there is
             none, or it is known.
         reduced: The observed scores at each, with the scores' run-to-run noise.
-        foretold: See `foretold_errors` [n, k]; None while simulations are being chosen.
+        foretold: Errors of the last simulations; None while simulations are being chosen.
     """
 
     emulator: Emulator
@@ -52,7 +53,7 @@ class SignalSurrogate:
     known: GivenNoise | None
     nodes: Nodes
     reduced: Reduced
-    foretold: np.ndarray | None = None
+    foretold: Foretold | None = None
 
     @property
     def gp(self):
@@ -119,9 +120,9 @@ class SignalSurrogate:
     @in_float64
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised errors: leave-one-out ones `loo_z` [n, components in use], and `foretold_z`
-        [n, components], see `foretold_errors`."""
+        [n, components + 1], see `Foretold`."""
         loo = {"loo_z": loo_errors(self.emulator)}
-        return loo if self.foretold is None else {**loo, "foretold_z": self.foretold}
+        return loo if self.foretold is None else {**loo, "foretold_z": self.foretold.errors}
 
     @in_float64
     def warnings(self) -> list[str]:
