@@ -6,7 +6,7 @@ from scipy.stats import binom, chi2, f, norm
 from .foretold import Foretold
 
 FALSE_ALARMS = 1e-3  # of each leave-one-out check, were its errors independent and normal
-SURPRISES = 1e-2  # of fits whose foretold errors are said to be too large by chance
+SURPRISES = 1e-2  # nominal share of good fits that are warned, see `surprised`
 FAR = 3.0  # studentised errors beyond are rare
 TOO_SURE = 1.5  # mean square of the studentised errors that matters
 OUTSIDE = (
@@ -57,8 +57,9 @@ def surprised(foretold: Foretold) -> list[str]:
     All components of a run go wrong together where the emulator does, and its hyperparameters come
     from few runs. So a run counts as one error, their mean square over the components, and the
     mean of q runs is held against Fisher's F of q and the first runs' degrees of freedom. That is
-    no theorem: see the tests for how often it speaks where it should not. What lies beyond the
-    components is judged likewise.
+    no theorem: outputs smooth on the scale of the box hardly ever alarm (tests), those that turn
+    within half of it more often than SURPRISES, for few runs show their length scales. What lies
+    beyond the components is judged likewise. Small failures of the emulator pass unseen.
     """
     seen = np.isfinite(foretold.errors[:, -1])
     if not seen.any():
