@@ -5,12 +5,14 @@ import jax.numpy as jnp
 import numpy as np
 import numpyro.distributions as dist
 import pytest
+from bolfi_liquids.inference import gp
 from bolfi_liquids.inference.compiled import predict as predict_scores
 from bolfi_liquids.inference.design import sobol
 from bolfi_liquids.inference.emulator import emulate, noise_share
 from bolfi_liquids.inference.families import Learnable, SignalFamily
 from bolfi_liquids.inference.gaussian import log_likelihood, log_second_moment
 from bolfi_liquids.inference.gp import predict
+from bolfi_liquids.inference.hyper import NOISE
 from bolfi_liquids.inference.repetition import next_replicate
 from scipy.stats import binom, multivariate_normal
 
@@ -216,6 +218,18 @@ def test_intervals_cover_beside_a_parameter_that_does_nothing():
         below = [np.interp(t[j], AXIS + 0.005, np.cumsum(m[j])) for m, t in found]
         inside = np.sum(np.abs(np.array(below) - 0.5) < 0.45)
         assert inside >= binom.ppf(1e-3, len(found), least)
+
+
+@pytest.mark.parametrize("fades", [True, False])
+def test_what_does_nothing_has_no_trend(monkeypatch, fades):
+    """Prior sd of the change from the middle to the edge of a parameter that is 20 times as long
+    as the box, against the sd of the noise that is expected of a score."""
+    if not fades:
+        monkeypatch.setattr(gp, "RELEVANT", np.inf)
+    hyper = gp.Hyper(jnp.log(jnp.array([0.3, 20.0])), jnp.zeros(()), jnp.zeros(()))
+    prior = gp.covariance(hyper, *2 * [jnp.array([[0.4, 0.5], [0.4, 1.0]])])
+    change = np.sqrt(prior[0, 0] + prior[1, 1] - 2.0 * prior[0, 1])
+    assert (change < np.exp(NOISE[0])) == fades
 
 
 def test_runs_that_no_parameter_predicts_leave_the_prior(design):
