@@ -121,6 +121,12 @@ def _calibrate(
         drawn = pick_draws(sampled["posterior"].to_dataset(), PREDICTIVE_DRAWS, settings.seed)
         check = check_by_simulation(simulate, drawn, fit.best, settings.seed, keep)
     tree = results_tree(sampled, fit, stirring, check)
+    if (now := read_run(run)["settings"]["budget"]) != settings.budget:
+        raise InputError(
+            f"another call has made its budget {now} meanwhile",
+            where=str(run),
+            fix="nothing was written; go on with that budget and --resume",
+        )
     write_tree(tree, run / POSTERIOR)
     write_section(run, "calibrate", calibration_section(tree, fit, stirring, check))
 
@@ -129,9 +135,8 @@ def _left(run: Path, settings: CalibrationSettings, bank: "SimulationBank") -> i
     """Simulations that a run still needs; some of those before it grew were judging, or pours."""
     from .predictive import PREDICTIVE_DRAWS, REPLICATES
 
-    before = read_run(run).get("grown", {"held": 0, "simulations": 0})
-    learned_from = min(before["held"], before["simulations"])
-    needed = settings.budget - learned_from + PREDICTIVE_DRAWS + REPLICATES
+    before = read_run(run).get("grown", [{"learned_from": 0, "simulations": 0}])[-1]
+    needed = settings.budget - before["learned_from"] + PREDICTIVE_DRAWS + REPLICATES
     return needed - (len(bank) - before["simulations"])
 
 

@@ -1,11 +1,7 @@
 """The command line; each command calls the function of the same name."""
 
-import shlex
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -21,6 +17,7 @@ from . import (
 )
 from .cli_errors import OneLineErrors
 from .cli_examples import examples, session
+from .cli_results import complaints_among_results, print_findings, print_next, print_section
 from .cli_rig import RigOption
 from .settings import (
     RISKS,
@@ -30,9 +27,6 @@ from .settings import (
     CriticismSettings,
     PourSettings,
 )
-
-if TYPE_CHECKING:
-    from .criticism import Criticism
 
 RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="Directory of a run.")]
 
@@ -105,7 +99,7 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
     resume: Annotated[
         bool,
         typer.Option(
-            "--resume", help="Go on with the run in RUN; --budget may be larger than its."
+            "--resume", help="Go on with the run in RUN; a larger --budget replaces its results."
         ),
     ] = False,
 ) -> None:
@@ -114,7 +108,7 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
     from .recordings import aborted_recordings, open_recordings
 
     opened = open_recordings(recordings)
-    with _complaints_among_results():
+    with complaints_among_results():
         run_calibrate(
             opened,
             out=out,
@@ -126,10 +120,10 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
             batch=batch,
             resume=resume,
         )
-    _print_section(out, "calibrate")
+    print_section(out, "calibrate")
     for line in aborted_recordings(opened):
         typer.echo(line, err=True)
-    _print_next(out, "criticise", "pour")
+    print_next(out, "criticise", "pour")
 
 
 @app.command(
@@ -187,8 +181,8 @@ def criticise(  # noqa: PLR0913  one parameter for each option
         accept=accept or None,
         seed=seed,
     )
-    _print_criticism(criticism)
-    _print_next(run, "pour")
+    print_findings(criticism)
+    print_next(run, "pour")
 
 
 @app.command(
@@ -236,8 +230,8 @@ def pour(  # noqa: PLR0913  one parameter for each option
 
     chosen_cups = bundled_cups() if cups is None else open_cups(cups)
     choose_pour(latest_calibration(run), chosen_cups, iterations=iterations, risk=risk)
-    _print_section(run, "pour")
-    _print_next(run, "report")
+    print_section(run, "pour")
+    print_next(run, "report")
 
 
 @app.command(epilog=examples("report runs/mine", "report runs/mine --still"))
@@ -267,46 +261,12 @@ def demo(
     from .criticism import Criticism
     from .demo import run_demo
 
-    with _complaints_among_results():
+    with complaints_among_results():
         path = run_demo(out)
-    _print_section(out, "calibrate")
-    _print_criticism(Criticism.open(out))
-    _print_section(out, "pour")
+    print_section(out, "calibrate")
+    print_findings(Criticism.open(out))
+    print_section(out, "pour")
     typer.echo(f"report: {path}")
-
-
-@contextmanager
-def _complaints_among_results() -> Iterator[None]:
-    """What the surrogate's checks complain of is printed with its results, and not before."""
-    from .inference import EmulatorWarning
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", EmulatorWarning)
-        yield
-
-
-def _print_next(run: Path, *commands: str) -> None:
-    """The commands that may follow, to be copied."""
-    typer.echo(
-        "next: " + " or: ".join(f"bolfi-liquids {c} {shlex.quote(str(run))}" for c in commands)
-    )
-
-
-def _print_section(run: Path, name: str) -> None:
-    from rich.console import Console
-
-    from .summary import read_summary
-    from .tables import print_calibration, print_pour
-
-    {"calibrate": print_calibration, "pour": print_pour}[name](read_summary(run)[name], Console())
-
-
-def _print_criticism(criticism: "Criticism") -> None:
-    from rich.console import Console
-
-    from .tables import print_criticism
-
-    print_criticism(criticism.summary, criticism.table, Console())
 
 
 def main() -> None:

@@ -36,8 +36,8 @@ def pour_figure(tree: "DataTree") -> str:
 
 
 def _draw_maps(figure: "SubFigure", panels: NDArray, tree: "DataTree") -> list[Readout]:
-    """What is minimised, with the actions that are not surely worse than the chosen one, and a
-    quantile over the draws."""
+    """The risk on which the first round chose, with the actions that are not surely worse than the
+    chosen one, and a quantile over the draws."""
     actions = tree["actions"].to_dataset()
     x = np.degrees(actions["angular_velocity"].to_numpy())
     y = 100.0 * actions["distance"].to_numpy()

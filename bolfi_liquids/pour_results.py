@@ -31,7 +31,7 @@ def pour_section(
 ) -> dict[str, Any]:
     """Numbers of a pour, in the design's form: degrees and centimetres, fractions of liquid.
 
-    `n_simulations` counts pours of one liquid, in both searches and in judging. Below
+    `n_simulations` counts pours of one liquid, in the searches and in judging. Below
     `least_viscosity` [Pa s] liquids look alike to the simulator in the chosen pour.
     """
     return {

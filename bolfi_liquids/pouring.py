@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .calibration import Calibration
 from .criticism import latest_calibration
 from .cups import bundled_cups
+from .errors import InputError
 from .progress import Advance, progress_bar
 from .run_directory import POUR, open_bank
 from .settings import PourSettings
@@ -110,7 +111,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
 
     Raises:
         InputError: A setting cannot be used.
-        RuntimeError: Pours failed at every angular velocity.
+        RuntimeError: Pours failed at every angular velocity, or at all of the promising ones.
     """
     from .pour_results import pour_section, pour_tree
     from .results import write_tree
@@ -120,7 +121,14 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     settings = PourSettings(iterations=iterations, draws=draws, risk=risk, seed=seed)
     cups = bundled_cups() if cups is None else cups
     # distinct strata: none of the draws that judge has chosen
-    drawn = calibration.draws((2 + JUDGE_DRAWS) * draws, seed)
+    needed = (2 + JUDGE_DRAWS) * draws
+    if needed > (there := next(iter(calibration.posterior.values())).size):
+        raise InputError(
+            f"{draws!r} needs {needed} posterior draws, the run has {there}",
+            where="--draws",
+            fix=f"give {there // (2 + JUDGE_DRAWS)} at most, or calibrate with more draws",
+        )
+    drawn = calibration.draws(needed, seed)
     stratum = np.arange(len(next(iter(drawn.values())))) % (2 + JUDGE_DRAWS)
     search, again, others = (
         {name: values[np.isin(stratum, chosen)] for name, values in drawn.items()}

@@ -20,7 +20,7 @@ RUN_TOML = "run.toml"
 SIMULATIONS = "simulations.sqlite"
 POSTERIOR = "posterior.nc"
 CRITICISM = "criticism.nc"
-CRITICISM_FORMAT = 2  # of what a criticism is kept as; another is made again
+CRITICISM_FORMAT = 3  # of what a criticism is kept as; another is made again
 POUR = "pour.nc"
 FRAMES = "frames.nc"
 REPORT = "report.html"
@@ -44,7 +44,7 @@ def enter_run(run: Path, record: Mapping[str, Any], *, resume: bool, growing: st
         resume: Whether the directory may hold a run, to go on with.
         growing: Field of `record`, if any, that may be larger than in the run that is gone on
             with. All simulations are kept then; what was concluded from fewer is removed.
-            run.toml says in its section `grown` how many simulations there were before.
+            run.toml says in `grown` when, by which versions, and what there was before.
 
     Raises:
         InputError: The directory holds a run and `resume` is false, or the run in it was made
@@ -62,10 +62,12 @@ def enter_run(run: Path, record: Mapping[str, Any], *, resume: bool, growing: st
             )
         held = read_run(run)
         differing = _differences(held, record)
-        if list(differing) == [growing] and _larger(*differing[growing]):
-            _grow(run, record, growing, differing[growing][0])
-        elif differing:
-            raise _refused(differing, run)
+        grows = growing in differing and _larger(*differing[growing])
+        others = {field: both for field, both in differing.items() if field != growing or not grows}
+        if others:
+            raise _refused(others, run)
+        if grows:
+            _grow(run, held, record, differing[growing][0])
         return
     if (run / SIMULATIONS).exists():
         raise InputError(
@@ -137,25 +139,32 @@ def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, tu
 
 def _refused(differing: Mapping[str, tuple[Any, Any]], run: Path) -> InputError:
     field, (held, wanted) = next(iter(differing.items()))
-    return InputError(
-        f"{field} is {held!r} in the run, but {wanted!r} was asked",
-        where=f"{run / RUN_TOML}",
-        fix="resume with the run's own value, or choose another --out",
-    )
+    if field.startswith("engine."):
+        what, fix = f"{field} was {held!r} and is {wanted!r} now", "choose another --out"
+    else:
+        what = f"{field} is {held!r} in the run, but {wanted!r} was asked"
+        fix = "resume with the run's own value, or choose another --out"
+    return InputError(what, where=f"{run / RUN_TOML}", fix=fix)
 
 
 def _larger(held: Any, wanted: Any) -> bool:
     return isinstance(held, int) and isinstance(wanted, int) and wanted > held
 
 
-def _grow(run: Path, record: Mapping[str, Any], field: str, held: int) -> None:
+def _grow(run: Path, held: Mapping[str, Any], record: Mapping[str, Any], size: int) -> None:
+    """Make room for a larger run: `record` in the place of `held`, of which `size` grows."""
+    grown = held.get("grown", [])
     with open_bank(run) as bank:
         simulations = len(bank)
+    before = grown[-1] if grown else {"learned_from": 0, "simulations": 0}
+    learned_from = min(size, before["learned_from"] + simulations - before["simulations"])
+    now = {"size": size, "learned_from": learned_from, "simulations": simulations}
+    made = {key: record[key] for key in ("created", "versions") if key in record}
     # first what was concluded: a call that is killed here leaves an unfinished run
     for name in CONCLUSIONS:
         (run / name).unlink(missing_ok=True)
-    grown = {"grown": {"field": field, "held": held, "simulations": simulations}}
-    write_text(run / RUN_TOML, tomli_w.dumps({**record, **grown}))
+    first = {key: held[key] for key in made if key in held}
+    write_text(run / RUN_TOML, tomli_w.dumps({**record, **first, "grown": [*grown, now | made]}))
 
 
 def _fields(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:

@@ -23,9 +23,9 @@ from .progress import progress_bar
 from .provenance import LIBRARIES, versions
 from .recordings import Recording, open_recordings
 from .run_directory import SIMULATIONS, enter_run
-from .sbc_pipelines import RUNS, Calibrate, CameraNoise, FromBank, Quietly
+from .sbc_pipelines import RUNS, SAMPLING, Calibrate, CameraNoise, FromBank, Quietly
 from .sbc_results import SurrogateCheck, checked, write_results
-from .settings import SURROGATES, SbcSettings
+from .settings import MIN_SIMULATIONS, PAPER_RULES, SURROGATES, SbcSettings
 from .stirring import Stirring, stirring_of
 from .worker_processes import processes
 
@@ -115,7 +115,9 @@ def _record(settings: SbcSettings, prior: "Prior", stirring: Stirring) -> Mappin
     from .inference import ENGINE_VERSION
 
     return {
-        "engine": {"version": ENGINE_VERSION},
+        "engine": {"version": ENGINE_VERSION, "initial": MIN_SIMULATIONS, "runs": RUNS}
+        | PAPER_RULES
+        | SAMPLING,
         "settings": {k: v for k, v in asdict(settings).items() if k not in ("runs", "sequential")}
         | {"prior": describe_prior(prior)},
         "simulator": stirring.settings,

@@ -109,7 +109,7 @@ class PourSettings:
 
     Attributes:
         iterations: Angular velocities that are tried, each with every distance.
-        draws: Posterior draws over which spillage is averaged.
+        draws: Posterior draws over which spillage is averaged, and again among the best actions.
         risk: "mean", or "cvar": the mean over the worst tenth of the draws.
         seed: Of everything random.
     """

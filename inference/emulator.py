@@ -11,7 +11,7 @@ from ._float64 import in_float64
 from .compiled import GROWTH, condition, extend, leave_one_out
 from .compiled import predict as predict_scores
 from .components import Basis, principal_components
-from .gp import GP, Data, Hyper, pad, predict_joint
+from .gp import GP, JITTER, Data, Hyper, pad, predict_joint
 from .hyper import maximum_a_posteriori
 from .noise import Remainder, shrunk_covariance
 from .own_noise import left_over, own_noise
@@ -170,7 +170,7 @@ def innovations(emulator: Emulator, u: np.ndarray, outputs: np.ndarray) -> np.nd
     mean = predict_scores(emulator.gp, u)[0][:used]
     padded = jnp.asarray(np.pad(u, ((0, len(emulator.gp.data.u) - n), (0, 0))))  # one shape
     joint = np.asarray(_joint(emulator.gp, padded, padded))[:used, :n, :n]
-    factor = np.linalg.cholesky(joint + noise[:, None, None] * np.eye(n))
+    factor = np.linalg.cholesky(joint + (noise[:, None, None] + JITTER) * np.eye(n))
     error = (basis.scores(outputs)[:, :used].T - mean)[:, :, None]
     return np.linalg.solve(factor, error)[:, :, 0].T
 

@@ -19,8 +19,9 @@ def pytest_configure(config):
         "punctual: alone, and repeated if it failed on a computer that stood still meanwhile",
     )
     # many processes compile the same functions: half of the time of the engine's tests
-    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(config.cache.mkdir("jax")))
-    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.1")
+    if hasattr(config, "cache"):
+        os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(config.cache.mkdir("jax")))
+        os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.1")
 
 
 def pytest_runtest_protocol(item, nextitem):

@@ -14,9 +14,6 @@ from .figure import Drawn
 from .sticky import TRAINING, Sticky, draw_sticky, poured, recipe, stirred
 from .workshop import Workshop
 
-CONSIDERED = ("adhesion", "shear_thinning", "yield_stress")
-"""What may be missing where liquids are poured."""
-
 _REHEARSAL = 73  # purpose of seeds
 
 CASES = {
@@ -91,9 +88,11 @@ def _spilled(workshop: Workshop, number: int) -> tuple[Sticky, list[float], str]
         resume=True,
         progress=shown,
     )
-    before = choose_pour(calibration, cups, seed=seed, progress=shown)
-    criticism = criticise(calibration, pours=table, effects=CONSIDERED, seed=seed, progress=shown)
-    after = choose_pour(criticism.calibration, cups, seed=seed, progress=shown)
+    tried = {"iterations": workshop.scale.rates, "seed": seed, "progress": shown}
+    before = choose_pour(calibration, cups, **tried)
+    effects = workshop.scale.considered
+    criticism = criticise(calibration, pours=table, effects=effects, seed=seed, progress=shown)
+    after = choose_pour(criticism.calibration, cups, **tried)
     sticks = executions(truth.theta, density, cups, truth.seed)
     flows = executions(truth.liquid, density, cups, truth.seed)
     rehearsed = executions(truth.theta, density, cups, truth.seed, _REHEARSAL)

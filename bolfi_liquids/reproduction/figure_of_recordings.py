@@ -50,7 +50,7 @@ def between(table: "PourTable", rate: float, distance: float) -> tuple[float, fl
 
 
 def _least(run: Path, risk: str) -> dict[str, float]:
-    """The action that another measure of risk would have chosen among those that were tried."""
+    """The action at which another measure of risk is least, over the draws tried everywhere."""
     actions = read_pour(run)["actions"]
     return Surface(*(actions[name].to_numpy() for name in Surface._fields)).least(risk)
 
@@ -75,6 +75,7 @@ def recordings(workshop: Workshop) -> Drawn:
         for column, (budget, surrogate) in enumerate(columns):
             pour = choose_pour(
                 workshop.calibration(liquid, budget, surrogate),
+                iterations=scale.rates,
                 seed=scale.seed,
                 progress=workshop.progress,
             )

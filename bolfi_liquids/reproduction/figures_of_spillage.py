@@ -83,7 +83,7 @@ def _table(study: "Dataset") -> str:
         lines.append(f"  {label}: " + ", ".join(pairs))
     known, unknown = (100.0 * float(study[name].mean()) for name in ("known", "unknown"))
     lines.append(f"  liquid known: {known:.2f}, unknown: {unknown:.2f}")
-    failed = study["spilled"].isnull().any(["rule", "budget"]).sum("truth")
+    failed = study["concluded"].isnull().any(["budget", "draw", "parameter"]).sum("truth")
     for method in failed["learned_by"].to_numpy()[failed.to_numpy() > 0]:
         left_out = int(failed.sel(learned_by=method))
         lines.append(f"  {method}: {left_out} of {study.sizes['truth']} calibrations failed")

@@ -16,6 +16,8 @@ class Scale:
         strokes: Of the star, after which is calibrated.
         few: Simulations with which is calibrated after some strokes.
         sticky: Repetitions of the liquid that sticks to its cup.
+        considered: Effects that may be missing where it is poured.
+        rates: Angular velocities among which pours after a recording are chosen.
         surrogates: That learn from these.
         lips: Heights of the lip that are compared.
         particles: Of every stirred liquid.
@@ -29,6 +31,8 @@ class Scale:
     strokes: tuple[int, ...] = (1, 2, 3, 5, 10)
     few: int = 10
     sticky: int = 5
+    considered: tuple[str, ...] = ("adhesion", "shear_thinning", "yield_stress")
+    rates: int = 15
     surrogates: tuple[str, ...] = ("discrepancy", "signal")
     lips: tuple[float, ...] = (0.10, 0.14, 0.20, 0.26)
     particles: int = 1000
@@ -43,6 +47,8 @@ QUICK = Scale(
     recorded=(10,),
     strokes=(1, 3, 10),
     sticky=1,
+    considered=("adhesion", "yield_stress"),
+    rates=9,
     surrogates=("discrepancy",),
     lips=(0.14, 0.20),
 )

@@ -61,7 +61,8 @@ def draw_sticky(repetition: int, seed: int) -> Sticky:
 
 
 def recipe(cups: "Cups", particles: int, seed: int) -> str:
-    """Short name of all that decides what is stirred and poured, but for the model's version."""
+    """Short name of what decides the drawn liquid and its pours; runs of another model are kept
+    elsewhere."""
     made_by = [LIKE, LIQUIDS[LIKE], SPREAD, ADHESION, TRAINING, NOISE.sd]
     text = json.dumps([*made_by, cups.settings(), particles, seed], sort_keys=True)
     return sha256(text.encode()).hexdigest()[:8]

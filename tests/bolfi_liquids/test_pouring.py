@@ -122,6 +122,8 @@ def test_section_is_of_the_pour(pour, calibration):
     assert section["least_viscosity"] == floor > 0.0
     assert section["plug_in"]["expected_spillage"] == pour.plug_in.expected_spillage
     finalists = xr.load_datatree(pour.path / "pour.nc")["finalists"]
+    rates = finalists["angular_velocity"].to_numpy()
+    assert np.isclose(rates, pour.plug_in.angular_velocity).any()
     assert section["n_simulations"] == 7 * (4 + 4) + 4 * len(finalists["angular_velocity"]) + 2 * 8
     assert bl.Calibration.open(pour.path).summary == calibration.summary  # left as it was
 
@@ -131,6 +133,11 @@ def test_choosing_again_simulates_nothing(pour, calibration):
     again = bl.choose_pour(calibration, iterations=7, draws=4, progress=False)
     assert rows(pour.path) == before
     np.testing.assert_array_equal(again.chosen.fractions, pour.chosen.fractions)
+
+
+def test_more_draws_than_there_are_is_said_in_the_setting_s_terms(calibration):
+    with pytest.raises(ValueError, match=r"--draws: 1001 needs 4004 posterior draws.*give 1000"):
+        bl.choose_pour(calibration, draws=1001, progress=False)
 
 
 @pytest.mark.parametrize(

@@ -93,7 +93,7 @@ def test_another_seed_is_refused_and_changes_nothing(short_recording, calibratio
 
 def test_another_engine_is_refused(short_recording, calibration, settings, monkeypatch):
     monkeypatch.setattr(inference, "ENGINE_VERSION", "0")
-    with pytest.raises(ValueError, match=r"engine\.version is '.' in the run, but '0' was asked"):
+    with pytest.raises(ValueError, match=r"engine\.version was '.' and is '0' now"):
         bl.calibrate(short_recording, out=calibration.path, resume=True, progress=False, **settings)
 
 

@@ -3,16 +3,26 @@
 import copy
 import json
 
+import numpy as np
 import pytest
+from bolfi_liquids.inference.bank import Simulation
 
+from bolfi_liquids import run_directory
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.files import write_whole
-from bolfi_liquids.run_directory import RUN_TOML, SIMULATIONS, enter_run, read_run
+from bolfi_liquids.run_directory import (
+    CONCLUSIONS,
+    RUN_TOML,
+    SIMULATIONS,
+    enter_run,
+    open_bank,
+    read_run,
+)
 from bolfi_liquids.summary import read_summary, write_section
 
 RECORD = {
     "created": "2026-01-01T00:00:00+00:00",
-    "settings": {"seed": 0, "budget": 20, "prior": {"viscosity": "LogUniform(0.001, 20)"}},
+    "settings": {"budget": 20, "seed": 0, "prior": {"viscosity": "LogUniform(0.001, 20)"}},
     "simulator": {"recording_1": {"particles": 1000, "cup": {"radius": 0.04}}},
     "inputs": {"sha256": ["ab"]},
     "versions": {"numpy": "2.0"},
@@ -58,13 +68,47 @@ def test_a_run_grows_in_the_field_that_may_grow(tmp_path):
         enter_run(tmp_path, larger, resume=False, growing="settings.budget")
     assert read_summary(tmp_path)
     enter_run(tmp_path, larger, resume=True, growing="settings.budget")
-    assert read_run(tmp_path)["settings"] == larger["settings"]
+    grown = read_run(tmp_path)
+    assert grown["settings"] == larger["settings"]
+    assert grown["created"] == RECORD["created"]
     assert not read_summary(tmp_path)  # what fewer simulations had taught
 
     other = copy.deepcopy(larger)
     other["settings"] |= {"budget": 40, "seed": 1}
     with pytest.raises(InputError, match=r"settings\.seed"):
         enter_run(tmp_path, other, resume=True, growing="settings.budget")
+
+
+def test_a_run_that_is_killed_while_it_grows_is_an_unfinished_one(tmp_path, monkeypatch):
+    enter_run(tmp_path, RECORD, resume=False)
+    for name in CONCLUSIONS:
+        (tmp_path / name).write_text("{}")
+    larger = copy.deepcopy(RECORD)
+    larger["settings"]["budget"] = 30
+
+    def die(path, text):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(run_directory, "write_text", die)
+        enter_run(tmp_path, larger, resume=True, growing="settings.budget")
+    assert read_run(tmp_path) == RECORD
+    assert not any((tmp_path / name).exists() for name in CONCLUSIONS)
+    enter_run(tmp_path, larger, resume=True, growing="settings.budget")
+    assert read_run(tmp_path)["settings"]["budget"] == 30
+
+
+def test_a_run_that_grows_twice_counts_what_it_had_learned_from(tmp_path):
+    enter_run(tmp_path, RECORD, resume=False)
+    for budget, simulations in ((40, 32), (60, 37)):  # 20 and 12 to judge them; 5 of 20 more
+        larger = copy.deepcopy(RECORD)
+        larger["settings"]["budget"] = budget
+        with open_bank(tmp_path) as bank:
+            for seed in range(len(bank), simulations):
+                bank.put("stir", {}, seed, Simulation(np.zeros(1), None, 1.0))
+        enter_run(tmp_path, larger, resume=True, growing="settings.budget")
+    grown = read_run(tmp_path)["grown"]
+    assert [(one["size"], one["learned_from"]) for one in grown] == [(20, 20), (40, 25)]
 
 
 def test_resuming_ignores_dates_and_versions(tmp_path):

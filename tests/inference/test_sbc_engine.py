@@ -4,8 +4,8 @@ Three simulators with a closed form, chosen for what they ask of the engine: a l
 whose noise is correlated in time, one whose posterior has two modes. The draws are quadrature's,
 so that the posterior is judged and not a sampler, which has tests of its own. 256 ranks find
 draws 30 % too narrow always and 20 % eight times in ten; the standard error of a rate of 0.9 is
-0.019. All of it takes some ten minutes on two cores, so continuous integration takes the tasks
-whose noise is correlated or whose posterior has two modes, and one of them with the discrepancy.
+0.019. All of it takes some ten minutes on two cores, so continuous integration takes some
+of the cases, the harder ones where the engine chooses its simulations.
 """
 
 import importlib

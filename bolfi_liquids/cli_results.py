@@ -1,0 +1,49 @@
+"""What commands print when they are done."""
+
+import shlex
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from .criticism import Criticism
+
+
+@contextmanager
+def complaints_among_results() -> Iterator[None]:
+    """What the surrogate's checks complain of is printed with its results, and not before."""
+    from .inference import EmulatorWarning
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", EmulatorWarning)
+        yield
+
+
+def print_next(run: Path, *commands: str) -> None:
+    """The commands that may follow, to be copied."""
+    typer.echo(
+        "next: " + " or: ".join(f"bolfi-liquids {c} {shlex.quote(str(run))}" for c in commands)
+    )
+
+
+def print_section(run: Path, name: str) -> None:
+    """Section "calibrate" or "pour" of a run's summary."""
+    from rich.console import Console
+
+    from .summary import read_summary
+    from .tables import print_calibration, print_pour
+
+    {"calibrate": print_calibration, "pour": print_pour}[name](read_summary(run)[name], Console())
+
+
+def print_findings(criticism: "Criticism") -> None:
+    """What a criticism found."""
+    from rich.console import Console
+
+    from .tables import print_criticism
+
+    print_criticism(criticism.summary, criticism.table, Console())
