@@ -110,6 +110,7 @@ def test_stronger_cohesion_breaks_a_column_into_larger_drops(run):
     assert 1.5 * sizes[0] < sizes[2] < 0.5 * len(start)
 
 
+@pytest.mark.slow
 def test_cohesion_draws_a_poured_stream_together(cups):
     """What falls from a fast pour is in larger pieces, and in a narrower stream."""
     cohesion, seeds = np.array([0.0, 0.0, 1.0, 1.0]), np.array([0, 1, 0, 1])

@@ -81,6 +81,7 @@ def test_a_neutral_coefficient_leaves_every_bit(stir, name):
     np.testing.assert_array_equal(alone[0], mixed[1])
 
 
+@pytest.mark.slow
 def test_all_effects_together_stay_neutral_where_they_are(stir):
     neutral = {name: effect.neutral for name, effect in models.EFFECTS.items()}
     base = stir()
@@ -89,6 +90,7 @@ def test_all_effects_together_stay_neutral_where_they_are(stir):
     np.testing.assert_array_equal(mixed[1:], base[1:])
 
 
+@pytest.mark.slow
 def test_effects_compose_whatever_the_order_they_are_given_in(stir):
     every = {name: coefficient(name) for name in models.EFFECTS}
     together = stir(every)
@@ -130,6 +132,7 @@ def test_every_effect_explains_itself(effect):
     assert np.isfinite(Univariate(effect.prior).log_prob(np.asarray(effect.neutral)))
 
 
+@pytest.mark.slow
 def test_a_pour_takes_what_a_stir_taught(pour):
     """Effects that do not act in a pour are accepted there, and change nothing."""
     elsewhere = [name for name, effect in models.EFFECTS.items() if "pour" not in effect.scenes]

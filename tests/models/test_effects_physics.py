@@ -140,6 +140,7 @@ def kicked(setup):
     return SimpleNamespace(time=time, position=position)
 
 
+@pytest.mark.slow
 def test_dry_friction_takes_the_same_angle_from_every_swing(setup):
     """I θ'' + k θ = -τ sign(θ') swings about -τ/k and τ/k in turns: 4 τ/k is lost each cycle."""
     stiffness = setup.stick.mass * GRAVITY * setup.stick.length / 2
