@@ -11,6 +11,7 @@ from .calibration import Calibration
 from .cups import bundled_cups
 from .errors import InputError
 from .pour_table import PourTable, open_pours
+from .provenance import generations
 from .recordings import Recording, Source, open_recordings
 from .recordings_kept import kept_recordings
 from .run_directory import CRITICISM_FORMAT
@@ -58,9 +59,6 @@ class Inputs:
     @property
     def made_from(self) -> dict[str, Any]:
         """What a result was made from, as JSON: settings, and the SHA-256 of every file."""
-        from .inference import ENGINE_VERSION
-        from .models import MODEL_VERSION
-
         groups = {
             "recordings": self.stirring.recordings,
             "held_out": self.held_out,
@@ -70,8 +68,7 @@ class Inputs:
         }
         made_from = {
             "version": version("bolfi-liquids"),
-            "engine": ENGINE_VERSION,
-            "model": MODEL_VERSION,
+            **generations(),
             "format": CRITICISM_FORMAT,
             "settings": asdict(self.settings),
             **{

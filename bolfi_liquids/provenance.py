@@ -32,6 +32,14 @@ def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring
     }
 
 
+def generations() -> dict[str, str]:
+    """Of engine and model: what another one made is not to be taken for this one's."""
+    from .inference import ENGINE_VERSION
+    from .models import MODEL_VERSION
+
+    return {"engine": ENGINE_VERSION, "model": MODEL_VERSION}
+
+
 def versions(libraries: Iterable[str]) -> dict[str, str]:
     """Of Python and the named libraries."""
     return {"python": platform.python_version()} | {name: version(name) for name in libraries}

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ..errors import InputError
-from ..provenance import LIBRARIES, versions
+from ..provenance import LIBRARIES, generations, versions
 from ..run_directory import open_bank
 from .figure import Drawn
 from .figure_of_adhesion import adhesion
@@ -64,17 +64,9 @@ def reproduce(
             raise InputError(
                 f"no figure {name!r}", where="reproduce", fix=f"choose all, {', '.join(FIGURES)}"
             )
-    from ..inference import ENGINE_VERSION
-    from ..models import MODEL_VERSION
-
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
-    made_with = {
-        "scale": asdict(scale),
-        "engine": ENGINE_VERSION,
-        "model": MODEL_VERSION,
-        "versions": versions(LIBRARIES),
-    }
+    made_with = {"scale": asdict(scale), **generations(), "versions": versions(LIBRARIES)}
     with open_bank(out) as bank:
         workshop = Workshop(out, scale, bank, progress)
         for name in chosen:

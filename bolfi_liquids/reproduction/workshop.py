@@ -12,6 +12,7 @@ from ..cups import bundled_cups
 from ..pour_grid import PourGrid, make_grid
 from ..prior import default_prior
 from ..progress import progress_bar
+from ..provenance import generations
 from .learners import after_strokes, by_stirring_and_pouring
 from .scale import Scale
 from .study import spillage_study
@@ -63,10 +64,8 @@ class Workshop:
     @property
     def runs(self) -> Path:
         """Where calibrations on recordings are kept; another version's are left alone."""
-        from ..inference import ENGINE_VERSION
-        from ..models import MODEL_VERSION
-
-        return self.out / "runs" / f"engine_{ENGINE_VERSION}_model_{MODEL_VERSION}"
+        made_by = "_".join(f"{part}_{number}" for part, number in generations().items())
+        return self.out / "runs" / made_by
 
     def calibration(self, liquid: str, budget: int, surrogate: str) -> Calibration:
         """Of a bundled recording, in a run of its own; a finished one is opened."""
