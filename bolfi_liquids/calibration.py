@@ -1,7 +1,7 @@
 """What stirring taught: the posterior of a run and what came with it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -12,12 +12,15 @@ from .draws import pick_draws
 from .errors import InputError
 from .prior import read_prior
 from .run_directory import POSTERIOR, read_run
+from .settings import CalibrationSettings
 from .summary import read_summary
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
     from .inference import Prior
+
+OPTIONS = ("budget", "surrogate", "sampler", "seed", "particles", "batch")  # of the command
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +54,8 @@ class Calibration:
             raise InputError(
                 "the calibration in it is not finished",
                 where=str(run),
-                fix="go on with it: bolfi-liquids calibrate RECORDING... --out RUN --resume",
+                fix=f"go on with it: bolfi-liquids calibrate RECORDING... --out {run} --resume"
+                + _given_options(record),
             )
         loaded = read_tree(
             run / POSTERIOR, fix="delete it and go on with --resume: no simulation is lost"
@@ -82,6 +86,13 @@ class Calibration:
     def draws(self, count: int, seed: int = 0) -> dict[str, NDArray]:
         """A stratified sample of the posterior: parameter -> values, shape (count,)."""
         return pick_draws(self.posterior, count, seed)
+
+
+def _given_options(record: Mapping[str, Any]) -> str:
+    """Options of `calibrate` with which a run was started, where they are not the default."""
+    settings, usual = record.get("settings", {}), asdict(CalibrationSettings())
+    given = {name: settings.get(name, usual[name]) for name in OPTIONS}
+    return "".join(f" --{name} {value}" for name, value in given.items() if value != usual[name])
 
 
 def is_calibrated(run: Path) -> bool:

@@ -1,5 +1,6 @@
 """From recordings to a posterior over the simulator's parameters."""
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -53,7 +54,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
             added up.
         out: The RUN directory.
         prior: Over `viscosity` [Pa s] and `cohesion` [1]; None is `default_prior()`.
-        budget: Simulations that the engine may learn from. A dozen more judge the result.
+        budget: Simulations that the engine may learn from. A dozen more judge the result, anew
+            where a run grew.
         seed: Of everything random.
         surrogate: "discrepancy", the paper's, or "signal", which emulates the inclination itself.
         batch: Simulations run at the same time.
@@ -85,7 +87,10 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     stirring = stirring_of(opened, particles)
     run = Path(out)
     record = run_record(settings, prior, stirring)
-    enter_run(run, record, resume=resume, growing="settings.budget")
+    removed = enter_run(run, record, resume=resume, growing="settings.budget")
+    if removed and progress:
+        what = f"removed {', '.join(removed)}, concluded from fewer simulations"
+        print(f"{run}: {what}; every simulation is kept", file=sys.stderr)
     keep_recordings(run, stirring.recordings)
     if not is_calibrated(run):
         _calibrate(run, stirring, prior, settings, progress)

@@ -19,6 +19,7 @@ from .cli_errors import OneLineErrors
 from .cli_examples import examples, session
 from .cli_results import complaints_among_results, print_findings, print_next, print_section
 from .cli_rig import RigOption
+from .run_directory import RUN_TOML
 from .settings import (
     RISKS,
     SAMPLERS,
@@ -108,6 +109,8 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
     from .recordings import aborted_recordings, open_recordings
 
     opened = open_recordings(recordings)
+    if resume and not (out / RUN_TOML).exists():
+        typer.echo(f"{out}: holds no run to resume: this is a new one", err=True)
     with complaints_among_results():
         run_calibrate(
             opened,

@@ -11,7 +11,7 @@ from .calibration import Calibration
 from .criticism import is_criticised
 from .criticism_figures import held_out_plot, pour_residual_plot, residual_plot, stroke_plot
 from .drawing import to_svg
-from .effect_figures import coefficient_plot, confusion_plot, score_plot
+from .effect_figures import any_fitted, coefficient_plot, confusion_plot, score_plot
 from .readouts import lines_of, to_chart
 from .results import read_tree
 from .run_directory import CRITICISM
@@ -125,6 +125,7 @@ def _effects_part(name: str, node: "DataTree") -> dict[str, Any]:
     return {
         "name": name,
         "scores": to_svg(score_plot(node), f"scores-{name}"),
+        "fitted": any_fitted(node),
         "confusion": to_svg(confusion_plot(node), f"confusion-{name}"),
         "rows": [
             _effect_row(str(effect), effects.sel(effect=effect), confusion)

@@ -29,8 +29,19 @@ BINS = 40
 INSIDE = (0.05, 0.95)
 
 
+def any_fitted(node: "DataTree") -> bool:
+    """Whether an effect was fitted, so that there is a gain to show.
+
+    Args:
+        node: The group `stirs` or `pours`.
+    """
+    return bool(np.isfinite(node["effects/gain"]).any())
+
+
 def score_plot(node: "DataTree") -> "Figure":
     """What each effect alone gains when it is fitted (left), and its score before (right).
+
+    Where no effect was fitted, there is no left side.
 
     Args:
         node: The group `stirs` or `pours`.
@@ -41,10 +52,14 @@ def score_plot(node: "DataTree") -> "Figure":
     order = np.lexsort((-np.nan_to_num(score), -np.nan_to_num(gain, nan=-np.inf)))
     names = [words(str(name)) for name in effects["effect"].to_numpy()[order]]
     states = [str(status) for status in effects["status"].to_numpy()[order]]
+    ratios = (3, 2) if any_fitted(node) else (1,)
     with styled():
         figure = new_figure(8.6, 0.26 * len(names) + 1.2)
-        left, right = figure.subplots(1, 2, sharey=True, gridspec_kw={"width_ratios": (3, 2)})
-        _draw_gains(left, gain[order], states)
+        grid = figure.subplots(1, len(ratios), sharey=True, squeeze=False, width_ratios=ratios)
+        left, right = grid[0, 0], grid[0, -1]
+        if left is not right:
+            _draw_gains(left, gain[order], states)
+            figure.legend(loc="outside upper center", ncols=len(STATUSES))
         right.axvspan(0.0, USUAL, color=LIGHT, linewidth=0, zorder=0)
         counts = effects["score"].to_numpy() * effects["side"].to_numpy() >= 0.0
         for at, status in enumerate(states):
@@ -56,7 +71,6 @@ def score_plot(node: "DataTree") -> "Figure":
         right.set_xlabel("size of the score [sd]")
         left.set_yticks(range(len(names)), names)
         left.set_ylim(len(names) - 0.4, -0.6)
-        figure.legend(loc="outside upper center", ncols=len(STATUSES))
     return figure
 
 

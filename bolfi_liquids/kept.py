@@ -47,10 +47,7 @@ def simulate_kept(
         Job({name: float(values[at]) for name, values in theta.items()}, seed)
         for at, seed in enumerate(seeds)
     ]
-    results = []
-    for start in range(0, len(jobs), keep.batch):
-        part = jobs[start : start + keep.batch]
-        results += run_missing(simulate, part, None, keep.bank, keep.identity, None)
+    results = run_missing(simulate, jobs, None, keep.bank, keep.identity, batch=keep.batch)
     good = {
         at: r.signal
         for at, r in enumerate(results)

@@ -55,8 +55,8 @@ def fit_sentence(section: Mapping[str, Any]) -> str:
     verdict = (
         "it follows as closely as can be expected"
         if fit <= AS_GOOD_AS_NOISE * noise
-        else "the rest is what the simulator's model of liquid, stick or cameras lacks, or what"
-        " more simulations would find"
+        else "either more simulations would find a closer one, or the simulator's model of liquid,"
+        " stick or cameras lacks something"
     )
     return (
         f"The closest of {section['n_simulations']} simulated hypotheses differs from the"
@@ -98,10 +98,10 @@ def floor_sentence(section: Mapping[str, Any]) -> str:
 
 def pour_sentence(section: Mapping[str, Any]) -> str:
     """What to do, and what it is expected to spill."""
+    velocity, distance = _action(section)
     return (
-        f"Turn the source at {section['angular_velocity_deg_s']:.0f}°/s with its lip"
-        f" {section['distance_cm']:.1f} cm from the receiver's axis: expected to spill"
-        f" {percent(section['expected_spillage'])}, in 19 of 20 cases less than"
+        f"Turn the source at {velocity} with its lip {distance} from the receiver's axis: expected"
+        f" to spill {percent(section['expected_spillage'])}, in 19 of 20 cases less than"
         f" {percent(section['spillage_q95'])}."
     )
 
@@ -109,9 +109,19 @@ def pour_sentence(section: Mapping[str, Any]) -> str:
 def sure_sentence(section: Mapping[str, Any]) -> str:
     """What the best action at theta* alone would do instead."""
     plug_in = section["plug_in"]
+    judged = (
+        "That is over liquids and landings that had no part in the choice. The best action at θ*"
+    )
+    if all(plug_in[key] == section[key] for key in ("angular_velocity_deg_s", "distance_cm")):
+        return f"{judged} alone is the same."
     return (
-        "That is over liquids and landings by which it was not chosen. The best action at θ* alone"
-        f" ({plug_in['angular_velocity_deg_s']:.0f}°/s, {plug_in['distance_cm']:.1f} cm) would"
+        f"{judged} alone ({', '.join(_action(plug_in))}) would"
         f" spill {percent(plug_in['expected_spillage'])} of the same liquids, in 19 of 20 cases"
         f" less than {percent(plug_in['spillage_q95'])}."
     )
+
+
+def _action(section: Mapping[str, Any]) -> tuple[str, str]:
+    """Angular velocity and distance, as they are told."""
+    velocity, distance = section["angular_velocity_deg_s"], section["distance_cm"]
+    return f"{velocity:.0f}°/s", f"{distance:.1f} cm"

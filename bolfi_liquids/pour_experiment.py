@@ -38,30 +38,40 @@ class Pouring:
     density: float
 
     def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
-        """Spilled and retained fractions (B, 2, A) of liquids (B,), each pouring all actions."""
+        """Spilled and retained fractions (B, 2, A) of liquids (B,), each pouring all actions.
+
+        Each angular velocity of a run is poured once, with a packing of its own, which all of its
+        distances share: they differ by the receiver alone.
+        """
         from . import models
 
-        pours, runs = len(self.distance), len(seeds)
+        rates, at = np.unique(self.angular_velocity, return_inverse=True)
+        runs = len(seeds)
         liquid, effects = split_parameters(
-            {name: np.repeat(values, pours) for name, values in theta.items()}
+            {name: np.repeat(values, len(rates)) for name, values in theta.items()}
         )
-        # each pour of a run has a packing of its own
-        own = np.add.outer(np.asarray(seeds) * 1009 % 2**31, np.arange(pours)) % 2**31
-        result = models.pour(
+        own = np.add.outer(np.asarray(seeds) * 1009 % 2**31, np.arange(len(rates))) % 2**31
+        landed = models.landings(
             models.Liquid(**liquid, density=self.density),
-            models.PourAction(np.tile(self.angular_velocity, runs), np.tile(self.distance, runs)),
+            np.tile(rates, runs),
             self.cups,
             own.ravel(),
             effects=effects,
         )
+        rows = np.add.outer(len(rates) * np.arange(runs), at).ravel()
+        result = models.Landings(landed.position[rows], landed.retained[rows]).into(
+            np.tile(self.distance, runs), self.cups.receiver.radius
+        )
         outcomes = [np.asarray(getattr(result, name), np.float64) for name in OUTCOMES]
-        return np.stack([outcome.reshape(runs, pours) for outcome in outcomes], axis=1)
+        return np.stack([outcome.reshape(runs, -1) for outcome in outcomes], axis=1)
 
     @property
     def identity(self) -> str:
         """A text that two equal experiments share."""
         actions = [self.angular_velocity.tolist(), self.distance.tolist()]
-        return json.dumps(["pours", self.cups.settings(), self.density, actions], sort_keys=True)
+        return json.dumps(
+            ["landed pours", self.cups.settings(), self.density, actions], sort_keys=True
+        )
 
 
 def pour_experiment(table: PourTable, cups: "Cups", density: float) -> "Experiment":

@@ -125,7 +125,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     if needed > (there := next(iter(calibration.posterior.values())).size):
         raise InputError(
             f"{draws!r} needs {needed} posterior draws, the run has {there}",
-            where="--draws",
+            where="draws",
             fix=f"give {there // (2 + JUDGE_DRAWS)} at most, or calibrate with more draws",
         )
     drawn = calibration.draws(needed, seed)

@@ -32,7 +32,9 @@ CONCLUSIONS = (POSTERIOR, CRITICISM, POUR, FRAMES, REPORT, SUMMARY)
 """What follows from the simulations, in the order in which it goes when these become more."""
 
 
-def enter_run(run: Path, record: Mapping[str, Any], *, resume: bool, growing: str = "") -> None:
+def enter_run(
+    run: Path, record: Mapping[str, Any], *, resume: bool, growing: str = ""
+) -> list[str]:
     """Start a run, or go on with one of the same settings.
 
     `record` is written to run.toml before anything else, so that whatever is found later in
@@ -45,6 +47,9 @@ def enter_run(run: Path, record: Mapping[str, Any], *, resume: bool, growing: st
         growing: Field of `record`, if any, that may be larger than in the run that is gone on
             with. All simulations are kept then; what was concluded from fewer is removed.
             run.toml says in `grown` when, by which versions, and what there was before.
+
+    Returns:
+        Names of the conclusions that were removed.
 
     Raises:
         InputError: The directory holds a run and `resume` is false, or the run in it was made
@@ -65,10 +70,8 @@ def enter_run(run: Path, record: Mapping[str, Any], *, resume: bool, growing: st
         grows = growing in differing and _larger(*differing[growing])
         others = {field: both for field, both in differing.items() if field != growing or not grows}
         if others:
-            raise _refused(others, run)
-        if grows:
-            _grow(run, held, record, differing[growing][0])
-        return
+            raise _refused(others, run, growing)
+        return _grow(run, held, record, differing[growing][0]) if grows else []
     if (run / SIMULATIONS).exists():
         raise InputError(
             f"holds {SIMULATIONS} without {RUN_TOML}",
@@ -77,6 +80,7 @@ def enter_run(run: Path, record: Mapping[str, Any], *, resume: bool, growing: st
         )
     run.mkdir(parents=True, exist_ok=True)
     write_text(path, tomli_w.dumps(record))
+    return []
 
 
 @contextmanager
@@ -137,13 +141,14 @@ def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, tu
     return {field: values for field, values in both.items() if values[0] != values[1]}
 
 
-def _refused(differing: Mapping[str, tuple[Any, Any]], run: Path) -> InputError:
+def _refused(differing: Mapping[str, tuple[Any, Any]], run: Path, growing: str) -> InputError:
     field, (held, wanted) = next(iter(differing.items()))
     if field.startswith("engine."):
         what, fix = f"{field} was {held!r} and is {wanted!r} now", "choose another --out"
     else:
         what = f"{field} is {held!r} in the run, but {wanted!r} was asked"
-        fix = "resume with the run's own value, or choose another --out"
+        own = "the run's own value" + (" or a larger one" if field == growing else "")
+        fix = f"resume with {own}, or choose another --out"
     return InputError(what, where=f"{run / RUN_TOML}", fix=fix)
 
 
@@ -151,7 +156,7 @@ def _larger(held: Any, wanted: Any) -> bool:
     return isinstance(held, int) and isinstance(wanted, int) and wanted > held
 
 
-def _grow(run: Path, held: Mapping[str, Any], record: Mapping[str, Any], size: int) -> None:
+def _grow(run: Path, held: Mapping[str, Any], record: Mapping[str, Any], size: int) -> list[str]:
     """Make room for a larger run: `record` in the place of `held`, of which `size` grows."""
     grown = held.get("grown", [])
     with open_bank(run) as bank:
@@ -161,10 +166,12 @@ def _grow(run: Path, held: Mapping[str, Any], record: Mapping[str, Any], size: i
     now = {"size": size, "learned_from": learned_from, "simulations": simulations}
     made = {key: record[key] for key in ("created", "versions") if key in record}
     # first what was concluded: a call that is killed here leaves an unfinished run
-    for name in CONCLUSIONS:
+    removed = [name for name in CONCLUSIONS if (run / name).exists()]
+    for name in removed:
         (run / name).unlink(missing_ok=True)
     first = {key: held[key] for key in made if key in held}
     write_text(run / RUN_TOML, tomli_w.dumps({**record, **first, "grown": [*grown, now | made]}))
+    return removed
 
 
 def _fields(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:

@@ -147,15 +147,20 @@ def stirs_everywhere(  # noqa: PLR0913  what makes simulations
         Job({name: float(values[at // RUNS]) for name, values in theta.items()}, seed)
         for at, seed in enumerate(seeds)
     ]
-    made = []
     with (
         SimulationBank(path) as bank,
         progress_bar("simulating stirs for all", count, shown=progress) as advance,
     ):
-        for start in range(0, count, AT_ONCE):
-            part = jobs[start : start + AT_ONCE]
-            made += run_missing(stirring.simulate, part, None, bank, stirring.identity, pool)
-            advance(len(part))
+        made = run_missing(
+            stirring.simulate,
+            jobs,
+            None,
+            bank,
+            stirring.identity,
+            pool,
+            batch=AT_ONCE,
+            advance=advance,
+        )
     nothing = np.full(stirring.observed.shape, np.nan)
     signals = np.stack([nothing if one.signal is None else one.signal for one in made])
     return prior.to_array(theta), signals.reshape(settings.design, RUNS, *nothing.shape)

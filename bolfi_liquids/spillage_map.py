@@ -160,12 +160,8 @@ def make_pours(
 
     identity = json.dumps(["spillage map", cups.settings(), density], sort_keys=True)
     missing = sum(bank.get(identity, *job) is None for job in jobs)
-    results = []
     with progress_bar("pours for the map", pours, shown=progress and missing > 0) as advance:
-        for start in range(0, pours, AT_ONCE):
-            part = jobs[start : start + AT_ONCE]
-            results += run_missing(simulate, part, (1,), bank, identity)
-            advance(len(part))
+        results = run_missing(simulate, jobs, (1,), bank, identity, batch=AT_ONCE, advance=advance)
     theta = {name: np.array([job.theta[name] for job in jobs]) for name in jobs[0].theta}
     return theta, np.array([np.nan if r.signal is None else r.signal[0] for r in results])
 

@@ -1,6 +1,6 @@
 """Simulating what the bank lacks: a batch in one call, or one by one on an executor."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, wait
 from functools import partial
 from pickle import PicklingError
@@ -223,13 +223,28 @@ def is_final(found: Simulation, timeout: float | None) -> bool:
 
 def run_missing(  # noqa: PLR0913  the runner's arguments and the call's
     simulate: "Simulator",
-    batch: Sequence[Job],
+    jobs: Sequence[Job],
     shape: Shape,
     bank: SimulationBank,
     identity: str,
     executor: Executor | None = None,
     timeout: float | None = None,
+    *,
+    batch: int | None = None,
+    advance: Callable[[int], object] = lambda count: None,
 ) -> list[Simulation]:
-    """Results of all jobs, in order; those that the bank lacks are simulated, see `Runner`."""
+    """Results of all jobs, in order; those that the bank lacks are simulated, see `Runner`.
+
+    Args:
+        batch: Jobs that are simulated in one call, and kept together, where there is no executor;
+            None is all of them.
+        advance: Called with 1 for each result, in order; those of a batch come together.
+    """
+    at_once = len(jobs) if batch is None or executor is not None else batch
+    results = []
     with Runner(simulate, bank, identity, executor, timeout) as runner:
-        return runner.run(batch, shape)
+        for start in range(0, len(jobs), max(at_once, 1)):
+            for outcome in runner.start(jobs[start : start + at_once], shape):
+                results.append(runner.result(outcome))
+                advance(1)
+    return results

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..prior import default_prior
 from ..progress import progress_bar
-from ..worker_processes import processes, processors
+from ..worker_processes import processes
 from .calibrations import Learner
 from .decisions import RULES, Action, decide, decide_unknowing, execute
 from .truths import Truths, draw_truths
@@ -84,12 +84,17 @@ def conclusions(
         Job({key: float(values[at]) for key, values in truths.theta.items()}, int(seed))
         for at, seed in enumerate(truths.seed)
     ]
-    found, at_once = [], 2 * processors()
     with progress_bar(f"calibrating ({name})", len(jobs), shown=progress) as advance:
-        for start in range(0, len(jobs), at_once):
-            part = jobs[start : start + at_once]
-            found += run_missing(learner.simulate, part, None, tasks.bank, learner.identity, pool)
-            advance(len(part))
+        found = run_missing(
+            learner.simulate,
+            jobs,
+            None,
+            tasks.bank,
+            learner.identity,
+            pool,
+            batch=1,
+            advance=advance,
+        )
     return [result.signal for result in found]
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -76,24 +77,29 @@ class Laboratory:
             Job({name: float(column[i]) for name, column in theta.items()}, int(seed))
             for i, seed in enumerate(seeds)
         ]
-        keeping, results = self.keeping, []
-        for start in range(0, len(jobs), keeping.batch):
-            part = jobs[start : start + keeping.batch]
-            results += run_missing(self.simulate, part, None, keeping.bank, self.identity, None)
-            keeping.report(phase, len(part))
-        good = [
-            i
+        keeping = self.keeping
+        results = run_missing(
+            self.simulate,
+            jobs,
+            None,
+            keeping.bank,
+            self.identity,
+            batch=keeping.batch,
+            advance=partial(keeping.report, phase),
+        )
+        good = {
+            i: result.signal
             for i, result in enumerate(results)
             if result.signal is not None and np.isfinite(result.signal).all()
-        ]
+        }
         if not good:
             raise RuntimeError(
                 f"all {len(jobs)} simulations of the phase {phase!r} failed, the first at "
                 f"{jobs[0].theta}: {results[0].error or 'its output is not finite'}"
             )
-        signals = np.stack([results[i].signal for i in good])
-        kept = {name: np.asarray(column, float)[good] for name, column in theta.items()}
-        return self.table(kept, signals, seeds[good])
+        rows = list(good)
+        kept = {name: np.asarray(column, float)[rows] for name, column in theta.items()}
+        return self.table(kept, np.stack(list(good.values())), seeds[rows])
 
     def table(
         self, theta: Mapping[str, np.ndarray], signals: np.ndarray, seeds: np.ndarray

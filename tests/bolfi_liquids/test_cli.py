@@ -142,6 +142,18 @@ def test_bad_cups_are_refused_in_one_line(calibration, tmp_path, old, new, named
     assert named in line
 
 
+def test_resuming_where_no_run_is_says_so(monkeypatch, short_recording, tmp_path):
+    def stop(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bolfi_liquids.calibrator.calibrate", stop)
+    mistyped = str(tmp_path / "mien")
+    command = ["calibrate", str(short_recording), "--out", mistyped]
+    said = CliRunner().invoke(app, [*command, "--resume"]).stderr
+    assert said.startswith(f"{mistyped}: holds no run to resume: this is a new one")
+    assert "no run to resume" not in CliRunner().invoke(app, command).stderr
+
+
 def test_interruption_says_how_to_go_on(monkeypatch, tmp_path):
     def interrupt(*_, **__):
         raise KeyboardInterrupt

@@ -136,7 +136,7 @@ def test_choosing_again_simulates_nothing(pour, calibration):
 
 
 def test_more_draws_than_there_are_is_said_in_the_setting_s_terms(calibration):
-    with pytest.raises(ValueError, match=r"--draws: 1001 needs 4004 posterior draws.*give 1000"):
+    with pytest.raises(ValueError, match=r"^draws: 1001 needs 4004 posterior draws.*give 1000"):
         bl.choose_pour(calibration, draws=1001, progress=False)
 
 

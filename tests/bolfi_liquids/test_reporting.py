@@ -7,7 +7,7 @@ from html.parser import HTMLParser
 import pytest
 
 import bolfi_liquids as bl
-from bolfi_liquids.narrative import fit_sentence, parameter_sentence
+from bolfi_liquids.narrative import fit_sentence, parameter_sentence, sure_sentence
 from bolfi_liquids.results import write_tree
 from bolfi_liquids.run_directory import CRITICISM
 from bolfi_liquids.summary import write_section
@@ -107,6 +107,18 @@ def test_sentence_tells_learned_from_not_learned(rng, high, verdict):
 def test_sentence_measures_the_fit_by_the_noise(fit, verdict):
     section = {"fit_rms_deg": fit, "noise_deg": 0.3, "n_simulations": 20}
     assert verdict in fit_sentence(section)
+
+
+def test_sentence_repeats_no_action():
+    chosen = {
+        "angular_velocity_deg_s": 30.0,
+        "distance_cm": 1.234,
+        "expected_spillage": 0.006,
+        "spillage_q95": 0.01,
+    }
+    assert sure_sentence(chosen | {"plug_in": chosen}).endswith("θ* alone is the same.")
+    other = chosen | {"distance_cm": 1.236, "expected_spillage": 0.02}
+    assert "(30°/s, 1.2 cm) would spill 2 %" in sure_sentence(chosen | {"plug_in": other})
 
 
 @pytest.fixture

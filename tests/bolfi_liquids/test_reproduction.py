@@ -1,5 +1,6 @@
 """What the figures' numbers are made of."""
 
+from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,6 +16,8 @@ from bolfi_liquids.reproduction.figures_of_spillage import interval
 from bolfi_liquids.reproduction.learners import by_stirring_and_pouring
 from bolfi_liquids.reproduction.reproduce import reproduce
 from bolfi_liquids.reproduction.scale import FULL
+from bolfi_liquids.reproduction.study import Tasks, conclusions
+from bolfi_liquids.reproduction.truths import draw_truths
 from bolfi_liquids.reproduction.workshop import Workshop
 
 
@@ -76,6 +79,31 @@ def test_what_another_version_made_is_left_alone(tmp_path, monkeypatch, part):
     monkeypatch.setattr(part, name, "another", raising=False)
     assert workshop.runs != now[0]
     assert part is models or learner.identity != now[1]
+
+
+class Failing:
+    """Concludes what the liquid's viscosity is, but for one seed."""
+
+    identity = "stub"
+
+    def __init__(self, seed):
+        self.seed = seed
+
+    def simulate(self, theta, seeds):
+        if self.seed in seeds:
+            raise RuntimeError("no fit")
+        return theta["viscosity"][:, None]
+
+
+@pytest.mark.parametrize("pooled", [False, True])
+def test_conclusions_are_those_of_the_truths_and_a_failed_one_is_none(pooled):
+    truths = draw_truths(1, seed=0)
+    with inference.SimulationBank() as bank, ThreadPoolExecutor(2) as pool:
+        tasks, learner = Tasks(truths, None, bank), Failing(truths.seed[2])
+        found = conclusions(learner, "stub", tasks, pool if pooled else None, progress=False)
+    assert found[2] is None
+    for at in (0, 1, 3, 4):
+        assert found[at] == truths.viscosity[at]
 
 
 def test_an_unknown_figure_is_named(tmp_path):

@@ -108,7 +108,9 @@ def test_a_larger_budget_goes_on_from_a_smaller_one(
     again = bl.calibrate(short_recording, out=grown, resume=True, **larger)
     after = finished(grown)
     assert {key: after[key] for key in before} == before  # none was simulated again
-    assert f"simulating stirs: {len(after) - len(before)} to run" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert f"simulating stirs: {len(after) - len(before)} to run" in told
+    assert "removed posterior.nc, pour.nc, summary.json, concluded from fewer simulations" in told
     assert not (grown / "pour.nc").exists()
 
     whole = bl.calibrate(short_recording, out=tmp_path / "whole", progress=False, **larger)

@@ -67,7 +67,8 @@ def test_a_run_grows_in_the_field_that_may_grow(tmp_path):
     with pytest.raises(InputError, match="holds a run already"):
         enter_run(tmp_path, larger, resume=False, growing="settings.budget")
     assert read_summary(tmp_path)
-    enter_run(tmp_path, larger, resume=True, growing="settings.budget")
+    removed = enter_run(tmp_path, larger, resume=True, growing="settings.budget")
+    assert removed == ["summary.json"]
     grown = read_run(tmp_path)
     assert grown["settings"] == larger["settings"]
     assert grown["created"] == RECORD["created"]
@@ -75,8 +76,10 @@ def test_a_run_grows_in_the_field_that_may_grow(tmp_path):
 
     other = copy.deepcopy(larger)
     other["settings"] |= {"budget": 40, "seed": 1}
-    with pytest.raises(InputError, match=r"settings\.seed"):
+    with pytest.raises(InputError, match=r"settings\.seed.*own value, or choose"):
         enter_run(tmp_path, other, resume=True, growing="settings.budget")
+    with pytest.raises(InputError, match=r"settings\.budget is 30.*own value or a larger one"):
+        enter_run(tmp_path, RECORD, resume=True, growing="settings.budget")
 
 
 def test_a_run_that_is_killed_while_it_grows_is_an_unfinished_one(tmp_path, monkeypatch):
@@ -114,7 +117,7 @@ def test_a_run_that_grows_twice_counts_what_it_had_learned_from(tmp_path):
 def test_resuming_ignores_dates_and_versions(tmp_path):
     enter_run(tmp_path, RECORD, resume=False)
     later = RECORD | {"created": "2027-01-01T00:00:00+00:00", "versions": {"numpy": "3.0"}}
-    enter_run(tmp_path, later, resume=True)
+    assert not enter_run(tmp_path, later, resume=True)
     assert read_run(tmp_path) == RECORD
 
 

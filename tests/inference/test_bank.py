@@ -2,6 +2,7 @@ import re
 import sqlite3
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -209,6 +210,45 @@ def test_two_processes_never_simulate_the_same_at_the_same_time(tmp_path):
     ]
     assert [run.wait(60.0) for run in runs] == [0, 0, 0, 0]
     assert sorted(int(seed) for seed in log.read_text().split()) == list(range(40))
+
+
+@pytest.mark.parametrize(("batch", "calls"), [(None, [7]), (3, [3, 3, 1])])
+def test_results_come_in_order_and_batches_are_kept_as_they_finish(batch, calls):
+    made, kept = [], []
+    jobs = [inference.Job({"a": 1.0}, seed) for seed in (5, 3, 9, 1, 7, 2, 8)]
+
+    def simulate(theta, seeds):
+        made.append(len(seeds))
+        return seeds[:, None] + 0.5
+
+    def interrupted(count):
+        kept.append(len(bank))
+        if len(kept) == 4:
+            raise KeyboardInterrupt
+
+    with inference.SimulationBank() as bank:
+        with pytest.raises(KeyboardInterrupt):
+            inference.run_missing(simulate, jobs, (1,), bank, "", batch=batch, advance=interrupted)
+        assert kept == ([7] * 4 if batch is None else [3, 3, 3, 6])
+        found = inference.run_missing(simulate, jobs, (1,), bank, "", batch=batch)
+        assert made == calls  # nothing twice
+        assert [one.signal[0] for one in found] == [job.seed + 0.5 for job in jobs]
+
+
+def test_an_executor_takes_jobs_one_by_one_whatever_the_batch():
+    made, finished = [], []
+
+    def simulate(theta, seeds):
+        made.append(len(seeds))
+        return seeds[:, None] + 0.5
+
+    jobs = [inference.Job({"a": 1.0}, seed) for seed in range(6)]
+    with inference.SimulationBank() as bank, ThreadPoolExecutor(2) as pool:
+        found = inference.run_missing(
+            simulate, jobs, (1,), bank, "", pool, batch=4, advance=finished.append
+        )
+    assert [one.signal[0] for one in found] == [job.seed + 0.5 for job in jobs]
+    assert made == finished == [1] * 6
 
 
 def test_what_was_finished_just_before_the_claim_is_not_simulated():

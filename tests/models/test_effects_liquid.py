@@ -148,6 +148,7 @@ def test_adhesion_keeps_liquid_in_the_cup(cups):
     assert sticky > 0.1
 
 
+@pytest.mark.slow
 def test_adhesion_does_not_heat(cups):
     """A liquid at rest stays so: below 1.3 cm/s, where it has 0.5 without adhesion."""
     from bolfi_liquids.models.packing import pack_cylinder

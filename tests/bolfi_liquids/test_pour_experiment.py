@@ -1,0 +1,25 @@
+"""Pours as a simulator that can be criticised."""
+
+import numpy as np
+
+from bolfi_liquids import models
+from bolfi_liquids.cups import bundled_cups
+from bolfi_liquids.pour_experiment import Pouring
+
+RATE = np.radians([80.0, 40.0, 80.0, 110.0, 40.0])  # neither sorted nor once each
+DISTANCE = np.array([0.01, 0.03, 0.04, 0.02, -0.01])
+DENSITY = 1000.0
+
+
+def test_each_pour_spills_what_it_spills_alone():
+    cups, seeds = bundled_cups(), np.array([3, 5])
+    theta = {"viscosity": np.array([0.01, 1.0]), "cohesion": np.array([0.2, 0.7])}
+    signals = Pouring(RATE, DISTANCE, cups, DENSITY).simulate(theta, seeds)
+    rates = np.unique(RATE)
+    for run, seed in enumerate(seeds):
+        one = {name: values[run] for name, values in theta.items()}
+        own = (seed * 1009 + np.searchsorted(rates, RATE)) % 2**31
+        alone = models.pour(
+            models.Liquid(**one, density=DENSITY), models.PourAction(RATE, DISTANCE), cups, own
+        )
+        np.testing.assert_array_equal(signals[run], [alone.spilled, alone.retained])
