@@ -1,6 +1,7 @@
 """A run that is killed and resumed is the run that was not."""
 
 import os
+import re
 import shutil
 import signal
 import sqlite3
@@ -110,7 +111,8 @@ def test_a_larger_budget_goes_on_from_a_smaller_one(
     assert {key: after[key] for key in before} == before  # none was simulated again
     told = capsys.readouterr().err
     assert f"simulating stirs: {len(after) - len(before)} to run" in told
-    assert "removed posterior.nc, pour.nc, summary.json, concluded from fewer simulations" in told
+    removed = re.search("removed (.*), concluded from fewer simulations", told)[1].split(", ")
+    assert {"posterior.nc", "pour.nc", "summary.json"} <= set(removed)  # and a report, if any was
     assert not (grown / "pour.nc").exists()
 
     whole = bl.calibrate(short_recording, out=tmp_path / "whole", progress=False, **larger)
