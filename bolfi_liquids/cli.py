@@ -19,6 +19,7 @@ from .cli_errors import OneLineErrors
 from .cli_examples import examples, session
 from .cli_results import complaints_among_results, print_findings, print_next, print_section
 from .cli_rig import RigOption
+from .compilations import keep_compilations
 from .run_directory import RUN_TOML
 from .settings import (
     RISKS,
@@ -68,6 +69,7 @@ def _global_options(
     ] = False,
 ) -> None:
     """`--debug` is read by `OneLineErrors`."""
+    keep_compilations()
 
 
 @app.command(

@@ -3,18 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrator import calibrate
-from ..criticiser import criticise
-from ..cups import bundled_cups
 from ..drawing import BLUE, GREY, ORANGE, PALETTE, new_figure, styled
-from ..pouring import Pour, choose_pour
-from ..spillage import Outcomes, pour_all, surface
-from .decisions import Action, executions, spilled_by
 from .figure import Drawn
-from .sticky import TRAINING, Sticky, draw_sticky, poured, recipe, stirred
+from .sticky import TRAINING
 from .workshop import Workshop
-
-_REHEARSAL = 73  # purpose of seeds
 
 CASES = {
     "believed": ("the same pour if it did not stick", GREY),
@@ -28,11 +20,10 @@ def adhesion(workshop: Workshop) -> Drawn:
     """Spilled by liquids like glycerin that stick to their cup."""
     from xarray import Dataset
 
-    numbers = range(workshop.scale.sticky)
-    found = [_spilled(workshop, number) for number in numbers]
-    truths = [truth for truth, _, _ in found]
-    spilled = np.array([values for _, values, _ in found])
-    named = [names for _, _, names in found]
+    found = workshop.sticky()
+    truths = [one.truth for one in found]
+    spilled = np.array([one.spilled for one in found])
+    named = [one.named for one in found]
     with styled():
         figure = new_figure(6.4, 3.8)
         axes = figure.subplots()
@@ -69,51 +60,3 @@ def _says(means: NDArray, named: list[str]) -> str:
         f"({believed:.1f} % if it did not stick), {after:.1f} % by the one chosen after criticism, "
         f"{known:.1f} % with all known: {won}adhesion named alone in {right} of {len(named)}"
     )
-
-
-def _spilled(workshop: Workshop, number: int) -> tuple[Sticky, list[float], str]:
-    """A truth, what it spilled in each of `CASES`, and the effects that were named."""
-    cups, seed, shown = bundled_cups(), workshop.scale.seed, workshop.progress
-    truth = draw_sticky(number, seed)
-    folder = workshop.runs / f"sticky_{number}_{recipe(cups, workshop.scale.particles, seed)}"
-    folder.mkdir(parents=True, exist_ok=True)
-    recording = stirred(truth, workshop.scale.particles, folder / "stir.nc")
-    density = recording.number("liquid_density")
-    table = poured(truth, density, cups, folder / "pours.csv")
-    calibration = calibrate(
-        recording,
-        out=folder / "run",
-        particles=workshop.scale.particles,
-        seed=seed,
-        resume=True,
-        progress=shown,
-    )
-    tried = {"iterations": workshop.scale.rates, "seed": seed, "progress": shown}
-    before = choose_pour(calibration, cups, **tried)
-    effects = workshop.scale.considered
-    criticism = criticise(calibration, pours=table, effects=effects, seed=seed, progress=shown)
-    after = choose_pour(criticism.calibration, cups, **tried)
-    sticks = executions(truth.theta, density, cups, truth.seed)
-    flows = executions(truth.liquid, density, cups, truth.seed)
-    rehearsed = executions(truth.theta, density, cups, truth.seed, _REHEARSAL)
-    actions = [_action(before), _action(after), _best(workshop, rehearsed)]
-    spilled = [
-        *spilled_by(flows, actions[:1], workshop.bank),
-        *spilled_by(sticks, actions, workshop.bank),
-    ]
-    return truth, spilled, ", ".join(criticism.effects)
-
-
-def _action(pour: Pour) -> Action:
-    return {
-        "angular_velocity": pour.chosen.angular_velocity,
-        "distance": pour.chosen.distance,
-    }
-
-
-def _best(workshop: Workshop, outcomes: Outcomes) -> Action:
-    """The action of least spillage where everything is known."""
-    rates = np.geomspace(*outcomes.cups.angular_velocity_range, workshop.scale.grid.rates)
-    return surface(
-        pour_all(outcomes, rates, workshop.bank, lambda steps: None), outcomes.cups
-    ).least("mean")

@@ -40,4 +40,4 @@ def after_strokes(scale: Scale) -> dict[str, Learner]:
 
 
 def _star(recording: Recording, scale: Scale) -> Stirring:
-    return stirring_of([recording], scale.particles)
+    return stirring_of([recording], scale.drawn_particles)

@@ -9,6 +9,7 @@ from pathlib import Path
 from ..errors import InputError
 from ..provenance import LIBRARIES, generations, versions
 from ..run_directory import open_bank
+from ..worker_processes import processes
 from .figure import Drawn
 from .figure_of_adhesion import adhesion
 from .figure_of_geometry import geometry
@@ -67,8 +68,10 @@ def reproduce(
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
     made_with = {"scale": asdict(scale), **generations(), "versions": versions(LIBRARIES)}
-    with open_bank(out) as bank:
-        workshop = Workshop(out, scale, bank, progress)
+    with open_bank(out) as bank, processes() as pool:
+        workshop = Workshop(out, scale, bank, pool, progress)
+        if "adhesion" in chosen:
+            workshop.begin_sticky()
         for name in chosen:
             began = time.perf_counter()
             drawn = FIGURES[name](workshop)

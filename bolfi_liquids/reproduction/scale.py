@@ -20,7 +20,8 @@ class Scale:
         rates: Angular velocities among which pours after a recording are chosen.
         surrogates: That learn from these.
         lips: Heights of the lip that are compared.
-        particles: Of every stirred liquid.
+        particles: Of the stirs that are compared with recordings.
+        drawn_particles: Of stirred liquids whose truth is drawn, and of the stirs compared.
         grid: Of the pours by which actions are chosen.
         seed: Of everything random.
     """
@@ -36,6 +37,7 @@ class Scale:
     surrogates: tuple[str, ...] = ("discrepancy", "signal")
     lips: tuple[float, ...] = (0.10, 0.14, 0.20, 0.26)
     particles: int = 1000
+    drawn_particles: int = 1000
     grid: GridSize = FINE
     seed: int = 0
 
@@ -51,4 +53,6 @@ QUICK = Scale(
     rates=9,
     surrogates=("discrepancy",),
     lips=(0.14, 0.20),
+    drawn_particles=500,
+    grid=GridSize(viscosities=16, cohesions=2, rates=12),
 )

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ..prior import default_prior
 from ..progress import progress_bar
-from ..worker_processes import processes
 from .calibrations import Learner
 from .decisions import RULES, Action, decide, decide_unknowing, execute
 from .truths import Truths, draw_truths
@@ -43,6 +42,7 @@ def spillage_study(
     bank: "SimulationBank",
     grid: "PourGrid",
     scale: "Scale",
+    pool: Executor | None = None,
     *,
     progress: bool = True,
 ) -> "Dataset":
@@ -55,15 +55,15 @@ def spillage_study(
         bank: Where all simulations and calibrations are kept.
         grid: Of pours, by which actions are chosen, and with whose cups they are carried out.
         scale: How many of what.
+        pool: Of processes that share the calibrations.
         progress: Show bars on stderr.
     """
     tasks = Tasks(draw_truths(scale.repetitions, scale.seed), grid, bank)
     unknowing = decide_unknowing(grid, default_prior(), scale.seed)
-    with processes() as pool:
-        concluded = {
-            name: conclusions(learner, name, tasks, pool, progress=progress)
-            for name, learner in learners.items()
-        }
+    concluded = {
+        name: conclusions(learner, name, tasks, pool, progress=progress)
+        for name, learner in learners.items()
+    }
     (budgets,) = {learner.budgets for learner in learners.values()}
     return _judged(tasks, unknowing, concluded, budgets, progress)
 

@@ -1,6 +1,8 @@
 """What the figures are made from: simulations that are kept, made once for all figures."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from concurrent.futures import Executor, Future, as_completed
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,8 +15,10 @@ from ..pour_grid import PourGrid, make_grid
 from ..prior import default_prior
 from ..progress import progress_bar
 from ..provenance import generations
+from .calibrations import Learner
 from .learners import after_strokes, by_stirring_and_pouring
 from .scale import Scale
+from .sticky_study import Stuck, spilled_where_it_sticks
 from .study import spillage_study
 from .truths import DENSITY
 
@@ -32,13 +36,16 @@ class Workshop:
         out: Directory of the results.
         scale: How much is simulated.
         bank: Every finished simulation and calibration.
+        pool: Of processes that share the work; None for this one alone.
         progress: Show bars on stderr.
     """
 
     out: Path
     scale: Scale
     bank: "SimulationBank"
+    pool: Executor | None = None
     progress: bool = True
+    _sticky: "list[Future[Stuck]]" = field(default_factory=list)
 
     @cached_property
     def grid(self) -> PourGrid:
@@ -53,13 +60,40 @@ class Workshop:
     def study(self) -> "Dataset":
         """Spillage after stirring and after pouring; see `spillage_study`."""
         learners = by_stirring_and_pouring(self.grid.cups, self.scale)
-        return spillage_study(learners, self.bank, self.grid, self.scale, progress=self.progress)
+        return self._studied(learners)
 
     @cached_property
     def strokes(self) -> "Dataset":
         """The same after stirring for some strokes only."""
-        learners = after_strokes(self.scale)
-        return spillage_study(learners, self.bank, self.grid, self.scale, progress=self.progress)
+        return self._studied(after_strokes(self.scale))
+
+    def _studied(self, learners: Mapping[str, Learner]) -> "Dataset":
+        return spillage_study(
+            learners, self.bank, self.grid, self.scale, self.pool, progress=self.progress
+        )
+
+    def begin_sticky(self) -> None:
+        """Begin on the pool what takes long and waits for nothing."""
+        if self.pool:
+            for number in range(self.scale.sticky):
+                arguments = self.out, self.runs, self.scale, number
+                self._sticky.append(self.pool.submit(spilled_where_it_sticks, *arguments))
+
+    def sticky(self) -> list[Stuck]:
+        """Liquids that stick to their cup, and what they spilled."""
+        count = self.scale.sticky
+        if not self._sticky:
+            return [
+                spilled_where_it_sticks(
+                    self.out, self.runs, self.scale, number, progress=self.progress
+                )
+                for number in range(count)
+            ]
+        with progress_bar("liquids that stick", count, shown=self.progress) as advance:
+            for one in as_completed(self._sticky):
+                one.result()
+                advance(1)
+        return [one.result() for one in self._sticky]
 
     @property
     def runs(self) -> Path:

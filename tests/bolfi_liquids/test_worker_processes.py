@@ -1,7 +1,14 @@
 """Processes that share long work."""
 
+import os
+import signal
 import subprocess
 import sys
+import time
+
+import pytest
+
+from bolfi_liquids.worker_processes import processes
 
 WORKING = """
 import os, time
@@ -13,12 +20,42 @@ with processes(2) as pool:
     print("started", flush=True)
     time.sleep(300)
 """
+"""One of its workers is busy then, the other idle."""
 
 
-def test_workers_busy_or_idle_end_with_a_parent_that_is_killed():
-    run = subprocess.Popen([sys.executable, "-c", WORKING], stdout=subprocess.PIPE)
-    assert run.stdout is not None
-    assert run.stdout.readline() == b"started\n"
-    run.kill()
-    rest, _ = run.communicate(timeout=60.0)  # until nobody holds the pipe
+@pytest.fixture
+def working():
+    """A process with two workers, in a group of its own, as a terminal starts it."""
+    with subprocess.Popen(
+        [sys.executable, "-c", WORKING],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    ) as run:
+        assert run.stdout is not None
+        assert run.stdout.readline() == b"started\n"
+        yield run
+
+
+def test_workers_busy_or_idle_end_with_a_parent_that_is_killed(working):
+    working.kill()
+    rest, _ = working.communicate(timeout=60.0)  # until nobody holds the pipe
     assert rest == b""
+
+
+def test_workers_end_on_ctrl_c_without_a_word(working):
+    os.killpg(working.pid, signal.SIGINT)
+    _, said = working.communicate(timeout=60.0)
+    assert said.decode().count("Traceback") == 1  # the parent's own
+    assert said.decode().endswith("KeyboardInterrupt\n")
+
+
+def test_work_is_given_up_where_there_was_an_error():
+    began = time.perf_counter()
+    with pytest.raises(KeyError), processes(2) as pool:
+        assert pool is not None
+        busy = [pool.submit(time.sleep, 300) for _ in range(5)]
+        pool.submit(int)
+        raise KeyError
+    assert time.perf_counter() - began < 60.0
+    assert all(future.done() for future in busy)

@@ -1,0 +1,81 @@
+"""What is poured of a liquid that sticks to its cup, before and after criticism."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ..calibrator import calibrate
+from ..criticiser import criticise
+from ..cups import bundled_cups
+from ..pouring import Pour, choose_pour
+from ..run_directory import open_bank
+from ..spillage import pour_all, surface
+from .decisions import Action, executions, spilled_by
+from .scale import Scale
+from .sticky import Sticky, draw_sticky, poured, recipe, stirred
+
+_REHEARSAL = 73  # purpose of seeds
+
+
+class Stuck(NamedTuple):
+    """What was found of a liquid.
+
+    Attributes:
+        truth: The liquid.
+        spilled: Fractions, by the pour chosen after stirring if it did not stick, by the same
+            pour, by the one chosen after criticism, and by the best where all is known.
+        named: The effects that criticism named.
+    """
+
+    truth: Sticky
+    spilled: list[float]
+    named: str
+
+
+def spilled_where_it_sticks(
+    out: Path, runs: Path, scale: Scale, number: int, *, progress: bool = False
+) -> Stuck:
+    """Stir a liquid, choose its pour, criticise, choose again, and carry all of it out.
+
+    Args:
+        out: Where pours are kept.
+        runs: Where the run is kept.
+        scale: How much is simulated.
+        number: Of the liquid.
+        progress: Show bars on stderr.
+    """
+    cups, seed, particles = bundled_cups(), scale.seed, scale.drawn_particles
+    truth = draw_sticky(number, seed)
+    folder = runs / f"sticky_{number}_{recipe(cups, particles, seed)}"
+    folder.mkdir(parents=True, exist_ok=True)
+    recording = stirred(truth, particles, folder / "stir.nc")
+    density = recording.number("liquid_density")
+    table = poured(truth, density, cups, folder / "pours.csv")
+    calibration = calibrate(
+        recording,
+        out=folder / "run",
+        particles=particles,
+        seed=seed,
+        resume=True,
+        progress=progress,
+    )
+    tried = {"iterations": scale.rates, "seed": seed, "progress": progress}
+    before = choose_pour(calibration, cups, **tried)
+    effects = scale.considered
+    criticism = criticise(calibration, pours=table, effects=effects, seed=seed, progress=progress)
+    after = choose_pour(criticism.calibration, cups, **tried)
+    sticks = executions(truth.theta, density, cups, truth.seed)
+    flows = executions(truth.liquid, density, cups, truth.seed)
+    rehearsed = executions(truth.theta, density, cups, truth.seed, _REHEARSAL)
+    rates = np.geomspace(*cups.angular_velocity_range, scale.grid.rates)
+    with open_bank(out) as bank:
+        known = surface(pour_all(rehearsed, rates, bank, lambda steps: None), cups).least("mean")
+        actions = [_action(before), _action(after), known]
+        spilled = [*spilled_by(flows, actions[:1], bank), *spilled_by(sticks, actions, bank)]
+    return Stuck(truth, spilled, ", ".join(criticism.effects))
+
+
+def _action(pour: Pour) -> Action:
+    chosen = pour.chosen
+    return {"angular_velocity": chosen.angular_velocity, "distance": chosen.distance}

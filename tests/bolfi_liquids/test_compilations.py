@@ -1,0 +1,59 @@
+"""What JAX compiles is kept for the next command."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+COMPILING = """
+from bolfi_liquids.compilations import keep_compilations
+keep_compilations()
+import jax, jax.numpy as jnp
+hits = []
+jax.monitoring.register_event_listener(lambda event, **_: hits.append(event))
+print(float(jax.jit(lambda x: jnp.sin(x).sum())(jnp.arange(5.0))))
+print(hits.count("/jax/compilation_cache/cache_hits"))
+"""
+
+
+def compiled(home, **environment):
+    """What is computed, and how many compilations were found."""
+    kept = {k: v for k, v in os.environ.items() if "CACHE" not in k}
+    own = kept | {"HOME": str(home)} | environment
+    run = subprocess.run(
+        [sys.executable, "-c", COMPILING], env=own, capture_output=True, text=True, check=True
+    )
+    assert run.stderr == ""
+    value, hits = run.stdout.split()
+    return value, int(hits)
+
+
+def test_the_next_command_finds_what_was_compiled(tmp_path):
+    first, none = compiled(tmp_path)
+    again, found = compiled(tmp_path)
+    assert (first, none) == (again, 0)
+    assert found > 0
+
+
+def test_the_environment_has_the_last_word(tmp_path):
+    chosen = tmp_path / "chosen"
+    places = {
+        "JAX_COMPILATION_CACHE_DIR": str(chosen),
+        "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0",
+    }
+    compiled(tmp_path / "home", **places)
+    assert list(chosen.iterdir())
+    assert not (tmp_path / "home").exists()
+
+
+@pytest.mark.parametrize("home", ["a file", "cut short"])
+def test_a_cache_that_cannot_be_used_is_done_without(tmp_path, home):
+    usual, _ = compiled(tmp_path / "usual")
+    if home == "a file":
+        (tmp_path / home).touch()
+    else:
+        compiled(tmp_path / home)
+        for entry in (tmp_path / home).rglob("*-cache"):
+            entry.write_bytes(entry.read_bytes()[:20])
+    assert compiled(tmp_path / home) == (usual, 0)
