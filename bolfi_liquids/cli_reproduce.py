@@ -18,7 +18,7 @@ def reproduce(
         "runs/reproduce"
     ),
     quick: Annotated[
-        bool, typer.Option("--quick", help="Fewer repetitions: half an hour instead of hours.")
+        bool, typer.Option("--quick", help="Fewer, coarser stirs: a quarter of an hour.")
     ] = False,
 ) -> None:
     """Draw the paper's figures, and those of what it left open.
