@@ -15,7 +15,6 @@ from ..pour_grid import PourGrid, make_grid
 from ..prior import default_prior
 from ..progress import progress_bar
 from ..provenance import generations
-from .calibrations import Learner
 from .learners import after_strokes, by_stirring_and_pouring
 from .scale import Scale
 from .sticky_study import Stuck, spilled_where_it_sticks
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
     from ..inference import SimulationBank
+    from .calibrations import Learner
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,15 +59,14 @@ class Workshop:
     @cached_property
     def study(self) -> "Dataset":
         """Spillage after stirring and after pouring; see `spillage_study`."""
-        learners = by_stirring_and_pouring(self.grid.cups, self.scale)
-        return self._studied(learners)
+        return self._studied(by_stirring_and_pouring(self.grid.cups, self.scale))
 
     @cached_property
     def strokes(self) -> "Dataset":
         """The same after stirring for some strokes only."""
         return self._studied(after_strokes(self.scale))
 
-    def _studied(self, learners: Mapping[str, Learner]) -> "Dataset":
+    def _studied(self, learners: "Mapping[str, Learner]") -> "Dataset":
         return spillage_study(
             learners, self.bank, self.grid, self.scale, self.pool, progress=self.progress
         )
