@@ -18,7 +18,7 @@ def reproduce(
         "runs/reproduce"
     ),
     quick: Annotated[
-        bool, typer.Option("--quick", help="Fewer, coarser stirs: a quarter of an hour.")
+        bool, typer.Option("--quick", help="Fewer truths, coarser stirs: a quarter of an hour.")
     ] = False,
 ) -> None:
     """Draw the paper's figures, and those of what it left open.

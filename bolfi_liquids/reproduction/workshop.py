@@ -1,9 +1,9 @@
 """What the figures are made from: simulations that are kept, made once for all figures."""
 
-from collections.abc import Mapping
-from concurrent.futures import Executor, Future, as_completed
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -45,7 +45,6 @@ class Workshop:
     bank: "SimulationBank"
     pool: Executor | None = None
     progress: bool = True
-    _sticky: "list[Future[Stuck]]" = field(default_factory=list)
 
     @cached_property
     def grid(self) -> PourGrid:
@@ -71,28 +70,13 @@ class Workshop:
             learners, self.bank, self.grid, self.scale, self.pool, progress=self.progress
         )
 
-    def begin_sticky(self) -> None:
-        """Begin on the pool what takes long and waits for nothing."""
-        if self.pool:
-            for number in range(self.scale.sticky):
-                arguments = self.out, self.runs, self.scale, number
-                self._sticky.append(self.pool.submit(spilled_where_it_sticks, *arguments))
-
-    def sticky(self) -> list[Stuck]:
-        """Liquids that stick to their cup, and what they spilled."""
-        count = self.scale.sticky
-        if not self._sticky:
-            return [
-                spilled_where_it_sticks(
-                    self.out, self.runs, self.scale, number, progress=self.progress
-                )
-                for number in range(count)
-            ]
-        with progress_bar("liquids that stick", count, shown=self.progress) as advance:
-            for one in as_completed(self._sticky):
-                one.result()
-                advance(1)
-        return [one.result() for one in self._sticky]
+    @cached_property
+    def sticky(self) -> "Iterator[Stuck]":
+        """Liquids that stick to their cup, and what they spilled, once; on a pool, work on all of
+        them begins when this is first read."""
+        progress = self.progress and not self.pool
+        one = partial(spilled_where_it_sticks, self.out, self.runs, self.scale, progress=progress)
+        return (self.pool.map if self.pool else map)(one, range(self.scale.sticky))
 
     @property
     def runs(self) -> Path:
