@@ -38,13 +38,14 @@ def processes(count: int | None = None) -> Iterator[Executor | None]:
 
 
 def _follow_parent() -> None:
-    """End this process, without a word, on Ctrl-C, and when the one that started it is gone, be it
-    by `kill -9`."""
+    """End this process, without a word, on Ctrl-C, unless that is ignored as in the background of a
+    script, and when the one that started it is gone, be it by `kill -9`."""
 
     def follow(parent: BaseProcess) -> None:
         parent.join()
         os._exit(1)
 
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
     if parent := parent_process():
         Thread(target=follow, args=(parent,), daemon=True).start()

@@ -11,9 +11,11 @@ import pytest
 from bolfi_liquids.worker_processes import processes
 
 WORKING = """
-import os, time
+import os, signal, time
 from bolfi_liquids.worker_processes import processes
 
+# these tests may themselves be run where it is ignored
+signal.signal(signal.SIGINT, signal.default_int_handler)
 with processes(2) as pool:
     pool.submit(time.sleep, 300)
     assert pool.submit(os.getpid).result() != os.getpid()
@@ -48,6 +50,17 @@ def test_workers_end_on_ctrl_c_without_a_word(working):
     _, said = working.communicate(timeout=60.0)
     assert said.decode().count("Traceback") == 1  # the parent's own
     assert said.decode().endswith("KeyboardInterrupt\n")
+
+
+def test_workers_go_on_where_ctrl_c_is_ignored():
+    told = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with processes(2) as pool:
+            assert pool is not None
+            os.kill(pool.submit(os.getpid).result(), signal.SIGINT)
+            assert pool.submit(pow, 2, 3).result(60.0) == 8
+    finally:
+        signal.signal(signal.SIGINT, told)
 
 
 def test_work_is_given_up_where_there_was_an_error():
