@@ -1,5 +1,7 @@
 """The one error that a person's input can cause, always a single line."""
 
+from functools import partial
+
 
 class InputError(ValueError):
     """Something a person gave cannot be used.
@@ -15,3 +17,7 @@ class InputError(ValueError):
         self.what = what
         self.where = where
         self.fix = fix
+
+    def __reduce__(self):
+        """It reaches the terminal from the processes that share long work, too."""
+        return partial(InputError, where=self.where, fix=self.fix), (self.what,)

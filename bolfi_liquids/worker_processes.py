@@ -5,17 +5,19 @@ import signal
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
-from multiprocessing import active_children, get_context, parent_process
+from multiprocessing import get_context, parent_process
 from multiprocessing.process import BaseProcess
 from threading import Thread
+
+from .compilations import ignore_torn_entries
 
 
 @contextmanager
 def processes(count: int | None = None) -> Iterator[Executor | None]:
     """Processes to work in; None, which is this process, where one is enough.
 
-    They are spawned, since JAX does not survive a fork. What they have not finished when the
-    `with` is left by an error, or by Ctrl-C, is given up.
+    They are spawned, since JAX does not survive a fork. The `with` waits for their work; when it
+    is left by an error, or by Ctrl-C, what they have not finished is given up.
 
     Args:
         count: How many; None is one for each processor.
@@ -24,17 +26,22 @@ def processes(count: int | None = None) -> Iterator[Executor | None]:
     if count == 1:
         yield None
         return
-    others = active_children()
     spawn = get_context("spawn")
-    pool = ProcessPoolExecutor(count, mp_context=spawn, initializer=_follow_parent)
+    pool = ProcessPoolExecutor(count, mp_context=spawn, initializer=_begin)
     try:
         yield pool
     except BaseException:
-        for worker in set(active_children()).difference(others):
+        # there is no public way before Python 3.14
+        for worker in list(pool._processes.values()):
             worker.terminate()
-        raise
-    finally:
         pool.shutdown(cancel_futures=True)
+        raise
+    pool.shutdown()
+
+
+def _begin() -> None:
+    ignore_torn_entries()
+    _follow_parent()
 
 
 def _follow_parent() -> None:

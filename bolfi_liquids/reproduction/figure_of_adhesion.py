@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..drawing import BLUE, GREY, ORANGE, PALETTE, new_figure, styled
-from ..progress import progress_bar
 from .figure import Drawn
 from .sticky import TRAINING
 from .workshop import Workshop
@@ -21,12 +20,7 @@ def adhesion(workshop: Workshop) -> Drawn:
     """Spilled by liquids like glycerin that stick to their cup."""
     from xarray import Dataset
 
-    count, shared = workshop.scale.sticky, workshop.pool is not None
-    with progress_bar("liquids that stick", count, shown=workshop.progress and shared) as advance:
-        found = []
-        for one in workshop.sticky:
-            found.append(one)
-            advance(1)
+    found = workshop.sticky
     truths = [one.truth for one in found]
     spilled = np.array([one.spilled for one in found])
     named = [one.named for one in found]

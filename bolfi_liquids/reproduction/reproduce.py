@@ -71,7 +71,7 @@ def reproduce(
     with open_bank(out) as bank, processes() as pool:
         workshop = Workshop(out, scale, bank, pool, progress)
         if "adhesion" in chosen:
-            _ = workshop.sticky  # begun first: a pool works on it beside the other figures
+            workshop.begin_sticky()
         for name in chosen:
             began = time.perf_counter()
             drawn = FIGURES[name](workshop)

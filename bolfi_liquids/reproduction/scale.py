@@ -20,8 +20,8 @@ class Scale:
         rates: Angular velocities among which pours after a recording are chosen.
         surrogates: That learn from these.
         lips: Heights of the lip that are compared.
-        particles: Of the stirs that are compared with recordings.
-        drawn_particles: Of stirred liquids whose truth is drawn, and of the stirs compared.
+        particles: Of the stirs by which bundled recordings are calibrated.
+        drawn_particles: Of the stirs of drawn truths, and of those by which they are calibrated.
         grid: Of the pours by which actions are chosen.
         seed: Of everything random.
     """

@@ -70,10 +70,22 @@ class Workshop:
             learners, self.bank, self.grid, self.scale, self.pool, progress=self.progress
         )
 
+    def begin_sticky(self) -> None:
+        """Let a pool begin on the liquids that stick, which take longest and wait for nothing."""
+        _ = self._sticking
+
     @cached_property
-    def sticky(self) -> "Iterator[Stuck]":
-        """Liquids that stick to their cup, and what they spilled, once; on a pool, work on all of
-        them begins when this is first read."""
+    def sticky(self) -> list[Stuck]:
+        """Liquids that stick to their cup, and what they spilled."""
+        found, shown = [], self.progress and self.pool is not None
+        with progress_bar("liquids that stick", self.scale.sticky, shown=shown) as advance:
+            for one in self._sticking:
+                found.append(one)
+                advance(1)
+        return found
+
+    @cached_property
+    def _sticking(self) -> Iterator[Stuck]:
         progress = self.progress and not self.pool
         one = partial(spilled_where_it_sticks, self.out, self.runs, self.scale, progress=progress)
         return (self.pool.map if self.pool else map)(one, range(self.scale.sticky))

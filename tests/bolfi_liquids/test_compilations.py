@@ -6,6 +6,14 @@ import sys
 
 import pytest
 
+COMMAND = """
+import sys
+from bolfi_liquids.cli import main
+assert "jax" not in sys.modules
+sys.argv[1:] = ["guide", "files"]
+main()
+"""
+
 COMPILING = """
 from bolfi_liquids.compilations import keep_compilations
 keep_compilations()
@@ -17,10 +25,14 @@ print(hits.count("/jax/compilation_cache/cache_hits"))
 """
 
 
+def elsewhere(home):
+    """An environment in which nothing was compiled yet."""
+    return {k: v for k, v in os.environ.items() if "CACHE" not in k} | {"HOME": str(home)}
+
+
 def compiled(home, **environment):
     """What is computed, and how many compilations were found."""
-    kept = {k: v for k, v in os.environ.items() if "CACHE" not in k}
-    own = kept | {"HOME": str(home)} | environment
+    own = elsewhere(home) | environment
     run = subprocess.run(
         [sys.executable, "-c", COMPILING], env=own, capture_output=True, text=True, check=True
     )
@@ -57,3 +69,9 @@ def test_a_cache_that_cannot_be_used_is_done_without(tmp_path, home):
         for entry in (tmp_path / home).rglob("*-cache"):
             entry.write_bytes(entry.read_bytes()[:20])
     assert compiled(tmp_path / home) == (usual, 0)
+
+
+def test_commands_keep_what_is_compiled(tmp_path):
+    own = elsewhere(tmp_path)
+    subprocess.run([sys.executable, "-c", COMMAND], env=own, stdout=subprocess.DEVNULL, check=True)
+    assert [place.name for place in tmp_path.rglob("jax")] == ["jax"]

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 
 import pytest
 
@@ -36,7 +37,11 @@ def working():
     ) as run:
         assert run.stdout is not None
         assert run.stdout.readline() == b"started\n"
-        yield run
+        try:
+            yield run
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(run.pid, signal.SIGKILL)
 
 
 def test_workers_busy_or_idle_end_with_a_parent_that_is_killed(working):
@@ -63,12 +68,20 @@ def test_workers_go_on_where_ctrl_c_is_ignored():
         signal.signal(signal.SIGINT, told)
 
 
+def test_work_is_waited_for_where_there_was_no_error():
+    with processes(2) as pool:
+        assert pool is not None
+        asked = [pool.submit(pow, 2, power) for power in range(9)]
+    assert [one.result(0.0) for one in asked] == [2**power for power in range(9)]
+
+
 def test_work_is_given_up_where_there_was_an_error():
     began = time.perf_counter()
     with pytest.raises(KeyError), processes(2) as pool:
         assert pool is not None
-        busy = [pool.submit(time.sleep, 300) for _ in range(5)]
-        pool.submit(int)
+        busy = [pool.submit(time.sleep, 300)]
+        assert pool.submit(int).result() == 0  # by the other worker
+        busy += [pool.submit(time.sleep, 300) for _ in range(4)]
         raise KeyError
     assert time.perf_counter() - began < 60.0
     assert all(future.done() for future in busy)
