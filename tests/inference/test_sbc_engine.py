@@ -73,7 +73,7 @@ def covers(made):
     return ((covered >= low) & (covered <= high)).all()
 
 
-@every_task("decay", "bimodal")
+@every_task("bimodal")
 def test_signal_surrogate_is_calibrated(run, task):
     made = run(task, "signal")
     uniform = inference.sbc(made)
