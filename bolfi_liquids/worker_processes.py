@@ -32,7 +32,7 @@ def processes(count: int | None = None) -> Iterator[Executor | None]:
         yield pool
     except BaseException:
         # there is no public way before Python 3.14
-        for worker in list(pool._processes.values()):
+        for worker in list((pool._processes or {}).values()):
             worker.terminate()
         pool.shutdown(cancel_futures=True)
         raise
