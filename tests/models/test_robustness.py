@@ -21,6 +21,12 @@ LOOK = 20  # substeps between two looks at the particles' speeds
 FASTEST = {"stir": 2.0, "pour": 4.0}  # m/s; a fall over the cup's depth gains 1.2, a pour's 1.9
 STEEPEST = np.radians(60.0)
 
+STARTS = range(0, POINTS, BATCH)
+BATCHES = [  # every other one in continuous integration
+    pytest.param(start, marks=pytest.mark.minutes if at % 2 else pytest.mark.slow)
+    for at, start in enumerate(STARTS)
+]
+
 
 class Points(NamedTuple):
     """Points of the prior box, every array of shape [n]."""
@@ -191,8 +197,7 @@ def pour_faults(drawn, cups, ends):
         yield from ((k, what) for what, fine in checks.items() if not fine)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("start", range(0, POINTS, BATCH))
+@pytest.mark.parametrize("start", BATCHES)
 def test_no_point_of_the_prior_box_goes_wrong(start, violent, cups, ends):
     drawn = points(start, cups)
     found = [("stir", *fault) for fault in stir_faults(drawn, violent, ends)]

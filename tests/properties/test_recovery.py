@@ -42,7 +42,7 @@ def test_simulated_truth_is_found(tmp_path):
         theta = {name: float(values[at]) for name, values in drawn.items()}
         recording = simulated_recording(tmp_path / f"{at}.nc", theta, seed=at)
         out = tmp_path / f"run{at}"
-        calibration = bl.calibrate(recording, budget=30, seed=at, out=out, progress=False)
+        calibration = bl.calibrate(recording, budget=20, seed=at, out=out, progress=False)
         viscosity = calibration.posterior["viscosity"].to_numpy().ravel()
         low, high = np.quantile(viscosity, [0.05, 0.95])
         covered.append(low <= theta["viscosity"] <= high)
