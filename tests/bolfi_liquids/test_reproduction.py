@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bolfi_liquids import inference, models
-from bolfi_liquids.bundled import bundled_recording
+from bolfi_liquids.bundled import POURED, bundled_pours, bundled_recording
 from bolfi_liquids.cups import bundled_cups
 from bolfi_liquids.pour_table import open_pours
 from bolfi_liquids.reproduction import sticky, workshop
@@ -53,6 +53,22 @@ def test_beyond_the_table_its_edge_is_taken():
     rising = table(lambda log_rate, distance: 10.0 * distance)
     value, _ = between(rising, 1.0, 0.08)
     assert value == pytest.approx(0.6, abs=0.01)
+
+
+@pytest.mark.parametrize("liquid", POURED)
+def test_pours_left_out_are_missed_by_less_than_by_chords(liquid):
+    """Whatever a valley is like, rows that were simulated and not told lie nearer."""
+    poured = bundled_pours(liquid)
+    _, error = between(poured, 1.0, 0.02)
+    chords = []
+    for rate in np.unique(poured.angular_velocity):
+        row = poured.angular_velocity == rate
+        distance, spilled = poured.distance[row], poured.fractions[row, 0]
+        for left in range(1, len(distance) - 1):
+            rest = np.arange(len(distance)) != left
+            guess = np.interp(distance[left], distance[rest], spilled[rest])
+            chords.append(guess - spilled[left])
+    assert error < np.sqrt(np.mean(np.square(chords)))
 
 
 def test_the_interval_covers_the_mean_as_often_as_it_says():
