@@ -23,9 +23,9 @@ from .progress import progress_bar
 from .provenance import LIBRARIES, versions
 from .recordings import Recording, open_recordings
 from .run_directory import SIMULATIONS, enter_run
-from .sbc_pipelines import RUNS, SAMPLING, Calibrate, CameraNoise, FromBank, Quietly
+from .sbc_pipelines import SAMPLING, Calibrate, CameraNoise, FromBank, Quietly
 from .sbc_results import SurrogateCheck, checked, write_results
-from .settings import MIN_SIMULATIONS, PAPER_RULES, SURROGATES, SbcSettings
+from .settings import MIN_SIMULATIONS, PAPER_RULES, RUNS, SURROGATES, SbcSettings
 from .stirring import Stirring, stirring_of
 from .worker_processes import processes
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .calibrator import engine_options, fit_recordings
-from .settings import CalibrationSettings
+from .settings import RUNS, CalibrationSettings
 from .stirring import Stirring
 
 if TYPE_CHECKING:
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 SAMPLING: dict[str, Any] = {"sampler": "quadrature", "chains": 2, "draws": 250}
 """Of the posterior: independent draws, which are sooner made; `calibrate` checks its own against
 the same quadrature."""
-
-RUNS = 2  # of each point of a shared set: the engine asks for replicates
 
 
 @dataclass(frozen=True)
@@ -94,13 +92,14 @@ class FromBank:
 
     def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
         from .inference import Bolfi
+        from .kept import fresh_seeds
 
         u = self.prior.to_unit(self.prior.to_dict(self.theta))
         left = np.asarray(np.isfinite(self.signals).all(axis=(2, 3)))
         options = engine_options(self.stirring, self.settings.surrogate)
         told: list[tuple[int, int]] = []  # point and run
 
-        def engine() -> Bolfi:
+        def engine(seed: int) -> Bolfi:
             """One that was told all so far, and waits for nothing that it asked before."""
             made = Bolfi(self.prior, observed, seed=seed, **options)
             if told:
@@ -110,17 +109,20 @@ class FromBank:
             return made
 
         while len(told) < self.settings.budget:
-            asking = engine()
+            # a new engine of the same seed would draw the same random numbers for every batch
+            asking = engine(seed if not told else fresh_seeds(seed, len(told), 1)[0])
             wanted = asking.initial if not told else self.settings.batch
             asked = asking.ask(min(wanted, self.settings.budget - len(told)))
             told += _nearest(self.prior.to_unit(asked), u, left)
-        fit = engine().fit()
+        fit = engine(seed).fit()
         return fit.sample(seed=seed, **SAMPLING), fit.log_prob
 
 
 def _nearest(asked: NDArray, points: NDArray, left: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
     """Point and run for each u asked [n, d]; what is given is no longer `left` [points, RUNS]."""
     for u in asked:
+        if not left.any():
+            raise RuntimeError("every run of the shared set was told; make it larger")
         apart = np.where(left.any(axis=1), np.sum((points - u) ** 2, axis=1), np.inf)
         point = int(np.argmin(apart))
         run = int(np.argmax(left[point]))

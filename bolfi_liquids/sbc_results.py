@@ -56,8 +56,8 @@ def checked(made: "Replicates", *, conservative: bool) -> SurrogateCheck:
 
     Args:
         made: The replicates.
-        conservative: Only too little coverage is a fault: the paper's likelihood is wide by
-            construction.
+        conservative: Of the coverage, only too little is a fault: the paper's likelihood is wide
+            by construction. Ranks must be uniform all the same.
     """
     from . import inference
 

@@ -15,6 +15,7 @@ RISKS = ("mean", "cvar")
 PAPER_RULES = {"acquisition": "lcb", "threshold": "min_mean"}
 """What goes with the paper's surrogate, and what results were measured on."""
 
+RUNS = 2  # of each point of a set of stirs that calibrations share: the engine asks for replicates
 ALARM = 0.05  # share of false alarms when simulation and data are compared
 MIN_SIMULATIONS = 7  # fewer say next to nothing of two parameters
 MIN_PARTICLES = 100  # with fewer, the stick is thinner than the gaps between them
@@ -90,6 +91,12 @@ class SbcSettings:
                 f"{self.noise_deg!r}", where="--noise", fix="give degrees above 0, such as 0.1"
             )
         self.calibration("discrepancy")
+        if self.runs and self.budget > RUNS * self.design:
+            raise InputError(
+                f"{self.budget} simulations each, but {self.design} points of {RUNS} stirs are shared",
+                where="--design",
+                fix=f"give {-(-self.budget // RUNS)} at least, or a smaller --budget",
+            )
 
     @property
     def replicates(self) -> dict[str, int]:
