@@ -93,7 +93,7 @@ class SbcSettings:
         self.calibration("discrepancy")
         if self.runs and self.budget > RUNS * self.design:
             raise InputError(
-                f"{self.budget} simulations each, but {self.design} points of {RUNS} stirs are shared",
+                f"{self.budget} simulations each, but {RUNS} of {self.design} points are shared",
                 where="--design",
                 fix=f"give {-(-self.budget // RUNS)} at least, or a smaller --budget",
             )

@@ -1,14 +1,20 @@
 """The check of whole calibrations: resumable, and each run of the shared set told once."""
 
 import sqlite3
+from types import SimpleNamespace
+from typing import ClassVar
 
+import jax
 import numpy as np
+import numpyro.distributions as dist
 import pytest
 import xarray as xr
+from bolfi_liquids.inference import acquisition
 
+from bolfi_liquids import inference
 from bolfi_liquids.sbc_check import check_sbc
-from bolfi_liquids.sbc_pipelines import RUNS, CameraNoise, _nearest
-from bolfi_liquids.settings import SbcSettings
+from bolfi_liquids.sbc_pipelines import CameraNoise, FromBank, Quietly, _nearest
+from bolfi_liquids.settings import RUNS, CalibrationSettings, SbcSettings
 
 SMALL = {"design": 8, "budget": 8, "particles": 100, "seed": 3}
 
@@ -25,6 +31,39 @@ def test_each_run_is_given_once_and_the_nearest_first():
     given = list(_nearest(asked, points, left))
     assert given == [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0)]
     assert left.sum() == 1
+
+
+def test_a_set_that_is_used_up_is_said():
+    with pytest.raises(RuntimeError, match="every run of the shared set was told"):
+        list(_nearest(np.zeros((2, 1)), np.zeros((1, 1)), np.array([[True]])))
+    with pytest.raises(ValueError, match="--design: 20 simulations each, but 2 of 8 points"):
+        SbcSettings(design=8, budget=20)
+    SbcSettings(design=8, budget=20, runs=0)  # where none is shared
+
+
+class Watching(acquisition.PosteriorDraws):
+    """Keeps the keys that it was called with."""
+
+    keys: ClassVar[list[tuple[int, ...]]] = []
+
+    def __call__(self, key, *given):
+        self.keys.append(tuple(jax.random.key_data(key).tolist()))
+        return super().__call__(key, *given)
+
+
+def test_every_batch_is_asked_with_random_numbers_of_its_own(monkeypatch):
+    """As by `calibrate`; the same ones again would choose by the same rule again and again."""
+    monkeypatch.setitem(acquisition.RULES, "draws", Watching)
+    prior = inference.Prior({"slope": dist.Uniform(0.0, 1.0)})
+    theta = (np.arange(20)[:, None] + 0.5) / 20
+    clean = theta * np.linspace(0.0, 1.0, 12)
+    noise = np.random.default_rng(0).normal(0.0, 0.02, (20, RUNS, 12, 1))
+    stirring = SimpleNamespace(discrepancy=lambda: None)
+    settings = CalibrationSettings(budget=20, surrogate="signal")
+    signals = clean[:, None, :, None] + noise
+    pipeline = Quietly(FromBank(stirring, prior, theta, signals, settings))
+    pipeline(clean[7][:, None], seed=1)
+    assert len(Watching.keys) == len(set(Watching.keys)) == 3  # after the start design of eight
 
 
 def test_camera_noise_is_as_large_as_it_says():
