@@ -14,9 +14,13 @@ def reproduce(
     figures: Annotated[
         list[str] | None, typer.Argument(metavar="[FIGURE]...", help="Names; all without any.")
     ] = None,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Directory of the results.")] = Path(
-        "runs/reproduce"
-    ),
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Directory of the results; else runs/reproduce, or runs/reproduce_quick.",
+        ),
+    ] = None,
     quick: Annotated[
         bool, typer.Option("--quick", help="Fewer truths, coarser stirs: a quarter of an hour.")
     ] = False,
@@ -39,6 +43,8 @@ def reproduce(
     from .reproduction.reproduce import reproduce as draw
     from .reproduction.scale import FULL, QUICK
 
+    # of one scale each, so that no figure of the one stands beside some of the other
+    out = out or Path("runs/reproduce_quick" if quick else "runs/reproduce")
     draw(
         figures or (),
         out,

@@ -43,10 +43,7 @@ def simulate_kept(
     Raises:
         RuntimeError: Every simulation failed.
     """
-    jobs = [
-        Job({name: float(values[at]) for name, values in theta.items()}, seed)
-        for at, seed in enumerate(seeds)
-    ]
+    jobs = _jobs(theta, seeds)
     results = run_missing(simulate, jobs, None, keep.bank, keep.identity, batch=keep.batch)
     good = {
         at: r.signal
@@ -60,6 +57,31 @@ def simulate_kept(
         )
     seconds = sum(result.seconds for result in results)
     return Kept(np.stack(list(good.values())), np.array(list(good)), seconds)
+
+
+def keeping(simulate: Simulate, shape: tuple[int, ...], keep: Keep) -> Simulate:
+    """`simulate`, but for what the bank holds; what is simulated is put there.
+
+    Args:
+        simulate: As given to `inference.fit`.
+        shape: Of a signal; a failed run's is NaN.
+        keep: Where simulations are kept.
+    """
+
+    def kept(theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
+        jobs = _jobs(theta, [int(seed) for seed in seeds])
+        results = run_missing(simulate, jobs, shape, keep.bank, keep.identity, batch=keep.batch)
+        failed = np.full(shape, np.nan)
+        return np.stack([failed if one.signal is None else one.signal for one in results])
+
+    return kept
+
+
+def _jobs(theta: Mapping[str, NDArray], seeds: Sequence[int]) -> list[Job]:
+    return [
+        Job({name: float(values[at]) for name, values in theta.items()}, seed)
+        for at, seed in enumerate(seeds)
+    ]
 
 
 def fresh_seeds(seed: int, purpose: int, count: int) -> list[int]:

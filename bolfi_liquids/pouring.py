@@ -17,6 +17,7 @@ from .progress import Advance, progress_bar
 from .run_directory import POUR, open_bank
 from .settings import PourSettings
 from .spillage import (
+    ACTION,
     FARTHEST,
     Outcomes,
     Profiles,
@@ -54,6 +55,11 @@ class Judged:
     angular_velocity: float
     distance: float
     fractions: NDArray[np.float64]
+
+    @property
+    def action(self) -> dict[str, float]:
+        """`angular_velocity` and `distance`."""
+        return dict(zip(ACTION, (self.angular_velocity, self.distance), strict=True))
 
     @property
     def expected_spillage(self) -> float:

@@ -8,6 +8,7 @@ import json
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,30 +42,37 @@ class ByStirring:
         prior: Of the parameters.
         surrogate: "signal", or "discrepancy": the paper's.
         budgets: Ascending; a larger one goes on from a smaller one's simulations.
+        bank: Where finished simulations are kept.
     """
 
     stirring: Stirring
     prior: "Prior"
     surrogate: str
     budgets: tuple[int, ...]
+    bank: str | Path = ":memory:"
 
     def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         """Conclusions (B, budgets, 1 + DRAWS, 2): theta*, then draws, of viscosity and cohesion."""
         return np.stack([self._one(truth, int(seed)) for truth, seed in _each(theta, seeds)])
 
     def _one(self, truth: dict[str, NDArray], seed: int) -> NDArray[np.float64]:
-        from ..inference import Bolfi
+        from ..inference import Bolfi, SimulationBank
+        from ..kept import Keep, keeping
 
-        clean = self.stirring.simulate(truth, np.array([seed]))[0]
-        engine = Bolfi(
-            self.prior,
-            NOISE(clean, np.random.default_rng(seed)),
-            seed=seed,
-            capacity=self.budgets[-1],
-            **engine_options(self.stirring, self.surrogate),
-        )
-        fits = after_each(engine, self.stirring.simulate, self.budgets)
-        return np.stack([concluded(fit, seed) for fit in fits])
+        stirring = self.stirring
+        with SimulationBank(self.bank) as bank:
+            keep = Keep(bank, stirring.identity, BATCH)
+            simulate = keeping(stirring.simulate, stirring.observed.shape, keep)
+            clean = simulate(truth, np.array([seed]))[0]
+            engine = Bolfi(
+                self.prior,
+                NOISE(clean, np.random.default_rng(seed)),
+                seed=seed,
+                capacity=self.budgets[-1],
+                **engine_options(stirring, self.surrogate),
+            )
+            fits = after_each(engine, simulate, self.budgets)
+            return np.stack([concluded(fit, seed) for fit in fits])
 
     @property
     def identity(self) -> str:
@@ -82,7 +90,7 @@ class ByPouring:
         cups: Of training pour and task alike.
         prior: Of the parameters.
         angular_velocity, distance: The training pour [rad/s], [m].
-        budgets: See `ByStirring`.
+        budgets, bank: See `ByStirring`.
     """
 
     cups: "Cups"
@@ -90,26 +98,31 @@ class ByPouring:
     angular_velocity: float
     distance: float
     budgets: tuple[int, ...]
+    bank: str | Path = ":memory:"
 
     def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         """As `ByStirring.simulate`."""
         return np.stack([self._one(truth, int(seed)) for truth, seed in _each(theta, seeds)])
 
     def _one(self, truth: dict[str, NDArray], seed: int) -> NDArray[np.float64]:
-        from ..inference import Bolfi
+        from ..inference import Bolfi, SimulationBank
+        from ..kept import Keep, keeping
 
         rules: dict[str, Any] = {**PAPER_RULES}
-        engine = Bolfi(
-            self.prior,
-            self._spilled(truth, np.array([seed]))[0],
-            seed=seed,
-            capacity=self.budgets[-1],
-            initial=MIN_SIMULATIONS,
-            discrepancy=_squared,
-            **rules,
-        )
-        fits = after_each(engine, self._spilled, self.budgets)
-        return np.stack([concluded(fit, seed) for fit in fits])
+        with SimulationBank(self.bank) as bank:
+            keep = Keep(bank, json.dumps(["training pour", *self._pour], sort_keys=True), BATCH)
+            simulate = keeping(self._spilled, (1,), keep)
+            engine = Bolfi(
+                self.prior,
+                simulate(truth, np.array([seed]))[0],
+                seed=seed,
+                capacity=self.budgets[-1],
+                initial=MIN_SIMULATIONS,
+                discrepancy=_squared,
+                **rules,
+            )
+            fits = after_each(engine, simulate, self.budgets)
+            return np.stack([concluded(fit, seed) for fit in fits])
 
     def _spilled(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         """Fraction that the training pour spills, shape (B, 1)."""
@@ -118,6 +131,10 @@ class ByPouring:
         action = models.PourAction(self.angular_velocity, self.distance)
         made = models.pour(models.Liquid(**theta, density=DENSITY), action, self.cups, seeds)
         return np.asarray(made.spilled, np.float64)[:, None]
+
+    @property
+    def _pour(self) -> list[Any]:
+        return [[self.angular_velocity, self.distance], DENSITY, self.cups.settings()]
 
     @property
     def identity(self) -> str:

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from ..drawing import BLUE, GREY, ORANGE, PALETTE, new_figure, styled
 from .figure import Drawn
+from .figures_of_spillage import interval
 from .sticky import TRAINING
 from .workshop import Workshop
 
@@ -47,14 +48,17 @@ def adhesion(workshop: Workshop) -> Drawn:
             **{key: ("truth", [truth.theta[key] for truth in truths]) for key in truths[0].theta},
         },
     )
-    return Drawn(data, figure, _says(100.0 * spilled.mean(axis=0), named))
+    return Drawn(data, figure, _says(100.0 * spilled, named))
 
 
-def _says(means: NDArray, named: list[str]) -> str:
-    believed, before, after, known = means
+def _says(percent: NDArray, named: list[str]) -> str:
+    """Of percentages spilled (truths, cases)."""
+    believed, before, after, known = percent.mean(axis=0)
     right = sum(names == "adhesion" for names in named)
-    lost = before - known
-    won = f"{100 * (before - after) / lost:.0f} % of the loss won back; " if lost > 0 else ""
+    low, high = interval(percent[:, 1] - percent[:, 2])
+    won = f"{before - after:.1f} points won back"
+    won += f" (paired, 90 %: {low:.1f} to {high:.1f})" if len(percent) > 1 else ""
+    won += f" of {before - known:.1f}; "
     return (
         f"spilled where the liquid sticks: {before:.1f} % by the pour chosen after stirring "
         f"({believed:.1f} % if it did not stick), {after:.1f} % by the one chosen after criticism, "

@@ -4,131 +4,152 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from ..bundled import POURED, bundled_pours
 from ..drawing import GREY, INK, PALETTE, new_figure, styled
 from ..pour_results import read_pour
 from ..pouring import choose_pour
 from ..prior import default_prior
-from ..spillage import Surface
-from .decisions import decide_unknowing
+from ..spillage import ACTION, Surface
+from .decisions import RULES, Action, decide_unknowing
 from .figure import Drawn
+from .table_between import between
 from .workshop import Workshop
 
 if TYPE_CHECKING:
-    from ..pour_table import PourTable
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from xarray import DataArray, Dataset
 
-
-def between(table: "PourTable", rate: float, distance: float) -> tuple[float, float]:
-    """What the table spilled between its actions, and what that misses.
-
-    Along the distance by monotone cubics (Fritsch and Carlson 1980), since the best distance lies
-    in a valley, which chords between rows of the table cut off: they miss more, and nearly always
-    upwards. Linear in the logarithm of the angular velocity. The error is the RMS over pours
-    that are left out in turn and have a neighbour on either side. Beyond the table its edge is
-    taken.
-
-    Returns:
-        Spilled fraction, and its error.
-    """
-    spilled = table.fractions[:, 0]
-    rates = np.unique(table.angular_velocity)
-    rows = [np.flatnonzero(table.angular_velocity == one) for one in rates]
-    rows = [row[np.argsort(table.distance[row])] for row in rows]
-
-    def along(row: NDArray, at: float) -> float:
-        """Of the pours `row`, all of one angular velocity."""
-        known = table.distance[row]
-        return float(PchipInterpolator(known, spilled[row])(np.clip(at, known[0], known[-1])))
-
-    value = np.interp(np.log(rate), np.log(rates), [along(row, distance) for row in rows])
-    missed = [
-        along(row[row != left], table.distance[left]) - spilled[left]
-        for row in rows
-        for left in row[1:-1]
-    ]
-    return float(value), float(np.sqrt(np.mean(np.square(missed))))
-
-
-def _least(run: Path, risk: str) -> dict[str, float]:
-    """The action at which another measure of risk is least, over the draws tried everywhere."""
-    actions = read_pour(run)["actions"]
-    return Surface(*(actions[name].to_numpy() for name in Surface._fields)).least(risk)
+OTHERS = {"plug_in": ("x", "best at θ* alone"), "cvar": ("^", "least CVaR of the first draws")}
+"""Rules beside the least expected spillage -> marker and label."""
 
 
 def recordings(workshop: Workshop) -> Drawn:
     """Chosen from a recording of stirring alone, spilled by the other solver."""
+    data = _judged(workshop)
+    return Drawn(data, _figure(data), _says(data))
+
+
+def _judged(workshop: Workshop) -> "Dataset":
     from xarray import Dataset
 
     scale = workshop.scale
-    action = decide_unknowing(workshop.grid, default_prior(), scale.seed)
-    unknowing = action["angular_velocity"], action["distance"]
-    columns = [(n, s) for s in scale.surrogates for n in scale.recorded]
-    shape = len(POURED), len(columns)
-    spilled, plug_in, cautious = np.empty(shape), np.empty(shape), np.empty(shape)
-    best, blind = [], []
-    lines = ["spilled by the other solver [%], its table interpolated:"]
+    runs = [(surrogate, n) for surrogate in scale.surrogates for n in scale.recorded]
+    shape = len(POURED), len(runs), len(RULES)
+    spilled, error, rates, distances = (np.empty(shape) for _ in range(4))
+    unknowing = decide_unknowing(workshop.grid, default_prior(), scale.seed)
+    best, unknown = np.empty(len(POURED)), np.empty((len(POURED), 2))
     for row, liquid in enumerate(POURED):
         table = bundled_pours(liquid)
-        least = int(np.argmin(table.fractions[:, 0]))
-        best.append(float(table.fractions[least, 0]))
-        blind.append(between(table, *unknowing)[0])
-        for column, (budget, surrogate) in enumerate(columns):
-            pour = choose_pour(
-                workshop.calibration(liquid, budget, surrogate),
-                iterations=scale.rates,
-                seed=scale.seed,
-                progress=workshop.progress,
-            )
-            spilled[row, column], error = between(
-                table, pour.chosen.angular_velocity, pour.chosen.distance
-            )
-            plug_in[row, column], _ = between(
-                table, pour.plug_in.angular_velocity, pour.plug_in.distance
-            )
-            worst = _least(pour.path, "cvar")
-            cautious[row, column], _ = between(table, worst["angular_velocity"], worst["distance"])
-            lines.append(
-                f"  {liquid}, N = {budget}, {surrogate}: {100 * spilled[row, column]:.1f} "
-                f"(error of interpolation {100 * error:.1f}) at "
-                f"{np.degrees(pour.chosen.angular_velocity):.0f} deg/s, "
-                f"{100 * pour.chosen.distance:.1f} cm; at theta* alone "
-                f"{100 * plug_in[row, column]:.1f}, by CVaR {100 * cautious[row, column]:.1f}; "
-                f"table's best {100 * best[-1]:.1f}; "
-                f"liquid unknown {100 * blind[-1]:.1f}"
-            )
-    labels = [f"{s}, N = {n}" for n, s in columns]
+        best[row] = table.fractions[:, 0].min()
+        unknown[row] = between(table, *(unknowing[name] for name in ACTION))
+        for column, (surrogate, budget) in enumerate(runs):
+            actions = _chosen(workshop, liquid, budget, surrogate)
+            for at, rule in enumerate(RULES):
+                rate, distance = (actions[rule][name] for name in ACTION)
+                place = row, column, at
+                spilled[place], error[place] = between(table, rate, distance)
+                rates[place], distances[place] = rate, distance
+    dims = ("liquid", "run", "rule")
+    return Dataset(
+        {
+            "spilled": (dims, spilled),
+            "error": (dims, error),
+            "angular_velocity": (dims, rates, {"units": "rad s-1"}),
+            "distance": (dims, distances, {"units": "m"}),
+            "best": ("liquid", best),
+            "unknown": ("liquid", unknown[:, 0]),
+            "unknown_error": ("liquid", unknown[:, 1]),
+        },
+        {
+            "liquid": list(POURED),
+            "run": [f"{surrogate}, N = {n}" for surrogate, n in runs],
+            "rule": list(RULES),
+        },
+    )
+
+
+def _chosen(workshop: Workshop, liquid: str, budget: int, surrogate: str) -> dict[str, Action]:
+    """By the rules of `RULES`."""
+    scale = workshop.scale
+    pour = choose_pour(
+        workshop.calibration(liquid, budget, surrogate),
+        iterations=scale.rates,
+        seed=scale.seed,
+        progress=workshop.progress,
+    )
+    return {
+        "plug_in": pour.plug_in.action,
+        "mean": pour.chosen.action,
+        "cvar": _least(pour.path, "cvar"),
+    }
+
+
+def _least(run: Path, risk: str) -> dict[str, float]:
+    """The action at which another measure of risk is least, over the draws tried everywhere.
+
+    `choose_pour` would try the most promising ones on other draws, too.
+    """
+    actions = read_pour(run)["actions"]
+    return Surface(*(actions[name].to_numpy() for name in Surface._fields)).least(risk)
+
+
+def _figure(data: "Dataset") -> "Figure":
+    labels = data["run"].to_numpy().tolist()
+    expected = data.sel(rule="mean")
+    bars = [("table's best", 100.0 * data["best"], None, GREY)]
+    bars += [("liquid unknown", 100.0 * data["unknown"], data["unknown_error"], "#c9cfd6")]
+    bars += [
+        (f"chosen, {label}", 100.0 * one["spilled"], one["error"], colour)
+        for label, colour in zip(labels, PALETTE, strict=False)
+        for one in [expected.sel(run=label)]
+    ]
+    width = 0.8 / len(bars)
     with styled():
         figure = new_figure(7.4, 3.8)
         axes = figure.subplots()
-        width = 0.8 / (len(columns) + 2)
-        bars = [
-            ("table's best", np.array(best), GREY),
-            ("liquid unknown", np.array(blind), "#c9cfd6"),
-        ]
-        bars += [(f"chosen, {label}", spilled[:, n], PALETTE[n]) for n, label in enumerate(labels)]
-        for at, (label, values, colour) in enumerate(bars):
-            x = np.arange(len(POURED)) + width * (at - (len(bars) - 1) / 2)
-            axes.bar(x, 100 * values, 0.9 * width, color=colour, label=label)
-            if at >= 2:
-                axes.plot(x, 100 * plug_in[:, at - 2], "x", color=INK, ms=5,
-                          label="best at θ* alone" if at == 2 else None)  # fmt: skip
-                axes.plot(x, 100 * cautious[:, at - 2], "^", color=INK, mfc="none", ms=5,
-                          label="by CVaR" if at == 2 else None)  # fmt: skip
-        axes.set_xticks(range(len(POURED)), POURED)
+        places = np.arange(data.sizes["liquid"])
+        for at, (label, percent, error, colour) in enumerate(bars):
+            x = places + width * (at - (len(bars) - 1) / 2)
+            axes.bar(x, percent, 0.9 * width, color=colour, label=label)
+            if error is not None:
+                _whiskers(axes, x, percent, 100.0 * error)
+            for rule, (marker, name) in OTHERS.items() if at >= 2 else ():
+                other = 100.0 * data["spilled"].sel(run=labels[at - 2], rule=rule)
+                shown = name if at == 2 else None
+                axes.plot(x, other, marker, color=INK, mfc="none", ms=5, label=shown)
+        axes.set_xticks(places, data["liquid"].to_numpy())
         axes.set_ylabel("spilled in the other solver [%]")
         figure.legend(loc="outside lower center", ncols=3)
-    dims = ("liquid", "run")
-    data = Dataset(
-        {
-            "spilled": (dims, spilled),
-            "plug_in": (dims, plug_in),
-            "cvar": (dims, cautious),
-            "best": ("liquid", best),
-            "unknown": ("liquid", blind),
-        },
-        {"liquid": list(POURED), "run": labels},
-    )
-    return Drawn(data, figure, "\n".join(lines))
+    return figure
+
+
+def _whiskers(axes: "Axes", x: np.ndarray, percent: "DataArray", error: "DataArray") -> None:
+    """Errors of the table; no less than nothing is spilled."""
+    off = np.stack([np.minimum(error, percent), error])
+    axes.errorbar(x, percent, off, fmt="none", ecolor=INK, elinewidth=0.8, alpha=0.6)
+
+
+def _says(data: "Dataset") -> str:
+    lines = ["spilled by the other solver [%], its table interpolated:"]
+    for liquid in data["liquid"].to_numpy():
+        for run in data["run"].to_numpy():
+            one = data.sel(liquid=liquid, run=run)
+            chosen = one.sel(rule="mean")
+            plug_in, cautious = (100.0 * float(one["spilled"].sel(rule=rule)) for rule in OTHERS)
+            lines.append(
+                f"  {liquid}, {run}: {100.0 * float(chosen['spilled']):.1f} "
+                f"({_reliability(float(chosen['error']))}) at "
+                f"{np.degrees(float(chosen['angular_velocity'])):.0f} deg/s, "
+                f"{100.0 * float(chosen['distance']):.1f} cm; at theta* alone {plug_in:.1f}, by "
+                f"CVaR {cautious:.1f}; table's best {100.0 * float(one['best']):.1f}; liquid "
+                f"unknown {100.0 * float(one['unknown']):.1f}"
+            )
+    return "\n".join(lines)
+
+
+def _reliability(error: float) -> str:
+    if np.isnan(error):
+        return "beyond the table: its edge"
+    return f"error of interpolation {100.0 * error:.1f}"

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..drawing import GREY, INK, PALETTE, new_figure, styled
 from .figure import Drawn
-from .figures_of_spillage import FEW_PERCENT, interval
+from .figures_of_spillage import FEW_PERCENT, complete, interval
 from .truths import LIQUIDS
 from .workshop import Workshop
 
@@ -19,7 +19,7 @@ ENOUGH = (0.05, 0.01)  # spilled, on average over the liquids
 
 def strokes(workshop: Workshop) -> Drawn:
     """Spilled percentage, and what is known of the viscosity, by the number of strokes."""
-    study = workshop.strokes.squeeze("budget")
+    study = complete(workshop.strokes).squeeze("budget")
     study = study.rename(learned_by="strokes").assign_coords(strokes=list(workshop.scale.strokes))
     spilled = study["spilled"].sel(rule="mean").transpose("truth", "strokes")
     drawn = study["concluded"].sel(parameter="viscosity").isel(draw=slice(1, None))
@@ -44,8 +44,10 @@ def _by_liquid(axes: "Axes", values: np.ndarray, study: "Dataset") -> None:
     numbers = study["strokes"].to_numpy()
     for liquid, colour in zip(LIQUIDS, PALETTE, strict=False):
         own = values[study["liquid"].to_numpy() == liquid]
-        axes.plot(numbers, np.nanmean(own, axis=0), ".-", color=colour, lw=0.8, label=liquid)
-    means = np.nanmean(values, axis=0)
+        if not len(own):
+            continue
+        axes.plot(numbers, own.mean(axis=0), ".-", color=colour, lw=0.8, label=liquid)
+    means = values.mean(axis=0)
     ends = np.array([interval(column) for column in values.T])
     axes.errorbar(numbers, means, np.abs(ends.T - means), fmt="o-", color=INK, ms=4,
                   label="all, with 90 %", zorder=4)  # fmt: skip
@@ -54,7 +56,7 @@ def _by_liquid(axes: "Axes", values: np.ndarray, study: "Dataset") -> None:
 
 
 def _says(study: "Dataset", spilled: np.ndarray, budget: int) -> str:
-    numbers, means = study["strokes"].to_numpy(), np.nanmean(spilled, axis=0)
+    numbers, means = study["strokes"].to_numpy(), spilled.mean(axis=0)
     told = ", ".join(f"{k}: {100 * mean:.2f}" for k, mean in zip(numbers, means, strict=True))
     lines = [f"spilled [%] after strokes, signal surrogate, N = {budget}, least expected: {told}"]
     for share in ENOUGH:

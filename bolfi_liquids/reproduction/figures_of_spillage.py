@@ -32,19 +32,22 @@ LEVEL = 0.9
 
 
 def interval(values: NDArray, seed: int = 0) -> tuple[float, float]:
-    """90 % bootstrap interval of the mean of values that are not NaN, shape (n,); NaN of none."""
-    seen = values[np.isfinite(values)]
-    if not len(seen):
+    """90 % bootstrap interval of the mean of values, shape (n,); NaN of none.
+
+    Truths are resampled whatever their liquid, which makes it rather wide: of each liquid there
+    are as many.
+    """
+    if not len(values):
         return np.nan, np.nan
     rng = np.random.default_rng(seed)
-    means = seen[rng.integers(0, len(seen), (RESAMPLED, len(seen)))].mean(axis=1)
+    means = values[rng.integers(0, len(values), (RESAMPLED, len(values)))].mean(axis=1)
     low, high = np.quantile(means, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
     return float(low), float(high)
 
 
 def spillage(workshop: Workshop) -> Drawn:
     """Spilled percentage against N for calibration by stirring and by pouring."""
-    study = workshop.study
+    study = complete(workshop.study)
     budgets = study["budget"].to_numpy()
     with styled():
         figure = new_figure(7.4, 4.6)
@@ -65,7 +68,7 @@ def spillage(workshop: Workshop) -> Drawn:
 def _against_budget(axes: "Axes", spilled: "DataArray", way: tuple[str, str], at: int) -> None:
     """Means, with 90 % intervals, side by side for those that are compared."""
     percent = 100.0 * spilled.transpose("budget", "truth").to_numpy()
-    means, ends = np.nanmean(percent, axis=1), np.array([interval(row) for row in percent])
+    means, ends = percent.mean(axis=1), np.array([interval(row) for row in percent])
     x = np.arange(len(means)) + 0.06 * (at - (len(SHOWN) - 1) / 2)
     colour = COLOURS[way]
     axes.plot(x, means, "-", color=colour, lw=0.8, alpha=0.5)
@@ -83,16 +86,25 @@ def _table(study: "Dataset") -> str:
         lines.append(f"  {label}: " + ", ".join(pairs))
     known, unknown = (100.0 * float(study[name].mean()) for name in ("known", "unknown"))
     lines.append(f"  liquid known: {known:.2f}, unknown: {unknown:.2f}")
-    failed = study["concluded"].isnull().any(["budget", "draw", "parameter"]).sum("truth")
-    for method in failed["learned_by"].to_numpy()[failed.to_numpy() > 0]:
-        left_out = int(failed.sel(learned_by=method))
-        lines.append(f"  {method}: {left_out} of {study.sizes['truth']} calibrations failed")
+    if left_out := study.attrs["left_out"]:
+        total = left_out + study.sizes["truth"]
+        lines.append(f"  without {left_out} of {total} truths, where a calibration or pour failed")
     return "\n".join(lines)
+
+
+def complete(study: "Dataset") -> "Dataset":
+    """The truths of which every calibration and every pour succeeded, so that means compare equals.
+
+    How many are not is its attribute `left_out`.
+    """
+    spilled = study[["spilled", "known", "unknown"]].to_array().notnull()
+    whole = spilled.all([name for name in spilled.dims if name != "truth"]).to_numpy()
+    return study.isel(truth=whole).assign_attrs(left_out=int((~whole).sum()))
 
 
 def liquids(workshop: Workshop) -> Drawn:
     """Spilled percentage by liquid at N = 10 and 20, or else at the largest N."""
-    study = workshop.study
+    study = complete(workshop.study)
     made = study["budget"].to_numpy().tolist()
     budgets = [n for n in (10, 20) if n in made] or made[-1:]
     rules = [
@@ -111,10 +123,12 @@ def liquids(workshop: Workshop) -> Drawn:
                 chosen = study["spilled"].sel(learned_by=method, rule=rule, budget=budget)
                 for place, liquid in enumerate(LIQUIDS):
                     percent = 100.0 * chosen.to_numpy()[study["liquid"].to_numpy() == liquid]
+                    if not len(percent):
+                        continue
                     x = place + 0.8 / len(rules) * (at - (len(rules) - 1) / 2)
                     label = SHOWN[method, rule] if place == 0 else None
                     colour, width = COLOURS[method, rule], 0.7 / len(rules)
-                    axes.bar(x, np.nanmean(percent), width, color=colour, alpha=0.6, label=label)
+                    axes.bar(x, percent.mean(), width, color=colour, alpha=0.6, label=label)
                     axes.plot(np.full(len(percent), x), percent, ".", color=colour, ms=4)
             axes.set_xticks(range(len(LIQUIDS)), list(LIQUIDS))
             axes.set_title(f"N = {budget}")
@@ -123,8 +137,9 @@ def liquids(workshop: Workshop) -> Drawn:
         panels[0].set_yticks(FEW_PERCENT, map(str, FEW_PERCENT))
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     last = study["spilled"].sel(learned_by="signal", rule="mean", budget=budgets[-1])
-    means = {name: 100.0 * float(last[study["liquid"] == name].mean()) for name in LIQUIDS}
-    says = ", ".join(f"{liquid} {mean:.2f} %" for liquid, mean in means.items())
+    by_liquid = (100.0 * last).groupby(study["liquid"]).mean()
+    told = [name for name in LIQUIDS if name in by_liquid["liquid"]]
+    says = ", ".join(f"{name} {float(by_liquid.sel(liquid=name)):.2f} %" for name in told)
     return Drawn(study, figure, f"least expected after N = {budgets[-1]} stirs: {says}")
 
 
@@ -132,30 +147,35 @@ def decision(workshop: Workshop) -> Drawn:
     """What deciding over the posterior saves against the plug-in at theta*, paired by truth."""
     from xarray import Dataset
 
-    study = workshop.study
+    study = complete(workshop.study)
     spilled = 100.0 * study["spilled"]
+    apart = spilled.sel(rule=["mean", "cvar"]) - spilled.sel(rule="plug_in", drop=True)
+    dims = ("learned_by", "rule", "budget")
+    ends = np.apply_along_axis(interval, -1, apart.transpose(*dims, "truth").to_numpy())
+    data = Dataset(
+        {
+            "difference": apart,
+            "mean": apart.mean("truth"),
+            "low": (dims, ends[..., 0]),
+            "high": (dims, ends[..., 1]),
+        }
+    )
     budgets = study["budget"].to_numpy()
     lines = ["spilled by the rule minus by the plug-in [percentage points], paired, with 90 %:"]
-    saved = {}
     with styled():
         figure = new_figure(7.4, 3.8)
         axes = figure.subplots()
         pairs = [(m, r) for m in ("discrepancy", "signal", "pour") for r in ("mean", "cvar")]
         for at, (method, rule) in enumerate(pairs):
-            apart = spilled.sel(learned_by=method, rule=rule) - spilled.sel(
-                learned_by=method, rule="plug_in"
-            )
-            rows = apart.transpose("budget", "truth").to_numpy()
-            saved[f"{method}_{rule}"] = ("budget", np.nanmean(rows, axis=1))
-            ends = np.array([interval(row) for row in rows])
+            one = data.sel(learned_by=method, rule=rule)
+            means, low, high = (one[name].to_numpy() for name in ("mean", "low", "high"))
             x = np.arange(len(budgets)) + 0.12 * (at - (len(pairs) - 1) / 2)
-            means = np.nanmean(rows, axis=1)
-            off = np.abs(ends.T - means)
+            off = np.stack([means - low, high - means])
             label = f"{method}, {'least expected' if rule == 'mean' else 'CVaR'}"
             axes.errorbar(x, means, off, fmt="o", ms=4, color=PALETTE[at], label=label)
             told = (
-                f"N = {n}: {m:+.2f} [{low:+.2f}, {high:+.2f}]"
-                for n, m, (low, high) in zip(budgets, means, ends, strict=True)
+                f"N = {n}: {m:+.2f} [{a:+.2f}, {b:+.2f}]"
+                for n, m, a, b in zip(budgets, means, low, high, strict=True)
             )
             lines.append(f"  {label}: " + ", ".join(told))
         axes.axhline(0.0, color=GREY, lw=0.8)
@@ -165,14 +185,14 @@ def decision(workshop: Workshop) -> Drawn:
         ticks = [*(-tick for tick in FEW_PERCENT[:0:-1]), *FEW_PERCENT]
         axes.set_yticks(ticks, [f"{tick:+g}" if tick else "0" for tick in ticks])
         figure.legend(loc="outside lower center", ncols=3)
-    return Drawn(Dataset(saved, {"budget": budgets}), figure, "\n".join(lines))
+    return Drawn(data, figure, "\n".join(lines))
 
 
 def surrogates(workshop: Workshop) -> Drawn:
     """Error of the viscosity at equal N: the signal surrogate against the paper's."""
     from xarray import DataArray, Dataset
 
-    study = workshop.study
+    study = complete(workshop.study)
     drawn = study["concluded"].sel(parameter="viscosity").isel(draw=slice(1, None))
     dims = ("learned_by", "truth", "budget")
     factors = drawn.transpose(*dims, "draw") / study["viscosity"]
@@ -185,7 +205,7 @@ def surrogates(workshop: Workshop) -> Drawn:
         axes = figure.subplots()
         for method, colour in zip(study["learned_by"].to_numpy(), PALETTE, strict=False):
             rows = error.sel(learned_by=method).transpose("budget", "truth").to_numpy()
-            means = np.nanmean(rows, axis=1)
+            means = rows.mean(axis=1)
             ends = np.array([interval(row) for row in rows])
             axes.fill_between(budgets, *np.exp(ends.T), color=colour, alpha=0.15, lw=0)
             label = {"pour": "pouring", "signal": "stirring, signal"}.get(method, "stirring, Φ")

@@ -1,5 +1,6 @@
 """Who learns the liquids of a study, and from what."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,24 +17,26 @@ if TYPE_CHECKING:
     from ..models import Cups
 
 
-def by_stirring_and_pouring(cups: "Cups", scale: Scale) -> dict[str, Learner]:
+def by_stirring_and_pouring(
+    cups: "Cups", scale: Scale, bank: str | Path = ":memory:"
+) -> dict[str, Learner]:
     """Stirring with either surrogate, and pouring as the paper's reference does."""
     prior, stirring = default_prior(), _star(bundled_recording("water"), scale)
     rate = np.sqrt(np.prod(cups.angular_velocity_range))
     training = float(rate), float(np.mean(cups.distance_range))
     return {
-        "signal": ByStirring(stirring, prior, "signal", scale.budgets),
-        "discrepancy": ByStirring(stirring, prior, "discrepancy", scale.budgets),
-        "pour": ByPouring(cups, prior, *training, scale.budgets),
+        "signal": ByStirring(stirring, prior, "signal", scale.budgets, bank),
+        "discrepancy": ByStirring(stirring, prior, "discrepancy", scale.budgets, bank),
+        "pour": ByPouring(cups, prior, *training, scale.budgets, bank),
     }
 
 
-def after_strokes(scale: Scale) -> dict[str, Learner]:
+def after_strokes(scale: Scale, bank: str | Path = ":memory:") -> dict[str, Learner]:
     """Stirring that ends after each number of strokes."""
     prior, whole = default_prior(), bundled_recording("water")
     return {
         str(number): ByStirring(
-            _star(until_stroke(whole, number), scale), prior, "signal", (scale.few,)
+            _star(until_stroke(whole, number), scale), prior, "signal", (scale.few,), bank
         )
         for number in scale.strokes
     }

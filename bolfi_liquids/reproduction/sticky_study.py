@@ -8,10 +8,10 @@ import numpy as np
 from ..calibrator import calibrate
 from ..criticiser import criticise
 from ..cups import bundled_cups
-from ..pouring import Pour, choose_pour
+from ..pouring import choose_pour
 from ..run_directory import open_bank
 from ..spillage import pour_all, surface
-from .decisions import Action, executions, spilled_by
+from .decisions import executions, spilled_by
 from .scale import Scale
 from .sticky import Sticky, draw_sticky, poured, recipe, stirred
 
@@ -71,11 +71,6 @@ def spilled_where_it_sticks(
     rates = np.geomspace(*cups.angular_velocity_range, scale.grid.rates)
     with open_bank(out) as bank:
         known = surface(pour_all(rehearsed, rates, bank, lambda steps: None), cups).least("mean")
-        actions = [_action(before), _action(after), known]
+        actions = [before.chosen.action, after.chosen.action, known]
         spilled = [*spilled_by(flows, actions[:1], bank), *spilled_by(sticks, actions, bank)]
     return Stuck(truth, spilled, ", ".join(criticism.effects))
-
-
-def _action(pour: Pour) -> Action:
-    chosen = pour.chosen
-    return {"angular_velocity": chosen.angular_velocity, "distance": chosen.distance}

@@ -15,6 +15,7 @@ from ..pour_grid import PourGrid, make_grid
 from ..prior import default_prior
 from ..progress import progress_bar
 from ..provenance import generations
+from ..run_directory import SIMULATIONS
 from .learners import after_strokes, by_stirring_and_pouring
 from .scale import Scale
 from .sticky_study import Stuck, spilled_where_it_sticks
@@ -58,12 +59,14 @@ class Workshop:
     @cached_property
     def study(self) -> "Dataset":
         """Spillage after stirring and after pouring; see `spillage_study`."""
-        return self._studied(by_stirring_and_pouring(self.grid.cups, self.scale))
+        return self._studied(
+            by_stirring_and_pouring(self.grid.cups, self.scale, self.out / SIMULATIONS)
+        )
 
     @cached_property
     def strokes(self) -> "Dataset":
         """The same after stirring for some strokes only."""
-        return self._studied(after_strokes(self.scale))
+        return self._studied(after_strokes(self.scale, self.out / SIMULATIONS))
 
     def _studied(self, learners: "Mapping[str, Learner]") -> "Dataset":
         return spillage_study(

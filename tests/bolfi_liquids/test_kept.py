@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference import SimulationBank
 
-from bolfi_liquids.kept import Keep, fresh_seeds, simulate_kept
+from bolfi_liquids.kept import Keep, fresh_seeds, keeping, simulate_kept
 
 
 def test_only_what_is_missing_is_simulated():
@@ -43,3 +43,19 @@ def test_seeds_differ_by_run_and_purpose():
     assert min(seeds) >= 0
     assert max(seeds) < 2**31
     assert fresh_seeds(0, 1, 50) == seeds[:50]
+
+
+def test_a_simulator_that_keeps_repeats_nothing_that_was_finished():
+    asked = []
+
+    def simulate(theta, seeds):
+        asked.extend(seeds.tolist())
+        return np.where(theta["a"] > 1.0, np.nan, theta["a"] + seeds)[:, None]
+
+    theta, seeds = {"a": np.array([0.0, 2.0, 1.0])}, np.array([1, 2, 3])
+    with SimulationBank() as bank:
+        kept = keeping(simulate, (1,), Keep(bank, "line", 2))
+        for _ in range(2):
+            np.testing.assert_array_equal(kept(theta, seeds), [[1.0], [np.nan], [4.0]])
+        np.testing.assert_array_equal(kept({"a": np.array([1.0])}, np.array([4])), [[5.0]])
+    assert [asked.count(seed) for seed in (1, 3, 4)] == [1, 1, 1]

@@ -1,0 +1,91 @@
+"""What a table of pours says between its actions, and how far that may be off."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bolfi_liquids import models
+from bolfi_liquids.bundled import bundled_pours
+from bolfi_liquids.cups import bundled_cups
+from bolfi_liquids.reproduction.table_between import between
+
+RATES = np.geomspace(0.5, 3.0, 5)
+
+
+def table(spilled):
+    """Pours on a grid of actions, of which a function tells the spillage."""
+    rate, distance = (m.ravel() for m in np.meshgrid(RATES, np.linspace(0, 0.06, 7)))
+    values = spilled(np.log(rate), distance)
+    fractions = np.column_stack([values, 1.0 - values, 0.0 * values])
+    return SimpleNamespace(angular_velocity=rate, distance=distance, fractions=fractions)
+
+
+def test_a_linear_table_is_interpolated_without_error():
+    plane = table(lambda log_rate, distance: 0.3 + 0.1 * log_rate + 2.0 * distance)
+    value, error = between(plane, 1.2, 0.033)
+    assert value == pytest.approx(0.3 + 0.1 * np.log(1.2) + 2.0 * 0.033)
+    assert error == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_table_curved_in_the_distance_tells_its_error():
+    def curved(_, distance):
+        return 200.0 * (distance - 0.03) ** 2
+
+    for rate in (1.2, RATES[2]):
+        value, error = between(table(curved), rate, 0.025)
+        assert abs(value - curved(0, 0.025)) < 3.0 * error < 0.1
+
+
+def test_a_table_curved_in_the_angular_velocity_tells_its_error_between_its_rows():
+    def curved(log_rate, _):
+        return 0.1 * log_rate**2
+
+    between_rows = np.sqrt(RATES[2] * RATES[3])
+    value, error = between(table(curved), between_rows, 0.025)
+    step = np.log(RATES[1] / RATES[0])
+    # of a chord over twice the step, by its second derivative: 0.2 / 2 * step^2
+    assert error == pytest.approx(0.1 * step**2)
+    assert abs(value - curved(np.log(between_rows), 0)) < error
+    assert between(table(curved), RATES[2], 0.025)[1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_beyond_the_table_its_edge_is_taken_and_no_error_is_claimed():
+    rising = table(lambda log_rate, distance: 10.0 * distance)
+    for rate, distance, edge in (1.0, 0.08, 0.6), (0.4, 0.03, 0.3), (3.5, 0.03, 0.3):
+        value, error = between(rising, rate, distance)
+        assert value == pytest.approx(edge)
+        assert np.isnan(error)
+    assert np.isfinite(between(rising, RATES[-1], 0.06)[1])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("viscosity", [0.01, 0.1, 1.0])
+def test_it_is_nearer_than_chords_to_a_finely_simulated_valley(viscosity):
+    """Of liquids like water, oil and glycerin, told at the other solver's distances.
+
+    Compared where less than 5 % is spilled: there choices lie.
+    """
+    pours, cups = bundled_pours("oil"), bundled_cups()
+    rate = pours.angular_velocity.min()
+    known = np.sort(pours.distance[pours.angular_velocity == rate])
+    fine = np.arange(known[0], known[-1], 5e-4)
+    seeds = np.arange(16)
+    liquid = models.Liquid(viscosity, np.linspace(0.0, 1.0, 16), 1000.0)
+    landed = models.landings(liquid, rate, cups, seeds)
+
+    def spilled(distance):
+        return landed.into(distance[:, None], cups.receiver.radius).spilled.mean(axis=1)
+
+    column = spilled(known)
+    told = SimpleNamespace(
+        angular_velocity=np.full(len(known), rate), distance=known, fractions=column[:, None]
+    )
+    truth = spilled(fine)
+    low = truth < 0.05
+    by_cubics = np.array([between(told, rate, distance)[0] for distance in fine])
+    by_chords = np.interp(fine, known, column)
+    missed = [guess[low] - truth[low] for guess in (by_cubics, by_chords)]
+    assert low.sum() > 5
+    assert np.abs(missed[0].mean()) < np.abs(missed[1].mean())
+    assert np.sqrt(np.mean(missed[0] ** 2)) < np.sqrt(np.mean(missed[1] ** 2))
