@@ -61,7 +61,7 @@ def check_sbc(
 
     Raises:
         InputError: A recording or setting cannot be used, or `out` holds other results.
-        RuntimeError: Of a surrogate, no replicate finished.
+        ValueError: Of a surrogate, no replicate finished.
     """
     settings = settings or SbcSettings()
     given = bundled_recording("water") if recording is None else recording

@@ -194,9 +194,8 @@ class Outcomes:
         """A text that two equal experiments share."""
         liquids = {name: np.asarray(values).tolist() for name, values in self.theta.items()}
         seeds = np.asarray(self.seeds).tolist()
-        return json.dumps(
-            ["profiles", self.cups.settings(), self.density, liquids, seeds], sort_keys=True
-        )
+        made_of = [self.cups.settings(), self.density, liquids, seeds, self.distances.tolist()]
+        return json.dumps(["profiles", *made_of], sort_keys=True)
 
 
 def pour_all(

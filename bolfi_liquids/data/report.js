@@ -113,7 +113,10 @@
       svg.setPointerCapture(event.pointerId); // its release counts also outside
       event.preventDefault();
     });
-    svg.addEventListener("pointercancel", () => (start = null));
+    svg.addEventListener("pointercancel", () => {
+      start = null;
+      frame.setAttribute("visibility", "hidden");
+    });
     svg.addEventListener("pointerup", (event) => {
       if (!start) return;
       const box = between(start, place(event));

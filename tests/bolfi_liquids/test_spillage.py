@@ -77,3 +77,12 @@ def test_a_shifted_landing_is_a_shifted_receiver():
     fractions = landed(made.fractions[0], made.distance, 0.03, np.array([-0.01, 0.0, 0.01]))
     assert fractions[:, 0] == pytest.approx([0.04, 0.03, 0.02])
     assert fractions.sum(axis=1) == pytest.approx(1.0)
+
+
+def test_profiles_of_other_distances_are_others(monkeypatch):
+    """What a bank holds of fewer distances is not taken for that of more."""
+    outcomes = Outcomes({}, 1000.0, bundled_cups(), np.zeros(1, int))
+    before = outcomes.identity
+    assert Outcomes({}, 1000.0, bundled_cups(), np.zeros(1, int)).identity == before
+    monkeypatch.setattr("bolfi_liquids.spillage.MISSED", 0.04)
+    assert outcomes.identity != before
