@@ -46,13 +46,6 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-app.add_typer(cli_check.app, name="check")
-app.add_typer(cli_rig.app, name="rig")
-app.add_typer(cli_simulate.app, name="simulate")
-app.command(epilog=cli_record.EPILOG)(cli_record.record)
-app.command(epilog=cli_reproduce.EPILOG)(cli_reproduce.reproduce)
-app.command("import", epilog=cli_import.EPILOG)(cli_import.import_table)
-app.command(epilog=cli_guide.EPILOG)(cli_guide.guide)
 
 
 def _print_version(asked: bool) -> None:
@@ -65,7 +58,8 @@ def _print_version(asked: bool) -> None:
 def _global_options(
     debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks of errors.")] = False,
     version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="And exit.")
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Show it and exit."),
     ] = False,
 ) -> None:
     """`--debug` is read by `OneLineErrors`."""
@@ -80,7 +74,7 @@ def _global_options(
 )
 def calibrate(  # noqa: PLR0913  one parameter for each option
     recordings: Annotated[
-        list[Path], typer.Argument(metavar="RECORDING...", help="NetCDF files, of one liquid.")
+        list[Path], typer.Argument(metavar="RECORDING", help="NetCDF files, of one liquid.")
     ],
     out: Annotated[Path, typer.Option(metavar="RUN", help="Directory of the run.")],
     budget: Annotated[
@@ -90,11 +84,11 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
         str, typer.Option(metavar="|".join(SURROGATES), help="What the engine emulates.")
     ] = CalibrationSettings.surrogate,
     sampler: Annotated[
-        str, typer.Option(metavar="|".join(SAMPLERS), help="Of the posterior.")
+        str, typer.Option(metavar="|".join(SAMPLERS), help="Of the posterior's draws.")
     ] = CalibrationSettings.sampler,
-    seed: Annotated[int, typer.Option(help="Of everything random.")] = CalibrationSettings.seed,
+    seed: Annotated[int, typer.Option(help="Of all random numbers.")] = CalibrationSettings.seed,
     particles: Annotated[
-        int, typer.Option(help="Of the simulated liquid.")
+        int, typer.Option(help="Of which the simulated liquid is made.")
     ] = CalibrationSettings.particles,
     batch: Annotated[
         int, typer.Option(help="Simulations run at the same time.")
@@ -165,7 +159,7 @@ def criticise(  # noqa: PLR0913  one parameter for each option
     accept: Annotated[
         list[str] | None, typer.Option(metavar="EFFECT", help="Joins the model in any case.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of everything random.")] = CriticismSettings.seed,
+    seed: Annotated[int, typer.Option(help="Of all random numbers.")] = CriticismSettings.seed,
 ) -> None:
     """Find where simulation and recording disagree, and which effect is missing."""
     from .criticiser import criticise as run_criticise
@@ -272,6 +266,16 @@ def demo(
     print_findings(Criticism.open(out))
     print_section(out, "pour")
     typer.echo(f"report: {path}")
+
+
+# after the commands above, for the help lists them in this order
+app.command("import", epilog=cli_import.EPILOG)(cli_import.import_table)
+app.command(epilog=cli_record.EPILOG)(cli_record.record)
+app.command(epilog=cli_reproduce.EPILOG)(cli_reproduce.reproduce)
+app.command(epilog=cli_guide.EPILOG)(cli_guide.guide)
+app.add_typer(cli_simulate.app, name="simulate")
+app.add_typer(cli_rig.app, name="rig")
+app.add_typer(cli_check.app, name="check")
 
 
 def main() -> None:

@@ -65,12 +65,12 @@ def sbc(  # noqa: PLR0913  one parameter for each option
     ] = SbcSettings.budget,
     noise: Annotated[float, typer.Option(help="Of the cameras [deg].")] = SbcSettings.noise_deg,
     particles: Annotated[
-        int, typer.Option(help="Of the simulated liquid.")
+        int, typer.Option(help="Of which the simulated liquid is made.")
     ] = SbcSettings.particles,
     workers: Annotated[
         int | None, typer.Option(min=1, help="Processes; else one for each processor.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of everything random.")] = SbcSettings.seed,
+    seed: Annotated[int, typer.Option(help="Of all random numbers.")] = SbcSettings.seed,
 ) -> None:
     """Simulation-based calibration of the whole pipeline, with the particle fluid.
 

@@ -3,6 +3,7 @@
 import shlex
 import sqlite3
 import sys
+import traceback
 from typing import Any
 
 import typer
@@ -30,13 +31,13 @@ class OneLineErrors(TyperGroup):
             raise
         except TyperException as err:
             if told := _one_line(err.format_message()):  # a group without a command shows its help
-                _say(f"error: {told}; see --help")
+                _say(f"error: {told.rstrip('.')}; see --help")
             raise typer.Exit(USAGE_ERROR) from None
         except BrokenPipeError:  # who reads has read enough, as `head` does: typer ends quietly
             raise
         except (ValueError, OSError, RuntimeError, ImportError, sqlite3.Error) as err:
             if ctx.params.get("debug"):
-                raise
+                traceback.print_exc()
             _say(f"error: {_explained(err)}")
             raise typer.Exit(FAILED if isinstance(err, RuntimeError) else USAGE_ERROR) from None
 

@@ -12,7 +12,7 @@ EPILOG = examples("reproduce --quick", "reproduce inclination posterior --out ru
 
 def reproduce(
     figures: Annotated[
-        list[str] | None, typer.Argument(metavar="[FIGURE]...", help="Names; all without any.")
+        list[str] | None, typer.Argument(metavar="FIGURE", help="Names; all without any.")
     ] = None,
     out: Annotated[
         Path | None,

@@ -15,7 +15,7 @@ Effects = Annotated[
     list[str] | None,
     typer.Option("--effect", metavar="NAME=VALUE", help="An effect; may be repeated."),
 ]
-Particles = Annotated[int, typer.Option(help="Of the simulated liquid.")]
+Particles = Annotated[int, typer.Option(help="Of which the simulated liquid is made.")]
 Seed = Annotated[int, typer.Option(help="Of the particles' first places.")]
 Movie = Annotated[Path | None, typer.Option(metavar="FILE", help="Show it: .mp4, .gif or .webp.")]
 GLYCERIN = {"viscosity": 1.0, "cohesion": 0.2, "density": 1260.0}

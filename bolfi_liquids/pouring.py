@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .calibration import Calibration
 from .criticism import latest_calibration
-from .cups import bundled_cups
+from .cups import bundled_cups, open_cups
 from .errors import InputError
 from .progress import Advance, progress_bar
 from .run_directory import POUR, open_bank
@@ -89,7 +89,7 @@ class Pour:
 
 def choose_pour(  # noqa: PLR0913  the one call that most users make
     calibration: Calibration | str | Path,
-    cups: "Cups | None" = None,
+    cups: "Cups | str | Path | None" = None,
     *,
     iterations: int = 15,
     draws: int = 16,
@@ -108,7 +108,8 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
 
     Args:
         calibration: Whose posterior is poured; or a RUN directory, whose latest is.
-        cups: Source, receiver and ranges of the action; None are the bundled ones.
+        cups: Source, receiver and ranges of the action, or a TOML file of them; None are the
+            bundled ones.
         iterations: Angular velocities tried, as many again for the plug-in.
         draws: Posterior draws that each action is tried on, and again those that promise most.
         risk: "mean", or "cvar": the mean over the worst tenth of the draws.
@@ -116,7 +117,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         progress: Whether to show a bar on stderr.
 
     Raises:
-        InputError: A setting cannot be used.
+        InputError: A setting or the file of the cups cannot be used.
         RuntimeError: Pours failed at every angular velocity, or at all of the promising ones.
     """
     from .pour_results import pour_section, pour_tree
@@ -125,7 +126,8 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     if not isinstance(calibration, Calibration):
         calibration = latest_calibration(calibration)
     settings = PourSettings(iterations=iterations, draws=draws, risk=risk, seed=seed)
-    cups = bundled_cups() if cups is None else cups
+    if cups is None or isinstance(cups, str | Path):
+        cups = bundled_cups() if cups is None else open_cups(cups)
     # distinct strata: none of the draws that judge has chosen
     needed = (2 + JUDGE_DRAWS) * draws
     if needed > (there := next(iter(calibration.posterior.values())).size):

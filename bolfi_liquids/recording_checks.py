@@ -19,8 +19,8 @@ MAX_BLIND = 0.5
 MIN_SEEN = 0.5
 """Smallest share of a plane's samples in which the stick must have been seen."""
 MAX_INTERVAL = 1.0  # between samples [s]; more looks like milliseconds
-MAX_POSITION = 2.0  # of the gripper [m]; more looks like millimetres
-MAX_LENGTH = 1.0  # of cup and stick [m]; more looks like millimetres
+MAX_POSITION = 2.0  # of the gripper [m]; more looks like cm or mm
+MAX_LENGTH = 1.0  # of cup and stick [m]; more looks like cm or mm
 MAX_MASS = 2.0  # of the stick [kg]; more looks like grams
 MAX_SPEED = 5.0  # of the gripper [m/s]; more looks like a time in other units
 MIN_TRAVEL = 1e-3  # of the gripper [m]; a liquid that is not stirred shows nothing
@@ -80,7 +80,7 @@ def _check_sizes(recording: "Recording") -> None:
     for name in LENGTHS:
         if recording.number(name) > MAX_LENGTH:
             raise InputError(
-                f"{attrs[name]} m looks like millimetres",
+                f"{attrs[name]} m looks like cm or mm",
                 where=f"{recording.path}: attribute {name}",
                 fix="convert it to m",
             )
@@ -112,7 +112,7 @@ def _check_gripper(recording: "Recording") -> None:
         seen = ~np.isnan(values)
         if np.abs(values[seen]).max(initial=0.0) > MAX_POSITION:
             raise InputError(
-                f"reaches {np.abs(values[seen]).max():g} m, which looks like millimetres",
+                f"reaches {np.abs(values[seen]).max():g} m, which looks like cm or mm",
                 where=where,
                 fix="convert the positions to m",
             )

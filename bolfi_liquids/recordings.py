@@ -138,7 +138,7 @@ def _read(path: Path) -> "Dataset":
         raise InputError(
             "not a NetCDF file that can be read",
             where=str(path),
-            fix="write it with xarray's to_netcdf, or record it again",
+            fix="if it is a table, bolfi-liquids import makes a recording of it",
         ) from err
     check_fields(dataset, path)
     return dataset

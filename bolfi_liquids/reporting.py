@@ -117,6 +117,7 @@ def _pour_context(section: Mapping[str, Any], tree: "DataTree") -> dict[str, Any
         "section": section,
         "sentence": narrative.pour_sentence(section),
         "sure_sentence": narrative.sure_sentence(section),
+        "limits": narrative.LIMITS,
         "figure": pour_figure(tree),
         "made_with": dict(tree.attrs),
         "rows": [("chosen pour", section), ("best at θ* alone", section["plug_in"])],

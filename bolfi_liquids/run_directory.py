@@ -143,6 +143,10 @@ def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, tu
 
 def _refused(differing: Mapping[str, tuple[Any, Any]], run: Path, growing: str) -> InputError:
     field, (held, wanted) = next(iter(differing.items()))
+    if field.startswith("inputs."):
+        what = "is of other recordings"
+        fix = f"give those that {RUN_TOML} names under files, unchanged, or choose another --out"
+        return InputError(what, where=str(run), fix=fix)
     if field.startswith("engine."):
         what, fix = f"{field} was {held!r} and is {wanted!r} now", "choose another --out"
     else:

@@ -76,7 +76,7 @@ class SbcSettings:
 
     runs: int = 200
     sequential: int = 40
-    design: int = 256
+    design: int = 512
     budget: int = 20
     noise_deg: float = 0.1
     particles: int = 1000

@@ -2,6 +2,7 @@
 
 import csv
 import hashlib
+from collections.abc import Iterator
 from difflib import get_close_matches
 from importlib.resources import files
 from pathlib import Path
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from .errors import InputError
 from .files import existing_file, new_netcdf, write_netcdf, write_text
 from .recording_checks import check_values
-from .recording_fields import PLANES
+from .recording_fields import AXES, DENSITIES, LENGTHS, PLANES
 from .recordings import Recording, as_recording, open_recording, recording_dataset
 from .strokes import speed
 from .table_map import ATTRIBUTE_UNITS, TableMap, open_table_map
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 
 TEMPLATE = "columns.toml"
 OTHER_NAME = "choose another name"
+STICK_WEIGHT_UNITS = {"stick_density": "kg/m3", "stick_mass": "kg"}
+LEAST_WAY = 5e-3  # m, of the gripper, on which an inclination can be seen to trail
+AHEAD = 0.2  # correlation from which a stick does not trail; thin liquids let it swing
 MISSING = ("", "nan", "na", "n/a", "null", "none", "-")
 
 
@@ -57,6 +61,8 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
     try:
         check_values(as_recording(dataset, table))
     except InputError as err:
+        if "looks like" not in err.what:
+            raise
         raise InputError(
             err.what, where=err.where, fix=f"{err.fix} (or the unit, in the map)"
         ) from err
@@ -121,9 +127,15 @@ def _cells(table: Path, meaning: TableMap) -> dict[str, NDArray[np.float64]]:
     for number, row in enumerate(reader, start=meaning.skip + 2):
         if not any(cell.strip() for cell in row):
             continue
+        if len(row) <= max(at.values()):
+            raise InputError(
+                f"{len(row)} cells, where the header has {len(header)}",
+                where=f"{table}: line {number}",
+                fix="complete the line, with empty cells for what is missing",
+            )
         for name, k in at.items():
-            cell = row[k].strip() if k < len(row) else ""
-            found[name].append(_number(cell, meaning.decimal, f"{table}: line {number}: {name}"))
+            where = f"{table}: line {number}: {name}"
+            found[name].append(_number(row[k].strip(), meaning.decimal, where))
     return {name: np.array(numbers) for name, numbers in found.items()}
 
 
@@ -159,7 +171,11 @@ def _number(cell: str, decimal: str, where: str) -> float:
 
 
 def outline(recording: Recording) -> str:
-    """What was read, in a few lines that show a wrong unit or sign at a glance."""
+    """What was read, in a few lines that show a wrong unit or sign at a glance.
+
+    A stirred stick trails: where the gripper is ahead of the cup's axis its tip is behind, so
+    the inclination in a plane goes against the gripper's position there.
+    """
     time, path = recording.time, recording.gripper.position
     reach, fastest = np.nanmax(path, axis=0) - np.nanmin(path, axis=0), np.nanmax(speed(recording))
     lines = [
@@ -169,9 +185,44 @@ def outline(recording: Recording) -> str:
         f"{100 * np.nanmean(path[:, 2]):.1f} cm above the cup's floor, "
         f"up to {100 * fastest:.1f} cm/s",
     ]
-    for name, angle in zip(PLANES, np.degrees(recording.inclination.T), strict=True):
-        lines.append(
-            f"{name}: {np.nanmin(angle):+.1f} to {np.nanmax(angle):+.1f} deg, "
-            f"seen in {np.isfinite(angle).mean():.1%} of the samples"
+    lines += [
+        f"{name}: {np.nanmin(angle):+.1f} to {np.nanmax(angle):+.1f} deg, "
+        f"seen in {np.isfinite(angle).mean():.1%} of the samples"
+        for name, angle in zip(PLANES, np.degrees(recording.inclination.T), strict=True)
+    ]
+    lines.append(", ".join(_sizes(recording)))
+    return "\n".join([*lines, *_trailing(recording)])
+
+
+def _sizes(recording: Recording) -> Iterator[str]:
+    for name in LENGTHS:
+        yield f"{name} {100 * recording.number(name):.4g} cm"
+    for name, unit in {**dict.fromkeys(DENSITIES, "kg/m3"), **STICK_WEIGHT_UNITS}.items():
+        if name in recording.attrs:
+            yield f"{name} {recording.number(name):.4g} {unit}"
+
+
+def _trailing(recording: Recording) -> Iterator[str]:
+    """How the inclinations go with the gripper, and what is strange about that."""
+    for name, angle, at in zip(PLANES, recording.inclination.T, (0, 1), strict=True):
+        along, across = (
+            _correlation(angle, recording.gripper.position[:, axis]) for axis in (at, 1 - at)
         )
-    return "\n".join(lines)
+        if not np.isfinite(along):
+            continue
+        yield f"{name}: correlation with the gripper's {AXES[at]} {along:+.2f} (usual: -0.4 to -1)"
+        if along > AHEAD:
+            yield f"warning: {name}: the stick leans ahead of the gripper; is `flip` right?"
+        elif abs(along) < abs(across):
+            yield (
+                f"warning: {name}: the stick follows {AXES[1 - at]} ({across:+.2f}) more than "
+                f"{AXES[at]}; are the planes exchanged?"
+            )
+
+
+def _correlation(angle: NDArray, position: NDArray) -> float:
+    """NaN where the gripper hardly moves that way."""
+    seen = np.isfinite(angle) & np.isfinite(position)
+    if np.ptp(position[seen]) < LEAST_WAY or np.ptp(angle[seen]) == 0.0:
+        return float("nan")
+    return float(np.corrcoef(angle[seen], position[seen])[0, 1])

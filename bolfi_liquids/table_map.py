@@ -2,7 +2,7 @@
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from .errors import InputError
 from .files import existing_file
 from .recording_fields import AXES, DENSITIES, LENGTHS, PLANES, STICK_WEIGHT
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
@@ -84,8 +87,14 @@ class TableMap(Given):
     def _complete(self) -> "TableMap":
         _check_names("columns", self.columns, COLUMN_UNITS, needed=tuple(COLUMN_UNITS))
         _check_names("attributes", self.attributes, ATTRIBUTE_UNITS, needed=LENGTHS + DENSITIES)
-        if not any(name in self.attributes for name in STICK_WEIGHT):
-            raise ValueError(f"attributes: {' or '.join(STICK_WEIGHT)} is missing")
+        weighed = [name for name in STICK_WEIGHT if name in self.attributes]
+        if len(weighed) != 1:
+            has = "both are given" if weighed else "is missing"
+            raise ValueError(f"attributes: one of {' and '.join(STICK_WEIGHT)}; {has}")
+        owners: dict[str, str] = {}
+        for name, one in self.columns.items():
+            if (other := owners.setdefault(one.column, name)) != name:
+                raise ValueError(f"columns.{name} and columns.{other} are both {one.column!r}")
         return self
 
 
@@ -101,13 +110,25 @@ def open_table_map(path: str | Path) -> TableMap:
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as err:
         raise InputError(f"not TOML: {err}", where=str(path), fix="correct that line") from err
     except ValidationError as err:
-        first = err.errors(include_url=False, include_context=False)[0]
+        # a mistyped name is missing under its right one, too
+        errors = err.errors(include_url=False, include_context=False)
+        first = min(errors, key=lambda one: one["type"] != "extra_forbidden")
         field = ".".join(map(str, first["loc"]))
         raise InputError(
-            first["msg"].removeprefix("Value error, "),
+            _said(first),
             where=f"{path}: {field}" if field else str(path),
             fix="compare with what `bolfi-liquids import --template` writes",
         ) from err
+
+
+def _said(error: "ErrorDetails") -> str:
+    """In the words of somebody who has written the file."""
+    if error["type"] == "extra_forbidden":
+        return "is no field that is known"
+    if error["type"] == "missing":
+        return "is missing"
+    said, given = error["msg"].removeprefix("Value error, "), error["input"]
+    return f"{said}, got {given!r}" if isinstance(given, str | int | float) else said
 
 
 def _check_names(

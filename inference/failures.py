@@ -1,16 +1,31 @@
 """Why a simulation failed: a sentence per simulation, of which the kind can be told."""
 
+import os
+import traceback
 from collections import Counter
 from collections.abc import Iterable
+from pathlib import Path
 
 RAISED, NOT_FINITE, TIMEOUT = "raised", "not finite", "timeout"
 """Kinds: the simulator raised; it returned NaN or infinity; it took too long."""
 
 
+_ENGINE = str(Path(__file__).parent)
+_INSTALLED = f"{os.sep}lib{os.sep}python"  # of Python's own modules and of packages
+
+
 def raised(error: BaseException) -> str:
-    """What is kept of an exception: its type's name and its text."""
-    text = f"{type(error).__name__}: {error}"
+    """What is kept of an exception: its type's name, its text, and the user's line, if any."""
+    text = f"{type(error).__name__}: {error}{_line(error)}"
     return text.encode(errors="backslashreplace").decode()  # file names may hold half characters
+
+
+def _line(error: BaseException) -> str:
+    """The last line of the traceback that is neither the engine's nor an installed package's."""
+    for frame in reversed(traceback.extract_tb(error.__traceback__)):
+        if not frame.filename.startswith(_ENGINE) and _INSTALLED not in frame.filename:
+            return f" ({Path(frame.filename).name}, line {frame.lineno})"
+    return ""
 
 
 def timed_out(timeout: float) -> str:

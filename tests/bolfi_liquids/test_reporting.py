@@ -97,13 +97,16 @@ def test_file_names_are_escaped(calibration, tmp_path):
     assert "&lt;script&gt;alert" in text
 
 
-@pytest.mark.parametrize(("high", "verdict"), [(0.98, "says little"), (0.3, "as wide as")])
+@pytest.mark.parametrize(("high", "verdict"), [(0.98, "says little"), (0.3, "what the prior held")])
 def test_sentence_tells_learned_from_not_learned(rng, high, verdict):
     values = {"q05": 0.1, "q50": 0.2, "q95": high}
     assert verdict in parameter_sentence("cohesion", values, rng.uniform(size=2000))
 
 
-@pytest.mark.parametrize(("fit", "verdict"), [(0.4, "as can be expected"), (0.9, "lacks")])
+@pytest.mark.parametrize(
+    ("fit", "verdict"),
+    [(0.3, "as closely as can be"), (0.4, "1.3 times as much"), (0.9, "lacks")],
+)
 def test_sentence_measures_the_fit_by_the_noise(fit, verdict):
     section = {"fit_rms_deg": fit, "noise_deg": 0.3, "n_simulations": 20}
     assert verdict in fit_sentence(section)

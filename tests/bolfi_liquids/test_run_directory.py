@@ -45,7 +45,6 @@ def test_a_run_is_not_overwritten(tmp_path):
         ("settings", "prior", {"viscosity": "Uniform(0, 1)"}),
         ("simulator", "recording_1", {"particles": 500, "cup": {"radius": 0.04}}),
         ("simulator", "recording_2", {"particles": 1000}),
-        ("inputs", "sha256", ["cd"]),
     ],
 )
 def test_resuming_with_another_setting_names_it(tmp_path, section, field, value):
@@ -55,6 +54,14 @@ def test_resuming_with_another_setting_names_it(tmp_path, section, field, value)
     with pytest.raises(InputError, match=rf"{section}\.{field}"):
         enter_run(tmp_path, other, resume=True)
     assert read_run(tmp_path) == RECORD
+
+
+def test_resuming_with_another_recording_is_said(tmp_path):
+    enter_run(tmp_path, RECORD, resume=False)
+    other = copy.deepcopy(RECORD)
+    other["inputs"]["sha256"] = ["cd"]
+    with pytest.raises(InputError, match="is of other recordings; give those that run.toml names"):
+        enter_run(tmp_path, other, resume=True)
 
 
 def test_a_run_grows_in_the_field_that_may_grow(tmp_path):

@@ -1,11 +1,13 @@
 """A table in other columns, units and signs becomes the recording that it was made from."""
 
+import re
 from importlib.resources import files
 
 import numpy as np
 import pytest
 
 import bolfi_liquids as bl
+from bolfi_liquids.bundled import RECORDED, bundled_recording
 from bolfi_liquids.table_import import import_table, outline, write_template
 from bolfi_liquids.table_map import open_table_map
 
@@ -83,7 +85,7 @@ def test_cells_without_a_number_are_missing_samples(tmp_path, written, truth):
     def blind(rows):
         for at, cell in ((40, ""), (41, "NaN"), (42, "n/a")):
             rows[at][4] = cell
-        del rows[50][5:]
+        rows[50][5] = ""
 
     table = table_of(tmp_path / "blind.csv", truth, blind)
     found = import_table(table, written[1], tmp_path / "blind.nc")
@@ -100,6 +102,10 @@ def test_cells_without_a_number_are_missing_samples(tmp_path, written, truth):
         (lambda rows: rows[0].__setitem__(6, "X"), "2 columns are named 'X'"),
         (lambda rows: rows.insert(20, rows[21]), "times must increase"),
         (lambda rows: rows.clear(), "no column"),
+        (
+            lambda rows: rows[7].__delitem__(slice(3, None)),
+            "line 10: 3 cells, where the header has 7",
+        ),
         (lambda rows: rows.__delitem__(slice(5, None)), "4 samples"),
     ],
 )
@@ -121,6 +127,14 @@ def test_what_cannot_be_used_is_named(tmp_path, written, truth, change, says):
         ("skip = 2", 'skip = "2"', "skip"),
         ("skip = 2", "skip 2", "not TOML"),
         ("liquid_density = { value", "liquid_densty = { value", "liquid_densty is none of"),
+        ('"X", unit = "mm"', '"Y", unit = "mm"', "columns.y and columns.x are both 'Y'"),
+        ('"X", unit = "mm"', '"X", units = "mm"', "columns.x.units: is no field that is known"),
+        ('"X", unit = "mm"', '"X"', "columns.x.unit: is missing"),
+        (
+            "[attributes]",
+            '[attributes]\nstick_mass = { value = 9.0, unit = "g" }',
+            "both are given",
+        ),
     ],
 )
 def test_a_map_that_cannot_be_right_is_named(tmp_path, written, old, new, says):
@@ -131,6 +145,37 @@ def test_a_map_that_cannot_be_right_is_named(tmp_path, written, old, new, says):
     with pytest.raises(ValueError, match=says):
         import_table(table, columns, tmp_path / "stir.nc")
     assert not (tmp_path / "stir.nc").exists()
+
+
+@pytest.mark.parametrize("liquid", RECORDED)
+def test_what_a_stick_does_is_not_warned_of(liquid):
+    assert "warning" not in outline(bundled_recording(liquid))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('"B", unit = "mrad", flip = true', '"B", unit = "mrad"', "_yz: the stick leans ahead of"),
+        ('"X", unit = "mm" }', '"X", unit = "mm", flip = true }', "_xz: the stick leans ahead of"),
+        ("inclination_xz = {", "swap", "inclination_xz: the stick follows y .* exchanged"),
+    ],
+)
+def test_a_stick_that_cannot_lean_so_is_warned_of(tmp_path, written, old, new, says):
+    table, columns = written
+    text = columns.read_text()
+    if new == "swap":
+        rest = text.replace("inclination_xz =", "X =").replace(
+            "inclination_yz =", "inclination_xz ="
+        )
+        columns.write_text(rest.replace("X =", "inclination_yz ="))
+    else:
+        columns.write_text(text.replace(old, new))
+    told = outline(import_table(table, columns, tmp_path / "stir.nc"))
+    assert re.search(f"warning: .*{says}", told)
+
+
+def test_sizes_are_told_as_a_person_measures_them(truth):
+    assert "cup_radius 4 cm" in outline(truth) and "liquid_density 1000 kg/m3" in outline(truth)
 
 
 @pytest.mark.parametrize("name", ["stir.csv", "columns.toml", "other.nc"])
