@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 SEARCHED = 3  # simulations that the engine chose, of which fewer are no search
 MUCH = 0.05  # spilled, which a person would mop up
+KEPT = 0.2  # by the source; what flows has left it then, and a gel leaves less than this
 STALE = (
     "The pour was chosen over another posterior than that of the latest calibration or criticism:"
     " choose it again."
@@ -95,6 +96,12 @@ def _of_the_pour(poured: Mapping[str, Any] | None, tree: "DataTree | None") -> l
         told.append(
             f"Even the best pour is expected to spill {share}: stir longer, or bring the cups"
             " nearer to each other."
+        )
+    retained = float(tree["chosen"]["retained"].mean())
+    if retained > KEPT:
+        told.append(
+            f"Of the liquid {narrative.percent(retained)} stays in the source, and what stays is "
+            "not spilled: is the final angle of the cups' file large, and held long, enough?"
         )
     return told
 

@@ -22,11 +22,14 @@ AGREES = {"verdict": "none", "baseline": 2}
 POURED = {"expected_spillage": 0.01}
 
 
-def poured(rate=1.0, distance=0.03):
+def poured(rate=1.0, distance=0.03, retained=0.05):
     actions = xr.Dataset(
         coords={"angular_velocity": [0.5, 1.0, 3.0], "distance": [0.0, 0.03, 0.07]}
     )
-    chosen = xr.Dataset(attrs={"angular_velocity": rate, "distance": distance})
+    chosen = xr.Dataset(
+        {"retained": ("outcome", [0.0, 2.0 * retained])},
+        attrs={"angular_velocity": rate, "distance": distance},
+    )
     liquids = xr.Dataset({"viscosity": ("draw", [1.0, 3.0])})
     return xr.DataTree.from_dict({"/actions": actions, "/chosen": chosen, "/liquids": liquids})
 
@@ -49,6 +52,7 @@ def test_nothing_is_said_where_nothing_is_wrong():
         ({}, {**AGREES, "baseline": 0}, 0.01, {}, "Without clean recordings"),
         ({}, AGREES, 0.12, {}, "expected to spill 12 %"),
         ({}, AGREES, 0.01, {"rate": 0.5}, "is the slowest that"),
+        ({}, AGREES, 0.01, {"retained": 0.4}, "40 % stays in the source"),
         ({}, AGREES, 0.01, {"rate": 3.0, "distance": 0.07}, "is the fastest and the farthest"),
     ],
 )
