@@ -97,7 +97,7 @@ def _of_the_pour(poured: Mapping[str, Any] | None, tree: "DataTree | None") -> l
             f"Even the best pour is expected to spill {share}: stir longer, or bring the cups"
             " nearer to each other."
         )
-    retained = float(tree["chosen"]["retained"].mean())
+    retained = float(tree["chosen"].to_dataset()["retained"].mean())
     if retained > KEPT:
         told.append(
             f"Of the liquid {narrative.percent(retained)} stays in the source, and what stays is "
