@@ -124,6 +124,7 @@ def test_a_larger_budget_goes_on_from_a_smaller_one(
 
 
 @pytest.mark.slow
+@pytest.mark.alone  # beside others it failed now and then, alone not yet; why is not known
 def test_criticism_killed_and_repeated_equals_undisturbed(calibration, tmp_path):
     quiet, killed = tmp_path / "quiet", tmp_path / "killed"
     shutil.copytree(calibration.path, quiet)
