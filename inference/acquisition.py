@@ -17,8 +17,13 @@ from scipy.special import ndtr, ndtri
 from ._float64 import in_float64
 from .base import LogLikelihood, LogSecondMoment, Surrogate
 from .feasibility import Feasibility, log_feasible
-from .gp import GP, predict, predict_joint, predict_many
-from .optimise import minimise_in_box
+from .gp.optimise import minimise_in_box
+from .gp.process import (
+    GP,
+    predict,
+    predict_joint,
+    predict_many,
+)
 from .screen import ROUNDS, screen
 
 CANDIDATES = 128  # points among which a rule chooses

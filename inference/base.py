@@ -7,7 +7,7 @@ import jax
 import numpy as np
 
 from .feasibility import Feasibility
-from .gp import GP
+from .gp.process import GP
 
 Theta = Mapping[str, np.ndarray]
 """Parameter name -> values in natural units; all of shape [n], or all scalars."""

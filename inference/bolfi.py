@@ -18,7 +18,7 @@ from .design import sobol, start_size
 from .emulator_checks import EmulatorWarning
 from .families import Family, Learnable, resolve
 from .feasibility import feasibility
-from .gp import padded_rows
+from .gp.process import padded_rows
 from .posterior import Fit
 from .prior import Prior
 from .repetition import next_replicate

@@ -9,10 +9,23 @@ import numpy as np
 
 from ._float64 import in_float64
 from .base import LogLikelihood, LogSecondMoment
-from .compiled import GROWTH, believe, condition, extend, leave_one_out, predict
 from .emulator_checks import EQUAL, complaints
-from .gp import GP, Data, pad, predict_many
-from .hyper import maximum_a_posteriori
+from .gp.condition import (
+    GROWTH,
+    believe,
+    condition,
+    extend,
+    leave_one_out,
+    predict,
+)
+from .gp.hyperparameters import maximum_a_posteriori
+from .gp.optimise import minimise_in_box
+from .gp.process import (
+    GP,
+    Data,
+    pad,
+    predict_many,
+)
 from .likelihood import (
     Threshold,
     ThresholdState,
@@ -21,7 +34,6 @@ from .likelihood import (
     log_second_moment,
 )
 from .marginal import posterior_draws
-from .optimise import minimise_in_box
 from .sane import sane
 from .transform import Transform, candidates
 

@@ -8,11 +8,23 @@ import jax.numpy as jnp
 import numpy as np
 
 from ._float64 import in_float64
-from .compiled import GROWTH, condition, extend, leave_one_out
-from .compiled import predict as predict_scores
 from .components import Basis, principal_components
-from .gp import GP, JITTER, Data, Hyper, pad, predict_joint
-from .hyper import maximum_a_posteriori
+from .gp.condition import (
+    GROWTH,
+    condition,
+    extend,
+    leave_one_out,
+)
+from .gp.condition import predict as predict_scores
+from .gp.hyperparameters import maximum_a_posteriori
+from .gp.process import (
+    GP,
+    JITTER,
+    Data,
+    Hyper,
+    pad,
+    predict_joint,
+)
 from .noise import Remainder, shrunk_covariance
 from .own_noise import left_over, own_noise
 

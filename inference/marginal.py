@@ -6,8 +6,8 @@ import numpy as np
 from jax.scipy.special import ndtri
 from scipy.special import ndtri as scipy_ndtri
 
-from .gp import Data, Hyper, log_marginal_likelihood
-from .hyper import prior_moments, unpack
+from .gp.hyperparameters import prior_moments, unpack
+from .gp.process import Data, Hyper, log_marginal_likelihood
 from .nuts import sample_nuts
 from .target import Length, Target
 

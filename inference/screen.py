@@ -15,7 +15,7 @@ from jax.scipy.stats import norm
 
 from .base import LogLikelihood
 from .design import sobol
-from .linalg import small_inverse_cholesky
+from .gp.linalg import small_inverse_cholesky
 
 ROUND = 64
 EVEN, ROUNDS = 4, 8  # rounds that fill the prior evenly, and rounds in all

@@ -9,13 +9,14 @@ import numpy as np
 
 from ._float64 import in_float64
 from .base import LogLikelihood, LogSecondMoment
-from .compiled import believe
 from .design import sobol
 from .emulator import Emulator, loo_errors, noise_share, predict, predictive_draws
 from .emulator_checks import EQUAL, OUTSIDE, UNPREDICTED, complaints, noisy, surprised
 from .foretold import Foretold
 from .gaussian import SignalState, log_likelihood, log_second_moment, node_log_densities
 from .given_noise import GivenNoise
+from .gp.condition import believe
+from .gp.optimise import minimise_in_box
 from .noise import (
     NO_MEASUREMENT_NOISE,
     Nodes,
@@ -25,7 +26,6 @@ from .noise import (
     reduce,
     residual_size,
 )
-from .optimise import minimise_in_box
 from .output import Output
 
 KEPT = 12  # nodes of unknown measurement noise that enter the likelihood

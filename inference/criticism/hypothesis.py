@@ -8,16 +8,16 @@ import jax
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from .. import gp as processes
 from .._float64 import in_float64
 from ..bolfi import Bolfi
 from ..emulator import latent_covariance, predict
 from ..emulator_checks import EmulatorWarning
 from ..families import SignalFamily
 from ..gaussian import SignalState
-from ..linalg import small_inverse_cholesky
+from ..gp import process as processes
+from ..gp.linalg import small_inverse_cholesky
+from ..gp.optimise import minimise_in_box
 from ..noise import Layout, Reduced
-from ..optimise import minimise_in_box
 from ..posterior import Fit
 from ..signal_surrogate import SignalSurrogate
 from .noise import Noise

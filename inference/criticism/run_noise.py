@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..compiled import leave_one_out
 from ..emulator import Emulator
+from ..gp.condition import leave_one_out
 from ..noise import Layout
 from .usual import positive_autocovariance
 

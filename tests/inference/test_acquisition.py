@@ -16,7 +16,7 @@ from bolfi_liquids.inference.acquisition import (
 from bolfi_liquids.inference.design import sobol
 from bolfi_liquids.inference.discrepancy_surrogate import learn
 from bolfi_liquids.inference.feasibility import feasibility, log_feasible
-from bolfi_liquids.inference.gp import predict
+from bolfi_liquids.inference.gp.process import predict
 from scipy.stats import kstest, multivariate_normal, norm, qmc, truncnorm
 
 from bolfi_liquids import inference

@@ -4,10 +4,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from bolfi_liquids.inference import gp as gaussian
-from bolfi_liquids.inference import hyper as hyperparameters
-from bolfi_liquids.inference.compiled import believe, condition, extend
-from bolfi_liquids.inference.linalg import (
+from bolfi_liquids.inference.gp import hyperparameters
+from bolfi_liquids.inference.gp import process as gaussian
+from bolfi_liquids.inference.gp.condition import believe, condition, extend
+from bolfi_liquids.inference.gp.linalg import (
     BLOCK,
     inverse_cholesky,
     log_normal_density,

@@ -5,9 +5,9 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import gp as processes
-from .arguments import checked_points
-from .gp import GP, Data, Hyper
+from ..arguments import checked_points
+from . import process as processes
+from .process import GP, Data, Hyper
 
 GROWTH = 1.3  # hyperparameters are found anew when data have grown by this factor
 

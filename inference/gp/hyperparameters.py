@@ -5,8 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.stats import norm, qmc
 
-from .gp import Data, Hyper, log_marginal_likelihood
 from .optimise import minimise_many
+from .process import Data, Hyper, log_marginal_likelihood
 
 # Normal priors of the logs: inputs are coordinates of the prior's sd (see `gp.coordinates`) and
 # targets of about unit variance, so one choice fits every parameter, unit and simulator.

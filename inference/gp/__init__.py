@@ -1,0 +1,1 @@
+"""Gaussian process: kernel, conditioning, hyperparameters."""
