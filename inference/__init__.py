@@ -31,7 +31,6 @@ if TYPE_CHECKING:
         shared_design,
         tarp,
     )
-    from .convergence import SamplingWarning
     from .criticism import (
         AutoregressiveNoise,
         Candidate,
@@ -68,6 +67,7 @@ if TYPE_CHECKING:
     from .posterior import Closest, Fit
     from .prior import Prior
     from .runner import run_missing
+    from .sampling.convergence import SamplingWarning
     from .simulate import Job
 
 __all__ = [
@@ -174,7 +174,7 @@ _HOME = {
     "Quantile": ".likelihood",
     "Quantity": ".checks",
     "Replicates": ".checks",
-    "SamplingWarning": ".convergence",
+    "SamplingWarning": ".sampling.convergence",
     "SBC": ".checks",
     "SharedDesign": ".checks",
     "SignalFamily": ".families",

@@ -8,8 +8,8 @@ from scipy.special import ndtri as scipy_ndtri
 
 from .gp.hyperparameters import prior_moments, unpack
 from .gp.process import Data, Hyper, log_marginal_likelihood
-from .nuts import sample_nuts
-from .target import Length, Target
+from .sampling.nuts import sample_nuts
+from .sampling.target import Length, Target
 
 CHAINS, WARMUP = 2, 300
 

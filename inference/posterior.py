@@ -14,9 +14,9 @@ from ._float64 import in_float64
 from .base import Surrogate, Theta
 from .prior import Prior
 from .results import add_surrogate, finished, results_tree, simulations_dataset
-from .sampling import SAMPLERS, draw_posterior
+from .sampling.draw import SAMPLERS, draw_posterior
+from .sampling.target import Length, Target, log_likelihood
 from .state import History
-from .target import Length, Target, log_likelihood
 
 
 class Closest(NamedTuple):

@@ -9,10 +9,10 @@ import numpy as np
 import xarray as xr
 
 from .base import Surrogate
-from .convergence import diagnose
 from .prior import Prior
+from .sampling.convergence import diagnose
+from .sampling.target import Chains
 from .state import History
-from .target import Chains
 
 PREDICTED = 50  # draws of each chain for which the surrogate predicts
 

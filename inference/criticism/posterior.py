@@ -6,8 +6,8 @@ import jax
 import numpy as np
 
 from .._float64 import in_float64
-from ..mixture import to_unit
-from ..population import explore
+from ..sampling.importance import explore
+from ..sampling.mixture import to_unit
 from .hypothesis import Hypothesis
 
 

@@ -5,8 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from bolfi_liquids.inference._float64 import in_float64
-from bolfi_liquids.inference.mixture import fit_mixture, log_density, to_unit
-from bolfi_liquids.inference.population import explore
+from bolfi_liquids.inference.sampling.importance import explore
+from bolfi_liquids.inference.sampling.mixture import fit_mixture, log_density, to_unit
 from scipy.special import logsumexp
 
 SEEDS = 5

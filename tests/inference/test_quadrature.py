@@ -3,9 +3,9 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from bolfi_liquids.inference import quadrature
 from bolfi_liquids.inference._float64 import in_float64
-from bolfi_liquids.inference.target import Length, Target
+from bolfi_liquids.inference.sampling import quadrature
+from bolfi_liquids.inference.sampling.target import Length, Target
 from scipy.stats import chisquare, norm
 
 integrate = in_float64(quadrature.integrate)

@@ -7,10 +7,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from arviz_stats.base import array_stats
-from bolfi_liquids.inference import nuts, quadrature, sampling
 from bolfi_liquids.inference._float64 import in_float64
-from bolfi_liquids.inference.convergence import CONVERGED, limits
-from bolfi_liquids.inference.target import Chains, Length, Target
+from bolfi_liquids.inference.sampling import draw as sampling
+from bolfi_liquids.inference.sampling import nuts, quadrature
+from bolfi_liquids.inference.sampling.convergence import CONVERGED, limits
+from bolfi_liquids.inference.sampling.target import Chains, Length, Target
 from scipy.stats import norm
 
 from bolfi_liquids import inference

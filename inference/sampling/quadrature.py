@@ -9,7 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .target import NOWHERE, NOWHERE_FINITE, Chains, Length, Target, log_likelihood
+from .target import (
+    NOWHERE,
+    NOWHERE_FINITE,
+    Chains,
+    Length,
+    Target,
+    log_likelihood,
+)
 
 BASE = {1: 256, 2: 32}  # cells along each axis at first
 TOLERANCE = 2e-5  # of a cell's error: its share of the mass, at most, times its unevenness^2

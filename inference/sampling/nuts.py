@@ -9,11 +9,27 @@ import jax.numpy as jnp
 import numpy as np
 from numpyro.infer.hmc import HMCState, hmc
 
-from .base import LogLikelihood
-from .mixture import UNIFORMS, Mixture, fit_mixture, propose, to_unit
+from ..base import LogLikelihood
+from .mixture import (
+    UNIFORMS,
+    Mixture,
+    fit_mixture,
+    propose,
+    to_unit,
+)
 from .mixture import log_density as log_mixture
-from .starts import local_factor, look_around, resampled, spread_factor
-from .target import Chains, Length, Target, log_density
+from .starts import (
+    local_factor,
+    look_around,
+    resampled,
+    spread_factor,
+)
+from .target import (
+    Chains,
+    Length,
+    Target,
+    log_density,
+)
 
 BLOCK = 250  # draws of one call of the compiled program, whatever number is asked for
 FIRST_STEP = 0.7  # in whitened coordinates

@@ -3,7 +3,7 @@
 import jax
 import numpy as np
 
-from .population import Population, explore
+from .importance import Population, explore
 from .target import NOWHERE_FINITE, Target
 
 SEPARATE = 0.5  # gain in mean log density over one Gaussian from which on modes count as separate

@@ -9,11 +9,17 @@ import jax
 import numpy as np
 from scipy.special import ndtr
 
-from .base import LogLikelihood
+from ..base import LogLikelihood
 from .mixture import UNIFORMS, Mixture, propose
 from .mixture import log_density as log_mixture
 from .starts import look_around, resampled
-from .target import NOWHERE, Chains, Length, Target, log_density
+from .target import (
+    NOWHERE,
+    Chains,
+    Length,
+    Target,
+    log_density,
+)
 
 WALKERS = 32
 LONGEST_THIN = 64  # steps; beyond, R-hat and ESS judge instead

@@ -1,0 +1,1 @@
+"""Posterior sampling: NUTS, ensemble, importance sampling, quadrature; convergence."""
