@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .acquisition import (
+    from .acquisition.rules import (
         ExpectedIntegratedVariance,
         LowerConfidenceBound,
         MaxVariance,
@@ -151,7 +151,7 @@ _HOME = {
     "DiscrepancyFamily": ".families",
     "ENGINE_VERSION": ".engine_version",
     "EmulatorWarning": ".emulator_checks",
-    "ExpectedIntegratedVariance": ".acquisition",
+    "ExpectedIntegratedVariance": ".acquisition.rules",
     "Experiment": ".criticism",
     "Extension": ".criticism",
     "Fit": ".posterior",
@@ -162,12 +162,12 @@ _HOME = {
     "Job": ".simulate",
     "Keeping": ".criticism",
     "KnownNoise": ".criticism",
-    "LowerConfidenceBound": ".acquisition",
-    "MaxVariance": ".acquisition",
+    "LowerConfidenceBound": ".acquisition.rules",
+    "MaxVariance": ".acquisition.rules",
     "Noise": ".criticism",
     "Pipeline": ".checks",
     "Plan": ".criticism",
-    "PosteriorDraws": ".acquisition",
+    "PosteriorDraws": ".acquisition.rules",
     "Predicted": ".likelihood",
     "Prior": ".prior",
     "Proposal": ".criticism",

@@ -9,8 +9,9 @@ import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import acquisition as acquisitions
 from ._float64 import in_float64
+from .acquisition import rules as acquisitions
+from .acquisition.replicates import next_replicate
 from .arguments import checked_array, checked_integer
 from .base import Acquisition, Theta
 from .describe import describe
@@ -21,7 +22,6 @@ from .feasibility import feasibility
 from .gp.process import padded_rows
 from .posterior import Fit
 from .prior import Prior
-from .repetition import next_replicate
 from .sane import sane
 from .state import UNKNOWN, History, explain, init, remember_asked, remember_told
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpyro.distributions as dist
 import pytest
 import xarray as xr
-from bolfi_liquids.inference import acquisition
+from bolfi_liquids.inference.acquisition import rules
 
 from bolfi_liquids import inference
 from bolfi_liquids.sbc_check import check_sbc
@@ -41,7 +41,7 @@ def test_a_set_that_is_used_up_is_said():
     SbcSettings(design=8, budget=20, runs=0)  # where none is shared
 
 
-class Watching(acquisition.PosteriorDraws):
+class Watching(rules.PosteriorDraws):
     """Keeps the keys that it was called with."""
 
     keys: ClassVar[list[tuple[int, ...]]] = []
@@ -53,7 +53,7 @@ class Watching(acquisition.PosteriorDraws):
 
 def test_every_batch_is_asked_with_random_numbers_of_its_own(monkeypatch):
     """As by `calibrate`; the same ones again would choose by the same rule again and again."""
-    monkeypatch.setitem(acquisition.RULES, "draws", Watching)
+    monkeypatch.setitem(rules.RULES, "draws", Watching)
     prior = inference.Prior({"slope": dist.Uniform(0.0, 1.0)})
     theta = (np.arange(20)[:, None] + 0.5) / 20
     clean = theta * np.linspace(0.0, 1.0, 12)

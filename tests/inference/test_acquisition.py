@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from bolfi_liquids.inference.acquisition import (
+from bolfi_liquids.inference.acquisition.rules import (
     RULES,
     LCBState,
     best_candidates,

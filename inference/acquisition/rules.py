@@ -14,11 +14,11 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from ._float64 import in_float64
-from .base import LogLikelihood, LogSecondMoment, Surrogate
-from .feasibility import Feasibility, log_feasible
-from .gp.optimise import minimise_in_box
-from .gp.process import (
+from .._float64 import in_float64
+from ..base import LogLikelihood, LogSecondMoment, Surrogate
+from ..feasibility import Feasibility, log_feasible
+from ..gp.optimise import minimise_in_box
+from ..gp.process import (
     GP,
     predict,
     predict_joint,
