@@ -14,7 +14,6 @@ if TYPE_CHECKING:
         PosteriorDraws,
     )
     from .bank import Simulation, SimulationBank, Simulations
-    from .base import Acquisition, Discrepancy, Simulator, Surrogate
     from .bolfi import Bolfi
     from .checks import (
         SBC,
@@ -58,17 +57,23 @@ if TYPE_CHECKING:
         usual_residual,
         weighted_posterior,
     )
-    from .discrepancy import squared_difference
-    from .emulator_checks import EmulatorWarning
     from .engine_version import ENGINE_VERSION
-    from .families import DiscrepancyFamily, SignalFamily
-    from .likelihood import Predicted, Quantile
     from .loop import fit
     from .posterior import Closest, Fit
     from .prior import Prior
     from .runner import run_missing
     from .sampling.convergence import SamplingWarning
     from .simulate import Job
+    from .surrogates.base import (
+        Acquisition,
+        Discrepancy,
+        Simulator,
+        Surrogate,
+    )
+    from .surrogates.families import DiscrepancyFamily, SignalFamily
+    from .surrogates.squared_difference import squared_difference
+    from .surrogates.threshold import Predicted, Quantile
+    from .surrogates.warnings import EmulatorWarning
 
 __all__ = [
     "Acquisition",
@@ -139,7 +144,7 @@ __all__ = [
 
 # loaded on use: a worker that imports `.simulate` to run a simulation must not pay for JAX
 _HOME = {
-    "Acquisition": ".base",
+    "Acquisition": ".surrogates.base",
     "AutoregressiveNoise": ".criticism",
     "Bolfi": ".bolfi",
     "Candidate": ".criticism",
@@ -147,10 +152,10 @@ _HOME = {
     "Closest": ".posterior",
     "Coverage": ".checks",
     "Criticism": ".criticism",
-    "Discrepancy": ".base",
-    "DiscrepancyFamily": ".families",
+    "Discrepancy": ".surrogates.base",
+    "DiscrepancyFamily": ".surrogates.families",
     "ENGINE_VERSION": ".engine_version",
-    "EmulatorWarning": ".emulator_checks",
+    "EmulatorWarning": ".surrogates.warnings",
     "ExpectedIntegratedVariance": ".acquisition.rules",
     "Experiment": ".criticism",
     "Extension": ".criticism",
@@ -168,23 +173,23 @@ _HOME = {
     "Pipeline": ".checks",
     "Plan": ".criticism",
     "PosteriorDraws": ".acquisition.rules",
-    "Predicted": ".likelihood",
+    "Predicted": ".surrogates.threshold",
     "Prior": ".prior",
     "Proposal": ".criticism",
-    "Quantile": ".likelihood",
+    "Quantile": ".surrogates.threshold",
     "Quantity": ".checks",
     "Replicates": ".checks",
     "SamplingWarning": ".sampling.convergence",
     "SBC": ".checks",
     "SharedDesign": ".checks",
-    "SignalFamily": ".families",
+    "SignalFamily": ".surrogates.families",
     "Simulation": ".bank",
     "SimulationBank": ".bank",
     "Simulations": ".bank",
-    "Simulator": ".base",
+    "Simulator": ".surrogates.base",
     "Suggestion": ".criticism",
     "SumOfNoises": ".criticism",
-    "Surrogate": ".base",
+    "Surrogate": ".surrogates.base",
     "Tarp": ".checks",
     "UsualResidual": ".criticism",
     "Verdict": ".criticism",
@@ -199,7 +204,7 @@ _HOME = {
     "run_missing": ".runner",
     "sbc": ".checks",
     "shared_design": ".checks",
-    "squared_difference": ".discrepancy",
+    "squared_difference": ".surrogates.squared_difference",
     "tarp": ".checks",
     "usual_residual": ".criticism",
     "weighted_posterior": ".criticism",

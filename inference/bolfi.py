@@ -13,17 +13,17 @@ from ._float64 import in_float64
 from .acquisition import rules as acquisitions
 from .acquisition.replicates import next_replicate
 from .arguments import checked_array, checked_integer
-from .base import Acquisition, Theta
 from .describe import describe
 from .design import sobol, start_size
-from .emulator_checks import EmulatorWarning
-from .families import Family, Learnable, resolve
-from .feasibility import feasibility
 from .gp.process import padded_rows
 from .posterior import Fit
 from .prior import Prior
-from .sane import sane
 from .state import UNKNOWN, History, explain, init, remember_asked, remember_told
+from .surrogates.base import Acquisition, Theta
+from .surrogates.families import Family, Learnable, resolve
+from .surrogates.feasibility import feasibility
+from .surrogates.outliers import sane
+from .surrogates.warnings import EmulatorWarning
 
 DIGITS, EDGE = 7, 1e-7  # of the prior quantiles that are asked, and how near the bounds
 MIN_LEARN = 3  # successful simulations before the surrogate may choose

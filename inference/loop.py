@@ -13,16 +13,16 @@ from numpy.typing import ArrayLike
 
 from .arguments import check_function, check_text, checked_array, checked_integer
 from .bank import Simulation, SimulationBank
-from .base import Acquisition, Simulator, Theta
 from .bolfi import MIN_LEARN, Bolfi
 from .design import start_size
 from .executors import opened
-from .families import Family
 from .posterior import Fit
 from .prior import Prior
 from .progress import progress_bar
 from .runner import Runner
 from .simulate import Job, columns, jobs, simulation_seed
+from .surrogates.base import Acquisition, Simulator, Theta
+from .surrogates.families import Family
 
 
 def fit(  # noqa: PLR0913  the one call that most users make

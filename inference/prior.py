@@ -10,8 +10,8 @@ from scipy.special import ndtri
 
 from ._float64 import in_float64
 from .arguments import checked_array
-from .base import Theta
 from .distributions import Univariate, describe
+from .surrogates.base import Theta
 
 RESERVED = frozenset(
     {"chain", "draw", "simulation", "seed", "discrepancy", "failed", "error", "round", "signal"}

@@ -8,11 +8,11 @@ import jax
 import numpy as np
 import xarray as xr
 
-from .base import Surrogate
 from .prior import Prior
 from .sampling.convergence import diagnose
 from .sampling.target import Chains
 from .state import History
+from .surrogates.base import Surrogate
 
 PREDICTED = 50  # draws of each chain for which the surrogate predicts
 

@@ -12,7 +12,7 @@ from .failures import TIMEOUT, kind, raised
 from .simulate import Job, run_batch
 
 if TYPE_CHECKING:
-    from .base import Simulator
+    from .surrogates.base import Simulator
 
 POLL = 0.2  # seconds between looks at what somebody else is simulating
 

@@ -15,8 +15,6 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from .._float64 import in_float64
-from ..base import LogLikelihood, LogSecondMoment, Surrogate
-from ..feasibility import Feasibility, log_feasible
 from ..gp.optimise import minimise_in_box
 from ..gp.process import (
     GP,
@@ -24,6 +22,8 @@ from ..gp.process import (
     predict_joint,
     predict_many,
 )
+from ..surrogates.base import LogLikelihood, LogSecondMoment, Surrogate
+from ..surrogates.feasibility import Feasibility, log_feasible
 from .screen import ROUNDS, screen
 
 CANDIDATES = 128  # points among which a rule chooses

@@ -13,9 +13,9 @@ import jax.numpy as jnp
 from jax.scipy.special import logsumexp, ndtr, ndtri
 from jax.scipy.stats import norm
 
-from ..base import LogLikelihood
 from ..design import sobol
 from ..gp.linalg import small_inverse_cholesky
+from ..surrogates.base import LogLikelihood
 
 ROUND = 64
 EVEN, ROUNDS = 4, 8  # rounds that fill the prior evenly, and rounds in all

@@ -12,14 +12,14 @@ import xarray as xr
 
 from ..arguments import check_function, checked_integer
 from ..bank import SimulationBank
-from ..base import Simulator
 from ..bolfi import MIN_LEARN, Bolfi
 from ..design import sobol
-from ..families import resolve
 from ..loop import fit
 from ..prior import Prior
 from ..runner import run_missing
 from ..simulate import jobs, simulation_seed
+from ..surrogates.base import Simulator
+from ..surrogates.families import resolve
 from .replicate import LogDensity
 
 Options = Mapping[str, Any]

@@ -7,8 +7,8 @@ import numpy as np
 import xarray as xr
 from scipy.stats import kstest
 
-from ..base import Simulator
 from ..prior import Prior
+from ..surrogates.base import Simulator
 from . import bands
 from .ranks import quantiles, to_ranks
 from .repeat import made_or_given

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..arguments import check_callable, check_function, checked_integer
-from ..base import Simulator
 from ..describe import describe
 from ..prior import Prior
 from ..progress import progress_bar
+from ..surrogates.base import Simulator
 from .replicate import Observe, Pipeline, Plan, Replicate, run_replicate
 from .replicated import Replicates
 from .store import ReplicateStore

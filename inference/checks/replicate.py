@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..base import Simulator
+from ..surrogates.base import Simulator
 from .draws import effective_size, posterior_array, thin
 
 FAILURES = (Exception, SystemExit)  # many programs end by the latter

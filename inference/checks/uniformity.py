@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 from scipy.stats import chisquare
 
-from ..base import Simulator
 from ..prior import Prior
+from ..surrogates.base import Simulator
 from . import bands
 from .ranks import bin_count, to_ranks
 from .repeat import made_or_given

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arguments import check_function, checked_array
-from ..base import Simulator
+from ..surrogates.base import Simulator
 from .misfit import Window
 from .noise import Noise
 

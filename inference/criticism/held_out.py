@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..output import SERIES
+from ..surrogates.output import SERIES
 from .experiment import Experiment
 from .hypothesis import samples
 from .laboratory import Laboratory

@@ -10,16 +10,16 @@ from scipy.linalg import solve_triangular
 
 from .._float64 import in_float64
 from ..bolfi import Bolfi
-from ..emulator import latent_covariance, predict
-from ..emulator_checks import EmulatorWarning
-from ..families import SignalFamily
-from ..gaussian import SignalState
 from ..gp import process as processes
 from ..gp.linalg import small_inverse_cholesky
 from ..gp.optimise import minimise_in_box
-from ..noise import Layout, Reduced
 from ..posterior import Fit
-from ..signal_surrogate import SignalSurrogate
+from ..surrogates.emulator import latent_covariance, predict
+from ..surrogates.families import SignalFamily
+from ..surrogates.measurement_noise import Layout, Reduced
+from ..surrogates.signal import SignalSurrogate
+from ..surrogates.signal_likelihood import SignalState
+from ..surrogates.warnings import EmulatorWarning
 from .noise import Noise
 from .run_noise import own_errors, resized, smooth_covariance
 from .runs import Runs

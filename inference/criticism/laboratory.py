@@ -7,10 +7,10 @@ from functools import partial
 import numpy as np
 
 from ..bank import SimulationBank
-from ..base import Simulator
 from ..prior import Prior
 from ..runner import run_missing
 from ..simulate import Job
+from ..surrogates.base import Simulator
 from .experiment import Experiment, Proposal
 from .extension import Extensions
 from .runs import Runs

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .._float64 import in_float64
-from ..noise import Layout
+from ..surrogates.measurement_noise import Layout
 from .hypothesis import Hypothesis, samples, values_of
 from .noise import Noise, gaussian
 from .signatures import Signature, directions

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..output import SERIES
+from ..surrogates.output import SERIES
 from .experiment import Proposal
 from .hypothesis import samples
 from .laboratory import Laboratory

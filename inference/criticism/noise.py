@@ -5,7 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..noise import Layout, Nodes, correlated
+from ..surrogates.measurement_noise import Layout, Nodes, correlated
 
 CORRELATIONS = np.linspace(0.0, 0.97, 40)  # of neighbouring samples
 DRAWS = 400

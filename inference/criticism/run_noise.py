@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..emulator import Emulator
 from ..gp.condition import leave_one_out
-from ..noise import Layout
+from ..surrogates.emulator import Emulator
+from ..surrogates.measurement_noise import Layout
 from .usual import positive_autocovariance
 
 ALIKE = 0.2  # of prior quantiles, over which a simulator's noise changes as a power

@@ -15,8 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax.scipy.special import ndtri
 
-from ..base import LogLikelihood
 from ..design import sobol
+from ..surrogates.base import LogLikelihood
 from .mixture import (
     COMPONENTS,
     UNIFORMS,

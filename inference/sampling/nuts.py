@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpyro.infer.hmc import HMCState, hmc
 
-from ..base import LogLikelihood
+from ..surrogates.base import LogLikelihood
 from .mixture import (
     UNIFORMS,
     Mixture,

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from ..base import LogLikelihood
+from ..surrogates.base import LogLikelihood
 from .mixture import log_prior, to_unit
 
 NOWHERE = -1e300

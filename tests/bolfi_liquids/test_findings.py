@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
-from bolfi_liquids.inference.noise import Layout
+from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 
 from bolfi_liquids.criticism_results import _effects, _posterior
 from bolfi_liquids.findings import Findings

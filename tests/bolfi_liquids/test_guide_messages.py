@@ -184,7 +184,7 @@ def test_missing_extra(told, monkeypatch):
 
 
 def test_warnings_of_the_engine():
-    from bolfi_liquids.inference.emulator_checks import OUTSIDE
+    from bolfi_liquids.inference.surrogates.warnings import OUTSIDE
 
     from bolfi_liquids import narrative
 

@@ -14,9 +14,9 @@ from bolfi_liquids.inference.acquisition.rules import (
     truncated_normal,
 )
 from bolfi_liquids.inference.design import sobol
-from bolfi_liquids.inference.discrepancy_surrogate import learn
-from bolfi_liquids.inference.feasibility import feasibility, log_feasible
 from bolfi_liquids.inference.gp.process import predict
+from bolfi_liquids.inference.surrogates.discrepancy import learn
+from bolfi_liquids.inference.surrogates.feasibility import feasibility, log_feasible
 from scipy.stats import kstest, multivariate_normal, norm, qmc, truncnorm
 
 from bolfi_liquids import inference

@@ -3,11 +3,11 @@
 import numpy as np
 import numpyro.distributions as dist
 import pytest
-from bolfi_liquids.inference import output
 from bolfi_liquids.inference.criticism.design import Box, fill
 from bolfi_liquids.inference.criticism.hypothesis import hypothesise, samples, values_of
 from bolfi_liquids.inference.criticism.laboratory import Laboratory
 from bolfi_liquids.inference.criticism.misfit import locate, null_draws
+from bolfi_liquids.inference.surrogates import output
 from scipy.stats import binom, chi2, norm
 
 from bolfi_liquids import inference

@@ -11,7 +11,7 @@ from bolfi_liquids.inference.criticism.hypothesis import samples
 from bolfi_liquids.inference.criticism.laboratory import Laboratory
 from bolfi_liquids.inference.criticism.misfit import check, locate, null_draws
 from bolfi_liquids.inference.criticism.search import Study, examine
-from bolfi_liquids.inference.emulator import latent_covariance
+from bolfi_liquids.inference.surrogates.emulator import latent_covariance
 from scipy.stats import binom, kstest, norm
 
 from bolfi_liquids import inference

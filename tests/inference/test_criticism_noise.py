@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bolfi_liquids.inference.criticism.noise import CORRELATIONS
-from bolfi_liquids.inference.noise import Layout
+from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 from scipy.stats import chisquare, norm

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference.criticism.misfit import slow_modes
 from bolfi_liquids.inference.criticism.run_noise import errors_of, resized, smooth_covariance
-from bolfi_liquids.inference.noise import Layout, shrunk_covariance
+from bolfi_liquids.inference.surrogates.measurement_noise import Layout, shrunk_covariance
 from scipy.stats import norm
 
 ALPHA = 1e-4  # false alarms per test

@@ -3,8 +3,8 @@ import warnings
 import numpy as np
 import pytest
 from bolfi_liquids.inference.design import sobol
-from bolfi_liquids.inference.discrepancy_surrogate import learn, marginalised
-from bolfi_liquids.inference.transform import Transform, candidates
+from bolfi_liquids.inference.surrogates.discrepancy import learn, marginalised
+from bolfi_liquids.inference.surrogates.transform import Transform, candidates
 
 ROWS = 64
 

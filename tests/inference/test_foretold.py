@@ -5,11 +5,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from bolfi_liquids.inference.design import sobol
-from bolfi_liquids.inference.emulator import emulate, innovations
-from bolfi_liquids.inference.emulator_checks import surprised
-from bolfi_liquids.inference.foretold import FEWEST, foretold
 from bolfi_liquids.inference.gp.condition import predict as predict_scores
 from bolfi_liquids.inference.gp.process import JITTER, predict_joint
+from bolfi_liquids.inference.surrogates.emulator import emulate, innovations
+from bolfi_liquids.inference.surrogates.held_back import FEWEST, foretold
+from bolfi_liquids.inference.surrogates.warnings import surprised
 from scipy.stats import binom
 
 TIME = np.linspace(0.0, 2.0, 40)

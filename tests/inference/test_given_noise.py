@@ -4,9 +4,9 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from bolfi_liquids.inference.families import SignalFamily
-from bolfi_liquids.inference.given_noise import given_noise
-from bolfi_liquids.inference.output import LONGEST, describe
+from bolfi_liquids.inference.surrogates.families import SignalFamily
+from bolfi_liquids.inference.surrogates.given_noise import given_noise
+from bolfi_liquids.inference.surrogates.output import LONGEST, describe
 
 from bolfi_liquids import inference
 

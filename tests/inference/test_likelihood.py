@@ -5,8 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from bolfi_liquids.inference.design import sobol
-from bolfi_liquids.inference.discrepancy_surrogate import learn
-from bolfi_liquids.inference.likelihood import log_cdf, log_likelihood
+from bolfi_liquids.inference.surrogates.discrepancy import learn
+from bolfi_liquids.inference.surrogates.threshold import log_cdf, log_likelihood
 from scipy.special import erfcx
 from scipy.stats import norm
 

@@ -3,7 +3,7 @@
 import jax
 import numpy as np
 import pytest
-from bolfi_liquids.inference.noise import (
+from bolfi_liquids.inference.surrogates.measurement_noise import (
     Layout,
     Nodes,
     candidates,

@@ -7,13 +7,13 @@ import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference.acquisition.replicates import next_replicate
 from bolfi_liquids.inference.design import sobol
-from bolfi_liquids.inference.emulator import emulate, noise_share
-from bolfi_liquids.inference.families import Learnable, SignalFamily
-from bolfi_liquids.inference.gaussian import log_likelihood, log_second_moment
 from bolfi_liquids.inference.gp import process as gp
 from bolfi_liquids.inference.gp.condition import predict as predict_scores
 from bolfi_liquids.inference.gp.hyperparameters import NOISE
 from bolfi_liquids.inference.gp.process import predict
+from bolfi_liquids.inference.surrogates.emulator import emulate, noise_share
+from bolfi_liquids.inference.surrogates.families import Learnable, SignalFamily
+from bolfi_liquids.inference.surrogates.signal_likelihood import log_likelihood, log_second_moment
 from scipy.stats import binom, multivariate_normal
 
 from bolfi_liquids import inference

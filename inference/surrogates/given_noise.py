@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import checked_array
+from ..arguments import checked_array
 from .output import Output
 
 

@@ -7,17 +7,21 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._float64 import in_float64
+from .._float64 import in_float64
+from ..design import sobol
+from ..gp.condition import believe
+from ..gp.optimise import minimise_in_box
 from .base import LogLikelihood, LogSecondMoment
-from .design import sobol
-from .emulator import Emulator, loo_errors, noise_share, predict, predictive_draws
-from .emulator_checks import EQUAL, OUTSIDE, UNPREDICTED, complaints, noisy, surprised
-from .foretold import Foretold
-from .gaussian import SignalState, log_likelihood, log_second_moment, node_log_densities
+from .emulator import (
+    Emulator,
+    loo_errors,
+    noise_share,
+    predict,
+    predictive_draws,
+)
 from .given_noise import GivenNoise
-from .gp.condition import believe
-from .gp.optimise import minimise_in_box
-from .noise import (
+from .held_back import Foretold
+from .measurement_noise import (
     NO_MEASUREMENT_NOISE,
     Nodes,
     Reduced,
@@ -27,6 +31,20 @@ from .noise import (
     residual_size,
 )
 from .output import Output
+from .signal_likelihood import (
+    SignalState,
+    log_likelihood,
+    log_second_moment,
+    node_log_densities,
+)
+from .warnings import (
+    EQUAL,
+    OUTSIDE,
+    UNPREDICTED,
+    complaints,
+    noisy,
+    surprised,
+)
 
 KEPT = 12  # nodes of unknown measurement noise that enter the likelihood
 SCREENED = 128

@@ -6,17 +6,17 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import check_callable, checked_integer
+from ..arguments import check_callable, checked_integer
 from .base import Discrepancy, Surrogate
-from .discrepancy import evaluate, squared_difference
-from .discrepancy_surrogate import DiscrepancySurrogate, learn, marginalised
+from .discrepancy import DiscrepancySurrogate, learn, marginalised
 from .emulator import PREDICTED, emulate
-from .foretold import foretold
 from .given_noise import GivenNoise, given_noise
-from .likelihood import Threshold, check_rule
+from .held_back import foretold
+from .outliers import sane
 from .output import Output, Summary, describe
-from .sane import sane
-from .signal_surrogate import SignalSurrogate, observe
+from .signal import SignalSurrogate, observe
+from .squared_difference import evaluate, squared_difference
+from .threshold import Threshold, check_rule
 from .transform import TRANSFORMS
 
 COMPONENTS = 8

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arguments import checked_array
-from .noise import Layout
+from ..arguments import checked_array
+from .measurement_noise import Layout
 
 SERIES = 16  # samples from which an output counts as a series, whose noise can be estimated
 LONGEST = 2000  # values; neighbouring samples of longer series are averaged

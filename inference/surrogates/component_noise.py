@@ -3,7 +3,7 @@
 import numpy as np
 
 from .components import Basis
-from .noise import Remainder
+from .measurement_noise import Remainder
 
 MOST = 0.9  # of a score that may count as its own run's noise
 

@@ -6,10 +6,10 @@ import numpy as np
 from jax.scipy.special import ndtri
 from scipy.special import ndtri as scipy_ndtri
 
-from .gp.hyperparameters import prior_moments, unpack
-from .gp.process import Data, Hyper, log_marginal_likelihood
-from .sampling.nuts import sample_nuts
-from .sampling.target import Length, Target
+from ..gp.hyperparameters import prior_moments, unpack
+from ..gp.process import Data, Hyper, log_marginal_likelihood
+from ..sampling.nuts import sample_nuts
+from ..sampling.target import Length, Target
 
 CHAINS, WARMUP = 2, 300
 

@@ -6,8 +6,8 @@ from typing import Any, Protocol
 import jax
 import numpy as np
 
+from ..gp.process import GP
 from .feasibility import Feasibility
-from .gp.process import GP
 
 Theta = Mapping[str, np.ndarray]
 """Parameter name -> values in natural units; all of shape [n], or all scalars."""

@@ -7,17 +7,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._float64 import in_float64
-from .components import Basis, principal_components
-from .gp.condition import (
+from .._float64 import in_float64
+from ..gp.condition import (
     GROWTH,
     condition,
     extend,
     leave_one_out,
 )
-from .gp.condition import predict as predict_scores
-from .gp.hyperparameters import maximum_a_posteriori
-from .gp.process import (
+from ..gp.condition import predict as predict_scores
+from ..gp.hyperparameters import maximum_a_posteriori
+from ..gp.process import (
     GP,
     JITTER,
     Data,
@@ -25,8 +24,9 @@ from .gp.process import (
     pad,
     predict_joint,
 )
-from .noise import Remainder, shrunk_covariance
-from .own_noise import left_over, own_noise
+from .component_noise import left_over, own_noise
+from .components import Basis, principal_components
+from .measurement_noise import Remainder, shrunk_covariance
 
 SHARE = 0.9995  # of the variance, to be explained by components
 PREDICTED = 0.3  # see `_predicted`

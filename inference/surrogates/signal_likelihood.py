@@ -6,8 +6,8 @@ import jax
 import jax.numpy as jnp
 from jax.scipy.special import logsumexp
 
-from .gp.linalg import small_inverse_cholesky
-from .gp.process import GP, predict
+from ..gp.linalg import small_inverse_cholesky
+from ..gp.process import GP, predict
 
 
 class SignalState(NamedTuple):

@@ -10,7 +10,7 @@ from jax.scipy.special import log_ndtr, logsumexp
 from jax.scipy.stats import norm
 from scipy.special import ndtri
 
-from .gp.process import GP, predict
+from ..gp.process import GP, predict
 from .transform import Transform
 
 

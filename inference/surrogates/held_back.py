@@ -5,8 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._float64 import in_float64
-from .emulator import Emulator, beyond_components, emulate, innovations
+from .._float64 import in_float64
+from .emulator import (
+    Emulator,
+    beyond_components,
+    emulate,
+    innovations,
+)
 
 EARLIER = 2.0 / 3.0  # share of the runs from which the others are foretold
 # Runs to foretell others from: fewer know little of the output, and believe in anything.

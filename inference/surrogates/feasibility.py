@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._float64 import in_float64
+from .._float64 import in_float64
 
 WIDTH = 0.1  # in prior quantiles
 HOPE = 0.05  # successes that are assumed everywhere

@@ -7,10 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._float64 import in_float64
-from .base import LogLikelihood, LogSecondMoment
-from .emulator_checks import EQUAL, complaints
-from .gp.condition import (
+from .._float64 import in_float64
+from ..gp.condition import (
     GROWTH,
     believe,
     condition,
@@ -18,24 +16,26 @@ from .gp.condition import (
     leave_one_out,
     predict,
 )
-from .gp.hyperparameters import maximum_a_posteriori
-from .gp.optimise import minimise_in_box
-from .gp.process import (
+from ..gp.hyperparameters import maximum_a_posteriori
+from ..gp.optimise import minimise_in_box
+from ..gp.process import (
     GP,
     Data,
     pad,
     predict_many,
 )
-from .likelihood import (
+from .base import LogLikelihood, LogSecondMoment
+from .hyper_draws import posterior_draws
+from .outliers import sane
+from .threshold import (
     Threshold,
     ThresholdState,
     choose_threshold,
     log_likelihood,
     log_second_moment,
 )
-from .marginal import posterior_draws
-from .sane import sane
 from .transform import Transform, candidates
+from .warnings import EQUAL, complaints
 
 RETHINK = 2.0  # the transform is chosen anew when data have grown by this factor
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.stats import binom, chi2, f, norm
 
-from .foretold import Foretold
+from .held_back import Foretold
 
 FALSE_ALARMS = 1e-3  # of each leave-one-out check, were its errors independent and normal
 SURPRISES = 1e-2  # nominal share of good fits that are warned, see `surprised`

@@ -1,0 +1,1 @@
+"""Surrogates of the discrepancy and of the signal."""
