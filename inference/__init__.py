@@ -13,7 +13,6 @@ if TYPE_CHECKING:
         MaxVariance,
         PosteriorDraws,
     )
-    from .bank import Simulation, SimulationBank, Simulations
     from .bolfi import Bolfi
     from .checks import (
         SBC,
@@ -61,9 +60,10 @@ if TYPE_CHECKING:
     from .loop import fit
     from .posterior import Closest, Fit
     from .prior import Prior
-    from .runner import run_missing
     from .sampling.convergence import SamplingWarning
-    from .simulate import Job
+    from .simulations.bank import Simulation, SimulationBank, Simulations
+    from .simulations.job import Job
+    from .simulations.runner import run_missing
     from .surrogates.base import (
         Acquisition,
         Discrepancy,
@@ -164,7 +164,7 @@ _HOME = {
     "Found": ".criticism",
     "Gap": ".criticism",
     "Hypothesis": ".criticism",
-    "Job": ".simulate",
+    "Job": ".simulations.job",
     "Keeping": ".criticism",
     "KnownNoise": ".criticism",
     "LowerConfidenceBound": ".acquisition.rules",
@@ -183,9 +183,9 @@ _HOME = {
     "SBC": ".checks",
     "SharedDesign": ".checks",
     "SignalFamily": ".surrogates.families",
-    "Simulation": ".bank",
-    "SimulationBank": ".bank",
-    "Simulations": ".bank",
+    "Simulation": ".simulations.bank",
+    "SimulationBank": ".simulations.bank",
+    "Simulations": ".simulations.bank",
     "Simulator": ".surrogates.base",
     "Suggestion": ".criticism",
     "SumOfNoises": ".criticism",
@@ -201,7 +201,7 @@ _HOME = {
     "own_residual": ".criticism",
     "replicates": ".checks",
     "rest_noise": ".criticism",
-    "run_missing": ".runner",
+    "run_missing": ".simulations.runner",
     "sbc": ".checks",
     "shared_design": ".checks",
     "squared_difference": ".surrogates.squared_difference",

@@ -12,15 +12,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arguments import check_function, check_text, checked_array, checked_integer
-from .bank import Simulation, SimulationBank
 from .bolfi import MIN_LEARN, Bolfi
 from .design import start_size
-from .executors import opened
 from .posterior import Fit
 from .prior import Prior
-from .progress import progress_bar
-from .runner import Runner
-from .simulate import Job, columns, jobs, simulation_seed
+from .simulations.bank import Simulation, SimulationBank
+from .simulations.executors import opened
+from .simulations.job import (
+    Job,
+    columns,
+    jobs,
+    simulation_seed,
+)
+from .simulations.progress import progress_bar
+from .simulations.runner import Runner
 from .surrogates.base import Acquisition, Simulator, Theta
 from .surrogates.families import Family
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .failures import count, not_finite
+from .simulations.failures import count, not_finite
 
 UNKNOWN = -1  # seed or round of a simulation made elsewhere
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..arguments import check_callable, check_function, checked_integer
 from ..describe import describe
 from ..prior import Prior
-from ..progress import progress_bar
+from ..simulations.progress import progress_bar
 from ..surrogates.base import Simulator
 from .replicate import Observe, Pipeline, Plan, Replicate, run_replicate
 from .replicated import Replicates

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..database import opened_database
+from ..simulations.database import opened_database
 from .replicate import Replicate
 
 MARK = 0x424C4652  # "BLFR"

@@ -6,10 +6,10 @@ from functools import partial
 
 import numpy as np
 
-from ..bank import SimulationBank
 from ..prior import Prior
-from ..runner import run_missing
-from ..simulate import Job
+from ..simulations.bank import SimulationBank
+from ..simulations.job import Job
+from ..simulations.runner import run_missing
 from ..surrogates.base import Simulator
 from .experiment import Experiment, Proposal
 from .extension import Extensions

@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from bolfi_liquids.inference.bank import Simulation
+from bolfi_liquids.inference.simulations.bank import Simulation
 
 from bolfi_liquids import run_directory
 from bolfi_liquids.errors import InputError

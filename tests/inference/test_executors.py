@@ -11,7 +11,7 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 import dask
 import numpy as np
 import pytest
-from bolfi_liquids.inference.simulate import simulation_seed
+from bolfi_liquids.inference.simulations.job import simulation_seed
 from distributed import LocalCluster
 
 from bolfi_liquids import inference

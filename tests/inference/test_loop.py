@@ -13,7 +13,7 @@ from pathlib import Path
 import jax
 import numpy as np
 import pytest
-from bolfi_liquids.inference.simulate import simulation_seed
+from bolfi_liquids.inference.simulations.job import simulation_seed
 
 from bolfi_liquids import inference
 
@@ -22,7 +22,7 @@ import os, sys, time
 import numpy as np
 import numpyro.distributions as dist
 from bolfi_liquids import inference
-from bolfi_liquids.inference.simulate import simulation_seed
+from bolfi_liquids.inference.simulations.job import simulation_seed
 
 log, bank, out, pause = sys.argv[1:]
 

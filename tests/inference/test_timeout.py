@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import xarray as xr
 from bolfi_liquids.inference import Job, Simulation, SimulationBank, run_missing
-from bolfi_liquids.inference.failures import timed_out
-from bolfi_liquids.inference.simulate import run_batch, simulation_seed
+from bolfi_liquids.inference.simulations.failures import timed_out
+from bolfi_liquids.inference.simulations.job import run_batch, simulation_seed
 
 from bolfi_liquids import inference
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, NamedTuple
 from .bank import Simulation, SimulationBank
 from .executors import killed_its_worker
 from .failures import TIMEOUT, kind, raised
-from .simulate import Job, run_batch
+from .job import Job, run_batch
 
 if TYPE_CHECKING:
-    from .surrogates.base import Simulator
+    from ..surrogates.base import Simulator
 
 POLL = 0.2  # seconds between looks at what somebody else is simulating
 

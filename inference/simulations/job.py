@@ -15,7 +15,7 @@ from .bank import Simulation
 from .failures import raised, timed_out
 
 if TYPE_CHECKING:
-    from .surrogates.base import Simulator
+    from ..surrogates.base import Simulator
 
 R = TypeVar("R")
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .claims import Claims
 from .database import opened_database
+from .simulation_locks import Claims
 
 MARK = 0x424C4651  # "BLFQ"
 SCHEMA = """

@@ -1,0 +1,1 @@
+"""Run simulations in executors and keep them in a bank."""
