@@ -58,8 +58,8 @@ if TYPE_CHECKING:
     )
     from .engine_version import ENGINE_VERSION
     from .loop import fit
-    from .posterior import Closest, Fit
     from .prior import Prior
+    from .result import Closest, Fit
     from .sampling.convergence import SamplingWarning
     from .simulations.bank import Simulation, SimulationBank, Simulations
     from .simulations.job import Job
@@ -149,7 +149,7 @@ _HOME = {
     "Bolfi": ".bolfi",
     "Candidate": ".criticism",
     "Check": ".criticism",
-    "Closest": ".posterior",
+    "Closest": ".result",
     "Coverage": ".checks",
     "Criticism": ".criticism",
     "Discrepancy": ".surrogates.base",
@@ -159,7 +159,7 @@ _HOME = {
     "ExpectedIntegratedVariance": ".acquisition.rules",
     "Experiment": ".criticism",
     "Extension": ".criticism",
-    "Fit": ".posterior",
+    "Fit": ".result",
     "FitPipeline": ".checks",
     "Found": ".criticism",
     "Gap": ".criticism",

@@ -14,11 +14,18 @@ from .acquisition import rules as acquisitions
 from .acquisition.replicates import next_replicate
 from .arguments import checked_array, checked_integer
 from .describe import describe
-from .design import sobol, start_size
 from .gp.process import padded_rows
-from .posterior import Fit
+from .history import (
+    UNKNOWN,
+    History,
+    explain,
+    init,
+    remember_asked,
+    remember_told,
+)
 from .prior import Prior
-from .state import UNKNOWN, History, explain, init, remember_asked, remember_told
+from .result import Fit
+from .sobol import sobol, start_size
 from .surrogates.base import Acquisition, Theta
 from .surrogates.families import Family, Learnable, resolve
 from .surrogates.feasibility import feasibility

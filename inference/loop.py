@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike
 
 from .arguments import check_function, check_text, checked_array, checked_integer
 from .bolfi import MIN_LEARN, Bolfi
-from .design import start_size
-from .posterior import Fit
 from .prior import Prior
+from .result import Fit
 from .simulations.bank import Simulation, SimulationBank
 from .simulations.executors import opened
 from .simulations.job import (
@@ -26,6 +25,7 @@ from .simulations.job import (
 )
 from .simulations.progress import progress_bar
 from .simulations.runner import Runner
+from .sobol import start_size
 from .surrogates.base import Acquisition, Simulator, Theta
 from .surrogates.families import Family
 

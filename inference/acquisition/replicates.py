@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..state import History
+from ..history import History
 
 FIRST = 2  # replicates to begin with, which tell a deterministic simulator
 SHARE = 0.1  # of the simulations, where runs differ

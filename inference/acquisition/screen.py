@@ -13,8 +13,8 @@ import jax.numpy as jnp
 from jax.scipy.special import logsumexp, ndtr, ndtri
 from jax.scipy.stats import norm
 
-from ..design import sobol
 from ..gp.linalg import small_inverse_cholesky
+from ..sobol import sobol
 from ..surrogates.base import LogLikelihood
 
 ROUND = 64

@@ -12,12 +12,12 @@ import xarray as xr
 
 from ..arguments import check_function, checked_integer
 from ..bolfi import MIN_LEARN, Bolfi
-from ..design import sobol
 from ..loop import fit
 from ..prior import Prior
 from ..simulations.bank import SimulationBank
 from ..simulations.job import jobs, simulation_seed
 from ..simulations.runner import run_missing
+from ..sobol import sobol
 from ..surrogates.base import Simulator
 from ..surrogates.families import resolve
 from .replicate import LogDensity

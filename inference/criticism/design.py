@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..design import sobol
 from ..prior import Prior
+from ..sobol import sobol
 
 REACH = 10.0  # posterior sds: narrower boxes make slopes of noise (errors in variables)
 WIDE, NARROW, MOST = 0.25, 0.08, 0.5  # half a box's width: to begin with, later, and at most

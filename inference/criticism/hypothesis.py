@@ -13,7 +13,7 @@ from ..bolfi import Bolfi
 from ..gp import process as processes
 from ..gp.linalg import small_inverse_cholesky
 from ..gp.optimise import minimise_in_box
-from ..posterior import Fit
+from ..result import Fit
 from ..surrogates.emulator import latent_covariance, predict
 from ..surrogates.families import SignalFamily
 from ..surrogates.measurement_noise import Layout, Reduced

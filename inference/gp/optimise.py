@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..design import sobol
+from ..sobol import sobol
 
 SCREENED, REFINED = 512, 3
 EDGE = 1e-6  # the box is [EDGE, 1 - EDGE]: beyond lie only tails of unbounded priors

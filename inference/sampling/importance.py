@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.scipy.special import ndtri
 
-from ..design import sobol
+from ..sobol import sobol
 from ..surrogates.base import LogLikelihood
 from .mixture import (
     COMPONENTS,

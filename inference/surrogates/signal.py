@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._float64 import in_float64
-from ..design import sobol
 from ..gp.condition import believe
 from ..gp.optimise import minimise_in_box
+from ..sobol import sobol
 from .base import LogLikelihood, LogSecondMoment
 from .emulator import (
     Emulator,

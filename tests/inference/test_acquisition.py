@@ -13,8 +13,8 @@ from bolfi_liquids.inference.acquisition.rules import (
     lower_confidence_bound,
     truncated_normal,
 )
-from bolfi_liquids.inference.design import sobol
 from bolfi_liquids.inference.gp.process import predict
+from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.discrepancy import learn
 from bolfi_liquids.inference.surrogates.feasibility import feasibility, log_feasible
 from scipy.stats import kstest, multivariate_normal, norm, qmc, truncnorm

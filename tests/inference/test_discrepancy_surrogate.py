@@ -2,7 +2,7 @@ import warnings
 
 import numpy as np
 import pytest
-from bolfi_liquids.inference.design import sobol
+from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.discrepancy import learn, marginalised
 from bolfi_liquids.inference.surrogates.transform import Transform, candidates
 

@@ -4,9 +4,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from bolfi_liquids.inference.design import sobol
 from bolfi_liquids.inference.gp.condition import predict as predict_scores
 from bolfi_liquids.inference.gp.process import JITTER, predict_joint
+from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.emulator import emulate, innovations
 from bolfi_liquids.inference.surrogates.held_back import FEWEST, foretold
 from bolfi_liquids.inference.surrogates.warnings import surprised

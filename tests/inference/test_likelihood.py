@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from bolfi_liquids.inference.design import sobol
+from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.discrepancy import learn
 from bolfi_liquids.inference.surrogates.threshold import log_cdf, log_likelihood
 from scipy.special import erfcx

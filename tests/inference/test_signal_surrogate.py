@@ -6,11 +6,11 @@ import numpy as np
 import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference.acquisition.replicates import next_replicate
-from bolfi_liquids.inference.design import sobol
 from bolfi_liquids.inference.gp import process as gp
 from bolfi_liquids.inference.gp.condition import predict as predict_scores
 from bolfi_liquids.inference.gp.hyperparameters import NOISE
 from bolfi_liquids.inference.gp.process import predict
+from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.emulator import emulate, noise_share
 from bolfi_liquids.inference.surrogates.families import Learnable, SignalFamily
 from bolfi_liquids.inference.surrogates.signal_likelihood import log_likelihood, log_second_moment

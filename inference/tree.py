@@ -8,10 +8,10 @@ import jax
 import numpy as np
 import xarray as xr
 
+from .history import History
 from .prior import Prior
 from .sampling.convergence import diagnose
 from .sampling.target import Chains
-from .state import History
 from .surrogates.base import Surrogate
 
 PREDICTED = 50  # draws of each chain for which the surrogate predicts

@@ -11,12 +11,17 @@ import numpy as np
 import xarray as xr
 
 from ._float64 import in_float64
+from .history import History
 from .prior import Prior
-from .results import add_surrogate, finished, results_tree, simulations_dataset
 from .sampling.draw import SAMPLERS, draw_posterior
 from .sampling.target import Length, Target, log_likelihood
-from .state import History
 from .surrogates.base import Surrogate, Theta
+from .tree import (
+    add_surrogate,
+    finished,
+    results_tree,
+    simulations_dataset,
+)
 
 
 class Closest(NamedTuple):
