@@ -1,18 +1,24 @@
 """Criticism of a fitted simulator: where it and the data disagree, and what it lacks."""
 
-from .clean import own_residual
+from .clean_data import own_residual
 from .criticise import Criticism, criticise
 from .experiment import Experiment, Proposal
 from .extension import Extension
 from .held_out import Gap, beyond
 from .hypothesis import Hypothesis
-from .laboratory import Keeping
+from .measurement_noise import (
+    AutoregressiveNoise,
+    KnownNoise,
+    Noise,
+    SumOfNoises,
+    rest_noise,
+)
 from .misfit import Check, Found, Window
 from .next_experiment import Suggestion
-from .noise import AutoregressiveNoise, KnownNoise, Noise, SumOfNoises, rest_noise
 from .posterior import weighted_posterior
 from .search import Plan
-from .usual import UsualResidual, usual_residual
+from .simulate import Keeping
+from .usual_residual import UsualResidual, usual_residual
 from .verdict import Candidate, Verdict
 
 __all__ = [

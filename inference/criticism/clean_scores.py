@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from .hypothesis import Hypothesis, samples, values_of
-from .noise import Noise
+from .measurement_noise import Noise
 from .signatures import Signature
-from .usual import usual_in, without_usual
+from .usual_residual import usual_in, without_usual
 
 
 def scored_on_clean(

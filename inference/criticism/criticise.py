@@ -11,14 +11,14 @@ from .experiment import Experiment, Proposal
 from .extension import Extensions, check_extensions
 from .held_out import Gap, gap, holds, predict
 from .hypothesis import Hypothesis, samples
-from .laboratory import Keeping, Laboratory
+from .measurement_noise import Noise
 from .misfit import Found, locate, null_draws
 from .next_experiment import Suggestion, suggest
-from .noise import Noise
 from .posterior import Interval, Weighted, weighted_posterior
 from .search import Base, Plan, Study, examine, explain
 from .signatures import confusion
-from .usual import without_usual
+from .simulate import Keeping, Laboratory
+from .usual_residual import without_usual
 from .verdict import ALARM, Candidate, Verdict, conclude, tied
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from ..arguments import check_function, checked_array
 from ..surrogates.base import Simulator
+from .measurement_noise import Noise
 from .misfit import Window
-from .noise import Noise
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ import numpy as np
 from ..surrogates.output import SERIES
 from .experiment import Experiment
 from .hypothesis import samples
-from .laboratory import Laboratory
+from .measurement_noise import gaussian
 from .misfit import MODES, exceedance, orthonormal, slow_modes
-from .noise import gaussian
 from .run_noise import errors_of, smooth_covariance
-from .usual import without_usual
+from .simulate import Laboratory
+from .usual_residual import without_usual
 from .verdict import ACCEPTED
 
 FLOOR = 0.99  # quantile of the noise's RMS below which a gap may be noise

@@ -20,9 +20,9 @@ from ..surrogates.measurement_noise import Layout, Reduced
 from ..surrogates.signal import SignalSurrogate
 from ..surrogates.signal_likelihood import SignalState
 from ..surrogates.warnings import EmulatorWarning
-from .noise import Noise
+from .measurement_noise import Noise
 from .run_noise import own_errors, resized, smooth_covariance
-from .runs import Runs
+from .run_table import Runs
 
 COMPONENTS = 10
 STEP = 0.02  # of prior quantiles, for slopes

@@ -8,7 +8,7 @@ import numpy as np
 from .._float64 import in_float64
 from ..surrogates.measurement_noise import Layout
 from .hypothesis import Hypothesis, samples, values_of
-from .noise import Noise, gaussian
+from .measurement_noise import Noise, gaussian
 from .signatures import Signature, directions
 
 REPLICATES = 999  # of the parametric bootstrap

@@ -9,9 +9,9 @@ import numpy as np
 from ..surrogates.output import SERIES
 from .experiment import Proposal
 from .hypothesis import samples
-from .laboratory import Laboratory
 from .misfit import MODES, orthonormal, slow_modes
 from .run_noise import errors_of, smooth_covariance
+from .simulate import Laboratory
 from .verdict import Candidate
 
 RUNS = 3  # of each explanation in each proposed experiment

@@ -7,7 +7,7 @@ import numpy as np
 from ..gp.condition import leave_one_out
 from ..surrogates.emulator import Emulator
 from ..surrogates.measurement_noise import Layout
-from .usual import positive_autocovariance
+from .usual_residual import positive_autocovariance
 
 ALIKE = 0.2  # of prior quantiles, over which a simulator's noise changes as a power
 FEW = 0.1  # runs

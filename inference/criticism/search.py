@@ -6,15 +6,22 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .boxes import (
+    NARROW,
+    WIDE,
+    Box,
+    around,
+    fill,
+    with_coefficient,
+)
 from .clean_scores import scored_on_clean
-from .design import NARROW, WIDE, Box, around, fill, with_coefficient
 from .extension import extended
 from .hypothesis import Hypothesis, hypothesise
-from .laboratory import Laboratory
+from .measurement_noise import Noise
 from .misfit import Check, check, null_draws
-from .noise import Noise
-from .runs import Runs, joined
+from .run_table import Runs, joined
 from .signatures import Signature, signature
+from .simulate import Laboratory
 from .verdict import Candidate, near_best
 
 PASSES = 2  # of a refit, the second only if the first moved the best fit out of its box

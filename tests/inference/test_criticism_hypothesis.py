@@ -3,10 +3,10 @@
 import numpy as np
 import numpyro.distributions as dist
 import pytest
-from bolfi_liquids.inference.criticism.design import Box, fill
+from bolfi_liquids.inference.criticism.boxes import Box, fill
 from bolfi_liquids.inference.criticism.hypothesis import hypothesise, samples, values_of
-from bolfi_liquids.inference.criticism.laboratory import Laboratory
 from bolfi_liquids.inference.criticism.misfit import locate, null_draws
+from bolfi_liquids.inference.criticism.simulate import Laboratory
 from bolfi_liquids.inference.surrogates import output
 from scipy.stats import binom, chi2, norm
 

@@ -8,9 +8,9 @@ import pytest
 from bolfi_liquids.inference._float64 import in_float64
 from bolfi_liquids.inference.criticism.clean_scores import scored_on_clean
 from bolfi_liquids.inference.criticism.hypothesis import samples
-from bolfi_liquids.inference.criticism.laboratory import Laboratory
 from bolfi_liquids.inference.criticism.misfit import check, locate, null_draws
 from bolfi_liquids.inference.criticism.search import Study, examine
+from bolfi_liquids.inference.criticism.simulate import Laboratory
 from bolfi_liquids.inference.surrogates.emulator import latent_covariance
 from scipy.stats import binom, kstest, norm
 

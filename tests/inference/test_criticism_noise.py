@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bolfi_liquids.inference.criticism.noise import CORRELATIONS
+from bolfi_liquids.inference.criticism.measurement_noise import CORRELATIONS
 from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter

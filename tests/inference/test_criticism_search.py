@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import numpyro.distributions as dist
 import pytest
-from bolfi_liquids.inference.criticism.laboratory import Laboratory
 from bolfi_liquids.inference.criticism.next_experiment import suggest
+from bolfi_liquids.inference.criticism.simulate import Laboratory
 
 from bolfi_liquids import inference
 

@@ -5,8 +5,8 @@ import numpy as np
 from ..prior import Prior
 from .experiment import Experiment
 from .extension import Extensions
-from .laboratory import Keeping, Laboratory
 from .search import Plan, Study, fit_base
+from .simulate import Keeping, Laboratory
 
 REPEATS = 4  # runs where the model fits best, whose mean is free of the emulator's error
 

@@ -13,7 +13,7 @@ from ..simulations.runner import run_missing
 from ..surrogates.base import Simulator
 from .experiment import Experiment, Proposal
 from .extension import Extensions
-from .runs import Runs
+from .run_table import Runs
 
 Report = Callable[[str, int], None]
 """(phase, simulations finished in it since the last call)"""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..surrogates.measurement_noise import Layout
-from .noise import Noise, SumOfNoises, gaussian
+from .measurement_noise import Noise, SumOfNoises, gaussian
 
 LEAST_FREEDOM = 3  # with fewer, draws have no variance and no effect would be found
 
