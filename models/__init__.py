@@ -3,10 +3,10 @@
 from .cups import Cups
 from .effect import Effect
 from .effects import EFFECTS, register
-from .faults import FailedSimulation
+from .fluid.faults import FailedSimulation
+from .fluid.liquid import Liquid
+from .fluid.numerics import MODEL_VERSION, PUBLISHED_DRAG, Numerics
 from .frames import PourFrames, StirFrames, pour_frames, stir_frames
-from .liquid import Liquid
-from .numerics import MODEL_VERSION, PUBLISHED_DRAG, Numerics
 from .pouring import Landings, PourAction, PourResult, landings, pour
 from .rig import Rig
 from .stir_setup import Cup, Stick, StirSetup

@@ -14,7 +14,7 @@ from pydantic import (
     model_validator,
 )
 
-from .numerics import MODEL_VERSION, POUR_PARTICLES, Numerics
+from .fluid.numerics import MODEL_VERSION, POUR_PARTICLES, Numerics
 
 
 def _in_metres(length: float) -> float:

@@ -7,13 +7,13 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import check_numbers
 from .cups import Cups
+from .fluid.checks import check_numbers
+from .fluid.liquid import Liquid
+from .fluid.numerics import POUR_PARTICLES
+from .fluid.runtime import Watch
 from .gripper_path import GripperPath
-from .liquid import Liquid
-from .numerics import POUR_PARTICLES
 from .pouring import watched_landings
-from .runtime import Watch
 from .stir_setup import StirSetup
 from .stirring import watched_stir
 

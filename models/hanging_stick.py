@@ -13,8 +13,8 @@ but the angular one only up to these two.
 import numpy as np
 import taichi as ti
 
-from . import tables
-from .fluid import GRAVITY, Fluid, vec3
+from .fluid import wall_tables
+from .fluid.fluid import GRAVITY, Fluid, vec3
 
 
 @ti.data_oriented
@@ -28,10 +28,10 @@ class HangingStick(Fluid):
         # a capsule of the stick's volume: its round end reaches as far as the flat one on average
         self.stick_end = stick.length - 2.0 * stick.radius / 3.0
         self.stick_gyration = stick.gyration
-        table = tables.cylinder(self.core / self.h)
+        table = wall_tables.cylinder(self.core / self.h)
         self.stick_table = self.load(table)
         hidden = np.pi * (stick.radius**2 - self.core**2)  # [m²]
-        around = self.h**2 * tables.around_cylinder(table.density, self.core / self.h)
+        around = self.h**2 * wall_tables.around_cylinder(table.density, self.core / self.h)
         self.hidden_share = hidden / around  # of a particle's volume, where the table is 1
         self.pivot, self.pivot_velocity, self.direction, self.swing = (
             ti.Vector.field(3, ti.f32, self.slots) for _ in range(4)

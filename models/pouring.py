@@ -11,17 +11,17 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import runtime
-from .checks import check_numbers
 from .coefficients import acting_in, liquid_sets, with_adhesion
 from .cups import Cups
 from .effect import Effect
-from .faults import faulty
-from .liquid import Liquid
-from .numerics import POUR_PARTICLES, Numerics
-from .packing import checked_seeds, pack_cylinder
-from .runtime import Watch
-from .settled import Packing, SettledPackings
+from .fluid import runtime
+from .fluid.checks import check_numbers
+from .fluid.faults import faulty
+from .fluid.liquid import Liquid
+from .fluid.numerics import POUR_PARTICLES, Numerics
+from .fluid.packing import checked_seeds, pack_cylinder
+from .fluid.runtime import Watch
+from .fluid.settled import Packing, SettledPackings
 
 SETTLING = 0.6  # s
 _packings = SettledPackings()

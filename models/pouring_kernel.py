@@ -7,8 +7,8 @@ the cup's floor, z along its axis; it coincides with the world's directions befo
 
 import taichi as ti
 
-from .faults import SOUND
-from .fluid import STRIDE, Fluid, vec3
+from .fluid.faults import SOUND
+from .fluid.fluid import STRIDE, Fluid, vec3
 
 INSIDE, ABOVE, OUTSIDE = 0, 1, 2  # of the source: within its walls, above its rim, past it
 

@@ -6,9 +6,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .checks import check_numbers
+from .fluid.checks import check_numbers
+from .fluid.numerics import MODEL_VERSION, Numerics
 from .gripper_path import GripperPath, mean_speed
-from .numerics import MODEL_VERSION, Numerics
 
 ROOM = 1.5  # times the setup's fill is the largest
 

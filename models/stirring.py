@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import runtime
 from .coefficients import acting_in, changed_rig, changed_signal, liquid_sets, with_adhesion
 from .effect import Effect
-from .faults import faulty
+from .fluid import runtime
+from .fluid.faults import faulty
+from .fluid.liquid import Liquid
+from .fluid.packing import checked_seeds, pack_cylinder
+from .fluid.runtime import Watch
+from .fluid.settled import Packing, SettledPackings
 from .gripper_path import GripperPath, substep_path
-from .liquid import Liquid
-from .packing import checked_seeds, pack_cylinder
 from .rig import Rig, check_rig
-from .runtime import Watch
-from .settled import Packing, SettledPackings
 from .stir_setup import StirSetup
 
 SETTLING = 1.0  # s that a packing relaxes around the held stick

@@ -4,8 +4,8 @@
 import numpy as np
 import taichi as ti
 
-from .faults import SOUND
-from .fluid import STRIDE, vec3
+from .fluid.faults import SOUND
+from .fluid.fluid import STRIDE, vec3
 from .hanging_stick import HangingStick
 
 

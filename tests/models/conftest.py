@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from bolfi_liquids.models import effects as registry
-from bolfi_liquids.models import runtime
+from bolfi_liquids.models.fluid import runtime
 
 from bolfi_liquids import models
 
@@ -40,7 +40,7 @@ def weightless():
     """Builds a scene of liquids without walls and gravity, whose `step` a test calls."""
     runtime.start()
     import taichi as ti
-    from bolfi_liquids.models.fluid import STRIDE, Fluid
+    from bolfi_liquids.models.fluid.fluid import STRIDE, Fluid
 
     @ti.data_oriented
     class Weightless(Fluid):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bolfi_liquids.models import pouring
-from bolfi_liquids.models.packing import pack_cylinder
+from bolfi_liquids.models.fluid.packing import pack_cylinder
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from bolfi_liquids.models import pouring, runtime
+from bolfi_liquids.models import pouring
+from bolfi_liquids.models.fluid import runtime
 from bolfi_liquids.models.validation.analysis.profiles import binned_profile
 from bolfi_liquids.models.validation.scenes.channel import Channel, Drive, channel_flow
 from bolfi_liquids.models.validation.truths.generalised_flows import herschel_bulkley_channel
@@ -151,7 +152,7 @@ def test_adhesion_keeps_liquid_in_the_cup(cups):
 @pytest.mark.slow
 def test_adhesion_does_not_heat(cups):
     """A liquid at rest stays so: below 1.3 cm/s, where it has 0.5 without adhesion."""
-    from bolfi_liquids.models.packing import pack_cylinder
+    from bolfi_liquids.models.fluid.packing import pack_cylinder
 
     adhesion = models.EFFECTS["adhesion"]
     particles, source = 664, cups.source

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bolfi_liquids.models import runtime
+from bolfi_liquids.models.fluid import runtime
 from bolfi_liquids.models.validation.analysis.profiles import decay_rate, wave_amplitude
 from bolfi_liquids.models.validation.scenes.box import Box, box_scene, lattice
 

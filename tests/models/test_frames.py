@@ -2,8 +2,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bolfi_liquids.models.fluid.runtime import Watch
 from bolfi_liquids.models.pouring import watched_landings
-from bolfi_liquids.models.runtime import Watch
 
 from bolfi_liquids import models
 

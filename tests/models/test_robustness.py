@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from bolfi_liquids.models import faults, pouring, runtime, stirring
+from bolfi_liquids.models import pouring, stirring
+from bolfi_liquids.models.fluid import faults, runtime
 from jax import random
 
 from bolfi_liquids import models

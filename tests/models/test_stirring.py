@@ -2,7 +2,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bolfi_liquids.models import gripper_path, runtime, stirring
+from bolfi_liquids.models import gripper_path, stirring
+from bolfi_liquids.models.fluid import runtime
 from scipy.integrate import solve_ivp
 
 from bolfi_liquids import models

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...liquid import Liquid
+from ...fluid.liquid import Liquid
 from ..scenes.channel import Channel, Drive, Profiles, channel_flow
 
 CHANNEL = Channel()

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...numerics import PUBLISHED_DRAG, Numerics
+from ...fluid.numerics import PUBLISHED_DRAG, Numerics
 from ...stir_setup import Stick
 from ..truths.pendulum import Rod
 

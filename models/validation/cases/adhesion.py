@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...liquid import Liquid
+from ...fluid.liquid import Liquid
 from ...pouring import PourAction, pour
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from .retained_film import CUPS

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from ... import runtime, stirring
-from ...fluid import DAMPING
-from ...liquid import Liquid
-from ...numerics import Numerics
+from ... import stirring
+from ...fluid import runtime
+from ...fluid.fluid import DAMPING
+from ...fluid.liquid import Liquid
+from ...fluid.numerics import Numerics
 from ...stir_setup import Cup, Stick, StirSetup
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from ..truths.pendulum import Rod, archimedes_torque

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ...liquid import Liquid
-from ...numerics import COARSE, PUBLISHED_DRAG
+from ...fluid.liquid import Liquid
+from ...fluid.numerics import COARSE, PUBLISHED_DRAG
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from ..scenes.stream import Stream, drag
 from ..truths.cylinder_drag import DRAG_COEFFICIENT, drag_coefficient

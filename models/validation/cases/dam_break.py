@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...liquid import Liquid
+from ...fluid.liquid import Liquid
 from ..analysis.shapes import column_height, front_position
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from ..scenes.column import Column, collapse

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.optimize import root_scalar
 
-from ...liquid import Liquid
+from ...fluid.liquid import Liquid
 from ..analysis.profiles import binned_profile
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from ..scenes.film import Film, film_flow

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...effects.shear_thinning import ONSET
-from ...liquid import Liquid
+from ...fluid.liquid import Liquid
 from ..analysis.profiles import binned_profile
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from ..scenes.channel import Channel, Drive, channel_flow

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 
-from ...liquid import Liquid
+from ...fluid.liquid import Liquid
 from ..analysis.motion import rms_speed
 from ..analysis.shapes import density_by_height
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.optimize import root_scalar
 
-from ...numerics import Numerics
+from ...fluid.numerics import Numerics
 from ..analysis.profiles import binned_profile, fit_poiseuille
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from ..scenes.channel import Profiles

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...cups import Cups
-from ...liquid import Liquid
+from ...fluid.liquid import Liquid
 from ...pouring import DRIP, PourAction, pour
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from ..truths.surfaces import GRAVITY, jeffreys_volume

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from ... import runtime, stirring
-from ...liquid import Liquid
+from ... import stirring
+from ...fluid import runtime
+from ...fluid.liquid import Liquid
 from ...stir_setup import StirSetup
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from . import seed_noise

@@ -7,11 +7,16 @@ from functools import cache
 import numpy as np
 import taichi as ti
 
-from ... import runtime, tables
 from ...effect import Effect
-from ...fluid import GRAVITY, STRIDE, Fluid, vec3
-from ...numerics import Numerics
-from ...runtime import CHUNK
+from ...fluid import runtime, wall_tables
+from ...fluid.fluid import (
+    GRAVITY,
+    STRIDE,
+    Fluid,
+    vec3,
+)
+from ...fluid.numerics import Numerics
+from ...fluid.runtime import CHUNK
 
 JITTER = 0.1  # sd of where particles start, in spacings
 
@@ -70,7 +75,7 @@ class BoxScene(Fluid):
         self.rod_grip = ti.field(ti.f32, (slots, box.particles))
         if box.rod > 0.0:
             self.rod = box.numerics.stick_core(box.rod, box.spacing)
-            self.rod_table = self.load(tables.cylinder(self.rod / self.h))
+            self.rod_table = self.load(wall_tables.cylinder(self.rod / self.h))
 
     @ti.func
     def gravity(self, b):

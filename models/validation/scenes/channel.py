@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import runtime
 from ...effects import EFFECTS
-from ...liquid import Liquid
-from ...numerics import COARSE, Numerics
+from ...fluid import runtime
+from ...fluid.liquid import Liquid
+from ...fluid.numerics import COARSE, Numerics
 from .box import Box, box_scene, lattice
 
 ROOM = 0.03  # of the gap beyond the particles' volume: what is squeezed in flows like sand

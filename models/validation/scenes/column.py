@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ... import runtime
-from ...liquid import Liquid
-from ...numerics import Numerics
+from ...fluid import runtime
+from ...fluid.liquid import Liquid
+from ...fluid.numerics import Numerics
 from .box import Box, box_scene, lattice
 
 AROUND = 8  # spacings along a side that repeats

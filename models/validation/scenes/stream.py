@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import runtime
-from ...fluid import GRAVITY
-from ...liquid import Liquid
-from ...numerics import COARSE, Numerics
+from ...fluid import runtime
+from ...fluid.fluid import GRAVITY
+from ...fluid.liquid import Liquid
+from ...fluid.numerics import COARSE, Numerics
 from .box import Box, box_scene, lattice
 
 SPONGE = 0.15  # of the length: where the wake that comes round is smoothed away

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from bolfi_liquids.models.numerics import POUR_PARTICLES
+from bolfi_liquids.models.fluid.numerics import POUR_PARTICLES
 from scipy.interpolate import LinearNDInterpolator
 from scipy.stats import spearmanr
 

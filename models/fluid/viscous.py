@@ -10,7 +10,7 @@ symmetric and positive, so any viscosity is stable, and every iterate keeps the 
 
 import taichi as ti
 
-from . import tables
+from . import wall_tables
 from .faults import LARGEST, UNSOLVED
 from .neighbours import vec3
 from .rheology import Rheology
@@ -43,7 +43,7 @@ class Viscous(Rheology):
         self.unit_coupling = 10.0 * self.numerics.viscosity_gain * self.dt
         # stress by slip of all liquid near a wall together, at a share of 1 and density of 1
         nearest = self.numerics.contact / self.numerics.support
-        rubbing = self.h * tables.over_half_space(tables.half_space().tangential, nearest)
+        rubbing = self.h * wall_tables.over_half_space(wall_tables.half_space().tangential, nearest)
         self.unit_friction = self.numerics.wall_slip * rubbing / self.dt
 
     @ti.func

@@ -19,7 +19,7 @@ velocities, as Bender & Koschier 2015 ("Divergence-free SPH") do.
 import numpy as np
 import taichi as ti
 
-from . import tables
+from . import wall_tables
 from .neighbours import NeighbourSearch, vec3
 
 LEAST_WEIGHT = 1e-3  # of 1 - r / h: closer to the edge of the support a pair has no say
@@ -50,11 +50,11 @@ class Pressure(NeighbourSearch):
         )
         self.carry(self.velocity, ti.Vector.field(3, ti.f32, shape))
         self.carry(self.multiplier, ti.field(ti.f32, shape))
-        self.half_space = self.load(tables.half_space())
+        self.half_space = self.load(wall_tables.half_space())
 
     def load(self, table):
         """A boundary table as a field of (density, gradient, normal, tangential) rows."""
-        field = ti.Vector.field(4, ti.f32, tables.ENTRIES)
+        field = ti.Vector.field(4, ti.f32, wall_tables.ENTRIES)
         field.from_numpy(np.stack(table, axis=1).astype(np.float32))
         return field
 
@@ -62,9 +62,9 @@ class Pressure(NeighbourSearch):
     def look_up(self, table, distance):
         """Row of `table` at `distance` [m], linearly interpolated; zero beyond the support."""
         row = ti.Vector([0.0, 0.0, 0.0, 0.0])
-        at = ti.math.clamp(distance / self.h, 0.0, 1.0) * (tables.ENTRIES - 1)
+        at = ti.math.clamp(distance / self.h, 0.0, 1.0) * (wall_tables.ENTRIES - 1)
         k = ti.cast(at, ti.i32)
-        if k < tables.ENTRIES - 1:
+        if k < wall_tables.ENTRIES - 1:
             f = at - k
             row = (1.0 - f) * table[k] + f * table[k + 1]
         return row
