@@ -6,12 +6,13 @@ Loaded on use: importing this needs neither OpenCV nor ur-rtde.
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from .patterns import Path, circle, star
+from .motion.patterns import Path, circle, star
 
 if TYPE_CHECKING:
     from .board import host_time
     from .errors import MotionRejected, RigError
-    from .motions import (
+    from .motion.pour_paths import approach_pour, pour_path, ready_to_pour
+    from .motion.stir_paths import (
         PosePath,
         above_cup,
         approach,
@@ -21,10 +22,8 @@ if TYPE_CHECKING:
         stir,
         strokes,
     )
-    from .pour_motions import approach_pour, pour_path, ready_to_pour
     from .recorder.finalise import finalise, partial, rig_attributes
     from .rig import Camera, Rig
-    from .rig_check import check_rig
     from .rig_file import bundled_rig, open_rig
     from .safety.limits import Tool, check_path
     from .safety.preflight import Check
@@ -44,6 +43,7 @@ if TYPE_CHECKING:
         describe,
     )
     from .session.emulated import EmulatedRig, HiddenLiquid, emulated
+    from .session.rig_check import check_rig
     from .session.session import Session, SessionStopped, Status
     from .vision.charuco import Board
 
@@ -56,7 +56,7 @@ _HOME = {
     "EmulatedRig": ".session.emulated",
     "HiddenLiquid": ".session.emulated",
     "MotionRejected": ".errors",
-    "PosePath": ".motions",
+    "PosePath": ".motion.stir_paths",
     "Rig": ".rig",
     "RigError": ".errors",
     "SENTENCE": ".session.confirmation",
@@ -64,30 +64,30 @@ _HOME = {
     "SessionStopped": ".session.session",
     "Status": ".session.session",
     "Tool": ".safety.limits",
-    "above_cup": ".motions",
-    "approach": ".motions",
-    "approach_pour": ".pour_motions",
+    "above_cup": ".motion.stir_paths",
+    "approach": ".motion.stir_paths",
+    "approach_pour": ".motion.pour_paths",
     "bundled_rig": ".rig_file",
     "calibrate_camera": ".session.camera_calibration",
     "check_path": ".safety.limits",
-    "check_rig": ".rig_check",
+    "check_rig": ".session.rig_check",
     "confirm": ".session.confirmation",
     "confirm_emulated": ".session.confirmation",
     "describe": ".session.confirmation",
     "emulated": ".session.emulated",
     "finalise": ".recorder.finalise",
     "host_time": ".board",
-    "insert": ".motions",
-    "joined": ".motions",
+    "insert": ".motion.stir_paths",
+    "joined": ".motion.stir_paths",
     "open_rig": ".rig_file",
     "partial": ".recorder.finalise",
     "pictures_in": ".session.camera_calibration",
-    "pour_path": ".pour_motions",
-    "ready_to_pour": ".pour_motions",
-    "retract": ".motions",
+    "pour_path": ".motion.pour_paths",
+    "ready_to_pour": ".motion.pour_paths",
+    "retract": ".motion.stir_paths",
     "rig_attributes": ".recorder.finalise",
-    "stir": ".motions",
-    "strokes": ".motions",
+    "stir": ".motion.stir_paths",
+    "strokes": ".motion.stir_paths",
     "take_pictures": ".session.camera_calibration",
     "webcams": ".session.cameras",
     "write_lens": ".session.camera_calibration",

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 
 from ..errors import RigError
-from ..kinematics import ARMS
+from ..motion.kinematics import ARMS
 from ..priority import hurry
 from .controller import HOME, MODELS, Options
 from .hanging_stick import Stick, checked

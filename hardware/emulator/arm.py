@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..kinematics import DhArm
+from ..motion.kinematics import DhArm
 from .motion import ArmState, Motion, MotionError, Plan, Reactive, Timed, Tool, joint_speed
 
 RESTING = 1e-4  # rad/s; under 0.2 mm/s at the TCP

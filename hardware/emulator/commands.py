@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from ..geometry import compose
-from ..kinematics import DhArm, forward, inverse
+from ..motion.kinematics import DhArm, forward, inverse
+from ..motion.poses import compose
 from .arm import Arm
 from .motion import (
     ArmState,

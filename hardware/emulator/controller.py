@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..kinematics import ARMS
+from ..motion.kinematics import ARMS
 from .arm import Arm
 from .commands import ProgramError
 from .fields import Snapshot

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..geometry import Numbers
+from ..motion.poses import Numbers
 
 GRAVITY = 9.81  # m/s2
 AIR_DAMPING = 0.05  # 1/s; the amplitude in air falls to 1/e in 40 s

@@ -6,8 +6,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..geometry import Numbers, matrix_pose, rotation_matrix, rotation_vector
-from ..kinematics import DhArm, forward, inverse, jacobian
+from ..motion.kinematics import (
+    DhArm,
+    forward,
+    inverse,
+    jacobian,
+)
+from ..motion.poses import (
+    Numbers,
+    matrix_pose,
+    rotation_matrix,
+    rotation_vector,
+)
 
 
 class MotionError(Exception):

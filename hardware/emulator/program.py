@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from ..geometry import Numbers
+from ..motion.poses import Numbers
 from .arm import Arm
 from .commands import COMMANDS, REALTIME, Machine, ProgramError
 from .motion import Plan

@@ -18,8 +18,8 @@ import numpy as np
 
 from ..board import Board, Row, Trouble, Who, host_time
 from ..errors import RigError
-from ..frames import cup_frame
-from ..pour_motions import upright_again
+from ..motion.cup_frame import cup_frame
+from ..motion.pour_paths import upright_again
 from ..priority import hurry, quieten
 from ..recorder.events import EventLog
 from ..recorder.rate import Rate, counted, no_rate
@@ -27,7 +27,12 @@ from ..recorder.sample import Sample
 from ..safety.guards import Reading, Rules, Seen, Trip, evaluate, first_watch, tripped, watched
 from ..safety.limits import turn_between, workspace
 from ..safety.preflight import failures
-from .base import ArmReader, ArmState, LinkLost, PathFollower
+from .arm import (
+    ArmReader,
+    ArmState,
+    LinkLost,
+    PathFollower,
+)
 from .course import Course, Leg, Trail, advanced, queued
 from .inbox import Inbox, Vetting
 from .orders import (

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..motions import PosePath
+from ..motion.stir_paths import PosePath
 
 
 class Leg(NamedTuple):

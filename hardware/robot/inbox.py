@@ -8,8 +8,8 @@ from threading import Thread
 import numpy as np
 
 from ..errors import MotionRejected
-from ..frames import cup_frame
-from ..motions import PosePath
+from ..motion.cup_frame import cup_frame
+from ..motion.stir_paths import PosePath
 from ..priority import hurry
 from ..rig import Rig
 from ..safety.guards import Trip

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..motions import PosePath
+from ..motion.stir_paths import PosePath
 from ..rig import Rig
 from ..safety.guards import Reading
 from ..safety.limits import Tool

@@ -21,7 +21,7 @@ from ..safety.preflight import (
     process_checks,
     program_check,
 )
-from .base import ArmState, LinkLost
+from .arm import ArmState, LinkLost
 from .orders import Assignment
 from .ur import URArm, URReader
 

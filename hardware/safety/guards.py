@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from ..board import Row, Trouble, Who
 from ..rig import Box, Limits
-from ..robot.base import ArmState
+from ..robot.arm import ArmState
 
 NORMAL, REDUCED = 1 << 0, 1 << 1
 RUNNING_MODE, PLAYING = 7, 2

@@ -10,9 +10,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..errors import MotionRejected
-from ..frames import cup_frame
-from ..kinematics import UR10, UR10E, DhArm, follow, inverse
-from ..motions import PosePath
+from ..motion.cup_frame import cup_frame
+from ..motion.kinematics import (
+    UR10,
+    UR10E,
+    DhArm,
+    follow,
+    inverse,
+)
+from ..motion.stir_paths import PosePath
 from ..rig import Box, Limits, Rig
 
 Tool = Literal["stirring", "pouring"]

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..board import Row, Who
-from ..frames import cup_frame
-from ..kinematics import forward
+from ..motion.cup_frame import cup_frame
+from ..motion.kinematics import forward
 from ..rig import Rig
-from ..robot.base import ArmState, Payload, Six
+from ..robot.arm import ArmState, Payload, Six
 from .guards import CAMERAS, FULL_SPEED, PLAYING, RECORDER_AGE, RUNNING_MODE, safe, safety_text
 from .limits import Tool, turn_between, workspace
 

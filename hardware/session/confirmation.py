@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from ..emulator.admin_client import Admin, AdminError
 from ..errors import RigError
-from ..motions import PosePath
+from ..motion.stir_paths import PosePath
 from ..rig import Rig
 from ..safety.limits import Tool, workspace
 

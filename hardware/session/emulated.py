@@ -13,8 +13,8 @@ from ..board import check_can_start
 from ..cameras.base import Camera
 from ..emulator.process import EmulatorProcess
 from ..errors import RigError
-from ..frames import cup_frame
-from ..kinematics import inverse
+from ..motion.cup_frame import cup_frame
+from ..motion.kinematics import inverse
 from ..recorder.views import camera_model
 from ..rig import Rig, View
 from ..safety.limits import Tool, workspace

@@ -15,8 +15,8 @@ import numpy as np
 from ..board import SPAWN, Board, Row, Who, check_can_start, host_time
 from ..cameras.base import Camera
 from ..errors import MotionRejected, RigError
-from ..frames import cup_frame
-from ..motions import PosePath
+from ..motion.cup_frame import cup_frame
+from ..motion.stir_paths import PosePath
 from ..recorder.directory import start_directory
 from ..recorder.events import EventLog, drop_reserve
 from ..recorder.process import run_recorder

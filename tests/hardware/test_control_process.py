@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.board import SPAWN, Board, Row, Who, host_time
 from bolfi_liquids.hardware.emulator.process import EmulatorProcess
-from bolfi_liquids.hardware.frames import cup_frame
-from bolfi_liquids.hardware.kinematics import forward, inverse
-from bolfi_liquids.hardware.motions import insert, stir
-from bolfi_liquids.hardware.pour_motions import approach_pour, pour_path, ready_to_pour
+from bolfi_liquids.hardware.motion.cup_frame import cup_frame
+from bolfi_liquids.hardware.motion.kinematics import forward, inverse
+from bolfi_liquids.hardware.motion.pour_paths import approach_pour, pour_path, ready_to_pour
+from bolfi_liquids.hardware.motion.stir_paths import insert, stir
 from bolfi_liquids.hardware.recorder.events import read_events
 from bolfi_liquids.hardware.recorder.sample import Sample
 from bolfi_liquids.hardware.rig_file import bundled_rig

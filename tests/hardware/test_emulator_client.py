@@ -6,8 +6,8 @@ from functools import cached_property
 
 import numpy as np
 import pytest
-from bolfi_liquids.hardware import geometry, kinematics
 from bolfi_liquids.hardware.emulator import EmulatorProcess
+from bolfi_liquids.hardware.motion import kinematics, poses
 
 pytestmark = pytest.mark.punctual
 
@@ -65,8 +65,8 @@ def moved(pose, *shift):
 
 
 def angle_between(first, second):
-    a, b = geometry.rotation_matrix(first[3:]), geometry.rotation_matrix(second[3:])
-    return np.linalg.norm(geometry.rotation_vector(a.T @ b))
+    a, b = poses.rotation_matrix(first[3:]), poses.rotation_matrix(second[3:])
+    return np.linalg.norm(poses.rotation_vector(a.T @ b))
 
 
 def states_until_rest(admin):
@@ -228,7 +228,7 @@ def test_questions_are_answered_by_the_kinematics(robot):
     assert control.isPoseWithinSafetyLimits(pose.tolist())
     assert not control.isPoseWithinSafetyLimits([2.0, 0, 0, 0, 0, 0])
     other = [0.1, 0.0, -0.2, 0.5, 0.0, 0.0]
-    assert control.poseTrans(tcp, other) == pytest.approx(geometry.compose(tcp, other))
+    assert control.poseTrans(tcp, other) == pytest.approx(poses.compose(tcp, other))
     assert wait_until(control.isSteady)
 
 

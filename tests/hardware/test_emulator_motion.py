@@ -12,7 +12,7 @@ from bolfi_liquids.hardware.emulator.motion import (
     servo,
     twist,
 )
-from bolfi_liquids.hardware.kinematics import UR10
+from bolfi_liquids.hardware.motion.kinematics import UR10
 from scipy.linalg import expm
 
 HOME = np.array([0.3, -1.4, 1.6, -1.7, -1.5, 0.2])

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
-from bolfi_liquids.hardware import geometry, kinematics
-from bolfi_liquids.hardware.kinematics import UR10, UR10E
+from bolfi_liquids.hardware.motion import kinematics
+from bolfi_liquids.hardware.motion import poses as geometry
+from bolfi_liquids.hardware.motion.kinematics import UR10, UR10E
 from scipy.spatial.transform import Rotation
 
 TCP = np.array([0.01, -0.02, 0.18, 0.2, -0.1, 0.3])

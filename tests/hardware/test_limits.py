@@ -1,10 +1,17 @@
 import numpy as np
 import pytest
 from bolfi_liquids.hardware.errors import MotionRejected
-from bolfi_liquids.hardware.frames import cup_frame
-from bolfi_liquids.hardware.kinematics import UR10, forward, inverse
-from bolfi_liquids.hardware.motions import PosePath, approach, insert, retract, stir, travel
-from bolfi_liquids.hardware.pour_motions import pour_path
+from bolfi_liquids.hardware.motion.cup_frame import cup_frame
+from bolfi_liquids.hardware.motion.kinematics import UR10, forward, inverse
+from bolfi_liquids.hardware.motion.pour_paths import pour_path
+from bolfi_liquids.hardware.motion.stir_paths import (
+    PosePath,
+    approach,
+    insert,
+    retract,
+    stir,
+    travel,
+)
 from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.safety import limits
 from bolfi_liquids.hardware.safety.limits import (

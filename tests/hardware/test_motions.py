@@ -1,7 +1,15 @@
 import numpy as np
 import pytest
 from bolfi_liquids.hardware import star
-from bolfi_liquids.hardware.motions import (
+from bolfi_liquids.hardware.motion.pour_paths import (
+    RAMP,
+    UPRIGHT_RATE,
+    approach_pour,
+    pour_path,
+    ready_to_pour,
+    upright_again,
+)
+from bolfi_liquids.hardware.motion.stir_paths import (
     approach,
     insert,
     joined,
@@ -9,14 +17,6 @@ from bolfi_liquids.hardware.motions import (
     retract,
     stir,
     strokes,
-)
-from bolfi_liquids.hardware.pour_motions import (
-    RAMP,
-    UPRIGHT_RATE,
-    approach_pour,
-    pour_path,
-    ready_to_pour,
-    upright_again,
 )
 from bolfi_liquids.hardware.rig_file import bundled_rig
 from scipy.spatial import cKDTree

@@ -10,9 +10,9 @@ import psutil
 import pytest
 from bolfi_liquids.hardware.emulator.process import EmulatorProcess
 from bolfi_liquids.hardware.errors import MotionRejected, RigError
-from bolfi_liquids.hardware.frames import cup_frame
-from bolfi_liquids.hardware.kinematics import inverse
-from bolfi_liquids.hardware.motions import insert, retract, stir
+from bolfi_liquids.hardware.motion.cup_frame import cup_frame
+from bolfi_liquids.hardware.motion.kinematics import inverse
+from bolfi_liquids.hardware.motion.stir_paths import insert, retract, stir
 from bolfi_liquids.hardware.recorder.events import read_events
 from bolfi_liquids.hardware.recorder.sample import SAMPLES
 from bolfi_liquids.hardware.rig_file import bundled_rig
@@ -213,7 +213,7 @@ def test_no_controller_is_a_line_of_the_list(tmp_path):
 ENDING = """
 import os, signal, sys, time
 from pathlib import Path
-from bolfi_liquids.hardware.motions import stir
+from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.session.confirmation import confirm_emulated
 from bolfi_liquids.hardware.session.session import Session

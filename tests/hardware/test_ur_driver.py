@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.emulator.process import EmulatorProcess
 from bolfi_liquids.hardware.errors import MotionRejected, RigError
-from bolfi_liquids.hardware.frames import cup_frame
-from bolfi_liquids.hardware.kinematics import inverse
-from bolfi_liquids.hardware.motions import stir
+from bolfi_liquids.hardware.motion.cup_frame import cup_frame
+from bolfi_liquids.hardware.motion.kinematics import inverse
+from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.rig_file import bundled_rig
-from bolfi_liquids.hardware.robot.base import LinkLost
+from bolfi_liquids.hardware.robot.arm import LinkLost
 from bolfi_liquids.hardware.robot.ur import URArm, URReader
 from bolfi_liquids.hardware.safety.limits import workspace
 
@@ -171,11 +171,11 @@ def test_a_protective_stop_is_told_and_takes_no_set_point(arm, emulator):
 # in a process of its own, which the library may crash
 DROPPED = """
 import os, sys, time
-from bolfi_liquids.hardware.frames import cup_frame
+from bolfi_liquids.hardware.motion.cup_frame import cup_frame
 from bolfi_liquids.hardware.emulator.admin_client import Admin
-from bolfi_liquids.hardware.motions import stir
+from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.rig_file import bundled_rig
-from bolfi_liquids.hardware.robot.base import LinkLost
+from bolfi_liquids.hardware.robot.arm import LinkLost
 from bolfi_liquids.hardware.robot.ur import URArm
 
 rig, address = bundled_rig(), sys.argv[1]

@@ -27,9 +27,9 @@ import numpy as np
 from bolfi_liquids.hardware.cameras.base import Frame
 from bolfi_liquids.hardware.emulator.admin_client import Admin
 from bolfi_liquids.hardware.emulator.process import EmulatorProcess
-from bolfi_liquids.hardware.frames import cup_frame
-from bolfi_liquids.hardware.kinematics import inverse
-from bolfi_liquids.hardware.motions import PosePath, stir
+from bolfi_liquids.hardware.motion.cup_frame import cup_frame
+from bolfi_liquids.hardware.motion.kinematics import inverse
+from bolfi_liquids.hardware.motion.stir_paths import PosePath, stir
 from bolfi_liquids.hardware.recorder.events import read_events
 from bolfi_liquids.hardware.recorder.outcome import outcome
 from bolfi_liquids.hardware.recorder.sample import SAMPLES

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
+from ..rig import Rig
 from .patterns import circle, star_vertices, travelled
-from .rig import Rig
 
 TURN_RATE = np.radians(30.0)  # rad/s, of the tool between two orientations
 TURN_ACCELERATION = np.radians(90.0)  # rad/s2

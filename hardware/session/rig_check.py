@@ -5,15 +5,15 @@ from collections.abc import Callable, Iterator
 from contextlib import closing
 from importlib.metadata import PackageNotFoundError, version
 
-from .cameras import CameraError
-from .errors import RigError
-from .motions import insert, retract, stir
-from .recorder.views import camera_model
-from .rig import Camera, Rig
-from .robot.ur import URReader
-from .safety.limits import check_path
-from .safety.preflight import Check, controller_checks, place_check
-from .session.cameras import RigCamera
+from ..cameras import CameraError
+from ..errors import RigError
+from ..motion.stir_paths import insert, retract, stir
+from ..recorder.views import camera_model
+from ..rig import Camera, Rig
+from ..robot.ur import URReader
+from ..safety.limits import check_path
+from ..safety.preflight import Check, controller_checks, place_check
+from .cameras import RigCamera
 
 RTDE_PORT = 30004
 ANSWER = 2.0  # s

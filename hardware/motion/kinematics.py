@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from .geometry import Numbers, matrix_pose, pose_matrix
+from .poses import Numbers, matrix_pose, pose_matrix
 
 _ALPHA = (0.5 * math.pi, 0.0, 0.0, 0.5 * math.pi, -0.5 * math.pi, 0.0)
 

@@ -7,9 +7,15 @@ upright and leaves upwards, as in "To Stir or Not to Stir" (angular velocity and
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .frames import cup_frame
-from .motions import PosePath, placed, profile, travel, turn_rate
-from .rig import Rig
+from ..rig import Rig
+from .cup_frame import cup_frame
+from .stir_paths import (
+    PosePath,
+    placed,
+    profile,
+    travel,
+    turn_rate,
+)
 
 RAMP = 0.1  # s, in which the turn reaches its angular velocity, and in which it ends
 UPRIGHT_RATE = np.radians(60.0)  # rad/s, of the turn back

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .rig import Cup
+from ..rig import Cup
 
 
 class CupFrame(NamedTuple):

@@ -1,0 +1,1 @@
+"""Kinematics and the paths of the gripper."""
