@@ -9,13 +9,13 @@ if TYPE_CHECKING:
     from .calibrator import calibrate
     from .criticiser import criticise
     from .criticism import Criticism
+    from .inputs.recording import Recording, open_recording
+    from .inputs.table_import import import_table
     from .models import Cups
     from .pour_execution import execute_pour
     from .pouring import choose_pour
     from .recorder import record
-    from .recordings import Recording, open_recording
     from .reporting import report
-    from .table_import import import_table
 
 __version__ = version("bolfi-liquids")
 __all__ = [
@@ -39,13 +39,13 @@ _HOME = {
     "Calibration": ".calibration",
     "Criticism": ".criticism",
     "Cups": ".models",
-    "Recording": ".recordings",
+    "Recording": ".inputs.recording",
     "calibrate": ".calibrator",
     "choose_pour": ".pouring",
     "criticise": ".criticiser",
     "execute_pour": ".pour_execution",
-    "import_table": ".table_import",
-    "open_recording": ".recordings",
+    "import_table": ".inputs.table_import",
+    "open_recording": ".inputs.recording",
     "record": ".recorder",
     "report": ".reporting",
 }

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from .draws import pick_draws
 from .errors import InputError
-from .prior import read_prior
+from .inputs.prior import read_prior
+from .inputs.settings import CalibrationSettings
 from .run_directory import POSTERIOR, read_run
-from .settings import CalibrationSettings
 from .summary import read_summary
 
 if TYPE_CHECKING:

@@ -11,13 +11,13 @@ from .calibration import Calibration, is_calibrated
 from .calibration_section import calibration_section
 from .draws import pick_draws
 from .errors import InputError
-from .prior import check_prior, default_prior
+from .inputs.prior import check_prior, default_prior
+from .inputs.recording import Recording, Source, open_recordings
+from .inputs.settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
 from .progress import Simulate, progress_bar, reported
 from .provenance import run_record
-from .recordings import Recording, Source, open_recordings
 from .recordings_kept import keep_recordings
 from .run_directory import POSTERIOR, enter_run, open_bank, read_run
-from .settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
 from .stirring import Stirring, stirring_of
 from .summary import write_section
 

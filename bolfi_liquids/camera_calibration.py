@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .errors import InputError
-from .rigs import rig_of
+from .inputs.rigs import rig_of
 
 if TYPE_CHECKING:
     from .hardware import CalibratedCamera, Camera

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .inputs.recording import Recording
 from .noise import sensor_noise
-from .recordings import Recording
 from .stir_experiment import camera_noise, same_experiment, stir_experiment
 from .stirring import stirring_of
 

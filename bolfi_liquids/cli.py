@@ -20,8 +20,7 @@ from .cli_examples import examples, session
 from .cli_results import complaints_among_results, print_findings, print_next, print_section
 from .cli_rig import RigOption
 from .compilations import keep_compilations
-from .run_directory import RUN_TOML
-from .settings import (
+from .inputs.settings import (
     RISKS,
     SAMPLERS,
     SURROGATES,
@@ -29,6 +28,7 @@ from .settings import (
     CriticismSettings,
     PourSettings,
 )
+from .run_directory import RUN_TOML
 
 RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="Directory of a run.")]
 
@@ -102,7 +102,7 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
 ) -> None:
     """Learn a liquid's parameters from recordings of it being stirred."""
     from .calibrator import calibrate as run_calibrate
-    from .recordings import aborted_recordings, open_recordings
+    from .inputs.recording import aborted_recordings, open_recordings
 
     opened = open_recordings(recordings)
     if resume and not (out / RUN_TOML).exists():
@@ -163,8 +163,8 @@ def criticise(  # noqa: PLR0913  one parameter for each option
 ) -> None:
     """Find where simulation and recording disagree, and which effect is missing."""
     from .criticiser import criticise as run_criticise
-    from .cups import open_cups
-    from .pour_table import open_pours
+    from .inputs.cups import open_cups
+    from .inputs.pour_table import open_pours
 
     for name, given in (("liquid", liquid), ("cups", cups), ("held-out-pours", held_out_pours)):
         if pours is None and given:
@@ -224,7 +224,7 @@ def pour(  # noqa: PLR0913  one parameter for each option
         if given:
             raise typer.BadParameter(f"--{option} needs --execute, which is missing")
     from .criticism import latest_calibration
-    from .cups import bundled_cups, open_cups
+    from .inputs.cups import bundled_cups, open_cups
     from .pouring import choose_pour
 
     chosen_cups = bundled_cups() if cups is None else open_cups(cups)

@@ -7,7 +7,7 @@ import typer
 
 from .cli_errors import FAILED
 from .cli_examples import examples
-from .settings import SbcSettings
+from .inputs.settings import SbcSettings
 
 app = typer.Typer(help="Long validation runs; a killed one goes on.", no_args_is_help=True)
 

@@ -28,8 +28,8 @@ def import_table(
 
     First write a template; change it to say what stands where in your table; then import.
     """
-    from .table_import import import_table as run_import
-    from .table_import import outline, write_template
+    from .inputs.table_import import import_table as run_import
+    from .inputs.table_import import outline, write_template
 
     if template is not None:
         written = write_template(template)

@@ -57,9 +57,9 @@ def record(  # noqa: PLR0913  one parameter for each option
     ] = None,
 ) -> None:
     """Stir, and record it. A dry run unless armed: it plans, checks everything, moves nothing."""
-    from .cups import open_cups
+    from .inputs.cups import open_cups
+    from .inputs.rigs import rig_of
     from .online_recorder import OnlineChoice
-    from .rigs import rig_of
     from .tables import print_recording
 
     _one_of(arm, emulator)
@@ -100,8 +100,8 @@ def _record(
 
 def execute(run: Path, rig: Path | None, *, arm: bool, emulator: bool) -> None:
     """`pour --execute`: a dry run unless armed."""
+    from .inputs.rigs import rig_of
     from .pour_execution import execute_pour
-    from .rigs import rig_of
 
     _one_of(arm, emulator)
     opened = rig_of(rig)

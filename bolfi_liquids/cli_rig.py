@@ -24,7 +24,7 @@ def check(rig: RigOption = None) -> None:
     from rich.console import Console
 
     from .hardware import check_rig
-    from .rigs import rig_of
+    from .inputs.rigs import rig_of
     from .tables import print_checks
 
     checks = check_rig(rig_of(rig))
@@ -38,7 +38,7 @@ def template(
     out: Annotated[Path, typer.Argument(metavar="FILE", help="To be written.")] = Path("rig.toml"),
 ) -> None:
     """Write the bundled rig.toml, to be changed into your own."""
-    from .rigs import write_template
+    from .inputs.rigs import write_template
 
     typer.echo(f"{write_template(out)}: change it, then: bolfi-liquids rig check --rig {out}")
 
@@ -92,7 +92,7 @@ def emulate(
 
     Any client of a real controller may connect to it, ours by `host` under `robot` in rig.toml.
     """
-    from .rigs import emulator_until_interrupted, rig_of
+    from .inputs.rigs import emulator_until_interrupted, rig_of
 
     for line in emulator_until_interrupted(rig_of(rig), address, viscosity):
         typer.echo(line)

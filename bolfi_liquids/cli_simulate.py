@@ -47,9 +47,9 @@ def stir(  # noqa: PLR0913  one parameter for each option
     """
     import numpy as np
 
-    from .bundled import bundled_recording
-    from .described_liquid import Described, read_effects
-    from .recordings import open_recording
+    from .inputs.bundled import bundled_recording
+    from .inputs.described_liquid import Described, read_effects
+    from .inputs.recording import open_recording
     from .simulated import simulate_stir
 
     opened = bundled_recording("glycerin") if recording is None else open_recording(recording)
@@ -96,8 +96,8 @@ def pour(  # noqa: PLR0913  one parameter for each option
     """
     import numpy as np
 
-    from .cups import bundled_cups, open_cups
-    from .described_liquid import Described, read_effects
+    from .inputs.cups import bundled_cups, open_cups
+    from .inputs.described_liquid import Described, read_effects
     from .simulated import simulate_pour
 
     opened = bundled_cups() if cups is None else open_cups(cups)

@@ -14,14 +14,14 @@ from .criticism_results import criticism_tree
 from .criticism_section import criticism_section
 from .errors import InputError
 from .findings import Findings
+from .inputs.pour_table import PourTable
+from .inputs.recording import Recording, Source
+from .inputs.settings import CriticismSettings
 from .pour_experiment import as_prior, pour_experiment
-from .pour_table import PourTable
 from .progress import phases
 from .proposals import pour_proposals, stir_proposals
-from .recordings import Recording, Source
 from .results import write_tree
 from .run_directory import CRITICISM, open_bank
-from .settings import CriticismSettings
 from .stir_experiment import camera_noise, effects_of, held_out_noise, stir_experiment
 from .stirring import Stirring, stirring_of
 from .summary import write_section

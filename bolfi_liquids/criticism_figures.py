@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from .criticism_narrative import words
 from .drawing import BLUE, GREY, INK, LIGHT, ORANGE, new_figure, styled
-from .settings import ALARM
+from .inputs.settings import ALARM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

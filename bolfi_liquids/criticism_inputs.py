@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .calibration import Calibration
-from .cups import bundled_cups
 from .errors import InputError
-from .pour_table import PourTable, open_pours
+from .inputs.cups import bundled_cups
+from .inputs.pour_table import PourTable, open_pours
+from .inputs.recording import Recording, Source, open_recordings
+from .inputs.settings import ALARM, CriticismSettings
 from .provenance import generations
-from .recordings import Recording, Source, open_recordings
 from .recordings_kept import kept_recordings
 from .run_directory import CRITICISM_FORMAT
-from .settings import ALARM, CriticismSettings
 from .stir_experiment import effects_of, frame_interval, same_rate
 from .stirring import Stirring, same_liquid, stirring_of
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .findings import Findings
-from .recording_fields import PLANE_NAMES
+from .inputs.fields import PLANE_NAMES
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree

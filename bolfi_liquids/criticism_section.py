@@ -7,8 +7,8 @@ import numpy as np
 
 from .calibration_section import parameter_summary
 from .findings import Findings
+from .inputs.settings import ALARM
 from .noise import rms
-from .settings import ALARM
 
 if TYPE_CHECKING:
     from xarray import DataTree

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from .criticism import latest_calibration
 from .criticism_narrative import unit_of
-from .cups import kept_cups
+from .inputs.cups import kept_cups
+from .inputs.prior import split_parameters
+from .inputs.recording import Recording
 from .kept import fresh_seeds
 from .pour_results import read_pour
-from .prior import split_parameters
 from .progress import Advance, progress_bar
-from .recordings import Recording
 from .recordings_kept import kept_recordings
 from .results import read_tree, write_tree
 from .run_directory import FRAMES, POUR

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .calibration import Calibration
 from .criticism_narrative import with_unit
-from .cups import kept_cups
+from .inputs.cups import kept_cups
 from .narrative import percent
 from .pour_results import read_pour
 from .readouts import short

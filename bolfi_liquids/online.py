@@ -18,16 +18,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .calibrator import calibrate
-from .cups import bundled_cups
 from .errors import InputError
+from .inputs.cups import bundled_cups
+from .inputs.prior import (
+    check_prior,
+    default_prior,
+    describe_prior,
+    read_prior,
+)
+from .inputs.recording import Recording, Source, open_recording
 from .online_learner import learn_online
 from .online_outbox import Outbox
 from .online_plan import SoFar, planned, stroke_ends
 from .online_request import FAILED, GONE, PREPARING, READY, REFUSED, Request, Status
 from .online_settings import OnlineSettings
 from .online_simulator import simulate_plan
-from .prior import check_prior, default_prior, describe_prior, read_prior
-from .recordings import Recording, Source, open_recording
 from .run_directory import RUN_TOML
 from .spillage_map import make_pours
 

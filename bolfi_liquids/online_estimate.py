@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from .kept import fresh_seeds
 from .online_plan import Followed
 from .online_settings import OnlineSettings
-from .settings import MIN_SIMULATIONS, PAPER_RULES
 from .spillage_map import SpillageMap
 from .stirring import Stirring
 

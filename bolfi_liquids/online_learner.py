@@ -43,8 +43,8 @@ class _Learner:
     """What the process knows."""
 
     def __init__(self, parent: Connection, simulator: Connection, request: Request):
+        from .inputs.prior import read_prior
         from .online_estimate import Problem
-        from .prior import read_prior
 
         self.parent, self.simulator, self.request = parent, simulator, request
         self.plan = request.plan()

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .armed_session import Ask, check_one
+from .inputs.recording import Recording, open_recording
 from .online import FAILED, REFUSED, OnlineCalibration, OnlineSettings, SoFar
 from .recorder import kept
-from .recordings import Recording, open_recording
 from .session_view import SessionView
 from .stir_session import AHEAD, StirPlan, plan_stir, stir_session
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .inputs.recording import Recording
 from .online_plan import planned
 from .online_settings import OnlineSettings
-from .recordings import Recording
 
 if TYPE_CHECKING:
     from .models import Cups

@@ -3,7 +3,13 @@
 from dataclasses import dataclass
 
 from .errors import InputError
-from .settings import MIN_PARTICLES, MIN_SIMULATIONS, SURROGATES, at_least, one_of
+from .inputs.settings import (
+    MIN_PARTICLES,
+    MIN_SIMULATIONS,
+    SURROGATES,
+    at_least,
+    one_of,
+)
 from .spillage_map import LEAST_POURS, POURS
 
 STOPS = ("bound", "mean")

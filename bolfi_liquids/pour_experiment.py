@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .inputs.pour_table import PourTable
+from .inputs.prior import split_parameters
 from .pour_noise import PourNoise
-from .pour_table import PourTable
-from .prior import split_parameters
 
 if TYPE_CHECKING:
     from numpyro.distributions import Distribution

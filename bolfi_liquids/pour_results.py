@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .inputs.settings import PourSettings
 from .results import read_tree
 from .run_directory import POUR
-from .settings import PourSettings
 from .spillage import ACTION, FRACTIONS, RISK, Surface
 
 if TYPE_CHECKING:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from .calibration import Calibration
 from .criticism import latest_calibration
-from .cups import bundled_cups, open_cups
 from .errors import InputError
+from .inputs.cups import bundled_cups, open_cups
+from .inputs.settings import PourSettings
 from .progress import Advance, progress_bar
 from .run_directory import POUR, open_bank
-from .settings import PourSettings
 from .spillage import (
     ACTION,
     FARTHEST,

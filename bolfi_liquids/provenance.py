@@ -7,8 +7,8 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from .prior import describe_prior
-from .settings import CalibrationSettings
+from .inputs.prior import describe_prior
+from .inputs.settings import CalibrationSettings
 from .stirring import Stirring
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .armed_session import Ask, check_one
-from .recordings import Recording, open_recording
-from .rigs import rig_of
+from .inputs.recording import Recording, open_recording
+from .inputs.rigs import rig_of
 from .session_view import SessionView
 from .stir_session import follow_plan, plan_stir, stir_session
 

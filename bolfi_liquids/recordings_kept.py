@@ -5,7 +5,7 @@ from typing import Any
 
 from .errors import InputError
 from .files import write_whole
-from .recordings import Recording, open_recording
+from .inputs.recording import Recording, open_recording
 
 FOLDER = "recordings"
 

@@ -19,10 +19,10 @@ import numpy as np
 
 from .errors import InputError
 from .files import write_netcdf
+from .inputs.fields import PLANE_NAMES
+from .inputs.strokes import stroke_numbers
 from .predictive import Check
-from .recording_fields import PLANE_NAMES
 from .stirring import Stirring
-from .strokes import stroke_numbers
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree

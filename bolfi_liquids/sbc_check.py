@@ -16,16 +16,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .bundled import bundled_recording
+from .inputs.bundled import bundled_recording
+from .inputs.prior import default_prior, describe_prior
+from .inputs.recording import Recording, open_recordings
+from .inputs.settings import (
+    MIN_SIMULATIONS,
+    PAPER_RULES,
+    RUNS,
+    SURROGATES,
+    SbcSettings,
+)
 from .kept import fresh_seeds
-from .prior import default_prior, describe_prior
 from .progress import progress_bar
 from .provenance import LIBRARIES, versions
-from .recordings import Recording, open_recordings
 from .run_directory import SIMULATIONS, enter_run
 from .sbc_pipelines import SAMPLING, Calibrate, CameraNoise, FromBank, Quietly
 from .sbc_results import SurrogateCheck, checked, write_results
-from .settings import MIN_SIMULATIONS, PAPER_RULES, RUNS, SURROGATES, SbcSettings
 from .stirring import Stirring, stirring_of
 from .worker_processes import processes
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .calibrator import engine_options, fit_recordings
-from .settings import RUNS, CalibrationSettings
+from .inputs.settings import RUNS, CalibrationSettings
 from .stirring import Stirring
 
 if TYPE_CHECKING:

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .described_liquid import Described
 from .errors import InputError
 from .files import write_netcdf
+from .inputs.described_liquid import Described
+from .inputs.recording import Recording
 from .movie_file import RATE, write_movie
 from .progress import progress_bar
-from .recordings import Recording
 from .simulated_files import check_targets, pour_dataset, stir_dataset
 from .spillage import FRACTIONS
 

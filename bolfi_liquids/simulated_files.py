@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import NDArray
 
-from .described_liquid import Described
 from .files import new_file, new_netcdf
+from .inputs.described_liquid import Described
+from .inputs.recording import Recording, along_path, recording_dataset
 from .movie_file import check_movie
-from .recordings import Recording, along_path, recording_dataset
 
 if TYPE_CHECKING:
     from xarray import Dataset

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .prior import split_parameters
+from .inputs.prior import split_parameters
 from .progress import Advance, reported
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError
-from .prior import PARAMETERS
+from .inputs.prior import PARAMETERS
 from .progress import progress_bar
 from .spillage import ACTION, normal_scores
 

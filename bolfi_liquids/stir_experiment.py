@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .errors import InputError
-from .recordings import Recording
+from .inputs.recording import Recording
+from .inputs.strokes import resting, windows
 from .stirring import Stirring
-from .strokes import resting, windows
 
 if TYPE_CHECKING:
     from .inference import AutoregressiveNoise, Experiment, Extension, Noise, UsualResidual

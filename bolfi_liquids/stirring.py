@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError
-from .prior import split_parameters
-from .recordings import Recording
+from .inputs.prior import split_parameters
+from .inputs.recording import Recording
 
 if TYPE_CHECKING:
     from .inference import Discrepancy

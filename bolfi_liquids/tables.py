@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
     from .hardware import Check
-    from .recordings import Recording
+    from .inputs.recording import Recording
 
 
 def print_calibration(section: Mapping[str, Any], console: Console) -> None:

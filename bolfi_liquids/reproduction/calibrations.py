@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from ..calibrator import engine_options
 from ..draws import pick_draws
-from ..prior import describe_prior
+from ..inputs.prior import describe_prior
+from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from ..progress import Simulate
 from ..sbc_pipelines import SAMPLING, CameraNoise
-from ..settings import MIN_SIMULATIONS, PAPER_RULES
 from ..stirring import Stirring
 from .truths import DENSITY
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from ..cups import bundled_cups
 from ..drawing import INK, new_figure, styled
+from ..inputs.cups import bundled_cups
 from ..kept import Keep, fresh_seeds, simulate_kept
 from ..progress import progress_bar, reported
 from ..spillage import STEP, landing_sd

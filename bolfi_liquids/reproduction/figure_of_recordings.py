@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..bundled import POURED, bundled_pours
 from ..drawing import GREY, INK, PALETTE, new_figure, styled
+from ..inputs.bundled import POURED, bundled_pours
+from ..inputs.prior import default_prior
 from ..pour_results import read_pour
 from ..pouring import choose_pour
-from ..prior import default_prior
 from ..spillage import ACTION, Surface
 from .decisions import RULES, Action, decide_unknowing
 from .figure import Drawn

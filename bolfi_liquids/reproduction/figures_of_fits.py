@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from ..bundled import RECORDED
 from ..drawing import GREY, INK, LIGHT, ORANGE, PALETTE, new_figure, plain_log_ticks, styled
+from ..inputs.bundled import RECORDED
 from ..posterior_figure import LABELS, contour_levels, grid_density
 from .figure import Drawn
 from .workshop import Workshop

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..bundled import bundled_recording
-from ..prior import default_prior
-from ..recordings import Recording
+from ..inputs.bundled import bundled_recording
+from ..inputs.prior import default_prior
+from ..inputs.recording import Recording
+from ..inputs.strokes import until_stroke
 from ..stirring import Stirring, stirring_of
-from ..strokes import until_stroke
 from .calibrations import ByPouring, ByStirring, Learner
 from .scale import Scale
 

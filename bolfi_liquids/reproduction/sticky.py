@@ -10,10 +10,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bundled import bundled_recording
 from ..files import write_netcdf, write_whole
+from ..inputs.bundled import bundled_recording
+from ..inputs.recording import (
+    Recording,
+    along_path,
+    open_recording,
+    recording_dataset,
+)
 from ..kept import fresh_seeds
-from ..recordings import Recording, along_path, open_recording, recording_dataset
 from .calibrations import NOISE
 from .truths import LIQUIDS, SPREAD
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..calibrator import calibrate
 from ..criticiser import criticise
-from ..cups import bundled_cups
+from ..inputs.cups import bundled_cups
 from ..pouring import choose_pour
 from ..run_directory import open_bank
 from ..spillage import pour_all, surface

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..prior import default_prior
+from ..inputs.prior import default_prior
 from ..progress import progress_bar
 from .calibrations import Learner
 from .decisions import RULES, Action, decide, decide_unknowing, execute

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 if TYPE_CHECKING:
-    from ..pour_table import PourTable
+    from ..inputs.pour_table import PourTable
 
 
 class Row(NamedTuple):

@@ -7,12 +7,12 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..bundled import bundled_recording
 from ..calibration import Calibration
 from ..calibrator import calibrate
-from ..cups import bundled_cups
+from ..inputs.bundled import bundled_recording
+from ..inputs.cups import bundled_cups
+from ..inputs.prior import default_prior
 from ..pour_grid import PourGrid, make_grid
-from ..prior import default_prior
 from ..progress import progress_bar
 from ..provenance import generations
 from ..run_directory import SIMULATIONS

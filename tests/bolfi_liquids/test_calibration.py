@@ -11,7 +11,7 @@ from arviz_stats.base.array import array_stats
 
 import bolfi_liquids as bl
 from bolfi_liquids import inference, models
-from bolfi_liquids.prior import default_prior
+from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.stirring import stirring_of
 
 

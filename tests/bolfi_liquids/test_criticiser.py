@@ -7,8 +7,8 @@ from bolfi_liquids.inference import Prior
 
 import bolfi_liquids as bl
 from bolfi_liquids.errors import InputError
+from bolfi_liquids.inputs.prior import default_prior, describe_prior, read_prior
 from bolfi_liquids.pour_experiment import as_prior
-from bolfi_liquids.prior import default_prior, describe_prior, read_prior
 from bolfi_liquids.recordings_kept import kept_recordings
 
 

@@ -10,7 +10,7 @@ from bolfi_liquids.clean_recordings import Clean, usual_elsewhere, usual_for
 from bolfi_liquids.criticism import finished_criticism
 from bolfi_liquids.criticism_inputs import open_inputs
 from bolfi_liquids.errors import InputError
-from bolfi_liquids.settings import CriticismSettings
+from bolfi_liquids.inputs.settings import CriticismSettings
 from bolfi_liquids.stir_experiment import camera_noise, held_out_noise, stir_experiment
 from bolfi_liquids.stirring import stirring_of
 

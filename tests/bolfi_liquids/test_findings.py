@@ -9,8 +9,8 @@ from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 
 from bolfi_liquids.criticism_results import _effects, _posterior
 from bolfi_liquids.findings import Findings
+from bolfi_liquids.inputs.settings import CriticismSettings
 from bolfi_liquids.pour_noise import MISSED, REPEATED, PourNoise
-from bolfi_liquids.settings import CriticismSettings
 
 
 def model(names, value):

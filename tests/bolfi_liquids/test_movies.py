@@ -6,16 +6,16 @@ from typer.testing import CliRunner
 
 from bolfi_liquids import models
 from bolfi_liquids.cli import app
-from bolfi_liquids.cups import bundled_cups
-from bolfi_liquids.described_liquid import Described, read_effects
 from bolfi_liquids.errors import InputError
+from bolfi_liquids.inputs.cups import bundled_cups
+from bolfi_liquids.inputs.described_liquid import Described, read_effects
+from bolfi_liquids.inputs.recording import open_recording
 from bolfi_liquids.movie_file import WRITERS, write_movie
 from bolfi_liquids.movie_landed import GRAVITY, landed, level
 from bolfi_liquids.movie_pour import pour_pictures, pour_view, receiver_glass, source_glass
 from bolfi_liquids.movie_stir import stir_pictures, stir_view
 from bolfi_liquids.movie_surface import Glass, surface
 from bolfi_liquids.movie_view import View
-from bolfi_liquids.recordings import open_recording
 
 UP = np.array([0.0, 0.0, 1.0])
 FAR = Glass(0.01, 0.01, np.array([9.0, 9.0, 9.0]), UP)  # holds nothing of what is drawn
@@ -327,7 +327,7 @@ def test_commands_simulate_film_and_write(tmp_path, monkeypatch):
 
 def _short(tmp_path):
     """Options for the first two seconds of the bundled glycerin."""
-    from bolfi_liquids.bundled import bundled_recording
+    from bolfi_liquids.inputs.bundled import bundled_recording
     from bolfi_liquids.simulated_files import stir_dataset
 
     whole = bundled_recording("glycerin")

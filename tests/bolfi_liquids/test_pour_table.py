@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bolfi_liquids.errors import InputError
-from bolfi_liquids.pour_table import open_pours
+from bolfi_liquids.inputs.pour_table import open_pours
 
 HEADER = "liquid,angular_velocity_deg_s,distance_cm,received,retained,spilled\n"
 ROWS = ["water,45,1.5,90,5,5", "water,90,1.5,80,0,20", "water,90,3,10,10,0", "oil,45,1.5,1,1,2"]

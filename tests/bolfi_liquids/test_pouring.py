@@ -10,7 +10,7 @@ import xarray as xr
 
 import bolfi_liquids as bl
 from bolfi_liquids import models, spillage
-from bolfi_liquids.cups import bundled_cups
+from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.pouring import LANDINGS
 from bolfi_liquids.run_directory import SIMULATIONS
 

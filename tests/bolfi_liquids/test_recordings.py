@@ -6,7 +6,7 @@ from typer.testing import CliRunner
 
 import bolfi_liquids as bl
 from bolfi_liquids.cli import app
-from bolfi_liquids.recording_checks import MAX_GRIPPER_GAP, longest_gap
+from bolfi_liquids.inputs.checks import MAX_GRIPPER_GAP, longest_gap
 
 GAP = slice(60, 75)  # half a second
 

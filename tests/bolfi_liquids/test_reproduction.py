@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from bolfi_liquids import inference, models
-from bolfi_liquids.bundled import bundled_recording
-from bolfi_liquids.cups import bundled_cups
-from bolfi_liquids.pour_table import open_pours
+from bolfi_liquids.inputs.bundled import bundled_recording
+from bolfi_liquids.inputs.cups import bundled_cups
+from bolfi_liquids.inputs.pour_table import open_pours
 from bolfi_liquids.reproduction import sticky, workshop
 from bolfi_liquids.reproduction.figure_of_adhesion import adhesion
 from bolfi_liquids.reproduction.figures_of_spillage import interval

@@ -5,7 +5,7 @@ import pytest
 from scipy.special import ndtr
 
 from bolfi_liquids import models
-from bolfi_liquids.cups import bundled_cups
+from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.spillage import (
     STEP,
     Outcomes,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bolfi_liquids import inference
-from bolfi_liquids.cups import bundled_cups
+from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.reproduction import figure_of_recordings, study
 from bolfi_liquids.reproduction.calibrations import DRAWS
 from bolfi_liquids.reproduction.decisions import RULES

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware import circle, star
 
-from bolfi_liquids.bundled import bundled_recording
-from bolfi_liquids.recordings import Gripper, Recording
-from bolfi_liquids.stirring import Stirring, stirring_of
-from bolfi_liquids.strokes import (
+from bolfi_liquids.inputs.bundled import bundled_recording
+from bolfi_liquids.inputs.recording import Gripper, Recording
+from bolfi_liquids.inputs.strokes import (
     PARTS,
     resting,
     speed,
@@ -19,6 +18,7 @@ from bolfi_liquids.strokes import (
     until_stroke,
     windows,
 )
+from bolfi_liquids.stirring import Stirring, stirring_of
 
 
 def recorded(path) -> Recording:

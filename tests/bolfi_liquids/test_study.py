@@ -4,8 +4,8 @@ import numpy as np
 import numpyro.distributions as dist
 
 from bolfi_liquids import inference
+from bolfi_liquids.inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from bolfi_liquids.reproduction.calibrations import after_each
-from bolfi_liquids.settings import MIN_SIMULATIONS, PAPER_RULES
 
 
 def line(theta, seeds):

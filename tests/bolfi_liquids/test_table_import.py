@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import bolfi_liquids as bl
-from bolfi_liquids.bundled import RECORDED, bundled_recording
-from bolfi_liquids.table_import import import_table, outline, write_template
-from bolfi_liquids.table_map import open_table_map
+from bolfi_liquids.inputs.bundled import RECORDED, bundled_recording
+from bolfi_liquids.inputs.table_import import import_table, outline, write_template
+from bolfi_liquids.inputs.table_map import open_table_map
 
 TRUTH = files("bolfi_liquids.data") / "water_v10.nc"
 OFFSET = 120.0  # mm, of the robot's z above the cup's floor

@@ -86,7 +86,7 @@ def run_with_a_pour(tmp_path):
 
     from xarray import DataTree
 
-    from bolfi_liquids.cups import bundled_cups
+    from bolfi_liquids.inputs.cups import bundled_cups
     from bolfi_liquids.results import write_tree
     from bolfi_liquids.summary import write_section
 

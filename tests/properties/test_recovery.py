@@ -9,7 +9,7 @@ import xarray as xr
 
 import bolfi_liquids as bl
 from bolfi_liquids import models
-from bolfi_liquids.prior import default_prior
+from bolfi_liquids.inputs.prior import default_prior
 
 DATA = files("bolfi_liquids.data")
 CAMERA_NOISE = np.radians(0.1)

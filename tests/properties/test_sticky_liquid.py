@@ -9,7 +9,7 @@ import xarray as xr
 
 import bolfi_liquids as bl
 from bolfi_liquids import models
-from bolfi_liquids.cups import bundled_cups
+from bolfi_liquids.inputs.cups import bundled_cups
 
 TEMPLATE = files("bolfi_liquids.data") / "glycerin_v10.nc"
 LIQUID = {"viscosity": 0.3, "cohesion": 0.5}

@@ -28,11 +28,11 @@ from kept import keep, results
 
 from bolfi_liquids import inference, models
 from bolfi_liquids.clean_recordings import Clean, clean_residuals, usual_for
+from bolfi_liquids.inputs.prior import default_prior
+from bolfi_liquids.inputs.recording import Gripper, Recording
+from bolfi_liquids.inputs.settings import CriticismSettings
 from bolfi_liquids.pour_experiment import Pouring
 from bolfi_liquids.pour_noise import REPEATED
-from bolfi_liquids.prior import default_prior
-from bolfi_liquids.recordings import Gripper, Recording
-from bolfi_liquids.settings import CriticismSettings
 from bolfi_liquids.stir_experiment import (
     camera_noise,
     effects_of,
@@ -199,7 +199,7 @@ def _criticised_pours(
 
 
 def _poured(actions: np.ndarray, truth: dict, rng: np.random.Generator) -> inference.Experiment:
-    from bolfi_liquids.cups import bundled_cups
+    from bolfi_liquids.inputs.cups import bundled_cups
 
     rate, distance = np.radians(actions[:, 0]), actions[:, 1] / 100.0
     cups = bundled_cups()

@@ -6,10 +6,10 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .errors import InputError
+from ..errors import InputError
 
 if TYPE_CHECKING:
-    from .hardware import Rig
+    from ..hardware import Rig
 
 
 def rig_of(path: str | Path | None) -> "Rig":
@@ -18,7 +18,7 @@ def rig_of(path: str | Path | None) -> "Rig":
     Raises:
         RigError: The file cannot be used.
     """
-    from .hardware import bundled_rig, open_rig
+    from ..hardware import bundled_rig, open_rig
 
     return bundled_rig() if path is None else open_rig(path)
 
@@ -44,7 +44,7 @@ def emulator_until_interrupted(
     Raises:
         RigError: It cannot start.
     """
-    from .hardware import HiddenLiquid, above_cup, emulated
+    from ..hardware import HiddenLiquid, above_cup, emulated
 
     liquid = HiddenLiquid(viscosity=viscosity)
     with emulated(rig, above_cup(rig), address=address, liquid=liquid) as running:

@@ -3,7 +3,7 @@
 from importlib.resources import as_file, files
 from typing import TYPE_CHECKING
 
-from .recordings import Recording, open_recording
+from .recording import Recording, open_recording
 
 if TYPE_CHECKING:
     from .pour_table import PourTable

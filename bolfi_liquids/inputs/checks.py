@@ -5,11 +5,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
-from .recording_fields import AXES, DENSITIES, LENGTHS, PLANES, STICK_WEIGHT
+from ..errors import InputError
+from .fields import (
+    AXES,
+    DENSITIES,
+    LENGTHS,
+    PLANES,
+    STICK_WEIGHT,
+)
 
 if TYPE_CHECKING:
-    from .recordings import Recording
+    from .recording import Recording
 
 MIN_SAMPLES = 10
 MAX_GRIPPER_GAP = 0.2
@@ -180,7 +186,7 @@ def _check_inclination(recording: "Recording") -> None:
 
 def _check_hangs(recording: "Recording") -> None:
     """Buoyancy's moment about the pivot must stay below the weight's, or the stick floats up."""
-    from .models import StirSetup
+    from ..models import StirSetup
 
     setup = StirSetup.from_recording(recording)
     stick, wet, mass = setup.stick, setup.submerged, setup.stick.mass

@@ -5,11 +5,11 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .errors import InputError
-from .files import existing_file
+from ..errors import InputError
+from ..files import existing_file
 
 if TYPE_CHECKING:
-    from .models import Cups
+    from ..models import Cups
 
 BUNDLED = "cups.toml"
 
@@ -22,7 +22,7 @@ def bundled_cups() -> "Cups":
 
 def kept_cups(settings: Mapping[str, Any]) -> "Cups":
     """Those whose `Cups.settings` a result holds."""
-    from .models import Cups
+    from ..models import Cups
 
     return Cups.model_validate({name: settings[name] for name in Cups.model_fields})
 
@@ -33,7 +33,7 @@ def open_cups(path: str | Path) -> "Cups":
     Raises:
         InputError: The file is missing or cannot be used; the message says why.
     """
-    from .models import Cups
+    from ..models import Cups
 
     path = existing_file(path)
     try:

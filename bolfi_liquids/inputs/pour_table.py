@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
-from .files import existing_file
+from ..errors import InputError
+from ..files import existing_file
 
 ACTIONS = ("angular_velocity_deg_s", "distance_cm")
 AMOUNTS = ("spilled", "received", "retained")

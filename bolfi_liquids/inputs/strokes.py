@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .recording_fields import PLANE_NAMES
-from .recordings import Recording
+from .fields import PLANE_NAMES
+from .recording import Recording
 
 if TYPE_CHECKING:
-    from .inference import Window
-    from .stirring import Stirring
+    from ..inference import Window
+    from ..stirring import Stirring
 
 MOVING = 0.5  # of the greatest speed: corners are too short for samples to see them at rest
 STILL = 1e-4  # m
@@ -84,7 +84,7 @@ def until_stroke(recording: Recording, number: int) -> Recording:
 
 def windows(stirring: "Stirring") -> tuple["Window", ...]:
     """Strokes in each plane, then speeds in both, over the joined samples."""
-    from .inference import Window
+    from ..inference import Window
 
     def whole(member: int, samples: NDArray[np.bool_], planes: tuple[int, ...]) -> NDArray:
         there = np.zeros((*stirring.member.shape, len(PLANE_NAMES)), bool)

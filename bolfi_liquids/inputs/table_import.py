@@ -11,11 +11,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
-from .files import existing_file, new_netcdf, write_netcdf, write_text
-from .recording_checks import check_values
-from .recording_fields import AXES, DENSITIES, LENGTHS, PLANES
-from .recordings import Recording, as_recording, open_recording, recording_dataset
+from ..errors import InputError
+from ..files import (
+    existing_file,
+    new_netcdf,
+    write_netcdf,
+    write_text,
+)
+from .checks import check_values
+from .fields import (
+    AXES,
+    DENSITIES,
+    LENGTHS,
+    PLANES,
+)
+from .recording import (
+    Recording,
+    as_recording,
+    open_recording,
+    recording_dataset,
+)
 from .strokes import speed
 from .table_map import ATTRIBUTE_UNITS, TableMap, open_table_map
 
@@ -90,7 +105,7 @@ def _attributes(path: Path) -> dict[str, Any]:
 
 
 def _dataset(table: Path, meaning: TableMap) -> "Dataset":
-    from . import __version__
+    from .. import __version__
 
     cells = _cells(table, meaning)
     values = {

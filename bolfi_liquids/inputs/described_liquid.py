@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .errors import InputError
+from ..errors import InputError
 from .settings import MIN_PARTICLES, at_least
 
 if TYPE_CHECKING:
-    from .models import Liquid
+    from ..models import Liquid
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Described:
 
     def liquid(self) -> "Liquid":
         """The liquid, as the simulator takes it."""
-        from .models import Liquid
+        from ..models import Liquid
 
         return Liquid(self.viscosity, self.cohesion, self.density)
 
@@ -67,8 +67,8 @@ class Described:
 
     def attributes(self) -> dict[str, float | int | str]:
         """The same for a file."""
-        from . import __version__
-        from .models import MODEL_VERSION
+        from .. import __version__
+        from ..models import MODEL_VERSION
 
         return {
             "source": f"simulated by bolfi-liquids {__version__}, model {MODEL_VERSION}",
@@ -92,7 +92,7 @@ def read_effects(given: Iterable[str], scene: str) -> dict[str, float]:
         InputError: One is of another form, unknown, given twice, out of its range, or acts in
             the other scene only.
     """
-    from .models import EFFECTS
+    from ..models import EFFECTS
 
     read: dict[str, float] = {}
     for text in given:

@@ -10,10 +10,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
-from .files import existing_file
-from .recording_checks import check_values
-from .recording_fields import AXES, PLANES, UNITS, check_fields
+from ..errors import InputError
+from ..files import existing_file
+from .checks import check_values
+from .fields import (
+    AXES,
+    PLANES,
+    UNITS,
+    check_fields,
+)
 
 if TYPE_CHECKING:
     from xarray import Dataset

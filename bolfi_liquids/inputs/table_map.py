@@ -8,9 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from .errors import InputError
-from .files import existing_file
-from .recording_fields import AXES, DENSITIES, LENGTHS, PLANES, STICK_WEIGHT
+from ..errors import InputError
+from ..files import existing_file
+from .fields import (
+    AXES,
+    DENSITIES,
+    LENGTHS,
+    PLANES,
+    STICK_WEIGHT,
+)
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails

@@ -4,10 +4,10 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, TypeVar
 
-from .errors import InputError
+from ..errors import InputError
 
 if TYPE_CHECKING:
-    from .inference import Prior
+    from ..inference import Prior
 
 PARAMETERS = ("viscosity", "cohesion")
 V = TypeVar("V")
@@ -28,7 +28,7 @@ def default_prior() -> "Prior":
     """
     import numpyro.distributions as dist
 
-    from .inference import Prior
+    from ..inference import Prior
 
     return Prior({"viscosity": dist.LogUniform(3e-3, 20.0), "cohesion": dist.Uniform(0.0, 1.0)})
 
@@ -44,7 +44,7 @@ def read_prior(described: Mapping[str, str]) -> "Prior":
     """
     import numpyro.distributions as dist
 
-    from .inference import Prior
+    from ..inference import Prior
 
     distributions = {}
     for name, text in described.items():
@@ -59,7 +59,7 @@ def read_prior(described: Mapping[str, str]) -> "Prior":
 
 def check_prior(prior: "Prior") -> None:
     """Raise `InputError` unless the prior is over the simulator's parameters, and can be kept."""
-    from .inference import Prior
+    from ..inference import Prior
 
     if not isinstance(prior, Prior):
         raise InputError(
