@@ -12,8 +12,8 @@ from .draws import pick_draws
 from .errors import InputError
 from .inputs.prior import read_prior
 from .inputs.settings import CalibrationSettings
-from .run_directory import POSTERIOR, read_run
-from .summary import read_summary
+from .run.directory import POSTERIOR, read_run
+from .run.summary import read_summary
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree

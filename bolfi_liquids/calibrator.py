@@ -15,15 +15,20 @@ from .inputs.prior import check_prior, default_prior
 from .inputs.recording import Recording, Source, open_recordings
 from .inputs.settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
 from .progress import Simulate, progress_bar, reported
-from .provenance import run_record
-from .recordings_kept import keep_recordings
-from .run_directory import POSTERIOR, enter_run, open_bank, read_run
+from .run.directory import (
+    POSTERIOR,
+    enter_run,
+    open_bank,
+    read_run,
+)
+from .run.provenance import run_record
+from .run.recordings import keep_recordings
+from .run.summary import write_section
 from .stirring import Stirring, stirring_of
-from .summary import write_section
 
 if TYPE_CHECKING:
     from .inference import Fit, Prior, SimulationBank
-    from .kept import Keep
+    from .run.simulations import Keep
 
 
 def calibrate(  # noqa: PLR0913  the one call that most users make
@@ -100,9 +105,9 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
 def _calibrate(
     run: Path, stirring: Stirring, prior: "Prior", settings: CalibrationSettings, progress: bool
 ) -> None:
-    from .kept import Keep
     from .predictive import PREDICTIVE_DRAWS, check_by_simulation
     from .results import results_tree, write_tree
+    from .run.simulations import Keep
 
     with (
         open_bank(run) as bank,

@@ -19,7 +19,6 @@ from .cli_errors import OneLineErrors
 from .cli_examples import examples, session
 from .cli_results import complaints_among_results, print_findings, print_next, print_section
 from .cli_rig import RigOption
-from .compilations import keep_compilations
 from .inputs.settings import (
     RISKS,
     SAMPLERS,
@@ -28,7 +27,8 @@ from .inputs.settings import (
     CriticismSettings,
     PourSettings,
 )
-from .run_directory import RUN_TOML
+from .run.directory import RUN_TOML
+from .run.jax_cache import keep_compilations
 
 RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="Directory of a run.")]
 

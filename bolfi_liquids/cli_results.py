@@ -34,7 +34,7 @@ def print_section(run: Path, name: str) -> None:
     """Section "calibrate" or "pour" of a run's summary."""
     from rich.console import Console
 
-    from .summary import read_summary
+    from .run.summary import read_summary
     from .tables import print_calibration, print_pour
 
     {"calibrate": print_calibration, "pour": print_pour}[name](read_summary(run)[name], Console())

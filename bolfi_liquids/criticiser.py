@@ -21,10 +21,10 @@ from .pour_experiment import as_prior, pour_experiment
 from .progress import phases
 from .proposals import pour_proposals, stir_proposals
 from .results import write_tree
-from .run_directory import CRITICISM, open_bank
+from .run.directory import CRITICISM, open_bank
+from .run.summary import write_section
 from .stir_experiment import camera_noise, effects_of, held_out_noise, stir_experiment
 from .stirring import Stirring, stirring_of
-from .summary import write_section
 
 if TYPE_CHECKING:
     from . import inference

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from .calibration import Calibration
 from .errors import InputError
-from .run_directory import CRITICISM, CRITICISM_FORMAT
-from .summary import read_summary
+from .run.directory import CRITICISM, CRITICISM_FORMAT
+from .run.summary import read_summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,8 +14,8 @@ from .drawing import to_svg
 from .effect_figures import any_fitted, coefficient_plot, confusion_plot, score_plot
 from .readouts import lines_of, to_chart
 from .results import read_tree
-from .run_directory import CRITICISM
-from .summary import read_summary
+from .run.directory import CRITICISM
+from .run.summary import read_summary
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree

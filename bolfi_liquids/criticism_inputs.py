@@ -13,9 +13,9 @@ from .inputs.cups import bundled_cups
 from .inputs.pour_table import PourTable, open_pours
 from .inputs.recording import Recording, Source, open_recordings
 from .inputs.settings import ALARM, CriticismSettings
-from .provenance import generations
-from .recordings_kept import kept_recordings
-from .run_directory import CRITICISM_FORMAT
+from .run.directory import CRITICISM_FORMAT
+from .run.provenance import generations
+from .run.recordings import kept_recordings
 from .stir_experiment import effects_of, frame_interval, same_rate
 from .stirring import Stirring, same_liquid, stirring_of
 

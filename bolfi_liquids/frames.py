@@ -20,12 +20,12 @@ from .criticism_narrative import unit_of
 from .inputs.cups import kept_cups
 from .inputs.prior import split_parameters
 from .inputs.recording import Recording
-from .kept import fresh_seeds
 from .pour_results import read_pour
 from .progress import Advance, progress_bar
-from .recordings_kept import kept_recordings
 from .results import read_tree, write_tree
-from .run_directory import FRAMES, POUR
+from .run.directory import FRAMES, POUR
+from .run.recordings import kept_recordings
+from .run.simulations import fresh_seeds
 
 if TYPE_CHECKING:
     from xarray import Dataset

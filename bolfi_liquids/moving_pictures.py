@@ -14,7 +14,7 @@ from .inputs.cups import kept_cups
 from .narrative import percent
 from .pour_results import read_pour
 from .readouts import short
-from .recordings_kept import kept_recordings
+from .run.recordings import kept_recordings
 
 if TYPE_CHECKING:
     from xarray import Dataset

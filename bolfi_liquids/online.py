@@ -33,7 +33,7 @@ from .online_plan import SoFar, planned, stroke_ends
 from .online_request import FAILED, GONE, PREPARING, READY, REFUSED, Request, Status
 from .online_settings import OnlineSettings
 from .online_simulator import simulate_plan
-from .run_directory import RUN_TOML
+from .run.directory import RUN_TOML
 from .spillage_map import make_pours
 
 if TYPE_CHECKING:

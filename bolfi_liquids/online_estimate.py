@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .inputs.settings import MIN_SIMULATIONS, PAPER_RULES
-from .kept import fresh_seeds
 from .online_plan import Followed
 from .online_settings import OnlineSettings
+from .run.simulations import fresh_seeds
 from .spillage_map import SpillageMap
 from .stirring import Stirring
 

@@ -15,7 +15,7 @@ from .errors import InputError
 from .files import write_text
 from .physics_identity import case_identity, has_identity
 from .physics_json import plain
-from .provenance import versions
+from .run.provenance import versions
 
 if TYPE_CHECKING:
     from .models.validation import Case, CaseResult

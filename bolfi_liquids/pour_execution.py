@@ -8,7 +8,7 @@ import numpy as np
 
 from .armed_session import Ask, Emulation, Task, armed_session, check_one
 from .errors import InputError
-from .run_directory import POUR, RUN_TOML
+from .run.directory import POUR, RUN_TOML
 from .session_view import SessionView
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ def dry_pour(run: str | Path, rig: "Rig", out: Path) -> "tuple[str, list[Check]]
 def _chosen(run: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """The section "pour" of a run, and the cups that it was chosen for."""
     from .pour_results import read_pour
-    from .summary import read_summary
+    from .run.summary import read_summary
 
     if not (run / RUN_TOML).exists() and not (run / POUR).exists():
         raise InputError(

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .kept import fresh_seeds
+from .run.simulations import fresh_seeds
 from .spillage import Outcomes, Profiles, Surface, pour_all, surface
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .inputs.settings import PourSettings
 from .results import read_tree
-from .run_directory import POUR
+from .run.directory import POUR
 from .spillage import ACTION, FRACTIONS, RISK, Surface
 
 if TYPE_CHECKING:

@@ -15,7 +15,8 @@ from .errors import InputError
 from .inputs.cups import bundled_cups, open_cups
 from .inputs.settings import PourSettings
 from .progress import Advance, progress_bar
-from .run_directory import POUR, open_bank
+from .run.directory import POUR, open_bank
+from .run.summary import write_section
 from .spillage import (
     ACTION,
     FARTHEST,
@@ -28,7 +29,6 @@ from .spillage import (
     pour_all,
     surface,
 )
-from .summary import write_section
 
 if TYPE_CHECKING:
     from .inference import SimulationBank
@@ -206,7 +206,7 @@ class _Pours:
         )
 
     def _profiles(self, rates: NDArray, liquids: Mapping[str, NDArray], purpose: int) -> Profiles:
-        from .kept import fresh_seeds
+        from .run.simulations import fresh_seeds
 
         count = len(next(iter(liquids.values())))
         seeds = np.array(fresh_seeds(self.settings.seed, purpose, count), np.int64)

@@ -14,9 +14,9 @@ from .files import write_text
 from .posterior_figure import posterior_figure
 from .pour_results import read_pour
 from .readouts import script_json
-from .run_directory import POUR, REPORT
+from .run.directory import POUR, REPORT
+from .run.summary import read_summary
 from .search_figure import search_figure
-from .summary import read_summary
 from .worries import worries
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ def _pour_context(section: Mapping[str, Any], tree: "DataTree") -> dict[str, Any
 def _moving(calibration: Calibration, progress: bool) -> dict[str, Any] | None:
     from .frames import frames_of
     from .moving_pictures import moving_context
-    from .recordings_kept import FOLDER
+    from .run.recordings import FOLDER
 
     if not (calibration.path / FOLDER).is_dir():  # of a run that was made before they were kept
         return None

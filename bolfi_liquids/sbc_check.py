@@ -26,14 +26,14 @@ from .inputs.settings import (
     SURROGATES,
     SbcSettings,
 )
-from .kept import fresh_seeds
 from .progress import progress_bar
-from .provenance import LIBRARIES, versions
-from .run_directory import SIMULATIONS, enter_run
+from .run.directory import SIMULATIONS, enter_run
+from .run.provenance import LIBRARIES, versions
+from .run.simulations import fresh_seeds
+from .run.workers import processes
 from .sbc_pipelines import SAMPLING, Calibrate, CameraNoise, FromBank, Quietly
 from .sbc_results import SurrogateCheck, checked, write_results
 from .stirring import Stirring, stirring_of
-from .worker_processes import processes
 
 if TYPE_CHECKING:
     from .inference import Prior, Replicates

@@ -52,7 +52,7 @@ class Calibrate:
 
     def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
         from .inference import SimulationBank
-        from .kept import Keep
+        from .run.simulations import Keep
 
         with SimulationBank(":memory:") as bank:
             keep = Keep(bank, self.stirring.identity, self.settings.batch)
@@ -92,7 +92,7 @@ class FromBank:
 
     def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
         from .inference import Bolfi
-        from .kept import fresh_seeds
+        from .run.simulations import fresh_seeds
 
         u = self.prior.to_unit(self.prior.to_dict(self.theta))
         left = np.asarray(np.isfinite(self.signals).all(axis=(2, 3)))

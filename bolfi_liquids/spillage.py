@@ -208,7 +208,7 @@ def pour_all(
     Raises:
         RuntimeError: That is all of them.
     """
-    from .kept import Keep, simulate_kept
+    from .run.simulations import Keep, simulate_kept
 
     keep = Keep(bank, outcomes.identity, 1)  # each is as many pours as there are liquids
     simulate = reported(outcomes.simulate, advance)

@@ -219,7 +219,7 @@ def _jobs(joint: "Prior", pours: int) -> "list[Job]":
     from scipy.stats import qmc
 
     from .inference import Job
-    from .kept import fresh_seeds
+    from .run.simulations import fresh_seeds
 
     design = qmc.Sobol(len(joint), rng=0).random_base2(int(np.ceil(np.log2(pours))))[:pours]
     theta = joint.from_unit(design)

@@ -57,7 +57,7 @@ class ByStirring:
 
     def _one(self, truth: dict[str, NDArray], seed: int) -> NDArray[np.float64]:
         from ..inference import Bolfi, SimulationBank
-        from ..kept import Keep, keeping
+        from ..run.simulations import Keep, keeping
 
         stirring = self.stirring
         with SimulationBank(self.bank) as bank:
@@ -106,7 +106,7 @@ class ByPouring:
 
     def _one(self, truth: dict[str, NDArray], seed: int) -> NDArray[np.float64]:
         from ..inference import Bolfi, SimulationBank
-        from ..kept import Keep, keeping
+        from ..run.simulations import Keep, keeping
 
         rules: dict[str, Any] = {**PAPER_RULES}
         with SimulationBank(self.bank) as bank:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kept import fresh_seeds
+from ..run.simulations import fresh_seeds
 from ..spillage import STEP, Outcomes, Profiles, pour_all
 from .calibrations import NAMES
 from .truths import DENSITY, Truths

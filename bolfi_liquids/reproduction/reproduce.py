@@ -7,9 +7,9 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ..errors import InputError
-from ..provenance import LIBRARIES, generations, versions
-from ..run_directory import open_bank
-from ..worker_processes import processes
+from ..run.directory import open_bank
+from ..run.provenance import LIBRARIES, generations, versions
+from ..run.workers import processes
 from .figure import Drawn
 from .figure_of_adhesion import adhesion
 from .figure_of_geometry import geometry

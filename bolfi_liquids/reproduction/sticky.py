@@ -18,7 +18,7 @@ from ..inputs.recording import (
     open_recording,
     recording_dataset,
 )
-from ..kept import fresh_seeds
+from ..run.simulations import fresh_seeds
 from .calibrations import NOISE
 from .truths import LIQUIDS, SPREAD
 

@@ -9,7 +9,7 @@ from ..calibrator import calibrate
 from ..criticiser import criticise
 from ..inputs.cups import bundled_cups
 from ..pouring import choose_pour
-from ..run_directory import open_bank
+from ..run.directory import open_bank
 from ..spillage import pour_all, surface
 from .decisions import executions, spilled_by
 from .scale import Scale

@@ -14,8 +14,8 @@ from ..inputs.cups import bundled_cups
 from ..inputs.prior import default_prior
 from ..pour_grid import PourGrid, make_grid
 from ..progress import progress_bar
-from ..provenance import generations
-from ..run_directory import SIMULATIONS
+from ..run.directory import SIMULATIONS
+from ..run.provenance import generations
 from .learners import after_strokes, by_stirring_and_pouring
 from .scale import Scale
 from .sticky_study import Stuck, spilled_where_it_sticks

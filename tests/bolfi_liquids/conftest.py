@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import bolfi_liquids as bl
-from bolfi_liquids.run_directory import CRITICISM_FORMAT
+from bolfi_liquids.run.directory import CRITICISM_FORMAT
 
 BUNDLED = Path(str(files("bolfi_liquids.data"))) / "glycerin_v10.nc"
 SHORT = 60  # samples, 2 s: the pause and the first strokes

@@ -15,7 +15,7 @@ main()
 """
 
 COMPILING = """
-from bolfi_liquids.compilations import keep_compilations
+from bolfi_liquids.run.jax_cache import keep_compilations
 keep_compilations()
 import jax, jax.numpy as jnp
 hits = []

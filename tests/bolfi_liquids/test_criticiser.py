@@ -9,7 +9,7 @@ import bolfi_liquids as bl
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.prior import default_prior, describe_prior, read_prior
 from bolfi_liquids.pour_experiment import as_prior
-from bolfi_liquids.recordings_kept import kept_recordings
+from bolfi_liquids.run.recordings import kept_recordings
 
 
 def test_a_prior_survives_its_description():

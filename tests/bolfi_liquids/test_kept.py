@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference import SimulationBank
 
-from bolfi_liquids.kept import Keep, fresh_seeds, keeping, simulate_kept
+from bolfi_liquids.run.simulations import (
+    Keep,
+    fresh_seeds,
+    keeping,
+    simulate_kept,
+)
 
 
 def test_only_what_is_missing_is_simulated():

@@ -12,7 +12,7 @@ import bolfi_liquids as bl
 from bolfi_liquids import models, spillage
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.pouring import LANDINGS
-from bolfi_liquids.run_directory import SIMULATIONS
+from bolfi_liquids.run.directory import SIMULATIONS
 
 
 def rows(run):

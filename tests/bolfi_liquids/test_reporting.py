@@ -9,8 +9,8 @@ import pytest
 import bolfi_liquids as bl
 from bolfi_liquids.narrative import fit_sentence, parameter_sentence, sure_sentence
 from bolfi_liquids.results import write_tree
-from bolfi_liquids.run_directory import CRITICISM
-from bolfi_liquids.summary import write_section
+from bolfi_liquids.run.directory import CRITICISM
+from bolfi_liquids.run.summary import write_section
 
 FIGURES = {
     "inclination [deg]": "inclination against time",

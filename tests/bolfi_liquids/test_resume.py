@@ -14,7 +14,7 @@ import pytest
 
 import bolfi_liquids as bl
 from bolfi_liquids import inference
-from bolfi_liquids.run_directory import SIMULATIONS
+from bolfi_liquids.run.directory import SIMULATIONS
 
 PATIENCE_S = 120
 EFFECTS = ("camera_delay", "camera_tilt")

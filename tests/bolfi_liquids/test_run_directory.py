@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference.simulations.bank import Simulation
 
-from bolfi_liquids import run_directory
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.files import write_whole
-from bolfi_liquids.run_directory import (
+from bolfi_liquids.run import directory
+from bolfi_liquids.run.directory import (
     CONCLUSIONS,
     RUN_TOML,
     SIMULATIONS,
@@ -18,7 +18,7 @@ from bolfi_liquids.run_directory import (
     open_bank,
     read_run,
 )
-from bolfi_liquids.summary import read_summary, write_section
+from bolfi_liquids.run.summary import read_summary, write_section
 
 RECORD = {
     "created": "2026-01-01T00:00:00+00:00",
@@ -100,7 +100,7 @@ def test_a_run_that_is_killed_while_it_grows_is_an_unfinished_one(tmp_path, monk
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr(run_directory, "write_text", die)
+        patch.setattr(directory, "write_text", die)
         enter_run(tmp_path, larger, resume=True, growing="settings.budget")
     assert read_run(tmp_path) == RECORD
     assert not any((tmp_path / name).exists() for name in CONCLUSIONS)

@@ -9,11 +9,11 @@ from contextlib import suppress
 
 import pytest
 
-from bolfi_liquids.worker_processes import processes
+from bolfi_liquids.run.workers import processes
 
 WORKING = """
 import os, signal, time
-from bolfi_liquids.worker_processes import processes
+from bolfi_liquids.run.workers import processes
 
 # these tests may themselves be run where it is ignored
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -88,7 +88,7 @@ def run_with_a_pour(tmp_path):
 
     from bolfi_liquids.inputs.cups import bundled_cups
     from bolfi_liquids.results import write_tree
-    from bolfi_liquids.summary import write_section
+    from bolfi_liquids.run.summary import write_section
 
     run = tmp_path / "run"
     run.mkdir()

@@ -5,8 +5,8 @@ import math
 from pathlib import Path
 from typing import Any
 
-from .errors import InputError
-from .files import write_text
+from ..errors import InputError
+from ..files import write_text
 
 NAME = "summary.json"
 RESTORE = "delete it; calibrate --resume, criticise and pour write it again from what was simulated"

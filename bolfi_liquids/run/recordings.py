@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-from .errors import InputError
-from .files import write_whole
-from .inputs.recording import Recording, open_recording
+from ..errors import InputError
+from ..files import write_whole
+from ..inputs.recording import Recording, open_recording
 
 FOLDER = "recordings"
 

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
-from .errors import InputError
-from .files import write_text
+from ..errors import InputError
+from ..files import write_text
 from .summary import NAME as SUMMARY
 
 if TYPE_CHECKING:
-    from .inference import SimulationBank
+    from ..inference import SimulationBank
 
 RUN_TOML = "run.toml"
 SIMULATIONS = "simulations.sqlite"
@@ -90,7 +90,7 @@ def open_bank(run: Path) -> "Iterator[SimulationBank]":
     Raises:
         InputError: The file is damaged or cannot be written.
     """
-    from .inference import SimulationBank
+    from ..inference import SimulationBank
 
     path = run / SIMULATIONS
     try:

@@ -9,7 +9,7 @@ from multiprocessing import get_context, parent_process
 from multiprocessing.process import BaseProcess
 from threading import Thread
 
-from .compilations import ignore_torn_entries
+from .jax_cache import ignore_torn_entries
 
 
 @contextmanager

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .inference import Job, SimulationBank, run_missing
-from .progress import Simulate
+from ..inference import Job, SimulationBank, run_missing
+from ..progress import Simulate
 
 
 class Keep(NamedTuple):

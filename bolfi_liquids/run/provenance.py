@@ -7,19 +7,19 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from .inputs.prior import describe_prior
-from .inputs.settings import CalibrationSettings
-from .stirring import Stirring
+from ..inputs.prior import describe_prior
+from ..inputs.settings import CalibrationSettings
+from ..stirring import Stirring
 
 if TYPE_CHECKING:
-    from .inference import Prior
+    from ..inference import Prior
 
 LIBRARIES = ("bolfi-liquids", "numpy", "scipy", "jax", "numpyro", "emcee", "taichi", "xarray")
 
 
 def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring) -> dict[str, Any]:
     """Settings, inputs and versions; see `run_directory.MUST_AGREE` for what must not change."""
-    from .inference import ENGINE_VERSION
+    from ..inference import ENGINE_VERSION
 
     return {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -34,8 +34,8 @@ def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring
 
 def generations() -> dict[str, str]:
     """Of engine and model: what another one made is not to be taken for this one's."""
-    from .inference import ENGINE_VERSION
-    from .models import MODEL_VERSION
+    from ..inference import ENGINE_VERSION
+    from ..models import MODEL_VERSION
 
     return {"engine": ENGINE_VERSION, "model": MODEL_VERSION}
 

@@ -1,0 +1,1 @@
+"""The run directory: settings, simulations, recordings, provenance."""
