@@ -13,7 +13,7 @@ from .errors import InputError
 from .files import write_netcdf
 from .inputs.described_liquid import Described
 from .inputs.recording import Recording
-from .movie_file import RATE, write_movie
+from .movie.file import RATE, write_movie
 from .progress import progress_bar
 from .simulated_files import check_targets, pour_dataset, stir_dataset
 from .spillage import FRACTIONS
@@ -60,7 +60,7 @@ def simulate_stir(
     if out is not None:
         write_netcdf(stir_dataset(described, recording, angles), out)
     if movie is not None:
-        from .movie_stir import stir_pictures
+        from .movie.stir import stir_pictures
 
         frames = models.stir_frames(*given, described.seed, rate=RATE, effects=described.effects)
         caption = [*described.lines()[:2], f"{recording.path.name}, {described.lines()[2]}"]
@@ -120,7 +120,7 @@ def simulate_pour(  # noqa: PLR0913  one for each option
     if out is not None:
         write_netcdf(pour_dataset(described, landings, given[1:], distance, fractions), out)
     if movie is not None:
-        from .movie_pour import pour_pictures
+        from .movie.pour import pour_pictures
 
         frames = models.pour_frames(
             *given,

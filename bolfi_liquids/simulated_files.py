@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .files import new_file, new_netcdf
 from .inputs.described_liquid import Described
 from .inputs.recording import Recording, along_path, recording_dataset
-from .movie_file import check_movie
+from .movie.file import check_movie
 
 if TYPE_CHECKING:
     from xarray import Dataset

@@ -10,12 +10,17 @@ from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.described_liquid import Described, read_effects
 from bolfi_liquids.inputs.recording import open_recording
-from bolfi_liquids.movie_file import WRITERS, write_movie
-from bolfi_liquids.movie_landed import GRAVITY, landed, level
-from bolfi_liquids.movie_pour import pour_pictures, pour_view, receiver_glass, source_glass
-from bolfi_liquids.movie_stir import stir_pictures, stir_view
-from bolfi_liquids.movie_surface import Glass, surface
-from bolfi_liquids.movie_view import View
+from bolfi_liquids.movie.file import WRITERS, write_movie
+from bolfi_liquids.movie.landed import GRAVITY, landed, level
+from bolfi_liquids.movie.pour import (
+    pour_pictures,
+    pour_view,
+    receiver_glass,
+    source_glass,
+)
+from bolfi_liquids.movie.stir import stir_pictures, stir_view
+from bolfi_liquids.movie.surface import Glass, surface
+from bolfi_liquids.movie.view import View
 
 UP = np.array([0.0, 0.0, 1.0])
 FAR = Glass(0.01, 0.01, np.array([9.0, 9.0, 9.0]), UP)  # holds nothing of what is drawn

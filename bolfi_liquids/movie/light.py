@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .movie_surface import Surface
-from .movie_view import View
+from .surface import Surface
+from .view import View
 
 Picture = NDArray[np.floating]
 """Red, green and blue from 0 to 1, shape [height, width, 3]."""

@@ -7,15 +7,29 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from .movie_landed import Landed, landed, level
-from .movie_light import ABSORBED, SCATTER, SCATTERED, Picture, over, through_liquid
-from .movie_solids import Shape, drawn, glass_before, glass_behind, ring, room
-from .movie_surface import Glass, surface
-from .movie_text import written
-from .movie_view import View
+from .landed import Landed, landed, level
+from .light import (
+    ABSORBED,
+    SCATTER,
+    SCATTERED,
+    Picture,
+    over,
+    through_liquid,
+)
+from .solids import (
+    Shape,
+    drawn,
+    glass_before,
+    glass_behind,
+    ring,
+    room,
+)
+from .surface import Glass, surface
+from .text import written
+from .view import View
 
 if TYPE_CHECKING:
-    from .models import Cups, Landings, PourFrames
+    from ..models import Cups, Landings, PourFrames
 
 SIZE = 480, 640
 AZIMUTH, ELEVATION = np.radians(12.0), np.radians(14.0)

@@ -6,14 +6,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .movie_light import through_liquid
-from .movie_solids import drawn, glass_before, glass_behind, room, stick_layer
-from .movie_surface import Glass, surface
-from .movie_text import written
-from .movie_view import View
+from .light import through_liquid
+from .solids import (
+    drawn,
+    glass_before,
+    glass_behind,
+    room,
+    stick_layer,
+)
+from .surface import Glass, surface
+from .text import written
+from .view import View
 
 if TYPE_CHECKING:
-    from .models import StirFrames, StirSetup
+    from ..models import StirFrames, StirSetup
 
 SIZE = 640, 480
 AZIMUTH, ELEVATION = np.radians(25.0), np.radians(22.0)

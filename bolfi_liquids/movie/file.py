@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
-from .files import write_whole
+from ..errors import InputError
+from ..files import write_whole
 
 Pictures = Iterable[NDArray[np.uint8]]
 RATE = 25.0  # pictures/s; a GIF's clock counts hundredths of a second

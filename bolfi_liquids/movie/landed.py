@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from .models import Cups, Landings
+    from ..models import Cups, Landings
 
 GRAVITY = 9.81
 

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 from scipy.ndimage import gaussian_filter
 
-from .movie_light import Layer, Picture, over
-from .movie_surface import Glass
-from .movie_view import View
+from .light import Layer, Picture, over
+from .surface import Glass
+from .view import View
 
 FINER = 2  # times finer are lines drawn than shown
 EDGE, FAINT = (92, 112, 130, 210), (92, 112, 130, 110)

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from .drawing import INK
-from .movie_light import Picture
+from ..drawing import INK
+from .light import Picture
 
 SIZE, MARGIN = 14, 12  # pixels
 GREY = "#5b6770"

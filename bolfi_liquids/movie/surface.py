@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import affine_transform, gaussian_filter, map_coordinates
 
-from .movie_view import View
+from .view import View
 
 CELLS = 3.5  # grid cells a particle spacing
 SMEAR = 0.6  # sd of a smeared particle, by the spacing
