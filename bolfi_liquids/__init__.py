@@ -5,8 +5,8 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .calibration import Calibration
-    from .calibrator import calibrate
+    from .calibration.calibrate import calibrate
+    from .calibration.result import Calibration
     from .criticiser import criticise
     from .criticism import Criticism
     from .inputs.recording import Recording, open_recording
@@ -36,11 +36,11 @@ __all__ = [
 
 # loaded on use: `import bolfi_liquids` must cost neither JAX nor Taichi
 _HOME = {
-    "Calibration": ".calibration",
+    "Calibration": ".calibration.result",
     "Criticism": ".criticism",
     "Cups": ".models",
     "Recording": ".inputs.recording",
-    "calibrate": ".calibrator",
+    "calibrate": ".calibration.calibrate",
     "choose_pour": ".pouring",
     "criticise": ".criticiser",
     "execute_pour": ".pour_execution",

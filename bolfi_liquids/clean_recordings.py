@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .calibration.noise import sensor_noise
+from .calibration.stir_simulator import stirring_of
 from .inputs.recording import Recording
-from .noise import sensor_noise
 from .stir_experiment import camera_noise, same_experiment, stir_experiment
-from .stirring import stirring_of
 
 if TYPE_CHECKING:
+    from .calibration.stir_simulator import Stirring
     from .inference import Extension, Keeping, Plan, Prior, UsualResidual
-    from .stirring import Stirring
 
 
 @dataclass(frozen=True, eq=False)

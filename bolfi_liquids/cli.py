@@ -101,7 +101,7 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
     ] = False,
 ) -> None:
     """Learn a liquid's parameters from recordings of it being stirred."""
-    from .calibrator import calibrate as run_calibrate
+    from .calibration.calibrate import calibrate as run_calibrate
     from .inputs.recording import aborted_recordings, open_recordings
 
     opened = open_recordings(recordings)

@@ -6,7 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .calibration import Calibration
+from .calibration.result import Calibration
+from .calibration.stir_simulator import Stirring, stirring_of
+from .calibration.tree import write_tree
 from .clean_recordings import Clean, clean_residuals, usual_elsewhere, usual_for
 from .criticism import Criticism, finished_criticism
 from .criticism_inputs import Inputs, Pours, open_inputs
@@ -20,11 +22,9 @@ from .inputs.settings import CriticismSettings
 from .pour_experiment import as_prior, pour_experiment
 from .progress import phases
 from .proposals import pour_proposals, stir_proposals
-from .results import write_tree
 from .run.directory import CRITICISM, open_bank
 from .run.summary import write_section
 from .stir_experiment import camera_noise, effects_of, held_out_noise, stir_experiment
-from .stirring import Stirring, stirring_of
 
 if TYPE_CHECKING:
     from . import inference

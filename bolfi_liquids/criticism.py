@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from .calibration import Calibration
+from .calibration.result import Calibration
 from .errors import InputError
 from .run.directory import CRITICISM, CRITICISM_FORMAT
 from .run.summary import read_summary
@@ -42,7 +42,7 @@ class Criticism:
         Raises:
             InputError: There is none in the directory.
         """
-        from .results import read_tree
+        from .calibration.tree import read_tree
 
         run = Path(run)
         if not is_criticised(run):

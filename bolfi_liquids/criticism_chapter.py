@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import criticism_narrative as narrative
-from .calibration import Calibration
+from .calibration.result import Calibration
+from .calibration.tree import read_tree
 from .criticism import is_criticised
 from .criticism_figures import held_out_plot, pour_residual_plot, residual_plot, stroke_plot
 from .drawing import to_svg
 from .effect_figures import any_fitted, coefficient_plot, confusion_plot, score_plot
 from .readouts import lines_of, to_chart
-from .results import read_tree
 from .run.directory import CRITICISM
 from .run.summary import read_summary
 

@@ -7,7 +7,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .calibration import Calibration
+from .calibration.result import Calibration
+from .calibration.stir_simulator import Stirring, same_liquid, stirring_of
 from .errors import InputError
 from .inputs.cups import bundled_cups
 from .inputs.pour_table import PourTable, open_pours
@@ -17,7 +18,6 @@ from .run.directory import CRITICISM_FORMAT
 from .run.provenance import generations
 from .run.recordings import kept_recordings
 from .stir_experiment import effects_of, frame_interval, same_rate
-from .stirring import Stirring, same_liquid, stirring_of
 
 if TYPE_CHECKING:
     from .models import Cups

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .calibration_section import parameter_summary
+from .calibration.noise import rms
+from .calibration.section import parameter_summary
 from .findings import Findings
 from .inputs.settings import ALARM
-from .noise import rms
 
 if TYPE_CHECKING:
     from xarray import DataTree

@@ -3,7 +3,7 @@
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from .calibrator import calibrate
+from .calibration.calibrate import calibrate
 from .criticiser import criticise
 from .pouring import choose_pour
 from .reporting import report

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from . import inference
-    from .calibration import Calibration
+    from .calibration.result import Calibration
     from .clean_recordings import Clean
     from .criticism_inputs import Inputs
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .calibration.tree import read_tree, write_tree
 from .criticism import latest_calibration
 from .criticism_narrative import unit_of
 from .inputs.cups import kept_cups
@@ -22,7 +23,6 @@ from .inputs.prior import split_parameters
 from .inputs.recording import Recording
 from .pour_results import read_pour
 from .progress import Advance, progress_bar
-from .results import read_tree, write_tree
 from .run.directory import FRAMES, POUR
 from .run.recordings import kept_recordings
 from .run.simulations import fresh_seeds
@@ -30,7 +30,7 @@ from .run.simulations import fresh_seeds
 if TYPE_CHECKING:
     from xarray import Dataset
 
-    from .calibration import Calibration
+    from .calibration.result import Calibration
 
 DRAWS = 3
 RATE = 15.0  # frames/s
@@ -133,7 +133,7 @@ def _stirred(
     advance: Advance,
 ) -> dict[str, Any]:
     from . import models
-    from .stirring import stirring_of
+    from .calibration.stir_simulator import stirring_of
 
     particles = int(calibration.record["settings"]["particles"])
     stirring = stirring_of([recording], particles)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .calibration import Calibration
+from .calibration.result import Calibration
 from .criticism_narrative import with_unit
 from .inputs.cups import kept_cups
 from .narrative import percent

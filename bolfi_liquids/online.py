@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .calibrator import calibrate
+from .calibration.calibrate import calibrate
 from .errors import InputError
 from .inputs.cups import bundled_cups
 from .inputs.prior import (

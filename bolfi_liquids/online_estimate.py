@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .calibration.stir_simulator import Stirring
 from .inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from .online_plan import Followed
 from .online_settings import OnlineSettings
 from .run.simulations import fresh_seeds
 from .spillage_map import SpillageMap
-from .stirring import Stirring
 
 if TYPE_CHECKING:
     from .inference import Bolfi, Job, Prior, Simulation

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .calibration.stir_simulator import stirring_of
 from .online_outbox import newest
 from .online_plan import SoFar, follow, stroke_ends
 from .online_request import FAILED, GONE, PREPARING, READY, REFUSED, Request, Status
 from .online_simulator import step_back
-from .stirring import stirring_of
 
 if TYPE_CHECKING:
     from .inference import Job

@@ -4,8 +4,8 @@ import os
 import signal
 from multiprocessing.connection import Connection
 
+from .calibration.stir_simulator import stirring_of
 from .online_request import GONE, Request
-from .stirring import stirring_of
 
 NICENESS = 10  # of this process; control and cameras come first
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .calibration.tree import read_tree
 from .inputs.settings import PourSettings
-from .results import read_tree
 from .run.directory import POUR
 from .spillage import ACTION, FRACTIONS, RISK, Surface
 

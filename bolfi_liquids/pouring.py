@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .calibration import Calibration
+from .calibration.result import Calibration
 from .criticism import latest_calibration
 from .errors import InputError
 from .inputs.cups import bundled_cups, open_cups
@@ -120,8 +120,8 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         InputError: A setting or the file of the cups cannot be used.
         RuntimeError: Pours failed at every angular velocity, or at all of the promising ones.
     """
+    from .calibration.tree import write_tree
     from .pour_results import pour_section, pour_tree
-    from .results import write_tree
 
     if not isinstance(calibration, Calibration):
         calibration = latest_calibration(calibration)

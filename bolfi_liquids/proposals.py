@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .calibration.stir_simulator import Stirring
 from .inputs.recording import Gripper, Recording
 from .inputs.strokes import speed
 from .pour_experiment import OUTCOMES, Pouring
 from .pour_noise import PourNoise
-from .stirring import Stirring
 
 if TYPE_CHECKING:
     from .inference import Noise, Proposal, UsualResidual

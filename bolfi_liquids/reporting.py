@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import narrative
-from .calibration import Calibration
+from .calibration.result import Calibration
 from .calibration_figures import inclination_figure, stroke_figure
 from .criticism import latest_calibration
 from .criticism_chapter import criticism_context

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .calibration.stir_simulator import Stirring, stirring_of
 from .inputs.bundled import bundled_recording
 from .inputs.prior import default_prior, describe_prior
 from .inputs.recording import Recording, open_recordings
@@ -33,7 +34,6 @@ from .run.simulations import fresh_seeds
 from .run.workers import processes
 from .sbc_pipelines import SAMPLING, Calibrate, CameraNoise, FromBank, Quietly
 from .sbc_results import SurrogateCheck, checked, write_results
-from .stirring import Stirring, stirring_of
 
 if TYPE_CHECKING:
     from .inference import Prior, Replicates

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .calibrator import engine_options, fit_recordings
+from .calibration.calibrate import engine_options, fit_recordings
+from .calibration.stir_simulator import Stirring
 from .inputs.settings import RUNS, CalibrationSettings
-from .stirring import Stirring
 
 if TYPE_CHECKING:
     from xarray import DataTree

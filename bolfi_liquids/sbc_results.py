@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .calibration.tree import write_tree
 from .drawing import new_figure, styled, write_figure
-from .results import write_tree
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .calibration.stir_simulator import Stirring
 from .errors import InputError
 from .inputs.recording import Recording
 from .inputs.strokes import resting, windows
-from .stirring import Stirring
 
 if TYPE_CHECKING:
     from .inference import AutoregressiveNoise, Experiment, Extension, Noise, UsualResidual

@@ -10,8 +10,8 @@ from .fields import PLANE_NAMES
 from .recording import Recording
 
 if TYPE_CHECKING:
+    from ..calibration.stir_simulator import Stirring
     from ..inference import Window
-    from ..stirring import Stirring
 
 MOVING = 0.5  # of the greatest speed: corners are too short for samples to see them at rest
 STILL = 1e-4  # m

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrator import engine_options
-from ..draws import pick_draws
+from ..calibration.calibrate import engine_options
+from ..calibration.draws import pick_draws
+from ..calibration.stir_simulator import Stirring
 from ..inputs.prior import describe_prior
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from ..progress import Simulate
 from ..sbc_pipelines import SAMPLING, CameraNoise
-from ..stirring import Stirring
 from .truths import DENSITY
 
 if TYPE_CHECKING:

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..calibration.stir_simulator import Stirring, stirring_of
 from ..inputs.bundled import bundled_recording
 from ..inputs.prior import default_prior
 from ..inputs.recording import Recording
 from ..inputs.strokes import until_stroke
-from ..stirring import Stirring, stirring_of
 from .calibrations import ByPouring, ByStirring, Learner
 from .scale import Scale
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..calibrator import calibrate
+from ..calibration.calibrate import calibrate
 from ..criticiser import criticise
 from ..inputs.cups import bundled_cups
 from ..pouring import choose_pour

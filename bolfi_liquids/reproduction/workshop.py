@@ -7,8 +7,8 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..calibration import Calibration
-from ..calibrator import calibrate
+from ..calibration.calibrate import calibrate
+from ..calibration.result import Calibration
 from ..inputs.bundled import bundled_recording
 from ..inputs.cups import bundled_cups
 from ..inputs.prior import default_prior

@@ -7,9 +7,9 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+from ..calibration.stir_simulator import Stirring
 from ..inputs.prior import describe_prior
 from ..inputs.settings import CalibrationSettings
-from ..stirring import Stirring
 
 if TYPE_CHECKING:
     from ..inference import Prior

@@ -11,8 +11,8 @@ from arviz_stats.base.array import array_stats
 
 import bolfi_liquids as bl
 from bolfi_liquids import inference, models
+from bolfi_liquids.calibration.stir_simulator import stirring_of
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.stirring import stirring_of
 
 
 def test_summary_is_of_the_posterior(calibration, settings):

@@ -146,7 +146,7 @@ def test_resuming_where_no_run_is_says_so(monkeypatch, short_recording, tmp_path
     def stop(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("bolfi_liquids.calibrator.calibrate", stop)
+    monkeypatch.setattr("bolfi_liquids.calibration.calibrate.calibrate", stop)
     mistyped = str(tmp_path / "mien")
     command = ["calibrate", str(short_recording), "--out", mistyped]
     said = CliRunner().invoke(app, [*command, "--resume"]).stderr
@@ -161,7 +161,7 @@ def test_interruption_says_how_to_go_on(monkeypatch, tmp_path):
     recording = tmp_path / "stir me.nc"
     recording.write_bytes((files("bolfi_liquids.data") / "glycerin_v10.nc").read_bytes())
     command = ["calibrate", str(recording), "--out", str(tmp_path)]
-    monkeypatch.setattr("bolfi_liquids.calibrator.calibrate", interrupt)
+    monkeypatch.setattr("bolfi_liquids.calibration.calibrate.calibrate", interrupt)
     monkeypatch.setattr(sys, "argv", ["bolfi-liquids", *command])
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 130

@@ -7,6 +7,7 @@ from bolfi_liquids.inference import Bolfi, Simulation
 
 import bolfi_liquids as bl
 from bolfi_liquids import models
+from bolfi_liquids.calibration.stir_simulator import stirring_of
 from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.online_estimate import (
     Made,
@@ -21,7 +22,6 @@ from bolfi_liquids.online_estimate import (
 from bolfi_liquids.online_plan import SoFar, follow, planned, stroke_ends
 from bolfi_liquids.online_settings import OnlineSettings
 from bolfi_liquids.spillage_map import Expected
-from bolfi_liquids.stirring import stirring_of
 
 ATTRS = {
     "cup_radius": 0.04,

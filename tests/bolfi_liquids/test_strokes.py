@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware import circle, star
 
+from bolfi_liquids.calibration.stir_simulator import Stirring, stirring_of
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.recording import Gripper, Recording
 from bolfi_liquids.inputs.strokes import (
@@ -18,7 +19,6 @@ from bolfi_liquids.inputs.strokes import (
     until_stroke,
     windows,
 )
-from bolfi_liquids.stirring import Stirring, stirring_of
 
 
 def recorded(path) -> Recording:

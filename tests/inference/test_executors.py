@@ -25,7 +25,7 @@ import numpy as np
 TIME = np.linspace(0.0, 1.0, 30)
 
 def simulate(theta, seeds):
-    loaded = [name for name in ("jax", "numpyro", "scipy", "bolfi_liquids.calibrator")
+    loaded = [name for name in ("jax", "numpyro", "scipy", "bolfi_liquids.calibration.calibrate")
               if name in sys.modules]
     if loaded:
         raise RuntimeError(f"the worker had to load {loaded}")

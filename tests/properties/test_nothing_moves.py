@@ -86,8 +86,8 @@ def run_with_a_pour(tmp_path):
 
     from xarray import DataTree
 
+    from bolfi_liquids.calibration.tree import write_tree
     from bolfi_liquids.inputs.cups import bundled_cups
-    from bolfi_liquids.results import write_tree
     from bolfi_liquids.run.summary import write_section
 
     run = tmp_path / "run"

@@ -27,6 +27,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from kept import keep, results
 
 from bolfi_liquids import inference, models
+from bolfi_liquids.calibration.stir_simulator import Stirring, stirring_of
 from bolfi_liquids.clean_recordings import Clean, clean_residuals, usual_for
 from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.inputs.recording import Gripper, Recording
@@ -39,7 +40,6 @@ from bolfi_liquids.stir_experiment import (
     held_out_noise,
     stir_experiment,
 )
-from bolfi_liquids.stirring import Stirring, stirring_of
 
 RIG = {
     "cup_radius": 0.04,

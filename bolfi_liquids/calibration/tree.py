@@ -17,17 +17,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .errors import InputError
-from .files import write_netcdf
-from .inputs.fields import PLANE_NAMES
-from .inputs.strokes import stroke_numbers
-from .predictive import Check
-from .stirring import Stirring
+from ..errors import InputError
+from ..files import write_netcdf
+from ..inputs.fields import PLANE_NAMES
+from ..inputs.strokes import stroke_numbers
+from .check import Check
+from .stir_simulator import Stirring
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
-    from .inference import Fit, Prior
+    from ..inference import Fit, Prior
 
 GRID = 121
 

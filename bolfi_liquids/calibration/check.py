@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .progress import Simulate
-from .run.simulations import Keep, fresh_seeds, simulate_kept
+from ..progress import Simulate
+from ..run.simulations import Keep, fresh_seeds, simulate_kept
 
 PREDICTIVE_DRAWS = 8
 REPLICATES = 4  # seeds at theta*, for the noise between seeds

@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .check import Check
 from .noise import irreducible_rms, rms
-from .predictive import Check
-from .stirring import Stirring
+from .stir_simulator import Stirring
 
 if TYPE_CHECKING:
     from xarray import DataArray, DataTree
 
-    from .inference import Fit
+    from ..inference import Fit
 
 QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
 

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
+from ..errors import InputError
+from ..inputs.prior import read_prior
+from ..inputs.settings import CalibrationSettings
+from ..run.directory import POSTERIOR, read_run
+from ..run.summary import read_summary
 from .draws import pick_draws
-from .errors import InputError
-from .inputs.prior import read_prior
-from .inputs.settings import CalibrationSettings
-from .run.directory import POSTERIOR, read_run
-from .run.summary import read_summary
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
-    from .inference import Prior
+    from ..inference import Prior
 
 OPTIONS = ("budget", "surrogate", "sampler", "seed", "particles", "batch")  # of the command
 
@@ -46,7 +46,7 @@ class Calibration:
         Raises:
             InputError: There is none in the directory, or it was not finished.
         """
-        from .results import read_tree
+        from .tree import read_tree
 
         run = Path(run)
         record = read_run(run)

@@ -7,28 +7,28 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from .calibration import Calibration, is_calibrated
-from .calibration_section import calibration_section
-from .draws import pick_draws
-from .errors import InputError
-from .inputs.prior import check_prior, default_prior
-from .inputs.recording import Recording, Source, open_recordings
-from .inputs.settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
-from .progress import Simulate, progress_bar, reported
-from .run.directory import (
+from ..errors import InputError
+from ..inputs.prior import check_prior, default_prior
+from ..inputs.recording import Recording, Source, open_recordings
+from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
+from ..progress import Simulate, progress_bar, reported
+from ..run.directory import (
     POSTERIOR,
     enter_run,
     open_bank,
     read_run,
 )
-from .run.provenance import run_record
-from .run.recordings import keep_recordings
-from .run.summary import write_section
-from .stirring import Stirring, stirring_of
+from ..run.provenance import run_record
+from ..run.recordings import keep_recordings
+from ..run.summary import write_section
+from .draws import pick_draws
+from .result import Calibration, is_calibrated
+from .section import calibration_section
+from .stir_simulator import Stirring, stirring_of
 
 if TYPE_CHECKING:
-    from .inference import Fit, Prior, SimulationBank
-    from .run.simulations import Keep
+    from ..inference import Fit, Prior, SimulationBank
+    from ..run.simulations import Keep
 
 
 def calibrate(  # noqa: PLR0913  the one call that most users make
@@ -105,9 +105,9 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
 def _calibrate(
     run: Path, stirring: Stirring, prior: "Prior", settings: CalibrationSettings, progress: bool
 ) -> None:
-    from .predictive import PREDICTIVE_DRAWS, check_by_simulation
-    from .results import results_tree, write_tree
-    from .run.simulations import Keep
+    from ..run.simulations import Keep
+    from .check import PREDICTIVE_DRAWS, check_by_simulation
+    from .tree import results_tree, write_tree
 
     with (
         open_bank(run) as bank,
@@ -143,7 +143,7 @@ def _calibrate(
 
 def _left(run: Path, settings: CalibrationSettings, bank: "SimulationBank") -> int:
     """Simulations that a run still needs; some of those before it grew were judging, or pours."""
-    from .predictive import PREDICTIVE_DRAWS, REPLICATES
+    from .check import PREDICTIVE_DRAWS, REPLICATES
 
     before = read_run(run).get("grown", [{"learned_from": 0, "simulations": 0}])[-1]
     needed = settings.budget - before["learned_from"] + PREDICTIVE_DRAWS + REPLICATES
@@ -173,7 +173,7 @@ def fit_recordings(  # noqa: PLR0913  what a calibration is made of
         seed: Of everything random.
         simulate: In place of the stirring's own, such as one that reports.
     """
-    from . import inference
+    from .. import inference
 
     options = engine_options(stirring, surrogate)
     if "initial" in options:

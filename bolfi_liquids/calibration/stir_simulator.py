@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
-from .inputs.prior import split_parameters
-from .inputs.recording import Recording
+from ..errors import InputError
+from ..inputs.prior import split_parameters
+from ..inputs.recording import Recording
 
 if TYPE_CHECKING:
-    from .inference import Discrepancy
-    from .models import StirSetup
+    from ..inference import Discrepancy
+    from ..models import StirSetup
 
 SAME_DENSITY = 0.02  # relative difference up to which two weighings are of one liquid
 
@@ -38,7 +38,7 @@ class Stirring:
 
         Besides the liquid's parameters, theta may hold coefficients of `models.EFFECTS`.
         """
-        from . import models
+        from .. import models
 
         liquid, effects = split_parameters(theta)
         signals = [
@@ -78,7 +78,7 @@ class Stirring:
 
     def discrepancy(self) -> "Discrepancy":
         """The paper's integral over each recording, summed over the recordings."""
-        from .inference import squared_difference
+        from ..inference import squared_difference
 
         parts = [squared_difference(recording.time) for recording in self.recordings]
         ends = np.cumsum([len(recording.time) for recording in self.recordings])[:-1]
@@ -119,7 +119,7 @@ def stirring_of(recordings: list[Recording], particles: int) -> Stirring:
     Raises:
         InputError: The recordings' liquids differ in density.
     """
-    from .models import StirSetup
+    from ..models import StirSetup
 
     first, *others = recordings
     for other in others:
