@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .calibration.calibrate import calibrate
     from .calibration.result import Calibration
-    from .criticiser import criticise
-    from .criticism import Criticism
+    from .criticism.criticise import criticise
+    from .criticism.result import Criticism
     from .inputs.recording import Recording, open_recording
     from .inputs.table_import import import_table
     from .models import Cups
@@ -37,12 +37,12 @@ __all__ = [
 # loaded on use: `import bolfi_liquids` must cost neither JAX nor Taichi
 _HOME = {
     "Calibration": ".calibration.result",
-    "Criticism": ".criticism",
+    "Criticism": ".criticism.result",
     "Cups": ".models",
     "Recording": ".inputs.recording",
     "calibrate": ".calibration.calibrate",
     "choose_pour": ".pouring",
-    "criticise": ".criticiser",
+    "criticise": ".criticism.criticise",
     "execute_pour": ".pour_execution",
     "import_table": ".inputs.table_import",
     "open_recording": ".inputs.recording",

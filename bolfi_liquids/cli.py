@@ -162,7 +162,7 @@ def criticise(  # noqa: PLR0913  one parameter for each option
     seed: Annotated[int, typer.Option(help="Of all random numbers.")] = CriticismSettings.seed,
 ) -> None:
     """Find where simulation and recording disagree, and which effect is missing."""
-    from .criticiser import criticise as run_criticise
+    from .criticism.criticise import criticise as run_criticise
     from .inputs.cups import open_cups
     from .inputs.pour_table import open_pours
 
@@ -223,7 +223,7 @@ def pour(  # noqa: PLR0913  one parameter for each option
     for option, given in (("arm", arm), ("emulator", emulator), ("rig", rig)):
         if given:
             raise typer.BadParameter(f"--{option} needs --execute, which is missing")
-    from .criticism import latest_calibration
+    from .criticism.result import latest_calibration
     from .inputs.cups import bundled_cups, open_cups
     from .pouring import choose_pour
 
@@ -257,7 +257,7 @@ def demo(
     ),
 ) -> None:
     """Calibrate on the bundled glycerin, criticise, choose a pour and write the report."""
-    from .criticism import Criticism
+    from .criticism.result import Criticism
     from .demo import run_demo
 
     with complaints_among_results():

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 if TYPE_CHECKING:
-    from .criticism import Criticism
+    from .criticism.result import Criticism
 
 
 @contextmanager

@@ -9,10 +9,20 @@ import numpy as np
 from . import criticism_narrative as narrative
 from .calibration.result import Calibration
 from .calibration.tree import read_tree
-from .criticism import is_criticised
-from .criticism_figures import held_out_plot, pour_residual_plot, residual_plot, stroke_plot
+from .criticism.effect_figures import (
+    any_fitted,
+    coefficient_plot,
+    confusion_plot,
+    score_plot,
+)
+from .criticism.figures import (
+    held_out_plot,
+    pour_residual_plot,
+    residual_plot,
+    stroke_plot,
+)
+from .criticism.result import is_criticised
 from .drawing import to_svg
-from .effect_figures import any_fitted, coefficient_plot, confusion_plot, score_plot
 from .readouts import lines_of, to_chart
 from .run.directory import CRITICISM
 from .run.summary import read_summary

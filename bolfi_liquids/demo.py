@@ -4,7 +4,7 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 from .calibration.calibrate import calibrate
-from .criticiser import criticise
+from .criticism.criticise import criticise
 from .pouring import choose_pour
 from .reporting import report
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .calibration.tree import read_tree, write_tree
-from .criticism import latest_calibration
+from .criticism.result import latest_calibration
 from .criticism_narrative import unit_of
 from .inputs.cups import kept_cups
 from .inputs.prior import split_parameters

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .calibration.result import Calibration
-from .criticism import latest_calibration
+from .criticism.result import latest_calibration
 from .errors import InputError
 from .inputs.cups import bundled_cups, open_cups
 from .inputs.settings import PourSettings

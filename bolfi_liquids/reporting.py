@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from . import narrative
 from .calibration.result import Calibration
 from .calibration_figures import inclination_figure, stroke_figure
-from .criticism import latest_calibration
+from .criticism.result import latest_calibration
 from .criticism_chapter import criticism_context
 from .files import write_text
 from .posterior_figure import posterior_figure

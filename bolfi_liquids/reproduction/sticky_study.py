@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..calibration.calibrate import calibrate
-from ..criticiser import criticise
+from ..criticism.criticise import criticise
 from ..inputs.cups import bundled_cups
 from ..pouring import choose_pour
 from ..run.directory import open_bank

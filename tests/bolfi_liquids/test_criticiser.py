@@ -6,9 +6,9 @@ import pytest
 from bolfi_liquids.inference import Prior
 
 import bolfi_liquids as bl
+from bolfi_liquids.criticism.pours import as_prior
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.prior import default_prior, describe_prior, read_prior
-from bolfi_liquids.pour_experiment import as_prior
 from bolfi_liquids.run.recordings import kept_recordings
 
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import bolfi_liquids as bl
-from bolfi_liquids.criticism_figures import residual_plot, stroke_plot
+from bolfi_liquids.criticism.effect_figures import coefficient_plot, confusion_plot, score_plot
+from bolfi_liquids.criticism.figures import residual_plot, stroke_plot
 from bolfi_liquids.drawing import to_svg
-from bolfi_liquids.effect_figures import coefficient_plot, confusion_plot, score_plot
 
 
 def drawn(figure):

@@ -7,12 +7,12 @@ import pytest
 import xarray as xr
 
 from bolfi_liquids.calibration.stir_simulator import stirring_of
-from bolfi_liquids.clean_recordings import Clean, usual_elsewhere, usual_for
-from bolfi_liquids.criticism import finished_criticism
-from bolfi_liquids.criticism_inputs import open_inputs
+from bolfi_liquids.criticism.baseline import Clean, usual_elsewhere, usual_for
+from bolfi_liquids.criticism.given import open_inputs
+from bolfi_liquids.criticism.result import finished_criticism
+from bolfi_liquids.criticism.stirs import camera_noise, held_out_noise, stir_experiment
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.settings import CriticismSettings
-from bolfi_liquids.stir_experiment import camera_noise, held_out_noise, stir_experiment
 
 HEADER = "angular_velocity_deg_s,distance_cm,spilled,received,retained"
 ROWS = ["45,1,5,90,5", "90,2,10,85,5", "60,3,20,75,5"]

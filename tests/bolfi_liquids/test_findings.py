@@ -7,10 +7,10 @@ import pytest
 import xarray as xr
 from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 
-from bolfi_liquids.criticism_results import _effects, _posterior
-from bolfi_liquids.findings import Findings
+from bolfi_liquids.criticism.findings import Findings
+from bolfi_liquids.criticism.pour_noise import MISSED, REPEATED, PourNoise
+from bolfi_liquids.criticism.tree import _effects, _posterior
 from bolfi_liquids.inputs.settings import CriticismSettings
-from bolfi_liquids.pour_noise import MISSED, REPEATED, PourNoise
 
 
 def model(names, value):

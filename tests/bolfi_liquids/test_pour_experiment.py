@@ -3,8 +3,8 @@
 import numpy as np
 
 from bolfi_liquids import models
+from bolfi_liquids.criticism.pours import Pouring
 from bolfi_liquids.inputs.cups import bundled_cups
-from bolfi_liquids.pour_experiment import Pouring
 
 RATE = np.radians([80.0, 40.0, 80.0, 110.0, 40.0])  # neither sorted nor once each
 DISTANCE = np.array([0.01, 0.03, 0.04, 0.02, -0.01])

@@ -28,18 +28,18 @@ from kept import keep, results
 
 from bolfi_liquids import inference, models
 from bolfi_liquids.calibration.stir_simulator import Stirring, stirring_of
-from bolfi_liquids.clean_recordings import Clean, clean_residuals, usual_for
-from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.inputs.recording import Gripper, Recording
-from bolfi_liquids.inputs.settings import CriticismSettings
-from bolfi_liquids.pour_experiment import Pouring
-from bolfi_liquids.pour_noise import REPEATED
-from bolfi_liquids.stir_experiment import (
+from bolfi_liquids.criticism.baseline import Clean, clean_residuals, usual_for
+from bolfi_liquids.criticism.pour_noise import REPEATED
+from bolfi_liquids.criticism.pours import Pouring
+from bolfi_liquids.criticism.stirs import (
     camera_noise,
     effects_of,
     held_out_noise,
     stir_experiment,
 )
+from bolfi_liquids.inputs.prior import default_prior
+from bolfi_liquids.inputs.recording import Gripper, Recording
+from bolfi_liquids.inputs.settings import CriticismSettings
 
 RIG = {
     "cup_radius": 0.04,

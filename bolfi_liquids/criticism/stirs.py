@@ -5,13 +5,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .calibration.stir_simulator import Stirring
-from .errors import InputError
-from .inputs.recording import Recording
-from .inputs.strokes import resting, windows
+from ..calibration.stir_simulator import Stirring
+from ..errors import InputError
+from ..inputs.recording import Recording
+from ..inputs.strokes import resting, windows
 
 if TYPE_CHECKING:
-    from .inference import AutoregressiveNoise, Experiment, Extension, Noise, UsualResidual
+    from ..inference import (
+        AutoregressiveNoise,
+        Experiment,
+        Extension,
+        Noise,
+        UsualResidual,
+    )
 
 TREND = 2  # degree of what the hanging stick does by itself in the second before it is moved
 SHORTEST = 8  # samples at rest from which noise can be learned
@@ -25,7 +31,7 @@ def camera_noise(recordings: Sequence[Recording]) -> "AutoregressiveNoise":
     Raises:
         InputError: They rest too shortly for that.
     """
-    from .inference import rest_noise
+    from ..inference import rest_noise
 
     seen = [(r.path.name, _longest_seen(r.inclination[resting(r)])) for r in recordings]
     rests = [(name, rest) for name, rest in seen if len(rest) >= SHORTEST]
@@ -69,7 +75,7 @@ def stir_experiment(
     stirring: Stirring, cameras: "AutoregressiveNoise", usual: "UsualResidual | None", label: str
 ) -> "Experiment":
     """Recordings of one liquid, with the cameras' noise and what the simulator usually lacks."""
-    from .inference import Experiment, SumOfNoises
+    from ..inference import Experiment, SumOfNoises
 
     noise: Noise = cameras if usual is None else SumOfNoises((cameras, usual))
     return Experiment(
@@ -83,8 +89,8 @@ def effects_of(scene: str, names: Sequence[str] | None = None) -> dict[str, "Ext
     Raises:
         InputError: A name that is not registered.
     """
-    from .inference import Extension
-    from .models import EFFECTS
+    from ..inference import Extension
+    from ..models import EFFECTS
 
     unknown = [name for name in names or () if name not in EFFECTS]
     if unknown:

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .inputs.pour_table import PourTable
-from .inputs.prior import split_parameters
+from ..inputs.pour_table import PourTable
+from ..inputs.prior import split_parameters
 from .pour_noise import PourNoise
 
 if TYPE_CHECKING:
     from numpyro.distributions import Distribution
 
-    from .inference import Experiment, Prior
-    from .models import Cups
+    from ..inference import Experiment, Prior
+    from ..models import Cups
 
 NARROWEST = 0.05  # sd of the log of a parameter, and share of another's prior interquartile range
 OUTCOMES = ("spilled", "retained")
@@ -43,7 +43,7 @@ class Pouring:
         Each angular velocity of a run is poured once, with a packing of its own, which all of its
         distances share: they differ by the receiver alone.
         """
-        from . import models
+        from .. import models
 
         rates, at = np.unique(self.angular_velocity, return_inverse=True)
         runs = len(seeds)
@@ -76,7 +76,7 @@ class Pouring:
 
 def pour_experiment(table: PourTable, cups: "Cups", density: float) -> "Experiment":
     """The pours of a table, each outcome a window of its own."""
-    from .inference import Experiment, Window
+    from ..inference import Experiment, Window
 
     pouring = Pouring(table.angular_velocity, table.distance, cups, density)
     every = np.ones(table.observed.shape, bool)
@@ -107,7 +107,7 @@ def as_prior(theta: Mapping[str, NDArray], weights: NDArray, prior: "Prior") -> 
     """
     import numpyro.distributions as dist
 
-    from .inference import Prior
+    from ..inference import Prior
 
     def moments(values: NDArray) -> tuple[float, float]:
         mean = float(np.average(values, weights=weights))

@@ -6,8 +6,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .criticism_narrative import unit_of, words
-from .drawing import BLUE, GREY, INK, LIGHT, ORANGE, new_figure, styled
+from ..criticism_narrative import unit_of, words
+from ..drawing import (
+    BLUE,
+    GREY,
+    INK,
+    LIGHT,
+    ORANGE,
+    new_figure,
+    styled,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -138,7 +146,7 @@ def coefficient_plot(tree: "DataTree", names: Sequence[str]) -> "Figure":
 
 
 def _draw_coefficient(axes: "Axes", name: str, draws: NDArray) -> None:
-    from .models import EFFECTS
+    from ..models import EFFECTS
 
     density, _, _ = axes.hist(
         draws, bins=BINS, density=True, color=BLUE, alpha=0.45, label="posterior"

@@ -7,20 +7,20 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .calibration.result import Calibration
-from .calibration.stir_simulator import Stirring, same_liquid, stirring_of
-from .errors import InputError
-from .inputs.cups import bundled_cups
-from .inputs.pour_table import PourTable, open_pours
-from .inputs.recording import Recording, Source, open_recordings
-from .inputs.settings import ALARM, CriticismSettings
-from .run.directory import CRITICISM_FORMAT
-from .run.provenance import generations
-from .run.recordings import kept_recordings
-from .stir_experiment import effects_of, frame_interval, same_rate
+from ..calibration.result import Calibration
+from ..calibration.stir_simulator import Stirring, same_liquid, stirring_of
+from ..errors import InputError
+from ..inputs.cups import bundled_cups
+from ..inputs.pour_table import PourTable, open_pours
+from ..inputs.recording import Recording, Source, open_recordings
+from ..inputs.settings import ALARM, CriticismSettings
+from ..run.directory import CRITICISM_FORMAT
+from ..run.provenance import generations
+from ..run.recordings import kept_recordings
+from .stirs import effects_of, frame_interval, same_rate
 
 if TYPE_CHECKING:
-    from .models import Cups
+    from ..models import Cups
 
 Pours = PourTable | str | Path
 RIG = ("cup_radius", "stick_radius", "stick_length")

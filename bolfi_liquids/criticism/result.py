@@ -7,10 +7,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from .calibration.result import Calibration
-from .errors import InputError
-from .run.directory import CRITICISM, CRITICISM_FORMAT
-from .run.summary import read_summary
+from ..calibration.result import Calibration
+from ..errors import InputError
+from ..run.directory import CRITICISM, CRITICISM_FORMAT
+from ..run.summary import read_summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,7 +42,7 @@ class Criticism:
         Raises:
             InputError: There is none in the directory.
         """
-        from .calibration.tree import read_tree
+        from ..calibration.tree import read_tree
 
         run = Path(run)
         if not is_criticised(run):
@@ -82,13 +82,13 @@ class Criticism:
 
     def plot_residuals(self) -> "Figure":
         """Observed less expected against time, before and after, strokes that differ marked."""
-        from .criticism_figures import residual_plot
+        from .figures import residual_plot
 
         return residual_plot(self.tree.children["stirs"])
 
     def plot_strokes(self) -> "Figure":
         """Size of the difference by stroke, plane and speed, before and after."""
-        from .criticism_figures import stroke_plot
+        from .figures import stroke_plot
 
         return stroke_plot(self.tree.children["stirs"])
 
@@ -122,7 +122,7 @@ class Criticism:
         Raises:
             ValueError: nothing was tried on such recordings.
         """
-        from .criticism_figures import held_out_plot
+        from .figures import held_out_plot
 
         if "held_out" not in self.tree["stirs"].children:
             raise ValueError(
@@ -136,7 +136,7 @@ class Criticism:
         Raises:
             ValueError: no pours were criticised.
         """
-        from .criticism_figures import pour_residual_plot
+        from .figures import pour_residual_plot
 
         if "pours" not in self.tree.children:
             raise ValueError("no pours were criticised; criticise the run with pours")

@@ -5,15 +5,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .calibration.noise import rms
-from .calibration.section import parameter_summary
+from ..calibration.noise import rms
+from ..calibration.section import parameter_summary
+from ..inputs.settings import ALARM
 from .findings import Findings
-from .inputs.settings import ALARM
 
 if TYPE_CHECKING:
     from xarray import DataTree
 
-    from . import inference
+    from .. import inference
 
 PLACE = ("channel", "start_s", "stop_s", "stroke")  # of a window; null where it has several
 
@@ -109,7 +109,7 @@ def _gap_deg(source: "inference.Criticism") -> dict[str, float | None]:
     A gap is the RMS of observed less expected beyond what the cameras and the simulator's own
     noise would leave of a right model, in quadrature; the RMS itself stands beside it.
     """
-    from .inference import beyond
+    from ..inference import beyond
 
     best = source.leading
     base = source.base.hypothesis

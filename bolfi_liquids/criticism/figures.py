@@ -6,9 +6,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .criticism_narrative import words
-from .drawing import BLUE, GREY, INK, LIGHT, ORANGE, new_figure, styled
-from .inputs.settings import ALARM
+from ..criticism_narrative import words
+from ..drawing import (
+    BLUE,
+    GREY,
+    INK,
+    LIGHT,
+    ORANGE,
+    new_figure,
+    styled,
+)
+from ..inputs.settings import ALARM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,15 +5,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .calibration.stir_simulator import Stirring
-from .inputs.recording import Gripper, Recording
-from .inputs.strokes import speed
-from .pour_experiment import OUTCOMES, Pouring
+from ..calibration.stir_simulator import Stirring
+from ..inputs.recording import Gripper, Recording
+from ..inputs.strokes import speed
 from .pour_noise import PourNoise
+from .pours import OUTCOMES, Pouring
 
 if TYPE_CHECKING:
-    from .inference import Noise, Proposal, UsualResidual
-    from .models import Cups
+    from ..inference import Noise, Proposal, UsualResidual
+    from ..models import Cups
 
 FASTER, SLOWER, FASTEST = 1.6, 0.5, 0.2  # times the recording's speed; and at most, m/s
 ROOM = 0.8  # of the way from the axis to the wall that the stick may go
@@ -39,8 +39,8 @@ def stir_proposals(
     Args:
         usual: What is usual for this simulator on other paths, if it is known.
     """
-    from .hardware import circle, star
-    from .inference import Proposal, SumOfNoises
+    from ..hardware import circle, star
+    from ..inference import Proposal, SumOfNoises
 
     all_noise = noise if usual is None else SumOfNoises((noise, usual))
     recording, setup = stirring.recordings[0], stirring.setups[0]
@@ -72,7 +72,7 @@ def stir_proposals(
 
 def pour_proposals(cups: "Cups", density: float, tried: int = 2) -> list["Proposal"]:
     """Pours at the slowest and at middling angular velocities, from two distances each."""
-    from .inference import Proposal
+    from ..inference import Proposal
 
     rates = np.linspace(*cups.angular_velocity_range, tried + 1)[:tried]
     made = []

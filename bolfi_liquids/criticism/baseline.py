@@ -7,14 +7,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .calibration.noise import sensor_noise
-from .calibration.stir_simulator import stirring_of
-from .inputs.recording import Recording
-from .stir_experiment import camera_noise, same_experiment, stir_experiment
+from ..calibration.noise import sensor_noise
+from ..calibration.stir_simulator import stirring_of
+from ..inputs.recording import Recording
+from .stirs import camera_noise, same_experiment, stir_experiment
 
 if TYPE_CHECKING:
-    from .calibration.stir_simulator import Stirring
-    from .inference import Extension, Keeping, Plan, Prior, UsualResidual
+    from ..calibration.stir_simulator import Stirring
+    from ..inference import (
+        Extension,
+        Keeping,
+        Plan,
+        Prior,
+        UsualResidual,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +52,7 @@ def clean_residuals(
     Raises:
         RuntimeError: Every simulation of one of them failed.
     """
-    from .inference import own_residual
+    from ..inference import own_residual
 
     def learn(recording: Recording) -> Clean:
         name, made = recording.path.name, []
@@ -80,7 +86,7 @@ def usual_elsewhere(clean: Sequence[Clean]) -> "UsualResidual | None":
 
 
 def _usual(clean: Sequence[Clean], same: list[bool]) -> "UsualResidual | None":
-    from .inference import KnownNoise, usual_residual
+    from ..inference import KnownNoise, usual_residual
 
     if not clean:
         return None

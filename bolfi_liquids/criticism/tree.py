@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..inputs.fields import PLANE_NAMES
 from .findings import Findings
-from .inputs.fields import PLANE_NAMES
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
-    from . import inference
+    from .. import inference
 
 
 UNITS = {"stirs": {"units": "rad"}, "pours": {"units": "1"}}

@@ -6,29 +6,39 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .calibration.result import Calibration
-from .calibration.stir_simulator import Stirring, stirring_of
-from .calibration.tree import write_tree
-from .clean_recordings import Clean, clean_residuals, usual_elsewhere, usual_for
-from .criticism import Criticism, finished_criticism
-from .criticism_inputs import Inputs, Pours, open_inputs
-from .criticism_results import criticism_tree
-from .criticism_section import criticism_section
-from .errors import InputError
+from ..calibration.result import Calibration
+from ..calibration.stir_simulator import Stirring, stirring_of
+from ..calibration.tree import write_tree
+from ..errors import InputError
+from ..inputs.pour_table import PourTable
+from ..inputs.recording import Recording, Source
+from ..inputs.settings import CriticismSettings
+from ..progress import phases
+from ..run.directory import CRITICISM, open_bank
+from ..run.summary import write_section
+from .baseline import (
+    Clean,
+    clean_residuals,
+    usual_elsewhere,
+    usual_for,
+)
 from .findings import Findings
-from .inputs.pour_table import PourTable
-from .inputs.recording import Recording, Source
-from .inputs.settings import CriticismSettings
-from .pour_experiment import as_prior, pour_experiment
-from .progress import phases
+from .given import Inputs, Pours, open_inputs
+from .pours import as_prior, pour_experiment
 from .proposals import pour_proposals, stir_proposals
-from .run.directory import CRITICISM, open_bank
-from .run.summary import write_section
-from .stir_experiment import camera_noise, effects_of, held_out_noise, stir_experiment
+from .result import Criticism, finished_criticism
+from .section import criticism_section
+from .stirs import (
+    camera_noise,
+    effects_of,
+    held_out_noise,
+    stir_experiment,
+)
+from .tree import criticism_tree
 
 if TYPE_CHECKING:
-    from . import inference
-    from .models import Cups
+    from .. import inference
+    from ..models import Cups
 
 
 def criticise(  # noqa: PLR0913  the one call that most users make
@@ -88,7 +98,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     if finished := finished_criticism(run, inputs.made_from):
         return finished
     with open_bank(run) as bank, phases(shown=progress) as report:
-        from .inference import Keeping
+        from ..inference import Keeping
 
         findings = _find(calibration, inputs, Keeping(bank, settings.batch, seed, report))
         tree = criticism_tree(findings)
@@ -125,7 +135,7 @@ def _stirs(
     clean: Sequence[Clean],
     keeping: "inference.Keeping",
 ) -> "inference.Criticism":
-    from . import inference
+    from .. import inference
 
     stirring, settings = inputs.stirring, inputs.settings
     extensions = effects_of("stir", settings.effects)
@@ -159,7 +169,7 @@ def _pours(
     keeping: "inference.Keeping",
 ) -> "inference.Criticism":
     """The same for pours, of a liquid of which the stirs are known to have taught something."""
-    from . import inference
+    from .. import inference
 
     density, settings = calibration.liquid_density, inputs.settings
     acting = effects_of("pour", settings.effects)

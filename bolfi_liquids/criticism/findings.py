@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from . import inference
-    from .calibration.result import Calibration
-    from .clean_recordings import Clean
-    from .criticism_inputs import Inputs
+    from .. import inference
+    from ..calibration.result import Calibration
+    from .baseline import Clean
+    from .given import Inputs
 
 
 @dataclass(frozen=True, eq=False)

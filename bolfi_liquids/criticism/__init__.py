@@ -1,0 +1,1 @@
+"""Find the effect that the simulator lacks."""
