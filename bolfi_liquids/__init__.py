@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .inputs.table_import import import_table
     from .models import Cups
     from .pour_execution import execute_pour
-    from .pouring import choose_pour
+    from .pouring.choose import choose_pour
     from .recorder import record
     from .reporting import report
 
@@ -41,7 +41,7 @@ _HOME = {
     "Cups": ".models",
     "Recording": ".inputs.recording",
     "calibrate": ".calibration.calibrate",
-    "choose_pour": ".pouring",
+    "choose_pour": ".pouring.choose",
     "criticise": ".criticism.criticise",
     "execute_pour": ".pour_execution",
     "import_table": ".inputs.table_import",

@@ -225,7 +225,7 @@ def pour(  # noqa: PLR0913  one parameter for each option
             raise typer.BadParameter(f"--{option} needs --execute, which is missing")
     from .criticism.result import latest_calibration
     from .inputs.cups import bundled_cups, open_cups
-    from .pouring import choose_pour
+    from .pouring.choose import choose_pour
 
     chosen_cups = bundled_cups() if cups is None else open_cups(cups)
     choose_pour(latest_calibration(run), chosen_cups, iterations=iterations, risk=risk)

@@ -21,7 +21,7 @@ from .criticism_narrative import unit_of
 from .inputs.cups import kept_cups
 from .inputs.prior import split_parameters
 from .inputs.recording import Recording
-from .pour_results import read_pour
+from .pouring.tree import read_pour
 from .progress import Advance, progress_bar
 from .run.directory import FRAMES, POUR
 from .run.recordings import kept_recordings

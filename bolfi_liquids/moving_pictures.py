@@ -12,7 +12,7 @@ from .calibration.result import Calibration
 from .criticism_narrative import with_unit
 from .inputs.cups import kept_cups
 from .narrative import percent
-from .pour_results import read_pour
+from .pouring.tree import read_pour
 from .readouts import short
 from .run.recordings import kept_recordings
 

@@ -33,8 +33,8 @@ from .online_plan import SoFar, planned, stroke_ends
 from .online_request import FAILED, GONE, PREPARING, READY, REFUSED, Request, Status
 from .online_settings import OnlineSettings
 from .online_simulator import simulate_plan
+from .pouring.map import make_pours
 from .run.directory import RUN_TOML
-from .spillage_map import make_pours
 
 if TYPE_CHECKING:
     from .inference import Prior

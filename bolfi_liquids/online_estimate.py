@@ -18,8 +18,8 @@ from .calibration.stir_simulator import Stirring
 from .inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from .online_plan import Followed
 from .online_settings import OnlineSettings
+from .pouring.map import SpillageMap
 from .run.simulations import fresh_seeds
-from .spillage_map import SpillageMap
 
 if TYPE_CHECKING:
     from .inference import Bolfi, Job, Prior, Simulation

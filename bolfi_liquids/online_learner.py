@@ -61,7 +61,7 @@ class _Learner:
         """Simulate the design; meanwhile learn the map and compile. Whether all went well."""
         from .inference import SimulationBank
         from .online_estimate import design, warm_up
-        from .spillage_map import make_map
+        from .pouring.map import make_map
 
         settings, jobs = self.request.settings, design(self.problem)
         side_by_side = os.cpu_count() or 1  # nothing is urgent before the robot moves

@@ -10,7 +10,7 @@ from .inputs.settings import (
     at_least,
     one_of,
 )
-from .spillage_map import LEAST_POURS, POURS
+from .pouring.map import LEAST_POURS, POURS
 
 STOPS = ("bound", "mean")
 

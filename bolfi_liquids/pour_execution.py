@@ -123,7 +123,7 @@ def dry_pour(run: str | Path, rig: "Rig", out: Path) -> "tuple[str, list[Check]]
 
 def _chosen(run: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """The section "pour" of a run, and the cups that it was chosen for."""
-    from .pour_results import read_pour
+    from .pouring.tree import read_pour
     from .run.summary import read_summary
 
     if not (run / RUN_TOML).exists() and not (run / POUR).exists():

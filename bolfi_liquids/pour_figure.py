@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .drawing import BLUE, INK, ORANGE, new_figure, styled
+from .pouring.spillage import ACTION, RISK
 from .readouts import Readout, field, to_chart
-from .spillage import ACTION, RISK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,7 @@ from .criticism.result import latest_calibration
 from .criticism_chapter import criticism_context
 from .files import write_text
 from .posterior_figure import posterior_figure
-from .pour_results import read_pour
+from .pouring.tree import read_pour
 from .readouts import script_json
 from .run.directory import POUR, REPORT
 from .run.summary import read_summary

@@ -14,9 +14,9 @@ from .files import write_netcdf
 from .inputs.described_liquid import Described
 from .inputs.recording import Recording
 from .movie.file import RATE, write_movie
+from .pouring.spillage import FRACTIONS
 from .progress import progress_bar
 from .simulated_files import check_targets, pour_dataset, stir_dataset
-from .spillage import FRACTIONS
 
 if TYPE_CHECKING:
     from .models import Cups

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import criticism_narrative, narrative
-from .spillage import ACTION
+from .pouring.spillage import ACTION
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree

@@ -6,15 +6,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..pouring.spillage import (
+    STEP,
+    Outcomes,
+    Profiles,
+    pour_all,
+)
 from ..run.simulations import fresh_seeds
-from ..spillage import STEP, Outcomes, Profiles, pour_all
 from .calibrations import NAMES
 from .truths import DENSITY, Truths
 
 if TYPE_CHECKING:
     from ..inference import Prior, SimulationBank
     from ..models import Cups
-    from ..pour_grid import PourGrid
+    from ..pouring.grid import PourGrid
     from ..progress import Advance
 
 RULES = ("plug_in", "mean", "cvar")

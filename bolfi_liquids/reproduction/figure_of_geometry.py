@@ -11,9 +11,9 @@ from scipy.ndimage import gaussian_filter1d
 
 from ..drawing import INK, new_figure, styled
 from ..inputs.cups import bundled_cups
+from ..pouring.spillage import STEP, landing_sd
 from ..progress import progress_bar, reported
 from ..run.simulations import Keep, fresh_seeds, simulate_kept
-from ..spillage import STEP, landing_sd
 from .figure import Drawn
 from .truths import DENSITY
 from .workshop import Workshop

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ..pour_grid import FINE, GridSize
+from ..pouring.grid import FINE, GridSize
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ import numpy as np
 from ..calibration.calibrate import calibrate
 from ..criticism.criticise import criticise
 from ..inputs.cups import bundled_cups
-from ..pouring import choose_pour
+from ..pouring.choose import choose_pour
+from ..pouring.spillage import pour_all, surface
 from ..run.directory import open_bank
-from ..spillage import pour_all, surface
 from .decisions import executions, spilled_by
 from .scale import Scale
 from .sticky import Sticky, draw_sticky, poured, recipe, stirred

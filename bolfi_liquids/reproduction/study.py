@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
     from ..inference import SimulationBank
-    from ..pour_grid import PourGrid
+    from ..pouring.grid import PourGrid
     from .scale import Scale
 
 

@@ -12,7 +12,7 @@ from ..calibration.result import Calibration
 from ..inputs.bundled import bundled_recording
 from ..inputs.cups import bundled_cups
 from ..inputs.prior import default_prior
-from ..pour_grid import PourGrid, make_grid
+from ..pouring.grid import PourGrid, make_grid
 from ..progress import progress_bar
 from ..run.directory import SIMULATIONS
 from ..run.provenance import generations

@@ -21,7 +21,7 @@ from bolfi_liquids.online_estimate import (
 )
 from bolfi_liquids.online_plan import SoFar, follow, planned, stroke_ends
 from bolfi_liquids.online_settings import OnlineSettings
-from bolfi_liquids.spillage_map import Expected
+from bolfi_liquids.pouring.map import Expected
 
 ATTRS = {
     "cup_radius": 0.04,

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from bolfi_liquids import inference, models, spillage
+from bolfi_liquids import inference, models
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.pour_grid import FINE, GridSize, make_grid
+from bolfi_liquids.pouring import spillage
+from bolfi_liquids.pouring.grid import FINE, GridSize, make_grid
 from bolfi_liquids.reproduction.decisions import decide, execute
 from bolfi_liquids.reproduction.truths import draw_truths
 

@@ -9,9 +9,10 @@ import pytest
 import xarray as xr
 
 import bolfi_liquids as bl
-from bolfi_liquids import models, spillage
+from bolfi_liquids import models
 from bolfi_liquids.inputs.cups import bundled_cups
-from bolfi_liquids.pouring import LANDINGS
+from bolfi_liquids.pouring import spillage
+from bolfi_liquids.pouring.choose import LANDINGS
 from bolfi_liquids.run.directory import SIMULATIONS
 
 

@@ -9,7 +9,7 @@ from bolfi_liquids.inference import SimulationBank
 from bolfi_liquids import models
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.spillage_map import make_map, make_pours
+from bolfi_liquids.pouring.map import make_map, make_pours
 
 POURS = 256
 NOISE = 0.02

@@ -11,6 +11,7 @@ import pytest
 
 from bolfi_liquids import inference
 from bolfi_liquids.inputs.cups import bundled_cups
+from bolfi_liquids.pouring.spillage import Surface
 from bolfi_liquids.reproduction import figure_of_recordings, study
 from bolfi_liquids.reproduction.calibrations import DRAWS
 from bolfi_liquids.reproduction.decisions import RULES
@@ -24,7 +25,6 @@ from bolfi_liquids.reproduction.figures_of_spillage import (
 )
 from bolfi_liquids.reproduction.scale import Scale
 from bolfi_liquids.reproduction.truths import draw_truths
-from bolfi_liquids.spillage import Surface
 
 RATES, DISTANCES = np.array([1.0]), np.linspace(0.0, 0.07, 24)  # one: neighbours are averaged
 SUITED = np.linspace(-3.0, 1.5, 24)[None]  # log10 of the viscosity that an action suits

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .inputs.prior import split_parameters
-from .progress import Advance, reported
+from ..inputs.prior import split_parameters
+from ..progress import Advance, reported
 
 if TYPE_CHECKING:
-    from .inference import SimulationBank
-    from .models import Cups
+    from ..inference import SimulationBank
+    from ..models import Cups
 
 FRACTIONS = ("spilled", "received", "retained")
 ACTION = ("angular_velocity", "distance")
@@ -173,7 +173,7 @@ class Outcomes:
             action: `angular_velocity` [rad/s], shape (actions,).
             seeds: The engine's, not used: see the class.
         """
-        from . import models
+        from .. import models
 
         draws, actions = len(self.seeds), len(seeds)
         tiled = {name: np.tile(values, actions) for name, values in self.theta.items()}
@@ -208,7 +208,7 @@ def pour_all(
     Raises:
         RuntimeError: That is all of them.
     """
-    from .run.simulations import Keep, simulate_kept
+    from ..run.simulations import Keep, simulate_kept
 
     keep = Keep(bank, outcomes.identity, 1)  # each is as many pours as there are liquids
     simulate = reported(outcomes.simulate, advance)

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .calibration.result import Calibration
-from .criticism.result import latest_calibration
-from .errors import InputError
-from .inputs.cups import bundled_cups, open_cups
-from .inputs.settings import PourSettings
-from .progress import Advance, progress_bar
-from .run.directory import POUR, open_bank
-from .run.summary import write_section
+from ..calibration.result import Calibration
+from ..criticism.result import latest_calibration
+from ..errors import InputError
+from ..inputs.cups import bundled_cups, open_cups
+from ..inputs.settings import PourSettings
+from ..progress import Advance, progress_bar
+from ..run.directory import POUR, open_bank
+from ..run.summary import write_section
 from .spillage import (
     ACTION,
     FARTHEST,
@@ -31,8 +31,8 @@ from .spillage import (
 )
 
 if TYPE_CHECKING:
-    from .inference import SimulationBank
-    from .models import Cups
+    from ..inference import SimulationBank
+    from ..models import Cups
 
 PLUG_IN_SEEDS = 4  # that each action of the plug-in is tried with; the paper tries one
 FINALISTS = 3  # angular velocities that are tried on as many draws again, and the plug-in's
@@ -120,8 +120,8 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         InputError: A setting or the file of the cups cannot be used.
         RuntimeError: Pours failed at every angular velocity, or at all of the promising ones.
     """
-    from .calibration.tree import write_tree
-    from .pour_results import pour_section, pour_tree
+    from ..calibration.tree import write_tree
+    from .tree import pour_section, pour_tree
 
     if not isinstance(calibration, Calibration):
         calibration = latest_calibration(calibration)
@@ -206,7 +206,7 @@ class _Pours:
         )
 
     def _profiles(self, rates: NDArray, liquids: Mapping[str, NDArray], purpose: int) -> Profiles:
-        from .run.simulations import fresh_seeds
+        from ..run.simulations import fresh_seeds
 
         count = len(next(iter(liquids.values())))
         seeds = np.array(fresh_seeds(self.settings.seed, purpose, count), np.int64)

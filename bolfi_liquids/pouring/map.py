@@ -18,14 +18,19 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
-from .inputs.prior import PARAMETERS
-from .progress import progress_bar
+from ..errors import InputError
+from ..inputs.prior import PARAMETERS
+from ..progress import progress_bar
 from .spillage import ACTION, normal_scores
 
 if TYPE_CHECKING:
-    from .inference import Fit, Job, Prior, SimulationBank
-    from .models import Cups
+    from ..inference import (
+        Fit,
+        Job,
+        Prior,
+        SimulationBank,
+    )
+    from ..models import Cups
 
 POURS = 512
 LEAST_POURS = 64  # of fewer the process learns next to nothing about four inputs
@@ -145,14 +150,14 @@ def make_pours(
     Raises:
         InputError: `pours` is too small.
     """
-    from .inference import run_missing
+    from ..inference import run_missing
 
     if pours < LEAST_POURS:
         raise InputError(f"{pours}", where="pours", fix=f"give at least {LEAST_POURS}")
     jobs = _jobs(_joint(prior, cups), pours)
 
     def simulate(theta: dict[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
-        from . import models
+        from .. import models
 
         liquid = models.Liquid(theta["viscosity"], theta["cohesion"], density)
         action = models.PourAction(**{name: theta[name] for name in ACTION})
@@ -194,7 +199,7 @@ def make_map(
 
 def _liquid(prior: "Prior") -> "Prior":
     """The same with its parameters in the order of the map's axes."""
-    from .inference import Prior
+    from ..inference import Prior
 
     return Prior({name: prior.distributions[name] for name in PARAMETERS})
 
@@ -203,7 +208,7 @@ def _joint(prior: "Prior", cups: "Cups") -> "Prior":
     """Of the liquid and of the action."""
     import numpyro.distributions as dist
 
-    from .inference import Prior
+    from ..inference import Prior
 
     return Prior(
         {
@@ -218,8 +223,8 @@ def _jobs(joint: "Prior", pours: int) -> "list[Job]":
     """A Sobol design; neighbours in the list turn at like rates, so that none waits for another."""
     from scipy.stats import qmc
 
-    from .inference import Job
-    from .run.simulations import fresh_seeds
+    from ..inference import Job
+    from ..run.simulations import fresh_seeds
 
     design = qmc.Sobol(len(joint), rng=0).random_base2(int(np.ceil(np.log2(pours))))[:pours]
     theta = joint.from_unit(design)
@@ -234,7 +239,7 @@ def _learn(
     joint: "Prior", theta: Mapping[str, NDArray], spilled: NDArray, chosen: NDArray[np.bool_]
 ) -> "Fit":
     """A Gaussian process on the root of the spilled fraction, by the engine's own surrogate."""
-    from .inference import EmulatorWarning, fit
+    from ..inference import EmulatorWarning, fit
 
     known = {name: values[chosen] for name, values in theta.items()}
     with warnings.catch_warnings():

@@ -13,15 +13,21 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .run.simulations import fresh_seeds
-from .spillage import Outcomes, Profiles, Surface, pour_all, surface
+from ..run.simulations import fresh_seeds
+from .spillage import (
+    Outcomes,
+    Profiles,
+    Surface,
+    pour_all,
+    surface,
+)
 
 if TYPE_CHECKING:
     from scipy.interpolate import RegularGridInterpolator
 
-    from .inference import Prior, SimulationBank
-    from .models import Cups
-    from .progress import Advance
+    from ..inference import Prior, SimulationBank
+    from ..models import Cups
+    from ..progress import Advance
 
 _PURPOSE = 31  # of seeds
 

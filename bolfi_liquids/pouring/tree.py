@@ -13,15 +13,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .calibration.tree import read_tree
-from .inputs.settings import PourSettings
-from .run.directory import POUR
-from .spillage import ACTION, FRACTIONS, RISK, Surface
+from ..calibration.tree import read_tree
+from ..inputs.settings import PourSettings
+from ..run.directory import POUR
+from .spillage import (
+    ACTION,
+    FRACTIONS,
+    RISK,
+    Surface,
+)
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
-    from .pouring import Judged, Pour
+    from .choose import Judged, Pour
 
 UNITS = {"angular_velocity": "rad s-1", "distance": "m"}
 

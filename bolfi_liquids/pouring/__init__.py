@@ -1,0 +1,1 @@
+"""Choose the pour that spills least in expectation."""
