@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .pour_execution import execute_pour
     from .pouring.choose import choose_pour
     from .recorder import record
-    from .reporting import report
+    from .reporting.report import report
 
 __version__ = version("bolfi-liquids")
 __all__ = [
@@ -47,7 +47,7 @@ _HOME = {
     "import_table": ".inputs.table_import",
     "open_recording": ".inputs.recording",
     "record": ".recorder",
-    "report": ".reporting",
+    "report": ".reporting.report",
 }
 
 

@@ -245,7 +245,7 @@ def report(
     ] = True,
 ) -> None:
     """Write RUN/report.html, one file that shows it all."""
-    from .reporting import report as write_report
+    from .reporting.report import report as write_report
 
     typer.echo(write_report(run, moving=moving))
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from .calibration.calibrate import calibrate
 from .criticism.criticise import criticise
 from .pouring.choose import choose_pour
-from .reporting import report
+from .reporting.report import report
 
 RECORDING, CLEAN = "glycerin_v10.nc", "water_v10.nc"
 

@@ -8,8 +8,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Column, Table
 
-from . import criticism_narrative as criticism
-from .narrative import UNITS, emulator_sentences, floor_sentence, sampler_sentence
+from .reporting import criticism_sentences as criticism
+from .reporting.sentences import (
+    UNITS,
+    emulator_sentences,
+    floor_sentence,
+    sampler_sentence,
+)
 
 if TYPE_CHECKING:
     from xarray import Dataset

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..criticism_narrative import unit_of, words
 from ..drawing import (
     BLUE,
     GREY,
@@ -16,6 +15,7 @@ from ..drawing import (
     new_figure,
     styled,
 )
+from ..reporting.criticism_sentences import unit_of, words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

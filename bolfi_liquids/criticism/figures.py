@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..criticism_narrative import words
 from ..drawing import (
     BLUE,
     GREY,
@@ -17,6 +16,7 @@ from ..drawing import (
     styled,
 )
 from ..inputs.settings import ALARM
+from ..reporting.criticism_sentences import words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

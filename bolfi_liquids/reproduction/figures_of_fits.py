@@ -6,7 +6,7 @@ import numpy as np
 
 from ..drawing import GREY, INK, LIGHT, ORANGE, PALETTE, new_figure, plain_log_ticks, styled
 from ..inputs.bundled import RECORDED
-from ..posterior_figure import LABELS, contour_levels, grid_density
+from ..reporting.posterior_figure import LABELS, contour_levels, grid_density
 from .figure import Drawn
 from .workshop import Workshop
 

@@ -12,8 +12,8 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 from bolfi_liquids.cli import app
-from bolfi_liquids.frames import frames_of
 from bolfi_liquids.guide import PAGES, read_page
+from bolfi_liquids.reporting.frames import frames_of
 
 LINE = re.compile(r"^- `(?P<name>[^`]+)`(?: \((?P<dims>[^)]*)\))?(?: \[(?P<unit>[^\]]+)\])?:")
 BRACES = re.compile(r"\{([^{}]*)\}")

@@ -160,7 +160,7 @@ def test_a_run_without_a_pour_executes_none(told, run):
 
 
 def test_criticism_without_proof_or_with_none(told, run, criticism_section):
-    from bolfi_liquids.criticism_narrative import NO_BASELINE, verdict_sentence
+    from bolfi_liquids.reporting.criticism_sentences import NO_BASELINE, verdict_sentence
 
     copy = next((run / "recordings").iterdir())
     shutil.copy(copy, "stir.nc")
@@ -186,12 +186,12 @@ def test_missing_extra(told, monkeypatch):
 def test_warnings_of_the_engine():
     from bolfi_liquids.inference.surrogates.warnings import OUTSIDE
 
-    from bolfi_liquids import narrative
+    from bolfi_liquids.reporting import sentences
 
     assert f"EmulatorWarning: {OUTSIDE}" in QUOTED
     section = {"rhat_max": 1.024, "ess_min": 80.0, "divergences": 0, "n_draws": 80}
-    assert narrative.sampler_sentence(section) in QUOTED
-    said = narrative.floor_sentence({"below_least_viscosity": 0.34, "least_viscosity": 0.0494})
+    assert sentences.sampler_sentence(section) in QUOTED
+    said = sentences.floor_sentence({"below_least_viscosity": 0.34, "least_viscosity": 0.0494})
     assert any(said.startswith(message) for message in QUOTED)
 
 

@@ -9,9 +9,14 @@ from rich.console import Console
 
 from bolfi_liquids.calibration.draws import pick_draws
 from bolfi_liquids.calibration.noise import irreducible_rms, replicate_noise, sensor_noise
-from bolfi_liquids.narrative import floor_sentence, parameter_sentence, percent, sampler_sentence
-from bolfi_liquids.posterior_figure import contour_levels, marginal
 from bolfi_liquids.pouring.spillage import mean_spillage, tail_spillage
+from bolfi_liquids.reporting.posterior_figure import contour_levels, marginal
+from bolfi_liquids.reporting.sentences import (
+    floor_sentence,
+    parameter_sentence,
+    percent,
+    sampler_sentence,
+)
 from bolfi_liquids.tables import print_calibration
 
 

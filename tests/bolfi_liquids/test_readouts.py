@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 from bolfi_liquids.drawing import new_figure, plain_log_ticks, styled
-from bolfi_liquids.readouts import field, lines_of, marks, script_json, series, to_chart
+from bolfi_liquids.reporting.hover import (
+    field,
+    lines_of,
+    marks,
+    script_json,
+    series,
+    to_chart,
+)
 
 
 def parts(chart):

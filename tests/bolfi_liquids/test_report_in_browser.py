@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import bolfi_liquids as bl
-from bolfi_liquids.frames import _stack, frames_of
-from bolfi_liquids.moving_pictures import STEPS, _packed, moving_context
+from bolfi_liquids.reporting.frames import _stack, frames_of
+from bolfi_liquids.reporting.moving_pictures import STEPS, _packed, moving_context
 
 WIDTHS = {"laptop": (1280, 800), "phone": (390, 844)}
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")

@@ -8,7 +8,7 @@ import pytest
 
 import bolfi_liquids as bl
 from bolfi_liquids.calibration.tree import write_tree
-from bolfi_liquids.narrative import fit_sentence, parameter_sentence, sure_sentence
+from bolfi_liquids.reporting.sentences import fit_sentence, parameter_sentence, sure_sentence
 from bolfi_liquids.run.directory import CRITICISM
 from bolfi_liquids.run.summary import write_section
 

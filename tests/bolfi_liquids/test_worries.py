@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bolfi_liquids.calibration_figures import _rms_by
-from bolfi_liquids.pour_figure import not_surely_worse
-from bolfi_liquids.worries import worries
+from bolfi_liquids.reporting.calibration_figures import _rms_by
+from bolfi_liquids.reporting.pour_figure import not_surely_worse
+from bolfi_liquids.reporting.warnings import worries
 
 FINE = {
     "fit_rms_deg": 0.3,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .narrative import UNITS
+from .sentences import UNITS
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -22,7 +22,7 @@ def words(name: str) -> str:
 
 def unit_of(name: str) -> str:
     """Unit of an effect's coefficient or of a liquid's parameter; "" if it has none."""
-    from .models import EFFECTS
+    from ..models import EFFECTS
 
     unit = EFFECTS[name].unit if name in EFFECTS else UNITS.get(name, "")
     return "" if unit == "1" else unit
@@ -114,7 +114,7 @@ def considered_sentence(section: Mapping[str, Any]) -> str:
 
 def coefficient_sentence(name: str, values: Mapping[str, float]) -> str:
     """How large a missing effect is, and what it is."""
-    from .models import EFFECTS
+    from ..models import EFFECTS
 
     sentence = (
         f"{words(name).capitalize()} is probably between {with_unit(name, values['q05'])} and"

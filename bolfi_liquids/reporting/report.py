@@ -5,19 +5,19 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import narrative
-from .calibration.result import Calibration
+from ..calibration.result import Calibration
+from ..criticism.result import latest_calibration
+from ..files import write_text
+from ..pouring.tree import read_pour
+from ..run.directory import POUR, REPORT
+from ..run.summary import read_summary
+from . import sentences as narrative
 from .calibration_figures import inclination_figure, stroke_figure
-from .criticism.result import latest_calibration
 from .criticism_chapter import criticism_context
-from .files import write_text
+from .hover import script_json
 from .posterior_figure import posterior_figure
-from .pouring.tree import read_pour
-from .readouts import script_json
-from .run.directory import POUR, REPORT
-from .run.summary import read_summary
 from .search_figure import search_figure
-from .worries import worries
+from .warnings import worries
 
 if TYPE_CHECKING:
     from xarray import DataTree
@@ -125,9 +125,9 @@ def _pour_context(section: Mapping[str, Any], tree: "DataTree") -> dict[str, Any
 
 
 def _moving(calibration: Calibration, progress: bool) -> dict[str, Any] | None:
+    from ..run.recordings import FOLDER
     from .frames import frames_of
     from .moving_pictures import moving_context
-    from .run.recordings import FOLDER
 
     if not (calibration.path / FOLDER).is_dir():  # of a run that was made before they were kept
         return None

@@ -15,22 +15,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .calibration.tree import read_tree, write_tree
-from .criticism.result import latest_calibration
-from .criticism_narrative import unit_of
-from .inputs.cups import kept_cups
-from .inputs.prior import split_parameters
-from .inputs.recording import Recording
-from .pouring.tree import read_pour
-from .progress import Advance, progress_bar
-from .run.directory import FRAMES, POUR
-from .run.recordings import kept_recordings
-from .run.simulations import fresh_seeds
+from ..calibration.tree import read_tree, write_tree
+from ..criticism.result import latest_calibration
+from ..inputs.cups import kept_cups
+from ..inputs.prior import split_parameters
+from ..inputs.recording import Recording
+from ..pouring.tree import read_pour
+from ..progress import Advance, progress_bar
+from ..run.directory import FRAMES, POUR
+from ..run.recordings import kept_recordings
+from ..run.simulations import fresh_seeds
+from .criticism_sentences import unit_of
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
-    from .calibration.result import Calibration
+    from ..calibration.result import Calibration
 
 DRAWS = 3
 RATE = 15.0  # frames/s
@@ -105,7 +105,7 @@ def _digest(
     pour: Mapping[str, Any] | None,
 ) -> str:
     """SHA-256 of all that the frames show."""
-    from .models import MODEL_VERSION
+    from ..models import MODEL_VERSION
 
     liquids = {name: values.tolist() for name, values in theta.items()}
     shown = [FORMAT, MODEL_VERSION, RATE, LONGEST, settings["particles"]]
@@ -132,8 +132,8 @@ def _stirred(
     seeds: list[int],
     advance: Advance,
 ) -> dict[str, Any]:
-    from . import models
-    from .calibration.stir_simulator import stirring_of
+    from .. import models
+    from ..calibration.stir_simulator import stirring_of
 
     particles = int(calibration.record["settings"]["particles"])
     stirring = stirring_of([recording], particles)
@@ -166,7 +166,7 @@ def _poured(
     seeds: list[int],
     advance: Advance,
 ) -> dict[str, Any]:
-    from . import models
+    from .. import models
 
     cups = kept_cups(pour["cups"])
     rate, distance = float(pour["angular_velocity"]), float(pour["distance"])

@@ -5,10 +5,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .drawing import BLUE, GREY, new_figure, plain_log_ticks, styled
-from .narrative import with_unit
+from ..drawing import (
+    BLUE,
+    GREY,
+    new_figure,
+    plain_log_ticks,
+    styled,
+)
+from .hover import Readout, marks, to_chart
 from .posterior_figure import LABELS, LOGARITHMIC
-from .readouts import Readout, marks, to_chart
+from .sentences import with_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

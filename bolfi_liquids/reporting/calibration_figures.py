@@ -5,8 +5,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .drawing import BLUE, INK, LIGHT, ORANGE, new_figure, styled
-from .readouts import Readout, series, to_chart
+from ..drawing import (
+    BLUE,
+    INK,
+    LIGHT,
+    ORANGE,
+    new_figure,
+    styled,
+)
+from .hover import Readout, series, to_chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,9 +5,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .drawing import BLUE, INK, ORANGE, new_figure, styled
-from .pouring.spillage import ACTION, RISK
-from .readouts import Readout, field, to_chart
+from ..drawing import (
+    BLUE,
+    INK,
+    ORANGE,
+    new_figure,
+    styled,
+)
+from ..pouring.spillage import ACTION, RISK
+from .hover import Readout, field, to_chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import criticism_narrative, narrative
-from .pouring.spillage import ACTION
+from ..pouring.spillage import ACTION
+from . import criticism_sentences, sentences
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
@@ -43,12 +43,12 @@ def worries(
         searched: Simulations at points that were chosen by what was learned.
     """
     told = [
-        narrative.sampler_sentence(calibrated),
-        *narrative.emulator_sentences(calibrated),
+        sentences.sampler_sentence(calibrated),
+        *sentences.emulator_sentences(calibrated),
         _search_sentence(calibrated, searched),
         "" if tree is None or poured_of(tree, posterior) else STALE,
         *_of_the_model(calibrated, criticised),
-        narrative.floor_sentence(calibrated),
+        sentences.floor_sentence(calibrated),
         *_of_the_pour(poured, tree),
     ]
     return [sentence for sentence in told if sentence]
@@ -73,7 +73,7 @@ def poured_of(tree: "DataTree", posterior: "Dataset") -> bool:
 
 def _of_the_model(calibrated: Mapping[str, Any], criticised: Mapping[str, Any] | None) -> list[str]:
     if criticised is None:
-        if calibrated["fit_rms_deg"] > narrative.AS_GOOD_AS_NOISE * calibrated["noise_deg"]:
+        if calibrated["fit_rms_deg"] > sentences.AS_GOOD_AS_NOISE * calibrated["noise_deg"]:
             return [
                 "The closest hypothesis is farther from the recording than noise explains, and the "
                 "fit was not criticised: which effect the simulator lacks is not known."
@@ -81,9 +81,9 @@ def _of_the_model(calibrated: Mapping[str, Any], criticised: Mapping[str, Any] |
         return ["The fit was not criticised: whether the simulator lacks an effect is not known."]
     told = []
     if criticised["verdict"] != "none" and not criticised["accepted"]:
-        told.append(criticism_narrative.verdict_sentence(criticised))
+        told.append(criticism_sentences.verdict_sentence(criticised))
     if not criticised["baseline"]:
-        told.append(criticism_narrative.NO_BASELINE)
+        told.append(criticism_sentences.NO_BASELINE)
     return told
 
 
@@ -92,7 +92,7 @@ def _of_the_pour(poured: Mapping[str, Any] | None, tree: "DataTree | None") -> l
         return []
     told = [_edge_sentence(tree)]
     if poured["expected_spillage"] > MUCH:
-        share = narrative.percent(poured["expected_spillage"])
+        share = sentences.percent(poured["expected_spillage"])
         told.append(
             f"Even the best pour is expected to spill {share}: stir longer, or bring the cups"
             " nearer to each other."
@@ -100,7 +100,7 @@ def _of_the_pour(poured: Mapping[str, Any] | None, tree: "DataTree | None") -> l
     retained = float(tree["chosen"].to_dataset()["retained"].mean())
     if retained > KEPT:
         told.append(
-            f"Of the liquid {narrative.percent(retained)} stays in the source, and what stays is "
+            f"Of the liquid {sentences.percent(retained)} stays in the source, and what stays is "
             "not spilled: is the final angle of the cups' file large, and held long, enough?"
         )
     return told

@@ -6,26 +6,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import criticism_narrative as narrative
-from .calibration.result import Calibration
-from .calibration.tree import read_tree
-from .criticism.effect_figures import (
+from ..calibration.result import Calibration
+from ..calibration.tree import read_tree
+from ..criticism.effect_figures import (
     any_fitted,
     coefficient_plot,
     confusion_plot,
     score_plot,
 )
-from .criticism.figures import (
+from ..criticism.figures import (
     held_out_plot,
     pour_residual_plot,
     residual_plot,
     stroke_plot,
 )
-from .criticism.result import is_criticised
-from .drawing import to_svg
-from .readouts import lines_of, to_chart
-from .run.directory import CRITICISM
-from .run.summary import read_summary
+from ..criticism.result import is_criticised
+from ..drawing import to_svg
+from ..run.directory import CRITICISM
+from ..run.summary import read_summary
+from . import criticism_sentences as narrative
+from .hover import lines_of, to_chart
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree

@@ -5,8 +5,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .drawing import BLUE, GREY, INK, ORANGE, new_figure, plain_log_ticks, styled
-from .readouts import Readout, marks, to_chart
+from ..drawing import (
+    BLUE,
+    GREY,
+    INK,
+    ORANGE,
+    new_figure,
+    plain_log_ticks,
+    styled,
+)
+from .hover import Readout, marks, to_chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .calibration.result import Calibration
-from .criticism_narrative import with_unit
-from .inputs.cups import kept_cups
-from .narrative import percent
-from .pouring.tree import read_pour
-from .readouts import short
-from .run.recordings import kept_recordings
+from ..calibration.result import Calibration
+from ..inputs.cups import kept_cups
+from ..pouring.tree import read_pour
+from ..run.recordings import kept_recordings
+from .criticism_sentences import with_unit
+from .hover import short
+from .sentences import percent
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -72,7 +72,7 @@ def _outcome(one: "Dataset") -> str:
 
 
 def _stir_scene(calibration: Calibration, frames: "Dataset") -> dict[str, Any]:
-    from .models import StirSetup
+    from ..models import StirSetup
 
     recording = kept_recordings(calibration.path, dict(calibration.record))[0]
     particles = int(calibration.record["settings"]["particles"])
