@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from ..calibration.calibrate import engine_options
 from ..calibration.draws import pick_draws
 from ..calibration.stir_simulator import Stirring
+from ..checks.sbc_pipelines import SAMPLING, CameraNoise
 from ..inputs.prior import describe_prior
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from ..progress import Simulate
-from ..sbc_pipelines import SAMPLING, CameraNoise
 from .truths import DENSITY
 
 if TYPE_CHECKING:

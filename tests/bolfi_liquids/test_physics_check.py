@@ -14,10 +14,10 @@ import pytest
 from bolfi_liquids.models.validation import Case, CaseResult, Curve, Panel, Row
 from typer.testing import CliRunner
 
-from bolfi_liquids import physics_check
+from bolfi_liquids.checks import physics
+from bolfi_liquids.checks.physics import all_cases, check_physics
 from bolfi_liquids.cli import app
 from bolfi_liquids.errors import InputError
-from bolfi_liquids.physics_check import all_cases, check_physics
 
 
 def outcome(error=0.01):
@@ -154,7 +154,7 @@ def test_a_killed_check_goes_on(tmp_path):
         import sys, time
         from pathlib import Path
         from bolfi_liquids.models.validation import Case, CaseResult, Curve, Panel, Row
-        from bolfi_liquids.physics_check import check_physics
+        from bolfi_liquids.checks.physics import check_physics
 
         here = Path(sys.argv[1])
 
@@ -205,7 +205,7 @@ def check_on_the_command_line(*arguments):
 
 
 def test_the_command_prints_the_table_and_its_status(tmp_path, registry, monkeypatch):
-    monkeypatch.setattr(physics_check, "all_cases", lambda: registry)
+    monkeypatch.setattr(physics, "all_cases", lambda: registry)
     failed = check_on_the_command_line("--out", tmp_path)
     assert failed.exit_code == 1
     for text in ("Lavoisier", "mass [kg]", "+20.0%", "5.0%", "FAIL", "pass", "1 of 2"):
@@ -221,7 +221,7 @@ def test_the_command_says_what_failed(tmp_path, monkeypatch):
     def breaks(progress, seed):
         raise RuntimeError("overflow [b]")
 
-    monkeypatch.setattr(physics_check, "all_cases", lambda: {"breaks": fake("breaks", breaks)})
+    monkeypatch.setattr(physics, "all_cases", lambda: {"breaks": fake("breaks", breaks)})
     result = check_on_the_command_line("--out", tmp_path)
     assert result.exit_code == 1
     assert "ERROR" in result.stdout
@@ -238,7 +238,7 @@ def test_misuse_of_the_command_is_one_line(tmp_path):
 
 def test_all_cases_are_there_without_starting_taichi():
     code = (
-        "import sys; from bolfi_liquids.physics_check import all_cases; all_cases();"
+        "import sys; from bolfi_liquids.checks.physics import all_cases; all_cases();"
         "from bolfi_liquids.models import runtime; print(runtime.start.cache_info().currsize,"
         "[m for m in ('jax', 'matplotlib') if m in sys.modules])"
     )

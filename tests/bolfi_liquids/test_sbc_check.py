@@ -12,9 +12,14 @@ import xarray as xr
 from bolfi_liquids.inference.acquisition import rules
 
 from bolfi_liquids import inference
+from bolfi_liquids.checks.sbc import check_sbc
+from bolfi_liquids.checks.sbc_pipelines import (
+    CameraNoise,
+    FromBank,
+    Quietly,
+    _nearest,
+)
 from bolfi_liquids.inputs.settings import RUNS, CalibrationSettings, SbcSettings
-from bolfi_liquids.sbc_check import check_sbc
-from bolfi_liquids.sbc_pipelines import CameraNoise, FromBank, Quietly, _nearest
 
 SMALL = {"design": 8, "budget": 8, "particles": 100, "seed": 3}
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bolfi_liquids.physics_check import all_cases, check_physics
+from bolfi_liquids.checks.physics import all_cases, check_physics
 
 # a minute or more each: `make test-long` runs them, and so does `check physics`
 LONG = ("adhesion", "couette", "cylinder_drag", "herschel_bulkley", "resolution")

@@ -7,7 +7,7 @@ import numpy as np
 from bolfi_liquids.models.validation.cases.seed_noise import spread
 
 from bolfi_liquids import open_recording
-from bolfi_liquids.physics_cases.recorded_stirs import apart, repeated
+from bolfi_liquids.checks.cases.recorded_stirs import apart, repeated
 
 from .line import Line
 from .liquids import LISTED, listed

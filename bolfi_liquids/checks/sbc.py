@@ -16,27 +16,33 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .calibration.stir_simulator import Stirring, stirring_of
-from .inputs.bundled import bundled_recording
-from .inputs.prior import default_prior, describe_prior
-from .inputs.recording import Recording, open_recordings
-from .inputs.settings import (
+from ..calibration.stir_simulator import Stirring, stirring_of
+from ..inputs.bundled import bundled_recording
+from ..inputs.prior import default_prior, describe_prior
+from ..inputs.recording import Recording, open_recordings
+from ..inputs.settings import (
     MIN_SIMULATIONS,
     PAPER_RULES,
     RUNS,
     SURROGATES,
     SbcSettings,
 )
-from .progress import progress_bar
-from .run.directory import SIMULATIONS, enter_run
-from .run.provenance import LIBRARIES, versions
-from .run.simulations import fresh_seeds
-from .run.workers import processes
-from .sbc_pipelines import SAMPLING, Calibrate, CameraNoise, FromBank, Quietly
-from .sbc_results import SurrogateCheck, checked, write_results
+from ..progress import progress_bar
+from ..run.directory import SIMULATIONS, enter_run
+from ..run.provenance import LIBRARIES, versions
+from ..run.simulations import fresh_seeds
+from ..run.workers import processes
+from .sbc_pipelines import (
+    SAMPLING,
+    Calibrate,
+    CameraNoise,
+    FromBank,
+    Quietly,
+)
+from .sbc_tree import SurrogateCheck, checked, write_results
 
 if TYPE_CHECKING:
-    from .inference import Prior, Replicates
+    from ..inference import Prior, Replicates
 
 
 AT_ONCE = 16  # stirs in one call
@@ -95,7 +101,7 @@ def _replicates(  # noqa: PLR0913  what the two surrogates share
     pool: Executor | None,
     progress: bool,
 ) -> "Replicates":
-    from . import inference
+    from .. import inference
 
     calibration = settings.calibration(name)
     if name == "signal":
@@ -118,7 +124,7 @@ def _replicates(  # noqa: PLR0913  what the two surrogates share
 
 
 def _record(settings: SbcSettings, prior: "Prior", stirring: Stirring) -> Mapping[str, Any]:
-    from .inference import ENGINE_VERSION
+    from ..inference import ENGINE_VERSION
 
     return {
         "engine": {"version": ENGINE_VERSION, "initial": MIN_SIMULATIONS, "runs": RUNS}
@@ -143,7 +149,7 @@ def stirs_everywhere(  # noqa: PLR0913  what makes simulations
     """Points that fill the prior [n, d], and `RUNS` stirs of each [n, RUNS, T, 2]; failed: NaN."""
     from scipy.stats import qmc
 
-    from .inference import Job, SimulationBank, run_missing
+    from ..inference import Job, SimulationBank, run_missing
 
     u = qmc.Sobol(len(prior), rng=settings.seed).random(settings.design)
     theta = prior.from_unit(u)

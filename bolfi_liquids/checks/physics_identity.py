@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .physics_json import plain
 
 if TYPE_CHECKING:
-    from .models.validation import Case
+    from ..models.validation import Case
 
 FIELDS = ("seed", "model", "settings", "code")
 
@@ -19,7 +19,7 @@ def case_identity(case: "Case", seed: int) -> dict[str, Any]:
 
     The simulator is known by its version alone, which rises with every change of its bits.
     """
-    from .models import MODEL_VERSION
+    from ..models import MODEL_VERSION
 
     digest = hashlib.sha256()
     for source in _sources(case):
@@ -39,7 +39,7 @@ def has_identity(record: Mapping[str, Any], identity: Mapping[str, Any]) -> bool
 
 def _sources(case: "Case") -> Iterator[Path]:
     """The case's own file, what it shares with its neighbours, all truths and analysis."""
-    from .models.validation import analysis, truths
+    from ..models.validation import analysis, truths
 
     own = Path(inspect.getfile(case.run))
     yield own

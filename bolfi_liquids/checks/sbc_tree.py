@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .calibration.tree import write_tree
-from .drawing import new_figure, styled, write_figure
+from ..calibration.tree import write_tree
+from ..drawing import new_figure, styled, write_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from xarray import Dataset
 
-    from .inference import SBC, Coverage, Replicates
+    from ..inference import SBC, Coverage, Replicates
 
 RESULTS = "sbc.nc"
 LEVEL = 0.9  # of the intervals that are looked at by region
@@ -59,7 +59,7 @@ def checked(made: "Replicates", *, conservative: bool) -> SurrogateCheck:
         conservative: Of the coverage, only too little is a fault: the paper's likelihood is wide
             by construction. Ranks must be uniform all the same.
     """
-    from . import inference
+    from .. import inference
 
     covered = inference.coverage(made, conservative=conservative)
     return SurrogateCheck(made, inference.sbc(made), covered, _regions(covered))

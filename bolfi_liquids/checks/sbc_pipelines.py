@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .calibration.calibrate import engine_options, fit_recordings
-from .calibration.stir_simulator import Stirring
-from .inputs.settings import RUNS, CalibrationSettings
+from ..calibration.calibrate import engine_options, fit_recordings
+from ..calibration.stir_simulator import Stirring
+from ..inputs.settings import RUNS, CalibrationSettings
 
 if TYPE_CHECKING:
     from xarray import DataTree
 
-    from .inference import Prior
+    from ..inference import Prior
 
 SAMPLING: dict[str, Any] = {"sampler": "quadrature", "chains": 2, "draws": 250}
 """Of the posterior: independent draws, which are sooner made; `calibrate` checks its own against
@@ -51,8 +51,8 @@ class Calibrate:
     settings: CalibrationSettings
 
     def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
-        from .inference import SimulationBank
-        from .run.simulations import Keep
+        from ..inference import SimulationBank
+        from ..run.simulations import Keep
 
         with SimulationBank(":memory:") as bank:
             keep = Keep(bank, self.stirring.identity, self.settings.batch)
@@ -91,8 +91,8 @@ class FromBank:
     settings: CalibrationSettings
 
     def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
-        from .inference import Bolfi
-        from .run.simulations import fresh_seeds
+        from ..inference import Bolfi
+        from ..run.simulations import fresh_seeds
 
         u = self.prior.to_unit(self.prior.to_dict(self.theta))
         left = np.asarray(np.isfinite(self.signals).all(axis=(2, 3)))
@@ -141,7 +141,7 @@ class Quietly:
     pipeline: Any
 
     def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
-        from .inference import EmulatorWarning
+        from ..inference import EmulatorWarning
 
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", EmulatorWarning)

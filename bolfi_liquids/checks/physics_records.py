@@ -11,14 +11,14 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .errors import InputError
-from .files import write_text
+from ..errors import InputError
+from ..files import write_text
+from ..run.provenance import versions
 from .physics_identity import case_identity, has_identity
 from .physics_json import plain
-from .run.provenance import versions
 
 if TYPE_CHECKING:
-    from .models.validation import Case, CaseResult
+    from ..models.validation import Case, CaseResult
 
 CASES = "cases"
 RESULTS = "physics.json"
@@ -29,7 +29,7 @@ def finished_record(
     case: "Case", result: "CaseResult", seed: int, seconds: float
 ) -> dict[str, Any]:
     """A case that ran to its end, within its tolerances or not."""
-    from .models.validation import Row
+    from ..models.validation import Row
 
     rows = [
         dict(zip(Row._fields, row, strict=True)) | {"passed": row.passed} for row in result.rows
@@ -89,7 +89,7 @@ def is_finished(record: Mapping[str, Any], identity: Mapping[str, Any]) -> bool:
 
 def write_results(out: Path, records: Iterable[Mapping[str, Any]], seed: int) -> Path:
     """All records in one file, without the points of their plots; its path."""
-    from .models import MODEL_VERSION
+    from ..models import MODEL_VERSION
 
     cases = {
         record["name"]: {key: value for key, value in record.items() if key != "panels"}

@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .drawing import BLUE, GREY, INK, ORANGE, new_figure, plain_log_ticks, styled
+from ..drawing import (
+    BLUE,
+    GREY,
+    INK,
+    ORANGE,
+    new_figure,
+    plain_log_ticks,
+    styled,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .errors import InputError
-from .files import write_text
-from .physics_files import (
+from ..errors import InputError
+from ..files import write_text
+from ..physics_progress import case_progress
+from .physics_identity import case_identity, has_identity
+from .physics_records import (
     CASES,
     RESULTS,
     failed_record,
@@ -19,11 +21,9 @@ from .physics_files import (
     write_record,
     write_results,
 )
-from .physics_identity import case_identity, has_identity
-from .physics_progress import case_progress
 
 if TYPE_CHECKING:
-    from .models.validation import Case
+    from ..models.validation import Case
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ class PhysicsCheck:
 
 def all_cases() -> "dict[str, Case]":
     """Every case, by name: those of the models, then those on recordings."""
-    from . import physics_cases
-    from .models.validation import cases, discover
+    from ..models.validation import cases, discover
+    from . import cases as physics_cases
 
     return discover(cases, physics_cases)
 

@@ -4,9 +4,16 @@ from importlib.resources import as_file, files
 
 import numpy as np
 
-from ..inputs.recording import Recording, open_recording
-from ..models import Liquid, StirSetup, stir
-from ..models.validation import Case, CaseResult, Curve, Panel, Progress, Row
+from ...inputs.recording import Recording, open_recording
+from ...models import Liquid, StirSetup, stir
+from ...models.validation import (
+    Case,
+    CaseResult,
+    Curve,
+    Panel,
+    Progress,
+    Row,
+)
 
 LIQUIDS = {"glycerin": 1.0, "water": 1e-3}
 """Viscosities [Pa s] given to the solver that made the recordings."""
