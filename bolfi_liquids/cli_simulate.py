@@ -50,7 +50,7 @@ def stir(  # noqa: PLR0913  one parameter for each option
     from .inputs.bundled import bundled_recording
     from .inputs.described_liquid import Described, read_effects
     from .inputs.recording import open_recording
-    from .simulated import simulate_stir
+    from .simulation.simulate import simulate_stir
 
     opened = bundled_recording("glycerin") if recording is None else open_recording(recording)
     density = opened.number("liquid_density") if density is None else density
@@ -98,7 +98,7 @@ def pour(  # noqa: PLR0913  one parameter for each option
 
     from .inputs.cups import bundled_cups, open_cups
     from .inputs.described_liquid import Described, read_effects
-    from .simulated import simulate_pour
+    from .simulation.simulate import simulate_pour
 
     opened = bundled_cups() if cups is None else open_cups(cups)
     effects = read_effects(effect or (), "pour")

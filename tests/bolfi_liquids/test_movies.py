@@ -333,7 +333,7 @@ def test_commands_simulate_film_and_write(tmp_path, monkeypatch):
 def _short(tmp_path):
     """Options for the first two seconds of the bundled glycerin."""
     from bolfi_liquids.inputs.bundled import bundled_recording
-    from bolfi_liquids.simulated_files import stir_dataset
+    from bolfi_liquids.simulation.files import stir_dataset
 
     whole = bundled_recording("glycerin")
     described = Described(1.0, 0.2, 1260.0)

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
-from .files import write_netcdf
-from .inputs.described_liquid import Described
-from .inputs.recording import Recording
-from .movie.file import RATE, write_movie
-from .pouring.spillage import FRACTIONS
-from .progress import progress_bar
-from .simulated_files import check_targets, pour_dataset, stir_dataset
+from ..errors import InputError
+from ..files import write_netcdf
+from ..inputs.described_liquid import Described
+from ..inputs.recording import Recording
+from ..movie.file import RATE, write_movie
+from ..pouring.spillage import FRACTIONS
+from ..progress import progress_bar
+from .files import check_targets, pour_dataset, stir_dataset
 
 if TYPE_CHECKING:
-    from .models import Cups
+    from ..models import Cups
 
 DISTANCES = -0.5, 0.5  # m, between lip and receiver, that are no slip of the unit
 
@@ -48,7 +48,7 @@ def simulate_stir(
         InputError, ImportError: Something given cannot be used; nothing was simulated.
         RuntimeError: The simulation went wrong.
     """
-    from . import models
+    from .. import models
 
     check_targets(movie, out)
     if out is not None and out.exists() and out.samefile(recording.path):
@@ -60,7 +60,7 @@ def simulate_stir(
     if out is not None:
         write_netcdf(stir_dataset(described, recording, angles), out)
     if movie is not None:
-        from .movie.stir import stir_pictures
+        from ..movie.stir import stir_pictures
 
         frames = models.stir_frames(*given, described.seed, rate=RATE, effects=described.effects)
         caption = [*described.lines()[:2], f"{recording.path.name}, {described.lines()[2]}"]
@@ -94,8 +94,8 @@ def simulate_pour(  # noqa: PLR0913  one for each option
         InputError, ImportError: Something given cannot be used; nothing was simulated.
         RuntimeError: The simulation went wrong.
     """
-    from . import models
-    from .models.pouring import FASTEST, SLOWEST
+    from .. import models
+    from ..models.pouring import FASTEST, SLOWEST
 
     check_targets(movie, out)
     if not DISTANCES[0] <= distance <= DISTANCES[1]:
@@ -120,7 +120,7 @@ def simulate_pour(  # noqa: PLR0913  one for each option
     if out is not None:
         write_netcdf(pour_dataset(described, landings, given[1:], distance, fractions), out)
     if movie is not None:
-        from .movie.pour import pour_pictures
+        from ..movie.pour import pour_pictures
 
         frames = models.pour_frames(
             *given,
@@ -149,7 +149,7 @@ def _film(path: Path, pictures: Iterable[NDArray], count: int, progress: bool) -
 @contextmanager
 def _failing() -> Iterator[None]:
     """Inside, a simulation that goes wrong is an error."""
-    from .models import FailedSimulation
+    from ..models import FailedSimulation
 
     with warnings.catch_warnings():
         warnings.simplefilter("error", FailedSimulation)

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import NDArray
 
-from .files import new_file, new_netcdf
-from .inputs.described_liquid import Described
-from .inputs.recording import Recording, along_path, recording_dataset
-from .movie.file import check_movie
+from ..files import new_file, new_netcdf
+from ..inputs.described_liquid import Described
+from ..inputs.recording import Recording, along_path, recording_dataset
+from ..movie.file import check_movie
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
-    from .models import Cups, Landings
+    from ..models import Cups, Landings
 
 
 def check_targets(movie: Path | None, out: Path | None) -> None:

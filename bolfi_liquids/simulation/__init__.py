@@ -1,0 +1,1 @@
+"""One stir or one pour by numbers."""
