@@ -12,10 +12,10 @@ if TYPE_CHECKING:
     from .inputs.recording import Recording, open_recording
     from .inputs.table_import import import_table
     from .models import Cups
-    from .pour_execution import execute_pour
     from .pouring.choose import choose_pour
-    from .recorder import record
     from .reporting.report import report
+    from .robot.pour import execute_pour
+    from .robot.record import record
 
 __version__ = version("bolfi-liquids")
 __all__ = [
@@ -43,10 +43,10 @@ _HOME = {
     "calibrate": ".calibration.calibrate",
     "choose_pour": ".pouring.choose",
     "criticise": ".criticism.criticise",
-    "execute_pour": ".pour_execution",
+    "execute_pour": ".robot.pour",
     "import_table": ".inputs.table_import",
     "open_recording": ".inputs.recording",
-    "record": ".recorder",
+    "record": ".robot.record",
     "report": ".reporting.report",
 }
 

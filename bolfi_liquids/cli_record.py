@@ -89,7 +89,7 @@ def _record(
 ):
     from .hardware import HiddenLiquid
     from .online_recorder import record_online
-    from .recorder import record as run_record
+    from .robot.record import record as run_record
 
     emulate: HiddenLiquid | None = None if viscosity is None else HiddenLiquid(viscosity=viscosity)
     ask = None if emulate is not None else typed_sentence
@@ -101,7 +101,7 @@ def _record(
 def execute(run: Path, rig: Path | None, *, arm: bool, emulator: bool) -> None:
     """`pour --execute`: a dry run unless armed."""
     from .inputs.rigs import rig_of
-    from .pour_execution import execute_pour
+    from .robot.pour import execute_pour
 
     _one_of(arm, emulator)
     opened = rig_of(rig)
@@ -139,7 +139,7 @@ def typed_sentence(plan: str) -> str:
 
 def _dry_run(rig: "Rig", cycles: int | None, out: Path) -> None:
     from .hardware import describe
-    from .stir_session import dry_run, plan_stir
+    from .robot.stir import dry_run, plan_stir
 
     if out.is_dir() and any(out.iterdir()):
         raise InputError("holds files already", where=str(out), fix="give a new directory: --out")
@@ -151,7 +151,7 @@ def _dry_run(rig: "Rig", cycles: int | None, out: Path) -> None:
 
 
 def _dry_pour(run: Path, rig: "Rig") -> None:
-    from .pour_execution import dry_pour
+    from .robot.pour import dry_pour
 
     with tempfile.TemporaryDirectory(dir=_nearest(run)) as directory:
         text, checks = dry_pour(run, rig, Path(directory))

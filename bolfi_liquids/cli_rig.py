@@ -71,7 +71,7 @@ def calibrate_cameras(  # noqa: PLR0913  one parameter for each option
     ] = None,
 ) -> None:
     """Learn a camera's lens from a printed board, and its roll from a plumb line."""
-    from .camera_calibration import calibrate_view, write_board
+    from .robot.camera_calibration import calibrate_view, write_board
 
     if print_board is not None:
         typer.echo(f"{write_board(print_board)}: print it, measure a square, glue it on a plate")

@@ -7,12 +7,17 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .armed_session import Ask, check_one
 from .inputs.recording import Recording, open_recording
 from .online import FAILED, REFUSED, OnlineCalibration, OnlineSettings, SoFar
-from .recorder import kept
-from .session_view import SessionView
-from .stir_session import AHEAD, StirPlan, plan_stir, stir_session
+from .robot.armed_session import Ask, check_one
+from .robot.live_view import SessionView
+from .robot.record import kept
+from .robot.stir import (
+    AHEAD,
+    StirPlan,
+    plan_stir,
+    stir_session,
+)
 
 if TYPE_CHECKING:
     from .hardware import HiddenLiquid, PosePath, Rig, Session

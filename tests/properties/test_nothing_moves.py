@@ -159,7 +159,7 @@ def test_one_file_knows_the_library_that_moves_arms():
     armed = {name for name, path in SOURCES.items() if gives("armed", path)}
     # the last two hand it on
     inside = {"hardware/session/session.py", "hardware/robot/control_process.py"}
-    assert armed == {"bolfi_liquids/armed_session.py", *inside}
+    assert armed == {"bolfi_liquids/robot/armed_session.py", *inside}
 
 
 @pytest.mark.parametrize("words", OF_A_RIG)

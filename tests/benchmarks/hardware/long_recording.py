@@ -19,7 +19,7 @@ import psutil
 import xarray
 from bolfi_liquids.hardware import HiddenLiquid, bundled_rig, stir
 
-from bolfi_liquids.recorder import record
+from bolfi_liquids.robot.record import record
 
 EVERY = 5.0  # s between two looks
 LEAST_LOOKS = 5

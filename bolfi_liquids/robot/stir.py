@@ -4,12 +4,23 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from .armed_session import Ask, Emulation, Task, armed_session
-from .errors import InputError
-from .session_view import SessionView
+from ..errors import InputError
+from .armed_session import (
+    Ask,
+    Emulation,
+    Task,
+    armed_session,
+)
+from .live_view import SessionView
 
 if TYPE_CHECKING:
-    from .hardware import Check, HiddenLiquid, PosePath, Rig, Session
+    from ..hardware import (
+        Check,
+        HiddenLiquid,
+        PosePath,
+        Rig,
+        Session,
+    )
 
 
 AHEAD = 2  # paths ordered beyond the one that runs, so that the arm need not wait
@@ -45,7 +56,12 @@ def plan_stir(rig: "Rig", cycles: int | None = None) -> StirPlan:
         InputError: `cycles` is below 1.
         MotionRejected: The plan breaks one of the rig's limits.
     """
-    from .hardware import check_path, insert, retract, strokes
+    from ..hardware import (
+        check_path,
+        insert,
+        retract,
+        strokes,
+    )
 
     cycles = rig.stirring.cycles if cycles is None else cycles
     if cycles < 1:
@@ -79,7 +95,7 @@ def stir_session(
         InputError: `ask` and `emulate` are both given, or neither is; or a camera is a file.
         RigError: The person did not agree, or something cannot be used.
     """
-    from .hardware import above_cup, emulated
+    from ..hardware import above_cup, emulated
 
     task = Task(rig, "stirring", plan.paths, out, cameras=True)
     if emulate is None:
@@ -113,7 +129,7 @@ def dry_run(rig: "Rig", plan: StirPlan, out: Path) -> list["Check"]:
     Raises:
         RigError: The directory cannot be used.
     """
-    from .hardware import Session, webcams
+    from ..hardware import Session, webcams
 
     with Session(rig, out, make_cameras=webcams(rig), plan=plan.paths) as session:
         return session.preflight()
@@ -126,7 +142,7 @@ def follow_plan(session: "Session", plan: StirPlan, view: SessionView) -> None:
         RigError: The pre-flight list has failures.
         SessionStopped: The arm was stopped.
     """
-    from .hardware import approach
+    from ..hardware import approach
 
     ordered = []
     view.motions = 1 + len(plan.paths)

@@ -5,10 +5,16 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from .errors import InputError
+from ..errors import InputError
 
 if TYPE_CHECKING:
-    from .hardware import EmulatedRig, PosePath, Rig, Session, Tool
+    from ..hardware import (
+        EmulatedRig,
+        PosePath,
+        Rig,
+        Session,
+        Tool,
+    )
 
 Ask = Callable[[str], str]
 """Shows a person the plan, and returns what the person typed."""
@@ -73,7 +79,13 @@ def armed_session(
         InputError: Both are given, or neither.
         RigError: The person did not agree, or something cannot be used.
     """
-    from .hardware import Session, confirm, confirm_emulated, describe, webcams
+    from ..hardware import (
+        Session,
+        confirm,
+        confirm_emulated,
+        describe,
+        webcams,
+    )
 
     check_one(ask, emulation, "armed_session")
     text = describe(task.paths, task.rig, task.tool)

@@ -5,14 +5,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..inputs.recording import Recording, open_recording
+from ..inputs.rigs import rig_of
 from .armed_session import Ask, check_one
-from .inputs.recording import Recording, open_recording
-from .inputs.rigs import rig_of
-from .session_view import SessionView
-from .stir_session import follow_plan, plan_stir, stir_session
+from .live_view import SessionView
+from .stir import follow_plan, plan_stir, stir_session
 
 if TYPE_CHECKING:
-    from .hardware import HiddenLiquid, Rig
+    from ..hardware import HiddenLiquid, Rig
 
 
 def record(
@@ -46,7 +46,7 @@ def record(
         MotionRejected: The plan breaks one of the rig's limits.
         SessionStopped: The arm was stopped; the message says why.
     """
-    from .hardware import finalise
+    from ..hardware import finalise
 
     check_one(ask, emulate, "record")
     opened = rig if rig is not None and not isinstance(rig, str | Path) else rig_of(rig)
@@ -68,7 +68,7 @@ def kept(directory: Path) -> Iterator[None]:
     Raises:
         SessionStopped: It was stopped, or interrupted; the message says what is left.
     """
-    from .hardware import SessionStopped
+    from ..hardware import SessionStopped
 
     try:
         yield
@@ -79,7 +79,7 @@ def kept(directory: Path) -> Iterator[None]:
 
 
 def _left(directory: Path) -> str:
-    from .hardware import RigError, finalise
+    from ..hardware import RigError, finalise
 
     try:
         return f"what was recorded until then is in {finalise(directory)}"

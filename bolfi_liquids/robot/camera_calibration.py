@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .errors import InputError
-from .inputs.rigs import rig_of
+from ..errors import InputError
+from ..inputs.rigs import rig_of
 
 if TYPE_CHECKING:
-    from .hardware import CalibratedCamera, Camera
+    from ..hardware import CalibratedCamera, Camera
 
 VIEWS = ("xz", "yz")
 BOARD_PICTURES = 15
@@ -22,8 +22,8 @@ def write_board(path: Path) -> Path:
     Raises:
         InputError: There is a file already, or none can be written.
     """
-    from .hardware import Board
-    from .hardware.vision.opencv import opencv
+    from ..hardware import Board
+    from ..hardware.vision.opencv import opencv
 
     if path.exists():
         raise InputError("exists already", where=str(path), fix="name a file that does not")
@@ -56,7 +56,13 @@ def calibrate_view(  # noqa: PLR0913  one for each thing a person may give
         InputError: `view` or `square` cannot be used.
         RigError: The rig, the camera or the pictures cannot be used.
     """
-    from .hardware import Board, calibrate_camera, pictures_in, take_pictures, write_lens
+    from ..hardware import (
+        Board,
+        calibrate_camera,
+        pictures_in,
+        take_pictures,
+        write_lens,
+    )
 
     if view not in VIEWS:
         raise InputError(f"{view!r}", where="--view", fix="give xz or yz")

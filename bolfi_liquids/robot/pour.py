@@ -6,13 +6,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from .armed_session import Ask, Emulation, Task, armed_session, check_one
-from .errors import InputError
-from .run.directory import POUR, RUN_TOML
-from .session_view import SessionView
+from ..errors import InputError
+from ..run.directory import POUR, RUN_TOML
+from .armed_session import (
+    Ask,
+    Emulation,
+    Task,
+    armed_session,
+    check_one,
+)
+from .live_view import SessionView
 
 if TYPE_CHECKING:
-    from .hardware import Check, PosePath, Rig
+    from ..hardware import Check, PosePath, Rig
 
 POURS = "pours"  # directories of what the arm did, in the RUN
 
@@ -42,7 +48,7 @@ def plan_pour(run: str | Path, rig: "Rig") -> PourPlan:
         InputError: The run has chosen none.
         MotionRejected: The motion breaks one of the rig's limits.
     """
-    from .hardware import check_path, pour_path, ready_to_pour
+    from ..hardware import check_path, pour_path, ready_to_pour
 
     tree, cups = _chosen(Path(run))
     turn = cups["pour"]
@@ -90,7 +96,7 @@ def execute_pour(
         MotionRejected: The motion breaks one of the rig's limits.
         SessionStopped: The arm was stopped.
     """
-    from .hardware import SessionStopped, approach_pour, emulated
+    from ..hardware import SessionStopped, approach_pour, emulated
 
     check_one(ask, emulate, "execute_pour")
     plan = plan_pour(run, rig)
@@ -114,7 +120,7 @@ def execute_pour(
 
 def dry_pour(run: str | Path, rig: "Rig", out: Path) -> "tuple[str, list[Check]]":
     """What the arm would do, and the pre-flight list of a session that cannot move it."""
-    from .hardware import Session, describe
+    from ..hardware import Session, describe
 
     plan = plan_pour(run, rig)
     with Session(rig, out, tool="pouring", plan=[plan.path]) as session:
@@ -123,8 +129,8 @@ def dry_pour(run: str | Path, rig: "Rig", out: Path) -> "tuple[str, list[Check]]
 
 def _chosen(run: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """The section "pour" of a run, and the cups that it was chosen for."""
-    from .pouring.tree import read_pour
-    from .run.summary import read_summary
+    from ..pouring.tree import read_pour
+    from ..run.summary import read_summary
 
     if not (run / RUN_TOML).exists() and not (run / POUR).exists():
         raise InputError(

@@ -7,7 +7,7 @@ from rich.console import Console, Group
 from rich.live import Live
 
 if TYPE_CHECKING:
-    from .hardware import Session
+    from ..hardware import Session
 
 REFRESH = 5.0  # per second
 
@@ -67,8 +67,8 @@ class SessionView:
         """Draw the session as it is now."""
         if self._live is None:
             return
-        from .hardware import host_time
-        from .hardware.session.live import LiveStatus, live_table
+        from ..hardware import host_time
+        from ..hardware.session.live import LiveStatus, live_table
 
         status = session.status()
         shown = LiveStatus(

@@ -1,0 +1,1 @@
+"""Record and pour with the arm."""
