@@ -11,11 +11,11 @@ from .cli_errors import FAILED
 from .cli_examples import examples
 from .cli_rig import RigOption
 from .errors import InputError
-from .online_settings import OnlineSettings
+from .online.settings import OnlineSettings
 
 if TYPE_CHECKING:
     from .hardware import Check, Rig
-    from .online_recorder import OnlineChoice
+    from .online.record import OnlineChoice
 
 OUT = Path("runs/recording")
 EPILOG = examples(
@@ -59,7 +59,7 @@ def record(  # noqa: PLR0913  one parameter for each option
     """Stir, and record it. A dry run unless armed: it plans, checks everything, moves nothing."""
     from .inputs.cups import open_cups
     from .inputs.rigs import rig_of
-    from .online_recorder import OnlineChoice
+    from .online.record import OnlineChoice
     from .tables import print_recording
 
     _one_of(arm, emulator)
@@ -88,7 +88,7 @@ def _record(
     viscosity: float | None,
 ):
     from .hardware import HiddenLiquid
-    from .online_recorder import record_online
+    from .online.record import record_online
     from .robot.record import record as run_record
 
     emulate: HiddenLiquid | None = None if viscosity is None else HiddenLiquid(viscosity=viscosity)

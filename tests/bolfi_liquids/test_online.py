@@ -14,9 +14,17 @@ import numpy as np
 import pytest
 
 import bolfi_liquids as bl
-from bolfi_liquids import models, online
-from bolfi_liquids.online import FAILED, READY, REFUSED, OnlineCalibration, OnlineSettings, SoFar
-from bolfi_liquids.online_outbox import Outbox, newest
+from bolfi_liquids import models
+from bolfi_liquids.online import online
+from bolfi_liquids.online.online import (
+    FAILED,
+    READY,
+    REFUSED,
+    OnlineCalibration,
+    OnlineSettings,
+    SoFar,
+)
+from bolfi_liquids.online.outbox import Outbox, newest
 
 # the process that simulates gives way to others: beside another test it may get nothing for minutes
 pytestmark = [pytest.mark.slow, pytest.mark.alone]

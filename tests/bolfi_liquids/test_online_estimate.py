@@ -9,7 +9,7 @@ import bolfi_liquids as bl
 from bolfi_liquids import models
 from bolfi_liquids.calibration.stir_simulator import stirring_of
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.online_estimate import (
+from bolfi_liquids.online.estimate import (
     Made,
     OnlineEstimate,
     Problem,
@@ -19,8 +19,13 @@ from bolfi_liquids.online_estimate import (
     proposals,
     with_results,
 )
-from bolfi_liquids.online_plan import SoFar, follow, planned, stroke_ends
-from bolfi_liquids.online_settings import OnlineSettings
+from bolfi_liquids.online.plan import (
+    SoFar,
+    follow,
+    planned,
+    stroke_ends,
+)
+from bolfi_liquids.online.settings import OnlineSettings
 from bolfi_liquids.pouring.map import Expected
 
 ATTRS = {

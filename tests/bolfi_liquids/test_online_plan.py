@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware import star
 
-from bolfi_liquids.online_plan import FARTHEST, LATEST, SoFar, follow, planned, stroke_ends
+from bolfi_liquids.online.plan import (
+    FARTHEST,
+    LATEST,
+    SoFar,
+    follow,
+    planned,
+    stroke_ends,
+)
 
 ATTRS = {"liquid_density": 1000.0}
 PATH = star(speed=0.1, height=0.235)

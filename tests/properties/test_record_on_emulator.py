@@ -82,8 +82,8 @@ def test_the_recording_is_complete_and_says_how_it_was_made(recorded):
 
 @pytest.mark.slow
 def test_stirring_ends_when_the_pour_is_known_well_enough(tmp_path):
-    from bolfi_liquids.online_recorder import OnlineChoice, record_online
-    from bolfi_liquids.online_settings import OnlineSettings
+    from bolfi_liquids.online.record import OnlineChoice, record_online
+    from bolfi_liquids.online.settings import OnlineSettings
 
     # a coarse map, and a target that any estimate meets once enough strokes were made
     settings = OnlineSettings(target=0.9, design=8, budget=12, pours=64, particles=300)

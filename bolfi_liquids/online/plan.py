@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import InputError
-from .inputs.fields import DENSITIES
-from .inputs.recording import Gripper, Recording
-from .inputs.strokes import strokes
+from ..errors import InputError
+from ..inputs.fields import DENSITIES
+from ..inputs.recording import Gripper, Recording
+from ..inputs.strokes import strokes
 
 FARTHEST = 2e-3  # m that the arm may be off its plan; star strokes are 50 mm long
 LATEST = 0.2  # s that a stroke may change the delay by; a servoed arm follows by some 0.1 s

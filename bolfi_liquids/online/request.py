@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .inputs.recording import Recording
-from .online_plan import planned
-from .online_settings import OnlineSettings
+from ..inputs.recording import Recording
+from .plan import planned
+from .settings import OnlineSettings
 
 if TYPE_CHECKING:
-    from .models import Cups
+    from ..models import Cups
 
 PREPARING, READY, REFUSED, FAILED = "preparing", "ready", "refused", "failed"
 GONE = EOFError, BrokenPipeError, ConnectionResetError

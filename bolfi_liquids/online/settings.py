@@ -2,15 +2,15 @@
 
 from dataclasses import dataclass
 
-from .errors import InputError
-from .inputs.settings import (
+from ..errors import InputError
+from ..inputs.settings import (
     MIN_PARTICLES,
     MIN_SIMULATIONS,
     SURROGATES,
     at_least,
     one_of,
 )
-from .pouring.map import LEAST_POURS, POURS
+from ..pouring.map import LEAST_POURS, POURS
 
 STOPS = ("bound", "mean")
 

@@ -7,16 +7,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .calibration.stir_simulator import stirring_of
-from .online_outbox import newest
-from .online_plan import SoFar, follow, stroke_ends
-from .online_request import FAILED, GONE, PREPARING, READY, REFUSED, Request, Status
-from .online_simulator import step_back
+from ..calibration.stir_simulator import stirring_of
+from .outbox import newest
+from .plan import SoFar, follow, stroke_ends
+from .request import (
+    FAILED,
+    GONE,
+    PREPARING,
+    READY,
+    REFUSED,
+    Request,
+    Status,
+)
+from .simulator import step_back
 
 if TYPE_CHECKING:
-    from .inference import Job
-    from .online_estimate import OnlineEstimate
-    from .online_plan import Followed
+    from ..inference import Job
+    from .estimate import OnlineEstimate
+    from .plan import Followed
 
 NICENESS = 5  # of this process; an estimate matters more than another simulation
 ALONE = "the process that simulates has died"
@@ -43,8 +51,8 @@ class _Learner:
     """What the process knows."""
 
     def __init__(self, parent: Connection, simulator: Connection, request: Request):
-        from .inputs.prior import read_prior
-        from .online_estimate import Problem
+        from ..inputs.prior import read_prior
+        from .estimate import Problem
 
         self.parent, self.simulator, self.request = parent, simulator, request
         self.plan = request.plan()
@@ -59,9 +67,9 @@ class _Learner:
 
     def prepare(self) -> bool:
         """Simulate the design; meanwhile learn the map and compile. Whether all went well."""
-        from .inference import SimulationBank
-        from .online_estimate import design, warm_up
-        from .pouring.map import make_map
+        from ..inference import SimulationBank
+        from ..pouring.map import make_map
+        from .estimate import design, warm_up
 
         settings, jobs = self.request.settings, design(self.problem)
         side_by_side = os.cpu_count() or 1  # nothing is urgent before the robot moves
@@ -111,7 +119,7 @@ class _Learner:
             self._tell(REFUSED, str(error))
 
     def _estimate(self, followed: "Followed", ended: float) -> None:
-        from .online_estimate import estimate
+        from .estimate import estimate
 
         known = self.followed is not None and followed.strokes <= self.followed.strokes
         if known or not np.isfinite(followed.observed).any():
@@ -125,7 +133,7 @@ class _Learner:
 
     def _go_on(self) -> None:
         """Keep one batch in flight, from the first stroke on."""
-        from .online_estimate import proposals
+        from .estimate import proposals
 
         settings = self.request.settings
         n = min(settings.batch, settings.budget - self.asked)
@@ -143,7 +151,7 @@ class _Learner:
             self.flying.append(jobs)
 
     def _land(self) -> None:
-        from .online_estimate import with_results
+        from .estimate import with_results
 
         try:
             results = self.simulator.recv()

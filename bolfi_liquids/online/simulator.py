@@ -4,8 +4,8 @@ import os
 import signal
 from multiprocessing.connection import Connection
 
-from .calibration.stir_simulator import stirring_of
-from .online_request import GONE, Request
+from ..calibration.stir_simulator import stirring_of
+from .request import GONE, Request
 
 NICENESS = 10  # of this process; control and cameras come first
 
@@ -15,7 +15,7 @@ def simulate_plan(link: Connection, request: Request) -> None:
 
     Ends when the other end of `link` is closed.
     """
-    from .inference import SimulationBank, run_missing
+    from ..inference import SimulationBank, run_missing
 
     step_back(NICENESS)
     stirring = stirring_of([request.plan()], request.settings.particles)

@@ -14,15 +14,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .calibration.stir_simulator import Stirring
-from .inputs.settings import MIN_SIMULATIONS, PAPER_RULES
-from .online_plan import Followed
-from .online_settings import OnlineSettings
-from .pouring.map import SpillageMap
-from .run.simulations import fresh_seeds
+from ..calibration.stir_simulator import Stirring
+from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES
+from ..pouring.map import SpillageMap
+from ..run.simulations import fresh_seeds
+from .plan import Followed
+from .settings import OnlineSettings
 
 if TYPE_CHECKING:
-    from .inference import Bolfi, Job, Prior, Simulation
+    from ..inference import (
+        Bolfi,
+        Job,
+        Prior,
+        Simulation,
+    )
 
 DRAWS = 500  # of each of two chains
 _SIMULATION = 31  # purpose of seeds
@@ -156,7 +161,7 @@ def estimate(
     Raises:
         ValueError: Fewer than three simulations succeeded, or nothing was seen.
     """
-    from .inference import EmulatorWarning, SamplingWarning
+    from ..inference import EmulatorWarning, SamplingWarning
 
     engine = _told(problem, made, followed.observed, problem.settings.seed)
     with warnings.catch_warnings():
@@ -208,7 +213,7 @@ def warm_up(problem: Problem, spillage: SpillageMap) -> None:
 
 
 def _engine(problem: Problem, observed: NDArray, seed: int) -> "Bolfi":
-    from .inference import Bolfi
+    from ..inference import Bolfi
 
     settings = problem.settings
     paper: dict[str, Any] = PAPER_RULES
@@ -232,7 +237,7 @@ def _told(problem: Problem, made: Made, observed: NDArray, seed: int) -> "Bolfi"
 
 
 def _jobs(problem: Problem, theta: Mapping[str, NDArray], first: int) -> "list[Job]":
-    from .inference import Job
+    from ..inference import Job
 
     count = len(theta[problem.prior.names[0]])
     seeds = fresh_seeds(problem.settings.seed, _SIMULATION, first + count)[first:]

@@ -7,23 +7,34 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .inputs.recording import Recording, open_recording
-from .online import FAILED, REFUSED, OnlineCalibration, OnlineSettings, SoFar
-from .robot.armed_session import Ask, check_one
-from .robot.live_view import SessionView
-from .robot.record import kept
-from .robot.stir import (
+from ..inputs.recording import Recording, open_recording
+from ..robot.armed_session import Ask, check_one
+from ..robot.live_view import SessionView
+from ..robot.record import kept
+from ..robot.stir import (
     AHEAD,
     StirPlan,
     plan_stir,
     stir_session,
 )
+from .online import (
+    FAILED,
+    REFUSED,
+    OnlineCalibration,
+    OnlineSettings,
+    SoFar,
+)
 
 if TYPE_CHECKING:
-    from .hardware import HiddenLiquid, PosePath, Rig, Session
-    from .hardware import Path as GripperPath
-    from .models import Cups
-    from .online_estimate import OnlineEstimate
+    from ..hardware import (
+        HiddenLiquid,
+        PosePath,
+        Rig,
+        Session,
+    )
+    from ..hardware import Path as GripperPath
+    from ..models import Cups
+    from .estimate import OnlineEstimate
 
 MOST_CYCLES = 5  # unless somebody asks for more
 RATE = 30.0  # Hz, of the simulated plan; the cameras'
@@ -82,7 +93,7 @@ def record_online(  # noqa: PLR0913  as `record`, and what to calibrate
         RuntimeError: The calibration could not be prepared; nothing has moved.
         SessionStopped: The arm was stopped.
     """
-    from .hardware import finalise, rig_attributes
+    from ..hardware import finalise, rig_attributes
 
     check_one(ask, emulate, "record")
     cycles = MOST_CYCLES if cycles is None else cycles
@@ -126,7 +137,7 @@ class _Stirring:
 
     def carry_out(self) -> None:
         """To the cup, strokes until it is enough, a rest, and out again."""
-        from .hardware import approach, retract
+        from ..hardware import approach, retract
 
         session = self._session
         session.follow(approach(session.rig, session.pose()))
@@ -188,8 +199,8 @@ def sentence(estimate: "OnlineEstimate") -> str:
 
 def _simulated(plan: StirPlan) -> "GripperPath":
     """The plan's stir as often as the cameras see it."""
-    from .hardware import Path as GripperPath
-    from .hardware import joined
+    from ..hardware import Path as GripperPath
+    from ..hardware import joined
 
     whole = joined(list(plan.strokes))
     times = np.arange(0.0, whole.duration, 1.0 / RATE)
@@ -199,7 +210,7 @@ def _simulated(plan: StirPlan) -> "GripperPath":
 
 def _still(rig: "Rig", pose: np.ndarray) -> "PosePath":
     """The rest at the end of a stir that ends early."""
-    from .hardware import PosePath
+    from ..hardware import PosePath
 
     times = np.arange(0.0, rig.stirring.rest, 1.0 / rig.robot.rate)
     return PosePath(times, np.tile(pose, (len(times), 1)), stirring=True)
@@ -207,7 +218,7 @@ def _still(rig: "Rig", pose: np.ndarray) -> "PosePath":
 
 def _so_far(directory: Path, ended: float) -> SoFar | None:
     """The data so far; None while they are too few."""
-    from .hardware import RigError, partial
+    from ..hardware import RigError, partial
 
     try:
         stir = partial(directory)

@@ -17,30 +17,38 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .calibration.calibrate import calibrate
-from .errors import InputError
-from .inputs.cups import bundled_cups
-from .inputs.prior import (
+from ..calibration.calibrate import calibrate
+from ..errors import InputError
+from ..inputs.cups import bundled_cups
+from ..inputs.prior import (
     check_prior,
     default_prior,
     describe_prior,
     read_prior,
 )
-from .inputs.recording import Recording, Source, open_recording
-from .online_learner import learn_online
-from .online_outbox import Outbox
-from .online_plan import SoFar, planned, stroke_ends
-from .online_request import FAILED, GONE, PREPARING, READY, REFUSED, Request, Status
-from .online_settings import OnlineSettings
-from .online_simulator import simulate_plan
-from .pouring.map import make_pours
-from .run.directory import RUN_TOML
+from ..inputs.recording import Recording, Source, open_recording
+from ..pouring.map import make_pours
+from ..run.directory import RUN_TOML
+from .learner import learn_online
+from .outbox import Outbox
+from .plan import SoFar, planned, stroke_ends
+from .request import (
+    FAILED,
+    GONE,
+    PREPARING,
+    READY,
+    REFUSED,
+    Request,
+    Status,
+)
+from .settings import OnlineSettings
+from .simulator import simulate_plan
 
 if TYPE_CHECKING:
-    from .inference import Prior
-    from .models import Cups
-    from .models.gripper_path import GripperPath
-    from .online_estimate import OnlineEstimate
+    from ..inference import Prior
+    from ..models import Cups
+    from ..models.gripper_path import GripperPath
+    from .estimate import OnlineEstimate
 
 __all__ = [
     "FAILED",
@@ -115,7 +123,7 @@ class OnlineCalibration:
         Raises:
             InputError: The plan, the prior or `out` cannot be used.
         """
-        from .inference import SimulationBank
+        from ..inference import SimulationBank
 
         settings = OnlineSettings() if settings is None else settings
         prior = default_prior() if prior is None else prior
@@ -187,7 +195,7 @@ class OnlineCalibration:
 
     def enough(self, estimate: "OnlineEstimate") -> bool:
         """Whether the pour is known well enough for stirring to end; see `OnlineSettings`."""
-        from .online_estimate import enough
+        from .estimate import enough
 
         return enough(estimate, self.settings)
 

@@ -1,0 +1,1 @@
+"""Learn while the robot stirs."""
