@@ -10,12 +10,12 @@ import pytest
 from typer.testing import CliRunner
 
 import bolfi_liquids as bl
-from bolfi_liquids.cli import app
+from bolfi_liquids.cli.app import app
 
 
 def bolfi_liquids(*arguments):
     """Run the command in a process of its own."""
-    code = "from bolfi_liquids.cli import main; main()"
+    code = "from bolfi_liquids.cli.app import main; main()"
     return subprocess.run(
         [sys.executable, "-c", code, *map(str, arguments)], capture_output=True, text=True
     )
@@ -170,7 +170,7 @@ def test_interruption_says_how_to_go_on(monkeypatch, tmp_path):
 
 @pytest.mark.parametrize("arguments", [["--help"], ["guide"], ["guide", "files"]])
 def test_a_reader_that_has_read_enough_is_no_error(arguments):
-    code = "from bolfi_liquids.cli import main; main()"
+    code = "from bolfi_liquids.cli.app import main; main()"
     command = [sys.executable, "-c", code, *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         process.stdout.close()  # as `head` does

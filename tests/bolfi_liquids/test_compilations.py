@@ -8,7 +8,7 @@ import pytest
 
 COMMAND = """
 import sys
-from bolfi_liquids.cli import main
+from bolfi_liquids.cli.app import main
 assert "jax" not in sys.modules
 sys.argv[1:] = ["guide", "files"]
 main()

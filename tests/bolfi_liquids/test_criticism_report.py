@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from bolfi_liquids.cli.tables import print_criticism
 from bolfi_liquids.reporting import criticism_sentences as narrative
 from bolfi_liquids.reporting.criticism_chapter import criticism_chapter
-from bolfi_liquids.tables import print_criticism
 
 EFFECTS = ["camera_delay", "gripper_scale", "stick_mass"]
 TIED = {

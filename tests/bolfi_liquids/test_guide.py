@@ -11,7 +11,7 @@ import xarray
 from typer.main import get_command
 from typer.testing import CliRunner
 
-from bolfi_liquids.cli import app
+from bolfi_liquids.cli.app import app
 from bolfi_liquids.guide import PAGES, read_page
 from bolfi_liquids.reporting.frames import frames_of
 

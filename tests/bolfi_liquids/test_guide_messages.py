@@ -10,7 +10,7 @@ import pytest
 import xarray
 from typer.testing import CliRunner
 
-from bolfi_liquids.cli import app
+from bolfi_liquids.cli.app import app
 from bolfi_liquids.guide import read_page
 
 HEADING = re.compile(r"^### (`+) ?(?P<message>.*?) ?\1$", re.MULTILINE)

@@ -5,7 +5,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from bolfi_liquids import models
-from bolfi_liquids.cli import app
+from bolfi_liquids.cli.app import app
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.described_liquid import Described, read_effects

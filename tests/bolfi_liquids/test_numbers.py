@@ -9,6 +9,7 @@ from rich.console import Console
 
 from bolfi_liquids.calibration.draws import pick_draws
 from bolfi_liquids.calibration.noise import irreducible_rms, replicate_noise, sensor_noise
+from bolfi_liquids.cli.tables import print_calibration
 from bolfi_liquids.pouring.spillage import mean_spillage, tail_spillage
 from bolfi_liquids.reporting.posterior_figure import contour_levels, marginal
 from bolfi_liquids.reporting.sentences import (
@@ -17,7 +18,6 @@ from bolfi_liquids.reporting.sentences import (
     percent,
     sampler_sentence,
 )
-from bolfi_liquids.tables import print_calibration
 
 
 def test_sensor_noise_is_found_under_a_smooth_signal(rng):

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from bolfi_liquids.checks import physics
 from bolfi_liquids.checks.physics import all_cases, check_physics
-from bolfi_liquids.cli import app
+from bolfi_liquids.cli.app import app
 from bolfi_liquids.errors import InputError
 
 

@@ -5,7 +5,7 @@ import pytest
 from typer.testing import CliRunner
 
 import bolfi_liquids as bl
-from bolfi_liquids.cli import app
+from bolfi_liquids.cli.app import app
 from bolfi_liquids.inputs.checks import MAX_GRIPPER_GAP, longest_gap
 
 GAP = slice(60, 75)  # half a second

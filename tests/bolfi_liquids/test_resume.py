@@ -23,13 +23,13 @@ STIRRINGS = "SELECT theta, seed, created FROM simulation WHERE theta LIKE '%visc
 
 def command(recording, out, settings, *more):
     options = [part for name, value in settings.items() for part in (f"--{name}", str(value))]
-    code = "from bolfi_liquids.cli import main; main()"
+    code = "from bolfi_liquids.cli.app import main; main()"
     return [sys.executable, "-c", code, "calibrate", recording, "--out", out, *options, *more]
 
 
 def criticise_command(run):
     options = [part for name in EFFECTS for part in ("--effects", name)]
-    code = "from bolfi_liquids.cli import main; main()"
+    code = "from bolfi_liquids.cli.app import main; main()"
     return [sys.executable, "-c", code, "criticise", str(run), *options]
 
 

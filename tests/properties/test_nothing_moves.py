@@ -19,7 +19,7 @@ from pexpect.fdpexpect import fdspawn
 
 import bolfi_liquids as bl
 from bolfi_liquids import hardware
-from bolfi_liquids.cli import app
+from bolfi_liquids.cli.app import app
 
 pytestmark = pytest.mark.alone
 
@@ -100,7 +100,7 @@ def run_with_a_pour(tmp_path):
 
 
 def bolfi_liquids(*arguments, typed=""):
-    code = "from bolfi_liquids.cli import main; main()"
+    code = "from bolfi_liquids.cli.app import main; main()"
     return subprocess.run(
         [sys.executable, "-c", code, *map(str, arguments)],
         input=typed,
@@ -113,7 +113,7 @@ def bolfi_liquids(*arguments, typed=""):
 def in_a_terminal(*arguments, typed):
     """Run the command as a person does, who answers the question; exit status and last words."""
     words = " ".join(map(str, arguments))
-    code = f"from bolfi_liquids.cli import app; app({words!r}.split())"
+    code = f"from bolfi_liquids.cli.app import app; app({words!r}.split())"
     # not pexpect.spawn, which forks this process with all of its threads
     ours, its = os.openpty()
     command = [sys.executable, "-c", code]
@@ -136,7 +136,7 @@ def test_every_command_is_known_here():
 
 def test_there_are_no_other_entry_points():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert project["scripts"] == {"bolfi-liquids": "bolfi_liquids.cli:main"}
+    assert project["scripts"] == {"bolfi-liquids": "bolfi_liquids.cli.app:main"}
     assert {name for name in SOURCES if name.endswith("__main__.py")} == {
         "hardware/emulator/__main__.py"
     }

@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
-from .cli_errors import FAILED
-from .cli_examples import examples
-from .inputs.settings import SbcSettings
+from ..inputs.settings import SbcSettings
+from .errors import FAILED
+from .examples import examples
 
 app = typer.Typer(help="Long validation runs; a killed one goes on.", no_args_is_help=True)
 
@@ -30,7 +30,7 @@ def physics(
     """
     from rich.console import Console
 
-    from .checks.physics import check_physics
+    from ..checks.physics import check_physics
     from .physics_table import print_physics
 
     check = check_physics(out, case or (), seed=seed)
@@ -78,7 +78,7 @@ def sbc(  # noqa: PLR0913  one parameter for each option
     concluded. The exit status is 1 when ranks or coverage speak against it. What has finished in
     DIR before is kept; more replicates can be added to it.
     """
-    from .checks.sbc import check_sbc
+    from ..checks.sbc import check_sbc
 
     settings = SbcSettings(
         runs=runs,

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .cli_examples import examples
+from .examples import examples
 
 app = typer.Typer(help="Simulate one stir or one pour, and look at it.", no_args_is_help=True)
 
@@ -47,10 +47,10 @@ def stir(  # noqa: PLR0913  one parameter for each option
     """
     import numpy as np
 
-    from .inputs.bundled import bundled_recording
-    from .inputs.described_liquid import Described, read_effects
-    from .inputs.recording import open_recording
-    from .simulation.simulate import simulate_stir
+    from ..inputs.bundled import bundled_recording
+    from ..inputs.described_liquid import Described, read_effects
+    from ..inputs.recording import open_recording
+    from ..simulation.simulate import simulate_stir
 
     opened = bundled_recording("glycerin") if recording is None else open_recording(recording)
     density = opened.number("liquid_density") if density is None else density
@@ -96,9 +96,9 @@ def pour(  # noqa: PLR0913  one parameter for each option
     """
     import numpy as np
 
-    from .inputs.cups import bundled_cups, open_cups
-    from .inputs.described_liquid import Described, read_effects
-    from .simulation.simulate import simulate_pour
+    from ..inputs.cups import bundled_cups, open_cups
+    from ..inputs.described_liquid import Described, read_effects
+    from ..simulation.simulate import simulate_pour
 
     opened = bundled_cups() if cups is None else open_cups(cups)
     effects = read_effects(effect or (), "pour")

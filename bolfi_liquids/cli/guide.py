@@ -4,8 +4,8 @@ from typing import Annotated
 
 import typer
 
-from .cli_examples import examples
-from .guide import PAGES, read_page
+from ..guide import PAGES, read_page
+from .examples import examples
 
 EPILOG = examples("guide", "guide files", "guide troubleshooting | less -R")
 

@@ -8,8 +8,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Column, Table
 
-from .reporting import criticism_sentences as criticism
-from .reporting.sentences import (
+from ..reporting import criticism_sentences as criticism
+from ..reporting.sentences import (
     UNITS,
     emulator_sentences,
     floor_sentence,
@@ -19,8 +19,8 @@ from .reporting.sentences import (
 if TYPE_CHECKING:
     from xarray import Dataset
 
-    from .hardware import Check
-    from .inputs.recording import Recording
+    from ..hardware import Check
+    from ..inputs.recording import Recording
 
 
 def print_calibration(section: Mapping[str, Any], console: Console) -> None:

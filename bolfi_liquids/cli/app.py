@@ -5,21 +5,8 @@ from typing import Annotated
 
 import typer
 
-from . import (
-    __version__,
-    cli_check,
-    cli_guide,
-    cli_import,
-    cli_record,
-    cli_reproduce,
-    cli_rig,
-    cli_simulate,
-)
-from .cli_errors import OneLineErrors
-from .cli_examples import examples, session
-from .cli_results import complaints_among_results, print_findings, print_next, print_section
-from .cli_rig import RigOption
-from .inputs.settings import (
+from .. import __version__
+from ..inputs.settings import (
     RISKS,
     SAMPLERS,
     SURROGATES,
@@ -27,8 +14,34 @@ from .inputs.settings import (
     CriticismSettings,
     PourSettings,
 )
-from .run.directory import RUN_TOML
-from .run.jax_cache import keep_compilations
+from ..run.directory import RUN_TOML
+from ..run.jax_cache import keep_compilations
+from . import (
+    check as cli_check,
+)
+from . import (
+    guide,
+    import_table,
+    reproduce,
+)
+from . import (
+    record as cli_record,
+)
+from . import (
+    rig as cli_rig,
+)
+from . import (
+    simulate as cli_simulate,
+)
+from .errors import OneLineErrors
+from .examples import examples, session
+from .printed import (
+    complaints_among_results,
+    print_findings,
+    print_next,
+    print_section,
+)
+from .rig import RigOption
 
 RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="Directory of a run.")]
 
@@ -101,8 +114,8 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
     ] = False,
 ) -> None:
     """Learn a liquid's parameters from recordings of it being stirred."""
-    from .calibration.calibrate import calibrate as run_calibrate
-    from .inputs.recording import aborted_recordings, open_recordings
+    from ..calibration.calibrate import calibrate as run_calibrate
+    from ..inputs.recording import aborted_recordings, open_recordings
 
     opened = open_recordings(recordings)
     if resume and not (out / RUN_TOML).exists():
@@ -162,9 +175,9 @@ def criticise(  # noqa: PLR0913  one parameter for each option
     seed: Annotated[int, typer.Option(help="Of all random numbers.")] = CriticismSettings.seed,
 ) -> None:
     """Find where simulation and recording disagree, and which effect is missing."""
-    from .criticism.criticise import criticise as run_criticise
-    from .inputs.cups import open_cups
-    from .inputs.pour_table import open_pours
+    from ..criticism.criticise import criticise as run_criticise
+    from ..inputs.cups import open_cups
+    from ..inputs.pour_table import open_pours
 
     for name, given in (("liquid", liquid), ("cups", cups), ("held-out-pours", held_out_pours)):
         if pours is None and given:
@@ -223,9 +236,9 @@ def pour(  # noqa: PLR0913  one parameter for each option
     for option, given in (("arm", arm), ("emulator", emulator), ("rig", rig)):
         if given:
             raise typer.BadParameter(f"--{option} needs --execute, which is missing")
-    from .criticism.result import latest_calibration
-    from .inputs.cups import bundled_cups, open_cups
-    from .pouring.choose import choose_pour
+    from ..criticism.result import latest_calibration
+    from ..inputs.cups import bundled_cups, open_cups
+    from ..pouring.choose import choose_pour
 
     chosen_cups = bundled_cups() if cups is None else open_cups(cups)
     choose_pour(latest_calibration(run), chosen_cups, iterations=iterations, risk=risk)
@@ -245,7 +258,7 @@ def report(
     ] = True,
 ) -> None:
     """Write RUN/report.html, one file that shows it all."""
-    from .reporting.report import report as write_report
+    from ..reporting.report import report as write_report
 
     typer.echo(write_report(run, moving=moving))
 
@@ -257,8 +270,8 @@ def demo(
     ),
 ) -> None:
     """Calibrate on the bundled glycerin, criticise, choose a pour and write the report."""
-    from .criticism.result import Criticism
-    from .demo import run_demo
+    from ..criticism.result import Criticism
+    from ..demo import run_demo
 
     with complaints_among_results():
         path = run_demo(out)
@@ -269,10 +282,10 @@ def demo(
 
 
 # after the commands above, for the help lists them in this order
-app.command("import", epilog=cli_import.EPILOG)(cli_import.import_table)
+app.command("import", epilog=import_table.EPILOG)(import_table.import_table)
 app.command(epilog=cli_record.EPILOG)(cli_record.record)
-app.command(epilog=cli_reproduce.EPILOG)(cli_reproduce.reproduce)
-app.command(epilog=cli_guide.EPILOG)(cli_guide.guide)
+app.command(epilog=reproduce.EPILOG)(reproduce.reproduce)
+app.command(epilog=guide.EPILOG)(guide.guide)
 app.add_typer(cli_simulate.app, name="simulate")
 app.add_typer(cli_rig.app, name="rig")
 app.add_typer(cli_check.app, name="check")

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .cli_examples import examples
+from .examples import examples
 
 EPILOG = examples("import --template columns.toml", "import stir.csv --columns columns.toml")
 
@@ -28,8 +28,8 @@ def import_table(
 
     First write a template; change it to say what stands where in your table; then import.
     """
-    from .inputs.table_import import import_table as run_import
-    from .inputs.table_import import outline, write_template
+    from ..inputs.table_import import import_table as run_import
+    from ..inputs.table_import import outline, write_template
 
     if template is not None:
         written = write_template(template)

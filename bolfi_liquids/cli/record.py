@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .cli_errors import FAILED
-from .cli_examples import examples
-from .cli_rig import RigOption
-from .errors import InputError
-from .online.settings import OnlineSettings
+from ..errors import InputError
+from ..online.settings import OnlineSettings
+from .errors import FAILED
+from .examples import examples
+from .rig import RigOption
 
 if TYPE_CHECKING:
-    from .hardware import Check, Rig
-    from .online.record import OnlineChoice
+    from ..hardware import Check, Rig
+    from ..online.record import OnlineChoice
 
 OUT = Path("runs/recording")
 EPILOG = examples(
@@ -57,9 +57,9 @@ def record(  # noqa: PLR0913  one parameter for each option
     ] = None,
 ) -> None:
     """Stir, and record it. A dry run unless armed: it plans, checks everything, moves nothing."""
-    from .inputs.cups import open_cups
-    from .inputs.rigs import rig_of
-    from .online.record import OnlineChoice
+    from ..inputs.cups import open_cups
+    from ..inputs.rigs import rig_of
+    from ..online.record import OnlineChoice
     from .tables import print_recording
 
     _one_of(arm, emulator)
@@ -87,9 +87,9 @@ def _record(
     online: "OnlineChoice | None",
     viscosity: float | None,
 ):
-    from .hardware import HiddenLiquid
-    from .online.record import record_online
-    from .robot.record import record as run_record
+    from ..hardware import HiddenLiquid
+    from ..online.record import record_online
+    from ..robot.record import record as run_record
 
     emulate: HiddenLiquid | None = None if viscosity is None else HiddenLiquid(viscosity=viscosity)
     ask = None if emulate is not None else typed_sentence
@@ -100,8 +100,8 @@ def _record(
 
 def execute(run: Path, rig: Path | None, *, arm: bool, emulator: bool) -> None:
     """`pour --execute`: a dry run unless armed."""
-    from .inputs.rigs import rig_of
-    from .robot.pour import execute_pour
+    from ..inputs.rigs import rig_of
+    from ..robot.pour import execute_pour
 
     _one_of(arm, emulator)
     opened = rig_of(rig)
@@ -125,7 +125,7 @@ def _needs(option: str, given: object, others: dict[str, object]) -> None:
 
 def typed_sentence(plan: str) -> str:
     """Show the plan, and read what the person types."""
-    from .hardware import SENTENCE
+    from ..hardware import SENTENCE
 
     typer.echo(plan)
     if not sys.stdin.isatty():
@@ -138,8 +138,8 @@ def typed_sentence(plan: str) -> str:
 
 
 def _dry_run(rig: "Rig", cycles: int | None, out: Path) -> None:
-    from .hardware import describe
-    from .robot.stir import dry_run, plan_stir
+    from ..hardware import describe
+    from ..robot.stir import dry_run, plan_stir
 
     if out.is_dir() and any(out.iterdir()):
         raise InputError("holds files already", where=str(out), fix="give a new directory: --out")
@@ -151,7 +151,7 @@ def _dry_run(rig: "Rig", cycles: int | None, out: Path) -> None:
 
 
 def _dry_pour(run: Path, rig: "Rig") -> None:
-    from .robot.pour import dry_pour
+    from ..robot.pour import dry_pour
 
     with tempfile.TemporaryDirectory(dir=_nearest(run)) as directory:
         text, checks = dry_pour(run, rig, Path(directory))

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 import typer
 
 if TYPE_CHECKING:
-    from .criticism.result import Criticism
+    from ..criticism.result import Criticism
 
 
 @contextmanager
 def complaints_among_results() -> Iterator[None]:
     """What the surrogate's checks complain of is printed with its results, and not before."""
-    from .inference import EmulatorWarning
+    from ..inference import EmulatorWarning
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", EmulatorWarning)
@@ -34,7 +34,7 @@ def print_section(run: Path, name: str) -> None:
     """Section "calibrate" or "pour" of a run's summary."""
     from rich.console import Console
 
-    from .run.summary import read_summary
+    from ..run.summary import read_summary
     from .tables import print_calibration, print_pour
 
     {"calibrate": print_calibration, "pour": print_pour}[name](read_summary(run)[name], Console())

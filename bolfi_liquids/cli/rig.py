@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from .cli_errors import FAILED
-from .cli_examples import examples
+from .errors import FAILED
+from .examples import examples
 
 RigOption = Annotated[
     Path | None, typer.Option("--rig", metavar="FILE", help="rig.toml; without it, the bundled.")
@@ -23,8 +23,8 @@ def check(rig: RigOption = None) -> None:
     """
     from rich.console import Console
 
-    from .hardware import check_rig
-    from .inputs.rigs import rig_of
+    from ..hardware import check_rig
+    from ..inputs.rigs import rig_of
     from .tables import print_checks
 
     checks = check_rig(rig_of(rig))
@@ -38,7 +38,7 @@ def template(
     out: Annotated[Path, typer.Argument(metavar="FILE", help="To be written.")] = Path("rig.toml"),
 ) -> None:
     """Write the bundled rig.toml, to be changed into your own."""
-    from .inputs.rigs import write_template
+    from ..inputs.rigs import write_template
 
     typer.echo(f"{write_template(out)}: change it, then: bolfi-liquids rig check --rig {out}")
 
@@ -71,7 +71,7 @@ def calibrate_cameras(  # noqa: PLR0913  one parameter for each option
     ] = None,
 ) -> None:
     """Learn a camera's lens from a printed board, and its roll from a plumb line."""
-    from .robot.camera_calibration import calibrate_view, write_board
+    from ..robot.camera_calibration import calibrate_view, write_board
 
     if print_board is not None:
         typer.echo(f"{write_board(print_board)}: print it, measure a square, glue it on a plate")
@@ -92,7 +92,7 @@ def emulate(
 
     Any client of a real controller may connect to it, ours by `host` under `robot` in rig.toml.
     """
-    from .inputs.rigs import emulator_until_interrupted, rig_of
+    from ..inputs.rigs import emulator_until_interrupted, rig_of
 
     for line in emulator_until_interrupted(rig_of(rig), address, viscosity):
         typer.echo(line)

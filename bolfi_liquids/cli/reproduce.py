@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .cli_examples import examples
+from .examples import examples
 
 EPILOG = examples("reproduce --quick", "reproduce inclination posterior --out runs/reproduce")
 
@@ -40,8 +40,8 @@ def reproduce(
 
     What has finished in DIR is kept: a killed run goes on with the same command.
     """
-    from .reproduction.reproduce import reproduce as draw
-    from .reproduction.scale import FULL, QUICK
+    from ..reproduction.reproduce import reproduce as draw
+    from ..reproduction.scale import FULL, QUICK
 
     # of one scale each, so that no figure of the one stands beside some of the other
     out = out or Path("runs/reproduce_quick" if quick else "runs/reproduce")
