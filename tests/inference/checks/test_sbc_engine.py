@@ -38,7 +38,7 @@ def every_task(*slow):
 @pytest.fixture(scope="module")
 def toys():
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(Path(__file__).parent))  # which spawned workers inherit
+        patch.syspath_prepend(str(Path(__file__).parents[1]))  # which spawned workers inherit
         yield importlib.import_module("closed_form")
 
 

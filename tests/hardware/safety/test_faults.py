@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-FAULTS = Path(__file__).parents[1] / "benchmarks" / "hardware" / "faults.py"
+FAULTS = Path(__file__).parents[2] / "benchmarks" / "hardware" / "faults.py"
 NAMES = (
     "control process killed",
     "main process killed",

@@ -20,7 +20,7 @@ CHECKS = {"sbc": inference.sbc, "coverage": inference.coverage, "tarp": inferenc
 @pytest.fixture(scope="module")
 def toys():
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(Path(__file__).parent))
+        patch.syspath_prepend(str(Path(__file__).parents[1]))
         yield importlib.import_module("closed_form")
 
 

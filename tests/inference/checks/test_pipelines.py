@@ -65,7 +65,7 @@ def test_a_shared_design_survives_failed_simulations(simulate, prior):
 @pytest.mark.slow
 def test_pipelines_travel_to_spawned_processes(monkeypatch):
     """Both kinds, on two processes, give what one process gives."""
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[1]))
     import closed_form
 
     simulate, prior = closed_form.TASKS["decay"]
