@@ -71,7 +71,7 @@ ANSWERS = {
     "8": Answer(
         "getForwardKinematics(q, tcp) is wrong",
         "kinematics of our own",
-        ("safety/hazards: calls_that_lie_are_not_used", "kinematics: "),
+        ("safety/hazards: calls_that_lie_are_not_used", "motion/kinematics: "),
     ),
     "9": Answer(
         "stopL, stopJ and setExternalForceTorque do something else",
