@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from ..calibration.stir_simulator import Stirring, stirring_of
 from ..inputs.bundled import bundled_recording
+from ..inputs.open import open_recordings
 from ..inputs.prior import default_prior, describe_prior
-from ..inputs.recording import Recording, open_recordings
+from ..inputs.recording import Recording
 from ..inputs.settings import (
     MIN_SIMULATIONS,
     PAPER_RULES,

@@ -11,8 +11,9 @@ from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, same_liquid, stirring_of
 from ..errors import InputError
 from ..inputs.cups import bundled_cups
+from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import PourTable, open_pours
-from ..inputs.recording import Recording, Source, open_recordings
+from ..inputs.recording import Recording
 from ..inputs.settings import ALARM, CriticismSettings
 from ..run.directory import CRITICISM_FORMAT
 from ..run.provenance import generations

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -67,11 +68,11 @@ class Described:
 
     def attributes(self) -> dict[str, float | int | str]:
         """The same for a file."""
-        from .. import __version__
         from ..models import MODEL_VERSION
 
+        release = version("bolfi-liquids")
         return {
-            "source": f"simulated by bolfi-liquids {__version__}, model {MODEL_VERSION}",
+            "source": f"simulated by bolfi-liquids {release}, model {MODEL_VERSION}",
             "viscosity": self.viscosity,
             "cohesion": self.cohesion,
             "liquid_density": self.density,
