@@ -9,7 +9,8 @@ if TYPE_CHECKING:
     from .calibration.result import Calibration
     from .criticism.criticise import criticise
     from .criticism.result import Criticism
-    from .inputs.recording import Recording, open_recording
+    from .inputs.open import open_recording
+    from .inputs.recording import Recording
     from .inputs.table_import import import_table
     from .models import Cups
     from .pouring.choose import choose_pour
@@ -45,7 +46,7 @@ _HOME = {
     "criticise": ".criticism.criticise",
     "execute_pour": ".robot.pour",
     "import_table": ".inputs.table_import",
-    "open_recording": ".inputs.recording",
+    "open_recording": ".inputs.open",
     "record": ".robot.record",
     "report": ".reporting.report",
 }

@@ -10,8 +10,9 @@ from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, stirring_of
 from ..calibration.tree import write_tree
 from ..errors import InputError
+from ..inputs.open import Source
 from ..inputs.pour_table import PourTable
-from ..inputs.recording import Recording, Source
+from ..inputs.recording import Recording
 from ..inputs.settings import CriticismSettings
 from ..progress import phases
 from ..run.directory import CRITICISM, open_bank

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..calibration.noise import rms
 from ..calibration.section import parameter_summary
-from ..inputs.settings import ALARM
+from ..inputs.settings import FALSE_ALARM_RATE
 from .findings import Findings
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def _held_out(source: "inference.Criticism") -> int:
 
 def _sure(source: "inference.Criticism") -> list[dict[str, Any]]:
     """The windows in which the base model and the data surely differ, surest first."""
-    sure = [found for found in source.before if found.p_value < ALARM]
+    sure = [found for found in source.before if found.p_value < FALSE_ALARM_RATE]
     ordered = sorted(sure, key=lambda found: (found.p_value, -abs(found.z)))
     return [
         {

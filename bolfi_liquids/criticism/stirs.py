@@ -8,7 +8,8 @@ import numpy as np
 from ..calibration.stir_simulator import Stirring
 from ..errors import InputError
 from ..inputs.recording import Recording
-from ..inputs.strokes import resting, windows
+from ..inputs.strokes import resting
+from .windows import windows
 
 if TYPE_CHECKING:
     from ..inference import (

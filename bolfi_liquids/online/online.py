@@ -20,13 +20,14 @@ from numpy.typing import NDArray
 from ..calibration.calibrate import calibrate
 from ..errors import InputError
 from ..inputs.cups import bundled_cups
+from ..inputs.open import Source, open_recording
 from ..inputs.prior import (
     check_prior,
     default_prior,
     describe_prior,
     read_prior,
 )
-from ..inputs.recording import Recording, Source, open_recording
+from ..inputs.recording import Recording
 from ..pouring.map import make_pours
 from ..run.directory import RUN_TOML
 from .learner import learn_online

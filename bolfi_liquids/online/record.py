@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..inputs.recording import Recording, open_recording
+from ..inputs.open import open_recording
+from ..inputs.recording import Recording
 from ..robot.armed_session import Ask, check_one
 from ..robot.live_view import SessionView
 from ..robot.record import kept
