@@ -38,7 +38,7 @@ OTHER_NAME = "choose another name"
 STICK_WEIGHT_UNITS = {"stick_density": "kg/m3", "stick_mass": "kg"}
 MIN_TRAVEL = 5e-3  # of the gripper [m], on which an inclination can be seen to trail
 MAX_CORRELATION = 0.2  # between a stick that trails and the gripper; thin liquids let it swing
-HEADER_FIX = "correct the map: `column`, `skip` or `delimiter`"
+HEADER_FIX = "correct the map: `column`, `skip` or `delimiter`, or leave `delimiter` out"
 
 
 def write_template(path: str | Path) -> Path:
