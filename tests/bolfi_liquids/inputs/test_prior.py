@@ -60,9 +60,6 @@ def test_a_person_may_write_any_function_of_numpyro():
 def test_the_text_of_version_0_1_is_the_same_prior():
     viscosity, cohesion = "LogUniform(high=20.0, low=0.003)", "Uniform(high=1.0, low=0.0)"
     text = {"viscosity": viscosity, "cohesion": cohesion}
-        "viscosity": "LogUniform(high=20.0, low=0.003)",
-        "cohesion": "Uniform(high=1.0, low=0.0)",
-    }
     for name, values in default_prior().from_unit(U).items():
         np.testing.assert_array_equal(read_prior(text).from_unit(U)[name], values)
     record = upgraded({"settings": {"seed": 1, "prior": text}})
