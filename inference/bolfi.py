@@ -26,11 +26,12 @@ from .history import (
 from .prior import Prior
 from .result import Fit
 from .sobol import sobol, start_size
-from .surrogates.base import Acquisition, Theta
+from .surrogates.base import Acquisition
 from .surrogates.families import Family, Learnable, resolve
 from .surrogates.feasibility import feasibility
 from .surrogates.outliers import sane
 from .surrogates.warnings import EmulatorWarning
+from .types import Theta
 
 DIGITS, EDGE = 7, 1e-7  # of the prior quantiles that are asked, and how near the bounds
 MIN_LEARN = 3  # successful simulations before the surrogate may choose

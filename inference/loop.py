@@ -26,8 +26,9 @@ from .simulations.job import (
 from .simulations.progress import progress_bar
 from .simulations.runner import Runner
 from .sobol import start_size
-from .surrogates.base import Acquisition, Simulator, Theta
+from .surrogates.base import Acquisition
 from .surrogates.families import Family
+from .types import Simulator, Theta
 
 
 def fit(  # noqa: PLR0913  the one call that most users make

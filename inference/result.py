@@ -15,13 +15,14 @@ from .history import History
 from .prior import Prior
 from .sampling.draw import SAMPLERS, draw_posterior
 from .sampling.target import Length, Target, log_likelihood
-from .surrogates.base import Surrogate, Theta
+from .surrogates.base import Surrogate
 from .tree import (
     add_surrogate,
     finished,
     results_tree,
     simulations_dataset,
 )
+from .types import Theta
 
 
 class Closest(NamedTuple):

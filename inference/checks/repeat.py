@@ -12,7 +12,7 @@ from ..arguments import check_callable, check_function, checked_integer
 from ..describe import describe
 from ..prior import Prior
 from ..simulations.progress import progress_bar
-from ..surrogates.base import Simulator
+from ..types import Simulator
 from .replicate import Observe, Pipeline, Plan, Replicate, run_replicate
 from .replicated import Replicates
 from .store import ReplicateStore

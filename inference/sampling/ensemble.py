@@ -9,7 +9,7 @@ import jax
 import numpy as np
 from scipy.special import ndtr
 
-from ..surrogates.base import LogLikelihood
+from ..types import LogLikelihood
 from .mixture import UNIFORMS, Mixture, propose
 from .mixture import log_density as log_mixture
 from .starts import look_around, resampled

@@ -7,15 +7,13 @@ library (tested), so that they start quickly and stay small.
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from ..types import Simulator
 from .bank import Simulation
 from .failures import raised, timed_out
-
-if TYPE_CHECKING:
-    from ..surrogates.base import Simulator
 
 R = TypeVar("R")
 
@@ -51,7 +49,7 @@ def columns(batch: Sequence[Job]) -> tuple[dict[str, np.ndarray], np.ndarray]:
 
 
 def run_batch(
-    simulate: "Simulator",
+    simulate: Simulator,
     batch: Sequence[Job],
     shape: tuple[int, ...] | None,
     timeout: float | None = None,

@@ -4,15 +4,13 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, wait
 from functools import partial
 from pickle import PicklingError
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from ..types import Simulator
 from .bank import Simulation, SimulationBank
 from .executors import killed_its_worker
 from .failures import TIMEOUT, kind, raised
 from .job import Job, run_batch
-
-if TYPE_CHECKING:
-    from ..surrogates.base import Simulator
 
 POLL = 0.2  # seconds between looks at what somebody else is simulating
 
@@ -45,7 +43,7 @@ class Runner:
 
     def __init__(
         self,
-        simulate: "Simulator",
+        simulate: Simulator,
         bank: SimulationBank,
         identity: str,
         executor: Executor | None = None,
@@ -222,7 +220,7 @@ def is_final(found: Simulation, timeout: float | None) -> bool:
 
 
 def run_missing(  # noqa: PLR0913  the runner's arguments and the call's
-    simulate: "Simulator",
+    simulate: Simulator,
     jobs: Sequence[Job],
     shape: Shape,
     bank: SimulationBank,
