@@ -42,7 +42,8 @@ from .sbc_pipelines import (
 from .sbc_tree import SurrogateCheck, checked, write_results
 
 if TYPE_CHECKING:
-    from ..inference import Prior, Replicates
+    from ..inference import Prior
+    from ..inference.checks import Replicates
 
 
 AT_ONCE = 16  # stirs in one call
@@ -124,7 +125,7 @@ def _replicates(  # noqa: PLR0913  what the two surrogates share
 
 
 def _record(settings: SbcSettings, prior: "Prior", stirring: Stirring) -> Mapping[str, Any]:
-    from ..inference import ENGINE_VERSION
+    from ..inference.engine_version import ENGINE_VERSION
 
     return {
         "engine": {"version": ENGINE_VERSION, "initial": MIN_SIMULATIONS, "runs": RUNS}
@@ -149,7 +150,8 @@ def stirs_everywhere(  # noqa: PLR0913  what makes simulations
     """Points that fill the prior [n, d], and `RUNS` stirs of each [n, RUNS, T, 2]; failed: NaN."""
     from scipy.stats import qmc
 
-    from ..inference import Job, SimulationBank, run_missing
+    from ..inference import SimulationBank
+    from ..inference.simulations import Job, run_missing
 
     u = qmc.Sobol(len(prior), rng=settings.seed).random(settings.design)
     theta = prior.from_unit(u)

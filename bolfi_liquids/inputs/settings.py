@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    from ..inference import Plan
+    from ..inference.criticism import Plan
 
 SURROGATES = ("signal", "discrepancy")
 SAMPLERS = ("nuts", "emcee")
@@ -157,21 +157,21 @@ class CriticismSettings:
 
         With held-out runs of four models, proposals and six baselines, at most 350 in all.
         """
-        from ..inference import Plan
+        from ..inference.criticism import Plan
 
         return Plan(base=24, extension=8, refit=12, held_out=6, most=168)
 
     @property
     def pour_plan(self) -> "Plan":
         """The same for pours, of which each run makes the whole table."""
-        from ..inference import Plan
+        from ..inference.criticism import Plan
 
         return Plan(start=12, base=12, extension=8, refit=10)
 
     @property
     def clean_plan(self) -> "Plan":
         """The same for each clean recording."""
-        from ..inference import Plan
+        from ..inference.criticism import Plan
 
         return Plan(start=8, base=8)
 

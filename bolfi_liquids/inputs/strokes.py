@@ -11,7 +11,7 @@ from .recording import Recording
 
 if TYPE_CHECKING:
     from ..calibration.stir_simulator import Stirring
-    from ..inference import Window
+    from ..inference.criticism import Window
 
 MOVING = 0.5  # of the greatest speed: corners are too short for samples to see them at rest
 STILL = 1e-4  # m
@@ -84,7 +84,7 @@ def until_stroke(recording: Recording, number: int) -> Recording:
 
 def windows(stirring: "Stirring") -> tuple["Window", ...]:
     """Strokes in each plane, then speeds in both, over the joined samples."""
-    from ..inference import Window
+    from ..inference.criticism import Window
 
     def whole(member: int, samples: NDArray[np.bool_], planes: tuple[int, ...]) -> NDArray:
         there = np.zeros((*stirring.member.shape, len(PLANE_NAMES)), bool)

@@ -19,7 +19,7 @@ LIBRARIES = ("bolfi-liquids", "numpy", "scipy", "jax", "numpyro", "emcee", "taic
 
 def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring) -> dict[str, Any]:
     """Settings, inputs and versions; see `run_directory.MUST_AGREE` for what must not change."""
-    from ..inference import ENGINE_VERSION
+    from ..inference.engine_version import ENGINE_VERSION
 
     return {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -34,7 +34,7 @@ def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring
 
 def generations() -> dict[str, str]:
     """Of engine and model: what another one made is not to be taken for this one's."""
-    from ..inference import ENGINE_VERSION
+    from ..inference.engine_version import ENGINE_VERSION
     from ..models import MODEL_VERSION
 
     return {"engine": ENGINE_VERSION, "model": MODEL_VERSION}
