@@ -26,6 +26,14 @@ class Simulator(Protocol):
         ...
 
 
+class SingleSimulator(Protocol):
+    """Anything that turns one set of parameters into one signal."""
+
+    def __call__(self, theta: dict[str, float], seed: int, /) -> np.ndarray:
+        """theta: name -> value; seed in [0, 2^31)  ->  signal [*signal_shape]."""
+        ...
+
+
 class Discrepancy(Protocol):
     """A distance between the observed and one simulated signal; non-finite means failed."""
 
