@@ -107,7 +107,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
 
 def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring) -> dict[str, Any]:
     """Content of run.toml: settings, inputs, versions; see `run.directory.MUST_AGREE`."""
-    from ..inference import ENGINE_VERSION
+    from ..inference.engine_version import ENGINE_VERSION
 
     return {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),

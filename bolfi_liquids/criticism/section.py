@@ -65,22 +65,22 @@ def _together(findings: Findings) -> tuple[str, tuple[str, ...]]:
     return "none", ()
 
 
-def _saying(kind: str, findings: Findings) -> "list[inference.Criticism]":
+def _saying(kind: str, findings: Findings) -> "list[inference.criticism.Criticism]":
     """The sources of this verdict."""
     return [source for source in findings.sources.values() if source.verdict.kind == kind]
 
 
-def _refuted(source: "inference.Criticism") -> list[str]:
+def _refuted(source: "inference.criticism.Criticism") -> list[str]:
     """Explanations that held-out data do not bear out."""
     return [" with ".join(names) for names in source.refuted]
 
 
-def _held_out(source: "inference.Criticism") -> int:
+def _held_out(source: "inference.criticism.Criticism") -> int:
     """Data held out on which something was tried."""
     return max(map(len, source.gaps.values()), default=0)
 
 
-def _sure(source: "inference.Criticism") -> list[dict[str, Any]]:
+def _sure(source: "inference.criticism.Criticism") -> list[dict[str, Any]]:
     """The windows in which the base model and the data surely differ, surest first."""
     sure = [found for found in source.before if found.p_value < FALSE_ALARM_RATE]
     ordered = sorted(sure, key=lambda found: (found.p_value, -abs(found.z)))
@@ -95,7 +95,7 @@ def _sure(source: "inference.Criticism") -> list[dict[str, Any]]:
     ]
 
 
-def _rms(hypothesis: "inference.Hypothesis") -> float:
+def _rms(hypothesis: "inference.criticism.Hypothesis") -> float:
     return rms(hypothesis.difference)
 
 
@@ -103,13 +103,13 @@ def _degrees(value: float | None) -> float | None:
     return None if value is None else float(np.degrees(value))
 
 
-def _gap_deg(source: "inference.Criticism") -> dict[str, float | None]:
+def _gap_deg(source: "inference.criticism.Criticism") -> dict[str, float | None]:
     """The gap before and after, by what was accepted or else by the best of what is tied.
 
     A gap is the RMS of observed less expected beyond what the cameras and the simulator's own
     noise would leave of a right model, in quadrature; the RMS itself stands beside it.
     """
-    from ..inference import beyond
+    from ..inference.criticism import beyond
 
     best = source.leading
     base = source.base.hypothesis
@@ -136,7 +136,7 @@ def _gap_deg(source: "inference.Criticism") -> dict[str, float | None]:
     return {name: _degrees(value) for name, value in numbers.items()}
 
 
-def _pour_gap(source: "inference.Criticism") -> dict[str, Any]:
+def _pour_gap(source: "inference.criticism.Criticism") -> dict[str, Any]:
     """RMS of the spilled and retained fractions, and the verdict on the pours alone."""
     best = source.leading
     return {
@@ -146,7 +146,7 @@ def _pour_gap(source: "inference.Criticism") -> dict[str, Any]:
     }
 
 
-def _verdict(source: "inference.Criticism") -> dict[str, Any]:
+def _verdict(source: "inference.criticism.Criticism") -> dict[str, Any]:
     """On one kind of data."""
     return {
         "verdict": source.verdict.kind,

@@ -69,7 +69,7 @@ def _posterior(findings: Findings) -> "Dataset":
     return known
 
 
-def _residual(findings: Findings, name: str, source: "inference.Criticism") -> "Dataset":
+def _residual(findings: Findings, name: str, source: "inference.criticism.Criticism") -> "Dataset":
     from xarray import Dataset
 
     observed = source.base.hypothesis.fit.observed
@@ -99,14 +99,14 @@ def _residual(findings: Findings, name: str, source: "inference.Criticism") -> "
     return Dataset({key: (*of, UNITS[name]) for key, of in columns.items()}, coords=coords)
 
 
-def _expected(hypothesis: "inference.Hypothesis") -> tuple[np.ndarray, np.ndarray]:
+def _expected(hypothesis: "inference.criticism.Hypothesis") -> tuple[np.ndarray, np.ndarray]:
     output = hypothesis.surrogate.output
     sd = np.sqrt(np.diag(hypothesis.spread + hypothesis.noise))
     residual, sd = (output.restore(row[None])[0] for row in (hypothesis.difference, sd))
     return hypothesis.fit.observed - residual, sd
 
 
-def _where(source: "inference.Criticism", units: dict[str, str]) -> "Dataset":
+def _where(source: "inference.criticism.Criticism", units: dict[str, str]) -> "Dataset":
     from xarray import Dataset
 
     keys = {key: type(value) for found in source.before for key, value in found.label.items()}
@@ -125,7 +125,7 @@ def _where(source: "inference.Criticism", units: dict[str, str]) -> "Dataset":
 _NOTHING: dict[type, Any] = {str: "", int: -1, float: float("nan")}
 
 
-def _effects(source: "inference.Criticism") -> "Dataset":
+def _effects(source: "inference.criticism.Criticism") -> "Dataset":
     from xarray import Dataset
 
     signatures, singles = source.base.signatures, source.singles
@@ -159,7 +159,9 @@ def _effects(source: "inference.Criticism") -> "Dataset":
     return Dataset({**columns, "unit": units, "status": status}, coords={"effect": names})
 
 
-def _status(candidate: "inference.Candidate", source: "inference.Criticism") -> str:
+def _status(
+    candidate: "inference.criticism.Candidate", source: "inference.criticism.Criticism"
+) -> str:
     """What became of an explanation by one effect."""
     if candidate.names[0] in source.verdict.effects:
         return "named" if source.verdict.kind == "effect" else "possible"
@@ -172,7 +174,7 @@ def _status(candidate: "inference.Candidate", source: "inference.Criticism") -> 
     return "less likely"
 
 
-def _confusion(source: "inference.Criticism") -> "Dataset":
+def _confusion(source: "inference.criticism.Criticism") -> "Dataset":
     from xarray import Dataset
 
     names = list(source.base.signatures)
@@ -182,7 +184,7 @@ def _confusion(source: "inference.Criticism") -> "Dataset":
     )
 
 
-def _held_out(source: "inference.Criticism", units: dict[str, str]) -> "Dataset":
+def _held_out(source: "inference.criticism.Criticism", units: dict[str, str]) -> "Dataset":
     from xarray import Dataset
 
     names = [" with ".join(explanation) for explanation in source.gaps]
@@ -200,7 +202,7 @@ def _held_out(source: "inference.Criticism", units: dict[str, str]) -> "Dataset"
     return Dataset(columns, coords={"explanation": names, "recording": labels})
 
 
-def _suggestions(source: "inference.Criticism") -> "Dataset":
+def _suggestions(source: "inference.criticism.Criticism") -> "Dataset":
     from xarray import Dataset
 
     return Dataset(

@@ -8,13 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    from ..hardware import (
-        EmulatedRig,
-        PosePath,
-        Rig,
-        Session,
-        Tool,
-    )
+    from ..hardware import EmulatedRig, Rig, Session, Tool
+    from ..hardware.motion import PosePath
 
 Ask = Callable[[str], str]
 """Shows a person the plan, and returns what the person typed."""
@@ -79,13 +74,8 @@ def armed_session(
         InputError: Both are given, or neither.
         RigError: The person did not agree, or something cannot be used.
     """
-    from ..hardware import (
-        Session,
-        confirm,
-        confirm_emulated,
-        describe,
-        webcams,
-    )
+    from ..hardware import Session, confirm, confirm_emulated, webcams
+    from ..hardware.session.confirmation import describe
 
     check_one(ask, emulation, "armed_session")
     text = describe(task.paths, task.rig, task.tool)

@@ -18,7 +18,8 @@ from .armed_session import (
 from .live_view import SessionView
 
 if TYPE_CHECKING:
-    from ..hardware import Check, PosePath, Rig
+    from ..hardware import Check, Rig
+    from ..hardware.motion import PosePath
 
 POURS = "pours"  # directories of what the arm did, in the RUN
 
@@ -48,7 +49,8 @@ def plan_pour(run: str | Path, rig: "Rig") -> PourPlan:
         InputError: The run has chosen none.
         MotionRejected: The motion breaks one of the rig's limits.
     """
-    from ..hardware import check_path, pour_path, ready_to_pour
+    from ..hardware import check_path
+    from ..hardware.motion import pour_path, ready_to_pour
 
     tree, cups = _chosen(Path(run))
     turn = cups["pour"]
@@ -96,7 +98,8 @@ def execute_pour(
         MotionRejected: The motion breaks one of the rig's limits.
         SessionStopped: The arm was stopped.
     """
-    from ..hardware import SessionStopped, approach_pour, emulated
+    from ..hardware import SessionStopped, emulated
+    from ..hardware.motion import approach_pour
 
     check_one(ask, emulate, "execute_pour")
     plan = plan_pour(run, rig)
@@ -120,7 +123,8 @@ def execute_pour(
 
 def dry_pour(run: str | Path, rig: "Rig", out: Path) -> "tuple[str, list[Check]]":
     """What the arm would do, and the pre-flight list of a session that cannot move it."""
-    from ..hardware import Session, describe
+    from ..hardware import Session
+    from ..hardware.session.confirmation import describe
 
     plan = plan_pour(run, rig)
     with Session(rig, out, tool="pouring", plan=[plan.path]) as session:

@@ -64,7 +64,7 @@ def pictures(tmp_path_factory):
 @pytest.fixture(scope="module")
 def emulator():
     rig = hardware.bundled_rig()
-    with hardware.emulated(rig, hardware.above_cup(rig)) as running:
+    with hardware.emulated(rig, hardware.motion.above_cup(rig)) as running:
         yield running.emulator
 
 
@@ -208,7 +208,7 @@ def test_armed_without_the_sentence_moves_nothing(
 def test_the_sentence_does_move_the_arm(run_with_a_pour, tmp_path):
     """Without this the tests above could not fail."""
     rig = hardware.bundled_rig()
-    ready = hardware.ready_to_pour(rig, 0.02, 0.2)
+    ready = hardware.motion.ready_to_pour(rig, 0.02, 0.2)
     with hardware.emulated(rig, ready, tool="pouring") as running:
         text = (files("bolfi_liquids.hardware.data") / "rig.toml").read_text()
         path = tmp_path / "rig.toml"
