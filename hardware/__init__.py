@@ -43,8 +43,10 @@ if TYPE_CHECKING:
         describe,
     )
     from .session.emulated import EmulatedRig, HiddenLiquid, emulated
+    from .session.progress import Phase
     from .session.rig_check import check_rig
     from .session.session import Session, SessionStopped, Status
+    from .session.setup import SessionSetup
     from .vision.charuco import Board
 
 _HOME = {
@@ -56,11 +58,13 @@ _HOME = {
     "EmulatedRig": ".session.emulated",
     "HiddenLiquid": ".session.emulated",
     "MotionRejected": ".errors",
+    "Phase": ".session.progress",
     "PosePath": ".motion.stir_paths",
     "Rig": ".rig",
     "RigError": ".errors",
     "SENTENCE": ".session.confirmation",
     "Session": ".session.session",
+    "SessionSetup": ".session.setup",
     "SessionStopped": ".session.session",
     "Status": ".session.session",
     "Tool": ".safety.limits",
@@ -102,11 +106,13 @@ __all__ = [
     "HiddenLiquid",
     "MotionRejected",
     "Path",
+    "Phase",
     "PosePath",
     "Rig",
     "RigError",
     "SENTENCE",
     "Session",
+    "SessionSetup",
     "SessionStopped",
     "Status",
     "Tool",

@@ -81,6 +81,7 @@ def armed_session(
     """
     from ..hardware import (
         Session,
+        SessionSetup,
         confirm,
         confirm_emulated,
         describe,
@@ -100,7 +101,7 @@ def armed_session(
             address, source = task.rig.robot.host, "robot"
             make_cameras = webcams(task.rig)
             confirmation = confirm(text, ask(text), address)
-        session = Session(
+        setup = SessionSetup(
             task.rig,
             task.out,
             address,
@@ -112,4 +113,4 @@ def armed_session(
             rehearsal=emulation is not None,
             source=source,
         )
-        yield stack.enter_context(session)
+        yield stack.enter_context(Session(setup))
