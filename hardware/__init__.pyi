@@ -17,7 +17,9 @@ from .session.confirmation import confirm_emulated as confirm_emulated
 from .session.emulated import EmulatedRig as EmulatedRig
 from .session.emulated import HiddenLiquid as HiddenLiquid
 from .session.emulated import emulated as emulated
+from .session.progress import Phase as Phase
 from .session.rig_check import check_rig as check_rig
 from .session.session import Session as Session
 from .session.session import SessionStopped as SessionStopped
 from .session.session import Status as Status
+from .session.setup import SessionSetup as SessionSetup

@@ -74,7 +74,7 @@ def armed_session(
         InputError: Both are given, or neither.
         RigError: The person did not agree, or something cannot be used.
     """
-    from ..hardware import Session, confirm, confirm_emulated, webcams
+    from ..hardware import Session, SessionSetup, confirm, confirm_emulated, webcams
     from ..hardware.session.confirmation import describe
 
     check_one(ask, emulation, "armed_session")
@@ -90,7 +90,7 @@ def armed_session(
             address, source = task.rig.robot.host, "robot"
             make_cameras = webcams(task.rig)
             confirmation = confirm(text, ask(text), address)
-        session = Session(
+        setup = SessionSetup(
             task.rig,
             task.out,
             address,
@@ -102,4 +102,4 @@ def armed_session(
             rehearsal=emulation is not None,
             source=source,
         )
-        yield stack.enter_context(session)
+        yield stack.enter_context(Session(setup))

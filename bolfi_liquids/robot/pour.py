@@ -123,11 +123,12 @@ def execute_pour(
 
 def dry_pour(run: str | Path, rig: "Rig", out: Path) -> "tuple[str, list[Check]]":
     """What the arm would do, and the pre-flight list of a session that cannot move it."""
-    from ..hardware import Session
+    from ..hardware import Session, SessionSetup
     from ..hardware.session.confirmation import describe
 
     plan = plan_pour(run, rig)
-    with Session(rig, out, tool="pouring", plan=[plan.path]) as session:
+    setup = SessionSetup(rig, out, tool="pouring", plan=[plan.path])
+    with Session(setup) as session:
         return describe([plan.path], rig, "pouring"), session.preflight()
 
 

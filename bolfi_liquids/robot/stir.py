@@ -121,9 +121,10 @@ def dry_run(rig: "Rig", plan: StirPlan, out: Path) -> list["Check"]:
     Raises:
         RigError: The directory cannot be used.
     """
-    from ..hardware import Session, webcams
+    from ..hardware import Session, SessionSetup, webcams
 
-    with Session(rig, out, make_cameras=webcams(rig), plan=plan.paths) as session:
+    setup = SessionSetup(rig, out, make_cameras=webcams(rig), plan=plan.paths)
+    with Session(setup) as session:
         return session.preflight()
 
 

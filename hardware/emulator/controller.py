@@ -8,14 +8,14 @@ import numpy as np
 
 from ..motion.kinematics import ARMS
 from .arm import Arm
-from .commands import ProgramError
-from .fields import Snapshot
 from .force import ForceReading
 from .hanging_stick import HangingStick, Stick
+from .machine import ProgramError
 from .motion import MotionError
 from .program import Program
 from .registers import Registers
 from .script import ScriptError, parse
+from .snapshot import Snapshot
 
 STOPPED, PLAYING = 1, 2
 NORMAL_BITS = 1 << 0

@@ -4,12 +4,12 @@ import sys
 import time
 from collections.abc import Callable
 
-from .admin import AdminSession, Faults
 from .controller import Controller, Options
-from .dashboard import DashboardSession
-from .network import ADMIN, DASHBOARD, RTDE, SCRIPT, Network
-from .rtde_server import RtdeSession
-from .script_server import ScriptSession
+from .servers.admin import AdminSession, Faults
+from .servers.dashboard import DashboardSession
+from .servers.network import ADMIN, DASHBOARD, RTDE, SCRIPT, Network
+from .servers.rtde import RtdeSession
+from .servers.script import ScriptSession
 
 LATE = 0.05  # s; ticks that are later are left out, not made up for
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 from ..errors import RigError
 from .admin_client import Admin
-from .network import ADMIN, DASHBOARD, RTDE, SCRIPT
+from .servers.network import ADMIN, DASHBOARD, RTDE, SCRIPT
 
 START_TIMEOUT = 20.0  # s
 _TRIES = 20

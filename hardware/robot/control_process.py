@@ -16,6 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arm import (
+    ArmReader,
+    ArmState,
+    LinkLost,
+    PathFollower,
+)
 from ..board import Board, Row, Trouble, Who, host_time
 from ..errors import RigError
 from ..motion.cup_frame import cup_frame
@@ -27,12 +33,6 @@ from ..recorder.sample import Sample
 from ..safety.guards import Reading, Rules, Seen, Trip, evaluate, first_watch, tripped, watched
 from ..safety.limits import turn_between, workspace
 from ..safety.preflight import failures
-from .arm import (
-    ArmReader,
-    ArmState,
-    LinkLost,
-    PathFollower,
-)
 from .course import Course, Leg, Trail, advanced, queued
 from .inbox import Inbox, Vetting
 from .orders import (

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arm import ArmState, LinkLost
 from ..board import Board, Row, Who, host_time
 from ..errors import RigError
 from ..safety.guards import CAMERAS
@@ -21,7 +22,6 @@ from ..safety.preflight import (
     process_checks,
     program_check,
 )
-from .arm import ArmState, LinkLost
 from .orders import Assignment
 from .ur import URArm, URReader
 

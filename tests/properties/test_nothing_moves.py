@@ -225,9 +225,9 @@ def test_python_asks_for_the_same(tmp_path):
     with pytest.raises(ValueError, match="ask="):
         bl.record(rig, out=tmp_path / "a")
     with pytest.raises(ValueError, match="armed without a confirmation"):
-        hardware.Session(rig, tmp_path / "b", armed=True)
+        hardware.SessionSetup(rig, tmp_path / "b", armed=True)
     with pytest.raises(ValueError, match="without an emulated arm"):
-        hardware.Session(
+        hardware.SessionSetup(
             rig,
             tmp_path / "c",
             armed=True,

@@ -5,13 +5,13 @@ import time
 
 import numpy as np
 import pytest
+from bolfi_liquids.hardware.arm import LinkLost
 from bolfi_liquids.hardware.emulator.process import EmulatorProcess
 from bolfi_liquids.hardware.errors import MotionRejected, RigError
 from bolfi_liquids.hardware.motion.cup_frame import cup_frame
 from bolfi_liquids.hardware.motion.kinematics import inverse
 from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.rig_file import bundled_rig
-from bolfi_liquids.hardware.robot.arm import LinkLost
 from bolfi_liquids.hardware.robot.ur import URArm, URReader
 from bolfi_liquids.hardware.safety.limits import workspace
 
@@ -175,7 +175,7 @@ from bolfi_liquids.hardware.motion.cup_frame import cup_frame
 from bolfi_liquids.hardware.emulator.admin_client import Admin
 from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.rig_file import bundled_rig
-from bolfi_liquids.hardware.robot.arm import LinkLost
+from bolfi_liquids.hardware.arm import LinkLost
 from bolfi_liquids.hardware.robot.ur import URArm
 
 rig, address = bundled_rig(), sys.argv[1]

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
-from ..errors import RigError
+from ...errors import RigError
 
 MOST_UNSENT = 1 << 18  # bytes; a client that reads no more than this loses what comes later
 RTDE, SCRIPT, DASHBOARD, ADMIN = 30004, 30003, 29999, 29997

@@ -6,10 +6,11 @@ from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
 
-from .controller import Controller
-from .fields import Recipe, Snapshot, find
+from ..controller import Controller
+from ..registers import INPUT_TYPES
+from ..snapshot import Snapshot
+from .fields import Recipe, find
 from .network import Connection
-from .registers import INPUT_TYPES
 from .wire import (
     CONTROLLER,
     DATA,
