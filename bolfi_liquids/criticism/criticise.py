@@ -16,7 +16,6 @@ from ..inputs.recording import Recording
 from ..inputs.settings import CriticismSettings
 from ..progress import phases
 from ..run.directory import CRITICISM, open_bank
-from ..run.summary import write_section
 from .baseline import (
     Clean,
     clean_residuals,
@@ -28,13 +27,13 @@ from .given import Inputs, Pours, open_inputs
 from .pours import as_prior, pour_experiment
 from .proposals import pour_proposals, stir_proposals
 from .result import Criticism, finished_criticism
-from .section import criticism_section
 from .stirs import (
     camera_noise,
     effects_of,
     held_out_noise,
     stir_experiment,
 )
+from .summary import CriticismSummary
 from .tree import criticism_tree
 
 if TYPE_CHECKING:
@@ -71,7 +70,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         cups: With which they were poured; None takes the bundled ones.
         effects: Names in `models.EFFECTS` to consider; None is all of them.
         accept: Effects that join the model whatever the verdict.
-        seed: Of everything random.
+        seed: Of all random draws.
         progress: Whether to show phases on stderr.
 
     Raises:
@@ -104,8 +103,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         findings = _find(calibration, inputs, Keeping(bank, settings.batch, seed, report))
         tree = criticism_tree(findings)
     write_tree(tree, run / CRITICISM)
-    section = criticism_section(findings, tree, time.perf_counter() - started)
-    write_section(run, "criticise", section)
+    CriticismSummary.from_findings(findings, tree, time.perf_counter() - started).write(run)
     return Criticism.open(run)
 
 
