@@ -17,6 +17,11 @@ LATE = 0.05  # s; ticks that are later are left out, not made up for
 class Emulator:
     """A controller with its four ports open.
 
+    Attributes:
+        controller: Behind the ports.
+        network: The ports.
+        faults: Of the link, as the admin port injects them.
+
     Raises:
         RigError: The address is not one of 127.0.0.0/8, or a port is taken.
     """
@@ -24,18 +29,18 @@ class Emulator:
     def __init__(self, address: str, options: Options, clock: HostClock = REAL_CLOCK):
         self.controller = Controller(options, clock)
         self._clock = clock
-        self._faults = Faults()
+        self.faults = Faults()
         self.network = Network(
             address,
             {
                 RTDE: lambda one: RtdeSession(one, self.controller, self._rtde),
                 SCRIPT: lambda one: ScriptSession(one, self.controller),
                 DASHBOARD: lambda one: DashboardSession(one, self.controller),
-                ADMIN: lambda one: AdminSession(one, self.controller, self._faults),
+                ADMIN: lambda one: AdminSession(one, self.controller, self.faults),
             },
             clock,
         )
-        self._faults.network = self.network
+        self.faults.network = self.network
 
     def run(self, wanted: Callable[[], bool]) -> None:
         """Serve while `wanted()`, which is asked every tick."""
@@ -72,7 +77,7 @@ class Emulator:
             if frozen:
                 session.miss()
             else:
-                session.publish(snapshot, self._faults.late)
+                session.publish(snapshot, self.faults.late)
         for session in self.network.sessions(ADMIN):
             if isinstance(session, AdminSession):
                 session.publish(snapshot)

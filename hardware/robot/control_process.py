@@ -9,6 +9,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from ..board import Board
+from ..host_clock import REAL_CLOCK, HostClock
 from ..recorder.events import EventLog
 from ..safety.preflight import failures
 from .control_loop import ControlLoop, Links
@@ -30,15 +31,14 @@ def run_control(
         samples: To the recorder; nobody else may hold this end.
     """
     log = EventLog(Path(assignment.directory), "control")
-    signals: list[str] = []
+    links = Links(board, orders, samples, log, [])
     # nothing moves yet, and connecting waits for a controller that may never answer
     _on_signals(lambda *_: os._exit(1))
     code = 1
     try:
-        prepared = prepare(assignment, partial(others, assignment, board))
-        if _tell_list(assignment, prepared, log, orders):
-            _on_signals(lambda number, _: signals.append(signal.Signals(number).name))
-            links = Links(board, orders, samples, log, signals)
+        prepared = checked(assignment, links)
+        if prepared is not None:
+            _on_signals(lambda number, _: links.signals.append(signal.Signals(number).name))
             code = ControlLoop(assignment, prepared, links).run()
     except Exception as err:
         log.write("failed", reason=f"{type(err).__name__}: {err}")
@@ -55,12 +55,14 @@ def _on_signals(act: Callable[[int, object], None]) -> None:
         signal.signal(number, act)
 
 
-def _tell_list(to: Assignment, prepared: Prepared, log: EventLog, orders: Connection) -> bool:
-    """Write the pre-flight list down; whether it is clean."""
+def checked(to: Assignment, links: Links, clock: HostClock = REAL_CLOCK) -> Prepared | None:
+    """Go through the pre-flight list and write it down; None unless it is clean."""
+    prepared = prepare(to, partial(others, to, links.board), clock)
     checks = prepared.checks
-    log.write("checked", checks=[list(check) for check in checks], armed=to.armed)
+    links.log.write("checked", checks=[list(check) for check in checks], armed=to.armed)
     failed = failures(checks)
-    if failed:
-        log.write("refused", reason=failed)
-        report_to(orders, Checked(checks, None, None))
-    return not failed
+    if not failed:
+        return prepared
+    links.log.write("refused", reason=failed)
+    report_to(links.orders, Checked(checks, None, None))
+    return None
