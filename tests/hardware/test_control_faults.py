@@ -33,6 +33,7 @@ FAULTS = {
     "a frozen link": (lambda one: one.emulator.network.freeze(10.0), 0.3, "silence"),
     "a dropped link": (lambda one: one.emulator.network.drop(), 0.3, "connection"),
     "a silent recorder": (lambda one: one.silent.add(Who.RECORDER), 0.6, "recorder: no sign"),
+    "a dead recorder": (lambda one: one.recorder.close(), 0.3, "recorder's process is gone"),
     "a full disk": (
         lambda one: one.trouble.update({Who.RECORDER: Trouble.WRITE_FAILED}),
         0.3,
