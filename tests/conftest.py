@@ -37,6 +37,8 @@ def pytest_runtest_protocol(item, nextitem):
     if any(report.failed for report in reports) and stillness.disturbed():
         item.config.stash[REPEATED].append(item.nodeid)
         _wait_for_calm()
+        # a fixture that failed would fail again without a new setup
+        item.session._setupstate.teardown_exact(None)
         item._initrequest()
         reports = runtestprotocol(item, nextitem=nextitem, log=False)
     for report in reports:

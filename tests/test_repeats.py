@@ -16,24 +16,35 @@ conftest._Stillness.disturbed = lambda _: {disturbed}
 conftest.CALM = conftest.MOST_CALM = 0.0
 tries = dict.fromkeys(range({tests}), 0)
 
+@pytest.fixture(scope="module")
+def prepared():
+    tries["fixture"] = tries.get("fixture", 0) + 1
+    assert tries["fixture"] > {failures}
+
 @pytest.mark.punctual
 @pytest.mark.parametrize("number", tries)
 def test_that_fails_at_first(number):
     tries[number] += 1
     assert tries[number] > {failures}
+
+@pytest.mark.skipif({tests} != 1, reason="counted above")
+@pytest.mark.punctual
+def test_whose_fixture_fails_at_first(prepared):
+    pass
 """
 
 
 @pytest.mark.parametrize(
     ("disturbed", "tests", "failures", "code", "said"),
     [
+        (True, 1, 1, 0, "repeats: 2"),
         (True, 3, 1, 0, "repeats: 3"),
         (True, 4, 1, 1, "repeats: 4"),
-        (True, 1, 2, 1, "repeats: 1"),
-        (False, 1, 1, 1, "1 failed"),
-        (True, 1, 0, 0, "1 passed"),
+        (True, 1, 2, 1, "repeats: 2"),
+        (False, 2, 1, 1, "2 failed"),
+        (True, 1, 0, 0, "2 passed"),
     ],
-    ids=["a few", "too many", "fails twice", "fails in peace", "passes"],
+    ids=["test and fixture", "a few", "too many", "fails twice", "fails in peace", "passes"],
 )
 def test_a_failure_is_repeated_once_and_seldom(tmp_path, disturbed, tests, failures, code, said):
     (tmp_path / "conftest.py").write_text((Path(__file__).parent / "conftest.py").read_text())
