@@ -23,11 +23,10 @@ from ..run.directory import (
 )
 from ..run.provenance import LIBRARIES, versions
 from ..run.recordings import keep_recordings
-from ..run.summary import write_section
 from .draws import pick_draws
 from .result import Calibration, is_calibrated
-from .section import calibration_section
 from .stir_simulator import Stirring, stirring_of
+from .summary import CalibrationSummary
 
 if TYPE_CHECKING:
     from ..inference import Fit, Prior, SimulationBank
@@ -107,7 +106,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
 
 def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring) -> dict[str, Any]:
     """Content of run.toml: settings, inputs, versions; see `run.directory.MUST_AGREE`."""
-    from ..inference import ENGINE_VERSION
+    from ..inference.engine_version import ENGINE_VERSION
 
     return {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -156,7 +155,7 @@ def _calibrate(
             fix="nothing was written; go on with that budget and --resume",
         )
     write_tree(tree, run / POSTERIOR)
-    write_section(run, "calibrate", calibration_section(tree, fit, stirring, check))
+    CalibrationSummary.from_fit(tree, fit, stirring, check).write(run)
 
 
 def _left(run: Path, settings: CalibrationSettings, bank: "SimulationBank") -> int:

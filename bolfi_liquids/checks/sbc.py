@@ -43,7 +43,8 @@ from .sbc_pipelines import (
 from .sbc_tree import SurrogateCheck, checked, write_results
 
 if TYPE_CHECKING:
-    from ..inference import Prior, Replicates
+    from ..inference import Prior
+    from ..inference.checks import Replicates
 
 
 AT_ONCE = 16  # stirs in one call
@@ -125,7 +126,7 @@ def _replicates(  # noqa: PLR0913  what the two surrogates share
 
 
 def _record(settings: SbcSettings, prior: "Prior", stirring: Stirring) -> Mapping[str, Any]:
-    from ..inference import ENGINE_VERSION
+    from ..inference.engine_version import ENGINE_VERSION
 
     return {
         "engine": {"version": ENGINE_VERSION, "initial": MIN_SIMULATIONS, "runs": RUNS_PER_POINT}
@@ -150,7 +151,8 @@ def stirs_everywhere(  # noqa: PLR0913  what makes simulations
     """Points of the prior [n, d] and stirs of each [n, RUNS_PER_POINT, T, 2]; failed: NaN."""
     from scipy.stats import qmc
 
-    from ..inference import Job, SimulationBank, run_missing
+    from ..inference import SimulationBank
+    from ..inference.simulations import Job, run_missing
 
     u = qmc.Sobol(len(prior), rng=settings.seed).random(settings.design)
     theta = prior.from_unit(u)

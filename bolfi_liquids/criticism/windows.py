@@ -12,14 +12,14 @@ from ..inputs.recording import Recording
 from ..inputs.strokes import resting, speed, strokes
 
 if TYPE_CHECKING:
-    from ..inference import Window
+    from ..inference.criticism import Window
 
 SPEED_BINS = 3
 
 
 def windows(stirring: Stirring) -> tuple["Window", ...]:
     """Strokes in each plane, then speeds in both, over the joined samples."""
-    from ..inference import Window
+    from ..inference.criticism import Window
 
     def whole(member: int, samples: NDArray[np.bool_], planes: tuple[int, ...]) -> NDArray:
         there = np.zeros((*stirring.member.shape, len(PLANE_NAMES)), bool)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 
-class Gripper(NamedTuple):
+class Trajectory(NamedTuple):
     """The path of the gripper, at which the stick pivots."""
 
     time: NDArray[np.float64]  # (T,) s
@@ -38,7 +38,7 @@ class Recording:
     """
 
     time: NDArray[np.float64]
-    gripper: Gripper
+    gripper: Trajectory
     inclination: NDArray[np.float64]
     attrs: Mapping[str, float | str]
     path: Path
@@ -54,7 +54,7 @@ class Recording:
         return replace(
             self,
             time=time,
-            gripper=Gripper(time, self.gripper.position[:count]),
+            gripper=Trajectory(time, self.gripper.position[:count]),
             inclination=self.inclination[:count],
         )
 
@@ -110,7 +110,7 @@ def as_recording(dataset: "Dataset", path: Path) -> Recording:
     time = _frozen(dataset["time"].to_numpy())
     return Recording(
         time=time,
-        gripper=Gripper(time, stack(AXES)),
+        gripper=Trajectory(time, stack(AXES)),
         inclination=stack(PLANES),
         attrs=MappingProxyType({str(k): _plain(v) for k, v in dataset.attrs.items()}),
         path=path,

@@ -10,7 +10,7 @@ from pydantic.dataclasses import dataclass as validated_dataclass
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    from ..inference import Plan
+    from ..inference.criticism import Plan
 
 SURROGATES = ("signal", "discrepancy")
 SAMPLERS = ("nuts", "emcee")
@@ -188,20 +188,20 @@ class CriticismSettings:
 
         With held-out runs of four models, proposals and six baselines, at most 350 in all.
         """
-        from ..inference import Plan
+        from ..inference.criticism import Plan
 
         return Plan(base=24, extension=8, refit=12, held_out=6, most=168)
 
     @property
     def pour_plan(self) -> "Plan":
         """Runs of each step for pours, of which each makes the whole table."""
-        from ..inference import Plan
+        from ..inference.criticism import Plan
 
         return Plan(start=12, base=12, extension=8, refit=10)
 
     @property
     def clean_plan(self) -> "Plan":
         """Runs of each step for each clean recording."""
-        from ..inference import Plan
+        from ..inference.criticism import Plan
 
         return Plan(start=8, base=8)

@@ -48,7 +48,7 @@ from .simulator import simulate_plan
 if TYPE_CHECKING:
     from ..inference import Prior
     from ..models import Cups
-    from ..models.gripper_path import GripperPath
+    from ..models.trajectory import Trajectory
     from .estimate import OnlineEstimate
 
 __all__ = [
@@ -92,7 +92,7 @@ class OnlineCalibration:
     @classmethod
     def start(  # noqa: PLR0913  the one call that most users make
         cls,
-        path: "GripperPath",
+        path: "Trajectory",
         attrs: Mapping[str, float | str],
         *,
         out: str | Path,

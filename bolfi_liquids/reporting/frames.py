@@ -20,12 +20,12 @@ from ..criticism.result import latest_calibration
 from ..inputs.cups import kept_cups
 from ..inputs.prior import split_parameters
 from ..inputs.recording import Recording
-from ..pouring.tree import read_pour
+from ..pouring.result import read_pour
 from ..progress import Advance, progress_bar
 from ..run.directory import FRAMES, POUR
 from ..run.recordings import kept_recordings
 from ..run.simulations import fresh_seeds
-from .criticism_sentences import unit_of
+from ..words import unit_of
 
 if TYPE_CHECKING:
     from xarray import Dataset

@@ -9,7 +9,7 @@ LIBRARIES = ("bolfi-liquids", "numpy", "scipy", "jax", "numpyro", "emcee", "taic
 
 def generations() -> dict[str, str]:
     """Of engine and model: what another one made is not to be taken for this one's."""
-    from ..inference import ENGINE_VERSION
+    from ..inference.engine_version import ENGINE_VERSION
     from ..models import MODEL_VERSION
 
     return {"engine": ENGINE_VERSION, "model": MODEL_VERSION}

@@ -5,11 +5,11 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
-from bolfi_liquids.hardware import circle, star
+from bolfi_liquids.hardware.motion import circle, star
 
 from bolfi_liquids.calibration.stir_simulator import stirring_of
 from bolfi_liquids.inputs.bundled import bundled_recording
-from bolfi_liquids.inputs.recording import Gripper, Recording
+from bolfi_liquids.inputs.recording import Recording, Trajectory
 from bolfi_liquids.inputs.strokes import (
     PARTS,
     resting,
@@ -23,7 +23,7 @@ from bolfi_liquids.inputs.strokes import (
 def recorded(path) -> Recording:
     still = np.zeros((len(path.time), 2))
     return Recording(
-        path.time, Gripper(*path), still, MappingProxyType({}), Path("stir.nc"), "hash"
+        path.time, Trajectory(*path), still, MappingProxyType({}), Path("stir.nc"), "hash"
     )
 
 
