@@ -28,12 +28,13 @@ pytestmark = pytest.mark.filterwarnings(
 RUNS, ROWS = 12, 64
 KEYS = [jax.random.key(0), jax.random.key(1)]
 POINTS = np.array([[0.2, 0.7], [0.5, 0.5], [0.9, 0.1]])
+FACES = (inference, inference.surrogates, inference.checks, inference.criticism)
 LAYOUT = Layout(np.tile([0, 1], 8), np.repeat(np.arange(8), 2))  # two channels of 8 samples
 
 
 def exported(kind):
-    """Name -> what `inference` exports of a kind, the protocols themselves left out."""
-    found = {name: getattr(inference, name) for name in inference.__all__}
+    """Name -> what the engine's faces export of a kind, the protocols themselves left out."""
+    found = {name: getattr(face, name) for face in FACES for name in face.__all__}
     concrete = {name: one for name, one in found.items() if not getattr(one, "_is_protocol", False)}
     return {name: one for name, one in concrete.items() if kind(one)}
 
@@ -45,7 +46,7 @@ def called_with(one):
 
 
 def is_rule(one):
-    return called_with(one) == called_with(inference.Acquisition)
+    return called_with(one) == called_with(inference.surrogates.Acquisition)
 
 
 def is_family(one):
@@ -57,13 +58,15 @@ def is_noise(one):
 
 
 def is_pipeline(one):
-    return called_with(one) == called_with(inference.Pipeline)
+    return called_with(one) == called_with(inference.checks.Pipeline)
 
 
 def is_check(one):
     """A function whose first argument may be `Replicates`."""
     given = inspect.signature(one).parameters.values() if inspect.isfunction(one) else ()
-    return any(inference.Replicates in typing.get_args(argument.annotation) for argument in given)
+    return any(
+        inference.checks.Replicates in typing.get_args(argument.annotation) for argument in given
+    )
 
 
 # What is exported has a name or a case.
@@ -76,14 +79,16 @@ def test_every_exported_rule_and_family_has_a_name_that_users_give():
 
 @pytest.fixture(scope="module")
 def noises():
-    white = inference.KnownNoise(0.3)
-    correlated = inference.AutoregressiveNoise(np.array([0.5]), np.array([0.8]))
+    white = inference.criticism.KnownNoise(0.3)
+    correlated = inference.criticism.AutoregressiveNoise(np.array([0.5]), np.array([0.8]))
     residual = np.random.default_rng(0).normal(0.0, 0.2, (8, 2))
     return {
-        inference.KnownNoise: white,
-        inference.AutoregressiveNoise: correlated,
-        inference.SumOfNoises: inference.SumOfNoises((white, correlated)),
-        inference.UsualResidual: inference.usual_residual([residual], [white], [True]),
+        inference.criticism.KnownNoise: white,
+        inference.criticism.AutoregressiveNoise: correlated,
+        inference.criticism.SumOfNoises: inference.criticism.SumOfNoises((white, correlated)),
+        inference.criticism.UsualResidual: inference.criticism.usual_residual(
+            [residual], [white], [True]
+        ),
     }
 
 
@@ -93,7 +98,7 @@ def pipelines(simulate, prior):
     short = {"sampler": "emcee", "chains": 2, "draws": 64, "warmup": 20}
     return {
         inference.FitPipeline: inference.FitPipeline(simulate, prior, 8, options, short),
-        inference.SharedDesign: inference.shared_design(
+        inference.checks.SharedDesign: inference.shared_design(
             simulate, prior, 10, options=options, sampling=short
         ),
     }
@@ -277,8 +282,8 @@ def test_a_noise_keeps_its_protocol(noises):
 def test_draws_of_a_noise_are_as_large_as_its_covariance_says(noises, kind):
     """The two-sided chance of 4.5 standard errors is 7e-6; a size known badly has no variance to
     judge by, so the trace is compared where the draws' size is known."""
-    noise = noises[getattr(inference, kind)]
-    if isinstance(noise, inference.UsualResidual):
+    noise = noises[exported(is_noise)[kind]]
+    if isinstance(noise, inference.criticism.UsualResidual):
         pytest.skip("its draws have heavy tails of infinite fourth moment")
     covariance = noise.covariance(LAYOUT)
     assert abs(excess(noise, covariance)) < 4.5
@@ -302,7 +307,7 @@ def made(prior, simulate):
 @pytest.mark.parametrize("name", exported(is_check))
 def test_a_check_keeps_its_protocol(made, name):
     """A table that ends in its judgement, the same each time, on replicates left as they are."""
-    check, before = getattr(inference, name), made.draws.copy()
+    check, before = exported(is_check)[name], made.draws.copy()
     result = check(made, alpha=1e-4)
     assert result.replicates is made
     assert isinstance(result.ok, bool | np.bool_) and result.ok  # prior draws are calibrated

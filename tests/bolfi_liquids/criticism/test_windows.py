@@ -14,9 +14,7 @@ from bolfi_liquids.inputs.strokes import resting
 
 def recorded(path: Trajectory) -> Recording:
     still = np.zeros((len(path.time), 2))
-    return Recording(
-        path.time, path, still, MappingProxyType({}), Path("stir.nc"), "hash"
-    )
+    return Recording(path.time, path, still, MappingProxyType({}), Path("stir.nc"), "hash")
 
 
 def test_windows_cover_every_sample_of_every_recording_once_by_stroke():
