@@ -2,14 +2,17 @@
 
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..inputs.prior import check_prior, default_prior
-from ..inputs.recording import Recording, Source, open_recordings
+from ..inputs.open import Source, open_recordings
+from ..inputs.prior import check_prior, default_prior, describe_prior
+from ..inputs.recording import Recording
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
 from ..progress import Simulate, progress_bar, reported
 from ..run.directory import (
@@ -18,7 +21,7 @@ from ..run.directory import (
     open_bank,
     read_run,
 )
-from ..run.provenance import run_record
+from ..run.provenance import LIBRARIES, versions
 from ..run.recordings import keep_recordings
 from .draws import pick_draws
 from .result import Calibration, is_calibrated
@@ -99,6 +102,21 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     if not is_calibrated(run):
         _calibrate(run, stirring, prior, settings, progress)
     return Calibration.open(run)
+
+
+def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring) -> dict[str, Any]:
+    """Content of run.toml: settings, inputs, versions; see `run.directory.MUST_AGREE`."""
+    from ..inference.engine_version import ENGINE_VERSION
+
+    return {
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "settings": asdict(settings) | {"prior": describe_prior(prior)},
+        "engine": {"version": ENGINE_VERSION},
+        "simulator": stirring.settings,
+        "inputs": {"sha256": [recording.hash for recording in stirring.recordings]},
+        "files": {"recordings": [recording.path.name for recording in stirring.recordings]},
+        "versions": versions(LIBRARIES),
+    }
 
 
 def _calibrate(

@@ -15,7 +15,7 @@ from ..inputs.prior import split_parameters
 from ..inputs.recording import Recording
 
 if TYPE_CHECKING:
-    from ..inference import Discrepancy
+    from ..inference.types import Discrepancy
     from ..models import StirSetup
 
 SAME_DENSITY = 0.02  # relative difference up to which two weighings are of one liquid

@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 
 from ..calibration.stir_simulator import Stirring, stirring_of
 from ..inputs.bundled import bundled_recording
+from ..inputs.open import open_recordings
 from ..inputs.prior import default_prior, describe_prior
-from ..inputs.recording import Recording, open_recordings
+from ..inputs.recording import Recording
 from ..inputs.settings import (
     MIN_SIMULATIONS,
     PAPER_RULES,
-    RUNS,
+    RUNS_PER_POINT,
     SURROGATES,
     SbcSettings,
 )
@@ -42,7 +43,8 @@ from .sbc_pipelines import (
 from .sbc_tree import SurrogateCheck, checked, write_results
 
 if TYPE_CHECKING:
-    from ..inference import Prior, Replicates
+    from ..inference import Prior
+    from ..inference.checks import Replicates
 
 
 AT_ONCE = 16  # stirs in one call
@@ -124,10 +126,10 @@ def _replicates(  # noqa: PLR0913  what the two surrogates share
 
 
 def _record(settings: SbcSettings, prior: "Prior", stirring: Stirring) -> Mapping[str, Any]:
-    from ..inference import ENGINE_VERSION
+    from ..inference.engine_version import ENGINE_VERSION
 
     return {
-        "engine": {"version": ENGINE_VERSION, "initial": MIN_SIMULATIONS, "runs": RUNS}
+        "engine": {"version": ENGINE_VERSION, "initial": MIN_SIMULATIONS, "runs": RUNS_PER_POINT}
         | PAPER_RULES
         | SAMPLING,
         "settings": {k: v for k, v in asdict(settings).items() if k not in ("runs", "sequential")}
@@ -146,17 +148,18 @@ def stirs_everywhere(  # noqa: PLR0913  what makes simulations
     pool: Executor | None,
     progress: bool,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Points that fill the prior [n, d], and `RUNS` stirs of each [n, RUNS, T, 2]; failed: NaN."""
+    """Points of the prior [n, d] and stirs of each [n, RUNS_PER_POINT, T, 2]; failed: NaN."""
     from scipy.stats import qmc
 
-    from ..inference import Job, SimulationBank, run_missing
+    from ..inference import SimulationBank
+    from ..inference.simulations import Job, run_missing
 
     u = qmc.Sobol(len(prior), rng=settings.seed).random(settings.design)
     theta = prior.from_unit(u)
-    count = RUNS * settings.design
+    count = RUNS_PER_POINT * settings.design
     seeds = fresh_seeds(settings.seed, _PURPOSE, count)
     jobs = [
-        Job({name: float(values[at // RUNS]) for name, values in theta.items()}, seed)
+        Job({name: float(values[at // RUNS_PER_POINT]) for name, values in theta.items()}, seed)
         for at, seed in enumerate(seeds)
     ]
     with (
@@ -175,4 +178,4 @@ def stirs_everywhere(  # noqa: PLR0913  what makes simulations
         )
     nothing = np.full(stirring.observed.shape, np.nan)
     signals = np.stack([nothing if one.signal is None else one.signal for one in made])
-    return prior.to_array(theta), signals.reshape(settings.design, RUNS, *nothing.shape)
+    return prior.to_array(theta), signals.reshape(settings.design, RUNS_PER_POINT, *nothing.shape)

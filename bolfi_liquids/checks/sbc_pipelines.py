@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..calibration.calibrate import engine_options, fit_recordings
 from ..calibration.stir_simulator import Stirring
-from ..inputs.settings import RUNS, CalibrationSettings
+from ..inputs.settings import RUNS_PER_POINT, CalibrationSettings
 
 if TYPE_CHECKING:
     from xarray import DataTree
@@ -80,7 +80,7 @@ class FromBank:
         stirring: How two signals are compared.
         prior: Of the parameters.
         theta: Points of the set [n, d].
-        signals: Of their runs [n, RUNS, T, 2].
+        signals: Of their runs [n, RUNS_PER_POINT, T, 2].
         settings: Of a calibration.
     """
 
@@ -105,7 +105,7 @@ class FromBank:
             if told:
                 point, run = np.array(told).T
                 theta = self.prior.to_dict(self.theta[point])
-                made.tell(theta, self.signals[point, run], RUNS * point + run)
+                made.tell(theta, self.signals[point, run], RUNS_PER_POINT * point + run)
             return made
 
         while len(told) < self.settings.budget:
@@ -119,7 +119,10 @@ class FromBank:
 
 
 def _nearest(asked: NDArray, points: NDArray, left: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """Point and run for each u asked [n, d]; what is given is no longer `left` [points, RUNS]."""
+    """Point and run for each u asked [n, d].
+
+    What is given is no longer `left` [points, RUNS_PER_POINT].
+    """
     for u in asked:
         if not left.any():
             raise RuntimeError("every run of the shared set was told; make it larger")

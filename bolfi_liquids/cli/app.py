@@ -115,7 +115,8 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
 ) -> None:
     """Learn a liquid's parameters from recordings of it being stirred."""
     from ..calibration.calibrate import calibrate as run_calibrate
-    from ..inputs.recording import aborted_recordings, open_recordings
+    from ..inputs.open import open_recordings
+    from ..inputs.recording import aborted_recordings
 
     opened = open_recordings(recordings)
     if resume and not (out / RUN_TOML).exists():

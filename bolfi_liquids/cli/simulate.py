@@ -49,7 +49,7 @@ def stir(  # noqa: PLR0913  one parameter for each option
 
     from ..inputs.bundled import bundled_recording
     from ..inputs.described_liquid import Described, read_effects
-    from ..inputs.recording import open_recording
+    from ..inputs.open import open_recording
     from ..simulation.simulate import simulate_stir
 
     opened = bundled_recording("glycerin") if recording is None else open_recording(recording)

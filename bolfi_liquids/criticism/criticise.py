@@ -10,8 +10,9 @@ from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, stirring_of
 from ..calibration.tree import write_tree
 from ..errors import InputError
+from ..inputs.open import Source
 from ..inputs.pour_table import PourTable
-from ..inputs.recording import Recording, Source
+from ..inputs.recording import Recording
 from ..inputs.settings import CriticismSettings
 from ..progress import phases
 from ..run.directory import CRITICISM, open_bank
@@ -97,7 +98,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     if finished := finished_criticism(run, inputs.made_from):
         return finished
     with open_bank(run) as bank, phases(shown=progress) as report:
-        from ..inference import Keeping
+        from ..inference.criticism import Keeping
 
         findings = _find(calibration, inputs, Keeping(bank, settings.batch, seed, report))
         tree = criticism_tree(findings)
@@ -111,7 +112,9 @@ def _names(given: str | Sequence[str] | None) -> tuple[str, ...] | None:
     return (given,) if isinstance(given, str) else None if given is None else tuple(given)
 
 
-def _find(calibration: Calibration, inputs: Inputs, keeping: "inference.Keeping") -> Findings:
+def _find(
+    calibration: Calibration, inputs: Inputs, keeping: "inference.criticism.Keeping"
+) -> Findings:
     clean = clean_residuals(
         inputs.baseline,
         inputs.stirring.setups[0].particles,
@@ -129,15 +132,15 @@ def _find(calibration: Calibration, inputs: Inputs, keeping: "inference.Keeping"
 def _stirs(
     calibration: Calibration,
     inputs: Inputs,
-    cameras: "inference.AutoregressiveNoise",
+    cameras: "inference.criticism.AutoregressiveNoise",
     clean: Sequence[Clean],
-    keeping: "inference.Keeping",
-) -> "inference.Criticism":
+    keeping: "inference.criticism.Keeping",
+) -> "inference.criticism.Criticism":
     from .. import inference
 
     stirring, settings = inputs.stirring, inputs.settings
     extensions = effects_of("stir", settings.effects)
-    return inference.criticise(
+    return inference.criticism.criticise(
         stir_experiment(stirring, cameras, usual_for(stirring, clean), "stir"),
         calibration.prior,
         extensions,
@@ -153,7 +156,7 @@ def _stirs(
 
 def _kept_back(
     recording: Recording, fitted: Stirring, clean: Sequence[Clean]
-) -> "inference.Experiment":
+) -> "inference.criticism.Experiment":
     own = stirring_of([recording], fitted.setups[0].particles)
     cameras = held_out_noise(recording, fitted.recordings)
     return stir_experiment(own, cameras, usual_for(own, clean), recording.path.name)
@@ -161,11 +164,11 @@ def _kept_back(
 
 def _pours(
     calibration: Calibration,
-    stirs: "inference.Criticism",
+    stirs: "inference.criticism.Criticism",
     table: PourTable,
     inputs: Inputs,
-    keeping: "inference.Keeping",
-) -> "inference.Criticism":
+    keeping: "inference.criticism.Keeping",
+) -> "inference.criticism.Criticism":
     """The same for pours, of a liquid of which the stirs are known to have taught something."""
     from .. import inference
 
@@ -183,7 +186,7 @@ def _pours(
     taught = as_prior(stirs.posterior.theta, stirs.posterior.weights, known.fit.prior)
     names = (*calibration.prior.names, *poured_too)
     base = inference.Prior({name: taught.distributions[name] for name in names})
-    return inference.criticise(
+    return inference.criticism.criticise(
         pour_experiment(table, inputs.cups, density),
         base,
         extensions,

@@ -15,7 +15,7 @@ from ..drawing import (
     panels,
     styled,
 )
-from ..inputs.settings import ALARM
+from ..inputs.settings import FALSE_ALARM_RATE
 from ..words import spoken
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def _draw_residual(axes: "Axes", part: "Dataset") -> None:
 
 
 def _shade(axes: "Axes", strokes: "Dataset") -> None:
-    sure = strokes["p_value_before"].to_numpy() < ALARM
+    sure = strokes["p_value_before"].to_numpy() < FALSE_ALARM_RATE
     for at in np.flatnonzero(sure):
         start, stop = (float(strokes[edge][at]) for edge in ("start_s", "stop_s"))
         axes.axvspan(start, stop, color=ORANGE, alpha=0.14, linewidth=0, zorder=0)
@@ -136,9 +136,9 @@ def _draw_bars(axes: "Axes", part: "Dataset", ticks: list[str]) -> None:
         shift = (k - (len(drawn) - 1) / 2.0) * width
         height = np.degrees(part[f"rms_{when}"].to_numpy())
         axes.bar(at + shift, height, width, color=colour, label=label)
-    sure = part["p_value_before"].to_numpy() < ALARM
+    sure = part["p_value_before"].to_numpy() < FALSE_ALARM_RATE
     top = np.degrees(part["rms_before"].to_numpy())
-    label = f"surely different (p < {ALARM:g})"
+    label = f"surely different (p < {FALSE_ALARM_RATE:g})"
     shift = -(len(drawn) - 1) / 2.0 * width
     axes.scatter(at[sure] + shift, 1.05 * top[sure], s=28, marker="*", color=INK, label=label)
     axes.set_xticks(at, ticks)

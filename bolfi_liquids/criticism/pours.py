@@ -15,7 +15,8 @@ from .pour_noise import PourNoise
 if TYPE_CHECKING:
     from numpyro.distributions import Distribution
 
-    from ..inference import Experiment, Prior
+    from ..inference import Prior
+    from ..inference.criticism import Experiment
     from ..models import Cups
 
 NARROWEST = 0.05  # sd of the log of a parameter, and share of another's prior interquartile range
@@ -76,7 +77,7 @@ class Pouring:
 
 def pour_experiment(table: PourTable, cups: "Cups", density: float) -> "Experiment":
     """The pours of a table, each outcome a window of its own."""
-    from ..inference import Experiment, Window
+    from ..inference.criticism import Experiment, Window
 
     pouring = Pouring(table.angular_velocity, table.distance, cups, density)
     every = np.ones(table.observed.shape, bool)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from ..calibration.noise import rms
-from ..inputs.settings import ALARM
+from ..inputs.settings import FALSE_ALARM_RATE
 from ..run.summary import Number
 from .verdict import Verdict
 
@@ -33,7 +33,7 @@ class SourceVerdict:
     held_out: int
 
     @classmethod
-    def of(cls, source: "inference.Criticism") -> Self:
+    def of(cls, source: "inference.criticism.Criticism") -> Self:
         """From what the engine concluded."""
         verdict = source.verdict
         return cls(
@@ -58,7 +58,7 @@ class PourVerdict(SourceVerdict):
     after: float | None
 
     @classmethod
-    def of(cls, source: "inference.Criticism") -> Self:
+    def of(cls, source: "inference.criticism.Criticism") -> Self:
         """From what the engine concluded."""
         best, common = source.leading, SourceVerdict.of(source)
         after = None if best is None else _rms(best.hypothesis)
@@ -89,7 +89,7 @@ class Window:
     speed: str | None = None
 
     @classmethod
-    def of(cls, found: "inference.Found") -> Self:
+    def of(cls, found: "inference.criticism.Found") -> Self:
         """From what the engine found."""
         nowhere = dict.fromkeys(("channel", "start_s", "stop_s", "stroke"))
         place: dict[str, Any] = {**nowhere, **found.label}
@@ -122,9 +122,9 @@ class Gap:
     held_out_noise: float | None
 
     @classmethod
-    def of(cls, source: "inference.Criticism") -> Self:
+    def of(cls, source: "inference.criticism.Criticism") -> Self:
         """From what the engine concluded on stirs."""
-        from ..inference import beyond
+        from ..inference.criticism import beyond
 
         best, base = source.leading, source.base.hypothesis
         gaps = () if best is None else source.gaps.get(best.names, ())
@@ -146,24 +146,24 @@ class Gap:
         return cls(**in_degrees)
 
 
-def refuted_by_held_out(source: "inference.Criticism") -> tuple[str, ...]:
+def refuted_by_held_out(source: "inference.criticism.Criticism") -> tuple[str, ...]:
     """Explanations that held-out data contradict, by name."""
     return tuple(" with ".join(names) for names in source.refuted)
 
 
-def held_out_count(source: "inference.Criticism") -> int:
+def held_out_count(source: "inference.criticism.Criticism") -> int:
     """Number of held-out data on which something was tried."""
     return max(map(len, source.gaps.values()), default=0)
 
 
-def significant_windows(source: "inference.Criticism") -> tuple[Window, ...]:
+def significant_windows(source: "inference.criticism.Criticism") -> tuple[Window, ...]:
     """The windows in which the base model and the data differ, most significant first."""
-    found = [window for window in source.before if window.p_value < ALARM]
+    found = [window for window in source.before if window.p_value < FALSE_ALARM_RATE]
     ordered = sorted(found, key=lambda window: (window.p_value, -abs(window.z)))
     return tuple(Window.of(window) for window in ordered)
 
 
-def _rms(hypothesis: "inference.Hypothesis") -> float:
+def _rms(hypothesis: "inference.criticism.Hypothesis") -> float:
     return rms(hypothesis.difference)
 
 

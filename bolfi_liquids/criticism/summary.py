@@ -62,7 +62,7 @@ class CameraNoise:
     samples: int
 
     @classmethod
-    def of(cls, noise: "inference.AutoregressiveNoise") -> Self:
+    def of(cls, noise: "inference.criticism.AutoregressiveNoise") -> Self:
         """From the engine's estimate."""
         return cls(
             sd_deg=float(np.degrees(noise.sd.mean())),
@@ -182,7 +182,9 @@ class CriticismSummary(Section):
         return tuple(self.made_from["settings"]["effects"] or ())
 
 
-def _together(sources: "Sequence[inference.Criticism]") -> tuple[Verdict, tuple[str, ...]]:
+def _together(
+    sources: "Sequence[inference.criticism.Criticism]",
+) -> tuple[Verdict, tuple[str, ...]]:
     """One verdict on all data: what was named anywhere, or else the gravest."""
     for verdict in GRAVEST_FIRST:
         if named := _concluding(verdict, sources):
@@ -191,7 +193,7 @@ def _together(sources: "Sequence[inference.Criticism]") -> tuple[Verdict, tuple[
 
 
 def _concluding(
-    verdict: Verdict, sources: "Sequence[inference.Criticism]"
-) -> "list[inference.Criticism]":
+    verdict: Verdict, sources: "Sequence[inference.criticism.Criticism]"
+) -> "list[inference.criticism.Criticism]":
     """The sources of this verdict."""
     return [source for source in sources if source.verdict.kind == verdict]

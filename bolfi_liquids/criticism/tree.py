@@ -70,7 +70,7 @@ def _posterior(findings: Findings) -> "Dataset":
     return known
 
 
-def _residual(findings: Findings, name: str, source: "inference.Criticism") -> "Dataset":
+def _residual(findings: Findings, name: str, source: "inference.criticism.Criticism") -> "Dataset":
     from xarray import Dataset
 
     observed = source.base.hypothesis.fit.observed
@@ -100,14 +100,14 @@ def _residual(findings: Findings, name: str, source: "inference.Criticism") -> "
     return Dataset({key: (*of, UNITS[name]) for key, of in columns.items()}, coords=coords)
 
 
-def _expected(hypothesis: "inference.Hypothesis") -> tuple[np.ndarray, np.ndarray]:
+def _expected(hypothesis: "inference.criticism.Hypothesis") -> tuple[np.ndarray, np.ndarray]:
     output = hypothesis.surrogate.output
     sd = np.sqrt(np.diag(hypothesis.spread + hypothesis.noise))
     residual, sd = (output.restore(row[None])[0] for row in (hypothesis.difference, sd))
     return hypothesis.fit.observed - residual, sd
 
 
-def _where(source: "inference.Criticism", units: dict[str, str]) -> "Dataset":
+def _where(source: "inference.criticism.Criticism", units: dict[str, str]) -> "Dataset":
     from xarray import Dataset
 
     keys = {key: type(value) for found in source.before for key, value in found.label.items()}
@@ -126,7 +126,7 @@ def _where(source: "inference.Criticism", units: dict[str, str]) -> "Dataset":
 _MISSING_LABEL: dict[type, Any] = {str: "", int: -1, float: float("nan")}
 
 
-def _effects(source: "inference.Criticism") -> "Dataset":
+def _effects(source: "inference.criticism.Criticism") -> "Dataset":
     from xarray import Dataset
 
     signatures, singles = source.base.signatures, source.singles
@@ -160,7 +160,9 @@ def _effects(source: "inference.Criticism") -> "Dataset":
     return Dataset({**columns, "unit": units, "status": status}, coords={"effect": names})
 
 
-def _status(candidate: "inference.Candidate", source: "inference.Criticism") -> EffectStatus:
+def _status(
+    candidate: "inference.criticism.Candidate", source: "inference.criticism.Criticism"
+) -> EffectStatus:
     """What became of an explanation by one effect."""
     if candidate.names[0] in source.verdict.effects:
         named = source.verdict.kind == Verdict.EFFECT
@@ -174,7 +176,7 @@ def _status(candidate: "inference.Candidate", source: "inference.Criticism") -> 
     return EffectStatus.LESS_LIKELY
 
 
-def _confusion(source: "inference.Criticism") -> "Dataset":
+def _confusion(source: "inference.criticism.Criticism") -> "Dataset":
     from xarray import Dataset
 
     names = list(source.base.signatures)
@@ -184,7 +186,7 @@ def _confusion(source: "inference.Criticism") -> "Dataset":
     )
 
 
-def _held_out(source: "inference.Criticism", units: dict[str, str]) -> "Dataset":
+def _held_out(source: "inference.criticism.Criticism", units: dict[str, str]) -> "Dataset":
     from xarray import Dataset
 
     names = [" with ".join(explanation) for explanation in source.gaps]
@@ -202,7 +204,7 @@ def _held_out(source: "inference.Criticism", units: dict[str, str]) -> "Dataset"
     return Dataset(columns, coords={"explanation": names, "recording": labels})
 
 
-def _suggestions(source: "inference.Criticism") -> "Dataset":
+def _suggestions(source: "inference.criticism.Criticism") -> "Dataset":
     from xarray import Dataset
 
     return Dataset(

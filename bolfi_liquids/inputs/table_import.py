@@ -4,6 +4,7 @@ import csv
 import hashlib
 from collections.abc import Iterator
 from difflib import get_close_matches
+from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,12 +26,8 @@ from .fields import (
     LENGTHS,
     PLANES,
 )
-from .recording import (
-    Recording,
-    as_recording,
-    open_recording,
-    recording_dataset,
-)
+from .open import open_recording
+from .recording import Recording, as_recording, recording_dataset
 from .strokes import speed
 from .table_map import ATTRIBUTE_UNITS, TableMap, open_table_map
 
@@ -105,8 +102,6 @@ def _attributes(path: Path) -> dict[str, Any]:
 
 
 def _dataset(table: Path, meaning: TableMap) -> "Dataset":
-    from .. import __version__
-
     cells = _cells(table, meaning)
     values = {
         name: column.in_si(name, cells[column.column]) for name, column in meaning.columns.items()
@@ -120,7 +115,7 @@ def _dataset(table: Path, meaning: TableMap) -> "Dataset":
         "source": meaning.source,
         "imported_from": table.name,
         "imported_sha256": hashlib.sha256(table.read_bytes()).hexdigest(),
-        "imported_with": f"bolfi-liquids {__version__}: {meaning.model_dump_json()}",
+        "imported_with": f"bolfi-liquids {version('bolfi-liquids')}: {meaning.model_dump_json()}",
     }
     return recording_dataset(values, attributes | made)
 

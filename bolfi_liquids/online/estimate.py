@@ -22,12 +22,8 @@ from .plan import Followed
 from .settings import OnlineSettings
 
 if TYPE_CHECKING:
-    from ..inference import (
-        Bolfi,
-        Job,
-        Prior,
-        Simulation,
-    )
+    from ..inference import Bolfi, Prior
+    from ..inference.simulations import Job, Simulation
 
 DRAWS = 500  # of each of two chains
 _SIMULATION = 31  # purpose of seeds
@@ -237,7 +233,7 @@ def _told(problem: Problem, made: Made, observed: NDArray, seed: int) -> "Bolfi"
 
 
 def _jobs(problem: Problem, theta: Mapping[str, NDArray], first: int) -> "list[Job]":
-    from ..inference import Job
+    from ..inference.simulations import Job
 
     count = len(theta[problem.prior.names[0]])
     seeds = fresh_seeds(problem.settings.seed, _SIMULATION, first + count)[first:]

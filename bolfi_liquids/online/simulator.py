@@ -15,7 +15,8 @@ def simulate_plan(link: Connection, request: Request) -> None:
 
     Ends when the other end of `link` is closed.
     """
-    from ..inference import SimulationBank, run_missing
+    from ..inference import SimulationBank
+    from ..inference.simulations import run_missing
 
     step_back(NICENESS)
     stirring = stirring_of([request.plan()], request.settings.particles)

@@ -24,12 +24,8 @@ from ..progress import progress_bar
 from .spillage import ACTION, normal_scores
 
 if TYPE_CHECKING:
-    from ..inference import (
-        Fit,
-        Job,
-        Prior,
-        SimulationBank,
-    )
+    from ..inference import Fit, Prior, SimulationBank
+    from ..inference.simulations import Job
     from ..models import Cups
 
 POURS = 512
@@ -150,7 +146,7 @@ def make_pours(
     Raises:
         InputError: `pours` is too small.
     """
-    from ..inference import run_missing
+    from ..inference.simulations import run_missing
 
     if pours < LEAST_POURS:
         raise InputError(f"{pours}", where="pours", fix=f"give at least {LEAST_POURS}")
@@ -223,7 +219,7 @@ def _jobs(joint: "Prior", pours: int) -> "list[Job]":
     """A Sobol design; neighbours in the list turn at like rates, so that none waits for another."""
     from scipy.stats import qmc
 
-    from ..inference import Job
+    from ..inference.simulations import Job
     from ..run.simulations import fresh_seeds
 
     design = qmc.Sobol(len(joint), rng=0).random_base2(int(np.ceil(np.log2(pours))))[:pours]

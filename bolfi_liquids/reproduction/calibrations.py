@@ -1,7 +1,7 @@
 """Calibrating a liquid whose parameters are known: by stirring it, and by pouring it.
 
-Both are simulators to `inference.run_missing`, which keeps what is finished: a truth goes in, what
-was concluded with each budget comes out.
+Both are simulators to `run_missing` of the engine, which keeps what is finished: a truth goes in,
+what was concluded with each budget comes out.
 """
 
 import json
@@ -149,7 +149,7 @@ Learner = ByStirring | ByPouring
 
 def _made_by(prior: "Prior") -> list[Any]:
     """What the conclusions of all learners depend on."""
-    from ..inference import ENGINE_VERSION
+    from ..inference.engine_version import ENGINE_VERSION
 
     learned_by = [ENGINE_VERSION, describe_prior(prior), BATCH, PAPER_RULES, MIN_SIMULATIONS]
     return [*learned_by, SAMPLING, DRAWS, NOISE.sd, DENSITY]

@@ -12,12 +12,8 @@ from numpy.typing import NDArray
 
 from ..files import write_netcdf, write_whole
 from ..inputs.bundled import bundled_recording
-from ..inputs.recording import (
-    Recording,
-    along_path,
-    open_recording,
-    recording_dataset,
-)
+from ..inputs.open import open_recording
+from ..inputs.recording import Recording, along_path, recording_dataset
 from ..run.simulations import fresh_seeds
 from .calibrations import NOISE
 from .truths import LIQUIDS, SPREAD

@@ -77,7 +77,7 @@ def conclusions(
     progress: bool,
 ) -> list[NDArray | None]:
     """Of each truth; None where its calibration failed."""
-    from ..inference import Job, run_missing
+    from ..inference.simulations import Job, run_missing
 
     truths = tasks.truths
     jobs = [

@@ -18,7 +18,8 @@ from .armed_session import (
 from .live_view import SessionView
 
 if TYPE_CHECKING:
-    from ..hardware import Check, PosePath, Rig
+    from ..hardware import Check, Rig
+    from ..hardware.motion import PosePath
     from ..pouring.result import PourSummary
 
 POURS = "pours"  # directories of what the arm did, in the RUN
@@ -49,7 +50,8 @@ def plan_pour(run: str | Path, rig: "Rig") -> PourPlan:
         InputError: The run has chosen none.
         MotionRejected: The motion breaks one of the rig's limits.
     """
-    from ..hardware import check_path, pour_path, ready_to_pour
+    from ..hardware import check_path
+    from ..hardware.motion import pour_path, ready_to_pour
 
     chosen, cups = _chosen(Path(run))
     turn = cups["pour"]
@@ -97,7 +99,8 @@ def execute_pour(
         MotionRejected: The motion breaks one of the rig's limits.
         SessionStopped: The arm was stopped.
     """
-    from ..hardware import SessionStopped, approach_pour, emulated
+    from ..hardware import SessionStopped, emulated
+    from ..hardware.motion import approach_pour
 
     check_one(ask, emulate, "execute_pour")
     plan = plan_pour(run, rig)
@@ -121,10 +124,12 @@ def execute_pour(
 
 def dry_pour(run: str | Path, rig: "Rig", out: Path) -> "tuple[str, list[Check]]":
     """What the arm would do, and the pre-flight list of a session that cannot move it."""
-    from ..hardware import Session, describe
+    from ..hardware import Session, SessionSetup
+    from ..hardware.session.confirmation import describe
 
     plan = plan_pour(run, rig)
-    with Session(rig, out, tool="pouring", plan=[plan.path]) as session:
+    setup = SessionSetup(rig, out, tool="pouring", plan=[plan.path])
+    with Session(setup) as session:
         return describe([plan.path], rig, "pouring"), session.preflight()
 
 

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..inference import Job, SimulationBank, run_missing
+from ..inference import SimulationBank
+from ..inference.simulations import Job, run_missing
 from ..progress import Simulate
 
 

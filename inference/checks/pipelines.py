@@ -18,8 +18,8 @@ from ..simulations.bank import SimulationBank
 from ..simulations.job import jobs, simulation_seed
 from ..simulations.runner import run_missing
 from ..sobol import sobol
-from ..surrogates.base import Simulator
 from ..surrogates.families import resolve
+from ..types import Simulator
 from .replicate import LogDensity
 
 Options = Mapping[str, Any]

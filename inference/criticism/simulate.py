@@ -10,7 +10,7 @@ from ..prior import Prior
 from ..simulations.bank import SimulationBank
 from ..simulations.job import Job
 from ..simulations.runner import run_missing
-from ..surrogates.base import Simulator
+from ..types import Simulator
 from .experiment import Experiment, Proposal
 from .extension import Extensions
 from .run_table import Runs

@@ -4,15 +4,13 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, wait
 from functools import partial
 from pickle import PicklingError
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from ..types import Simulator
 from .bank import Simulation, SimulationBank
 from .executors import killed_its_worker
 from .failures import TIMEOUT, kind, raised
-from .job import Job, run_batch
-
-if TYPE_CHECKING:
-    from ..surrogates.base import Simulator
+from .job import Job, OneByOne, run_batch
 
 POLL = 0.2  # seconds between looks at what somebody else is simulating
 
@@ -45,7 +43,7 @@ class Runner:
 
     def __init__(
         self,
-        simulate: "Simulator",
+        simulate: Simulator,
         bank: SimulationBank,
         identity: str,
         executor: Executor | None = None,
@@ -143,10 +141,12 @@ class Runner:
         return True
 
     def _simulate_here(self, orders: list[Order]) -> None:
-        batch = [order.job for order in orders]
-        made = run_batch(self.simulate, batch, orders[0].shape, self.timeout)
-        for order, simulation in zip(orders, made, strict=True):
-            self._keep(order, simulation)
+        single = isinstance(self.simulate, OneByOne)  # each run is kept when it is finished
+        for part in [[order] for order in orders] if single else [orders]:
+            batch = [order.job for order in part]
+            made = run_batch(self.simulate, batch, orders[0].shape, self.timeout)
+            for order, simulation in zip(part, made, strict=True):
+                self._keep(order, simulation)
 
     def _submit(self, executor: Executor, order: Order) -> None:
         work = partial(run_batch, self.simulate, [order.job], order.shape, self.timeout)
@@ -222,7 +222,7 @@ def is_final(found: Simulation, timeout: float | None) -> bool:
 
 
 def run_missing(  # noqa: PLR0913  the runner's arguments and the call's
-    simulate: "Simulator",
+    simulate: Simulator,
     jobs: Sequence[Job],
     shape: Shape,
     bank: SimulationBank,

@@ -276,10 +276,10 @@ def simulate(theta, seeds):
 if __name__ == "__main__":
     import jax
     from bolfi_liquids import inference
-    jobs = [inference.Job({"a": 1.0}, 0)]
+    jobs = [simulations.Job({"a": 1.0}, 0)]
     with ProcessPoolExecutor(1, mp_context=get_context(sys.argv[1])) as pool:
         with inference.SimulationBank() as bank:
-            print(inference.run_missing(simulate, jobs, (5,), bank, "", pool)[0].signal)
+            print(simulations.run_missing(simulate, jobs, (5,), bank, "", pool)[0].signal)
 """
 
 

@@ -8,7 +8,8 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 import pytest
 import xarray as xr
-from bolfi_liquids.inference import Job, Simulation, SimulationBank, run_missing
+from bolfi_liquids.inference import SimulationBank
+from bolfi_liquids.inference.simulations import Job, Simulation, run_missing
 from bolfi_liquids.inference.simulations.failures import timed_out
 from bolfi_liquids.inference.simulations.job import run_batch, simulation_seed
 

@@ -1,0 +1,14 @@
+from .calibration.calibrate import calibrate as calibrate
+from .calibration.result import Calibration as Calibration
+from .criticism.criticise import criticise as criticise
+from .criticism.result import Criticism as Criticism
+from .inputs.open import open_recording as open_recording
+from .inputs.recording import Recording as Recording
+from .inputs.table_import import import_table as import_table
+from .models import Cups as Cups
+from .pouring.choose import choose_pour as choose_pour
+from .reporting.report import report as report
+from .robot.pour import execute_pour as execute_pour
+from .robot.record import record as record
+
+__version__: str
