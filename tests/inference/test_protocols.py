@@ -322,7 +322,7 @@ def test_a_check_keeps_its_protocol(made, name):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", exported(is_pipeline))
 def test_a_pipeline_keeps_its_protocol(pipelines, prior, observed, kind):
-    pipeline = pipelines[getattr(inference, kind)]
+    pipeline = pipelines[exported(is_pipeline)[kind]]
     (drawn, log_density), (again, _), (other, _) = (pipeline(observed, seed) for seed in (0, 0, 1))
     for name in prior.names:
         values = drawn["posterior"][name]
