@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..calibration.calibrate import engine_options, fit_recordings
 from ..calibration.stir_simulator import Stirring
 from ..inputs.settings import RUNS_PER_POINT, CalibrationSettings
+from ..seeds import Phase, simulation_seeds
 
 if TYPE_CHECKING:
     from xarray import DataTree
@@ -92,7 +93,6 @@ class FromBank:
 
     def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
         from ..inference import Bolfi
-        from ..run.simulations import fresh_seeds
 
         u = self.prior.to_unit(self.prior.to_dict(self.theta))
         left = np.asarray(np.isfinite(self.signals).all(axis=(2, 3)))
@@ -110,7 +110,8 @@ class FromBank:
 
         while len(told) < self.settings.budget:
             # a new engine of the same seed would draw the same random numbers for every batch
-            asking = engine(seed if not told else fresh_seeds(seed, len(told), 1)[0])
+            (own,) = simulation_seeds(seed, Phase.SBC_SEARCH, 1, len(told))
+            asking = engine(seed if not told else own)
             wanted = asking.initial if not told else self.settings.batch
             asked = asking.ask(min(wanted, self.settings.budget - len(told)))
             told += _nearest(self.prior.to_unit(asked), u, left)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..calibration.stir_simulator import Stirring
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from ..pouring.map import SpillageMap
-from ..run.simulations import fresh_seeds
+from ..seeds import Phase, generator, simulation_seeds
 from .plan import Followed
 from .settings import OnlineSettings
 
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from ..inference.simulations import Job, Simulation
 
 DRAWS = 500  # of each of two chains
-_SIMULATION = 31  # purpose of seeds
 MARGIN = 8  # rows of the engine's arrays beyond the budget, for what is pending
 
 
@@ -138,7 +137,7 @@ def proposals(problem: Problem, made: Made, observed: NDArray, first: int, n: in
         n: How many.
     """
     # the rule's own jitter must differ from one call to the next
-    (seed,) = fresh_seeds(problem.settings.seed, _SIMULATION + 1 + first, 1)
+    (seed,) = simulation_seeds(problem.settings.seed, Phase.ONLINE_SEARCH, 1, first)
     return _jobs(problem, _told(problem, made, observed, seed).ask(n), first)
 
 
@@ -193,7 +192,7 @@ def enough(estimate: OnlineEstimate, settings: OnlineSettings) -> bool:
 
 def warm_up(problem: Problem, spillage: SpillageMap) -> None:
     """Compile all that estimates and proposals need, on signals made up for that."""
-    rng = np.random.default_rng(0)
+    rng = generator(0, Phase.WARM_UP)
     n = problem.settings.design
     theta = problem.prior.from_unit(rng.random((n, len(problem.prior))))
     time_ = problem.stirring.time
@@ -236,7 +235,7 @@ def _jobs(problem: Problem, theta: Mapping[str, NDArray], first: int) -> "list[J
     from ..inference.simulations import Job
 
     count = len(theta[problem.prior.names[0]])
-    seeds = fresh_seeds(problem.settings.seed, _SIMULATION, first + count)[first:]
+    seeds = simulation_seeds(problem.settings.seed, Phase.ONLINE_STIRS, first + count)[first:]
     return [
         Job({name: float(values[at]) for name, values in theta.items()}, seed)
         for at, seed in enumerate(seeds)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..inputs.prior import PARAMETERS
 from ..progress import progress_bar
+from ..seeds import Phase, generator, simulation_seeds
 from .spillage import ACTION, normal_scores
 
 if TYPE_CHECKING:
@@ -37,7 +38,6 @@ LIQUID_GRID = 33, 5  # viscosity and cohesion, which acts slowly
 ACTION_GRID = 16  # along each axis
 LITTLE = 0.1  # spilled fraction below which a pour counts as one that spills little
 OUTCOMES = 16  # equally probable ones of each predicted pour
-_PURPOSE = 21  # of seeds
 
 
 class MapError(NamedTuple):
@@ -183,7 +183,7 @@ def make_map(
     """
     theta, spilled = make_pours(cups, density, bank, prior=prior, pours=pours, progress=progress)
     prior, joint = _liquid(prior), _joint(prior, cups)
-    left_out = np.random.default_rng(0).permutation(pours) % LEFT_OUT == 0
+    left_out = generator(0, Phase.HELD_BACK_POURS).permutation(pours) % LEFT_OUT == 0
     error = _left_out_error(_learn(joint, theta, spilled, ~left_out), theta, spilled, left_out)
     learned = _learn(joint, theta, spilled, np.ones(pours, bool))
     axes = np.linspace(0.0, 1.0, LIQUID_GRID[0]), np.linspace(0.0, 1.0, LIQUID_GRID[1])
@@ -220,11 +220,12 @@ def _jobs(joint: "Prior", pours: int) -> "list[Job]":
     from scipy.stats import qmc
 
     from ..inference.simulations import Job
-    from ..run.simulations import fresh_seeds
 
-    design = qmc.Sobol(len(joint), rng=0).random_base2(int(np.ceil(np.log2(pours))))[:pours]
+    design = qmc.Sobol(len(joint), rng=generator(0, Phase.MAP_DESIGN)).random_base2(
+        int(np.ceil(np.log2(pours)))
+    )[:pours]
     theta = joint.from_unit(design)
-    seeds = fresh_seeds(0, _PURPOSE, PACKINGS)
+    seeds = simulation_seeds(0, Phase.MAP_POURS, PACKINGS)
     return [
         Job({name: float(values[at]) for name, values in theta.items()}, seeds[at % PACKINGS])
         for at in np.argsort(theta["angular_velocity"], kind="stable")

@@ -21,6 +21,7 @@ from ..checks.sbc_pipelines import SAMPLING, CameraNoise
 from ..inputs.prior import describe_prior
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from ..progress import Simulate
+from ..seeds import Phase, generator
 from .truths import DENSITY
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ class ByStirring:
             clean = simulate(truth, np.array([seed]))[0]
             engine = Bolfi(
                 self.prior,
-                NOISE(clean, np.random.default_rng(seed)),
+                NOISE(clean, generator(seed, Phase.CAMERA_NOISE)),
                 seed=seed,
                 capacity=self.budgets[-1],
                 **engine_options(stirring, self.surrogate),
@@ -168,7 +169,7 @@ def after_each(engine: "Bolfi", simulate: Simulate, budgets: Sequence[int]) -> "
     """
     from ..inference import EmulatorWarning
 
-    rng = np.random.default_rng([engine.seed, 1])
+    rng = generator(engine.seed, Phase.TRUTH_STIRS)
     for budget in budgets:
         while (left := budget - engine.told) > 0:
             theta = engine.ask(min(BATCH, left))
