@@ -38,7 +38,6 @@ from .sbc_pipelines import (
     Calibrate,
     CameraNoise,
     FromBank,
-    Quietly,
 )
 from .sbc_tree import SurrogateCheck, checked, write_results
 
@@ -111,7 +110,7 @@ def _replicates(  # noqa: PLR0913  what the two surrogates share
     else:
         pipeline = Calibrate(stirring, prior, calibration)
     return inference.replicates(
-        Quietly(pipeline),
+        pipeline,
         stirring.simulate,
         prior,
         count,

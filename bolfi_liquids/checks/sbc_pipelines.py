@@ -1,6 +1,5 @@
 """Calibrations as pipelines of `inference.replicates`."""
 
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -65,6 +64,7 @@ class Calibrate:
                 budget=self.settings.budget,
                 surrogate=self.settings.surrogate,
                 seed=seed,
+                warn=False,
             )
         return fit.sample(seed=seed, **SAMPLING), fit.log_prob
 
@@ -115,7 +115,7 @@ class FromBank:
             wanted = asking.initial if not told else self.settings.batch
             asked = asking.ask(min(wanted, self.settings.budget - len(told)))
             told += _nearest(self.prior.to_unit(asked), u, left)
-        fit = engine(seed).fit()
+        fit = engine(seed).fit(warn=False)
         return fit.sample(seed=seed, **SAMPLING), fit.log_prob
 
 
@@ -132,21 +132,3 @@ def _nearest(asked: NDArray, points: NDArray, left: NDArray[np.bool_]) -> Iterat
         run = int(np.argmax(left[point]))
         left[point, run] = False
         yield point, run
-
-
-@dataclass(frozen=True)
-class Quietly:
-    """A pipeline whose emulator's complaints are not repeated for every replicate.
-
-    Attributes:
-        pipeline: See `inference.replicates`.
-    """
-
-    pipeline: Any
-
-    def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
-        from ..inference import EmulatorWarning
-
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", EmulatorWarning)
-            return self.pipeline(observed, seed)

@@ -6,7 +6,6 @@ Delta(t) = int_0^t (y - y~)^2 dt, and no array changes its shape: nothing is com
 """
 
 import time
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -156,14 +155,12 @@ def estimate(
     Raises:
         ValueError: Fewer than three simulations succeeded, or nothing was seen.
     """
-    from ..inference import EmulatorWarning, SamplingWarning
+    from ..inference.sampling.convergence import Status
 
     engine = _told(problem, made, followed.observed, problem.settings.seed)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", EmulatorWarning)  # they are among the complaints
-        warnings.simplefilter("ignore", SamplingWarning)
-        fit = engine.fit()
-        tree = fit.sample("quadrature", chains=2, draws=DRAWS, seed=problem.settings.seed)
+    fit = engine.fit(warn=False)  # warnings are among the estimate's complaints
+    seed = problem.settings.seed
+    tree = fit.sample("quadrature", chains=2, draws=DRAWS, seed=seed, warn=False)
     posterior = tree["posterior"]
     status = str(posterior.attrs["status"])
     draws = {name: posterior[name].to_numpy().ravel() for name in problem.prior.names}
@@ -179,7 +176,7 @@ def estimate(
         lag=time.monotonic() - ended,
         delay=followed.delay,
         apart=followed.apart,
-        complaints=(*fit.warnings, *([] if status == "converged" else [status])),
+        complaints=(*fit.warnings, *([] if status == Status.CONVERGED else [status])),
     )
 
 

@@ -88,14 +88,17 @@ def run_with_a_pour(tmp_path):
 
     from bolfi_liquids.calibration.tree import write_tree
     from bolfi_liquids.inputs.cups import bundled_cups
-    from bolfi_liquids.run.summary import write_section
+    from bolfi_liquids.pouring.result import ActionSummary, PourSummary
 
     run = tmp_path / "run"
     run.mkdir()
     tree = DataTree()
     tree.attrs["cups"] = json.dumps(bundled_cups().settings())
     write_tree(tree, run / "pour.nc")
-    write_section(run, "pour", {"angular_velocity_deg_s": 60.0, "distance_cm": 2.0})
+    action = ActionSummary(60.0, 2.0, expected_spillage=0.01, spillage_q95=0.03)
+    PourSummary(
+        **vars(action), least_viscosity=0.01, n_simulations=1, risk="mean", seed=0, plug_in=action
+    ).write(run)
     return run
 
 

@@ -42,13 +42,12 @@ def test_summary_says_below_which_viscosity_liquids_look_alike(
     moving = np.linalg.norm(np.diff(recording.gripper.position, axis=0), axis=1).sum()
     mean = moving / np.ptp(recording.time)  # below the root mean square, above rest
     density = recording.number("liquid_density")
-    section = calibration.summary
-    floor = section["least_viscosity"]
+    floor = calibration.summary.least_viscosity
     assert setup.numerics.least_viscosity(setup.spacing, density, mean) <= floor
     assert floor < setup.numerics.least_viscosity(setup.spacing, density, 2.0 * mean)
     assert calibration.tree.attrs["least_viscosity"] == floor
     draws = calibration.posterior["viscosity"].to_numpy()
-    assert section["below_least_viscosity"] == pytest.approx((draws < floor).mean())
+    assert calibration.summary.below_least_viscosity == pytest.approx((draws < floor).mean())
 
 
 def test_closest_is_the_least_discrepancy_and_reproducible(calibration, short_recording, settings):
@@ -56,7 +55,7 @@ def test_closest_is_the_least_discrepancy_and_reproducible(calibration, short_re
     nearest = simulations.isel(simulation=int(np.argmin(simulations["discrepancy"].data)))
     assert float(calibration.tree["closest"]["discrepancy"]) == float(nearest["discrepancy"])
     stirring = stirring_of([bl.open_recording(short_recording)], settings["particles"])
-    theta = {name: np.array([value]) for name, value in calibration.summary["closest"].items()}
+    theta = {name: np.array([value]) for name, value in calibration.summary.closest.items()}
     again = stirring.simulate(theta, np.array([int(nearest["seed"])]))
     np.testing.assert_array_equal(again[0], calibration.tree["closest"]["inclination"])
 

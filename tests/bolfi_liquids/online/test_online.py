@@ -215,9 +215,9 @@ def test_stops_at_the_target_or_at_the_last_stroke(short_recording, tmp_path, ta
         assert strokes == ([1] if target == 0.9 else [1, 2, 3])
         run = of.finish(recording, budget=8, progress=False)
     calibration = bl.Calibration.open(run)
-    assert calibration.summary["n_simulations"] == 8
+    assert calibration.summary.n_simulations == 8
     online_last = estimates[-1].parameters["viscosity"]
-    ordinary = calibration.summary["parameters"]["viscosity"]
+    ordinary = calibration.summary.parameters["viscosity"]
     assert online_last.q05 < ordinary["q95"] and ordinary["q05"] < online_last.q95
     pour = bl.choose_pour(calibration, iterations=7, draws=2, progress=False)
     assert bl.report(run, moving=False).is_file() and 0.0 <= pour.chosen.expected_spillage <= 1.0
@@ -235,6 +235,6 @@ def test_the_last_estimate_agrees_with_the_ordinary_calibration(tmp_path):
             assert until(lambda: of.status.simulations > 16, of)
             ordinary = bl.Calibration.open(of.finish(recording, progress=False))
     last = estimates[-1].parameters["viscosity"]
-    other = ordinary.summary["parameters"]["viscosity"]
+    other = ordinary.summary.parameters["viscosity"]
     assert estimates[-1].strokes == len(of.ends)
     assert last.q05 < other["q95"] and other["q05"] < last.q95
