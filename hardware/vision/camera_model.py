@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-UNDISTORT_ROUNDS = 20
-UNDISTORT_TOLERANCE = 1e-9  # normalised coordinates; a millionth of a pixel
+from .opencv import opencv
+
+UNDISTORT_UNTIL = 20, 1e-9  # iterations, or an error of the picture [px]
 
 
 class CameraModelError(ValueError):
@@ -78,26 +80,35 @@ class CameraModel:
         Returns:
             Columns and rows [px], shape (N, 2); NaN for points behind the camera.
         """
-        camera = self.to_camera(points)
-        depth = np.where(camera[..., 2] > 0, camera[..., 2], np.nan)
-        return self.to_pixels(camera[..., :2] / depth[..., None])
+        points = np.asarray(points, dtype=float)
+        if not points.size:  # OpenCV refuses none
+            return np.empty((*points.shape[:-1], 2))
+        turn, _ = opencv().Rodrigues(self.rotation)
+        shift = -self.rotation @ self.position
+        found, _ = opencv().projectPoints(
+            points.reshape(-1, 1, 3), turn, shift, self.matrix, np.array(self.distortion)
+        )
+        pixels = found.reshape(*points.shape[:-1], 2)
+        in_front = self.to_camera(points)[..., 2:] > 0
+        return np.where(in_front, pixels, np.nan)
 
-    def to_pixels(self, normalised: np.ndarray) -> np.ndarray:
-        """Pixels [px] of undistorted normalised coordinates, both of shape (..., 2)."""
-        return _distorted(normalised, self.distortion) * self.focal + self.centre
+    @property
+    def matrix(self) -> np.ndarray:
+        """OpenCV's camera matrix [px], shape (3, 3)."""
+        (fx, fy), (cx, cy) = self.focal, self.centre
+        return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
 
     def undistort(self, pixels: np.ndarray) -> np.ndarray:
         """Undistorted normalised coordinates (x / z, y / z) of pixels, both of shape (..., 2)."""
-        seen = (np.asarray(pixels, dtype=float) - self.centre) / self.focal
-        if not any(self.distortion):
-            return seen
-        guess = seen
-        for _ in range(UNDISTORT_ROUNDS):
-            step = seen - _distorted(guess, self.distortion)
-            guess = guess + step
-            if not (np.abs(step) > UNDISTORT_TOLERANCE).any():
-                break
-        return guess
+        pixels = np.asarray(pixels, dtype=float)
+        if not (pixels.size and any(self.distortion)):
+            return (pixels - self.centre) / self.focal
+        cv2 = opencv()
+        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, *UNDISTORT_UNTIL)
+        found = cv2.undistortPoints(
+            pixels.reshape(-1, 1, 2), self.matrix, np.array(self.distortion), criteria=criteria
+        )
+        return found.reshape(pixels.shape)
 
     def place(self, pixel: np.ndarray, depth: float) -> np.ndarray:
         """The point [m], shape (3,), of the cup frame at a pixel and a depth in front [m]."""
@@ -112,7 +123,7 @@ class CameraModel:
         """The camera turned about its own axes [rad] and moved in the cup frame [m]."""
         return replace(
             self,
-            rotation=rotation_matrix(-np.asarray(rotation_vector)) @ self.rotation,
+            rotation=Rotation.from_rotvec(-np.asarray(rotation_vector)).as_matrix() @ self.rotation,
             position=self.position + shift,
         )
 
@@ -138,17 +149,7 @@ def look_at(position: np.ndarray, target: np.ndarray, roll: float = 0.0) -> np.n
         )
     right, forward = right / np.linalg.norm(right), forward / np.linalg.norm(forward)
     level = np.stack([right, np.cross(forward, right), forward])
-    return rotation_matrix(np.array([0.0, 0.0, -roll])) @ level
-
-
-def rotation_matrix(vector: np.ndarray) -> np.ndarray:
-    """Rotation about `vector` by its length [rad] (Rodrigues' formula), shape (3, 3)."""
-    angle = float(np.linalg.norm(vector))
-    if angle < 1e-15:
-        return np.eye(3)
-    x, y, z = np.asarray(vector) / angle
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    return Rotation.from_euler("z", -roll).as_matrix() @ level
 
 
 def as_fields(camera: CameraModel) -> dict[str, Any]:
@@ -197,22 +198,6 @@ def read_camera(path: Path) -> CameraModel:
         raise CameraModelError(
             f"{path} describes no camera ({err}); calibrate this camera again"
         ) from err
-
-
-def _distorted(normalised: np.ndarray, distortion: tuple[float, ...]) -> np.ndarray:
-    """OpenCV's model: k1, k2, k3 radial, p1, p2 tangential."""
-    k1, k2, p1, p2, k3 = distortion
-    x, y = normalised[..., 0], normalised[..., 1]
-    square = x * x + y * y
-    radial = 1.0 + square * (k1 + square * (k2 + square * k3))
-    product = 2.0 * x * y
-    return np.stack(
-        [
-            x * radial + p1 * product + p2 * (square + 2.0 * x * x),
-            y * radial + p2 * product + p1 * (square + 2.0 * y * y),
-        ],
-        axis=-1,
-    )
 
 
 def _check_rotation(rotation: np.ndarray) -> None:

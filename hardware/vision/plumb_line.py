@@ -4,8 +4,9 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from .camera_model import CameraModel, rotation_matrix
+from .camera_model import CameraModel
 from .coarse_search import Ray, Rows, sampled_rows, search_rays
 from .opencv import opencv
 from .stick_line import Line, fit_line
@@ -58,7 +59,7 @@ def level_camera(
         )
     line = _thread(image, camera, width, 1.0 if bright else -1.0)
     roll = -_correction(line, camera)
-    turned = replace(camera, rotation=rotation_matrix(np.array([0, 0, -roll])) @ camera.rotation)
+    turned = replace(camera, rotation=Rotation.from_euler("z", -roll).as_matrix() @ camera.rotation)
     return Levelled(turned, roll, line.slope_error / (1.0 + line.slope**2))
 
 

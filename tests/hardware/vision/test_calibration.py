@@ -14,7 +14,7 @@ from bolfi_liquids.hardware.vision import (
     level_camera,
     look_at,
 )
-from bolfi_liquids.hardware.vision.camera_model import rotation_matrix
+from scipy.spatial.transform import Rotation
 
 cv2 = pytest.importorskip("cv2")
 
@@ -31,7 +31,7 @@ TRUTH = CameraModel(
 
 def board_picture(turn, place, seed: int) -> np.ndarray:
     """The board's middle at `place` [m] in the camera frame, turned by a rotation vector."""
-    rotation = rotation_matrix(np.array(turn))
+    rotation = Rotation.from_rotvec(turn).as_matrix()
     middle = 0.5 * BOARD.square * np.array([BOARD.columns, BOARD.rows, 0.0])
     rng = np.random.default_rng(seed)
     return render_board(BOARD, TRUTH, rotation, np.array(place) - rotation @ middle, rng)
@@ -63,7 +63,8 @@ def test_the_calibrated_lens_maps_the_picture_like_the_true_one(pictures):
     found = calibrate_intrinsics(pictures, BOARD).placed(np.eye(3), np.zeros(3))
     columns, rows = np.meshgrid(np.linspace(60, 580, 9), np.linspace(50, 430, 7))
     pixels = np.stack([columns, rows], axis=-1)
-    apart = found.to_pixels(TRUTH.undistort(pixels)) - pixels
+    seen = TRUTH.undistort(pixels)
+    apart = found.project(np.concatenate([seen, np.ones((*seen.shape[:-1], 1))], axis=-1)) - pixels
     apart -= apart.mean(axis=(0, 1))  # a shifted centre is a turned camera
     assert np.abs(apart).max() < 1.5
 

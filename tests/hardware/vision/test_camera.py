@@ -10,7 +10,7 @@ from bolfi_liquids.hardware.vision import (
     write_camera,
 )
 
-cv2 = pytest.importorskip("cv2")
+pytest.importorskip("cv2")
 
 BENT = (-0.21, 0.08, 0.0012, -0.0009, -0.01)
 
@@ -28,22 +28,27 @@ def camera(**changes) -> CameraModel:
     return CameraModel(**{**fields, **changes})
 
 
-def test_projection_is_that_of_opencv():
+def test_projection_is_that_of_the_model_of_brown_and_conrady():
     one, rng = camera(), np.random.default_rng(0)
     points = rng.uniform([-0.15, -0.15, 0.0], [0.15, 0.15, 0.25], (200, 3))
-    matrix = np.array([[652.0, 0, 330.0], [0, 648.0, 233.0], [0, 0, 1]])
-    turn, _ = cv2.Rodrigues(one.rotation)
-    expected, _ = cv2.projectPoints(
-        points, turn, -one.rotation @ one.position, matrix, np.array(BENT)
-    )
-    np.testing.assert_allclose(one.project(points), expected[:, 0], atol=1e-6)
+    across, down, ahead = one.rotation @ (points - one.position).T
+    x, y, (k1, k2, p1, p2, k3) = across / ahead, down / ahead, BENT
+    square = x**2 + y**2
+    radial = 1.0 + k1 * square + k2 * square**2 + k3 * square**3
+    bent_x = x * radial + 2.0 * p1 * x * y + p2 * (square + 2.0 * x**2)
+    bent_y = y * radial + 2.0 * p2 * x * y + p1 * (square + 2.0 * y**2)
+    expected = np.stack([652.0 * bent_x + 330.0, 648.0 * bent_y + 233.0], axis=-1)
+    np.testing.assert_allclose(one.project(points), expected, atol=1e-9)
 
 
-def test_undistort_is_the_inverse_of_the_distortion_over_the_whole_picture():
-    one = camera()
+@pytest.mark.parametrize("bent", [BENT, (0.0, 0.0, 0.0, 0.0, 0.0)])
+def test_undistort_is_the_inverse_of_the_distortion_over_the_whole_picture(bent):
+    one = camera(distortion=bent)
     columns, rows = np.meshgrid(np.linspace(0, 639, 30), np.linspace(0, 479, 20))
     pixels = np.stack([columns, rows], axis=-1)
-    np.testing.assert_allclose(one.to_pixels(one.undistort(pixels)), pixels, atol=1e-4)
+    seen = one.undistort(pixels)
+    rays = np.concatenate([seen, np.ones((*seen.shape[:-1], 1))], axis=-1) @ one.rotation
+    np.testing.assert_allclose(one.project(one.position + 0.3 * rays), pixels, atol=1e-4)
 
 
 def test_points_behind_the_camera_have_no_pixel():
