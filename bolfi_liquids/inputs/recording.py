@@ -10,10 +10,22 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .fields import AXES, PLANES, UNITS
+from ..words import html_table
+from .fields import AXES, LENGTHS, PLANES, UNITS
 
 if TYPE_CHECKING:
     from xarray import Dataset
+
+
+SUBJECTS = {
+    "cup": ("cup_radius", "cup_height", "fill"),
+    "stick": ("stick_radius", "stick_length", "stick_mass", "stick_density"),
+    "liquid": ("liquid_density",),
+    "notes": ("status", "reason", "source"),
+}
+"""Attributes of a recording's file, by what they are of."""
+
+ATTRIBUTE_UNITS = {"stick_mass": "kg", "stick_density": "kg/m³", "liquid_density": "kg/m³"}
 
 
 class Trajectory(NamedTuple):
@@ -23,7 +35,7 @@ class Trajectory(NamedTuple):
     position: NDArray[np.float64]  # (T, 3) m, z up, origin on the cup's axis at its floor
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Recording:
     """One stir, as recorded; arrays are read-only, missing samples are NaN.
 
@@ -44,6 +56,27 @@ class Recording:
     path: Path
     hash: str
 
+    def __repr__(self) -> str:
+        told = "; ".join(f"{name} {value}" for name, value in self._rows().items())
+        return f"Recording({str(self.path)!r}: {told})"
+
+    def _repr_html_(self) -> str:
+        return html_table("Recording", {"file": self.path, **self._rows()})
+
+    def _rows(self) -> dict[str, str]:
+        """What it is of, by subject; without what the file does not say."""
+        length = f"{self.time[-1] - self.time[0]:.1f} s" if len(self.time) else "0 s"
+        return {
+            "duration": f"{length} ({len(self.time)} samples)",
+            **{
+                subject: ", ".join(parts)
+                for subject, names in SUBJECTS.items()
+                if (
+                    parts := [_told(name, self.attrs[name]) for name in names if name in self.attrs]
+                )
+            },
+        }
+
     def number(self, name: str) -> float:
         """A numeric attribute, in SI units."""
         return float(self.attrs[name])
@@ -61,6 +94,15 @@ class Recording:
     def __reduce__(self):
         """Processes that simulate need it, and a mapping proxy cannot be pickled."""
         return _unpickled, ({**vars(self), "attrs": dict(self.attrs)},)
+
+
+def _told(name: str, value: float | str) -> str:
+    """An attribute as a person reads it."""
+    if isinstance(value, str):
+        return value
+    if name in LENGTHS:
+        return f"{name.partition('_')[2] or name} {100.0 * value:.3g} cm"
+    return f"{value:.4g} {ATTRIBUTE_UNITS.get(name, '')}".strip()
 
 
 def _unpickled(values: dict[str, Any]) -> Recording:

@@ -1,5 +1,9 @@
 """Every bad recording is refused in one line that names file, field and value."""
 
+from importlib.resources import files
+from pathlib import Path
+from types import MappingProxyType
+
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -7,6 +11,7 @@ from typer.testing import CliRunner
 import bolfi_liquids as bl
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.inputs.checks import MAX_GRIPPER_GAP, longest_gap
+from bolfi_liquids.inputs.recording import Recording, Trajectory
 
 GAP = slice(60, 75)  # half a second
 
@@ -165,3 +170,26 @@ def test_gap_counts_to_the_ends():
     duration, start = longest_gap(time, seen)
     assert (duration, start) == (pytest.approx(0.3), pytest.approx(0.6))
     assert duration > MAX_GRIPPER_GAP
+
+
+def test_a_recording_shows_what_it_is_of():
+    recording = bl.open_recording(str(files("bolfi_liquids.data") / "glycerin_v10.nc"))
+    shown = repr(recording)
+    parts = [str(recording.path), f"{len(recording.time)} samples", "cup", "stick", "1260 kg/m³"]
+    assert all(part in shown for part in parts)
+    assert len(shown) < 400 and "array" not in shown
+    page = recording._repr_html_()
+    assert page.startswith("<table>") and recording.path.name in page
+
+
+def test_a_recording_that_has_neither_samples_nor_attributes_is_shown():
+    nothing = np.empty((0, 3))
+    empty = Recording(
+        nothing[:, 0],
+        Trajectory(nothing[:, 0], nothing),
+        nothing[:, :2],
+        MappingProxyType({}),
+        Path("a.nc"),
+        "",
+    )
+    assert "a.nc" in repr(empty)
