@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..files import write_text
-from ..physics_progress import case_progress
+from ..progress import fraction_bar
 from .physics_identity import case_identity, has_identity
 from .physics_records import (
     CASES,
@@ -119,7 +119,7 @@ def _chosen(names: Iterable[str], registry: "Mapping[str, Case]") -> "list[Case]
 def _run(case: "Case", seed: int, label: str, *, shown: bool) -> dict[str, Any]:
     """The record of one case, which ran or failed."""
     began = time.perf_counter()
-    with case_progress(label, shown=shown) as tell:
+    with fraction_bar(label, shown=shown) as tell:
         try:
             result = case.run(tell, seed)
             return finished_record(case, result, seed, time.perf_counter() - began)

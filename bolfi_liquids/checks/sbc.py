@@ -9,7 +9,7 @@ draws another set.
 
 from collections.abc import Mapping
 from concurrent.futures import Executor
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +31,6 @@ from ..progress import progress_bar
 from ..run.directory import SIMULATIONS, enter_run
 from ..run.provenance import LIBRARIES, versions
 from ..run.simulations import fresh_seeds
-from ..run.workers import processes
 from .sbc_pipelines import (
     SAMPLING,
     Calibrate,
@@ -43,10 +42,10 @@ from .sbc_tree import SurrogateCheck, checked, write_results
 
 if TYPE_CHECKING:
     from ..inference import Prior, Replicates
+    from ..inference.simulations.executors import Workers
 
-
-AT_ONCE = 16  # stirs in one call
-_PURPOSE = 61  # of seeds
+STIRS_PER_CALL = 16  # of the simulator, where there is no executor
+STIR_SEEDS = 61  # purpose of the seeds of shared stirs
 
 
 def check_sbc(
@@ -54,7 +53,8 @@ def check_sbc(
     recording: str | Path | Recording | None = None,
     *,
     settings: SbcSettings | None = None,
-    workers: int | None = None,
+    executor: "Workers | None" = None,
+    timeout: float | None = None,
     progress: bool = True,
 ) -> dict[str, SurrogateCheck]:
     """Simulation-based calibration and coverage of both surrogates with the particle fluid.
@@ -65,8 +65,9 @@ def check_sbc(
         out: Directory of results; made if missing.
         recording: Whose gripper path and rig are simulated; None is the bundled stir of water.
         settings: How many of what; None is the default.
-        workers: Processes that share the work; None is one for each processor.
-        progress: Show bars on stderr.
+        executor: Shares the work, see `calibrate`; None is this process.
+        timeout: Seconds that one simulation may take; None sets no limit.
+        progress: Whether to show bars on stderr.
 
     Returns:
         By the surrogate's name.
@@ -75,52 +76,23 @@ def check_sbc(
         InputError: A recording or setting cannot be used, or `out` holds other results.
         ValueError: Of a surrogate, no replicate finished.
     """
+    from ..inference.simulations.executors import open_executor
+
     settings = settings or SbcSettings()
     given = bundled_recording("water") if recording is None else recording
     stirring = stirring_of(open_recordings(given), settings.particles)
     prior, out = default_prior(), Path(out)
-    enter_run(out, _record(settings, prior, stirring), resume=True)
+    record = _record(settings, prior, stirring)
+    enter_run(out, record, resume=True)
     found = {}
-    with processes(workers) as pool:
+    with open_executor(executor) as workers:
+        study = SbcStudy(out, stirring, prior, settings, workers, timeout, progress)
         for name in SURROGATES:
-            count = settings.replicates[name]
-            if count:
-                made = _replicates(name, count, out, stirring, prior, settings, pool, progress)
+            if settings.replicates[name]:
+                made = study.replicates(name)
                 found[name] = checked(made, conservative=name == "discrepancy")
-                write_results(out, found, _record(settings, prior, stirring))
+                write_results(out, found, record)
     return found
-
-
-def _replicates(  # noqa: PLR0913  what the two surrogates share
-    name: str,
-    count: int,
-    out: Path,
-    stirring: Stirring,
-    prior: "Prior",
-    settings: SbcSettings,
-    pool: Executor | None,
-    progress: bool,
-) -> "Replicates":
-    from .. import inference
-
-    calibration = settings.calibration(name)
-    if name == "signal":
-        shared = stirs_everywhere(stirring, prior, settings, out / SIMULATIONS, pool, progress)
-        pipeline: Any = FromBank(stirring, prior, *shared, calibration)
-    else:
-        pipeline = Calibrate(stirring, prior, calibration)
-    return inference.replicates(
-        Quietly(pipeline),
-        stirring.simulate,
-        prior,
-        count,
-        seed=settings.seed,
-        observe=CameraNoise(np.radians(settings.noise_deg)),
-        executor=pool,
-        store=out / f"{name}.sqlite",
-        identity=stirring.identity,
-        progress=progress,
-    )
 
 
 def _record(settings: SbcSettings, prior: "Prior", stirring: Stirring) -> Mapping[str, Any]:
@@ -138,41 +110,75 @@ def _record(settings: SbcSettings, prior: "Prior", stirring: Stirring) -> Mappin
     }
 
 
-def stirs_everywhere(  # noqa: PLR0913  what makes simulations
-    stirring: Stirring,
-    prior: "Prior",
-    settings: SbcSettings,
-    path: Path,
-    pool: Executor | None,
-    progress: bool,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Points that fill the prior [n, d], and `RUNS` stirs of each [n, RUNS, T, 2]; failed: NaN."""
-    from scipy.stats import qmc
+@dataclass(frozen=True)
+class SbcStudy:
+    """What the replicates of both surrogates share.
 
-    from ..inference import Job, SimulationBank, run_missing
+    Attributes:
+        out: Directory of results.
+        stirring: The simulator.
+        prior: Prior of the parameters.
+        settings: How many of what.
+        executor: Shares the work; None is this process.
+        timeout: Seconds that one simulation may take; None sets no limit.
+        progress: Whether to show bars on stderr.
+    """
 
-    u = qmc.Sobol(len(prior), rng=settings.seed).random(settings.design)
-    theta = prior.from_unit(u)
-    count = RUNS * settings.design
-    seeds = fresh_seeds(settings.seed, _PURPOSE, count)
-    jobs = [
-        Job({name: float(values[at // RUNS]) for name, values in theta.items()}, seed)
-        for at, seed in enumerate(seeds)
-    ]
-    with (
-        SimulationBank(path) as bank,
-        progress_bar("simulating stirs for all", count, shown=progress) as advance,
-    ):
-        made = run_missing(
-            stirring.simulate,
-            jobs,
-            None,
-            bank,
-            stirring.identity,
-            pool,
-            batch=AT_ONCE,
-            advance=advance,
+    out: Path
+    stirring: Stirring
+    prior: "Prior"
+    settings: SbcSettings
+    executor: Executor | None = None
+    timeout: float | None = None
+    progress: bool = True
+
+    def replicates(self, name: str) -> "Replicates":
+        """Calibrations of stirs whose truths are known, by one of `SURROGATES`."""
+        from .. import inference
+
+        calibration = self.settings.calibration(name)
+        if name == "signal":
+            pipeline: Any = FromBank(
+                self.stirring, self.prior, *self.stirs_everywhere(), calibration
+            )
+        else:
+            pipeline = Calibrate(self.stirring, self.prior, calibration, self.timeout)
+        return inference.replicates(
+            Quietly(pipeline),
+            self.stirring.simulate,
+            self.prior,
+            self.settings.replicates[name],
+            seed=self.settings.seed,
+            observe=CameraNoise(np.radians(self.settings.noise_deg)),
+            executor=self.executor,
+            store=self.out / f"{name}.sqlite",
+            identity=self.stirring.identity,
+            progress=self.progress,
         )
-    nothing = np.full(stirring.observed.shape, np.nan)
-    signals = np.stack([nothing if one.signal is None else one.signal for one in made])
-    return prior.to_array(theta), signals.reshape(settings.design, RUNS, *nothing.shape)
+
+    def stirs_everywhere(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Points that fill the prior [n, d], and `RUNS` stirs of each [n, RUNS, T, 2].
+
+        A stir that failed is NaN.
+        """
+        from scipy.stats import qmc
+
+        from ..inference import SimulationBank
+        from ..inference.simulations.job import jobs
+        from ..inference.simulations.runner import Keep, run_missing
+
+        stirring, design = self.stirring, self.settings.design
+        u = qmc.Sobol(len(self.prior), rng=self.settings.seed).random(design)
+        theta = self.prior.from_unit(u)
+        count = RUNS * design
+        seeds = fresh_seeds(self.settings.seed, STIR_SEEDS, count)
+        repeated = {name: np.repeat(values, RUNS) for name, values in theta.items()}
+        with (
+            SimulationBank(self.out / SIMULATIONS) as bank,
+            progress_bar("simulating stirs for all", count, shown=self.progress) as advance,
+        ):
+            keep = Keep(bank, stirring.identity, STIRS_PER_CALL, self.executor, self.timeout)
+            made = run_missing(stirring.simulate, jobs(repeated, seeds), keep, advance=advance)
+        nothing = np.full(stirring.observed.shape, np.nan)
+        signals = np.stack([nothing if one.signal is None else one.signal for one in made])
+        return self.prior.to_array(theta), signals.reshape(design, RUNS, *nothing.shape)

@@ -38,6 +38,7 @@ from .tree import criticism_tree
 
 if TYPE_CHECKING:
     from .. import inference
+    from ..inference.simulations.executors import Workers
     from ..models import Cups
 
 
@@ -52,6 +53,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     effects: str | Sequence[str] | None = None,
     accept: str | Sequence[str] | None = None,
     seed: int = 0,
+    executor: "Workers | None" = None,
+    timeout: float | None = None,
     progress: bool = True,
 ) -> Criticism:
     """Find where a calibrated simulator and the data disagree, and which effect it lacks.
@@ -70,13 +73,18 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         cups: With which they were poured; None takes the bundled ones.
         effects: Names in `models.EFFECTS` to consider; None is all of them.
         accept: Effects that join the model whatever the verdict.
-        seed: Of everything random.
+        seed: Seed of all random draws.
+        executor: Where simulations run, see `calibrate`; the result has the same bits.
+        timeout: Seconds that one simulation may take; None sets no limit.
         progress: Whether to show phases on stderr.
 
     Raises:
         InputError: Something given cannot be used.
         RuntimeError: Simulations failed; the message says how.
     """
+    from ..inference import Keeping
+    from ..inference.simulations.executors import open_executor
+
     if not isinstance(calibration, Calibration):
         calibration = Calibration.open(calibration)
     started = time.perf_counter()
@@ -97,10 +105,13 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     run = calibration.path
     if finished := finished_criticism(run, inputs.made_from):
         return finished
-    with open_bank(run) as bank, phases(shown=progress) as report:
-        from ..inference import Keeping
-
-        findings = _find(calibration, inputs, Keeping(bank, settings.batch, seed, report))
+    with (
+        open_bank(run) as bank,
+        open_executor(executor) as workers,
+        phases(shown=progress) as report,
+    ):
+        keeping = Keeping(bank, settings.batch, seed, report, workers, timeout)
+        findings = _find(calibration, inputs, keeping)
         tree = criticism_tree(findings)
     write_tree(tree, run / CRITICISM)
     section = criticism_section(findings, tree, time.perf_counter() - started)

@@ -146,7 +146,7 @@ class CriticismSettings:
     effects: tuple[str, ...] | None = None
     accept: tuple[str, ...] | None = None
     seed: int = 0
-    batch: int = 8
+    batch: int = 4
 
     def __post_init__(self):
         at_least(0, "--seed", self.seed)

@@ -31,7 +31,8 @@ from .spillage import (
 )
 
 if TYPE_CHECKING:
-    from ..inference import SimulationBank
+    from ..inference.simulations.executors import Workers
+    from ..inference.simulations.runner import Keep
     from ..models import Cups
 
 PLUG_IN_SEEDS = 4  # that each action of the plug-in is tried with; the paper tries one
@@ -95,6 +96,8 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     draws: int = 16,
     risk: str = "mean",
     seed: int = 0,
+    executor: "Workers | None" = None,
+    timeout: float | None = None,
     progress: bool = True,
 ) -> Pour:
     """Choose angular velocity and distance so that little is spilled whatever the liquid is.
@@ -113,7 +116,9 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         iterations: Angular velocities tried, as many again for the plug-in.
         draws: Posterior draws that each action is tried on, and again those that promise most.
         risk: "mean", or "cvar": the mean over the worst tenth of the draws.
-        seed: Of everything random.
+        seed: Seed of all random draws.
+        executor: Where pours are simulated, see `calibrate`; the result has the same bits.
+        timeout: Seconds that one pour may take; None sets no limit.
         progress: Whether to show a bar on stderr.
 
     Raises:
@@ -121,6 +126,8 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         RuntimeError: Pours failed at every angular velocity, or at all of the promising ones.
     """
     from ..calibration.tree import write_tree
+    from ..inference.simulations.executors import open_executor
+    from ..inference.simulations.runner import Keep
     from .tree import pour_section, pour_tree
 
     if not isinstance(calibration, Calibration):
@@ -145,9 +152,11 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     best = {name: np.full(PLUG_IN_SEEDS, value) for name, value in calibration.best.items()}
     with (
         open_bank(calibration.path) as bank,
+        open_executor(executor) as workers,
         progress_bar("trying actions", 2 * iterations + FINALISTS + 3, shown=progress) as advance,
     ):
-        pours = _Pours(cups, calibration.liquid_density, settings, bank, advance)
+        keep = Keep(bank, executor=workers, timeout=timeout)
+        pours = _Pours(cups, calibration.liquid_density, settings, keep, advance)
         over_posterior, at_best = pours.try_all(search), pours.try_all(best)
         if_true = at_best.least(risk)
         finalists = pours.try_again(over_posterior, if_true["angular_velocity"], again)
@@ -179,7 +188,7 @@ class _Pours:
     cups: "Cups"
     density: float
     settings: PourSettings
-    bank: "SimulationBank"
+    keep: "Keep"
     advance: Advance
 
     def try_all(self, liquids: Mapping[str, NDArray]) -> Surface:
@@ -211,4 +220,4 @@ class _Pours:
         count = len(next(iter(liquids.values())))
         seeds = np.array(fresh_seeds(self.settings.seed, purpose, count), np.int64)
         outcomes = Outcomes(liquids, self.density, self.cups, seeds)
-        return pour_all(outcomes, rates, self.bank, self.advance)
+        return pour_all(outcomes, rates, self.keep, self.advance)

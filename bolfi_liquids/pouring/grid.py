@@ -25,7 +25,8 @@ from .spillage import (
 if TYPE_CHECKING:
     from scipy.interpolate import RegularGridInterpolator
 
-    from ..inference import Prior, SimulationBank
+    from ..inference import Prior
+    from ..inference.simulations.runner import Keep
     from ..models import Cups
     from ..progress import Advance
 
@@ -82,7 +83,7 @@ def make_grid(
     cups: "Cups",
     density: float,
     prior: "Prior",
-    bank: "SimulationBank",
+    keep: "Keep",
     advance: "Advance",
     *,
     size: GridSize = FINE,
@@ -93,7 +94,7 @@ def make_grid(
         cups: Of the pours.
         density: Of every liquid [kg/m3].
         prior: Its bounds are the grid's.
-        bank: Where the pours are kept.
+        keep: Where the pours are made and kept.
         advance: Called after each angular velocity.
         size: Two of each at least.
     """
@@ -105,5 +106,5 @@ def make_grid(
     theta = {"viscosity": mesh[0].ravel(), "cohesion": mesh[1].ravel()}
     seeds = np.array(fresh_seeds(0, _PURPOSE, mesh[0].size), np.int64)
     rates = np.geomspace(*cups.angular_velocity_range, size.rates)
-    made = pour_all(Outcomes(theta, density, cups, seeds), rates, bank, advance)
+    made = pour_all(Outcomes(theta, density, cups, seeds), rates, keep, advance)
     return PourGrid(cups, np.log(viscosity), cohesion, made)

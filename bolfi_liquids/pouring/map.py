@@ -150,7 +150,7 @@ def make_pours(
     Raises:
         InputError: `pours` is too small.
     """
-    from ..inference import run_missing
+    from ..inference.simulations.runner import Keep, run_missing
 
     if pours < LEAST_POURS:
         raise InputError(f"{pours}", where="pours", fix=f"give at least {LEAST_POURS}")
@@ -166,7 +166,7 @@ def make_pours(
     identity = json.dumps(["spillage map", cups.settings(), density], sort_keys=True)
     missing = sum(bank.get(identity, *job) is None for job in jobs)
     with progress_bar("pours for the map", pours, shown=progress and missing > 0) as advance:
-        results = run_missing(simulate, jobs, (1,), bank, identity, batch=AT_ONCE, advance=advance)
+        results = run_missing(simulate, jobs, Keep(bank, identity, AT_ONCE), (1,), advance=advance)
     theta = {name: np.array([job.theta[name] for job in jobs]) for name in jobs[0].theta}
     return theta, np.array([np.nan if r.signal is None else r.signal[0] for r in results])
 

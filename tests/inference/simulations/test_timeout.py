@@ -8,9 +8,10 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 import pytest
 import xarray as xr
-from bolfi_liquids.inference import Job, Simulation, SimulationBank, run_missing
+from bolfi_liquids.inference import Job, Simulation, SimulationBank
 from bolfi_liquids.inference.simulations.failures import timed_out
 from bolfi_liquids.inference.simulations.job import run_batch, simulation_seed
+from bolfi_liquids.inference.simulations.runner import Keep, run_missing
 
 from bolfi_liquids import inference
 
@@ -79,7 +80,7 @@ def test_an_error_that_is_no_text_is_kept_all_the_same():
         raise OSError("cannot read \udcff.dat")  # how Python spells a file name that is not UTF-8
 
     with SimulationBank() as bank:
-        (found,) = run_missing(simulate, JOBS[:1], (1,), bank, "")
+        (found,) = run_missing(simulate, JOBS[:1], Keep(bank), (1,))
         assert bank.get("", *JOBS[0]) == found
     assert found.error.startswith(r"OSError: cannot read \udcff.dat (")
 
@@ -88,12 +89,12 @@ def test_an_error_that_is_no_text_is_kept_all_the_same():
 def test_a_timeout_is_final_until_more_time_is_allowed(forever, allowed, again):
     calls = []
     with SimulationBank() as bank:
-        first = run_missing(stuck_at(0, forever), JOBS[:1], (1,), bank, "", timeout=0.1)
-        then = run_missing(stuck_at(-1, forever, calls), JOBS[:1], (1,), bank, "", timeout=allowed)
+        first = run_missing(stuck_at(0, forever), JOBS[:1], Keep(bank, timeout=0.1))
+        then = run_missing(stuck_at(-1, forever, calls), JOBS[:1], Keep(bank, timeout=allowed))
         assert bool(calls) == again
         assert (then == first) == (not again)
         # no limit is more time than any
-        (last,) = run_missing(stuck_at(-1, forever), JOBS[:1], (1,), bank, "")
+        (last,) = run_missing(stuck_at(-1, forever), JOBS[:1], Keep(bank))
     np.testing.assert_array_equal(last.signal, [0.0])
 
 
@@ -151,7 +152,7 @@ def test_the_clock_runs_in_the_worker(tmp_path, monkeypatch):
     batch = [Job({"a": 0.3}, seed) for seed in range(4)] + [Job({"a": 30.0}, 4)]
     context = multiprocessing.get_context("spawn")
     with SimulationBank() as bank, ProcessPoolExecutor(1, mp_context=context) as pool:
-        found = run_missing(sleeper.sleep, batch, (1,), bank, "", pool, timeout=0.9)
+        found = run_missing(sleeper.sleep, batch, Keep(bank, executor=pool, timeout=0.9))
     assert [result.error for result in found] == [None] * 4 + [timed_out(0.9)]
 
 
