@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from .reporting.report import report
     from .robot.pour import execute_pour
     from .robot.record import record
+    from .simulation.simulate import simulate_pour, simulate_stir
 
 __version__ = version("bolfi-liquids")
 __all__ = [
@@ -32,6 +33,8 @@ __all__ = [
     "open_recording",
     "record",
     "report",
+    "simulate_pour",
+    "simulate_stir",
 ]
 
 # loaded on use: `import bolfi_liquids` must cost neither JAX nor Taichi
@@ -48,6 +51,8 @@ _HOME = {
     "open_recording": ".inputs.recording",
     "record": ".robot.record",
     "report": ".reporting.report",
+    "simulate_pour": ".simulation.simulate",
+    "simulate_stir": ".simulation.simulate",
 }
 
 

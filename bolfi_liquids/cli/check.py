@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from ..inputs.settings import SbcSettings
-from .compute import AllProcessors, Compute
+from .compute import StudyCompute, Workers
 from .errors import FAILED
 from .examples import examples
 from .grouped import grouped
@@ -19,7 +19,7 @@ app = typer.Typer(help="Long validation runs; a killed one goes on.", no_args_is
 @app.command(epilog=examples("check physics --case couette", "check physics --out runs/physics"))
 @grouped
 def physics(
-    compute: Compute,
+    compute: Workers,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Directory of the results.")] = Path(
         "runs/physics"
     ),
@@ -40,9 +40,7 @@ def physics(
     from .physics_table import print_physics
 
     with compute.executor() as executor:
-        check = check_physics(
-            out, case or (), seed=seed, executor=executor, timeout=compute.timeout
-        )
+        check = check_physics(out, case or (), seed=seed, executor=executor)
     print_physics(check.records, Console())
     typer.echo(f"results: {check.results}")
     if not check.passed:
@@ -55,7 +53,7 @@ def physics(
 @grouped
 def sbc(
     options: SbcOptions,
-    compute: AllProcessors,
+    compute: StudyCompute,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Directory of the results.")] = Path(
         "runs/sbc"
     ),

@@ -26,18 +26,16 @@ TimeoutOption = Annotated[
 
 
 @dataclass(frozen=True)
-class Compute:
-    """Where simulations run, and for how long at the most.
+class Workers:
+    """Where something long runs.
 
     Attributes:
         workers: Number of processes; 1 is this process, None one for each processor.
         dask: Address of a Dask scheduler, in place of processes.
-        timeout: Seconds that one simulation may take; None sets no limit.
     """
 
     workers: WorkersOption = 1
     dask: DaskOption = None
-    timeout: TimeoutOption = None
 
     @contextmanager
     def executor(self) -> "Iterator[Executor | None]":
@@ -47,8 +45,26 @@ class Compute:
 
 
 @dataclass(frozen=True)
-class AllProcessors(Compute):
-    """The same for long studies, which take all processors unless told otherwise."""
+class Compute(Workers):
+    """Where simulations run, and for how long at the most.
+
+    Attributes:
+        timeout: Seconds that one simulation may take; None sets no limit.
+    """
+
+    timeout: TimeoutOption = None
+
+
+@dataclass(frozen=True)
+class AllProcessors(Workers):
+    """`Workers` of a long study, which takes all processors unless told otherwise."""
+
+    workers: WorkersOption = None
+
+
+@dataclass(frozen=True)
+class StudyCompute(Compute):
+    """`Compute` of a long study, which takes all processors unless told otherwise."""
 
     workers: WorkersOption = None
 

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from distributed import LocalCluster
 
 import bolfi_liquids as bl
 from bolfi_liquids.cli.compute import open_executor_of
+from bolfi_liquids.inputs.bundled import bundled_recording
 
 STIR = {"budget": 9, "batch": 3, "particles": 100, "chains": 2, "draws": 50, "seed": 5}
 POUR = {"iterations": 7, "draws": 4, "seed": 2}
@@ -23,19 +25,11 @@ def cluster():
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
-    """Half a second of a stir, after the pause."""
+    """A second and a half: the pause, and the beginning of the first stroke."""
     path = tmp_path_factory.mktemp("recordings") / "short.nc"
-    import xarray as xr
-
-    with xr.open_dataset(bl.open_recording(_bundled()).path, decode_times=False) as whole:
+    with xr.open_dataset(bundled_recording("glycerin").path, decode_times=False) as whole:
         whole.isel(time=slice(0, 45)).to_netcdf(path)
     return path
-
-
-def _bundled():
-    from bolfi_liquids.inputs.bundled import bundled_recording
-
-    return bundled_recording("glycerin")
 
 
 def concluded(recording, out, workers, dask):
