@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..inputs.pour_table import PourTable
 from ..inputs.prior import split_parameters
+from ..run.time_limit import TimeLimited
 from .pour_noise import PourNoise
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ OUTCOMES = ("spilled", "retained")
 
 
 @dataclass(frozen=True)
-class Pouring:
+class Pouring(TimeLimited):
     """Pours of one liquid as a simulator.
 
     Attributes:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..inputs.prior import split_parameters
 from ..progress import Advance
+from ..run.time_limit import TimeLimited
 
 if TYPE_CHECKING:
     from ..inference.simulations.runner import Keep
@@ -140,7 +141,7 @@ def landed(fractions: NDArray, distances: NDArray, distance: float, off: NDArray
 
 
 @dataclass(frozen=True)
-class Outcomes:
+class Outcomes(TimeLimited):
     """The liquids and seeds that every action is tried on.
 
     Actions that meet the same liquids and the same seeds (common random numbers) differ by

@@ -17,6 +17,7 @@ from ..inputs.cups import bundled_cups, open_cups
 from ..inputs.described_liquid import check_effects
 from ..inputs.prior import split_parameters
 from ..inputs.recording import Gripper, Recording, Source, open_recordings
+from ..run.time_limit import TimeLimited
 from .batch import Where, batch_of, simulated
 from .files import check_targets, pour_dataset, stir_dataset
 from .film import film_pour, film_stir
@@ -146,7 +147,7 @@ def _planned(
 
 
 @dataclass(frozen=True)
-class PourSimulator:
+class PourSimulator(TimeLimited):
     """One pour of liquids, as a simulator.
 
     Attributes:

@@ -7,6 +7,7 @@ library (tested), so that they start quickly and stay small.
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
     from ..surrogates.base import Simulator
 
 R = TypeVar("R")
+
+Limit = Callable[[float], AbstractContextManager[object]]
+"""Inside `limit(seconds)` a simulator raises TimeoutError once it has taken so long."""
 
 
 class Job(NamedTuple):
@@ -74,6 +78,7 @@ def run_batch(
         signals = within(
             None if timeout is None else timeout * len(batch),
             lambda: np.asarray(simulate(theta, seeds), np.float64),
+            limit_of(simulate),
         )
     # whatever the user's code raises is a failed run, and kept; many programs end by SystemExit
     except (Exception, SystemExit) as error:
@@ -92,18 +97,34 @@ def run_batch(
     return [Simulation(signal, None, seconds) for signal in signals]
 
 
-def within(timeout: float | None, call: Callable[[], R]) -> R:
+def limit_of(simulate: "Simulator") -> Limit | None:
+    """How a simulator stops itself: the method `time_limit` of it, or of the object whose method
+    it is; None if there is no such method."""
+    return getattr(getattr(simulate, "__self__", simulate), "time_limit", None)
+
+
+def within(timeout: float | None, call: Callable[[], R], limit: Limit | None = None) -> R:
     """What `call` returns or raises, if it does so in `timeout` seconds.
 
-    The call then runs in a thread of its own. Python cannot stop a thread: one that is overdue
-    is abandoned, and goes on, unheard, until it returns or the process ends. Code that never
-    releases the interpreter's lock cannot be timed out.
+    With a `limit` the call stops itself, in this thread. Else it runs in a thread of its own.
+    Python cannot stop a thread: one that is overdue is abandoned, and goes on, unheard, until it
+    returns or the process ends. Code that never releases the interpreter's lock cannot be timed
+    out.
 
     Raises:
         Overdue: it did not.
     """
     if timeout is None:
         return call()
+    if limit is not None:
+        ends = time.monotonic() + timeout
+        try:
+            with limit(timeout):
+                return call()
+        except TimeoutError as error:
+            if time.monotonic() < ends:
+                raise
+            raise Overdue from error
     returned: list[R] = []
     failed: list[BaseException] = []
 

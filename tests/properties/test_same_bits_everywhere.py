@@ -1,5 +1,8 @@
 """Where simulations run changes no bit of a calibration or of a pour."""
 
+import shutil
+from contextlib import contextmanager
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -9,8 +12,7 @@ import bolfi_liquids as bl
 from bolfi_liquids.cli.compute import open_executor_of
 from bolfi_liquids.inputs.bundled import bundled_recording
 
-STIR = {"budget": 9, "batch": 3, "particles": 100, "chains": 2, "draws": 50, "seed": 5}
-POUR = {"iterations": 7, "draws": 4, "seed": 2}
+SETTINGS = {"budget": 9, "batch": 3, "particles": 100, "chains": 2, "draws": 50, "seed": 5}
 GROUPS = ("posterior", "simulations", "posterior_predictive", "replicates", "closest")
 
 
@@ -32,34 +34,43 @@ def recording(tmp_path_factory):
     return path
 
 
-def concluded(recording, out, workers, dask):
-    """A calibration and a pour, made as `--workers` and `--dask` say."""
+@contextmanager
+def executor_of(where, address):
+    workers, dask = {"here": (1, None), "processes": (2, None), "dask": (1, address)}[where]
     with open_executor_of(workers, dask) as executor:
-        where = {"executor": executor, "timeout": 60.0, "progress": False}
-        calibration = bl.calibrate(recording, out=out, **STIR, **where)
-        return calibration, bl.choose_pour(calibration, **POUR, **where)
+        yield {"executor": executor, "timeout": 300.0, "progress": False}
 
 
 @pytest.fixture(scope="module")
-def alone(recording, tmp_path_factory):
-    """In this process."""
-    return concluded(recording, tmp_path_factory.mktemp("alone") / "run", 1, None)
+def here(recording, tmp_path_factory):
+    """A calibration in this process."""
+    with executor_of("here", None) as where:
+        return bl.calibrate(
+            recording, out=tmp_path_factory.mktemp("here") / "run", **SETTINGS, **where
+        )
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::bolfi_liquids.inference.EmulatorWarning")
-@pytest.mark.filterwarnings("ignore::bolfi_liquids.inference.SamplingWarning")
 @pytest.mark.parametrize("where", ["processes", "dask"])
-def test_workers_and_clusters_conclude_the_same(alone, recording, cluster, tmp_path, where):
-    workers, dask = (2, None) if where == "processes" else (1, cluster)
-    calibration, pour = concluded(recording, tmp_path / "run", workers, dask)
-    here, poured_here = alone
+def test_a_calibration_is_the_same(here, recording, cluster, tmp_path, where):
+    with executor_of(where, cluster) as options:
+        there = bl.calibrate(recording, out=tmp_path / "run", **SETTINGS, **options)
     for group in GROUPS:
         for name, values in here.tree[group].data_vars.items():
             if name != "seconds":
-                there = calibration.tree[group][name].to_numpy()
-                np.testing.assert_array_equal(there, values.to_numpy(), err_msg=f"{group}/{name}")
-    for name in ("chosen", "plug_in"):
-        judged, judged_here = getattr(pour, name), getattr(poured_here, name)
-        assert judged.action == judged_here.action
-        np.testing.assert_array_equal(judged.fractions, judged_here.fractions)
+                found = there.tree[group][name].to_numpy()
+                np.testing.assert_array_equal(found, values.to_numpy(), err_msg=f"{group}/{name}")
+
+
+@pytest.mark.minutes
+@pytest.mark.parametrize("where", ["processes", "dask"])
+def test_a_pour_is_the_same(here, cluster, tmp_path, where):
+    found = []
+    for at in ("here", where):
+        run = tmp_path / at
+        shutil.copytree(here.path, run)
+        with executor_of(at, cluster) as options:
+            found.append(bl.choose_pour(run, iterations=7, draws=1, seed=2, **options))
+    for judged, other in zip(*((one.chosen, one.plug_in) for one in found), strict=True):
+        assert judged.action == other.action
+        np.testing.assert_array_equal(judged.fractions, other.fractions)

@@ -49,6 +49,14 @@ def test_one_of_a_pair_is_the_same_alone_and_elsewhere(pair):
         np.testing.assert_array_equal(alone[name], pair[name][1])
 
 
+def test_a_stir_that_takes_too_long_is_stopped_and_costs_nothing_else(pair):
+    options = {"density": 1100.0, "path": SHORT, "seed": 4, **FEW}
+    with pytest.raises(RuntimeError, match="timeout: no signal after 1e-09 s"):
+        bl.simulate_stir(0.05, 0.3, timeout=1e-9, **options)
+    again = bl.simulate_stir(0.05, 0.3, timeout=60.0, **options)
+    np.testing.assert_array_equal(again["inclination_xz"], pair["inclination_xz"][0])
+
+
 def test_a_simulated_stir_is_a_recording(tmp_path):
     made = bl.simulate_stir(path=SHORT, out=tmp_path / "stir.nc", **FEW)
     read = bl.open_recording(tmp_path / "stir.nc")

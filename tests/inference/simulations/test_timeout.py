@@ -4,6 +4,7 @@ import multiprocessing
 import threading
 import time
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -96,6 +97,34 @@ def test_a_timeout_is_final_until_more_time_is_allowed(forever, allowed, again):
         # no limit is more time than any
         (last,) = run_missing(stuck_at(-1, forever), JOBS[:1], Keep(bank))
     np.testing.assert_array_equal(last.signal, [0.0])
+
+
+class Patient:
+    """A simulator that stops itself, as one that must stay in its thread."""
+
+    def __init__(self, seconds):
+        self.seconds, self.allowed, self.threads = seconds, 0.0, set()
+
+    @contextmanager
+    def time_limit(self, seconds):
+        self.allowed = seconds
+        yield
+
+    def simulate(self, theta, seeds):
+        self.threads.add(threading.current_thread())
+        time.sleep(min(self.seconds, self.allowed + 0.01))
+        if self.seconds > self.allowed:
+            raise TimeoutError("stopped")
+        return theta["a"][:, None]
+
+
+@pytest.mark.parametrize(("seconds", "error"), [(0.0, None), (9.0, timed_out(0.1))])
+def test_a_simulator_that_stops_itself_stays_in_its_thread(seconds, error):
+    patient = Patient(seconds)
+    with SimulationBank() as bank:
+        (found,) = run_missing(patient.simulate, JOBS[:1], Keep(bank, timeout=0.1))
+    assert found.error == error
+    assert patient.threads == {threading.current_thread()}
 
 
 def test_every_kind_is_counted_and_written(tmp_path, prior, observed, simulate, forever):
