@@ -10,7 +10,7 @@ from .pouring.choose import choose_pour
 from .reporting.report import report
 
 if TYPE_CHECKING:
-    from .inference.simulations.executors import Workers
+    from .inference.simulations import Workers
 
 RECORDING, CLEAN = "glycerin_v10.nc", "water_v10.nc"
 

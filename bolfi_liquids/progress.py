@@ -5,44 +5,15 @@ from contextlib import contextmanager
 
 from numpy.typing import NDArray
 
+from .inference.progress import Advance as Advance
+from .inference.progress import progress_bar as progress_bar
+
 Simulate = Callable[[dict[str, NDArray], NDArray], NDArray]
 """(theta, seeds) -> signals, one row for each seed."""
-
-Advance = Callable[[int], object]
-"""Called with the number of simulations that have finished since the last call."""
 
 
 def silent(steps: int) -> None:
     """Shows nothing."""
-
-
-@contextmanager
-def progress_bar(task: str, total: int, *, shown: bool) -> Iterator[Advance]:
-    """A bar that the yielded function moves on; one line only where there is no terminal.
-
-    Args:
-        task: What is being done, in a few words.
-        total: Number of steps.
-        shown: False for silence.
-    """
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    if not shown or not console.is_terminal:
-        if shown:
-            console.print(f"{task}: {total} to run", highlight=False)
-        yield lambda steps: None
-        return
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=console) as bar:
-        handle = bar.add_task(task, total=total)
-        yield lambda steps: bar.advance(handle, steps)
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from .acquisition import rules as acquisitions
 from .acquisition.replicates import next_replicate
 from .arguments import checked_array, checked_integer
 from .describe import describe
+from .display import as_html, as_text
 from .gp.process import padded_rows
 from .history import (
     UNKNOWN,
@@ -26,11 +27,12 @@ from .history import (
 from .prior import Prior
 from .result import Fit
 from .sobol import sobol, start_size
-from .surrogates.base import Acquisition, Theta
+from .surrogates.base import Acquisition
 from .surrogates.families import Family, Learnable, resolve
 from .surrogates.feasibility import feasibility
 from .surrogates.outliers import sane
 from .surrogates.warnings import EmulatorWarning
+from .types import Theta
 
 DIGITS, EDGE = 7, 1e-7  # of the prior quantiles that are asked, and how near the bounds
 MIN_LEARN = 3  # successful simulations before the surrogate may choose
@@ -103,6 +105,25 @@ class Bolfi:
         self._state = init(len(prior), self.observed.shape, self._learner.features)
         self._learned: Any = None  # the family's surrogate, once there is one
         self._seconds = 0.0
+
+    def __repr__(self) -> str:
+        return as_text("Bolfi", self._rows())
+
+    def _repr_html_(self) -> str:
+        return as_html("Bolfi", self._rows())
+
+    def _rows(self) -> list[tuple[str, str]]:
+        parameters = [f"{name} ~ {of['prior']}" for name, of in self.prior.describe().items()]
+        told = (
+            f"{self.told} told, {self.succeeded} to learn from, {len(self._state.pending)} pending"
+        )
+        return [
+            ("parameters", ", ".join(parameters)),
+            ("observed", f"shape {self.observed.shape}"),
+            ("simulations", f"{self.asked} asked, {told}"),
+            ("surrogate", f"{self.settings['surrogate']!r}"),
+            ("acquisition", f"{self.settings['acquisition']}"),
+        ]
 
     @property
     def asked(self) -> int:
@@ -244,18 +265,26 @@ class Bolfi:
                 f"signals must have shape {(n, *shape)}, one row per theta, got {signals.shape}"
             )
 
-    def fit(self, seconds: Mapping[str, float] | None = None, stacklevel: int = 2) -> Fit:
+    def fit(
+        self,
+        seconds: Mapping[str, float] | None = None,
+        *,
+        warn: bool = True,
+        stacklevel: int = 2,
+    ) -> Fit:
         """What can be concluded from the simulations told so far.
 
         Args:
             seconds: Times that the caller measured (such as the simulator's), to be kept.
+            warn: Whether each of the surrogate's complaints is raised as a warning.
             stacklevel: Of the warnings; 2 blames the line that calls this.
 
         Raises:
             ValueError: fewer than three simulations succeeded.
 
         Warns:
-            EmulatorWarning: for each of the surrogate's complaints, see `Fit.warnings`.
+            EmulatorWarning: for each of the surrogate's complaints, unless warn=False; they are
+                in `Fit.warnings` in any case.
         """
         if self.succeeded < MIN_LEARN:
             raise ValueError(
@@ -277,7 +306,7 @@ class Bolfi:
             settings=self.settings,
             seconds={"simulator": 0.0, **(seconds or {}), "engine": spent},
         )
-        for complaint in made.warnings:
+        for complaint in made.warnings if warn else []:
             warnings.warn(complaint, EmulatorWarning, stacklevel=stacklevel)
         return made
 

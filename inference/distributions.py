@@ -3,9 +3,11 @@
 from collections.abc import Callable
 from typing import Any
 
+import lazy_loader
 import numpy as np
 import numpyro.distributions as dist
-from scipy import stats
+
+stats = lazy_loader.load("scipy.stats", suppress_warning=True)  # takes as long as NumPyro
 
 SCIPY: dict[type, Callable[[Any], Any]] = {
     dist.Uniform: lambda d: stats.uniform(d.low, d.high - d.low),

@@ -14,29 +14,25 @@ from numpy.typing import ArrayLike
 from .arguments import check_function, check_text, checked_array, checked_integer
 from .bolfi import MIN_LEARN, Bolfi
 from .prior import Prior
+from .progress import progress_bar
 from .result import Fit
 from .simulations.bank import Simulation, SimulationBank
 from .simulations.executors import Workers, open_executor
-from .simulations.job import (
-    Job,
-    columns,
-    jobs,
-    simulation_seed,
-)
-from .simulations.progress import progress_bar
+from .simulations.job import BATCH, Job, OneByOne, columns, jobs, simulation_seed, stacked
 from .simulations.runner import Keep, Runner
 from .sobol import start_size
-from .surrogates.base import Acquisition, Simulator, Theta
+from .surrogates.base import Acquisition
 from .surrogates.families import Family
+from .types import Simulator, SingleSimulator, Theta
 
 
 def fit(  # noqa: PLR0913  the one call that most users make
-    simulate: Simulator,
+    simulate: Simulator | SingleSimulator,
     prior: Prior,
     observed: ArrayLike,
     *,
     budget: int = 20,
-    batch: int = 2,
+    batch: int = BATCH,
     seed: int = 0,
     surrogate: str | Family | None = None,
     acquisition: str | Acquisition | None = None,
@@ -46,8 +42,10 @@ def fit(  # noqa: PLR0913  the one call that most users make
     identity: str = "",
     timeout: float | None = None,
     earlier: tuple[Theta, ArrayLike] | tuple[Theta, ArrayLike, ArrayLike] | None = None,
+    vectorised: bool = True,
     in_rounds: bool = False,
-    progress: bool | Callable[[int], object] = False,
+    warn: bool = True,
+    progress: bool | Callable[[int], object] = True,
     **options: Any,
 ) -> Fit:
     """Infer the parameters of `simulate` from `observed` with `budget` simulations.
@@ -65,7 +63,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
     `in_rounds` makes them the same as without an executor.
 
     Args:
-        simulate: Callable (theta: name -> [b], seeds: [b]) -> signals [b, *signal_shape].
+        simulate: Callable (theta: name -> [b], seeds: [b]) -> signals [b, *signal_shape]; or,
+            with vectorised=False, (theta: name -> float, seed) -> signal [*signal_shape].
             A run that raises, returns NaN or takes too long costs that run only, see
             `Fit.failures`.
         prior: The parameters and their priors.
@@ -91,10 +90,17 @@ def fit(  # noqa: PLR0913  the one call that most users make
             `SimulationBank.simulations` returns them. They are learned from like the others,
             take the place of the start design's points, and count beside the budget, which may
             then be 0.
-        in_rounds: Ask whole rounds of an executor, too: it then simulates the same points, and
-            the fit has the same bits, as without an executor.
-        progress: Show a bar; or a function that is called with 1 for each simulation.
-        options: Of the surrogate's family, see `Bolfi`.
+        vectorised: Whether `simulate` makes a batch of runs in one call; False calls it once
+            for each run, such as `simulate({"a": 1.0}, seed)`.
+        in_rounds: Whether to ask whole rounds of an executor, too: it then simulates the same
+            points, and the fit has the same bits, as without an executor.
+        warn: Whether each of the surrogate's complaints is raised as an `EmulatorWarning`;
+            `Fit.warnings` holds them in any case.
+        progress: Whether to show a bar on stderr; or a function that is called with 1 for each
+            simulation.
+        options: Of the surrogate's family, see `Bolfi`. Editors know those of
+            `surrogate=SignalFamily(noise=0)` or `DiscrepancyFamily(...)`, which are checked
+            before anything is simulated.
 
     Raises:
         ValueError: bad argument; budget smaller than the start design; signals of wrong shape.
@@ -103,7 +109,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         ImportError, ConnectionError: Dask is not installed, or does not answer.
 
     Warns:
-        EmulatorWarning: for each of the surrogate's complaints, see `Fit.warnings`.
+        EmulatorWarning: for each of the surrogate's complaints, unless warn=False.
     """
     batch = checked_integer("batch", batch)
     budget = checked_integer("budget", budget, MIN_LEARN if earlier is None else 0)
@@ -134,12 +140,12 @@ def fit(  # noqa: PLR0913  the one call that most users make
     with ExitStack() as stack:
         if not isinstance(bank, SimulationBank):
             bank = stack.enter_context(SimulationBank(bank))
-        shown = progress if isinstance(progress, bool) else False
-        bar = stack.enter_context(progress_bar("simulations", budget, shown=shown))
+        bar = stack.enter_context(progress_bar("simulations", budget, shown=progress is True))
         advance = bar if isinstance(progress, bool) else progress
         workers = stack.enter_context(open_executor(executor))
+        simulator = simulate if vectorised else OneByOne(simulate)
         keep = Keep(bank, identity, batch, workers, timeout)
-        runner = stack.enter_context(Runner(simulate, keep))
+        runner = stack.enter_context(Runner(simulator, keep))
         schedule = _in_rounds if workers is None or in_rounds else _in_flight
         finished = schedule(engine, runner, budget, batch)
         seconds = 0.0
@@ -154,7 +160,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
                 f"{bank.where}; mend the cause, or raise budget, and repeat the call to go on "
                 "from there"
             )
-    return engine.fit({"simulator": seconds}, stacklevel=3)
+    return engine.fit({"simulator": seconds}, stacklevel=3, warn=warn)
 
 
 def _in_rounds(engine: Bolfi, runner: Runner, budget: int, batch: int) -> Iterator[Simulation]:
@@ -193,24 +199,13 @@ def _tell(engine: Bolfi, asked: list[Job], results: list[Simulation]) -> list[Si
     """
     theta, seeds = columns(asked)
     errors = [result.error or "" for result in results]
-    engine.tell(theta, _signals(results, engine.signal_shape), seeds, errors)
+    engine.tell(theta, stacked(results, engine.signal_shape), seeds, errors)
     if engine.told >= engine.initial and engine.succeeded == 0:
         raise RuntimeError(
             f"all {engine.told} simulations of the start design failed; the last error: "
             f"{engine.errors[-1]}"
         )
     return results
-
-
-def _signals(results: list[Simulation], shape: tuple[int, ...]) -> np.ndarray:
-    """Signals [n, *signal_shape], rows of NaN where a run failed."""
-    good = [r.signal for r in results if r.signal is not None]
-    if len({signal.shape for signal in good}) > 1:
-        raise ValueError(
-            f"simulate must return signals of one shape, got {[s.shape for s in good]}"
-        )
-    empty = np.full(good[0].shape if good else shape, np.nan)
-    return np.stack([empty if r.signal is None else r.signal for r in results])
 
 
 def _length(earlier: Any) -> int:

@@ -11,7 +11,7 @@ from scipy.special import ndtri
 from ._float64 import in_float64
 from .arguments import checked_array
 from .distributions import Univariate, describe
-from .surrogates.base import Theta
+from .types import Theta
 
 RESERVED = frozenset(
     {"chain", "draw", "simulation", "seed", "discrepancy", "failed", "error", "round", "signal"}

@@ -1,27 +1,28 @@
 """What a run concludes: posterior, best hypothesis, surrogate, simulations."""
 
 import time
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import numpy as np
-import xarray as xr
 
 from ._float64 import in_float64
+from .display import as_html, as_text
 from .history import History
 from .prior import Prior
+from .sampling.convergence import SamplingWarning
 from .sampling.draw import SAMPLERS, draw_posterior
 from .sampling.target import Length, Target, log_likelihood
-from .surrogates.base import Surrogate, Theta
-from .tree import (
-    add_surrogate,
-    finished,
-    results_tree,
-    simulations_dataset,
-)
+from .surrogates.base import Surrogate
+from .types import Theta
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
 
 
 class Closest(NamedTuple):
@@ -33,22 +34,37 @@ class Closest(NamedTuple):
 
 
 class SurrogateView:
-    """The surrogate in the prior's natural units; other attributes are the surrogate's own."""
+    """A surrogate in the prior's natural units.
+
+    Attributes:
+        prior: Leads from parameters to the quantiles that the surrogate knows.
+        learned: The surrogate over these quantiles, with all that its family offers.
+    """
 
     def __init__(self, prior: Prior, learned: Surrogate):
         self.prior = prior
         self.learned = learned
 
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("__") or name in ("prior", "learned"):  # while copied or unpickled
-            raise AttributeError(name)
-        return getattr(self.learned, name)
+    def predict(self, theta: Theta) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd of a new simulation at theta, each [..., *its own axes].
 
-    def predict(self, theta: Theta) -> Any:
-        """What the surrogate's `predict` says at theta, each array [..., *its own axes]."""
+        Of the discrepancy family that is the transformed discrepancy, of the signal family the
+        output's values; the sd holds run-to-run noise, but no measurement noise.
+        """
         u = self.prior.to_unit(theta)
-        made = self.learned.predict(u.reshape(-1, u.shape[-1]))  # type: ignore[attr-defined]
-        return jax.tree.map(lambda a: np.asarray(a).reshape((*u.shape[:-1], *a.shape[1:])), made)
+        mean, sd = self.learned.predict(u.reshape(-1, u.shape[-1]))
+        return _shaped(mean, u.shape[:-1]), _shaped(sd, u.shape[:-1])
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the surrogate's own checks complain of, in sentences."""
+        return self.learned.warnings()
+
+
+def _shaped(rows: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """[n, ...] -> [*shape, ...]."""
+    array = np.asarray(rows)
+    return array.reshape((*shape, *array.shape[1:]))
 
 
 @dataclass(frozen=True)
@@ -73,15 +89,24 @@ class Fit:
     seconds: Mapping[str, float]
 
     def __repr__(self) -> str:
+        return as_text("Fit", self._rows())
+
+    def _repr_html_(self) -> str:
+        return as_html("Fit", self._rows())
+
+    def _rows(self) -> list[tuple[str, str]]:
         parameters = [f"{name} ~ {of['prior']}" for name, of in self.prior.describe().items()]
         failed = ", ".join(f"{n} {kind}" for kind, n in self.failures.items())
-        lines = [
-            f"parameters: {', '.join(parameters)}",
-            f"simulations: {len(self.history.theta)}, failed: {failed or 'none'}",
-            f"surrogate: {self.settings['surrogate']!r}, of {self.learned_from.sum()} simulations",
-            f"warnings: {'; '.join(self.warnings) or 'none'}",
+        told = len(self.history.theta)
+        return [
+            ("parameters", ", ".join(parameters)),
+            ("simulations", f"{told}, failed: {failed or 'none'}"),
+            (
+                "surrogate",
+                f"{self.settings['surrogate']!r}, of {self.learned_from.sum()} simulations",
+            ),
+            ("warnings", "; ".join(self.warnings) or "none"),
         ]
-        return "\n  ".join(["Fit", *lines])
 
     @cached_property
     def warnings(self) -> list[str]:
@@ -108,9 +133,11 @@ class Fit:
         return Closest(theta, self.history.signals[i], float(self.history.discrepancy[i]))
 
     @property
-    def simulations(self) -> xr.Dataset:
+    def simulations(self) -> "xr.Dataset":
         """Every simulation in the order told: theta, seed, round, discrepancy, failed, error,
         signal."""
+        from .tree import simulations_dataset
+
         return simulations_dataset(self.prior, self.history)
 
     @property
@@ -139,7 +166,8 @@ class Fit:
         warmup: int = 500,
         seed: int = 0,
         extend: int = 8,
-    ) -> xr.DataTree:
+        warn: bool = True,
+    ) -> "xr.DataTree":
         """Draw from the posterior, and say whether the draws can be trusted.
 
         "nuts" and "emcee" first look for the posterior all over the prior: some two thousand
@@ -171,26 +199,13 @@ class Fit:
             warmup: Discarded steps per chain that adapt the sampler.
             seed: Fixes the draws.
             extend: Largest multiple of `draws` to make; 1 never goes on.
+            warn: Whether draws that are not to be trusted raise a `SamplingWarning`; the
+                posterior's attribute `status` says so in any case.
 
         Returns:
-            DataTree in ArviZ's schema; opens in ArviZ 0.23 and 1.x, also from `to_netcdf`.
-            posterior: draws [chain, draw] in the parameters' own units. Attributes of each:
-            `prior`, `units` (where the prior has them), `rhat`, `ess_bulk`, `ess_tail`, and
-            Monte Carlo standard errors of mean and 5 and 95 % quantiles, `mcse_mean`,
-            `mcse_q05`, `mcse_q95`. Of the group: `status` ("converged", or what is wrong),
-            `rhat_max`, `ess_bulk_min`, `ess_tail_min`, `divergences`, `draws_made` (per
-            chain, before thinning); for one or two parameters `quadrature_total_variation`
-            (of 16 equally probable bins; independent draws as many as the effective ones stay
-            below `quadrature_total_variation_limit`) and `log_evidence` of the surrogate's
-            likelihood.
-            sample_stats: `lp`, log density over Phi^-1(u) of the prior quantiles u, and
-            what the sampler records. prior: `draws` draws. observed_data: `signal`.
-            posterior_predictive: what the surrogate predicts at some draws, whose indices are
-            its coordinate `draw`. constant_data: the surrogate's constants. emulator_checks:
-            the surrogate's own checks for each simulation, NaN where it learned nothing from
-            one, and what it complains of in the attribute `warnings`. simulations: as
-            `Fit.simulations`. The root's attributes hold how the run was made, and the seconds
-            it took.
+            DataTree in ArviZ's schema, draws in the parameters' own units, with R-hat, effective
+            sample sizes and Monte Carlo errors; `inference.tree` describes its groups and
+            attributes. Opens in ArviZ 0.23 and 1.x, also from `to_netcdf`.
 
         Raises:
             ValueError: unknown sampler, a length too small, quadrature of more than two
@@ -206,9 +221,13 @@ class Fit:
                 "sampling needs chains >= 2, draws >= 4, warmup >= 1 and extend >= 1, "
                 f"got chains={chains}, draws={draws}, warmup={warmup}, extend={extend}"
             )
+        from .tree import add_surrogate, finished, results_tree
+
         started = time.perf_counter()
         length = Length(chains, warmup, draws)
         made = draw_posterior(sampler, self._target, self.prior.names, length, seed, extend)
+        if warn and made.found:
+            warnings.warn(made.status, SamplingWarning, stacklevel=3)  # beyond `in_float64`
         seconds = {**self.seconds, "sampling": time.perf_counter() - started}
         rng = np.random.default_rng([seed, 1])
         drawn = self.prior.from_unit(rng.random((draws, len(self.prior))))
@@ -216,9 +235,41 @@ class Fit:
         tree["posterior"].attrs.update(status=made.status, draws_made=made.steps, **made.checks)
         key = jax.random.key(seed)
         add_surrogate(tree, self.learned, self.learned_from, made.chains.u, key)
-        attributes = {
+        attributes: dict[str, object] = {
             **self.settings,
             **{"sampler": sampler, **length._asdict(), "extend": extend, "sampling_seed": seed},
             **{f"seconds_{part}": spent for part, spent in seconds.items()},
         }
         return finished(tree, attributes)
+
+    def plot_search(self, ax: "Axes | None" = None) -> "Axes":
+        """Discrepancy of every simulation by the round in which it was asked.
+
+        Args:
+            ax: To draw on; None makes a figure.
+        """
+        from .figures import plot_search
+
+        return plot_search(self.history.rounds, self.history.discrepancy, ax)
+
+    def plot_predictive(
+        self, sampled: "xr.DataTree | None" = None, axes: Any = None
+    ) -> "list[Axes]":
+        """The observed output, the closest simulation and the posterior predictive distribution.
+
+        The predictive distribution needs the signal family without a summary: the paper's
+        surrogate predicts discrepancies alone, and is drawn without it.
+
+        Args:
+            sampled: What `sample` returned; None samples here.
+            axes: One for each of the output's channels; None makes a figure.
+        """
+        from .figures import plot_predictive
+
+        tree = self.sample(draws=250, warmup=250, warn=False) if sampled is None else sampled
+        groups = tree["posterior_predictive"] if "posterior_predictive" in tree.children else {}
+        predicted = None
+        if "signal" in groups:
+            values = groups["signal"].to_numpy()  # [chain, draw, *shape]
+            predicted = values.reshape(-1, *values.shape[2:])
+        return plot_predictive(self.observed, self.closest.signal, predicted, axes)

@@ -1,7 +1,9 @@
 """The space-filling start design."""
 
+import lazy_loader
 import numpy as np
-from scipy.stats import qmc
+
+stats = lazy_loader.load("scipy.stats", suppress_warning=True)  # takes as long as NumPyro
 
 
 def start_size(dimension: int) -> int:
@@ -24,7 +26,7 @@ def sobol(seed: int, start: int, stop: int, dimension: int) -> np.ndarray:
     Returns:
         u [stop - start, dimension] in (0, 1).
     """
-    engine = qmc.Sobol(dimension, scramble=True, rng=seed)
+    engine = stats.qmc.Sobol(dimension, scramble=True, rng=seed)
     # a full power of two: scipy warns of anything less, and prefixes agree between sizes
     points = engine.random_base2(max(stop - 1, 1).bit_length())
     return np.clip(points[start:stop], 1e-9, 1.0 - 1e-9)

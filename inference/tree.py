@@ -1,4 +1,20 @@
-"""Results as xarray, in ArviZ's schema."""
+"""Results as xarray, in ArviZ's schema.
+
+posterior: draws [chain, draw] in the parameters' own units. Attributes of each: `prior`, `units`
+(where the prior has them), `rhat`, `ess_bulk`, `ess_tail`, and Monte Carlo standard errors of mean
+and 5 and 95 % quantiles, `mcse_mean`, `mcse_q05`, `mcse_q95`. Of the group: `status` ("converged",
+or what is wrong), `rhat_max`, `ess_bulk_min`, `ess_tail_min`, `divergences`, `draws_made` (per
+chain, before thinning); for one or two parameters `quadrature_total_variation` (of 16 equally
+probable bins; independent draws as many as the effective ones stay below
+`quadrature_total_variation_limit`) and `log_evidence` of the surrogate's likelihood.
+
+sample_stats: `lp`, log density over Phi^-1(u) of the prior quantiles u, and what the sampler
+records. prior: as many draws. observed_data: `signal`. posterior_predictive: what the surrogate
+predicts at some draws, whose indices are its coordinate `draw`. constant_data: the surrogate's
+constants. emulator_checks: the surrogate's own checks for each simulation, NaN where it learned
+nothing from one, and its complaints in the attribute `warnings`. simulations: as `Fit.simulations`.
+The root's attributes hold how the run was made, and the seconds it took.
+"""
 
 from collections.abc import Mapping
 from importlib.metadata import version

@@ -12,10 +12,10 @@ from .fluid.checks import check_numbers
 from .fluid.liquid import Liquid
 from .fluid.numerics import POUR_PARTICLES
 from .fluid.runtime import Watch
-from .gripper_path import GripperPath
 from .pouring import watched_landings
 from .stir_setup import StirSetup
 from .stirring import watched_stir
+from .trajectory import Trajectory
 
 RATE = 25.0  # frames/s
 
@@ -58,7 +58,7 @@ Frames = TypeVar("Frames", StirFrames, PourFrames)
 
 def stir_frames(  # noqa: PLR0913  as of `stir`
     liquid: Liquid,
-    gripper: GripperPath,
+    gripper: Trajectory,
     setup: StirSetup,
     seed: int,
     *,

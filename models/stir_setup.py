@@ -8,7 +8,7 @@ import numpy as np
 
 from .fluid.checks import check_numbers
 from .fluid.numerics import MODEL_VERSION, Numerics
-from .gripper_path import GripperPath, mean_speed
+from .trajectory import Trajectory, mean_speed
 
 ROOM = 1.5  # times the setup's fill is the largest
 
@@ -19,7 +19,7 @@ class HasRig(Protocol):
     @property
     def attrs(self) -> Mapping[str, Any]: ...
     @property
-    def gripper(self) -> GripperPath: ...
+    def gripper(self) -> Trajectory: ...
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class StirSetup:
         """Largest depth of liquid for which there is room [m]."""
         return max(min(self.cup.height, ROOM * self.cup.fill), self.cup.fill)
 
-    def least_viscosity(self, density: float, gripper: GripperPath) -> float:
+    def least_viscosity(self, density: float, gripper: Trajectory) -> float:
         """Viscosity [Pa s] below which liquids of `density` [kg/m³] look alike while the gripper
         repeats its path; see `Numerics.least_viscosity`."""
         return self.numerics.least_viscosity(self.spacing, density, mean_speed(gripper))

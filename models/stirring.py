@@ -15,9 +15,9 @@ from .fluid.liquid import Liquid
 from .fluid.packing import checked_seeds, pack_cylinder
 from .fluid.runtime import Watch
 from .fluid.settled import Packing, SettledPackings
-from .gripper_path import GripperPath, substep_path
 from .rig import Rig, check_rig
 from .stir_setup import StirSetup
+from .trajectory import Trajectory, substep_path
 
 SETTLING = 1.0  # s that a packing relaxes around the held stick
 _packings = SettledPackings()
@@ -25,7 +25,7 @@ _packings = SettledPackings()
 
 def stir(
     liquid: Liquid,
-    gripper: GripperPath,
+    gripper: Trajectory,
     setup: StirSetup,
     seeds: ArrayLike,
     effects: Mapping[str, ArrayLike] | None = None,
@@ -56,7 +56,7 @@ def stir(
 
 def watched_stir(  # noqa: PLR0913  `stir` with one more
     liquid: Liquid,
-    gripper: GripperPath,
+    gripper: Trajectory,
     setup: StirSetup,
     seeds: ArrayLike,
     effects: Mapping[str, ArrayLike] | None,

@@ -2,6 +2,8 @@
 
 import logging
 from collections.abc import Sequence
+from dataclasses import asdict
+from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -9,28 +11,27 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..inputs.prior import check_prior, default_prior
-from ..inputs.recording import Recording, Source, open_recordings
+from ..inputs.open import Source, open_recordings
+from ..inputs.prior import check_prior, default_prior, describe_prior
+from ..inputs.recording import Recording
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
-from ..progress import Advance, progress_bar, silent
+from ..progress import progress_bar
 from ..run.directory import (
     POSTERIOR,
     enter_run,
     open_bank,
     read_run,
 )
-from ..run.provenance import run_record
+from ..run.provenance import LIBRARIES, versions
 from ..run.recordings import keep_recordings
-from ..run.summary import write_section
 from .draws import pick_draws
 from .result import Calibration, is_calibrated
-from .section import calibration_section
 from .stir_simulator import Stirring, stirring_of
+from .summary import CalibrationSummary
 
 if TYPE_CHECKING:
     from ..inference import Fit, Prior
-    from ..inference.simulations.executors import Workers
-    from ..inference.simulations.runner import Keep
+    from ..inference.simulations import Keep, Workers
 
 logger = logging.getLogger(__name__)
 
@@ -119,11 +120,25 @@ class _Means(NamedTuple):
     progress: bool
 
 
+def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring) -> dict[str, Any]:
+    """Content of run.toml: settings, inputs, versions; see `run.directory.MUST_AGREE`."""
+    from ..inference.engine_version import ENGINE_VERSION
+
+    return {
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "settings": asdict(settings) | {"prior": describe_prior(prior)},
+        "engine": {"version": ENGINE_VERSION},
+        "simulator": stirring.settings,
+        "inputs": {"sha256": [recording.hash for recording in stirring.recordings]},
+        "files": {"recordings": [recording.path.name for recording in stirring.recordings]},
+        "versions": versions(LIBRARIES),
+    }
+
+
 def _calibrate(
     run: Path, stirring: Stirring, prior: "Prior", settings: CalibrationSettings, means: _Means
 ) -> None:
-    from ..inference.simulations.executors import open_executor
-    from ..inference.simulations.runner import Keep
+    from ..inference.simulations import Keep, open_executor
     from .check import PREDICTIVE_DRAWS, REPLICATES, check_by_simulation
     from .tree import results_tree, write_tree
 
@@ -134,7 +149,7 @@ def _calibrate(
         progress_bar("simulating stirs", needed, shown=means.progress) as advance,
     ):
         keep = Keep(bank, stirring.identity, settings.batch, workers, means.timeout)
-        fit = fit_recordings(stirring, stirring.observed, prior, keep, settings, advance=advance)
+        fit = fit_recordings(stirring, stirring.observed, prior, keep, settings, progress=advance)
         sampled = fit.sample(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
         )
@@ -150,7 +165,7 @@ def _calibrate(
             fix="nothing was written; go on with that budget and --resume",
         )
     write_tree(tree, run / POSTERIOR)
-    write_section(run, "calibrate", calibration_section(tree, fit, stirring, check))
+    CalibrationSummary.from_fit(tree, fit, stirring, check).write(run)
 
 
 def fit_recordings(
@@ -159,8 +174,7 @@ def fit_recordings(
     prior: "Prior",
     keep: "Keep",
     settings: CalibrationSettings,
-    *,
-    advance: Advance = silent,
+    **report: Any,
 ) -> "Fit":
     """The engine's fit of a stir, with the options that go with the surrogate.
 
@@ -170,7 +184,7 @@ def fit_recordings(
         prior: Prior of the parameters.
         keep: Where simulations are made and kept.
         settings: Budget, surrogate and seed.
-        advance: Called with 1 for each simulation, also for those found in the bank.
+        report: Arguments `progress` and `warn` of `inference.fit`; none shows no bar.
     """
     from .. import inference
 
@@ -189,7 +203,7 @@ def fit_recordings(
         bank=keep.bank,
         identity=keep.identity,
         timeout=keep.timeout,
-        progress=advance,
+        **{"progress": False, **report},
         **options,
     )
 

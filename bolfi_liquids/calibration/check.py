@@ -6,13 +6,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..inference.simulations.runner import Keep
+from ..inference.simulations import Keep
 from ..progress import Advance, Simulate, silent
-from ..run.simulations import fresh_seeds, simulate_kept
+from ..run.simulations import simulate_kept
+from ..seeds import Phase, simulation_seeds
 
 PREDICTIVE_DRAWS = 8
 REPLICATES = 4  # seeds at theta*, for the noise between seeds
-_PREDICTIVE, _REPLICATE = 1, 2  # purposes of seeds
 
 
 class Check(NamedTuple):
@@ -44,7 +44,10 @@ def check_by_simulation(
     """
     count = len(next(iter(draws.values())))
     at_best = {name: np.full(REPLICATES, value) for name, value in best.items()}
-    seeds = fresh_seeds(seed, _PREDICTIVE, count), fresh_seeds(seed, _REPLICATE, REPLICATES)
+    seeds = (
+        simulation_seeds(seed, Phase.PREDICTIVE, count),
+        simulation_seeds(seed, Phase.REPLICATES, REPLICATES),
+    )
     predictive = simulate_kept(simulate, draws, seeds[0], keep, advance=advance)
     replicates = simulate_kept(simulate, at_best, seeds[1], keep, advance=advance)
     return Check(predictive.signals, replicates.signals, predictive.seconds + replicates.seconds)

@@ -16,7 +16,7 @@ from ..inputs.recording import Recording
 from ..run.time_limit import TimeLimited
 
 if TYPE_CHECKING:
-    from ..inference import Discrepancy
+    from ..inference.types import Discrepancy
     from ..models import StirSetup
 
 SAME_DENSITY = 0.02  # relative difference up to which two weighings are of one liquid

@@ -25,7 +25,7 @@ from .physics_records import (
 )
 
 if TYPE_CHECKING:
-    from ..inference.simulations.executors import Workers
+    from ..inference.simulations import Workers
     from ..models.validation import Case
 
 
@@ -87,7 +87,7 @@ def check_physics(
     Raises:
         InputError: an unknown name, a negative seed, or a directory that holds something else.
     """
-    from ..inference.simulations.executors import open_executor
+    from ..inference.simulations import open_executor
 
     registry = all_cases() if cases is None else cases
     chosen = _chosen(names, registry)

@@ -18,34 +18,34 @@ from numpy.typing import NDArray
 
 from ..calibration.stir_simulator import Stirring, stirring_of
 from ..inputs.bundled import bundled_recording
+from ..inputs.open import open_recordings
 from ..inputs.prior import default_prior, describe_prior
-from ..inputs.recording import Recording, open_recordings
+from ..inputs.recording import Recording
 from ..inputs.settings import (
     MIN_SIMULATIONS,
     PAPER_RULES,
-    RUNS,
+    RUNS_PER_POINT,
     SURROGATES,
     SbcSettings,
 )
 from ..progress import progress_bar
 from ..run.directory import SIMULATIONS, enter_run
 from ..run.provenance import LIBRARIES, versions
-from ..run.simulations import fresh_seeds
+from ..seeds import Phase, generator, simulation_seeds
 from .sbc_pipelines import (
     SAMPLING,
     Calibrate,
     CameraNoise,
     FromBank,
-    Quietly,
 )
 from .sbc_tree import SurrogateCheck, checked, write_results
 
 if TYPE_CHECKING:
-    from ..inference import Prior, Replicates
-    from ..inference.simulations.executors import Workers
+    from ..inference import Prior
+    from ..inference.checks import Replicates
+    from ..inference.simulations import Workers
 
 STIRS_PER_CALL = 16  # of the simulator, where there is no executor
-STIR_SEEDS = 61  # purpose of the seeds of shared stirs
 
 
 def check_sbc(
@@ -76,7 +76,7 @@ def check_sbc(
         InputError: A recording or setting cannot be used, or `out` holds other results.
         ValueError: Of a surrogate, no replicate finished.
     """
-    from ..inference.simulations.executors import open_executor
+    from ..inference.simulations import open_executor
 
     settings = settings or SbcSettings()
     given = bundled_recording("water") if recording is None else recording
@@ -96,10 +96,10 @@ def check_sbc(
 
 
 def _record(settings: SbcSettings, prior: "Prior", stirring: Stirring) -> Mapping[str, Any]:
-    from ..inference import ENGINE_VERSION
+    from ..inference.engine_version import ENGINE_VERSION
 
     return {
-        "engine": {"version": ENGINE_VERSION, "initial": MIN_SIMULATIONS, "runs": RUNS}
+        "engine": {"version": ENGINE_VERSION, "initial": MIN_SIMULATIONS, "runs": RUNS_PER_POINT}
         | PAPER_RULES
         | SAMPLING,
         "settings": {k: v for k, v in asdict(settings).items() if k not in ("runs", "sequential")}
@@ -144,7 +144,7 @@ class SbcStudy:
         else:
             pipeline = Calibrate(self.stirring, self.prior, calibration, self.timeout)
         return inference.replicates(
-            Quietly(pipeline),
+            pipeline,
             self.stirring.simulate,
             self.prior,
             self.settings.replicates[name],
@@ -157,28 +157,29 @@ class SbcStudy:
         )
 
     def stirs_everywhere(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Points that fill the prior [n, d], and `RUNS` stirs of each [n, RUNS, T, 2].
+        """Points that fill the prior, and `RUNS_PER_POINT` stirs of each.
 
-        A stir that failed is NaN.
+        Returns:
+            Points [n, d], and signals [n, RUNS_PER_POINT, T, 2]; NaN for a stir that failed.
         """
         from scipy.stats import qmc
 
         from ..inference import SimulationBank
-        from ..inference.simulations.job import jobs
-        from ..inference.simulations.runner import Keep, run_missing
+        from ..inference.simulations import Keep, jobs, run_missing, stacked
 
         stirring, design = self.stirring, self.settings.design
-        u = qmc.Sobol(len(self.prior), rng=self.settings.seed).random(design)
+        rng = generator(self.settings.seed, Phase.SBC_DESIGN)
+        u = qmc.Sobol(len(self.prior), rng=rng).random(design)
         theta = self.prior.from_unit(u)
-        count = RUNS * design
-        seeds = fresh_seeds(self.settings.seed, STIR_SEEDS, count)
-        repeated = {name: np.repeat(values, RUNS) for name, values in theta.items()}
+        count = RUNS_PER_POINT * design
+        seeds = simulation_seeds(self.settings.seed, Phase.SBC_STIRS, count)
+        repeated = {name: np.repeat(values, RUNS_PER_POINT) for name, values in theta.items()}
         with (
             SimulationBank(self.out / SIMULATIONS) as bank,
             progress_bar("simulating stirs for all", count, shown=self.progress) as advance,
         ):
             keep = Keep(bank, stirring.identity, STIRS_PER_CALL, self.executor, self.timeout)
             made = run_missing(stirring.simulate, jobs(repeated, seeds), keep, advance=advance)
-        nothing = np.full(stirring.observed.shape, np.nan)
-        signals = np.stack([nothing if one.signal is None else one.signal for one in made])
-        return self.prior.to_array(theta), signals.reshape(design, RUNS, *nothing.shape)
+        shape = stirring.observed.shape
+        signals = stacked(made, shape).reshape(design, RUNS_PER_POINT, *shape)
+        return self.prior.to_array(theta), signals

@@ -1,6 +1,5 @@
 """Calibrations as pipelines of `inference.replicates`."""
 
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,8 @@ from numpy.typing import NDArray
 
 from ..calibration.calibrate import engine_options, fit_recordings
 from ..calibration.stir_simulator import Stirring
-from ..inputs.settings import RUNS, CalibrationSettings
+from ..inputs.settings import RUNS_PER_POINT, CalibrationSettings
+from ..seeds import Phase, simulation_seeds
 
 if TYPE_CHECKING:
     from xarray import DataTree
@@ -54,12 +54,12 @@ class Calibrate:
 
     def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
         from ..inference import SimulationBank
-        from ..inference.simulations.runner import Keep
+        from ..inference.simulations import Keep
 
         with SimulationBank(":memory:") as bank:
             keep = Keep(bank, self.stirring.identity, timeout=self.timeout)
             settings = replace(self.settings, seed=seed)
-            fit = fit_recordings(self.stirring, observed, self.prior, keep, settings)
+            fit = fit_recordings(self.stirring, observed, self.prior, keep, settings, warn=False)
         return fit.sample(seed=seed, **SAMPLING), fit.log_prob
 
 
@@ -75,7 +75,7 @@ class FromBank:
         stirring: How two signals are compared.
         prior: Of the parameters.
         theta: Points of the set [n, d].
-        signals: Of their runs [n, RUNS, T, 2].
+        signals: Of their runs [n, RUNS_PER_POINT, T, 2].
         settings: Of a calibration.
     """
 
@@ -87,7 +87,6 @@ class FromBank:
 
     def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
         from ..inference import Bolfi
-        from ..run.simulations import fresh_seeds
 
         u = self.prior.to_unit(self.prior.to_dict(self.theta))
         left = np.asarray(np.isfinite(self.signals).all(axis=(2, 3)))
@@ -100,21 +99,25 @@ class FromBank:
             if told:
                 point, run = np.array(told).T
                 theta = self.prior.to_dict(self.theta[point])
-                made.tell(theta, self.signals[point, run], RUNS * point + run)
+                made.tell(theta, self.signals[point, run], RUNS_PER_POINT * point + run)
             return made
 
         while len(told) < self.settings.budget:
             # a new engine of the same seed would draw the same random numbers for every batch
-            asking = engine(seed if not told else fresh_seeds(seed, len(told), 1)[0])
+            (own,) = simulation_seeds(seed, Phase.SBC_SEARCH, 1, len(told))
+            asking = engine(seed if not told else own)
             wanted = asking.initial if not told else self.settings.batch
             asked = asking.ask(min(wanted, self.settings.budget - len(told)))
             told += _nearest(self.prior.to_unit(asked), u, left)
-        fit = engine(seed).fit()
+        fit = engine(seed).fit(warn=False)
         return fit.sample(seed=seed, **SAMPLING), fit.log_prob
 
 
 def _nearest(asked: NDArray, points: NDArray, left: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """Point and run for each u asked [n, d]; what is given is no longer `left` [points, RUNS]."""
+    """Point and run for each u asked [n, d].
+
+    What is given is no longer `left` [points, RUNS_PER_POINT].
+    """
     for u in asked:
         if not left.any():
             raise RuntimeError("every run of the shared set was told; make it larger")
@@ -123,21 +126,3 @@ def _nearest(asked: NDArray, points: NDArray, left: NDArray[np.bool_]) -> Iterat
         run = int(np.argmax(left[point]))
         left[point, run] = False
         yield point, run
-
-
-@dataclass(frozen=True)
-class Quietly:
-    """A pipeline whose emulator's complaints are not repeated for every replicate.
-
-    Attributes:
-        pipeline: See `inference.replicates`.
-    """
-
-    pipeline: Any
-
-    def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
-        from ..inference import EmulatorWarning
-
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", EmulatorWarning)
-            return self.pipeline(observed, seed)

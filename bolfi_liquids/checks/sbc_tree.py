@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from xarray import Dataset
 
-    from ..inference import SBC, Coverage, Replicates
+    from ..inference.checks import SBC, Coverage, Replicates
 
 RESULTS = "sbc.nc"
 LEVEL = 0.9  # of the intervals that are looked at by region

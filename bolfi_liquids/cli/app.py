@@ -93,7 +93,8 @@ def calibrate(
 ) -> None:
     """Learn a liquid's parameters from recordings of it being stirred."""
     from ..calibration.calibrate import calibrate as run_calibrate
-    from ..inputs.recording import aborted_recordings, open_recordings
+    from ..inputs.open import open_recordings
+    from ..inputs.recording import aborted_recordings
 
     opened = open_recordings(recordings)
     if resume and not (out / RUN_TOML).exists():
@@ -136,6 +137,9 @@ def criticise(
         None if path is None else open_pours(path, poured.liquid)
         for path in (poured.pours, poured.held_out_pours)
     ]
+    for table in filter(None, tables):
+        if table.unused:
+            typer.echo(f"{table.path}: columns not used: {', '.join(table.unused)}", err=True)
     cups = None if poured.cups is None else open_cups(poured.cups)
     with compute.executor() as executor:
         criticism = run_criticise(

@@ -86,7 +86,7 @@ def open_executor_of(workers: int | None, dask: str | None) -> "Iterator[Executo
         return
     if workers not in (None, 1):
         raise typer.BadParameter("--workers and --dask name two places to simulate: give one")
-    from ..inference.simulations.executors import open_executor
+    from ..inference.simulations import open_executor
 
     with open_executor(dask) as executor:
         yield executor

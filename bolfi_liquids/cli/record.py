@@ -125,7 +125,7 @@ def _needs(option: str, given: object, others: dict[str, object]) -> None:
 
 def typed_sentence(plan: str) -> str:
     """Show the plan, and read what the person types."""
-    from ..hardware import SENTENCE
+    from ..hardware.session.confirmation import SENTENCE
 
     typer.echo(plan)
     if not sys.stdin.isatty():
@@ -138,7 +138,7 @@ def typed_sentence(plan: str) -> str:
 
 
 def _dry_run(rig: "Rig", cycles: int | None, out: Path) -> None:
-    from ..hardware import describe
+    from ..hardware.session.confirmation import describe
     from ..robot.stir import dry_run, plan_stir
 
     if out.is_dir() and any(out.iterdir()):

@@ -14,13 +14,8 @@ from .stirs import camera_noise, same_experiment, stir_experiment
 
 if TYPE_CHECKING:
     from ..calibration.stir_simulator import Stirring
-    from ..inference import (
-        Extension,
-        Keeping,
-        Plan,
-        Prior,
-        UsualResidual,
-    )
+    from ..inference import Prior
+    from ..inference.criticism import Extension, Keeping, Plan, UsualResidual
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +47,7 @@ def clean_residuals(
     Raises:
         RuntimeError: Every simulation of one of them failed.
     """
-    from ..inference import own_residual
+    from ..inference.criticism import own_residual
 
     def learn(recording: Recording) -> Clean:
         name, made = recording.path.name, []
@@ -86,7 +81,7 @@ def usual_elsewhere(clean: Sequence[Clean]) -> "UsualResidual | None":
 
 
 def _usual(clean: Sequence[Clean], same: list[bool]) -> "UsualResidual | None":
-    from ..inference import KnownNoise, usual_residual
+    from ..inference.criticism import KnownNoise, usual_residual
 
     if not clean:
         return None

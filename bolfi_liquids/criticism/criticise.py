@@ -10,12 +10,12 @@ from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, stirring_of
 from ..calibration.tree import write_tree
 from ..errors import InputError
+from ..inputs.open import Source
 from ..inputs.pour_table import PourTable
-from ..inputs.recording import Recording, Source
+from ..inputs.recording import Recording
 from ..inputs.settings import CriticismSettings
 from ..progress import phases
 from ..run.directory import CRITICISM, open_bank
-from ..run.summary import write_section
 from .baseline import (
     Clean,
     clean_residuals,
@@ -27,18 +27,18 @@ from .given import Inputs, Pours, open_inputs
 from .pours import as_prior, pour_experiment
 from .proposals import pour_proposals, stir_proposals
 from .result import Criticism, finished_criticism
-from .section import criticism_section
 from .stirs import (
     camera_noise,
     effects_of,
     held_out_noise,
     stir_experiment,
 )
+from .summary import CriticismSummary
 from .tree import criticism_tree
 
 if TYPE_CHECKING:
     from .. import inference
-    from ..inference.simulations.executors import Workers
+    from ..inference.simulations import Workers
     from ..models import Cups
 
 
@@ -83,7 +83,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         RuntimeError: Simulations failed; the message says how.
     """
     from ..inference import Keeping
-    from ..inference.simulations.executors import open_executor
+    from ..inference.simulations import open_executor
 
     if not isinstance(calibration, Calibration):
         calibration = Calibration.open(calibration)
@@ -114,8 +114,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         findings = _find(calibration, inputs, keeping)
         tree = criticism_tree(findings)
     write_tree(tree, run / CRITICISM)
-    section = criticism_section(findings, tree, time.perf_counter() - started)
-    write_section(run, "criticise", section)
+    CriticismSummary.from_findings(findings, tree, time.perf_counter() - started).write(run)
     return Criticism.open(run)
 
 
@@ -124,7 +123,9 @@ def _names(given: str | Sequence[str] | None) -> tuple[str, ...] | None:
     return (given,) if isinstance(given, str) else None if given is None else tuple(given)
 
 
-def _find(calibration: Calibration, inputs: Inputs, keeping: "inference.Keeping") -> Findings:
+def _find(
+    calibration: Calibration, inputs: Inputs, keeping: "inference.criticism.Keeping"
+) -> Findings:
     clean = clean_residuals(
         inputs.baseline,
         inputs.stirring.setups[0].particles,
@@ -142,15 +143,15 @@ def _find(calibration: Calibration, inputs: Inputs, keeping: "inference.Keeping"
 def _stirs(
     calibration: Calibration,
     inputs: Inputs,
-    cameras: "inference.AutoregressiveNoise",
+    cameras: "inference.criticism.AutoregressiveNoise",
     clean: Sequence[Clean],
-    keeping: "inference.Keeping",
-) -> "inference.Criticism":
+    keeping: "inference.criticism.Keeping",
+) -> "inference.criticism.Criticism":
     from .. import inference
 
     stirring, settings = inputs.stirring, inputs.settings
     extensions = effects_of("stir", settings.effects)
-    return inference.criticise(
+    return inference.criticism.criticise(
         stir_experiment(stirring, cameras, usual_for(stirring, clean), "stir"),
         calibration.prior,
         extensions,
@@ -166,7 +167,7 @@ def _stirs(
 
 def _kept_back(
     recording: Recording, fitted: Stirring, clean: Sequence[Clean]
-) -> "inference.Experiment":
+) -> "inference.criticism.Experiment":
     own = stirring_of([recording], fitted.setups[0].particles)
     cameras = held_out_noise(recording, fitted.recordings)
     return stir_experiment(own, cameras, usual_for(own, clean), recording.path.name)
@@ -174,11 +175,11 @@ def _kept_back(
 
 def _pours(
     calibration: Calibration,
-    stirs: "inference.Criticism",
+    stirs: "inference.criticism.Criticism",
     table: PourTable,
     inputs: Inputs,
-    keeping: "inference.Keeping",
-) -> "inference.Criticism":
+    keeping: "inference.criticism.Keeping",
+) -> "inference.criticism.Criticism":
     """The same for pours, of a liquid of which the stirs are known to have taught something."""
     from .. import inference
 
@@ -196,7 +197,7 @@ def _pours(
     taught = as_prior(stirs.posterior.theta, stirs.posterior.weights, known.fit.prior)
     names = (*calibration.prior.names, *poured_too)
     base = inference.Prior({name: taught.distributions[name] for name in names})
-    return inference.criticise(
+    return inference.criticism.criticise(
         pour_experiment(table, inputs.cups, density),
         base,
         extensions,

@@ -16,19 +16,19 @@ class Findings:
 
     calibration: "Calibration"
     inputs: "Inputs"
-    cameras: "inference.AutoregressiveNoise"
+    cameras: "inference.criticism.AutoregressiveNoise"
     baseline: "tuple[Clean, ...]"
-    stirs: "inference.Criticism"
-    pours: "inference.Criticism | None"
+    stirs: "inference.criticism.Criticism"
+    pours: "inference.criticism.Criticism | None"
 
     @property
-    def sources(self) -> "dict[str, inference.Criticism]":
+    def sources(self) -> "dict[str, inference.criticism.Criticism]":
         """By name."""
         pours = {} if self.pours is None else {"pours": self.pours}
         return {"stirs": self.stirs, **pours}
 
     @property
-    def models(self) -> "tuple[inference.Hypothesis, ...]":
+    def models(self) -> "tuple[inference.criticism.Hypothesis, ...]":
         """The last model that was extended, or else the stirs' base model; and the stirs' before
         it, where it knows of effects that do not act in pours."""
         stirs = self.stirs.extended or self.stirs.base.hypothesis

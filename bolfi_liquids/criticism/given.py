@@ -11,9 +11,10 @@ from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, same_liquid, stirring_of
 from ..errors import InputError
 from ..inputs.cups import bundled_cups
+from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import PourTable, open_pours
-from ..inputs.recording import Recording, Source, open_recordings
-from ..inputs.settings import ALARM, CriticismSettings
+from ..inputs.recording import Recording
+from ..inputs.settings import FALSE_ALARM_RATE, CriticismSettings
 from ..run.directory import CRITICISM_FORMAT
 from ..run.provenance import generations
 from ..run.recordings import kept_recordings
@@ -54,7 +55,7 @@ class Inputs:
     @property
     def level(self) -> float:
         """p-value below which a source is rejected, so that all of them share one error rate."""
-        return ALARM if self.table is None else ALARM / 2.0
+        return FALSE_ALARM_RATE if self.table is None else FALSE_ALARM_RATE / 2.0
 
     @property
     def made_from(self) -> dict[str, Any]:

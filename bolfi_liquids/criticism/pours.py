@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 from ..inputs.pour_table import PourTable
 from ..inputs.prior import split_parameters
 from ..run.time_limit import TimeLimited
+from ..seeds import Phase, simulation_seeds
 from .pour_noise import PourNoise
 
 if TYPE_CHECKING:
     from numpyro.distributions import Distribution
 
-    from ..inference import Experiment, Prior
+    from ..inference import Prior
+    from ..inference.criticism import Experiment
     from ..models import Cups
 
 NARROWEST = 0.05  # sd of the log of a parameter, and share of another's prior interquartile range
@@ -51,12 +53,12 @@ class Pouring(TimeLimited):
         liquid, effects = split_parameters(
             {name: np.repeat(values, len(rates)) for name, values in theta.items()}
         )
-        own = np.add.outer(np.asarray(seeds) * 1009 % 2**31, np.arange(len(rates))) % 2**31
+        own = [simulation_seeds(int(one), Phase.RUNS_OF_POURS, len(rates)) for one in seeds]
         landed = models.landings(
             models.Liquid(**liquid, density=self.density),
             np.tile(rates, runs),
             self.cups,
-            own.ravel(),
+            np.ravel(own),
             effects=effects,
         )
         rows = np.add.outer(len(rates) * np.arange(runs), at).ravel()
@@ -71,13 +73,13 @@ class Pouring(TimeLimited):
         """A text that two equal experiments share."""
         actions = [self.angular_velocity.tolist(), self.distance.tolist()]
         return json.dumps(
-            ["landed pours", self.cups.settings(), self.density, actions], sort_keys=True
+            [Phase.RUNS_OF_POURS.value, self.cups.settings(), self.density, actions], sort_keys=True
         )
 
 
 def pour_experiment(table: PourTable, cups: "Cups", density: float) -> "Experiment":
     """The pours of a table, each outcome a window of its own."""
-    from ..inference import Experiment, Window
+    from ..inference.criticism import Experiment, Window
 
     pouring = Pouring(table.angular_velocity, table.distance, cups, density)
     every = np.ones(table.observed.shape, bool)

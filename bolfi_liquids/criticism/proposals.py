@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..calibration.stir_simulator import Stirring
-from ..inputs.recording import Gripper, Recording
+from ..inputs.recording import Recording, Trajectory
 from ..inputs.strokes import speed
 from .pour_noise import PourNoise
 from .pours import OUTCOMES, Pouring
 
 if TYPE_CHECKING:
-    from ..inference import Noise, Proposal, UsualResidual
+    from ..inference.criticism import Noise, Proposal, UsualResidual
     from ..models import Cups
 
 FASTER, SLOWER, FASTEST = 1.6, 0.5, 0.2  # times the recording's speed; and at most, m/s
@@ -23,7 +23,7 @@ ROOM = 0.8  # of the way from the axis to the wall that the stick may go
 class Planned:
     """A stir that was not made: what a simulator needs of a recording."""
 
-    gripper: Gripper
+    gripper: Trajectory
     recording: Recording
 
     def number(self, name: str) -> float:
@@ -39,8 +39,8 @@ def stir_proposals(
     Args:
         usual: What is usual for this simulator on other paths, if it is known.
     """
-    from ..hardware import circle, star
-    from ..inference import Proposal, SumOfNoises
+    from ..hardware.motion import circle, star
+    from ..inference.criticism import Proposal, SumOfNoises
 
     all_noise = noise if usual is None else SumOfNoises((noise, usual))
     recording, setup = stirring.recordings[0], stirring.setups[0]
@@ -63,7 +63,7 @@ def stir_proposals(
     }
     made = []
     for label, path in paths.items():
-        planned = Planned(Gripper(path.time, path.position), recording)
+        planned = Planned(Trajectory(path.time, path.position), recording)
         own = Stirring((planned,), (setup,))  # type: ignore[arg-type]
         shape = (len(path.time), 2)
         made.append(Proposal(own.simulate, all_noise, shape, own.identity, label))
@@ -72,7 +72,7 @@ def stir_proposals(
 
 def pour_proposals(cups: "Cups", density: float, tried: int = 2) -> list["Proposal"]:
     """Pours at the slowest and at middling angular velocities, from two distances each."""
-    from ..inference import Proposal
+    from ..inference.criticism import Proposal
 
     rates = np.linspace(*cups.angular_velocity_range, tried + 1)[:tried]
     made = []

@@ -8,10 +8,11 @@ import numpy as np
 from ..calibration.stir_simulator import Stirring
 from ..errors import InputError
 from ..inputs.recording import Recording
-from ..inputs.strokes import resting, windows
+from ..inputs.strokes import resting
+from .windows import windows
 
 if TYPE_CHECKING:
-    from ..inference import (
+    from ..inference.criticism import (
         AutoregressiveNoise,
         Experiment,
         Extension,
@@ -31,7 +32,7 @@ def camera_noise(recordings: Sequence[Recording]) -> "AutoregressiveNoise":
     Raises:
         InputError: They rest too shortly for that.
     """
-    from ..inference import rest_noise
+    from ..inference.criticism import rest_noise
 
     seen = [(r.path.name, _longest_seen(r.inclination[resting(r)])) for r in recordings]
     rests = [(name, rest) for name, rest in seen if len(rest) >= SHORTEST]
@@ -75,7 +76,7 @@ def stir_experiment(
     stirring: Stirring, cameras: "AutoregressiveNoise", usual: "UsualResidual | None", label: str
 ) -> "Experiment":
     """Recordings of one liquid, with the cameras' noise and what the simulator usually lacks."""
-    from ..inference import Experiment, SumOfNoises
+    from ..inference.criticism import Experiment, SumOfNoises
 
     noise: Noise = cameras if usual is None else SumOfNoises((cameras, usual))
     return Experiment(
@@ -89,7 +90,7 @@ def effects_of(scene: str, names: Sequence[str] | None = None) -> dict[str, "Ext
     Raises:
         InputError: A name that is not registered.
     """
-    from ..inference import Extension
+    from ..inference.criticism import Extension
     from ..models import EFFECTS
 
     unknown = [name for name in names or () if name not in EFFECTS]

@@ -5,8 +5,15 @@ from importlib.resources import files
 from ..errors import InputError
 
 PAGES = {
-    "files": "every file that is written: variables, units, attributes, fields",
+    "recordings": "the recording format, import, resuming, what a run holds",
     "priors": "choosing a prior and the number of simulations, going on, seeds and noise",
+    "criticism": "finding the effect that the simulator lacks",
+    "simulator": "the inference engine with your own simulator",
+    "liquids": "simulated stirs and pours, effects, movies",
+    "robot": "arm, cameras, safety, online calibration",
+    "accuracy": "measured errors of fluid, posterior, pours and criticism",
+    "reproduce": "the paper's figures and simulation-based calibration",
+    "files": "every file that is written: variables, units, attributes, fields",
     "troubleshooting": "messages by their first line, with cause and cure",
 }
 """What each page is about, by its name."""

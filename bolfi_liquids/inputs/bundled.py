@@ -3,7 +3,8 @@
 from importlib.resources import as_file, files
 from typing import TYPE_CHECKING
 
-from .recording import Recording, open_recording
+from .open import open_recording
+from .recording import Recording
 
 if TYPE_CHECKING:
     from .pour_table import PourTable

@@ -1,21 +1,11 @@
 """What a recording's values must satisfy for a simulator to replay it."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .fields import (
-    AXES,
-    DENSITIES,
-    LENGTHS,
-    PLANES,
-    STICK_WEIGHT,
-)
-
-if TYPE_CHECKING:
-    from .recording import Recording
+from .fields import AXES, DENSITIES, LENGTHS, PLANES, STICK_WEIGHT
+from .recording import Recording
 
 MIN_SAMPLES = 10
 MAX_GRIPPER_GAP = 0.2
@@ -33,7 +23,7 @@ MIN_TRAVEL = 1e-3  # of the gripper [m]; a liquid that is not stirred shows noth
 MIN_DENSITY, MAX_DENSITY = 50.0, 20_000.0  # [kg/m3]; less looks like g/cm3
 
 
-def check_values(recording: "Recording") -> None:
+def check_values(recording: Recording) -> None:
     """Raise `InputError` at the first value that no simulator could use."""
     _check_time(recording)
     _check_numbers(recording)
@@ -44,7 +34,7 @@ def check_values(recording: "Recording") -> None:
     _check_hangs(recording)
 
 
-def _check_time(recording: "Recording") -> None:
+def _check_time(recording: Recording) -> None:
     time, where = recording.time, f"{recording.path}: time"
     if len(time) < MIN_SAMPLES:
         raise InputError(
@@ -69,7 +59,7 @@ def _check_time(recording: "Recording") -> None:
         )
 
 
-def _check_numbers(recording: "Recording") -> None:
+def _check_numbers(recording: Recording) -> None:
     names = LENGTHS + DENSITIES + tuple(n for n in STICK_WEIGHT if n in recording.attrs)
     for name in names:
         value = recording.attrs[name]
@@ -81,7 +71,7 @@ def _check_numbers(recording: "Recording") -> None:
             )
 
 
-def _check_sizes(recording: "Recording") -> None:
+def _check_sizes(recording: Recording) -> None:
     attrs = recording.attrs
     for name in LENGTHS:
         if recording.number(name) > MAX_LENGTH:
@@ -112,7 +102,7 @@ def _check_sizes(recording: "Recording") -> None:
             )
 
 
-def _check_gripper(recording: "Recording") -> None:
+def _check_gripper(recording: Recording) -> None:
     for name, values in zip(AXES, recording.gripper.position.T, strict=True):
         where = f"{recording.path}: {name}"
         seen = ~np.isnan(values)
@@ -156,7 +146,7 @@ def longest_gap(time: NDArray, seen: NDArray[np.bool_]) -> tuple[float, float]:
     return float(gaps[at]), float(edges[at])
 
 
-def _check_inclination(recording: "Recording") -> None:
+def _check_inclination(recording: Recording) -> None:
     for name, values in zip(PLANES, recording.inclination.T, strict=True):
         where = f"{recording.path}: {name}"
         seen = ~np.isnan(values)
@@ -184,7 +174,7 @@ def _check_inclination(recording: "Recording") -> None:
             )
 
 
-def _check_hangs(recording: "Recording") -> None:
+def _check_hangs(recording: Recording) -> None:
     """Buoyancy's moment about the pivot must stay below the weight's, or the stick floats up."""
     from ..models import StirSetup
 
@@ -200,7 +190,7 @@ def _check_hangs(recording: "Recording") -> None:
         )
 
 
-def _check_scene(recording: "Recording") -> None:
+def _check_scene(recording: Recording) -> None:
     cup, fill = recording.number("cup_radius"), recording.number("fill")
     x, y, z = recording.gripper.position.T
     radius = float(np.nanmax(np.hypot(x, y)))

@@ -5,8 +5,7 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError
-from ..files import existing_file
+from .toml_file import read_toml
 
 if TYPE_CHECKING:
     from ..models import Cups
@@ -21,7 +20,7 @@ def bundled_cups() -> "Cups":
 
 
 def kept_cups(settings: Mapping[str, Any]) -> "Cups":
-    """Those whose `Cups.settings` a result holds."""
+    """The cups whose `Cups.settings` a result holds."""
     from ..models import Cups
 
     return Cups.model_validate({name: settings[name] for name in Cups.model_fields})
@@ -35,12 +34,4 @@ def open_cups(path: str | Path) -> "Cups":
     """
     from ..models import Cups
 
-    path = existing_file(path)
-    try:
-        return Cups.from_toml(path)
-    except ValueError as err:
-        raise InputError(
-            str(err).removeprefix(f"{path}: "),
-            where=str(path),
-            fix="compare with the bundled cups.toml",
-        ) from err
+    return read_toml(path, Cups, fix="compare with the bundled cups.toml")

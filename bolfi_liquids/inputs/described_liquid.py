@@ -2,53 +2,41 @@
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+from pydantic import Field
 
 from ..errors import InputError
-from .settings import MIN_PARTICLES, at_least
+from .settings import Particles, Seed, checked
 
 if TYPE_CHECKING:
     from ..models import Liquid
 
 
-@dataclass(frozen=True)
+@checked()
 class Described:
     """A liquid and how it is simulated.
 
     Attributes:
         viscosity: [Pa s].
-        cohesion: 0 to 1, where the simulator was made for it.
+        cohesion: 0 to 1, the simulator's useful range.
         density: [kg/m³].
         effects: Coefficients of `models.EFFECTS` by name.
-        particles: Of the simulated liquid.
-        seed: Of the packing.
+        particles: Number of particles of the simulated liquid.
+        seed: Seed of the packing.
 
     Raises:
         InputError: A value cannot be used.
     """
 
-    viscosity: float
-    cohesion: float
-    density: float
-    effects: Mapping[str, float] = field(default_factory=dict)
-    particles: int = 1000
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        rules = {
-            "viscosity": (self.viscosity >= 0.0, "0 or more"),
-            "cohesion": (0.0 <= self.cohesion <= 1.0, "0 to 1"),
-            "density": (self.density > 0.0, "positive"),
-        }
-        for name, (kept, rule) in rules.items():
-            value = getattr(self, name)
-            if not (kept and np.isfinite(value)):
-                raise InputError(f"{value}", where=f"--{name}", fix=f"give a number, {rule}")
-        at_least(MIN_PARTICLES, "--particles", self.particles)
-        at_least(0, "--seed", self.seed)
+    viscosity: Annotated[float, Field(ge=0.0)]
+    cohesion: Annotated[float, Field(ge=0.0, le=1.0)]
+    density: Annotated[float, Field(gt=0.0)]
+    effects: Mapping[str, float] = Field(default_factory=dict)
+    particles: Particles = 1000
+    seed: Seed = 0
 
     def liquid(self) -> "Liquid":
         """The liquid, as the simulator takes it."""
@@ -57,7 +45,7 @@ class Described:
         return Liquid(self.viscosity, self.cohesion, self.density)
 
     def lines(self) -> list[str]:
-        """What it is, for a person."""
+        """A description in three lines."""
         effects = [f"{name} {value:g}" for name, value in self.effects.items()]
         return [
             f"viscosity {self.viscosity:g} Pa s, cohesion {self.cohesion:g}",
@@ -66,12 +54,12 @@ class Described:
         ]
 
     def attributes(self) -> dict[str, float | int | str]:
-        """The same for a file."""
-        from .. import __version__
+        """Attributes of a file that holds what the liquid did."""
         from ..models import MODEL_VERSION
 
+        release = version("bolfi-liquids")
         return {
-            "source": f"simulated by bolfi-liquids {__version__}, model {MODEL_VERSION}",
+            "source": f"simulated by bolfi-liquids {release}, model {MODEL_VERSION}",
             "viscosity": self.viscosity,
             "cohesion": self.cohesion,
             "liquid_density": self.density,

@@ -1,4 +1,4 @@
-"""Recordings of a stir: the file format, read and checked."""
+"""A recording of a stir, and the variables of its file."""
 
 import hashlib
 from collections.abc import Iterable, Mapping
@@ -10,21 +10,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..files import existing_file
-from .checks import check_values
-from .fields import (
-    AXES,
-    PLANES,
-    UNITS,
-    check_fields,
-)
+from .fields import AXES, PLANES, UNITS
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
 
-class Gripper(NamedTuple):
+class Trajectory(NamedTuple):
     """The path of the gripper, at which the stick pivots."""
 
     time: NDArray[np.float64]  # (T,) s
@@ -46,7 +38,7 @@ class Recording:
     """
 
     time: NDArray[np.float64]
-    gripper: Gripper
+    gripper: Trajectory
     inclination: NDArray[np.float64]
     attrs: Mapping[str, float | str]
     path: Path
@@ -62,7 +54,7 @@ class Recording:
         return replace(
             self,
             time=time,
-            gripper=Gripper(time, self.gripper.position[:count]),
+            gripper=Trajectory(time, self.gripper.position[:count]),
             inclination=self.inclination[:count],
         )
 
@@ -75,42 +67,6 @@ def _unpickled(values: dict[str, Any]) -> Recording:
     return Recording(**{**values, "attrs": MappingProxyType(values["attrs"])})
 
 
-Source = Recording | str | Path
-
-
-def open_recording(path: str | Path) -> Recording:
-    """Read a recording and check that it can be simulated.
-
-    Args:
-        path: A NetCDF file with the fields, units and attributes of the README.
-
-    Raises:
-        InputError: The file is missing, is no NetCDF file, or holds something a simulator
-            cannot use; the message names file, field, value and what to do.
-    """
-    path = existing_file(path)
-    recording = as_recording(_read(path), path)
-    check_values(recording)
-    return recording
-
-
-def open_recordings(
-    sources: Source | Iterable[Source], option: str = "recordings"
-) -> list[Recording]:
-    """One or several, those that are opened already as they are.
-
-    Args:
-        sources: Recordings or their paths.
-        option: What they were given as, for a refusal.
-
-    Raises:
-        InputError: One of them cannot be used.
-    """
-    if isinstance(sources, Source) or not isinstance(sources, Iterable):
-        return [_opened(sources, option)]
-    return [_opened(one, option) for one in sources]
-
-
 def aborted_recordings(recordings: Iterable[Recording]) -> list[str]:
     """A warning for each recording that something stopped."""
     return [
@@ -119,34 +75,6 @@ def aborted_recordings(recordings: Iterable[Recording]) -> list[str]:
         for one in recordings
         if one.attrs.get("status") == "aborted"
     ]
-
-
-def _opened(source: object, option: str) -> Recording:
-    if isinstance(source, Recording):
-        return source
-    if isinstance(source, str | Path):
-        return open_recording(source)
-    raise InputError(
-        f"{source!r:.80} is no recording",
-        where=option,
-        fix="give paths of NetCDF files, or what open_recording returns",
-    )
-
-
-def _read(path: Path) -> "Dataset":
-    import xarray
-
-    try:
-        # times stay numbers: a unit such as "ms" is then seen, not silently converted
-        dataset = xarray.load_dataset(path, decode_times=False)
-    except (OSError, ValueError) as err:
-        raise InputError(
-            "not a NetCDF file that can be read",
-            where=str(path),
-            fix="if it is a table, bolfi-liquids import makes a recording of it",
-        ) from err
-    check_fields(dataset, path)
-    return dataset
 
 
 def recording_dataset(values: Mapping[str, NDArray], attrs: Mapping[str, float | str]) -> "Dataset":
@@ -182,7 +110,7 @@ def as_recording(dataset: "Dataset", path: Path) -> Recording:
     time = _frozen(dataset["time"].to_numpy())
     return Recording(
         time=time,
-        gripper=Gripper(time, stack(AXES)),
+        gripper=Trajectory(time, stack(AXES)),
         inclination=stack(PLANES),
         attrs=MappingProxyType({str(k): _plain(v) for k, v in dataset.attrs.items()}),
         path=path,

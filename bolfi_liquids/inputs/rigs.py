@@ -44,7 +44,8 @@ def emulator_until_interrupted(
     Raises:
         RigError: It cannot start.
     """
-    from ..hardware import HiddenLiquid, above_cup, emulated
+    from ..hardware import HiddenLiquid, emulated
+    from ..hardware.motion import above_cup
 
     liquid = HiddenLiquid(viscosity=viscosity)
     with emulated(rig, above_cup(rig), address=address, liquid=liquid) as running:

@@ -1,66 +1,112 @@
-"""Settings of a calibration and of a pour, checked before anything is simulated."""
+"""Settings of the commands, checked before anything is simulated."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from functools import wraps
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, dataclass_transform
+
+from pydantic import AfterValidator, ConfigDict, Field, ValidationError
+from pydantic.dataclasses import dataclass as validated_dataclass
 
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    from ..inference import Plan
+    from ..inference.criticism import Plan
 
 SURROGATES = ("signal", "discrepancy")
 SAMPLERS = ("nuts", "emcee")
 RISKS = ("mean", "cvar")
 
 PAPER_RULES = {"acquisition": "lcb", "threshold": "min_mean"}
-"""What goes with the paper's surrogate, and what results were measured on."""
-
-RUNS = 2  # of each point of a set of stirs that calibrations share: the engine asks for replicates
-ALARM = 0.05  # share of false alarms when simulation and data are compared
-MIN_SIMULATIONS = 7  # fewer say next to nothing of two parameters
-MIN_PARTICLES = 100  # with fewer, the stick is thinner than the gaps between them
-_LEAST = {
-    "budget": MIN_SIMULATIONS,
-    "batch": 1,
-    "seed": 0,
-    "particles": MIN_PARTICLES,
-    "chains": 2,
-    "draws": 4,
-}
+"""Engine options that go with the paper's surrogate, on which the results were measured."""
+RUNS_PER_POINT = 2
+"""Of the stirs that calibrations share: the engine asks for replicates."""
+FALSE_ALARM_RATE = 0.05
+"""Of the comparison between simulation and data."""
+MIN_SIMULATIONS = 7
+"""With fewer, the posterior over two parameters says next to nothing."""
+MIN_PARTICLES = 100
+"""With fewer, the stick is thinner than the gaps between them."""
 
 
-@dataclass(frozen=True)
+def one_of(choices: tuple[str, ...]) -> AfterValidator:
+    """A rule for texts."""
+
+    def check(value: str) -> str:
+        if value not in choices:
+            raise ValueError(f"Input should be {' or '.join(map(repr, choices))}")
+        return value
+
+    return AfterValidator(check)
+
+
+Seed = Annotated[int, Field(ge=0)]
+Count = Annotated[int, Field(ge=1)]
+Simulations = Annotated[int, Field(ge=MIN_SIMULATIONS)]
+Particles = Annotated[int, Field(ge=MIN_PARTICLES)]
+Surrogate = Annotated[str, one_of(SURROGATES)]
+
+T = TypeVar("T")
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(Field,))
+def checked(where: str = "--{}", **fields: str) -> Callable[[type[T]], type[T]]:
+    """Make a frozen dataclass whose values are checked by their annotations.
+
+    Args:
+        where: How a refusal names a field; the braces stand for its name.
+        fields: Names that differ from that, by field.
+
+    Returns:
+        A class decorator. The class raises `InputError` at the first value that breaks a rule.
+    """
+
+    def decorate(cls: type[T]) -> type[T]:
+        rules = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+        made: Any = validated_dataclass(frozen=True, config=rules)(cls)
+        validate, names = made.__init__, tuple(made.__dataclass_fields__)
+
+        @wraps(validate)
+        def init(self: T, *values: Any, **named: Any) -> None:
+            try:
+                validate(self, **dict(zip(names, values, strict=False)), **named)
+            except ValidationError as err:
+                raise InputError.from_validation(err, where=place) from None
+
+        def place(name: str) -> str:
+            return fields.get(name) or where.format(name)
+
+        made.__init__ = init
+        return made
+
+    return decorate
+
+
+@checked()
 class CalibrationSettings:
     """What decides a calibration besides its recordings and prior.
 
     Attributes:
         budget: Simulations that the engine may learn from.
         batch: Simulations run at the same time.
-        seed: Of everything random.
+        seed: Seed of all random draws.
         surrogate: "discrepancy", the paper's, or "signal", which emulates the inclination itself.
-        particles: Of the simulated liquid.
+        particles: Number of particles of the simulated liquid.
         sampler: "nuts" or "emcee".
-        chains: Of the sampler; two at least, for R-hat needs them.
-        draws: Kept, for each chain.
+        chains: Number of chains; R-hat needs at least two.
+        draws: Draws kept of each chain.
     """
 
-    budget: int = 20
-    batch: int = 4
-    seed: int = 0
-    surrogate: str = "discrepancy"
-    particles: int = 1000
-    sampler: str = "nuts"
-    chains: int = 4
-    draws: int = 1000
-
-    def __post_init__(self):
-        for name, least in _LEAST.items():
-            at_least(least, f"--{name}", getattr(self, name))
-        one_of(SURROGATES, "--surrogate", self.surrogate)
-        one_of(SAMPLERS, "--sampler", self.sampler)
+    budget: Simulations = 20
+    batch: Count = 4
+    seed: Seed = 0
+    surrogate: Surrogate = "discrepancy"
+    particles: Particles = 1000
+    sampler: Annotated[str, one_of(SAMPLERS)] = "nuts"
+    chains: Annotated[int, Field(ge=2)] = 4
+    draws: Annotated[int, Field(ge=4)] = 1000
 
 
-@dataclass(frozen=True)
+@checked(noise_deg="--noise")
 class SbcSettings:
     """What decides a check of calibrations besides the recording that gives path and rig.
 
@@ -69,48 +115,41 @@ class SbcSettings:
         sequential: Replicates of the paper's surrogate, each with simulations of its own.
         design: Points that the former share, each stirred twice.
         budget: Simulations that each learns from.
-        noise_deg: Of the cameras, added to each simulated sample [deg].
-        particles: Of the simulated liquid.
-        seed: Of everything random.
+        noise_deg: Standard deviation of the cameras' noise, added to each simulated sample [deg].
+        particles: Number of particles of the simulated liquid.
+        seed: Seed of all random draws.
     """
 
-    runs: int = 200
-    sequential: int = 40
-    design: int = 512
-    budget: int = 20
-    noise_deg: float = 0.1
-    particles: int = 1000
-    seed: int = 0
+    runs: Annotated[int, Field(ge=0)] = 200
+    sequential: Annotated[int, Field(ge=0)] = 40
+    design: Simulations = 512
+    budget: Simulations = 20
+    noise_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = 0.1
+    particles: Particles = 1000
+    seed: Seed = 0
 
     def __post_init__(self):
-        least = {"runs": 0, "sequential": 0, "design": MIN_SIMULATIONS, "seed": 0}
-        for name, lowest in least.items():
-            at_least(lowest, f"--{name}", getattr(self, name))
-        if not 0.0 < self.noise_deg < 90.0:
+        if self.runs and self.budget > RUNS_PER_POINT * self.design:
             raise InputError(
-                f"{self.noise_deg!r}", where="--noise", fix="give degrees above 0, such as 0.1"
-            )
-        self.calibration("discrepancy")
-        if self.runs and self.budget > RUNS * self.design:
-            raise InputError(
-                f"{self.budget} simulations each, but {RUNS} of {self.design} points are shared",
+                f"{self.budget} simulations each, but {RUNS_PER_POINT} of {self.design} points "
+                "are shared",
                 where="--design",
-                fix=f"give {-(-self.budget // RUNS)} at least, or a smaller --budget",
+                fix=f"give {-(-self.budget // RUNS_PER_POINT)} at least, or a smaller --budget",
             )
 
     @property
     def replicates(self) -> dict[str, int]:
-        """How many, by surrogate."""
+        """Their number, by surrogate."""
         return {"signal": self.runs, "discrepancy": self.sequential}
 
     def calibration(self, surrogate: str) -> CalibrationSettings:
-        """Of one replicate: as `calibrate` has it."""
+        """Settings of one replicate: those of `calibrate`."""
         return CalibrationSettings(
             budget=self.budget, surrogate=surrogate, particles=self.particles
         )
 
 
-@dataclass(frozen=True)
+@checked()
 class PourSettings:
     """What decides the choice of a pour besides the posterior and the cups.
 
@@ -118,38 +157,30 @@ class PourSettings:
         iterations: Angular velocities that are tried, each with every distance.
         draws: Posterior draws over which spillage is averaged, and again among the best actions.
         risk: "mean", or "cvar": the mean over the worst tenth of the draws.
-        seed: Of everything random.
+        seed: Seed of all random draws.
     """
 
-    iterations: int = 15
-    draws: int = 16
-    risk: str = "mean"
-    seed: int = 0
-
-    def __post_init__(self):
-        for name, least in {"iterations": MIN_SIMULATIONS, "draws": 1, "seed": 0}.items():
-            at_least(least, f"--{name}", getattr(self, name))
-        one_of(RISKS, "--risk", self.risk)
+    iterations: Simulations = 15
+    draws: Count = 16
+    risk: Annotated[str, one_of(RISKS)] = "mean"
+    seed: Seed = 0
 
 
-@dataclass(frozen=True)
+@checked()
 class CriticismSettings:
     """What decides a criticism besides its data.
 
     Attributes:
         effects: Names of those that are considered; None is all.
         accept: Names of those that join the model whatever the verdict.
-        seed: Of everything random.
+        seed: Seed of all random draws.
         batch: Simulations run at the same time.
     """
 
     effects: tuple[str, ...] | None = None
     accept: tuple[str, ...] | None = None
-    seed: int = 0
-    batch: int = 4
-
-    def __post_init__(self):
-        at_least(0, "--seed", self.seed)
+    seed: Seed = 0
+    batch: Count = 4
 
     @property
     def stir_plan(self) -> "Plan":
@@ -157,36 +188,20 @@ class CriticismSettings:
 
         With held-out runs of four models, proposals and six baselines, at most 350 in all.
         """
-        from ..inference import Plan
+        from ..inference.criticism import Plan
 
         return Plan(base=24, extension=8, refit=12, held_out=6, most=168)
 
     @property
     def pour_plan(self) -> "Plan":
-        """The same for pours, of which each run makes the whole table."""
-        from ..inference import Plan
+        """Runs of each step for pours, of which each makes the whole table."""
+        from ..inference.criticism import Plan
 
         return Plan(start=12, base=12, extension=8, refit=10)
 
     @property
     def clean_plan(self) -> "Plan":
-        """The same for each clean recording."""
-        from ..inference import Plan
+        """Runs of each step for each clean recording."""
+        from ..inference.criticism import Plan
 
         return Plan(start=8, base=8)
-
-
-def at_least(lowest: int, where: str, value: object) -> None:
-    """Raise `InputError` unless `value` is a whole number of at least `lowest`."""
-    if not isinstance(value, int) or isinstance(value, bool) or value < lowest:
-        raise InputError(
-            f"{value!r}",
-            where=where,
-            fix=f"give a whole number of at least {lowest}",
-        )
-
-
-def one_of(choices: tuple[str, ...], where: str, value: object) -> None:
-    """Raise `InputError` unless `value` is one of the choices."""
-    if value not in choices:
-        raise InputError(f"{value!r}", where=where, fix=f"choose {' or '.join(choices)}")

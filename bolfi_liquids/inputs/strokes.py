@@ -1,22 +1,15 @@
-"""Windows of a stir: its strokes in each plane, and stretches of like speed."""
+"""Strokes of a stir, and the speed of its gripper."""
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .fields import PLANE_NAMES
 from .recording import Recording
-
-if TYPE_CHECKING:
-    from ..calibration.stir_simulator import Stirring
-    from ..inference import Window
 
 MOVING = 0.5  # of the greatest speed: corners are too short for samples to see them at rest
 STILL = 1e-4  # m
 PARTS = 8  # of a stir without separate strokes
-SPEEDS = 3  # bins
 
 
 class Stroke(NamedTuple):
@@ -80,43 +73,3 @@ def until_stroke(recording: Recording, number: int) -> Recording:
     if number not in found:
         raise ValueError(f"stroke must be one of {', '.join(map(str, found))}, got {number}")
     return recording.first(int(np.flatnonzero(found[number])[-1]) + 1)
-
-
-def windows(stirring: "Stirring") -> tuple["Window", ...]:
-    """Strokes in each plane, then speeds in both, over the joined samples."""
-    from ..inference import Window
-
-    def whole(member: int, samples: NDArray[np.bool_], planes: tuple[int, ...]) -> NDArray:
-        there = np.zeros((*stirring.member.shape, len(PLANE_NAMES)), bool)
-        rows = np.flatnonzero(stirring.member == member)[samples]
-        there[rows[:, None], list(planes)] = True
-        return there
-
-    found = []
-    for member, recording in enumerate(stirring.recordings):
-        for stroke in strokes(recording):
-            time = recording.time[stroke.samples]
-            label = {
-                "recording": recording.path.name,
-                "stroke": stroke.number,
-                "start_s": float(time[0]),
-                "stop_s": float(time[-1]),
-            }
-            for plane, name in enumerate(PLANE_NAMES):
-                samples = whole(member, stroke.samples, (plane,))
-                found.append(Window({"channel": name, **label}, samples))
-        for text, samples in _speeds(recording):
-            label = {"recording": recording.path.name, "speed": text}
-            found.append(Window(label, whole(member, samples, (0, 1))))
-    return tuple(found)
-
-
-def _speeds(recording: Recording) -> Iterator[tuple[str, NDArray[np.bool_]]]:
-    """Stretches of like speed after the first rest."""
-    fast, rest = speed(recording), resting(recording)
-    edges = np.linspace(0.0, fast.max(), SPEEDS + 1)
-    bins = np.clip(np.digitize(fast, edges) - 1, 0, SPEEDS - 1)
-    for k in range(SPEEDS):
-        samples = (bins == k) & ~rest
-        if samples.any():
-            yield f"{100 * edges[k]:.0f} to {100 * edges[k + 1]:.0f} cm/s", samples

@@ -1,25 +1,14 @@
 """What the columns of a table mean: `columns.toml`, written by a person."""
 
-import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from ..errors import InputError
-from ..files import existing_file
-from .fields import (
-    AXES,
-    DENSITIES,
-    LENGTHS,
-    PLANES,
-    STICK_WEIGHT,
-)
-
-if TYPE_CHECKING:
-    from pydantic_core import ErrorDetails
+from .fields import AXES, DENSITIES, LENGTHS, PLANES, STICK_WEIGHT
+from .toml_file import read_toml
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
@@ -74,16 +63,16 @@ class TableMap(Given):
     """How to read a recording out of a table.
 
     Attributes:
-        delimiter: Between two cells.
-        decimal: In a number.
+        delimiter: Between two cells; None is found in the header.
+        decimal: In a number; None is found in the cells.
         skip: Lines before the header.
         columns: Of `time`, `x`, `y`, `z`, `inclination_xz` and `inclination_yz`.
         attributes: Sizes and densities.
         source: Where the data come from.
     """
 
-    delimiter: Annotated[str, Field(min_length=1, max_length=1)] = ","
-    decimal: Literal[".", ","] = "."
+    delimiter: Annotated[str, Field(min_length=1, max_length=1)] | None = None
+    decimal: Literal[".", ","] | None = None
     skip: Annotated[int, Field(ge=0)] = 0
     columns: dict[str, Column]
     attributes: dict[str, Quantity]
@@ -110,31 +99,9 @@ def open_table_map(path: str | Path) -> TableMap:
     Raises:
         InputError: The file is missing or cannot be used; the message names the field.
     """
-    path = existing_file(path)
-    try:
-        return TableMap.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as err:
-        raise InputError(f"not TOML: {err}", where=str(path), fix="correct that line") from err
-    except ValidationError as err:
-        # a mistyped name is missing under its right one, too
-        errors = err.errors(include_url=False, include_context=False)
-        first = min(errors, key=lambda one: one["type"] != "extra_forbidden")
-        field = ".".join(map(str, first["loc"]))
-        raise InputError(
-            _said(first),
-            where=f"{path}: {field}" if field else str(path),
-            fix="compare with what `bolfi-liquids import --template` writes",
-        ) from err
-
-
-def _said(error: "ErrorDetails") -> str:
-    """In the words of somebody who has written the file."""
-    if error["type"] == "extra_forbidden":
-        return "is no field that is known"
-    if error["type"] == "missing":
-        return "is missing"
-    said, given = error["msg"].removeprefix("Value error, "), error["input"]
-    return f"{said}, got {given!r}" if isinstance(given, str | int | float) else said
+    return read_toml(
+        path, TableMap, fix="compare with what `bolfi-liquids import --template` writes"
+    )
 
 
 def _check_names(

@@ -22,7 +22,7 @@ from .request import (
 from .simulator import step_back
 
 if TYPE_CHECKING:
-    from ..inference import Job
+    from ..inference.simulations import Job
     from .estimate import OnlineEstimate
     from .plan import Followed
 

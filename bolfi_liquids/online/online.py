@@ -20,13 +20,14 @@ from numpy.typing import NDArray
 from ..calibration.calibrate import calibrate
 from ..errors import InputError
 from ..inputs.cups import bundled_cups
+from ..inputs.open import Source, open_recording
 from ..inputs.prior import (
     check_prior,
     default_prior,
     describe_prior,
     read_prior,
 )
-from ..inputs.recording import Recording, Source, open_recording
+from ..inputs.recording import Recording
 from ..pouring.map import make_pours
 from ..run.directory import RUN_TOML
 from .learner import learn_online
@@ -47,7 +48,7 @@ from .simulator import simulate_plan
 if TYPE_CHECKING:
     from ..inference import Prior
     from ..models import Cups
-    from ..models.gripper_path import GripperPath
+    from ..models.trajectory import Trajectory
     from .estimate import OnlineEstimate
 
 __all__ = [
@@ -91,7 +92,7 @@ class OnlineCalibration:
     @classmethod
     def start(  # noqa: PLR0913  the one call that most users make
         cls,
-        path: "GripperPath",
+        path: "Trajectory",
         attrs: Mapping[str, float | str],
         *,
         out: str | Path,

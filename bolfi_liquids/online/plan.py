@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..inputs.fields import DENSITIES
-from ..inputs.recording import Gripper, Recording
+from ..inputs.recording import Recording, Trajectory
 from ..inputs.strokes import strokes
 
 FARTHEST = 2e-3  # m that the arm may be off its plan; star strokes are 50 mm long
@@ -82,7 +82,7 @@ def planned(time: ArrayLike, position: ArrayLike, attrs: Mapping[str, float | st
         if name not in attrs:
             raise InputError("missing", where=f"plan: attribute {name}", fix="weigh the liquid")
     unseen = np.full((len(time), 2), np.nan)
-    path = Gripper(time, position)
+    path = Trajectory(time, position)
     return Recording(time, path, unseen, MappingProxyType(dict(attrs)), Path("plan"), "")
 
 

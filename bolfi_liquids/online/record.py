@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..inputs.recording import Recording, open_recording
+from ..inputs.open import open_recording
+from ..inputs.recording import Recording
 from ..robot.armed_session import Ask, check_one
 from ..robot.live_view import SessionView
 from ..robot.record import kept
@@ -26,13 +27,8 @@ from .online import (
 )
 
 if TYPE_CHECKING:
-    from ..hardware import (
-        HiddenLiquid,
-        PosePath,
-        Rig,
-        Session,
-    )
-    from ..hardware import Path as GripperPath
+    from ..hardware import HiddenLiquid, Rig, Session
+    from ..hardware.motion import PosePath, Trajectory
     from ..models import Cups
     from .estimate import OnlineEstimate
 
@@ -93,7 +89,8 @@ def record_online(  # noqa: PLR0913  as `record`, and what to calibrate
         RuntimeError: The calibration could not be prepared; nothing has moved.
         SessionStopped: The arm was stopped.
     """
-    from ..hardware import finalise, rig_attributes
+    from ..hardware import finalise
+    from ..hardware.recorder.finalise import rig_attributes
 
     check_one(ask, emulate, "record")
     cycles = MOST_CYCLES if cycles is None else cycles
@@ -137,7 +134,7 @@ class _Stirring:
 
     def carry_out(self) -> None:
         """To the cup, strokes until it is enough, a rest, and out again."""
-        from ..hardware import approach, retract
+        from ..hardware.motion import approach, retract
 
         session = self._session
         session.follow(approach(session.rig, session.pose()))
@@ -197,20 +194,19 @@ def sentence(estimate: "OnlineEstimate") -> str:
     )
 
 
-def _simulated(plan: StirPlan) -> "GripperPath":
+def _simulated(plan: StirPlan) -> "Trajectory":
     """The plan's stir as often as the cameras see it."""
-    from ..hardware import Path as GripperPath
-    from ..hardware import joined
+    from ..hardware.motion import Trajectory, joined
 
     whole = joined(list(plan.strokes))
     times = np.arange(0.0, whole.duration, 1.0 / RATE)
     columns = [np.interp(times, whole.time, axis) for axis in whole.pose[:, :3].T]
-    return GripperPath(times, np.column_stack(columns))
+    return Trajectory(times, np.column_stack(columns))
 
 
 def _still(rig: "Rig", pose: np.ndarray) -> "PosePath":
     """The rest at the end of a stir that ends early."""
-    from ..hardware import PosePath
+    from ..hardware.motion import PosePath
 
     times = np.arange(0.0, rig.stirring.rest, 1.0 / rig.robot.rate)
     return PosePath(times, np.tile(pose, (len(times), 1)), stirring=True)
@@ -218,7 +214,8 @@ def _still(rig: "Rig", pose: np.ndarray) -> "PosePath":
 
 def _so_far(directory: Path, ended: float) -> SoFar | None:
     """The data so far; None while they are too few."""
-    from ..hardware import RigError, partial
+    from ..hardware import RigError
+    from ..hardware.recorder.finalise import partial
 
     try:
         stir = partial(directory)

@@ -1,21 +1,18 @@
 """What decides an online calibration besides plan, cups and data."""
 
-from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import Field
 
 from ..errors import InputError
-from ..inputs.settings import (
-    MIN_PARTICLES,
-    MIN_SIMULATIONS,
-    SURROGATES,
-    at_least,
-    one_of,
-)
+from ..inputs.settings import Count, Particles, Seed, Simulations, Surrogate, checked, one_of
 from ..pouring.map import LEAST_POURS, POURS
 
 STOPS = ("bound", "mean")
+WHERE = "online setting {}"
 
 
-@dataclass(frozen=True)
+@checked(WHERE)
 class OnlineSettings:
     """What decides an online calibration besides plan, cups and data.
 
@@ -23,49 +20,32 @@ class OnlineSettings:
         target: Spilled fraction under which stirring may end.
         stop: What must be under it: "bound", the spilled fraction that one pour in twenty exceeds,
             or "mean", the expected one.
-        least_strokes: That must be finished before stirring may end. After the first ones the
-            posterior is often wide, and sometimes wrong: nine see the cup from all sides.
+        least_strokes: Strokes that must be finished before stirring may end. After the first ones
+            the posterior is often wide, and sometimes wrong: nine see the cup from all sides.
         design: Simulations all over the prior, made before the robot moves.
         budget: Simulations in all.
         batch: Simulations side by side while the robot stirs, each on a core of its own.
         surrogate: "discrepancy", the paper's, or "signal", which emulates the inclination itself.
-        particles: Of the simulated liquid.
-        pours: Of the spillage map.
-        seed: Of everything random.
+        particles: Number of particles of the simulated liquid.
+        pours: Number of pours of the spillage map.
+        seed: Seed of all random draws.
     """
 
-    target: float = 0.05
-    stop: str = "bound"
-    least_strokes: int = 9
-    design: int = 16
+    target: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.05
+    stop: Annotated[str, one_of(STOPS)] = "bound"
+    least_strokes: Count = 9
+    design: Simulations = 16
     budget: int = 48
-    batch: int = 1
-    surrogate: str = "discrepancy"
-    particles: int = 1000
-    pours: int = POURS
-    seed: int = 0
+    batch: Count = 1
+    surrogate: Surrogate = "discrepancy"
+    particles: Particles = 1000
+    pours: Annotated[int, Field(ge=LEAST_POURS)] = POURS
+    seed: Seed = 0
 
     def __post_init__(self):
-        if not (isinstance(self.target, int | float) and 0.0 < self.target < 1.0):
+        if self.budget < self.design:
             raise InputError(
-                f"{self.target!r}",
-                where=_where("target"),
-                fix="give a spilled fraction between 0 and 1",
+                f"{self.budget} simulations in all, fewer than the {self.design} of the design",
+                where=WHERE.format("budget"),
+                fix="give a larger budget or a smaller design",
             )
-        for name, choices in {"stop": STOPS, "surrogate": SURROGATES}.items():
-            one_of(choices, _where(name), getattr(self, name))
-        least = {
-            "least_strokes": 1,
-            "design": MIN_SIMULATIONS,
-            "budget": self.design,
-            "batch": 1,
-            "particles": MIN_PARTICLES,
-            "pours": LEAST_POURS,
-            "seed": 0,
-        }
-        for name, lowest in least.items():
-            at_least(lowest, _where(name), getattr(self, name))
-
-
-def _where(name: str) -> str:
-    return f"online setting {name}"

@@ -16,7 +16,7 @@ def simulate_plan(link: Connection, request: Request) -> None:
     Ends when the other end of `link` is closed.
     """
     from ..inference import SimulationBank
-    from ..inference.simulations.runner import Keep, run_missing
+    from ..inference.simulations import Keep, run_missing
 
     step_back(NICENESS)
     stirring = stirring_of([request.plan()], request.settings.particles)

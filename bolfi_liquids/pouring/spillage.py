@@ -17,7 +17,7 @@ from ..progress import Advance
 from ..run.time_limit import TimeLimited
 
 if TYPE_CHECKING:
-    from ..inference.simulations.runner import Keep
+    from ..inference.simulations import Keep
     from ..models import Cups
 
 FRACTIONS = ("spilled", "received", "retained")

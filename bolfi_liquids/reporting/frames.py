@@ -20,12 +20,12 @@ from ..criticism.result import latest_calibration
 from ..inputs.cups import kept_cups
 from ..inputs.prior import split_parameters
 from ..inputs.recording import Recording
-from ..pouring.tree import read_pour
+from ..pouring.result import read_pour
 from ..progress import Advance, progress_bar
 from ..run.directory import FRAMES, POUR
 from ..run.recordings import kept_recordings
-from ..run.simulations import fresh_seeds
-from .criticism_sentences import unit_of
+from ..seeds import Phase, simulation_seeds
+from ..words import unit_of
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -36,7 +36,6 @@ DRAWS = 3
 RATE = 15.0  # frames/s
 LONGEST = 10.0  # s of a stir that are shown
 FORMAT = 1  # of the file
-_PURPOSE = 81  # of seeds
 
 
 def frames_of(run: str | Path, *, progress: bool = True) -> "Dataset":
@@ -55,7 +54,7 @@ def frames_of(run: str | Path, *, progress: bool = True) -> "Dataset":
     seed = int(calibration.record["settings"]["seed"])
     theta = calibration.draws(DRAWS, seed)
     pour = _chosen(calibration.path)
-    seeds = fresh_seeds(seed, _PURPOSE, DRAWS)
+    seeds = simulation_seeds(seed, Phase.MOVING_PICTURES, DRAWS)
     made_from = _digest(theta, seeds, recording, calibration.record["settings"], pour)
     path = calibration.path / FRAMES
     if path.is_file():

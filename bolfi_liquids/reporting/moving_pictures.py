@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from ..calibration.result import Calibration
 from ..inputs.cups import kept_cups
-from ..pouring.tree import read_pour
+from ..pouring.result import read_pour
 from ..run.recordings import kept_recordings
-from .criticism_sentences import with_unit
+from ..words import sentence, with_unit
 from .hover import short
-from .sentences import percent
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -37,7 +36,7 @@ def moving_context(calibration: Calibration, frames: "Dataset") -> dict[str, Any
     if "poured" in frames:
         scenes["pour"] = _pour_scene(run, frames)
     draws = [_draw(frames.isel(draw=at)) for at in range(frames.sizes["draw"])]
-    extended = set(draws[0]["theta"]) != set(calibration.summary["parameters"])
+    extended = set(draws[0]["theta"]) != set(calibration.summary.parameters)
     return {"draws": draws, "scenes": scenes, "extended": extended}
 
 
@@ -68,7 +67,7 @@ def _outcome(one: "Dataset") -> str:
     if "spilled" not in one:
         return ""
     spilled, retained = float(one["spilled"]), float(one["retained"])
-    return f"{percent(spilled)} is spilled, {percent(retained)} stays in the source"
+    return str(sentence("pour.outcome", spilled=spilled, retained=retained))
 
 
 def _stir_scene(calibration: Calibration, frames: "Dataset") -> dict[str, Any]:

@@ -12,9 +12,9 @@ from ..drawing import (
     plain_log_ticks,
     styled,
 )
+from ..words import with_unit
 from .hover import Readout, marks, to_chart
 from .posterior_figure import LABELS, LOGARITHMIC
-from .sentences import with_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ..errors import InputError
-from ..inference.simulations.executors import Workers, open_executor
+from ..inference.simulations import Workers, open_executor
 from ..run.directory import open_bank
 from ..run.provenance import LIBRARIES, generations, versions
 from .figure import Drawn

@@ -77,8 +77,7 @@ def conclusions(
     progress: bool,
 ) -> list[NDArray | None]:
     """Of each truth; None where its calibration failed."""
-    from ..inference import Job
-    from ..inference.simulations.runner import Keep, run_missing
+    from ..inference.simulations import Job, Keep, run_missing
 
     truths = tasks.truths
     jobs = [

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..calibration.calibrate import calibrate
 from ..calibration.result import Calibration
-from ..inference.simulations.runner import Keep
+from ..inference.simulations import Keep
 from ..inputs.bundled import bundled_recording
 from ..inputs.cups import bundled_cups
 from ..inputs.prior import default_prior

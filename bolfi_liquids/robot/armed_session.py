@@ -8,13 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    from ..hardware import (
-        EmulatedRig,
-        PosePath,
-        Rig,
-        Session,
-        Tool,
-    )
+    from ..hardware import EmulatedRig, Rig, Session, Tool
+    from ..hardware.motion import PosePath
 
 Ask = Callable[[str], str]
 """Shows a person the plan, and returns what the person typed."""
@@ -79,13 +74,8 @@ def armed_session(
         InputError: Both are given, or neither.
         RigError: The person did not agree, or something cannot be used.
     """
-    from ..hardware import (
-        Session,
-        confirm,
-        confirm_emulated,
-        describe,
-        webcams,
-    )
+    from ..hardware import Session, SessionSetup, confirm, confirm_emulated, webcams
+    from ..hardware.session.confirmation import describe
 
     check_one(ask, emulation, "armed_session")
     text = describe(task.paths, task.rig, task.tool)
@@ -100,7 +90,7 @@ def armed_session(
             address, source = task.rig.robot.host, "robot"
             make_cameras = webcams(task.rig)
             confirmation = confirm(text, ask(text), address)
-        session = Session(
+        setup = SessionSetup(
             task.rig,
             task.out,
             address,
@@ -112,4 +102,4 @@ def armed_session(
             rehearsal=emulation is not None,
             source=source,
         )
-        yield stack.enter_context(session)
+        yield stack.enter_context(Session(setup))

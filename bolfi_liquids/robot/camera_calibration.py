@@ -10,7 +10,8 @@ from ..errors import InputError
 from ..inputs.rigs import rig_of
 
 if TYPE_CHECKING:
-    from ..hardware import CalibratedCamera, Camera
+    from ..hardware import Camera
+    from ..hardware.session.camera_calibration import CalibratedCamera
 
 VIEWS = ("xz", "yz")
 BOARD_PICTURES = 15
@@ -22,7 +23,7 @@ def write_board(path: Path) -> Path:
     Raises:
         InputError: There is a file already, or none can be written.
     """
-    from ..hardware import Board
+    from ..hardware.vision import Board
     from ..hardware.vision.opencv import opencv
 
     if path.exists():
@@ -56,13 +57,13 @@ def calibrate_view(  # noqa: PLR0913  one for each thing a person may give
         InputError: `view` or `square` cannot be used.
         RigError: The rig, the camera or the pictures cannot be used.
     """
-    from ..hardware import (
-        Board,
+    from ..hardware.session.camera_calibration import (
         calibrate_camera,
         pictures_in,
         take_pictures,
         write_lens,
     )
+    from ..hardware.vision import Board
 
     if view not in VIEWS:
         raise InputError(f"{view!r}", where="--view", fix="give xz or yz")

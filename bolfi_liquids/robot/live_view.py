@@ -67,7 +67,7 @@ class SessionView:
         """Draw the session as it is now."""
         if self._live is None:
             return
-        from ..hardware import host_time
+        from ..hardware.board import host_time
         from ..hardware.session.live import LiveStatus, live_table
 
         status = session.status()

@@ -18,7 +18,9 @@ from .armed_session import (
 from .live_view import SessionView
 
 if TYPE_CHECKING:
-    from ..hardware import Check, PosePath, Rig
+    from ..hardware import Check, Rig
+    from ..hardware.motion import PosePath
+    from ..pouring.result import PourSummary
 
 POURS = "pours"  # directories of what the arm did, in the RUN
 
@@ -48,13 +50,14 @@ def plan_pour(run: str | Path, rig: "Rig") -> PourPlan:
         InputError: The run has chosen none.
         MotionRejected: The motion breaks one of the rig's limits.
     """
-    from ..hardware import check_path, pour_path, ready_to_pour
+    from ..hardware import check_path
+    from ..hardware.motion import pour_path, ready_to_pour
 
-    tree, cups = _chosen(Path(run))
+    chosen, cups = _chosen(Path(run))
     turn = cups["pour"]
     action = {
-        "angular_velocity": float(np.radians(tree["angular_velocity_deg_s"])),
-        "distance": float(tree["distance_cm"]) / 100,
+        "angular_velocity": float(np.radians(chosen.angular_velocity_deg_s)),
+        "distance": chosen.distance_cm / 100,
         "lip_height": float(turn["lip_height"]),
     }
     path = pour_path(
@@ -96,7 +99,8 @@ def execute_pour(
         MotionRejected: The motion breaks one of the rig's limits.
         SessionStopped: The arm was stopped.
     """
-    from ..hardware import SessionStopped, approach_pour, emulated
+    from ..hardware import SessionStopped, emulated
+    from ..hardware.motion import approach_pour
 
     check_one(ask, emulate, "execute_pour")
     plan = plan_pour(run, rig)
@@ -120,17 +124,18 @@ def execute_pour(
 
 def dry_pour(run: str | Path, rig: "Rig", out: Path) -> "tuple[str, list[Check]]":
     """What the arm would do, and the pre-flight list of a session that cannot move it."""
-    from ..hardware import Session, describe
+    from ..hardware import Session, SessionSetup
+    from ..hardware.session.confirmation import describe
 
     plan = plan_pour(run, rig)
-    with Session(rig, out, tool="pouring", plan=[plan.path]) as session:
+    setup = SessionSetup(rig, out, tool="pouring", plan=[plan.path])
+    with Session(setup) as session:
         return describe([plan.path], rig, "pouring"), session.preflight()
 
 
-def _chosen(run: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+def _chosen(run: Path) -> "tuple[PourSummary, dict[str, Any]]":
     """The section "pour" of a run, and the cups that it was chosen for."""
-    from ..pouring.tree import read_pour
-    from ..run.summary import read_summary
+    from ..pouring.result import PourSummary, read_pour
 
     if not (run / RUN_TOML).exists() and not (run / POUR).exists():
         raise InputError(
@@ -141,7 +146,7 @@ def _chosen(run: Path) -> tuple[dict[str, Any], dict[str, Any]]:
             "no pour was chosen", where=str(run), fix=f"choose one: bolfi-liquids pour {run}"
         )
     tree = read_pour(run)
-    return read_summary(run)["pour"], json.loads(tree.attrs["cups"])
+    return PourSummary.read(run), json.loads(tree.attrs["cups"])
 
 
 def _next_directory(run: Path) -> Path:

@@ -5,7 +5,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..inputs.recording import Recording, open_recording
+from ..inputs.open import open_recording
+from ..inputs.recording import Recording
 from ..inputs.rigs import rig_of
 from .armed_session import Ask, check_one
 from .live_view import SessionView

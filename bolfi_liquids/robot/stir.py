@@ -14,13 +14,8 @@ from .armed_session import (
 from .live_view import SessionView
 
 if TYPE_CHECKING:
-    from ..hardware import (
-        Check,
-        HiddenLiquid,
-        PosePath,
-        Rig,
-        Session,
-    )
+    from ..hardware import Check, HiddenLiquid, Rig, Session
+    from ..hardware.motion import PosePath
 
 
 AHEAD = 2  # paths ordered beyond the one that runs, so that the arm need not wait
@@ -56,12 +51,8 @@ def plan_stir(rig: "Rig", cycles: int | None = None) -> StirPlan:
         InputError: `cycles` is below 1.
         MotionRejected: The plan breaks one of the rig's limits.
     """
-    from ..hardware import (
-        check_path,
-        insert,
-        retract,
-        strokes,
-    )
+    from ..hardware import check_path
+    from ..hardware.motion import insert, retract, strokes
 
     cycles = rig.stirring.cycles if cycles is None else cycles
     if cycles < 1:
@@ -95,7 +86,8 @@ def stir_session(
         InputError: `ask` and `emulate` are both given, or neither is; or a camera is a file.
         RigError: The person did not agree, or something cannot be used.
     """
-    from ..hardware import above_cup, emulated
+    from ..hardware import emulated
+    from ..hardware.motion import above_cup
 
     task = Task(rig, "stirring", plan.paths, out, cameras=True)
     if emulate is None:
@@ -129,9 +121,10 @@ def dry_run(rig: "Rig", plan: StirPlan, out: Path) -> list["Check"]:
     Raises:
         RigError: The directory cannot be used.
     """
-    from ..hardware import Session, webcams
+    from ..hardware import Session, SessionSetup, webcams
 
-    with Session(rig, out, make_cameras=webcams(rig), plan=plan.paths) as session:
+    setup = SessionSetup(rig, out, make_cameras=webcams(rig), plan=plan.paths)
+    with Session(setup) as session:
         return session.preflight()
 
 
@@ -142,7 +135,7 @@ def follow_plan(session: "Session", plan: StirPlan, view: SessionView) -> None:
         RigError: The pre-flight list has failures.
         SessionStopped: The arm was stopped.
     """
-    from ..hardware import approach
+    from ..hardware.motion import approach
 
     ordered = []
     view.motions = 1 + len(plan.paths)

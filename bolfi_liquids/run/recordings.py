@@ -5,7 +5,8 @@ from typing import Any
 
 from ..errors import InputError
 from ..files import write_whole
-from ..inputs.recording import Recording, open_recording
+from ..inputs.open import open_recording
+from ..inputs.recording import Recording
 
 FOLDER = "recordings"
 

@@ -12,7 +12,7 @@ from ..progress import Simulate
 from .film import failures_raised
 
 if TYPE_CHECKING:
-    from ..inference.simulations.executors import Workers
+    from ..inference.simulations import Workers
 
 
 class Batch(NamedTuple):
@@ -105,8 +105,7 @@ def simulated(simulate: Simulate, batch: Batch, where: Where) -> NDArray[np.floa
         RuntimeError: A simulation failed.
     """
     from ..inference import Job, SimulationBank
-    from ..inference.simulations.executors import open_executor
-    from ..inference.simulations.runner import Keep, run_missing
+    from ..inference.simulations import Keep, open_executor, run_missing
 
     jobs = [
         Job({"viscosity": one.viscosity, "cohesion": one.cohesion, **one.effects}, one.seed)

@@ -15,8 +15,9 @@ from ..files import write_netcdf
 from ..inputs.bundled import bundled_recording
 from ..inputs.cups import bundled_cups, open_cups
 from ..inputs.described_liquid import check_effects
+from ..inputs.open import Source, open_recordings
 from ..inputs.prior import split_parameters
-from ..inputs.recording import Gripper, Recording, Source, open_recordings
+from ..inputs.recording import Gripper, Recording
 from ..run.time_limit import TimeLimited
 from .batch import Where, batch_of, simulated
 from .files import check_targets, pour_dataset, stir_dataset
@@ -25,7 +26,7 @@ from .film import film_pour, film_stir
 if TYPE_CHECKING:
     from xarray import Dataset
 
-    from ..inference.simulations.executors import Workers
+    from ..inference.simulations import Workers
     from ..models import Cups
 
 VISCOSITY, COHESION, DENSITY = 1.0, 0.2, 1260.0  # Pa s, 1, kg/m3: the bundled glycerin

@@ -5,7 +5,7 @@ import socket
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from .network import ADMIN
+from .servers.network import ADMIN
 
 
 class State(NamedTuple):

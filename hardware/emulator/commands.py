@@ -1,13 +1,13 @@
 """What ur_rtde's control script does for each number in its command register."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from ..motion.kinematics import DhArm, forward, inverse
 from ..motion.poses import compose
 from .arm import Arm
+from .machine import ProgramError, RunningScript
 from .motion import (
     ArmState,
     Motion,
@@ -18,11 +18,7 @@ from .motion import (
     servo,
     twist,
 )
-from .registers import Registers
 from .script import Kind, Waypoint
-
-if TYPE_CHECKING:
-    from .program import Program
 
 BRAKE = 3.0  # rad/s2; of a motion whose thread was killed
 SERVO_RATE = 15.0  # rad/s2; the real arm's is not published
@@ -30,26 +26,6 @@ _ZERO = np.zeros(6)
 
 # carried out again whenever the script reads them, and answered at once
 REALTIME = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, *range(66, 72)})
-
-
-class ProgramError(Exception):
-    """The script fails, as it would on the controller: it ends, and the arm stops."""
-
-
-class Machine(Protocol):
-    """What a script acts on: the controller."""
-
-    arm: Arm
-    registers: Registers
-    version: tuple[int, int]
-    dt: float
-
-    @property
-    def steady(self) -> bool: ...
-    def zero_force(self) -> None: ...
-    def set_payload(self, mass: float, centre: tuple[float, ...]) -> None: ...
-    def set_watchdog(self, frequency: float, register: int) -> None: ...
-    def protective_stop(self, reason: str) -> None: ...
 
 
 def within_limits(arm: Arm, pose: np.ndarray) -> bool:
@@ -71,8 +47,8 @@ def _plan(arm: Arm, waypoint: Waypoint) -> Plan:
     return plan
 
 
-def _move(kind: Kind, *, is_pose: bool) -> Callable[["Program"], None]:
-    def run(program: "Program") -> None:
+def _move(kind: Kind, *, is_pose: bool) -> Callable[[RunningScript], None]:
+    def run(program: RunningScript) -> None:
         *target, speed, acceleration = program.numbers(0, 8)
         waypoint = Waypoint(kind, is_pose, tuple(target), speed, acceleration, None)
         program.end_move()
@@ -82,14 +58,14 @@ def _move(kind: Kind, *, is_pose: bool) -> Callable[["Program"], None]:
     return run
 
 
-def _move_path(program: "Program") -> None:
+def _move_path(program: RunningScript) -> None:
     path = program.script.path
     program.end_move()
     thread = "move" if program.integer(1) == 1 else None
     program.begin([_plan(program.arm, one) for one in path], thread, brake=BRAKE, path=path)
 
 
-def _fresh(program: "Program", count: int) -> list[float] | None:
+def _fresh(program: RunningScript, count: int) -> list[float] | None:
     """Numbers of a real-time command, or None while they stay what they were."""
     numbers = program.numbers(0, count)
     latest = (program.integer(0), *numbers)
@@ -99,8 +75,8 @@ def _fresh(program: "Program", count: int) -> list[float] | None:
     return numbers
 
 
-def _servo(*, is_pose: bool) -> Callable[["Program"], None]:
-    def run(program: "Program") -> None:
+def _servo(*, is_pose: bool) -> Callable[[RunningScript], None]:
+    def run(program: RunningScript) -> None:
         numbers = _fresh(program, 11)
         if numbers is None:
             return
@@ -114,8 +90,8 @@ def _servo(*, is_pose: bool) -> Callable[["Program"], None]:
     return run
 
 
-def _speed(*, linear: bool) -> Callable[["Program"], None]:
-    def run(program: "Program") -> None:
+def _speed(*, linear: bool) -> Callable[[RunningScript], None]:
+    def run(program: RunningScript) -> None:
         numbers = _fresh(program, 7)
         if numbers is None:
             return
@@ -127,25 +103,25 @@ def _speed(*, linear: bool) -> Callable[["Program"], None]:
     return run
 
 
-def _stop_plan(program: "Program", rate: float, *, linear: bool) -> Plan:
+def _stop_plan(program: RunningScript, rate: float, *, linear: bool) -> Plan:
     tool = program.arm.tool
     if linear:
         return lambda _: twist(tool, _ZERO, rate, ends=True)
     return lambda _: joint_speed(tool.arm, _ZERO, rate, ends=True)
 
 
-def _speed_stop(program: "Program") -> None:
+def _speed_stop(program: RunningScript) -> None:
     program.end_thread("speed")
     plan = _stop_plan(program, program.number(0), linear=program.speeds_are_linear)
     program.begin([plan], None)
 
 
-def _servo_stop(program: "Program") -> None:
+def _servo_stop(program: RunningScript) -> None:
     program.end_thread("servo")
     program.begin([_stop_plan(program, program.number(0), linear=True)], None)
 
 
-def _stop(program: "Program") -> None:
+def _stop(program: RunningScript) -> None:
     """stopL and stopJ alike: whether the stop is linear depends on whether one was asynchronous."""
     if program.thread == "stop":
         program.end_thread("stop")
@@ -159,7 +135,7 @@ def _stop(program: "Program") -> None:
     program.begin([plan], "stop" if asynchronous else None)
 
 
-def _inverse(program: "Program", near: np.ndarray | None = None) -> np.ndarray:
+def _inverse(program: RunningScript, near: np.ndarray | None = None) -> np.ndarray:
     pose, arm = np.array(program.numbers(0)), program.arm
     start = arm.state.joints if near is None else near
     found = inverse(arm.tool.arm, pose, start, tcp=arm.tool.tcp)
@@ -168,43 +144,43 @@ def _inverse(program: "Program", near: np.ndarray | None = None) -> np.ndarray:
     return found.joints
 
 
-def _has_inverse(program: "Program") -> None:
+def _has_inverse(program: RunningScript) -> None:
     program.give_integer(within_limits(program.arm, np.array(program.numbers(0))))
 
 
-def _joints_within(program: "Program") -> None:
+def _joints_within(program: RunningScript) -> None:
     joints = np.array(program.numbers(0))
     program.give_integer(bool((np.abs(joints) <= program.arm.tool.arm.joint_limit).all()))
 
 
-def _forward(program: "Program") -> None:
+def _forward(program: RunningScript) -> None:
     model: DhArm = program.arm.tool.arm
     program.give(forward(model, program.numbers(0), tcp=program.numbers(6)))
 
 
-def _set_tcp(program: "Program") -> None:
+def _set_tcp(program: RunningScript) -> None:
     offset = np.array(program.numbers(0))
     if not np.isfinite(offset).all():
         raise ProgramError(f"TCP offset {offset.tolist()} is not finite")
     program.arm.mount(offset)
 
 
-def _set_payload(program: "Program") -> None:
+def _set_payload(program: RunningScript) -> None:
     mass, *centre = program.numbers(0, 4)
     program.machine.set_payload(mass, tuple(centre))
 
 
-def _on_e_series(run: Callable[["Program"], None]) -> Callable[["Program"], None]:
+def _on_e_series(run: Callable[[RunningScript], None]) -> Callable[[RunningScript], None]:
     """ur_rtde strikes these lines from the script for older controllers: nothing happens there."""
 
-    def guarded(program: "Program") -> None:
+    def guarded(program: RunningScript) -> None:
         if program.machine.version >= (5, 4):
             run(program)
 
     return guarded
 
 
-COMMANDS: dict[int, Callable[["Program"], None]] = {
+COMMANDS: dict[int, Callable[[RunningScript], None]] = {
     1: _move("movej", is_pose=False),
     2: _move("movej", is_pose=True),
     3: _move("movel", is_pose=True),

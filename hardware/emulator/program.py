@@ -1,10 +1,9 @@
 """ur_rtde's control script at work: reads a command register each tick, answers, owns threads."""
 
-from typing import Literal
-
 from ..motion.poses import Numbers
 from .arm import Arm
-from .commands import COMMANDS, REALTIME, Machine, ProgramError
+from .commands import COMMANDS, REALTIME
+from .machine import Machine, ProgramError, Thread
 from .motion import Plan
 from .registers import Registers
 from .script import Script, Waypoint
@@ -13,8 +12,6 @@ READY, DONE = 1, 2
 STOP_SCRIPT = 255
 _RUNNING = 1 << 15
 _LONGEST = 127
-
-Thread = Literal["move", "stop", "servo", "speed"]
 
 
 class Program:

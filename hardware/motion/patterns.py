@@ -1,15 +1,8 @@
 """Stirring patterns as timed paths of the gripper."""
 
-from typing import NamedTuple
-
 import numpy as np
 
-
-class Path(NamedTuple):
-    """Times [s], shape [T], and gripper positions [m], shape [T, 3]."""
-
-    time: np.ndarray
-    position: np.ndarray
+from .trajectory import Trajectory
 
 
 def star(  # noqa: PLR0913  a pattern has that many sizes
@@ -21,7 +14,7 @@ def star(  # noqa: PLR0913  a pattern has that many sizes
     acceleration: float = 1.0,
     rest: float = 0.5,
     rate: float = 30.0,
-) -> Path:
+) -> Trajectory:
     """A star of straight strokes in a horizontal plane ("To Stir or Not to Stir": m = 9).
 
     The gripper rests above the cup's axis, moves to the first of `points` vertices on a circle,
@@ -62,7 +55,7 @@ def star(  # noqa: PLR0913  a pattern has that many sizes
     elapsed = np.clip(time - ends[k], 0.0, durations[k])
     share = travelled(elapsed, durations[k], ramps[k], peaks[k]) / strokes[k]
     plane = corners[k] + share[:, None] * (corners[k + 1] - corners[k])
-    return Path(time, np.column_stack([plane, np.full(len(time), height)]))
+    return Trajectory(time, np.column_stack([plane, np.full(len(time), height)]))
 
 
 def star_vertices(points: int, radius: float) -> np.ndarray:
@@ -108,7 +101,7 @@ def circle(
     turns: float = 4.0,
     rest: float = 0.5,
     rate: float = 30.0,
-) -> Path:
+) -> Trajectory:
     """Turns on a horizontal circle about the cup's axis, reached and left along a spiral.
 
     The radius grows over the first half turn and shrinks over the last, both smoothly.
@@ -134,4 +127,4 @@ def circle(
     out = radius * np.sin(0.5 * np.pi * near) ** 2
     angle = 2.0 * np.pi * turned
     plane = np.column_stack([out * np.cos(angle), out * np.sin(angle)])
-    return Path(time, np.column_stack([plane, np.full(len(time), height)]))
+    return Trajectory(time, np.column_stack([plane, np.full(len(time), height)]))

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RigError
+from ..motion.trajectory import Trajectory
 from ..rig import View
-from ..vision.clock import Clock, ClockError, GripperSamples, fit_clock
+from ..vision.clock import Clock, ClockError, fit_clock
 from ..vision.frame_measurement import BAD_LINE
 from ..vision.joining import View as JoinedView
 from ..vision.joining import join
@@ -124,7 +125,7 @@ def _clock(raw: Raw, view: View, series: FrameSeries, span: _Span) -> Clock:
     try:
         return fit_clock(
             series,
-            GripperSamples(samples["time"][near], path),
+            Trajectory(samples["time"][near], path),
             raw.provenance.cameras[view],
             raw.provenance.rig.camera(view).marker,
             guess=guess,

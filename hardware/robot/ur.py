@@ -14,15 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import RigError, missing_extra
-from ..rig import Rig
-from ..safety.limits import TargetCheck, Tool
-from .arm import (
+from ..arm import (
     ArmState,
     LinkLost,
     Payload,
     Six,
 )
+from ..errors import RigError, missing_extra
+from ..rig import Rig
+from ..safety.limits import TargetCheck, Tool
 
 WATCHDOG_RATE = 10.0  # Hz: the controller stops its program 0.1 s after the last set-point
 # the defaults of the vendor's manual: the arm lags its set-points by about the first

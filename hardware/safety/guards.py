@@ -7,9 +7,9 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from ..arm import ArmState
 from ..board import Row, Trouble, Who
 from ..rig import Box, Limits
-from ..robot.arm import ArmState
 
 NORMAL, REDUCED = 1 << 0, 1 << 1
 RUNNING_MODE, PLAYING = 7, 2

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arm import ArmState, Payload, Six
 from ..board import Row, Who
 from ..motion.cup_frame import cup_frame
 from ..motion.kinematics import forward
 from ..rig import Rig
-from ..robot.arm import ArmState, Payload, Six
 from .guards import CAMERAS, FULL_SPEED, PLAYING, RECORDER_AGE, RUNNING_MODE, safe, safety_text
 from .limits import Tool, turn_between, workspace
 

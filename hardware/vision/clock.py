@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from ..motion.trajectory import Trajectory
 from .camera_model import CameraModel
 from .series import FrameSeries
 
@@ -59,21 +60,9 @@ class Clock(NamedTuple):
         return self.reference + elapsed
 
 
-class GripperSamples(NamedTuple):
-    """The robot's samples.
-
-    Attributes:
-        time: On the robot's clock [s], shape (N,), increasing.
-        position: Of the pivot in the cup frame [m], shape (N, 3).
-    """
-
-    time: np.ndarray
-    position: np.ndarray
-
-
 def fit_clock(
     series: FrameSeries,
-    gripper: GripperSamples,
+    gripper: Trajectory,
     camera: CameraModel,
     marker_offset: tuple[float, float, float],
     *,
@@ -147,7 +136,7 @@ class _Path(NamedTuple):
 
 
 def _path(
-    gripper: GripperSamples, camera: CameraModel, marker_offset: tuple[float, float, float]
+    gripper: Trajectory, camera: CameraModel, marker_offset: tuple[float, float, float]
 ) -> _Path:
     time, position = np.asarray(gripper.time), np.asarray(gripper.position)
     finite = np.isfinite(position).all(axis=1) & np.isfinite(time)

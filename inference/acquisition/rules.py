@@ -22,8 +22,9 @@ from ..gp.process import (
     predict_joint,
     predict_many,
 )
-from ..surrogates.base import LogLikelihood, LogSecondMoment, Surrogate
+from ..surrogates.base import Surrogate
 from ..surrogates.feasibility import Feasibility, log_feasible
+from ..types import LogLikelihood, LogSecondMoment
 from .screen import ROUNDS, screen
 
 CANDIDATES = 128  # points among which a rule chooses

@@ -15,7 +15,7 @@ from jax.scipy.stats import norm
 
 from ..gp.linalg import small_inverse_cholesky
 from ..sobol import sobol
-from ..surrogates.base import LogLikelihood
+from ..types import LogLikelihood
 
 ROUND = 64
 EVEN, ROUNDS = 4, 8  # rounds that fill the prior evenly, and rounds in all

@@ -1,26 +1,5 @@
 """Is a posterior calibrated? Checks of any pipeline on data whose truth is known."""
 
-from .intervals import Coverage, coverage
-from .pipelines import FitPipeline, SharedDesign, shared_design
-from .random_points import Tarp, tarp
-from .repeat import replicates
-from .replicate import Pipeline, Replicate
-from .replicated import Quantity, Replicates
-from .uniformity import SBC, sbc
+import lazy_loader
 
-__all__ = [
-    "SBC",
-    "Coverage",
-    "FitPipeline",
-    "Pipeline",
-    "Quantity",
-    "Replicate",
-    "Replicates",
-    "SharedDesign",
-    "Tarp",
-    "coverage",
-    "replicates",
-    "sbc",
-    "shared_design",
-    "tarp",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

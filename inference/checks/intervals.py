@@ -9,7 +9,7 @@ import xarray as xr
 from scipy.stats import beta, binom
 
 from ..prior import Prior
-from ..surrogates.base import Simulator
+from ..types import Simulator
 from .repeat import made_or_given
 from .replicate import Pipeline
 from .replicated import Quantity, Replicates
@@ -108,9 +108,10 @@ class Coverage:
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Coverage minus its nominal level, with 95 % intervals at the levels."""
-        from .plots import plot_coverage
+        from .plots import Rates, plot_coverage
 
-        return plot_coverage(self, ax)
+        rates = Rates(self.levels, self.rate, self.low, self.high)
+        return plot_coverage(self.names, self.quantiles, rates, ax)
 
 
 def coverage(  # noqa: PLR0913  operands of `replicates`, then what is asked of them

@@ -1,6 +1,7 @@
-"""Figures of the checks. Matplotlib is imported by whoever asks for one."""
+"""Figures of the checks, of plain arrays. Matplotlib is imported by whoever asks for one."""
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -13,28 +14,45 @@ from .ranks import bin_count
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from .intervals import Coverage
-    from .random_points import Tarp
-    from .uniformity import SBC
-
 INK, GREY, BAND = "#1f2933", "#8a94a0", "#e4e7eb"
 COLOURS = ("#2463a6", "#d1591a", "#2d8659", "#8a4fa3", "#b8860b", "#5b6770", "#c2185b", "#00838f")
 SIZE = (5.2, 3.9)  # inch
-BELOW: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16), "ncols": 3}
-PERCENT = 100  # levels at which a coverage curve is drawn
+LEGEND_BELOW: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16), "ncols": 3}
+COVERAGE_LEVELS = 100  # at which a coverage curve is drawn
 
 
-def plot_ecdf_difference(result: "SBC", ax: "Axes | None", level: float) -> "Axes":
+class Rates(NamedTuple):
+    """Shares of intervals that held the truth, at k nominal levels for q quantities."""
+
+    levels: np.ndarray  # [k]
+    rate: np.ndarray  # [k, q]
+    low: np.ndarray  # [k, q], lower end of each rate's interval
+    high: np.ndarray  # [k, q]
+
+
+class Curve(NamedTuple):
+    """Expected coverage against credibility, with its pointwise band; each [L + 2]."""
+
+    credibility: np.ndarray
+    expected_coverage: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def plot_ecdf_difference(
+    names: Sequence[str], ranks: np.ndarray, draws: int, ax: "Axes | None", level: float
+) -> "Axes":
+    """ECDF of ranks [R, q], each from 0 to `draws`, minus that of uniform ranks."""
     ax = _axes(ax)
-    n, draws = len(result.replicates), result.draws
+    n = len(ranks)
     limits = bands.band(n, draws, level)
     z = _closed(limits.z, 1.0)
     lower, upper = (_closed(edge / n - limits.z, 0.0) for edge in (limits.lower, limits.upper))
     label = f"{100 * level:g} % band of the whole curve"
     ax.fill_between(z, lower, upper, color=BAND, lw=0, label=label)
     ax.axhline(0.0, color=GREY, lw=0.8)
-    for j, name in enumerate(result.names):
-        below = bands.counts_below(result.ranks[:, j], draws) / n - limits.z
+    for j, name in enumerate(names):
+        below = bands.counts_below(ranks[:, j], draws) / n - limits.z
         ax.plot(z, _closed(below, 0.0), color=_colour(j), lw=1.6, label=name)
     ax.set_xlim(0.0, 1.0)
     reach = 1.15 * np.abs(ax.dataLim.intervaly).max()
@@ -42,11 +60,14 @@ def plot_ecdf_difference(result: "SBC", ax: "Axes | None", level: float) -> "Axe
     ax.set_xlabel("rank of the truth among the draws, as a fraction")
     ax.set_ylabel("ECDF − uniform")
     ax.set_title(f"{n} replicates", loc="right", color=GREY)
-    return _finish(ax, **BELOW)
+    return _finish(ax, **LEGEND_BELOW)
 
 
-def plot_histograms(result: "SBC", axes: Any, level: float) -> "list[Axes]":
-    q, n, draws = len(result.names), len(result.replicates), result.draws
+def plot_histograms(
+    names: Sequence[str], ranks: np.ndarray, draws: int, axes: Any, level: float
+) -> "list[Axes]":
+    """Histograms of ranks [R, q], each from 0 to `draws`; one axes per quantity."""
+    n, q = ranks.shape
     if axes is None:
         size = (max(2.6 * q, 3.2), 2.6)
         axes = plt.subplots(1, q, figsize=size, sharey=True, layout="constrained")[1]
@@ -55,8 +76,8 @@ def plot_histograms(result: "SBC", axes: Any, level: float) -> "list[Axes]":
         raise ValueError(f"axes must hold one for each of {q} quantities, got {len(panels)}")
     bins = bin_count(n, draws)
     low, high = binom.interval(level, n, 1 / bins)
-    for j, (name, ax) in enumerate(zip(result.names, panels, strict=False)):
-        counts = np.bincount(result.ranks[:, j] * bins // (draws + 1), minlength=bins)
+    for j, (name, ax) in enumerate(zip(names, panels, strict=False)):
+        counts = np.bincount(ranks[:, j] * bins // (draws + 1), minlength=bins)
         ax.axhspan(low, high, color=BAND, lw=0)
         ax.axhline(n / bins, color=GREY, lw=0.8)
         ax.stairs(counts, np.linspace(0.0, 1.0, bins + 1), color=_colour(j), fill=True, alpha=0.35)
@@ -70,21 +91,31 @@ def plot_histograms(result: "SBC", axes: Any, level: float) -> "list[Axes]":
     return panels[:q]
 
 
-def plot_coverage(result: "Coverage", ax: "Axes | None") -> "Axes":
+def plot_coverage(
+    names: Sequence[str], quantiles: np.ndarray, rates: Rates, ax: "Axes | None"
+) -> "Axes":
+    """Share of truths held by central intervals minus the nominal level.
+
+    Args:
+        names: Of q quantities.
+        quantiles: Where each truth lies among its draws, [R, q]; gives the whole curve.
+        rates: At the levels that were asked for.
+        ax: To draw on; None makes a figure.
+    """
     ax = _axes(ax)
-    n, q = len(result.replicates), len(result.names)
-    limits = bands.band(n, PERCENT - 1, 0.95)  # |2 u - 1| is uniform like u
+    n, q = quantiles.shape
+    limits = bands.band(n, COVERAGE_LEVELS - 1, 0.95)  # |2 u - 1| is uniform like u
     level = _closed(limits.z, 1.0)
     low, high = (_closed(edge / n - limits.z, 0.0) for edge in (limits.lower, limits.upper))
     ax.fill_between(level, low, high, color=BAND, lw=0, label="95 % band of the whole curve")
     ax.axhline(0.0, color=GREY, lw=0.8)
-    for j, name in enumerate(result.names):
-        within = np.sort(2 * np.abs(result.quantiles[:, j] - 0.5))
+    for j, name in enumerate(names):
+        within = np.sort(2 * np.abs(quantiles[:, j] - 0.5))
         curve = np.searchsorted(within, level, side="right") / n - level
         ax.plot(level, curve, color=_colour(j), lw=1.2, alpha=0.6)
-        shifted = result.levels + 0.008 * (j - (q - 1) / 2)  # so that bars do not hide each other
-        error = np.stack([result.rate - result.low, result.high - result.rate])[:, :, j]
-        excess = result.rate[:, j] - result.levels
+        shifted = rates.levels + 0.008 * (j - (q - 1) / 2)  # so that bars do not hide each other
+        error = np.stack([rates.rate - rates.low, rates.high - rates.rate])[:, :, j]
+        excess = rates.rate[:, j] - rates.levels
         style = {"fmt": "o", "ms": 4.5, "capsize": 2.5, "lw": 1.2}
         ax.errorbar(shifted, excess, error, color=_colour(j), label=name, **style)
     ax.set_xlim(0.0, 1.0)
@@ -93,22 +124,23 @@ def plot_coverage(result: "Coverage", ax: "Axes | None") -> "Axes":
     ax.set_xlabel("nominal level of the central interval")
     ax.set_ylabel("truths held − nominal")
     ax.set_title(f"{n} replicates", loc="right", color=GREY)
-    return _finish(ax, **BELOW)
+    return _finish(ax, **LEGEND_BELOW)
 
 
-def plot_tarp(result: "Tarp", ax: "Axes | None") -> "Axes":
+def plot_tarp(curve: Curve, replicates: int, draws: int, ax: "Axes | None") -> "Axes":
+    """Expected coverage against credibility, from so many replicates of so many draws."""
     ax = _axes(ax, (4.4, 4.2))
-    n = len(result.replicates)
-    limits = bands.band(n, result.replicates.most, 0.95)
+    n = replicates
+    limits = bands.band(n, draws, 0.95)
     z = _closed(limits.z, 1.0)
     lower, upper = (_closed(edge / n, 1.0) for edge in (limits.lower, limits.upper))
     ax.fill_between(z, lower, upper, color=BAND, lw=0, label="95 % band of the whole curve")
     ax.plot([0, 1], [0, 1], color=GREY, lw=0.8)
-    c = result.credibility
-    ax.fill_between(c, result.low, result.high, color=COLOURS[0], alpha=0.25, lw=0)
+    c = curve.credibility
+    ax.fill_between(c, curve.low, curve.high, color=COLOURS[0], alpha=0.25, lw=0)
     ax.plot(
         c,
-        result.expected_coverage,
+        curve.expected_coverage,
         color=COLOURS[0],
         lw=1.6,
         label="joint posterior, 95 % by bootstrap",

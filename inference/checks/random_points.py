@@ -8,7 +8,7 @@ import xarray as xr
 from scipy.stats import kstest
 
 from ..prior import Prior
-from ..surrogates.base import Simulator
+from ..types import Simulator
 from . import bands
 from .ranks import quantiles, to_ranks
 from .repeat import made_or_given
@@ -100,9 +100,10 @@ class Tarp:
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Expected coverage against credibility, with its bootstrap band and the diagonal."""
-        from .plots import plot_tarp
+        from .plots import Curve, plot_tarp
 
-        return plot_tarp(self, ax)
+        curve = Curve(self.credibility, self.expected_coverage, self.low, self.high)
+        return plot_tarp(curve, len(self.replicates), self.replicates.most, ax)
 
 
 def tarp(

@@ -11,9 +11,9 @@ import numpy as np
 from ..arguments import check_callable, check_function, checked_integer
 from ..describe import describe
 from ..prior import Prior
+from ..progress import progress_bar
 from ..simulations.executors import Workers, open_executor
-from ..simulations.progress import progress_bar
-from ..surrogates.base import Simulator
+from ..types import Simulator
 from .replicate import Observe, Pipeline, Plan, Replicate, run_replicate
 from .replicated import Replicates
 from .store import ReplicateStore
@@ -35,7 +35,7 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
     store: str | Path = ":memory:",
     identity: str = "",
     retry: bool = False,
-    progress: bool = False,
+    progress: bool = True,
 ) -> Replicates:
     """Draw parameters from the prior, simulate data, run the pipeline on them; n times.
 
@@ -60,7 +60,7 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
         identity: Names what the store cannot see: anything in the code that would change the
             draws must change it.
         retry: Run again what failed before and is in the store with its error.
-        progress: Show a bar.
+        progress: Whether to show a bar on stderr.
 
     Raises:
         ValueError: bad argument; a store made with other settings; a simulator or pipeline

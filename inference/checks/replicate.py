@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..surrogates.base import Simulator
+from ..types import Simulator
 from .draws import effective_size, posterior_array, thin
 
 FAILURES = (Exception, SystemExit)  # many programs end by the latter

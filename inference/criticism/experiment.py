@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arguments import check_function, checked_array
-from ..surrogates.base import Simulator
+from ..types import Simulator
 from .measurement_noise import Noise
 from .misfit import Window
 

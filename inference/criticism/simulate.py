@@ -9,9 +9,9 @@ import numpy as np
 
 from ..prior import Prior
 from ..simulations.bank import SimulationBank
-from ..simulations.job import Job
+from ..simulations.job import BATCH, jobs
 from ..simulations.runner import Keep, run_missing
-from ..surrogates.base import Simulator
+from ..types import Simulator
 from .experiment import Experiment, Proposal
 from .extension import Extensions
 from .run_table import Runs
@@ -38,7 +38,7 @@ class Keeping:
     """
 
     bank: SimulationBank = field(default_factory=SimulationBank)
-    batch: int = 4
+    batch: int = BATCH
     seed: int = 0
     report: Report = silent
     executor: Executor | None = None
@@ -82,13 +82,10 @@ class Laboratory:
             RuntimeError: all of them failed.
         """
         seeds = phase_seeds(self.keeping.seed, phase, len(next(iter(theta.values()))))
-        jobs = [
-            Job({name: float(column[i]) for name, column in theta.items()}, int(seed))
-            for i, seed in enumerate(seeds)
-        ]
+        asked = jobs(theta, [int(seed) for seed in seeds])
         keeping = self.keeping
         report = partial(keeping.report, phase)
-        results = run_missing(self.simulate, jobs, keeping.of(self.identity), advance=report)
+        results = run_missing(self.simulate, asked, keeping.of(self.identity), advance=report)
         good = {
             i: result.signal
             for i, result in enumerate(results)
@@ -96,8 +93,8 @@ class Laboratory:
         }
         if not good:
             raise RuntimeError(
-                f"all {len(jobs)} simulations of the phase {phase!r} failed, the first at "
-                f"{jobs[0].theta}: {results[0].error or 'its output is not finite'}"
+                f"all {len(asked)} simulations of the phase {phase!r} failed, the first at "
+                f"{asked[0].theta}: {results[0].error or 'its output is not finite'}"
             )
         rows = list(good)
         kept = {name: np.asarray(column, float)[rows] for name, column in theta.items()}

@@ -2,11 +2,13 @@
 
 import jax
 import jax.numpy as jnp
+import lazy_loader
 import numpy as np
-from scipy.stats import norm, qmc
 
 from .optimise import minimise_many
 from .process import Data, Hyper, log_marginal_likelihood
+
+stats = lazy_loader.load("scipy.stats", suppress_warning=True)  # takes as long as NumPyro
 
 # Normal priors of the logs: inputs are coordinates of the prior's sd (see `gp.coordinates`) and
 # targets of about unit variance, so one choice fits every parameter, unit and simulator.
@@ -61,8 +63,8 @@ def prior_moments(dimension: int) -> tuple[np.ndarray, np.ndarray]:
 def starts(dimension: int) -> np.ndarray:
     """Fixed quasi-random draws from the priors, [SCORED, dimension + 2]."""
     mean, sd = prior_moments(dimension)
-    uniform = qmc.Halton(dimension + 2, scramble=False).random(SCORED + 1)[1:]
-    return mean + sd * norm.ppf(uniform)
+    uniform = stats.qmc.Halton(dimension + 2, scramble=False).random(SCORED + 1)[1:]
+    return mean + sd * stats.norm.ppf(uniform)
 
 
 def maximum_a_posteriori(data: Data, previous: Hyper | None = None) -> Hyper:

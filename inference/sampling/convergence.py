@@ -1,15 +1,31 @@
 """Have the chains converged, and if not, what is wrong and what to do."""
 
 from collections.abc import Mapping, Sequence
+from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
-from arviz_stats.base.array import array_stats
 
 RHAT_LIMIT = 1.01
 ESS_PER_CHAIN = 100.0
 DIVERGENT_SHARE = 0.01
-CONVERGED = "converged"
+
+
+class Status(StrEnum):
+    """What came of sampling; each text is what to do about it."""
+
+    CONVERGED = "converged"
+    TOO_FEW_DRAWS = (
+        "Raise `draws` or `extend`, and look at the chains, for example with az.plot_trace."
+    )
+    DIVERGENT = (
+        "The log likelihood is too steep somewhere: compare with sample('emcee'), and look where "
+        "sample_stats.diverging is true, for example with az.plot_pair."
+    )
+    QUADRATURE_DIFFERS = (
+        "A mode may be missed, or the posterior too narrow for the grid: compare with "
+        "sample('quadrature')."
+    )
 
 
 class SamplingWarning(UserWarning):
@@ -38,6 +54,8 @@ def diagnose(draws: np.ndarray) -> dict[str, float]:
 
     Draws that do not vary at all have an infinite R-hat and no effective draws.
     """
+    from arviz_stats.base.array import array_stats  # with it come pandas and Matplotlib
+
     if np.ptp(draws) == 0.0:
         constant = {"rhat": np.inf, "ess_bulk": 0.0, "ess_tail": 0.0}
         return {**constant, "mcse_mean": 0.0, "mcse_q05": 0.0, "mcse_q95": 0.0}
@@ -91,8 +109,7 @@ def describe(short: Sequence[Shortfall], steps: int) -> str:
                 f"{bound} {worst.limit:{digits}}"
             )
     return (
-        f"not converged after {steps} draws per chain: {'; '.join(parts)}. Raise `draws` or "
-        "`extend`, and look at the chains, for example with az.plot_trace."
+        f"not converged after {steps} draws per chain: {'; '.join(parts)}. {Status.TOO_FEW_DRAWS}"
     )
 
 
@@ -100,6 +117,5 @@ def describe_divergences(share: float) -> str:
     """The same for a share of divergent transitions."""
     return (
         f"not converged: {share:.1%} of the transitions diverged, above {DIVERGENT_SHARE:.0%}. "
-        "The log likelihood is too steep somewhere: compare with sample('emcee'), and look where "
-        "sample_stats.diverging is true, for example with az.plot_pair."
+        f"{Status.DIVERGENT}"
     )

@@ -1,6 +1,5 @@
 """Draws from a posterior: one call for all samplers, which goes on until they suffice."""
 
-import warnings
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
@@ -8,9 +7,8 @@ import numpy as np
 
 from . import quadrature
 from .convergence import (
-    CONVERGED,
     DIVERGENT_SHARE,
-    SamplingWarning,
+    Status,
     describe,
     describe_divergences,
     diagnose,
@@ -36,8 +34,13 @@ class Sampled(NamedTuple):
 
     chains: Chains
     steps: int  # draws per chain that were made; those kept are evenly spaced among them
-    status: str  # "converged", or what is wrong
+    found: dict[Status, str]  # what is wrong -> a sentence with its size and what to do
     checks: dict[str, float]  # results of the comparison with quadrature, where there was one
+
+    @property
+    def status(self) -> str:
+        """ "converged", or all that is wrong, in sentences."""
+        return " ".join(self.found.values()) or Status.CONVERGED.value
 
 
 def draw_posterior(
@@ -53,9 +56,6 @@ def draw_posterior(
         length: As asked for.
         seed: Fixes everything.
         extend: Largest multiple of `length.draws` to make.
-
-    Warns:
-        SamplingWarning: something is wrong; the message is the status.
     """
     source = SAMPLERS[sampler](np.random.default_rng(seed), target, length)
     parts = [next(source)]
@@ -67,20 +67,18 @@ def draw_posterior(
             break
         parts += [next(source) for _ in range(len(parts))]
     steps = len(parts) * length.draws
-    complaints = [describe(short, steps)] if short else []
+    found = {Status.TOO_FEW_DRAWS: describe(short, steps)} if short else {}
     flags = [part.stats["diverging"] for part in parts if "diverging" in part.stats]
     divergent = float(np.mean(flags)) if flags else 0.0
     if divergent > DIVERGENT_SHARE:
-        complaints.append(describe_divergences(divergent))
+        found[Status.DIVERGENT] = describe_divergences(divergent)
     checks: dict[str, float] = {}
     if target.dimension in quadrature.BASE and sampler != "quadrature":
         effective = min(min(m["ess_bulk"], m["ess_tail"]) for m in measures.values())
-        checks, disagreement = _cross_checked(chains.u, target, effective)
-        complaints += disagreement
-    status = " ".join(complaints) or CONVERGED
-    if complaints:
-        warnings.warn(status, SamplingWarning, stacklevel=4)  # at the caller of Fit.sample
-    return Sampled(chains, steps, status, checks)
+        checks, complaint = _cross_checked(chains.u, target, effective)
+        if complaint:
+            found[Status.QUADRATURE_DIFFERS] = complaint
+    return Sampled(chains, steps, found, checks)
 
 
 def thinned(parts: list[Chains]) -> Chains:
@@ -94,9 +92,8 @@ def thinned(parts: list[Chains]) -> Chains:
     return Chains(together([part.u for part in parts]), stats)
 
 
-def _cross_checked(
-    u: np.ndarray, target: Target, effective: float
-) -> tuple[dict[str, float], list[str]]:
+def _cross_checked(u: np.ndarray, target: Target, effective: float) -> tuple[dict[str, float], str]:
+    """Measures of the comparison with quadrature, and a complaint or ""."""
     flat = u.reshape(-1, u.shape[-1])
     limit = quadrature.largest_expected(min(effective, len(flat)))
     for budget in (quadrature.QUICK, quadrature.THOROUGH):
@@ -110,10 +107,9 @@ def _cross_checked(
         "log_evidence": cells.log_evidence,
     }
     if distance <= limit:
-        return checks, []
+        return checks, ""
     complaint = (
         f"disagrees with quadrature: total variation {distance:.3f} over {quadrature.BINS} bins, "
-        f"above {limit:.3f}. A mode may be missed, or the posterior too narrow for the grid: "
-        "compare with sample('quadrature')."
+        f"above {limit:.3f}. {Status.QUADRATURE_DIFFERS}"
     )
-    return checks, [complaint]
+    return checks, complaint

@@ -2,14 +2,13 @@
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import emcee
 import jax
 import numpy as np
 from scipy.special import ndtr
 
-from ..surrogates.base import LogLikelihood
+from ..types import LogLikelihood
 from .mixture import UNIFORMS, Mixture, propose
 from .mixture import log_density as log_mixture
 from .starts import look_around, resampled
@@ -20,6 +19,9 @@ from .target import (
     Target,
     log_density,
 )
+
+if TYPE_CHECKING:
+    import emcee
 
 WALKERS = 32
 LONGEST_THIN = 64  # steps; beyond, R-hat and ESS judge instead
@@ -75,7 +77,7 @@ def sample_emcee(rng: np.random.Generator, target: Target, length: Length) -> It
 
 def _sampler(
     target: Target, mixture: Mixture, walkers: int, rng: np.random.Generator
-) -> emcee.EnsembleSampler:
+) -> "emcee.EnsembleSampler":
     d = target.dimension
 
     def log_prob(x: np.ndarray) -> np.ndarray:
@@ -90,6 +92,8 @@ def _sampler(
         new, factors = _jumps(mixture, x, random.standard_normal(x.shape), uniforms)
         return np.asarray(new), np.asarray(factors)
 
+    import emcee  # loaded on use, as are all that one sampler alone needs
+
     moves = [
         (emcee.moves.DEMove(), 0.4),
         (emcee.moves.StretchMove(), 0.2),
@@ -103,6 +107,8 @@ def _sampler(
 
 def _autocorrelation_time(x: np.ndarray) -> int:
     """In steps, of the slowest coordinate of x [step, walker, d]; from 1 to LONGEST_THIN."""
+    import emcee
+
     times = emcee.autocorr.integrated_time(x, tol=0)
     slowest = float(np.max(times)) if np.isfinite(times).all() else LONGEST_THIN
     return int(np.clip(np.ceil(slowest), 1, LONGEST_THIN))

@@ -16,7 +16,7 @@ import numpy as np
 from jax.scipy.special import ndtri
 
 from ..sobol import sobol
-from ..surrogates.base import LogLikelihood
+from ..types import LogLikelihood
 from .mixture import (
     COMPONENTS,
     UNIFORMS,

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpyro.infer.hmc import HMCState, hmc
 
-from ..surrogates.base import LogLikelihood
+from ..types import LogLikelihood
 from .mixture import (
     UNIFORMS,
     Mixture,

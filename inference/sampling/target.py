@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from ..surrogates.base import LogLikelihood
+from ..types import LogLikelihood
 from .mixture import log_prior, to_unit
 
 NOWHERE = -1e300

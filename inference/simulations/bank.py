@@ -1,6 +1,7 @@
 """Every finished simulation, kept on disk and reused."""
 
 import json
+import sqlite3
 import threading
 import time
 from collections.abc import Mapping
@@ -10,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..display import as_html, as_text
 from .database import opened_database
 from .simulation_locks import Claims
 
@@ -80,6 +82,26 @@ class SimulationBank:
     def where(self) -> str:
         """Where finished simulations are kept, for messages."""
         return "nothing, for bank is in memory" if self.in_memory else self.path
+
+    def __repr__(self) -> str:
+        return as_text("SimulationBank", self._rows())
+
+    def _repr_html_(self) -> str:
+        return as_html("SimulationBank", self._rows())
+
+    def _rows(self) -> list[tuple[str, str]]:
+        try:
+            with self._lock:
+                found = self._connection.execute(
+                    "SELECT identity, count(*), count(signal) FROM simulation GROUP BY identity"
+                ).fetchall()
+        except sqlite3.ProgrammingError:
+            return [("file", self.path), ("state", "closed")]
+        of_each = [
+            (f"identity {identity!r:.60}", f"{count} simulations, {count - good} failed")
+            for identity, count, good in found
+        ]
+        return [("file", self.path), *(of_each or [("simulations", "none")])]
 
     def get(self, identity: str, theta: Mapping[str, float], seed: int) -> Simulation | None:
         """The run of exactly this simulator, theta and seed, or None."""

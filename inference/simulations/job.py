@@ -8,17 +8,17 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from ..types import Simulator, SingleSimulator
 from .bank import Simulation
 from .failures import raised, timed_out
 
-if TYPE_CHECKING:
-    from ..surrogates.base import Simulator
-
 R = TypeVar("R")
+BATCH = 4  # runs in one call, or in flight, where nobody says how many
 
 Limit = Callable[[float], AbstractContextManager[object]]
 """Inside `limit(seconds)` a simulator raises TimeoutError once it has taken so long."""
@@ -54,8 +54,42 @@ def columns(batch: Sequence[Job]) -> tuple[dict[str, np.ndarray], np.ndarray]:
     return theta, np.array([job.seed for job in batch], np.int64)
 
 
+@dataclass(frozen=True)
+class OneByOne:
+    """A simulator of single runs as one of batches, which is what the engine calls.
+
+    Attributes:
+        simulate: Callable (theta: name -> float, seed) -> signal [*signal_shape].
+    """
+
+    simulate: SingleSimulator
+
+    def __call__(self, theta: Mapping[str, np.ndarray], seeds: np.ndarray) -> np.ndarray:
+        """theta: name -> [n]; seeds: int64 [n]  ->  signals [n, *signal_shape]."""
+        runs = [np.asarray(self.simulate(*job), np.float64) for job in jobs(theta, seeds)]
+        return np.stack(runs)
+
+
+def stacked(results: Sequence[Simulation], shape: tuple[int, ...] | None = None) -> np.ndarray:
+    """Signals [n, *signal_shape] of n runs, rows of NaN where one failed.
+
+    Args:
+        shape: Of one signal where every run failed; None raises then.
+
+    Raises:
+        ValueError: signals of several shapes, or none and no `shape`.
+    """
+    found = {result.signal.shape for result in results if result.signal is not None}
+    if len(found) > 1:
+        raise ValueError(f"simulate must return signals of one shape, got {sorted(found)}")
+    if not found and shape is None:
+        raise ValueError(f"all {len(results)} simulations failed, so their shape is not known")
+    empty = np.full(found.pop() if found else shape, np.nan)
+    return np.stack([empty if result.signal is None else result.signal for result in results])
+
+
 def run_batch(
-    simulate: "Simulator",
+    simulate: Simulator,
     batch: Sequence[Job],
     shape: tuple[int, ...] | None,
     timeout: float | None = None,
@@ -97,7 +131,7 @@ def run_batch(
     return [Simulation(signal, None, seconds) for signal in signals]
 
 
-def limit_of(simulate: "Simulator") -> Limit | None:
+def limit_of(simulate: Simulator) -> Limit | None:
     """How a simulator stops itself: the method `time_limit` of it, or of the object whose method
     it is; None if there is no such method."""
     return getattr(getattr(simulate, "__self__", simulate), "time_limit", None)

@@ -4,15 +4,13 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, wait
 from functools import partial
 from pickle import PicklingError
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from ..types import Simulator
 from .bank import Simulation, SimulationBank
 from .executors import killed_its_worker
-from .failures import TIMEOUT, kind, raised
-from .job import Job, run_batch
-
-if TYPE_CHECKING:
-    from ..surrogates.base import Simulator
+from .failures import Failure, kind, raised
+from .job import Job, OneByOne, run_batch
 
 POLL = 0.2  # seconds between looks at what somebody else is simulating
 
@@ -59,7 +57,7 @@ class Runner:
         keep: Where simulations are made and kept; the caller decides on batches.
     """
 
-    def __init__(self, simulate: "Simulator", keep: Keep):
+    def __init__(self, simulate: Simulator, keep: Keep):
         self.simulate = simulate
         self.bank, self.identity, _, self.executor, self.timeout = keep
         self._elsewhere: list[Order] = []  # claimed by somebody else
@@ -149,10 +147,12 @@ class Runner:
         return True
 
     def _simulate_here(self, orders: list[Order]) -> None:
-        batch = [order.job for order in orders]
-        made = run_batch(self.simulate, batch, orders[0].shape, self.timeout)
-        for order, simulation in zip(orders, made, strict=True):
-            self._keep(order, simulation)
+        single = isinstance(self.simulate, OneByOne)  # each run is kept when it is finished
+        for part in [[order] for order in orders] if single else [orders]:
+            batch = [order.job for order in part]
+            made = run_batch(self.simulate, batch, orders[0].shape, self.timeout)
+            for order, simulation in zip(part, made, strict=True):
+                self._keep(order, simulation)
 
     def _submit(self, executor: Executor, order: Order) -> None:
         work = partial(run_batch, self.simulate, [order.job], order.shape, self.timeout)
@@ -222,13 +222,13 @@ def is_final(found: Simulation, timeout: float | None) -> bool:
     """
     if found.error is None:
         return True
-    if kind(found.error) != TIMEOUT:
+    if kind(found.error) is not Failure.TIMEOUT:
         return False
     return timeout is not None and timeout <= found.seconds
 
 
 def run_missing(
-    simulate: "Simulator",
+    simulate: Simulator,
     jobs: Sequence[Job],
     keep: Keep,
     shape: Shape = None,

@@ -1,36 +1,13 @@
-"""Protocols at the engine's borders; the consumer owns them."""
+"""Protocols of what the engine learns and how it chooses; families and users satisfy them."""
 
-from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 import jax
 import numpy as np
 
 from ..gp.process import GP
+from ..types import LogLikelihood, LogSecondMoment
 from .feasibility import Feasibility
-
-Theta = Mapping[str, np.ndarray]
-"""Parameter name -> values in natural units; all of shape [n], or all scalars."""
-
-LogLikelihood = Callable[[Any, jax.Array], jax.Array]
-"""(state, u [d]) -> scalar. A module-level function, so that what it compiles to is cached."""
-
-LogSecondMoment = Callable[[Any, jax.Array, Any], jax.Array]
-"""(state, u [d], spread [k] or None) -> scalar; see `acquisition`."""
-
-
-class Simulator(Protocol):
-    """Anything that turns parameters into signals, one row per seed."""
-
-    def __call__(self, theta: dict[str, np.ndarray], seeds: np.ndarray, /) -> np.ndarray:
-        """theta: name -> [n]; seeds: int64 [n]  ->  signals [n, *signal_shape]."""
-        ...
-
-
-class Discrepancy(Protocol):
-    """A distance between the observed and one simulated signal; non-finite means failed."""
-
-    def __call__(self, observed: np.ndarray, simulated: np.ndarray, /) -> float: ...
 
 
 class Surrogate(Protocol):

@@ -24,7 +24,7 @@ from ..gp.process import (
     pad,
     predict_many,
 )
-from .base import LogLikelihood, LogSecondMoment
+from ..types import LogLikelihood, LogSecondMoment
 from .hyper_draws import posterior_draws
 from .outliers import sane
 from .threshold import (

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_callable, checked_integer
-from .base import Discrepancy, Surrogate
+from ..types import Discrepancy
+from .base import Surrogate
 from .discrepancy import DiscrepancySurrogate, learn, marginalised
 from .emulator import PREDICTED, emulate
 from .given_noise import GivenNoise, given_noise

@@ -11,7 +11,7 @@ from .._float64 import in_float64
 from ..gp.condition import believe
 from ..gp.optimise import minimise_in_box
 from ..sobol import sobol
-from .base import LogLikelihood, LogSecondMoment
+from ..types import LogLikelihood, LogSecondMoment
 from .emulator import (
     Emulator,
     loo_errors,

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .base import Discrepancy
+from ..types import Discrepancy
 
 
 def squared_difference(time: ArrayLike | None = None) -> Discrepancy:

@@ -1,9 +1,11 @@
 """What leave-one-out errors, foretold errors and the noise say against an emulator."""
 
+import lazy_loader
 import numpy as np
-from scipy.stats import binom, chi2, f, norm
 
 from .held_back import Foretold
+
+stats = lazy_loader.load("scipy.stats", suppress_warning=True)  # takes as long as NumPyro
 
 FALSE_ALARMS = 1e-3  # of each leave-one-out check, were its errors independent and normal
 SURPRISES = 1e-2  # nominal share of good fits that are warned, see `surprised`
@@ -37,7 +39,7 @@ def complaints(loo_z: np.ndarray, what: str) -> list[str]:
     count = loo_z.size
     said = []
     far = int(np.sum(np.abs(loo_z) > FAR))
-    if far > binom.isf(FALSE_ALARMS, count, 2.0 * norm.sf(FAR)):
+    if far > stats.binom.isf(FALSE_ALARMS, count, 2.0 * stats.norm.sf(FAR)):
         said.append(
             f"{far} of {count} leave-one-out errors of the {what} exceed {FAR:g} standard "
             "deviations: it is not Gaussian, or changes faster than the emulator believes; "
@@ -66,7 +68,7 @@ def surprised(foretold: Foretold) -> list[str]:
         return []
     scores, beyond = foretold.errors[seen, :-1], foretold.errors[seen, -1]
     scores = scores[:, np.isfinite(scores).all(0)]
-    limit = f.isf(SURPRISES / 2.0, len(beyond), foretold.freedom)
+    limit = stats.f.isf(SURPRISES / 2.0, len(beyond), foretold.freedom)
     if max(np.mean(part**2) for part in (scores, beyond) if part.size) <= limit:
         return []
     return [
@@ -92,4 +94,4 @@ def noisy(share: float) -> list[str]:
 def _too_large(errors: np.ndarray, matters: float) -> bool:
     """Whether studentised errors are, in the mean square, by more than chance."""
     count = errors.size
-    return bool(np.mean(errors**2) > max(matters, chi2.isf(FALSE_ALARMS, count) / count))
+    return bool(np.mean(errors**2) > max(matters, stats.chi2.isf(FALSE_ALARMS, count) / count))

@@ -10,7 +10,7 @@ from typing import NamedTuple  # noqa: E402
 import numpy as np  # noqa: E402
 
 from bolfi_liquids import models  # noqa: E402
-from bolfi_liquids.inputs.recording import open_recording  # noqa: E402
+from bolfi_liquids.inputs.open import open_recording  # noqa: E402
 
 SAMPLES = 10
 

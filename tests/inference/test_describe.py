@@ -30,7 +30,10 @@ class Plain:
         (np.float64(0.5), "0.5"),
         (np.linalg.norm, "numpy.linalg.norm"),
         (partial(np.mean, axis=0), "partial(numpy.mean, [], axis=0)"),
-        (inference.Quantile(0.1), "bolfi_liquids.inference.surrogates.threshold.Quantile(q=0.1)"),
+        (
+            inference.surrogates.Quantile(0.1),
+            "bolfi_liquids.inference.surrogates.threshold.Quantile(q=0.1)",
+        ),
         (inference.Prior({"a": dist.Uniform(0.0, 2.0)}), "Prior(a=Uniform(low=0, high=2))"),
     ],
 )

@@ -2,7 +2,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bolfi_liquids.models import gripper_path, stirring
+from bolfi_liquids.models import stirring, trajectory
 from bolfi_liquids.models.fluid import runtime
 from scipy.integrate import solve_ivp
 
@@ -52,7 +52,7 @@ def test_without_liquid_the_stick_is_the_driven_spherical_pendulum(glycerin):
     signal = models.stir(thin, gripper, setup, [0])[0]
 
     rate = setup.rate
-    path = gripper_path.substep_path(gripper, rate)
+    path = trajectory.substep_path(gripper, rate)
     grid = gripper.time[0] + np.arange(len(path)) / rate
     acceleration = np.gradient(np.gradient(path, 1 / rate, axis=0), 1 / rate, axis=0)
     stick = setup.stick
@@ -74,10 +74,12 @@ def test_without_liquid_the_stick_is_the_driven_spherical_pendulum(glycerin):
     assert rms_deg(signal - expected) < 0.05 * swing
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("numerics", "tolerance"),
-    [(models.Numerics(), 0.2), (models.PUBLISHED_DRAG, 0.1)],
+    [
+        pytest.param(models.Numerics(), 0.2, marks=pytest.mark.slow),
+        pytest.param(models.PUBLISHED_DRAG, 0.1, marks=pytest.mark.minutes),
+    ],
 )
 def test_a_submerged_stick_is_buoyed_as_archimedes_says(glycerin, numerics, tolerance):
     """At 15 degrees, where buoyancy outweighs the packing's own push of a particle's weight."""
@@ -131,7 +133,7 @@ def test_no_particle_is_ever_outside_the_cup(water, speed, monkeypatch):
     monkeypatch.setattr(scene, "stir", stir_and_look)
     models.stir(models.Liquid([0.0, 1e-3, 10.0], [0.0, 1.0, 0.5], 1000.0), path, setup, [0, 1, 2])
     seen = np.stack(looks)
-    substeps = len(gripper_path.substep_path(path, setup.rate)) - 1
+    substeps = len(trajectory.substep_path(path, setup.rate)) - 1
     assert len(seen) == -(-substeps // 2) and np.isfinite(seen).all()
     assert np.hypot(seen[..., 0], seen[..., 1]).max() < setup.cup.radius
     assert seen[..., 2].min() > 0.0
@@ -190,9 +192,9 @@ def test_a_stir_s_least_viscosity_is_that_of_its_mean_speed(glycerin):
     position[:, 0] = 0.1 * np.maximum(time - 1.0, 0.0)
     speed = 0.1 / np.sqrt(2.0)
     path = SimpleNamespace(time=time, position=position)
-    assert gripper_path.mean_speed(path) == pytest.approx(speed)
+    assert trajectory.mean_speed(path) == pytest.approx(speed)
     position[40:43] = np.nan
-    assert gripper_path.mean_speed(path) == pytest.approx(speed)
+    assert trajectory.mean_speed(path) == pytest.approx(speed)
     setup = models.StirSetup.from_recording(glycerin)
     expected = setup.numerics.least_viscosity(setup.spacing, 1260.0, speed)
     assert setup.least_viscosity(1260.0, path) == pytest.approx(expected)

@@ -4,7 +4,8 @@ from importlib.resources import as_file, files
 
 import numpy as np
 
-from ...inputs.recording import Recording, open_recording
+from ...inputs.open import open_recording
+from ...inputs.recording import Recording
 from ...models import Liquid, StirSetup, stir
 from ...models.validation import (
     Case,

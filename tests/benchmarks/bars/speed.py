@@ -33,7 +33,7 @@ def stirring_seconds(recording: Path) -> Iterator[Line]:
             yield Line(what, spent * SECONDS / trial.duration, most)
 
 
-class GripperPath(NamedTuple):
+class Trajectory(NamedTuple):
     """Times [T] in s and positions [T, 3] in m."""
 
     time: np.ndarray
@@ -49,7 +49,7 @@ class Trial:
         opened = open_recording(recording)
         part = opened.time <= opened.time[0] + seconds
         self.liquid = listed(liquid)
-        self.path = GripperPath(*(column[part] for column in opened.gripper))
+        self.path = Trajectory(*(column[part] for column in opened.gripper))
         self.setup = models.StirSetup.from_recording(opened, particles)
 
     @property

@@ -23,29 +23,23 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-from bolfi_liquids.hardware.cameras.base import Frame
 from bolfi_liquids.hardware.emulator.admin_client import Admin
 from bolfi_liquids.hardware.emulator.process import EmulatorProcess
 from bolfi_liquids.hardware.motion.cup_frame import cup_frame
 from bolfi_liquids.hardware.motion.kinematics import inverse
-from bolfi_liquids.hardware.motion.stir_paths import PosePath, stir
+from bolfi_liquids.hardware.motion.stir_paths import stir
 from bolfi_liquids.hardware.recorder.events import read_events
 from bolfi_liquids.hardware.recorder.outcome import outcome
 from bolfi_liquids.hardware.recorder.sample import SAMPLES
-from bolfi_liquids.hardware.rig import Rig
-from bolfi_liquids.hardware.rig_file import bundled_rig
-from bolfi_liquids.hardware.robot.orders import Follow
 from bolfi_liquids.hardware.safety.limits import workspace
-from bolfi_liquids.hardware.session.confirmation import confirm_emulated, describe
-from bolfi_liquids.hardware.session.session import Session, SessionStopped
+from faulty_session import small_rig
 
 WATCHED = 2.0  # s after a fault, in which nothing may restart
 LOST = 1.0  # s of the recording before a fault that may be missing
 DEAD, ALIVE = 0.5, 0.3  # s to rest where our process is dead, and where it lives
-SIZE = (160, 120)  # px
 STALL = 0.3  # s, of the loop
 UNSEEN = 0.2  # s, at the end of the watch, of which the watcher may not have heard yet
+EARLIEST = 0.2  # s of a motion, for a fault
 PATIENCE = 5.0  # s, for the arm to move
 TRIES = 8  # of a run whose session ended before its fault
 
@@ -53,12 +47,12 @@ TRIES = 8  # of a run whose session ended before its fault
 class Fault(NamedTuple):
     """A fault, the time that the arm has to come to rest [s], and words of the reason."""
 
-    inject: Callable[["Rig_"], None]
+    inject: Callable[["UnderTest"], None]
     bar: float
     reason: str
 
 
-class Rig_(NamedTuple):
+class UnderTest(NamedTuple):
     """What a fault can be done to: processes by name, the emulator, and the flags' directory."""
 
     pids: dict[str, int]
@@ -97,20 +91,20 @@ class Result(NamedTuple):
         return "; ".join(wrong)
 
 
-def _kill(name: str) -> Callable[[Rig_], None]:
+def _kill(name: str) -> Callable[[UnderTest], None]:
     return lambda rig: os.kill(rig.pids[name], signal.SIGKILL)
 
 
-def _flag(name: str) -> Callable[[Rig_], None]:
+def _flag(name: str) -> Callable[[UnderTest], None]:
     return lambda rig: (rig.flags / name).touch()
 
 
-def _stall(rig: Rig_) -> None:
+def _stall(rig: UnderTest) -> None:
     os.kill(rig.pids["control"], signal.SIGSTOP)
     threading.Timer(STALL, lambda: os.kill(rig.pids["control"], signal.SIGCONT)).start()
 
 
-def _fill_disk(rig: Rig_) -> None:
+def _fill_disk(rig: UnderTest) -> None:
     """The recorder's files can grow no more: what a full disk does to it."""
     import resource
 
@@ -133,90 +127,6 @@ FAULTS = {
     "target outside the box": Fault(_flag("order_outside"), ALIVE, "refused.*outside"),
     "loop overrun": Fault(_stall, ALIVE, "overrun"),
 }
-
-
-# -- the session under test, in a process of its own
-
-
-class NoiseCamera:
-    """Small pictures of noise at 30 Hz; flags in a directory stop or freeze it."""
-
-    def __init__(self, flags: Path):
-        self._flags = flags
-        self._random = np.random.default_rng(0)
-        self._image = np.zeros(SIZE[::-1], np.uint8)
-        self._index = 0
-        self._due = time.monotonic()
-
-    def read(self) -> Frame | None:
-        """The next picture; waits for it, for ever if it was told to stop."""
-        self._due += 1.0 / 30.0
-        time.sleep(max(self._due - time.monotonic(), 0.0))
-        while (self._flags / "camera_stops").exists():
-            time.sleep(1.0)
-        if not (self._flags / "camera_freezes").exists():
-            self._image = self._random.integers(0, 255, SIZE[::-1], dtype=np.uint8)
-        self._index += 1
-        now = time.monotonic()
-        return Frame(self._index, now, now, self._image)
-
-    def close(self) -> None:
-        """Nothing to let go."""
-
-
-class MakeCamera(NamedTuple):
-    """Opens a `NoiseCamera` in the process that reads it."""
-
-    flags: Path
-
-    def __call__(self) -> NoiseCamera:
-        return NoiseCamera(self.flags)
-
-
-def small_rig() -> Rig:
-    """The bundled rig with small pictures and short rests."""
-    rig = bundled_rig()
-    cameras = tuple(
-        camera.model_copy(update={"width": SIZE[0], "height": SIZE[1]}) for camera in rig.cameras
-    )
-    stirring = rig.stirring.model_copy(update={"rest": 0.2})
-    return rig.model_copy(update={"cameras": cameras, "stirring": stirring})
-
-
-def run_main(directory: Path, address: str) -> None:
-    """Stir until something stops it; a flag makes it send an order that no limit allows."""
-    rig = small_rig()
-    plan = [stir(rig, 3)]
-    make = {"xz": MakeCamera(directory), "yz": MakeCamera(Path("/nonexistent"))}
-    leave = confirm_emulated(describe(plan, rig, "stirring"), address)
-    recording = directory / "recording"
-    with Session(
-        rig, recording, address, make, armed=True, confirmation=leave, plan=plan
-    ) as session:
-        session.pose()
-        session.follow(plan[0])
-        session.wait(0, timeout=0.05)
-        # the faults' files lie beside the samples' for `_fill_disk`
-        (directory / SAMPLES).symlink_to(recording / SAMPLES)
-        pids = {child.name: child.process.pid for child in session._children}
-        print(json.dumps(pids | {"main": os.getpid()}), flush=True)
-        try:
-            while not session.wait(timeout=0.005):
-                _order_nonsense(session, directory, plan[0])
-        except SessionStopped as err:
-            print(err, file=sys.stderr)
-
-
-def _order_nonsense(session: Session, flags: Path, path: PosePath) -> None:
-    pose = path.pose.copy()
-    if (flags / "order_nan").exists():
-        pose[3, 1] = np.nan
-    elif (flags / "order_outside").exists():
-        pose[:, 0] += 0.2
-    else:
-        return
-    # as a fault in main would: past the check that `follow` makes there
-    session._try_to_send(Follow(path._replace(pose=pose)))
 
 
 # -- the watcher
@@ -263,18 +173,18 @@ class Disturbed(Exception):
     """The session had ended before the fault: this computer stood still, or was too slow."""
 
 
-def run_fault(name: str, seed: int) -> Result:
+def run_fault(name: str, seed: int, latest: float) -> Result:
     """One run; what happens from the fault on counts, whatever else this computer did."""
     for tried in range(TRIES):
         try:
-            result = _run_once(name, seed + 1000 * tried)
+            result = _run_once(name, seed + 1000 * tried, latest)
             return result._replace(seed=seed, repeated=tried)
         except Disturbed as early:
             print(f"ended before the fault: {early}", file=sys.stderr, flush=True)
     raise RuntimeError(f"{name}: {TRIES} sessions ended before their fault")
 
 
-def _run_once(name: str, seed: int) -> Result:
+def _run_once(name: str, seed: int, latest: float) -> Result:
     chance = random.Random(f"{name} {seed}")
     rig = small_rig()
     space = workspace(rig, "stirring")
@@ -284,7 +194,8 @@ def _run_once(name: str, seed: int) -> Result:
         tempfile.TemporaryDirectory() as directory,
         EmulatorProcess.start(joints=joints) as emulator,
     ):
-        command = [sys.executable, __file__, "--main", directory, "--address", emulator.address]
+        script = Path(__file__).with_name("faulty_session.py")
+        command = [sys.executable, str(script), directory, emulator.address]
         with subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
         ) as main:
@@ -292,9 +203,9 @@ def _run_once(name: str, seed: int) -> Result:
             said = main.stdout.readline()
             if not said:
                 raise Disturbed(f"{name}: the session did not start; {emulator.notes()}")
-            under_test = Rig_(json.loads(said), emulator.admin, Path(directory))
+            under_test = UnderTest(json.loads(said), emulator.admin, Path(directory))
             try:
-                return _inject(name, under_test, chance.uniform(0.2, 5.0))
+                return _inject(name, under_test, chance.uniform(EARLIEST, latest))
             finally:
                 _end(main)
 
@@ -306,7 +217,7 @@ def _end(main: subprocess.Popen) -> None:
         main.kill()
 
 
-def _inject(name: str, rig: Rig_, delay: float) -> Result:
+def _inject(name: str, rig: UnderTest, delay: float) -> Result:
     watcher = Watcher(rig.admin)
     time.sleep(delay)
     recording = rig.flags / "recording"
@@ -390,20 +301,16 @@ def main() -> int:
     parser.add_argument("--times", type=int, default=20)
     parser.add_argument("--only", choices=list(FAULTS), action="append")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--latest", type=float, default=5.0, help="of a motion, for a fault [s]")
     parser.add_argument("--out", type=Path, help="keep runs here; those that it holds count")
-    parser.add_argument("--main", type=Path, help=argparse.SUPPRESS)
-    parser.add_argument("--address", help=argparse.SUPPRESS)
     chosen: Any = parser.parse_args()
-    if chosen.main:
-        run_main(chosen.main, chosen.address)
-        return 0
     seeds = range(chosen.seed, chosen.seed + chosen.times)
     asked = [(name, seed) for seed in seeds for name in chosen.only or FAULTS]
     results = [one for one in kept_in(chosen.out) if (one.fault, one.seed) in asked]
     done = {(one.fault, one.seed) for one in results}
     for name, seed in asked:
         if (name, seed) not in done:
-            results.append(run_fault(name, seed))
+            results.append(run_fault(name, seed, chosen.latest))
             keep(results[-1], chosen.out)
             fails = results[-1].fails(FAULTS[name])
             print(f"{len(results)}/{len(asked)} {name}: {fails or 'well'}", file=sys.stderr)

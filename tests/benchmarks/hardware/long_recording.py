@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 import psutil
 import xarray
-from bolfi_liquids.hardware import HiddenLiquid, bundled_rig, stir
+from bolfi_liquids.hardware import HiddenLiquid, bundled_rig
+from bolfi_liquids.hardware.motion import stir
 
 from bolfi_liquids.robot.record import record
 

@@ -24,6 +24,7 @@ from bolfi_liquids import hardware as paths
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from bolfi_liquids.inference import criticism
 from kept import keep, results
 
 from bolfi_liquids import inference, models
@@ -38,7 +39,7 @@ from bolfi_liquids.criticism.stirs import (
     stir_experiment,
 )
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.inputs.recording import Gripper, Recording
+from bolfi_liquids.inputs.recording import Recording, Trajectory
 from bolfi_liquids.inputs.settings import CriticismSettings
 
 RIG = {
@@ -120,29 +121,29 @@ def examine(one: Set, bank: inference.SimulationBank) -> dict:
 
 def _criticised_stirs(
     truth: dict, rng: np.random.Generator, bank: inference.SimulationBank
-) -> inference.Criticism:
+) -> criticism.Criticism:
     usual, stir_plan = _clean(bank), CriticismSettings().stir_plan
 
     star, circle = (_record(path, truth, rng) for path in PATHS)
 
-    def experiment(recording: Recording, cameras: inference.AutoregressiveNoise):
+    def experiment(recording: Recording, cameras: criticism.AutoregressiveNoise):
         stirring = stirring_of([recording], MODEL)
         name = recording.path.stem
         return stir_experiment(stirring, cameras, usual_for(stirring, usual), name)
 
-    return inference.criticise(
+    return criticism.criticise(
         experiment(star, camera_noise([star])),
         default_prior(),
         effects_of("stir"),
         held_out=[experiment(circle, held_out_noise(circle, [star]))],
         plan=replace(stir_plan, most=stir_plan.most + stir_plan.start),
-        keeping=inference.Keeping(bank),
+        keeping=criticism.Keeping(bank),
     )
 
 
 def _record(path: str, truth: dict, rng: np.random.Generator) -> Recording:
     """A simulated stir with cameras' noise."""
-    gripper = Gripper(*PATHS[path])
+    gripper = Trajectory(*PATHS[path])
     recording = _recording(path, np.zeros((len(gripper.time), 2)))
     own = Stirring((recording,), (models.StirSetup.from_recording(recording, particles=DATA),))
     theta = {name: np.array([value]) for name, value in truth.items()}
@@ -154,7 +155,7 @@ def _record(path: str, truth: dict, rng: np.random.Generator) -> Recording:
 
 
 def _recording(path: str, inclination: np.ndarray) -> Recording:
-    gripper = Gripper(*PATHS[path])
+    gripper = Trajectory(*PATHS[path])
     label = f"{path}-{hash(inclination.tobytes())}"
     return Recording(
         gripper.time, gripper, inclination, MappingProxyType(RIG), Path(f"{path}.nc"), label
@@ -176,29 +177,29 @@ def _clean(bank: inference.SimulationBank) -> list[Clean]:
         default_prior(),
         effects_of("stir"),
         plan=CriticismSettings().clean_plan,
-        keeping=inference.Keeping(bank),
+        keeping=criticism.Keeping(bank),
     )
 
 
 def _criticised_pours(
     truth: dict, rng: np.random.Generator, bank: inference.SimulationBank
-) -> inference.Criticism:
+) -> criticism.Criticism:
     """As after a stir that told the viscosity within a fifth, and nothing of the cohesion."""
     told = np.log(truth["viscosity"]) + 0.2 * rng.normal()
     prior = inference.Prior(
         {"viscosity": dist.LogNormal(told, 0.2), "cohesion": dist.Uniform(0.0, 1.0)}
     )
-    return inference.criticise(
+    return criticism.criticise(
         _poured(ACTIONS, truth, rng),
         prior,
         effects_of("pour"),
         held_out=[_poured(ACTIONS + [30.0, 0.3], truth, rng)],
         plan=CriticismSettings().pour_plan,
-        keeping=inference.Keeping(bank),
+        keeping=criticism.Keeping(bank),
     )
 
 
-def _poured(actions: np.ndarray, truth: dict, rng: np.random.Generator) -> inference.Experiment:
+def _poured(actions: np.ndarray, truth: dict, rng: np.random.Generator) -> criticism.Experiment:
     from bolfi_liquids.inputs.cups import bundled_cups
 
     rate, distance = np.radians(actions[:, 0]), actions[:, 1] / 100.0
@@ -214,11 +215,11 @@ def _poured(actions: np.ndarray, truth: dict, rng: np.random.Generator) -> infer
         effects={"adhesion": truth["adhesion"]},
     )
     observed = np.stack([made.spilled, made.retained]) + 0.005 * rng.normal(size=(2, len(rate)))
-    noise = inference.KnownNoise(REPEATED)
-    return inference.Experiment(pouring.simulate, observed, noise, pouring.identity, "pours")
+    noise = criticism.KnownNoise(REPEATED)
+    return criticism.Experiment(pouring.simulate, observed, noise, pouring.identity, "pours")
 
 
-def _snr(found: inference.Criticism, effect: str, truth: dict) -> float:
+def _snr(found: criticism.Criticism, effect: str, truth: dict) -> float:
     """Of the effect at its true size, as the emulator of its model sees it."""
     base = found.base.hypothesis
     candidate = found.singles.get(effect)

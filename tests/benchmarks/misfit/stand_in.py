@@ -13,7 +13,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import numpyro.distributions as dist
-from bolfi_liquids.hardware import star
+from bolfi_liquids.hardware.motion import star
+from bolfi_liquids.inference import criticism
 from scipy.ndimage import gaussian_filter1d
 
 from bolfi_liquids import inference
@@ -32,14 +33,14 @@ NOISE, CORRELATION = np.deg2rad(0.2), 0.6  # of the cameras, of neighbouring sam
 PRIOR = inference.Prior({"drag": dist.LogUniform(0.3, 10.0), "eddy": dist.Uniform(0.0, 0.6)})
 
 EXTENSIONS = {
-    "friction": inference.Extension(dist.HalfNormal(0.6)),
-    "thinning": inference.Extension(dist.HalfNormal(0.6)),
-    "wall": inference.Extension(dist.HalfNormal(2.0)),
-    "fill": inference.Extension(dist.Normal(0.0, 0.2)),
-    "tilt": inference.Extension(dist.Normal(0.0, 0.05)),
-    "delay": inference.Extension(dist.Normal(0.0, 0.05)),
-    "drift": inference.Extension(dist.Normal(0.0, 0.005)),
-    "gripper_scale": inference.Extension(dist.Normal(0.0, 0.1)),
+    "friction": criticism.Extension(dist.HalfNormal(0.6)),
+    "thinning": criticism.Extension(dist.HalfNormal(0.6)),
+    "wall": criticism.Extension(dist.HalfNormal(2.0)),
+    "fill": criticism.Extension(dist.Normal(0.0, 0.2)),
+    "tilt": criticism.Extension(dist.Normal(0.0, 0.05)),
+    "delay": criticism.Extension(dist.Normal(0.0, 0.05)),
+    "drift": criticism.Extension(dist.Normal(0.0, 0.005)),
+    "gripper_scale": criticism.Extension(dist.Normal(0.0, 0.1)),
 }
 """What the model may lack, and knows of."""
 

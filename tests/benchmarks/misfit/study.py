@@ -21,10 +21,9 @@ from scipy.optimize import least_squares, root_scalar
 sys.path.insert(0, str(Path(__file__).parent))
 
 import stand_in
+from bolfi_liquids.inference import criticism
 from kept import keep, results
 from stand_in import EXTENSIONS, NOISE, PRIOR, REST, UNKNOWN, Stir
-
-from bolfi_liquids import inference
 
 STRENGTHS = (2.5, 6.0)  # RMS of what the effect changes, over the cameras' noise
 NULLS, SETS, OUTSIDE_SETS = 300, 50, 12
@@ -65,15 +64,15 @@ def examine(one: Set) -> dict:
 
     def experiment(stir: Stir, label: str, observed: np.ndarray, *more: np.ndarray):
         rests = [each[:MOVES] for each in (observed, *more)]
-        noise = inference.rest_noise(rests, seed=number, trend=TREND)
-        return inference.Experiment(stir.simulate, observed, noise, label, label)
+        noise = criticism.rest_noise(rests, seed=number, trend=TREND)
+        return criticism.Experiment(stir.simulate, observed, noise, label, label)
 
-    found = inference.criticise(
+    found = criticism.criticise(
         experiment(FIRST, "star", first),
         PRIOR,
         EXTENSIONS,
         held_out=[experiment(SECOND, "other star", second, first)],
-        keeping=inference.Keeping(batch=64, seed=seed),
+        keeping=criticism.Keeping(batch=64, seed=seed),
     )
     return {
         "effect": effect,
@@ -133,17 +132,17 @@ def _snr(base: dict, effect: str, coefficient: float) -> float:
     return float(np.sqrt(2.0 * least_squares(left, start, bounds=ends, diff_step=0.02).cost))
 
 
-def _before_held_out(found: inference.Criticism) -> list[list[str]]:
+def _before_held_out(found: criticism.Criticism) -> list[list[str]]:
     """The explanations that went to the held-out data."""
     return [list(names) for names in found.gaps]
 
 
-def _gap(found: inference.Criticism, truth: dict) -> list[float] | None:
+def _gap(found: criticism.Criticism, truth: dict) -> list[float] | None:
     """RMS of truth less expected on the held-out stir, without any noise: before, after [deg]."""
     if found.extended is None:
         return None
     seen = _exact(SECOND, truth)
-    posteriors = inference.weighted_posterior(found.base.hypothesis), found.posterior
+    posteriors = criticism.weighted_posterior(found.base.hypothesis), found.posterior
     expected = [SECOND.exact(each.draw(0, DRAWS), DRAWS).mean(0) for each in posteriors]
     return [float(np.rad2deg(np.sqrt(np.mean((seen - one) ** 2)))) for one in expected]
 

@@ -16,10 +16,9 @@ from bolfi_liquids.checks.sbc import check_sbc
 from bolfi_liquids.checks.sbc_pipelines import (
     CameraNoise,
     FromBank,
-    Quietly,
     _nearest,
 )
-from bolfi_liquids.inputs.settings import RUNS, CalibrationSettings, SbcSettings
+from bolfi_liquids.inputs.settings import RUNS_PER_POINT, CalibrationSettings, SbcSettings
 
 SMALL = {"design": 8, "budget": 8, "particles": 100, "seed": 3}
 
@@ -31,7 +30,7 @@ def rows(path, table):
 
 def test_each_run_is_given_once_and_the_nearest_first():
     points = np.array([[0.1, 0.1], [0.2, 0.1], [0.9, 0.9]])
-    left = np.ones((3, RUNS), bool)
+    left = np.ones((3, RUNS_PER_POINT), bool)
     asked = np.array([[0.1, 0.1]] * 5)
     given = list(_nearest(asked, points, left))
     assert given == [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0)]
@@ -62,11 +61,11 @@ def test_every_batch_is_asked_with_random_numbers_of_its_own(monkeypatch):
     prior = inference.Prior({"slope": dist.Uniform(0.0, 1.0)})
     theta = (np.arange(20)[:, None] + 0.5) / 20
     clean = theta * np.linspace(0.0, 1.0, 12)
-    noise = np.random.default_rng(0).normal(0.0, 0.02, (20, RUNS, 12, 1))
+    noise = np.random.default_rng(0).normal(0.0, 0.02, (20, RUNS_PER_POINT, 12, 1))
     stirring = SimpleNamespace(discrepancy=lambda: None)
     settings = CalibrationSettings(budget=20, surrogate="signal")
     signals = clean[:, None, :, None] + noise
-    pipeline = Quietly(FromBank(stirring, prior, theta, signals, settings))
+    pipeline = FromBank(stirring, prior, theta, signals, settings)
     pipeline(clean[7][:, None], seed=1)
     assert len(Watching.keys) == len(set(Watching.keys)) == 3  # after the start design of eight
 
@@ -95,13 +94,13 @@ def test_a_check_goes_on_where_it_ended(tmp_path, short_recording):
         "signal": 3,
         "discrepancy": 1,
     }
-    assert rows(out / "simulations.sqlite", "simulation") == RUNS * SMALL["design"]
+    assert rows(out / "simulations.sqlite", "simulation") == RUNS_PER_POINT * SMALL["design"]
 
     more = SbcSettings(runs=5, sequential=1, **SMALL)
     again = check_sbc(out, short_recording, settings=more, progress=False)
     first = [one.replicates.finished[0].draws for one in (found["signal"], again["signal"])]
     np.testing.assert_array_equal(*first)
-    assert rows(out / "simulations.sqlite", "simulation") == RUNS * SMALL["design"]
+    assert rows(out / "simulations.sqlite", "simulation") == RUNS_PER_POINT * SMALL["design"]
     with xr.open_datatree(out / "sbc.nc", engine="h5netcdf") as tree:
         assert tree["signal/replicates"].sizes["replicate"] == 5
         assert tree["signal/regions"]["rate"].dims == ("region", "quantity")

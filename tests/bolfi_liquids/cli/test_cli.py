@@ -127,7 +127,7 @@ def test_directory_without_a_run_is_refused(tmp_path, command):
     [
         ("radius = 0.028", "radius = -0.028", "-0.028"),
         ("lip_height", "lip_hight", "lip_height"),
-        ("[source]", "[source", "not a TOML file"),
+        ("[source]", "[source", "not TOML"),
     ],
 )
 def test_bad_cups_are_refused_in_one_line(calibration, tmp_path, old, new, named):

@@ -1,15 +1,15 @@
-"""Windows of a stir."""
+"""Strokes of a stir."""
 
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 import pytest
-from bolfi_liquids.hardware import circle, star
+from bolfi_liquids.hardware.motion import circle, star
 
-from bolfi_liquids.calibration.stir_simulator import Stirring, stirring_of
+from bolfi_liquids.calibration.stir_simulator import stirring_of
 from bolfi_liquids.inputs.bundled import bundled_recording
-from bolfi_liquids.inputs.recording import Gripper, Recording
+from bolfi_liquids.inputs.recording import Recording, Trajectory
 from bolfi_liquids.inputs.strokes import (
     PARTS,
     resting,
@@ -17,14 +17,13 @@ from bolfi_liquids.inputs.strokes import (
     stroke_numbers,
     strokes,
     until_stroke,
-    windows,
 )
 
 
 def recorded(path) -> Recording:
     still = np.zeros((len(path.time), 2))
     return Recording(
-        path.time, Gripper(*path), still, MappingProxyType({}), Path("stir.nc"), "hash"
+        path.time, Trajectory(*path), still, MappingProxyType({}), Path("stir.nc"), "hash"
     )
 
 
@@ -43,17 +42,6 @@ def test_a_circle_has_no_strokes_and_is_cut_evenly():
     recording = recorded(circle(speed=0.1, height=0.2))
     assert [stroke.number for stroke in strokes(recording)] == list(range(1, PARTS + 1))
     assert speed(recording).max() < 0.2
-
-
-def test_windows_cover_every_sample_of_every_recording_once_by_stroke():
-    both = tuple(recorded(star(speed=v, height=0.2)) for v in (0.1, 0.05))
-    stirring = Stirring(both, ())
-    made = windows(stirring)
-    by_stroke = [window.samples for window in made if "stroke" in window.label]
-    assert (np.sum(by_stroke, axis=0) == 1).all()
-    by_speed = np.sum([window.samples for window in made if "speed" in window.label], axis=0)
-    moving = np.concatenate([~resting(recording) for recording in both])
-    assert (by_speed == moving[:, None]).all()
 
 
 def test_numbers_of_samples_are_those_of_their_strokes():

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from bolfi_liquids.hardware import star
-from bolfi_liquids.inference import Bolfi, Simulation
+from bolfi_liquids.hardware.motion import star
+from bolfi_liquids.inference import Bolfi
+from bolfi_liquids.inference.simulations import Simulation
 
 import bolfi_liquids as bl
 from bolfi_liquids import models

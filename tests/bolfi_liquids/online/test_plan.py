@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bolfi_liquids.hardware import star
+from bolfi_liquids.hardware.motion import star
 
 from bolfi_liquids.online.plan import (
     FARTHEST,

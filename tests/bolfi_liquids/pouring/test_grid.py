@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bolfi_liquids.inference.simulations.runner import Keep
+from bolfi_liquids.inference.simulations import Keep
 
 from bolfi_liquids import inference, models
 from bolfi_liquids.inputs.cups import bundled_cups

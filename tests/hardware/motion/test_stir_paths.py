@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from bolfi_liquids.hardware import star
+from bolfi_liquids.hardware.motion import star
 from bolfi_liquids.hardware.motion.pour_paths import (
     RAMP,
     UPRIGHT_RATE,

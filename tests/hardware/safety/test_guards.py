@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
+from bolfi_liquids.hardware.arm import ArmState
 from bolfi_liquids.hardware.board import Row, Trouble, Who
 from bolfi_liquids.hardware.rig_file import bundled_rig
-from bolfi_liquids.hardware.robot.arm import ArmState
 from bolfi_liquids.hardware.safety.guards import (
     Rules,
     Seen,

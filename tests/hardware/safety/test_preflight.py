@@ -1,6 +1,6 @@
 import pytest
+from bolfi_liquids.hardware.arm import Payload
 from bolfi_liquids.hardware.rig_file import bundled_rig
-from bolfi_liquids.hardware.robot.arm import Payload
 from bolfi_liquids.hardware.safety.preflight import payload_check
 
 RIG = bundled_rig()

@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
-from bolfi_liquids.hardware import star
 from bolfi_liquids.hardware.cameras import RenderedCamera, Timing
+from bolfi_liquids.hardware.motion import Trajectory, star
 from bolfi_liquids.hardware.rendering import (
     Look,
     MovingWorld,
@@ -19,7 +19,6 @@ from bolfi_liquids.hardware.vision import (
     ClockError,
     FrameMeter,
     FrameSeries,
-    GripperSamples,
     PoseError,
     View,
     ViewLines,
@@ -45,9 +44,9 @@ def pivot(time):
     return _spline(np.clip(time - START, 0.0, DURATION))
 
 
-def samples(rate: float) -> GripperSamples:
+def samples(rate: float) -> Trajectory:
     time = START + np.arange(0.0, DURATION, 1.0 / rate)
-    return GripperSamples(time, pivot(time))
+    return Trajectory(time, pivot(time))
 
 
 def marker_series(camera, noise: float, seed: int = 0) -> FrameSeries:
@@ -122,10 +121,10 @@ def test_pictures_that_tell_nothing_about_time_are_refused():
     hidden = series._replace(marker=np.full_like(series.marker, np.nan))
     with pytest.raises(ClockError, match="only 0 frames"):
         fit_clock(hidden, robot, camera, MARKER, guess=OFFSET)
-    still = GripperSamples(robot.time, np.tile(robot.position[0], (len(robot.time), 1)))
+    still = Trajectory(robot.time, np.tile(robot.position[0], (len(robot.time), 1)))
     with pytest.raises(ClockError, match="hardly moves"):
         fit_clock(series, still, camera, MARKER, guess=OFFSET)
-    lost = GripperSamples(robot.time, np.full_like(robot.position, np.nan))
+    lost = Trajectory(robot.time, np.full_like(robot.position, np.nan))
     with pytest.raises(ClockError, match="0 finite samples"):
         fit_clock(series, lost, camera, MARKER, guess=OFFSET)
 

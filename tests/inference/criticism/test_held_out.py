@@ -2,15 +2,14 @@
 
 import numpy as np
 import pytest
+from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference.criticism.held_out import FLOOR, gap, holds
 from bolfi_liquids.inference.criticism.hypothesis import samples
 from scipy.stats import binom, norm
 
-from bolfi_liquids import inference
-
 ALPHA = 1e-4  # false alarms per test
 SETS, RUNS, N = 100, 8, 60
-NOISE = inference.AutoregressiveNoise(np.array([0.2]), np.array([0.6]))
+NOISE = criticism.AutoregressiveNoise(np.array([0.2]), np.array([0.6]))
 AT = samples(np.zeros(N))
 EFFECT = np.sin(np.linspace(0.0, 6.0, N))
 LAG = np.subtract.outer(np.arange(N), np.arange(N))
@@ -27,7 +26,7 @@ def judged(number, *, acts, before=0.0, after=1.0, believed=NOISE):
     rng = np.random.default_rng(number)
     runs = rng.normal(size=(2 * RUNS + 1, N)) @ OWN.T
     observed = acts * EFFECT + runs[-1] + noise_of(rng, 1)[0]
-    experiment = inference.Experiment(len, observed, believed, label="other")
+    experiment = criticism.Experiment(len, observed, believed, label="other")
     return gap(experiment, before * EFFECT + runs[:RUNS], after * EFFECT + runs[RUNS:-1], number)
 
 
@@ -86,7 +85,7 @@ def test_an_explanation_that_predicts_the_same_gains_nothing():
 
 def test_noise_believed_too_small_refuses_the_right_explanation():
     """Most often: eight runs know their own noise, and so the floor, to some 30 %."""
-    quiet = inference.KnownNoise(0.05)
+    quiet = criticism.KnownNoise(0.05)
     found = [judged(number, acts=1.0, believed=quiet) for number in range(20)]
     assert np.mean([holds([one]) for one in found]) < 0.25
 
@@ -95,12 +94,12 @@ def usual_of(freedom):
     """A simulator that is usually wrong by .2, as said by so many clean sets."""
     shapes = np.zeros((0, 0, 0))
     autocovariance = 0.2**2 * np.exp(-np.arange(N) / 10.0)
-    return inference.UsualResidual(autocovariance, shapes, freedom)
+    return criticism.UsualResidual(autocovariance, shapes, freedom)
 
 
 def test_what_is_usual_for_a_simulator_does_not_make_it_deaf():
     """A wrong shape is seen beside a usual residual of about its size."""
-    believed = inference.SumOfNoises((NOISE, usual_of(6)))
+    believed = criticism.SumOfNoises((NOISE, usual_of(6)))
     wrong = [judged(k, acts=3.0, after=1.0, believed=believed) for k in range(20)]
     assert np.mean([holds([one]) for one in wrong]) < 0.1
     right = [judged(k, acts=3.0, after=3.0, believed=believed) for k in range(20)]
@@ -109,7 +108,7 @@ def test_what_is_usual_for_a_simulator_does_not_make_it_deaf():
 
 def test_gains_of_several_recordings_add_up_and_each_may_veto():
     def of(gain, p_value=0.5):
-        return inference.Gap("", 1.0, 0.5, 0.3, 0.4, p_value, gain)
+        return criticism.Gap("", 1.0, 0.5, 0.3, 0.4, p_value, gain)
 
     assert not holds([of(2.0)])
     assert holds([of(2.0), of(2.0)]) and holds([])
@@ -118,14 +117,14 @@ def test_gains_of_several_recordings_add_up_and_each_may_veto():
 
 def test_most_of_a_gap_must_go_unless_it_may_be_noise():
     """Beyond noise of .3 in quadrature; .4 of noise is rare."""
-    small = inference.Gap("", 0.45, 0.39, 0.3, 0.4, 0.5, 20.0)
+    small = criticism.Gap("", 0.45, 0.39, 0.3, 0.4, 0.5, 20.0)
     assert small.excess[1] > 0.5 * small.excess[0]
     assert holds([small])
-    large = [inference.Gap("", 1.0, after, 0.3, 0.4, 0.5, 20.0) for after in (0.55, 0.6)]
+    large = [criticism.Gap("", 1.0, after, 0.3, 0.4, 0.5, 20.0) for after in (0.55, 0.6)]
     assert [one.excess[1] / one.excess[0] < 0.5 for one in large] == [True, False]
     assert [holds([one]) for one in large] == [True, False]
     # a recording that shows nothing of it takes nothing away
-    indifferent = inference.Gap("", 0.45, 0.45, 0.3, 0.4, 0.5, 0.0)
+    indifferent = criticism.Gap("", 0.45, 0.45, 0.3, 0.4, 0.5, 0.0)
     assert holds([large[0]._replace(after=0.4), indifferent]) and not holds([indifferent])
 
 
@@ -135,7 +134,7 @@ def test_missing_samples_are_left_out():
     kept = np.isfinite(observed)
     rng = np.random.default_rng(0)
     before, after = 0.1 * rng.normal(size=(2, RUNS, 40))
-    experiment = inference.Experiment(len, observed, NOISE, label="gappy")
+    experiment = criticism.Experiment(len, observed, NOISE, label="gappy")
     found = gap(experiment, before, EFFECT[kept] + after, 0)
     expected = np.sqrt(np.mean((EFFECT[kept] - before.mean(0)) ** 2))
     assert found.label == "gappy" and found.before == pytest.approx(expected)

@@ -3,6 +3,7 @@
 import numpy as np
 import numpyro.distributions as dist
 import pytest
+from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference.criticism.boxes import Box, fill
 from bolfi_liquids.inference.criticism.hypothesis import hypothesise, samples, values_of
 from bolfi_liquids.inference.criticism.misfit import locate, null_draws
@@ -17,8 +18,8 @@ EMULATORS, RUNS = 20, 8
 LEVEL = 0.05
 TIME = np.linspace(0.0, 3.0, 40)
 PRIOR = inference.Prior({"rate": dist.Uniform(2.0, 6.0)})
-EXTENSIONS = {"offset": inference.Extension(dist.Normal(0.0, 1.0))}
-NOISE = inference.KnownNoise(0.01)
+EXTENSIONS = {"offset": criticism.Extension(dist.Normal(0.0, 1.0))}
+NOISE = criticism.KnownNoise(0.01)
 
 
 def oscillate(theta, seeds):
@@ -27,7 +28,7 @@ def oscillate(theta, seeds):
 
 
 def fitted(simulate, observed, noise, bank, count=RUNS):
-    keeping = inference.Keeping(seed=bank, batch=64)
+    keeping = criticism.Keeping(seed=bank, batch=64)
     laboratory = Laboratory(simulate, PRIOR, EXTENSIONS, "", keeping)
     runs = laboratory.run("start", fill(Box(np.zeros(1), np.ones(1)), PRIOR, bank, count))
     return hypothesise((), PRIOR, runs, observed, noise)
@@ -79,7 +80,7 @@ def tilted(theta, seeds):
 def window(start, end, channels=slice(None)):
     chosen = np.zeros(SHAPE, bool)
     chosen[start:end, channels] = True
-    return inference.Window({"start": start}, chosen)
+    return criticism.Window({"start": start}, chosen)
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +92,7 @@ def averaged():
     observed[30:45, 1] += 0.5
     observed[10:16, 0] = np.nan
     here = np.isfinite(observed).ravel()
-    noise = inference.KnownNoise(np.tile(SD, SHAPE[0])[here])
+    noise = criticism.KnownNoise(np.tile(SD, SHAPE[0])[here])
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(output, "LONGEST", 40)
         return fitted(tilted, observed, noise, 0, count=16), noise

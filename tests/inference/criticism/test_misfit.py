@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import numpyro.distributions as dist
 import pytest
+from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference._float64 import in_float64
 from bolfi_liquids.inference.criticism.clean_scores import scored_on_clean
 from bolfi_liquids.inference.criticism.hypothesis import samples
@@ -28,13 +29,13 @@ DESIGN = np.stack([np.ones(N), np.sin(STEPS / 15.0)], axis=1)
 INSIDE = (STEPS >= 48) & (STEPS < 64)
 BUMP = np.where(INSIDE, np.sin(2.0 * np.pi * (STEPS - 47.5) / 16.0), 0.0)
 OWN = 0.1**2 * np.exp(-0.5 * (np.subtract.outer(STEPS, STEPS) / 3.0) ** 2) + 1e-12 * np.eye(N)
-NOISE = inference.AutoregressiveNoise(np.array([0.2]), np.array([0.6]))
-WHITE = inference.KnownNoise(0.2)
+NOISE = criticism.AutoregressiveNoise(np.array([0.2]), np.array([0.6]))
+WHITE = criticism.KnownNoise(0.2)
 AT = samples(np.zeros(N))
 PRIOR = inference.Prior({"level": dist.Uniform(-2.0, 2.0), "wave": dist.Uniform(-2.0, 2.0)})
-EXTENSIONS = {"bump": inference.Extension(dist.Uniform(-2.0, 2.0))}
+EXTENSIONS = {"bump": criticism.Extension(dist.Uniform(-2.0, 2.0))}
 WINDOWS = [
-    inference.Window({"start": start}, (STEPS >= start) & (STEPS < start + 16))
+    criticism.Window({"start": start}, (STEPS >= start) & (STEPS < start + 16))
     for start in range(0, N, 16)
 ]
 
@@ -58,9 +59,9 @@ def observe(simulate, number, bump=0.0):
 
 
 def examined(simulate, observed, bank):
-    keeping = inference.Keeping(seed=bank, batch=64)
+    keeping = criticism.Keeping(seed=bank, batch=64)
     laboratory = Laboratory(simulate, PRIOR, EXTENSIONS, "", keeping)
-    return examine(Study(laboratory, observed, NOISE, inference.Plan()), None)[0]
+    return examine(Study(laboratory, observed, NOISE, criticism.Plan()), None)[0]
 
 
 def on(hypothesis, observed):
@@ -198,13 +199,13 @@ def test_the_window_in_which_the_data_differ_is_found(banks):
 def test_clean_data_are_scored_by_what_the_others_teach(banks):
     """Against generalised least squares, which knows the design and not the emulator."""
     base = banks[0]
-    silent = inference.KnownNoise(0.0)
+    silent = criticism.KnownNoise(0.0)
     shapes = [1.5 * BUMP, 0.3 * np.cos(STEPS / 5.0) - 0.8 * BUMP, 0.4 * np.sin(STEPS / 9.0)]
     clean, repeats = [shape[:, None] for shape in shapes], [True, True, False]
     scores = []
     for k in range(2):
         left, again = np.delete(clean, k, axis=0), np.delete(repeats, k)
-        taught = inference.usual_residual(list(left), [silent] * 2, list(again))
+        taught = criticism.usual_residual(list(left), [silent] * 2, list(again))
         weight = np.linalg.inv(
             base.hypothesis.spread + NOISE.covariance(AT) + taught.covariance(AT)
         )
@@ -214,8 +215,8 @@ def test_clean_data_are_scored_by_what_the_others_teach(banks):
         scores.append(change @ weight @ shapes[k] / np.sqrt(change @ weight @ change))
     size = np.sqrt((1.0 + np.sum(np.square(scores))) / 3.0)
     assert size > 1.5
-    usual = inference.usual_residual(clean, [silent] * 3, repeats)
-    noise = inference.SumOfNoises((NOISE, usual))
+    usual = criticism.usual_residual(clean, [silent] * 3, repeats)
+    noise = criticism.SumOfNoises((NOISE, usual))
     believed = replace(base.hypothesis, noise=noise.covariance(AT))
     found = scored_on_clean(believed, noise, base.signatures)
     assert found["bump"].clean == pytest.approx(size, rel=0.02)
@@ -223,8 +224,8 @@ def test_clean_data_are_scored_by_what_the_others_teach(banks):
 
 def test_a_clean_set_alone_says_nothing_of_scores(banks):
     base = banks[0]
-    usual = inference.usual_residual([BUMP[:, None]], [inference.KnownNoise(0.0)], [True])
-    for noise in (NOISE, inference.SumOfNoises((NOISE, usual))):
+    usual = criticism.usual_residual([BUMP[:, None]], [criticism.KnownNoise(0.0)], [True])
+    for noise in (NOISE, criticism.SumOfNoises((NOISE, usual))):
         assert scored_on_clean(base.hypothesis, noise, base.signatures)["bump"].clean == 1.0
 
 
@@ -242,10 +243,10 @@ def test_what_clean_data_show_as_well_is_no_discovery(banks):
 
 @pytest.mark.parametrize(("low", "high", "side"), [(-2.0, 2.0, 0), (0.0, 2.0, 1), (-2.0, 0.0, -1)])
 def test_a_prior_says_on_which_side_an_effect_can_act(low, high, side):
-    extensions = {"bump": inference.Extension(dist.Uniform(low, high))}
-    laboratory = Laboratory(exact, PRIOR, extensions, "", inference.Keeping(batch=64))
+    extensions = {"bump": criticism.Extension(dist.Uniform(low, high))}
+    laboratory = Laboratory(exact, PRIOR, extensions, "", criticism.Keeping(batch=64))
     observed = observe(exact, 3)
-    found = examine(Study(laboratory, observed, NOISE, inference.Plan()), None)[0].signatures
+    found = examine(Study(laboratory, observed, NOISE, criticism.Plan()), None)[0].signatures
     assert found["bump"].side == side
     assert found["bump"].change @ BUMP > 0.0  # towards a greater coefficient, on either side
 

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
+from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference.criticism.next_experiment import RUNS, _distance
-
-from bolfi_liquids import inference
 
 SAMPLES, NOISE, REPEATS = 120, 0.1, 200
 WAVE = np.sqrt(2.0 / SAMPLES) * np.cos(np.pi * 6 * (np.arange(SAMPLES) + 0.5) / SAMPLES)
@@ -13,8 +12,8 @@ WAVE = np.sqrt(2.0 / SAMPLES) * np.cos(np.pi * 6 * (np.arange(SAMPLES) + 0.5) / 
 def found(ratio, own):
     """Of two explanations that differ by `ratio` times all noise, their runs by `own` of it."""
     measured = NOISE * np.sqrt(1.0 - own**2)
-    noise = inference.KnownNoise(measured)
-    proposal = inference.Proposal(len, noise, (SAMPLES,))
+    noise = criticism.KnownNoise(measured)
+    proposal = criticism.Proposal(len, noise, (SAMPLES,))
 
     def repeat(seed):
         rng = np.random.default_rng(seed)

@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
+from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference.criticism.measurement_noise import CORRELATIONS
 from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 from scipy.stats import chisquare, norm
-
-from bolfi_liquids import inference
 
 ALPHA = 1e-4  # false alarms per test
 DRAWS, RUNS, BINS = 63, 128, 8  # of the rank test; the bins divide DRAWS + 1
@@ -48,7 +47,7 @@ def rests():
             line = np.stack([np.ones(samples), np.arange(samples)], axis=1)
             drift = line @ rng.normal(0.0, [[100.0 * sd], [sd]], (2, 2))
             stretches.append(drift + autoregressive(rng, (samples, 2), sd, correlation))
-        found = inference.rest_noise(stretches, seed=run, trend=1, draws=DRAWS)
+        found = criticism.rest_noise(stretches, seed=run, trend=1, draws=DRAWS)
         truths.append([sd, correlation])
         draws.append(np.stack([found.sd, found.correlation], -1))
     return np.array(truths), np.array(draws)
@@ -75,18 +74,18 @@ def test_ranks_of_the_true_noise_are_uniform_among_its_posterior_draws(rests, wh
 def test_a_trend_that_is_not_taken_out_is_taken_for_correlated_noise():
     rng = np.random.default_rng(0)
     rest = rng.normal(size=(60, 2)) + np.linspace(0.0, 10.0, 60)[:, None]
-    straight = inference.rest_noise([rest], trend=1)
+    straight = criticism.rest_noise([rest], trend=1)
     assert abs(straight.sd.mean() - 1.0) < 4.0 / np.sqrt(2.0 * rest.size)
-    assert inference.rest_noise([rest], trend=0).correlation.mean() > 0.8
+    assert criticism.rest_noise([rest], trend=0).correlation.mean() > 0.8
 
 
 @pytest.mark.parametrize(("samples", "channels", "trend"), [(8, 1, 0), (4, 2, 0), (9, 1, 1)])
 def test_stretches_too_short_to_learn_from_are_refused(samples, channels, trend):
     rest = np.random.default_rng(0).normal(size=(samples, channels))
     with pytest.raises(ValueError, match="of 8 needed; give longer ones"):
-        inference.rest_noise([rest], trend=trend)
+        criticism.rest_noise([rest], trend=trend)
     more = np.random.default_rng(0).normal(size=(samples + 1, channels))
-    assert inference.rest_noise([more], trend=trend).samples == more.size
+    assert criticism.rest_noise([more], trend=trend).samples == more.size
 
 
 # Drawn as believed.
@@ -98,16 +97,16 @@ def deviation(drawn, covariance):
     return np.abs((products.mean(0) - covariance) / (products.std(0) / np.sqrt(len(drawn)))).max()
 
 
-AR = inference.AutoregressiveNoise(np.array([0.5, 0.7, 0.6]), np.array([0.2, 0.9, 0.6]))
-SIZES = inference.KnownNoise(np.linspace(0.1, 2.0, 16))
+AR = criticism.AutoregressiveNoise(np.array([0.5, 0.7, 0.6]), np.array([0.2, 0.9, 0.6]))
+SIZES = criticism.KnownNoise(np.linspace(0.1, 2.0, 16))
 RESIDUALS = [autoregressive(np.random.default_rng(k), (10, 2), 1.0, 0.8) for k in range(FREEDOM)]
-NOTHING = inference.KnownNoise(0.0)
-USUAL = inference.usual_residual(RESIDUALS, [NOTHING] * FREEDOM, [True] * FREEDOM)
+NOTHING = criticism.KnownNoise(0.0)
+USUAL = criticism.usual_residual(RESIDUALS, [NOTHING] * FREEDOM, [True] * FREEDOM)
 NOISES = {
-    "known": (inference.KnownNoise(0.3), 1.0),
+    "known": (criticism.KnownNoise(0.3), 1.0),
     "of each sample": (SIZES, 1.0),
     "autoregressive": (AR, 1.0),
-    "sum": (inference.SumOfNoises((AR, SIZES)), 1.0),
+    "sum": (criticism.SumOfNoises((AR, SIZES)), 1.0),
     # of a size that is known as well as a variance from FREEDOM numbers: Student's t
     "usual residual": (USUAL, FREEDOM / (FREEDOM - 2.0)),
 }
@@ -125,7 +124,7 @@ def test_draws_have_the_covariance(gappy, kind):
 
 def test_white_draws_are_not_taken_for_correlated_ones(gappy):
     covariance = AR.covariance(gappy)
-    white = inference.KnownNoise(np.sqrt(np.diag(covariance)))
+    white = criticism.KnownNoise(np.sqrt(np.diag(covariance)))
     drawn = white.draw(np.random.default_rng(0), gappy, 20_000)
     assert deviation(drawn, covariance) > 2.0 * norm.isf(ALPHA / 2 / covariance.size)
 
@@ -146,8 +145,8 @@ def clean():
 
 def test_the_autocovariance_of_a_stationary_process_is_recovered(clean):
     """Within Bartlett's errors; measurement noise, and the residuals' own noise, apart."""
-    measured = inference.KnownNoise(np.sqrt(WHITE))
-    found = inference.usual_residual(clean, [measured] * SETS, [False] * SETS).autocovariance
+    measured = criticism.KnownNoise(np.sqrt(WHITE))
+    found = criticism.usual_residual(clean, [measured] * SETS, [False] * SETS).autocovariance
     lags = np.arange(25)
     expected = 0.8**lags * (1.0 - lags / LENGTH)
     m = np.arange(-200, 201)
@@ -160,7 +159,7 @@ def test_the_autocovariance_of_a_stationary_process_is_recovered(clean):
     error = np.sqrt(variance / (2 * SETS * LENGTH))
     limit = norm.isf(ALPHA / 2 / len(lags))
     assert np.abs((found[lags] - expected) / error).max() < limit
-    ignored = inference.usual_residual(clean, [NOTHING] * SETS, [False] * SETS).autocovariance
+    ignored = criticism.usual_residual(clean, [NOTHING] * SETS, [False] * SETS).autocovariance
     np.testing.assert_allclose(ignored[0] - found[0], WHITE, atol=0.01)
 
 
@@ -168,12 +167,12 @@ def test_residuals_of_the_same_experiment_say_where_it_errs_again(clean):
     at = Layout(np.repeat([0, 1], 40), np.tile(np.arange(40), 2))
     again = [residual[:40].copy() for residual in clean[:3]]
     again[1][7, 0] = np.nan
-    learned = inference.usual_residual(again, [NOTHING] * 3, [False, True, True])
+    learned = criticism.usual_residual(again, [NOTHING] * 3, [False, True, True])
     stationary = np.kron(np.eye(2), toeplitz(learned.autocovariance))
     flat = [np.nan_to_num(residual).T.ravel() for residual in again[1:]]
     shapes = sum(np.outer(residual, residual) for residual in flat)
     np.testing.assert_allclose(learned.covariance(at), stationary + shapes, atol=1e-12)
-    other = inference.usual_residual(again, [NOTHING] * 3, [False] * 3)
+    other = criticism.usual_residual(again, [NOTHING] * 3, [False] * 3)
     np.testing.assert_allclose(other.covariance(at), stationary, atol=1e-12)
     assert (learned.freedom, other.freedom) == (2, 3)
 
@@ -187,12 +186,12 @@ def test_the_covariance_is_positive_semidefinite(longest):
     lengths = [rng.normal(size=(samples, 2)) for samples in (20, 40)]
     for residuals in ([waves], lengths, [waves, *lengths], [np.cumsum(waves, 0) + 3.0]):
         for noise in (0.0, 0.5, 2.0):
-            noises = [inference.KnownNoise(noise)] * len(residuals)
-            learned = inference.usual_residual(residuals, noises, [False] * len(residuals))
+            noises = [criticism.KnownNoise(noise)] * len(residuals)
+            learned = criticism.usual_residual(residuals, noises, [False] * len(residuals))
             values = np.linalg.eigvalsh(learned.covariance(at))
             assert values[0] > -1e-9 * max(values[-1], 1e-12)
 
 
 def test_no_clean_data_teach_nothing():
     with pytest.raises(ValueError, match="at least one clean data set"):
-        inference.usual_residual([], [], [])
+        criticism.usual_residual([], [], [])

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import numpyro.distributions as dist
 import pytest
+from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference.criticism.next_experiment import suggest
 from bolfi_liquids.inference.criticism.simulate import Laboratory
 
@@ -17,17 +18,17 @@ pytestmark = pytest.mark.slow  # compiling takes half a minute on busy cores
 TIME = np.linspace(0.0, 6.0, 60)
 PRIOR = inference.Prior({"frequency": dist.Uniform(2.0, 4.0)})
 EXTENSIONS = {
-    "offset": inference.Extension(dist.Normal(0.0, 0.5)),
-    "delay": inference.Extension(dist.Normal(0.0, 0.1)),
-    "phase": inference.Extension(dist.Normal(0.0, 0.3)),
-    "drift": inference.Extension(dist.Normal(0.0, 0.1)),
-    "broken": inference.Extension(dist.HalfNormal(1.0)),
+    "offset": criticism.Extension(dist.Normal(0.0, 0.5)),
+    "delay": criticism.Extension(dist.Normal(0.0, 0.1)),
+    "phase": criticism.Extension(dist.Normal(0.0, 0.3)),
+    "drift": criticism.Extension(dist.Normal(0.0, 0.1)),
+    "broken": criticism.Extension(dist.HalfNormal(1.0)),
 }
-NOISE = inference.AutoregressiveNoise(np.array([0.05]), np.array([0.6]))
-PLAN = inference.Plan(refits=2)
+NOISE = criticism.AutoregressiveNoise(np.array([0.05]), np.array([0.6]))
+PLAN = criticism.Plan(refits=2)
 WINDOWS = (
-    inference.Window({"part": "first"}, TIME < 3.0),
-    inference.Window({"part": "second"}, TIME >= 3.0),
+    criticism.Window({"part": "first"}, TIME < 3.0),
+    criticism.Window({"part": "second"}, TIME >= 3.0),
 )
 
 
@@ -49,7 +50,7 @@ def experiment(simulate=oscillate, seed=0, label="fitted", **truth):
     at = SimpleNamespace(channel=np.zeros(60, int), sample=np.arange(60))
     noise = NOISE.draw(np.random.default_rng([seed, 1]), at, 1)[0]
     observed = simulate(theta, [10**6 + seed])[0] + noise
-    return inference.Experiment(simulate, observed, NOISE, label, label, WINDOWS)
+    return criticism.Experiment(simulate, observed, NOISE, label, label, WINDOWS)
 
 
 class Counted:
@@ -94,8 +95,8 @@ def criticised(bank):
     """(fitted, ...) -> Criticism, all runs in one bank."""
 
     def call(fitted, extensions=EXTENSIONS, **asked):
-        keeping = inference.Keeping(bank=bank, batch=64)
-        return inference.criticise(fitted, PRIOR, extensions, plan=PLAN, keeping=keeping, **asked)
+        keeping = criticism.Keeping(bank=bank, batch=64)
+        return criticism.criticise(fitted, PRIOR, extensions, plan=PLAN, keeping=keeping, **asked)
 
     return call
 
@@ -193,7 +194,7 @@ def test_with_no_effect_that_can_be_simulated_nothing_is_known(criticised):
 
 
 def proposal(speed):
-    return inference.Proposal(
+    return criticism.Proposal(
         partial(oscillate, speed=speed), NOISE, (60,), f"speed {speed}", f"speed {speed}"
     )
 
@@ -212,7 +213,7 @@ def test_effects_that_look_alike_are_tied_and_the_experiment_that_separates_them
 
 @pytest.fixture
 def laboratory():
-    return Laboratory(oscillate, PRIOR, EXTENSIONS, "", inference.Keeping())
+    return Laboratory(oscillate, PRIOR, EXTENSIONS, "", criticism.Keeping())
 
 
 def rival(**best):

@@ -6,19 +6,20 @@ from types import SimpleNamespace
 import numpy as np
 import numpyro.distributions as dist
 import pytest
+from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference.criticism.verdict import conclude, near_best
 
 from bolfi_liquids import inference
 
-REJECTED = inference.Check(0.001, 0.001, 0.2, {})
-FITS = inference.Check(0.4, 0.3, 0.5, {})
+REJECTED = criticism.Check(0.001, 0.001, 0.2, {})
+FITS = criticism.Check(0.4, 0.3, 0.5, {})
 
 
 def candidate(*names, gain, p_value=0.4, **more):
     """An explanation as `conclude` sees it."""
-    check = inference.Check(p_value, p_value, p_value, {})
+    check = criticism.Check(p_value, p_value, p_value, {})
     more = {"refitted": True, **more}
-    return inference.Candidate(SimpleNamespace(names=names), check, gain, **more)
+    return criticism.Candidate(SimpleNamespace(names=names), check, gain, **more)
 
 
 def verdict(*candidates, base=REJECTED):
@@ -97,7 +98,7 @@ def test_the_best_and_what_fits_already_are_refitted():
 # What makes no sense is refused before anything is simulated.
 
 PRIOR = inference.Prior({"rate": dist.Uniform(0.0, 1.0)})
-DRAG = {"drag": inference.Extension(dist.HalfNormal(1.0))}
+DRAG = {"drag": criticism.Extension(dist.HalfNormal(1.0))}
 
 
 def never(theta, seeds):
@@ -105,12 +106,12 @@ def never(theta, seeds):
 
 
 def experiment(observed, label="data"):
-    return inference.Experiment(never, observed, inference.KnownNoise(0.1), label=label)
+    return criticism.Experiment(never, observed, criticism.KnownNoise(0.1), label=label)
 
 
 def refused(match, extensions=DRAG, **asked):
     with pytest.raises(ValueError, match=match):
-        inference.criticise(experiment(np.arange(20.0)), PRIOR, extensions, **asked)
+        criticism.criticise(experiment(np.arange(20.0)), PRIOR, extensions, **asked)
 
 
 def test_accepting_what_is_not_registered_is_refused():
@@ -132,7 +133,7 @@ def test_held_out_data_that_are_fitted_are_refused():
     refused("very data that are fitted", held_out=[experiment(observed.copy(), "other")])
     observed[3] = np.nan
     with pytest.raises(ValueError, match="very data that are fitted"):
-        inference.criticise(
+        criticism.criticise(
             experiment(observed), PRIOR, DRAG, held_out=[experiment(observed.copy(), "other")]
         )
 
@@ -140,16 +141,16 @@ def test_held_out_data_that_are_fitted_are_refused():
 @pytest.mark.parametrize("neutral", [-0.1, np.inf, np.nan])
 def test_a_neutral_coefficient_must_be_possible(neutral):
     with pytest.raises(ValueError, match="neutral must"):
-        inference.Extension(dist.HalfNormal(1.0), neutral)
-    assert inference.Extension(dist.HalfNormal(1.0), 0.0).neutral == 0.0
+        criticism.Extension(dist.HalfNormal(1.0), neutral)
+    assert criticism.Extension(dist.HalfNormal(1.0), 0.0).neutral == 0.0
 
 
 def test_experiments_without_data_and_windows_of_other_shape_are_refused():
     with pytest.raises(ValueError, match="other: observed must have a finite value"):
         experiment(np.full(20, np.nan), "other")
-    window = inference.Window({"stroke": 1}, np.ones(19, bool))
+    window = criticism.Window({"stroke": 1}, np.ones(19, bool))
     with pytest.raises(ValueError, match=r"stroke.*\(19,\), expected \(20,\)"):
-        inference.Experiment(never, np.zeros(20), inference.KnownNoise(0.1), windows=(window,))
+        criticism.Experiment(never, np.zeros(20), criticism.KnownNoise(0.1), windows=(window,))
 
 
 def other(theta, seeds):
@@ -161,8 +162,8 @@ def test_experiments_that_the_bank_would_confuse_are_refused():
     first = experiment(np.zeros(20), "recording")
     second = replace(first, simulate=other, observed=np.ones(20))
     refused("two experiments 'recording'.*identity", held_out=[first, second])
-    noise = inference.KnownNoise(0.1)
-    proposals = [inference.Proposal(one, noise, (20,)) for one in (never, other)]
+    noise = criticism.KnownNoise(0.1)
+    proposals = [criticism.Proposal(one, noise, (20,)) for one in (never, other)]
     refused("two experiments 'experiment'.*identity", proposals=proposals)
 
 
@@ -172,4 +173,4 @@ def test_experiments_that_the_bank_tells_apart_or_may_confuse_are_not_refused(to
     first = experiment(np.zeros(20), "recording")
     second = replace(first, **{"simulate": other, "observed": np.ones(20), **told_apart})
     with pytest.raises(RuntimeError, match="AssertionError: simulated"):
-        inference.criticise(experiment(np.arange(20.0)), PRIOR, DRAG, held_out=[first, second])
+        criticism.criticise(experiment(np.arange(20.0)), PRIOR, DRAG, held_out=[first, second])

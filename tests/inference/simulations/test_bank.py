@@ -6,7 +6,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from bolfi_liquids.inference.simulations.runner import Keep, run_missing
+from bolfi_liquids.inference import simulations
+from bolfi_liquids.inference.simulations import Keep, run_missing
 
 from bolfi_liquids import inference
 
@@ -17,18 +18,19 @@ WRITE_50 = """
 import sys
 import numpy as np
 from bolfi_liquids import inference
+from bolfi_liquids.inference import simulations
 
 path, first = sys.argv[1], int(sys.argv[2])
 with inference.SimulationBank(path) as bank:
     for seed in range(first, first + 50):
-        bank.put("id", {"a": 1.0}, seed, inference.Simulation(np.zeros(3), None, 0.0))
+        bank.put("id", {"a": 1.0}, seed, simulations.Simulation(np.zeros(3), None, 0.0))
 """
 
 
 def test_keeps_signals_exactly(tmp_path):
     signal = np.random.default_rng(0).normal(size=(5, 2)).astype(np.float32)
     with inference.SimulationBank(tmp_path / "b.sqlite") as bank:
-        bank.put("id", THETA, 7, inference.Simulation(signal, None, 1.5))
+        bank.put("id", THETA, 7, simulations.Simulation(signal, None, 1.5))
     with inference.SimulationBank(tmp_path / "b.sqlite") as bank:
         found = bank.get("id", {"a": 1e-3, "b": 0.1 + 0.2}, 7)
         assert len(bank) == 1
@@ -43,16 +45,16 @@ def test_keeps_signals_exactly(tmp_path):
 )
 def test_looks_up_exactly(identity, theta, seed):
     with inference.SimulationBank() as bank:
-        bank.put("id", THETA, 7, inference.Simulation(np.zeros(2), None, 0.0))
+        bank.put("id", THETA, 7, simulations.Simulation(np.zeros(2), None, 0.0))
         assert bank.get(identity, theta, seed) is None
 
 
 def test_keeps_failures_until_a_signal_comes_and_then_that():
     with inference.SimulationBank() as bank:
-        bank.put("id", THETA, 0, inference.Simulation(None, "boom", 0.0))
-        assert bank.get("id", THETA, 0) == inference.Simulation(None, "boom", 0.0)
+        bank.put("id", THETA, 0, simulations.Simulation(None, "boom", 0.0))
+        assert bank.get("id", THETA, 0) == simulations.Simulation(None, "boom", 0.0)
         for value in (1.0, 2.0):
-            bank.put("id", THETA, 0, inference.Simulation(np.full(2, value), None, 0.0))
+            bank.put("id", THETA, 0, simulations.Simulation(np.full(2, value), None, 0.0))
         kept = bank.get("id", THETA, 0)
         assert kept is not None and kept.error is None
         np.testing.assert_array_equal(kept.signal, np.full(2, 1.0))
@@ -112,9 +114,9 @@ def test_all_simulations_of_one_identity(tmp_path):
             for identity, a, seed in order:
                 signal = np.array([[a, np.nan], [seed, 1.0]])
                 bank.put(
-                    identity, {"b": 1.0, "a": a}, seed, inference.Simulation(signal, None, 0.0)
+                    identity, {"b": 1.0, "a": a}, seed, simulations.Simulation(signal, None, 0.0)
                 )
-            bank.put("id", {"b": 2.0, "a": 0.0}, 7, inference.Simulation(None, "boom", 0.0))
+            bank.put("id", {"b": 2.0, "a": 0.0}, 7, simulations.Simulation(None, "boom", 0.0))
             found.append(bank.simulations("id"))
     for kept in found:
         np.testing.assert_array_equal(kept.theta["a"], [0.1, 0.1, 0.3])
@@ -129,7 +131,7 @@ def test_simulations_that_are_not_alike_are_refused():
         with pytest.raises(ValueError, match="identity='id', got none"):
             bank.simulations("id")
         for a in (2, 3):
-            bank.put("id", {"a": a}, 0, inference.Simulation(np.zeros(a), None, 0.0))
+            bank.put("id", {"a": a}, 0, simulations.Simulation(np.zeros(a), None, 0.0))
         with pytest.raises(ValueError, match=r"got a -> \[2\]; a -> \[3\]"):
             bank.simulations("id")
 
@@ -150,6 +152,7 @@ def test_a_claim_excludes_all_others_until_released(tmp_path):
 HOLD = """
 import sys, time
 from bolfi_liquids import inference
+from bolfi_liquids.inference import simulations
 
 bank = inference.SimulationBank(sys.argv[1])
 print(bank.claim("id", {"a": 1.0}, 0), flush=True)
@@ -180,7 +183,8 @@ import sys, time
 from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from bolfi_liquids import inference
-from bolfi_liquids.inference.simulations.runner import Keep, run_missing
+from bolfi_liquids.inference import simulations
+from bolfi_liquids.inference.simulations import Keep, run_missing
 
 def simulate(theta, seeds):
     time.sleep(0.02)
@@ -188,7 +192,7 @@ def simulate(theta, seeds):
         log.writelines(f"{seed}\\n" for seed in seeds)
     return np.array([[seed + 0.5] for seed in seeds])
 
-jobs = [inference.Job({"a": 1.0}, seed) for seed in range(40)]
+jobs = [simulations.Job({"a": 1.0}, seed) for seed in range(40)]
 if sys.argv[3] == "backwards":
     jobs = jobs[::-1]
 with inference.SimulationBank(sys.argv[1]) as bank, ThreadPoolExecutor(3) as pool:
@@ -217,7 +221,7 @@ def test_two_processes_never_simulate_the_same_at_the_same_time(tmp_path):
 @pytest.mark.parametrize(("batch", "calls"), [(None, [7]), (3, [3, 3, 1])])
 def test_results_come_in_order_and_batches_are_kept_as_they_finish(batch, calls):
     made, kept = [], []
-    jobs = [inference.Job({"a": 1.0}, seed) for seed in (5, 3, 9, 1, 7, 2, 8)]
+    jobs = [simulations.Job({"a": 1.0}, seed) for seed in (5, 3, 9, 1, 7, 2, 8)]
 
     def simulate(theta, seeds):
         made.append(len(seeds))
@@ -244,7 +248,7 @@ def test_an_executor_takes_jobs_one_by_one_whatever_the_batch():
         made.append(len(seeds))
         return seeds[:, None] + 0.5
 
-    jobs = [inference.Job({"a": 1.0}, seed) for seed in range(6)]
+    jobs = [simulations.Job({"a": 1.0}, seed) for seed in range(6)]
     with inference.SimulationBank() as bank, ThreadPoolExecutor(2) as pool:
         found = run_missing(
             simulate, jobs, Keep(bank, batch=4, executor=pool), (1,), advance=finished.append
@@ -258,7 +262,7 @@ def test_what_was_finished_just_before_the_claim_is_not_simulated():
         """Somebody else stores and releases between the look and the claim."""
 
         def claim(self, identity, theta, seed):
-            self.put(identity, theta, seed, inference.Simulation(np.array([7.0]), None, 0.0))
+            self.put(identity, theta, seed, simulations.Simulation(np.array([7.0]), None, 0.0))
             return super().claim(identity, theta, seed)
 
     def simulate(theta, seeds):
@@ -266,7 +270,7 @@ def test_what_was_finished_just_before_the_claim_is_not_simulated():
 
     with Busy() as bank:
         for _ in range(2):
-            (found,) = run_missing(simulate, [inference.Job(THETA, 0)], Keep(bank), (1,))
+            (found,) = run_missing(simulate, [simulations.Job(THETA, 0)], Keep(bank), (1,))
             np.testing.assert_array_equal(found.signal, [7.0])
         assert bank.claim("", THETA, 0)  # nobody holds it any more
 
@@ -279,6 +283,6 @@ def test_the_same_job_twice_in_a_batch_is_simulated_once():
         return theta["a"][:, None]
 
     with inference.SimulationBank() as bank:
-        batch = [inference.Job(THETA, seed) for seed in (0, 1, 0)]
+        batch = [simulations.Job(THETA, seed) for seed in (0, 1, 0)]
         found = run_missing(simulate, batch, Keep(bank), (1,))
     assert calls == [0, 1] and [result.signal[0] for result in found] == [THETA["a"]] * 3

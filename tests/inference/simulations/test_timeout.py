@@ -9,10 +9,10 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 import xarray as xr
-from bolfi_liquids.inference import Job, Simulation, SimulationBank
+from bolfi_liquids.inference import SimulationBank
+from bolfi_liquids.inference.simulations import Job, Keep, Simulation, run_missing
 from bolfi_liquids.inference.simulations.failures import timed_out
 from bolfi_liquids.inference.simulations.job import run_batch, simulation_seed
-from bolfi_liquids.inference.simulations.runner import Keep, run_missing
 
 from bolfi_liquids import inference
 

@@ -56,7 +56,7 @@ def test_slope_of_log_cdf_agrees_with_the_mills_ratio():
     ("rule", "expected"),
     [
         ("min_observed", np.sqrt(DELTA.min())),
-        (inference.Quantile(0.25), np.sqrt(np.quantile(DELTA, 0.25))),
+        (inference.surrogates.Quantile(0.25), np.sqrt(np.quantile(DELTA, 0.25))),
         (1.44, 1.2),
     ],
 )
@@ -64,7 +64,7 @@ def test_threshold_rules(rule, expected):
     np.testing.assert_allclose(learn(U, DELTA, ROWS, "sqrt", rule).threshold, expected)
 
 
-@pytest.mark.parametrize("rule", ["nonsense", inference.Quantile(1.5), np.nan])
+@pytest.mark.parametrize("rule", ["nonsense", inference.surrogates.Quantile(1.5), np.nan])
 def test_bad_rules_are_refused(prior, observed, rule):
     with pytest.raises(ValueError, match="threshold must be one of"):
         inference.Bolfi(prior, observed, threshold=rule)

@@ -4,36 +4,11 @@ import struct
 from collections.abc import Callable
 from typing import NamedTuple
 
-from .registers import COUNT
+from ..registers import COUNT
+from ..snapshot import Snapshot
 from .wire import layout
 
 _ZEROS = (0.0,) * 6
-
-
-class Snapshot(NamedTuple):
-    """What the controller knows at one tick, as plain numbers; SI units, base frame."""
-
-    time: float
-    host: float
-    joints: tuple[float, ...]
-    joint_speeds: tuple[float, ...]
-    pose: tuple[float, ...]
-    velocity: tuple[float, ...]
-    force: tuple[float, ...]
-    runtime_state: int
-    safety_mode: int
-    safety_bits: int
-    robot_bits: int
-    slider: float
-    scaling: float
-    payload: float
-    payload_centre: tuple[float, ...]
-    digital_outputs: int
-    analog_outputs: tuple[float, ...]
-    output_ints: tuple[int, ...]
-    output_doubles: tuple[float, ...]
-    resting: bool
-    stick: tuple[float, float] | None
 
 
 class Field(NamedTuple):

@@ -1,8 +1,8 @@
 """Upload of scripts, port 30003. What the real port streams, ur_rtde never reads."""
 
-from .controller import Controller
+from ..controller import Controller
+from ..script import take
 from .network import Connection
-from .script import take
 
 LARGEST = 1 << 20  # bytes; a script without an end
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from .controller import Controller
-from .fields import Snapshot
+from ..controller import Controller
+from ..snapshot import Snapshot
 from .network import Connection, Network
 
 

@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 
 
-class GripperPath(Protocol):
+class Trajectory(Protocol):
     """Times [T] in s and pivot positions [T, 3] in m; rows that are not finite are skipped."""
 
     @property
@@ -14,7 +14,7 @@ class GripperPath(Protocol):
     def position(self) -> np.ndarray: ...
 
 
-def substep_path(gripper: GripperPath, rate: float) -> np.ndarray:
+def substep_path(gripper: Trajectory, rate: float) -> np.ndarray:
     """Pivot at the start and at the end of each substep [m], shape [substeps + 1, 3].
 
     Raises:
@@ -27,7 +27,7 @@ def substep_path(gripper: GripperPath, rate: float) -> np.ndarray:
     return np.stack([np.interp(grid, seen, position[:, axis]) for axis in range(3)], axis=1)
 
 
-def _finite(gripper: GripperPath) -> tuple[np.ndarray, np.ndarray]:
+def _finite(gripper: Trajectory) -> tuple[np.ndarray, np.ndarray]:
     """Times [n] and positions [n, 3] of the finite samples, two at least."""
     time, position = np.asarray(gripper.time), np.asarray(gripper.position)
     if position.shape != (len(time), 3):
@@ -43,7 +43,7 @@ def _finite(gripper: GripperPath) -> tuple[np.ndarray, np.ndarray]:
     return time[finite], position[finite]
 
 
-def mean_speed(gripper: GripperPath) -> float:
+def mean_speed(gripper: Trajectory) -> float:
     """Root mean square speed of the pivot between its finite samples [m/s].
 
     Raises:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from .controller import Controller
+from ..controller import Controller
 from .network import Connection
 
 TOO_EARLY = (

@@ -1,0 +1,14 @@
+from .patterns import circle as circle
+from .patterns import star as star
+from .pour_paths import approach_pour as approach_pour
+from .pour_paths import pour_path as pour_path
+from .pour_paths import ready_to_pour as ready_to_pour
+from .stir_paths import PosePath as PosePath
+from .stir_paths import above_cup as above_cup
+from .stir_paths import approach as approach
+from .stir_paths import insert as insert
+from .stir_paths import joined as joined
+from .stir_paths import retract as retract
+from .stir_paths import stir as stir
+from .stir_paths import strokes as strokes
+from .trajectory import Trajectory as Trajectory

@@ -1,0 +1,159 @@
+"""The processes of a session: started together, supervised by a thread, ended together."""
+
+import threading
+from collections.abc import Callable, Mapping
+from multiprocessing.connection import wait
+from pathlib import Path
+from typing import Any
+
+from ..board import SPAWN, Board, Who, host_time
+from ..cameras.base import Camera
+from ..recorder.events import EventLog
+from ..recorder.process import run_recorder
+from ..rig import View
+from ..robot.control_process import run_control
+from ..robot.orders import Assignment, Order, Stop, Stopped
+from .camera_process import run_camera
+from .children import Child, end, ended_how, start, tell_to_leave
+from .progress import Progress
+
+MAX_SILENCE = 1.0  # s, after which a control process without a sign of life is ended
+SUPERVISION_PERIOD = 0.1  # s, at the longest, from one look to the next
+
+
+class Processes:
+    """Recorder, cameras and control process of a session.
+
+    Args:
+        board: On which they show signs of life.
+        log: Of the main process.
+        progress: Takes what the control process reports, and why the arm was stopped.
+    """
+
+    def __init__(self, board: Board, log: EventLog, progress: Progress):
+        self.children: list[Child] = []
+        self.control: Child | None = None
+        self._board = board
+        self._log = log
+        self._progress = progress
+        self._sending = threading.Lock()
+        self._supervisor: threading.Thread | None = None
+
+    def start(
+        self, assignment: Assignment, make_cameras: Mapping[View, Callable[[], Camera]]
+    ) -> None:
+        """Start them all; those that were started before an error are among `children`."""
+        board, directory = self._board, Path(assignment.directory)
+        reading, writing = SPAWN.Pipe(duplex=False)
+        try:
+            self.children.append(
+                start("recorder", run_recorder, lambda link: (board, reading, link, directory))
+            )
+            for view, make in make_cameras.items():
+                self.children.append(self._start_camera(assignment, view, make))
+            self.control = start(
+                "control", run_control, lambda link: (assignment, board, link, writing)
+            )
+            self.children.append(self.control)
+        finally:
+            # the recorder sees the samples' end only if nobody else can write any
+            reading.close()
+            writing.close()
+
+    def _start_camera(
+        self, assignment: Assignment, view: View, make: Callable[[], Camera]
+    ) -> Child:
+        rig, board, directory = assignment.rig, self._board, Path(assignment.directory)
+        return start(
+            f"camera {view}", run_camera, lambda link: (rig, view, make, board, link, directory)
+        )
+
+    def supervise(self) -> None:
+        """Take reports and notice deaths from now on, in a thread."""
+        self._supervisor = threading.Thread(target=self._supervise, name="supervisor", daemon=True)
+        self._supervisor.start()
+
+    def send(self, order: Order) -> bool:
+        """Tell the control process; false where there is none any more."""
+        if self.control is None:
+            return False
+        try:
+            with self._sending:
+                self.control.link.send(order)
+        except OSError:
+            return False
+        return True
+
+    def stop(self, stopped: Stopped) -> None:
+        """Stop the arm and write the reason down, if there is none yet."""
+        self.send(Stop(stopped.reason))
+        with self._progress.news:
+            if self._progress.stopped is None:
+                self._progress.stopped = stopped
+                self._log.write("stopped", guard=stopped.guard, reason=stopped.reason)
+            self._progress.news.notify_all()
+
+    def end(self, last: Order, patience: float) -> None:
+        """End them all: the control process by its last order, within so many seconds."""
+        if self.control is not None:
+            self.send(last)
+            self.control.process.join(patience)
+        for child in self.children:
+            if child is not self.control:
+                tell_to_leave(child)
+        for child in end(self.children):
+            self._log.write("ended_by_force", process=child.name)
+        if self._supervisor is not None:
+            self._supervisor.join()
+        for child in self.children:
+            child.link.close()
+
+    # -- the supervisor's thread
+
+    def _supervise(self) -> None:
+        """Take reports and notice deaths, until all children are gone."""
+        assert self.control is not None
+        link: Any = self.control.link
+        alive = {child.process.sentinel: child for child in self.children}
+        while alive:
+            sources = [*alive, link] if link is not None else [*alive]
+            self._end_if_silent(self.control)
+            for ready in wait(sources, timeout=SUPERVISION_PERIOD):
+                if ready is link:
+                    link = link if self._take_report() else None
+                elif isinstance(ready, int):
+                    child = alive.pop(ready)
+                    child.process.join()
+                    if child is self.control and link is not None:
+                        while link.poll() and self._take_report():
+                            pass
+                        link = None
+                    self._notice_end(child)
+
+    def _take_report(self) -> bool:
+        """Take one report of the control process; false when there will be no more."""
+        assert self.control is not None
+        try:
+            report = self.control.link.recv()
+        except (EOFError, OSError):
+            return False
+        self._progress.take(report)
+        return True
+
+    def _end_if_silent(self, control: Child) -> None:
+        """A control process that hangs keeps no watchdog quiet, and is of no more use."""
+        row = self._board.read(Who.CONTROL)
+        over = self._progress.left or not row.beat or not control.process.is_alive()
+        if over or row.age(host_time()) <= MAX_SILENCE:
+            return
+        control.process.kill()
+        reason = f"no sign of life of the control process for {MAX_SILENCE} s"
+        self.stop(Stopped(reason, "control"))
+
+    def _notice_end(self, child: Child) -> None:
+        progress = self._progress
+        is_control = child is self.control
+        over = progress.left or progress.refused or progress.stopped is not None
+        if progress.closing or (is_control and over):
+            return
+        self.stop(Stopped(ended_how(child), child.name))

@@ -1,0 +1,127 @@
+"""How far a session has come, as its control process reports it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from threading import Condition
+from typing import NamedTuple
+
+import numpy as np
+
+from ..board import Row, Who
+from ..robot.orders import Began, Checked, Done, Left, Report, Stopped, Told
+from ..safety.guards import Reading
+
+
+class SessionStopped(RuntimeError):
+    """The arm was stopped for good; what was recorded is kept, and marked as aborted."""
+
+
+class Phase(Enum):
+    """Where a session is between its start and its end."""
+
+    NEW = "new"  # nothing is started, no file is written
+    CHECKING = "checking"  # the pre-flight list is on its way
+    REFUSED = "refused"  # the list has failures: the arm takes no order
+    READY = "ready"  # the arm rests, every path that was ordered is done
+    MOVING = "moving"  # paths that were ordered are not done yet
+    STOPPED = "stopped"  # the arm was stopped for good
+    CLOSED = "closed"
+
+
+class Status(NamedTuple):
+    """What an operator wants to know.
+
+    Attributes:
+        rows: The board's, by participant.
+        readings: The guards', as of the last time that they were told.
+        pose: Tool's position in the cup's frame [m] and rotation vector in the base frame, (6,).
+        began: Paths that have begun, with the controller's time [s].
+        done: Paths that are done, likewise.
+        stopped: Why the arm was stopped; None while all is well.
+    """
+
+    rows: dict[Who, Row]
+    readings: tuple[Reading, ...]
+    pose: np.ndarray | None
+    began: tuple[Began, ...]
+    done: tuple[Done, ...]
+    stopped: Stopped | None
+
+
+@dataclass
+class Progress:
+    """What was ordered and what was reported; written under `news`, read from any thread.
+
+    Attributes:
+        news: Notified at each change.
+        started: Whether the processes were started.
+        checked: The pre-flight list, once it is there.
+        told: The latest readings.
+        began: Paths that have begun.
+        done: Paths that are done.
+        stopped: Why the arm was stopped for good; the first reason stays.
+        left: Whether the control process ends as told.
+        closing: Whether the session ends, or has ended.
+        ordered: Number of paths that were ordered.
+        joints: Where the latest of them ends [rad], shape (6,).
+    """
+
+    news: Condition = field(default_factory=Condition)
+    started: bool = False
+    checked: Checked | None = None
+    told: Told = field(default_factory=lambda: Told((), np.full(6, np.nan)))
+    began: list[Began] = field(default_factory=list)
+    done: list[Done] = field(default_factory=list)
+    stopped: Stopped | None = None
+    left: bool = False
+    closing: bool = False
+    ordered: int = 0
+    joints: np.ndarray | None = None
+
+    @property
+    def refused(self) -> bool:
+        """Whether the pre-flight list has failures, so that the control process ends."""
+        return self.checked is not None and self.checked.pose is None
+
+    @property
+    def busy(self) -> bool:
+        """Whether a path that was ordered is not done."""
+        return len(self.done) < self.ordered
+
+    @property
+    def phase(self) -> Phase:
+        if self.closing:
+            return Phase.CLOSED
+        if self.stopped is not None:
+            return Phase.STOPPED
+        if not self.started:
+            return Phase.NEW
+        if self.checked is None:
+            return Phase.CHECKING
+        if self.refused:
+            return Phase.REFUSED
+        return Phase.MOVING if self.busy else Phase.READY
+
+    def take(self, report: Report) -> None:
+        """Note a report of the control process."""
+        with self.news:
+            match report:
+                case Checked():
+                    self.checked = report
+                case Told():
+                    self.told = report
+                case Began():
+                    self.began.append(report)
+                case Done():
+                    self.done.append(report)
+                case Stopped():
+                    self.stopped = self.stopped or report
+                case Left():
+                    self.left = True
+            self.news.notify_all()
+
+    def wait_for(self, happened: Callable[[], bool], timeout: float | None) -> None:
+        """Wait until something has happened, the arm was stopped, or the time [s] is over."""
+        with self.news:
+            self.news.wait_for(lambda: happened() or self.stopped is not None, timeout)

@@ -1,0 +1,140 @@
+"""What a session is for, and whether it may move the arm."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ..cameras.base import Camera
+from ..errors import RigError
+from ..motion.cup_frame import cup_frame
+from ..motion.stir_paths import PosePath
+from ..rig import Rig, View
+from ..robot.orders import Assignment
+from ..safety.limits import Tool
+from .confirmation import Confirmation
+from .patience import patient
+
+PROBES = 60  # poses of the plan about which the controller's own limits are asked
+
+
+@dataclass(frozen=True)
+class SessionSetup:
+    """Rig, directory and permissions of one session; a dry run unless it is armed.
+
+    Attributes:
+        rig: What is there.
+        directory: Of the recording; new or empty.
+        address: Of the controller; the rig's own if None.
+        make_cameras: By view, what opens its camera in the process that reads it; both or none.
+        tool: What is in the gripper.
+        armed: Whether the arm may move.
+        confirmation: What a person has typed after reading the plan; needed if armed.
+        plan: What will be followed; the controller's own safety limits are asked about it.
+        rehearsal: Whether stalls of this computer are borne, as `patient` says; for an emulated
+            arm only.
+        source: Where the data come from, for the recording.
+
+    Raises:
+        RigError: Armed without a confirmation for this controller, or a rehearsal without an
+            emulated arm.
+    """
+
+    rig: Rig
+    directory: Path
+    address: str | None = None
+    make_cameras: Mapping[View, Callable[[], Camera]] = field(default_factory=dict)
+    tool: Tool = "stirring"
+    armed: bool = False
+    confirmation: Confirmation | None = None
+    plan: Sequence[PosePath] = ()
+    rehearsal: bool = False
+    source: str = "robot"
+
+    def __post_init__(self) -> None:
+        self._check_permission()
+
+    @property
+    def controller(self) -> str:
+        """Address of the controller."""
+        return self.rig.robot.host if self.address is None else self.address
+
+    @property
+    def duration(self) -> float:
+        """Of the plan [s]."""
+        return sum(path.duration for path in self.plan)
+
+    def recorded_rig(self) -> Rig:
+        """The rig, validated: copies of a rig may hold numbers that its file may not.
+
+        Raises:
+            ValueError: A number is not allowed.
+        """
+        return Rig.model_validate(self.rig.model_dump())
+
+    def guarded_rig(self) -> Rig:
+        """The rig by whose limits the arm is guarded; wider ones in a rehearsal."""
+        rig = self.recorded_rig()
+        return patient(rig) if self.rehearsal else rig
+
+    def assignment(self) -> Assignment:
+        """What the control process is for."""
+        return Assignment(
+            rig=self.guarded_rig(),
+            address=self.controller,
+            tool=self.tool,
+            armed=self.armed,
+            directory=str(self.directory),
+            probes=_probes(self.plan, self.rig),
+            cameras=bool(self.make_cameras),
+        )
+
+    def take_confirmation(self) -> None:
+        """Use the confirmation up: it is good for one session.
+
+        Raises:
+            RigError: There is none for this controller, or another session has taken it.
+        """
+        self._check_permission()
+        if self.armed and self.confirmation is not None:
+            self.confirmation.used = True
+
+    def _check_permission(self) -> None:
+        if self.armed:
+            _check_confirmation(self.confirmation, self.controller)
+        if self.rehearsal and (self.confirmation is None or not self.confirmation.emulated):
+            raise RigError(
+                "a rehearsal without an emulated arm",
+                where="SessionSetup(rehearsal=True)",
+                fix="pass confirm_emulated(plan, address), or leave rehearsal out",
+            )
+
+
+def _check_confirmation(confirmation: Confirmation | None, address: str) -> None:
+    if not isinstance(confirmation, Confirmation):
+        raise RigError(
+            "armed without a confirmation",
+            where="SessionSetup(armed=True)",
+            fix="show the plan and pass confirm(plan, typed, address)",
+        )
+    if confirmation.address != address:
+        raise RigError(
+            f"the confirmation is for {confirmation.address}, the controller is at {address}",
+            where="SessionSetup(confirmation=...)",
+            fix="confirm the plan for this controller",
+        )
+    if confirmation.used:
+        raise RigError(
+            "the confirmation was for an earlier session",
+            where="SessionSetup(confirmation=...)",
+            fix="show the plan again and pass what confirm returns then",
+        )
+
+
+def _probes(plan: Sequence[PosePath], rig: Rig) -> np.ndarray:
+    if not plan:
+        return np.empty((0, 6))
+    pose = np.concatenate([path.pose for path in plan])
+    chosen = np.unique(np.linspace(0, len(pose) - 1, PROBES).astype(int))
+    return cup_frame(rig.cup).to_base(pose[chosen])

@@ -1,0 +1,14 @@
+from .intervals import Coverage as Coverage
+from .intervals import coverage as coverage
+from .pipelines import FitPipeline as FitPipeline
+from .pipelines import SharedDesign as SharedDesign
+from .pipelines import shared_design as shared_design
+from .random_points import Tarp as Tarp
+from .random_points import tarp as tarp
+from .repeat import replicates as replicates
+from .replicate import Pipeline as Pipeline
+from .replicate import Replicate as Replicate
+from .replicated import Quantity as Quantity
+from .replicated import Replicates as Replicates
+from .uniformity import SBC as SBC
+from .uniformity import sbc as sbc

@@ -1,0 +1,91 @@
+"""Figures of a fit, of plain arrays. Matplotlib is imported by whoever asks for one."""
+
+from typing import TYPE_CHECKING, Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+OBSERVED, CLOSEST, PREDICTED, GREY = "#1f2933", "#d1591a", "#2463a6", "#8a94a0"
+MAX_PANELS = 6  # channels of a signal that are drawn
+INTERVAL = 0.05, 0.5, 0.95  # quantiles of the predictive distribution
+
+
+def plot_search(rounds: np.ndarray, discrepancy: np.ndarray, ax: "Axes | None") -> "Axes":
+    """Discrepancies by round, and the least so far.
+
+    Args:
+        rounds: In which each simulation was asked [n]; negative where it was made elsewhere.
+        discrepancy: [n], NaN where a simulation failed.
+        ax: To draw on; None makes a figure.
+    """
+    if ax is None:
+        ax = plt.subplots(figsize=(5.2, 3.4), layout="constrained")[1]
+    at = np.maximum(rounds + 1, 0)  # 0: before the first round
+    there = np.isfinite(discrepancy)
+    ax.plot(at[there], discrepancy[there], "o", ms=4, color=PREDICTED, label="simulation")
+    if there.any():
+        each = np.unique(at[there])
+        least = [discrepancy[there & (at <= one)].min() for one in each]
+        ax.step(each, least, where="post", color=CLOSEST, lw=1.4, label="least so far")
+        if discrepancy[there].min() > 0.0:
+            ax.set_yscale("log")
+    failed = at[~there]
+    if failed.size:
+        low = ax.get_ylim()[0]
+        ax.plot(failed, np.full(len(failed), low), "x", color=GREY, label="failed", clip_on=False)
+    ax.set_xlabel("round")
+    ax.set_ylabel("discrepancy")
+    ax.legend(frameon=False, fontsize="small")
+    return _bare(ax)
+
+
+def plot_predictive(
+    observed: np.ndarray, closest: np.ndarray, predicted: np.ndarray | None, axes: Any
+) -> "list[Axes]":
+    """The observed output, the closest simulation, and the posterior predictive distribution.
+
+    Args:
+        observed: [t, *channels], NaN where missing.
+        closest: The simulation of least discrepancy, of the same shape; else it is left out.
+        predicted: Draws of new observations [n, t, *channels]; None, or another shape, leaves
+            them out.
+        axes: One for each channel, of which six are drawn at most; None makes a figure.
+    """
+    panels = _channels(observed)[:MAX_PANELS]
+    near = _channels(closest) if closest.shape == observed.shape else None
+    draws = None
+    if predicted is not None and predicted.shape[1:] == observed.shape:
+        draws = np.stack([_channels(one) for one in predicted], axis=1)  # [channel, n, t]
+    if axes is None:
+        size = (5.2, 1.2 + 1.8 * len(panels))
+        axes = plt.subplots(len(panels), 1, figsize=size, sharex=True, layout="constrained")[1]
+    given = list(np.atleast_1d(axes).ravel())
+    if len(given) < len(panels):
+        raise ValueError(f"axes must hold one for each of {len(panels)} channels, got {len(given)}")
+    for j, (ax, values) in enumerate(zip(given, panels, strict=False)):
+        index = np.arange(len(values))
+        if draws is not None:
+            low, middle, high = np.quantile(draws[j], INTERVAL, axis=0)
+            label = "predicted, 90 %"
+            ax.fill_between(index, low, high, color=PREDICTED, alpha=0.25, lw=0, label=label)
+            ax.plot(index, middle, color=PREDICTED, lw=1.0)
+        if near is not None:
+            ax.plot(index, near[j], color=CLOSEST, lw=1.2, label="closest simulation")
+        ax.plot(index, values, ".", ms=3, color=OBSERVED, label="observed")
+        _bare(ax)
+    given[0].legend(frameon=False, fontsize="small")
+    given[len(panels) - 1].set_xlabel("sample")
+    return given[: len(panels)]
+
+
+def _channels(output: np.ndarray) -> np.ndarray:
+    """[t, *channels] -> [channel, t]; a number is a series of one sample."""
+    return np.atleast_1d(output).reshape(len(np.atleast_1d(output)), -1).T
+
+
+def _bare(ax: "Axes") -> "Axes":
+    ax.spines[["top", "right"]].set_visible(False)
+    return ax

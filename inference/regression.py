@@ -1,0 +1,67 @@
+"""A number as a function of parameters, learned from runs that were made before."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ._float64 import in_float64
+from .arguments import checked_array
+from .gp.process import padded_rows
+from .prior import Prior
+from .result import SurrogateView
+from .surrogates.discrepancy import DiscrepancySurrogate, learn
+from .surrogates.transform import Transform
+from .types import Theta
+
+MIN_VALUES = 3  # finite values from which a process can be learned
+
+
+class Regression(SurrogateView):
+    """A Gaussian process on g(value), in the prior's natural units; see `regress`."""
+
+    learned: DiscrepancySurrogate
+
+    @property
+    def transform(self) -> Transform:
+        """g: called with values; `transform.inverse` leads back."""
+        return self.learned.transform
+
+
+@in_float64
+def regress(
+    prior: Prior, theta: Theta, values: ArrayLike, transform: str | None = None
+) -> Regression:
+    """Learn a number as a function of parameters, by a Gaussian process over prior quantiles.
+
+    No simulator is run, nothing is observed and nothing is sampled: use it for a cost, a
+    success rate or a duration that was recorded with each run.
+
+    Args:
+        prior: Gives names, ranges and scales of the parameters.
+        theta: Name -> [n], in the prior's support.
+        values: [n]; what is not finite is left out.
+        transform: g: "identity", "sqrt" or "log"; None chooses by leave-one-out log predictive
+            density.
+
+    Returns:
+        `predict(theta)` gives mean and sd of a new g(value), its noise included; `transform` is
+        g; `warnings` is what leave-one-out errors say against it.
+
+    Raises:
+        ValueError: shapes disagree, fewer than three finite values, theta outside the support,
+            or a transform that is undefined at some value.
+    """
+    rows = prior.to_dict(np.atleast_2d(prior.to_array(theta)))
+    known = checked_array("values", values)
+    n = len(next(iter(rows.values())))
+    if known.shape != (n,):
+        raise ValueError(f"values must have shape ({n},), one per theta, got {known.shape}")
+    finite = np.isfinite(known)
+    if finite.sum() < MIN_VALUES:
+        raise ValueError(
+            f"values must hold {MIN_VALUES} finite numbers, got {finite.sum()} of {n}; make more"
+        )
+    if not prior.contains(rows).all():
+        raise ValueError("theta must lie in the support of the prior; leave the other rows out")
+    u = prior.to_unit(rows)[finite]
+    learned = learn(u, known[finite], padded_rows(n), transform, normal=prior.normal)
+    return Regression(prior, learned)
