@@ -14,6 +14,7 @@ import numpyro.distributions as dist
 from .distributions import describe as describe_distribution
 from .prior import Prior
 
+OWN = __name__.partition(".")[0]
 ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
 
@@ -69,4 +70,8 @@ def _plain(value: Any) -> str:
 
 
 def _name(value: Any) -> str:
-    return f"{value.__module__}.{value.__qualname__}"
+    """Module and name; of this package without the module's place, which is no part of what is
+    kept: a module that moves orphans nothing."""
+    module = value.__module__
+    place = OWN if module.startswith(f"{OWN}.") else module
+    return f"{place}.{value.__qualname__}"

@@ -17,6 +17,7 @@ from .summary import NAME as SUMMARY
 if TYPE_CHECKING:
     from ..inference import SimulationBank
 
+PROGRAM = "bolfi-liquids"
 RUN_TOML = "run.toml"
 SIMULATIONS = "simulations.sqlite"
 POSTERIOR = "posterior.nc"
@@ -71,7 +72,7 @@ def enter_run(
         grows = growing in differing and _larger(*differing[growing])
         others = {field: both for field, both in differing.items() if field != growing or not grows}
         if others:
-            raise _refused(others, run, growing)
+            raise _refused(others, held, run, growing)
         return _grow(run, held, record, differing[growing][0]) if grows else []
     if (run / SIMULATIONS).exists():
         raise InputError(
@@ -142,14 +143,19 @@ def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, tu
     return {field: values for field, values in both.items() if values[0] != values[1]}
 
 
-def _refused(differing: Mapping[str, tuple[Any, Any]], run: Path, growing: str) -> InputError:
+def _refused(
+    differing: Mapping[str, tuple[Any, Any]], record: Mapping[str, Any], run: Path, growing: str
+) -> InputError:
+    """A refusal that names the first field that differs from the run's `record`."""
     field, (held, wanted) = next(iter(differing.items()))
     if field.startswith("inputs."):
         what = "is of other recordings"
         fix = f"give those that {RUN_TOML} names under files, unchanged, or choose another --out"
         return InputError(what, where=str(run), fix=fix)
-    if field.startswith("engine."):
-        what, fix = f"{field} was {held!r} and is {wanted!r} now", "choose another --out"
+    if field.startswith(("engine.", "simulator.")):  # settings and recordings are the same
+        version = record.get("versions", {}).get(PROGRAM, "of the program")
+        what = f"{field} was {held!r} and is {wanted!r} now"
+        fix = f"go on with version {version}, which made the run, or choose another --out"
     else:
         what = f"{field} is {held!r} in the run, but {wanted!r} was asked"
         own = "the run's own value" + (" or a larger one" if field == growing else "")
