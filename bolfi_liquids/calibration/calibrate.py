@@ -177,6 +177,7 @@ def fit_recordings(  # noqa: PLR0913  what a calibration is made of
     surrogate: str,
     seed: int,
     simulate: Simulate | None = None,
+    warn: bool = True,
 ) -> "Fit":
     """The engine's fit of a stir, with the options that go with the surrogate.
 
@@ -189,6 +190,7 @@ def fit_recordings(  # noqa: PLR0913  what a calibration is made of
         surrogate: One of `settings.SURROGATES`.
         seed: Of everything random.
         simulate: In place of the stirring's own, such as one that reports.
+        warn: Whether the emulator's complaints are raised as warnings.
     """
     from .. import inference
 
@@ -204,6 +206,8 @@ def fit_recordings(  # noqa: PLR0913  what a calibration is made of
         seed=seed,
         bank=keep.bank,
         identity=keep.identity,
+        warn=warn,
+        progress=False,
         **options,
     )
 

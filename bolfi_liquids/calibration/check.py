@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..progress import Simulate
-from ..run.simulations import Keep, fresh_seeds, simulate_kept
+from ..run.simulations import Keep, simulate_kept
+from ..seeds import Phase, simulation_seeds
 
 PREDICTIVE_DRAWS = 8
 REPLICATES = 4  # seeds at theta*, for the noise between seeds
-_PREDICTIVE, _REPLICATE = 1, 2  # purposes of seeds
 
 
 class Check(NamedTuple):
@@ -40,6 +40,9 @@ def check_by_simulation(
     """
     count = len(next(iter(draws.values())))
     at_best = {name: np.full(REPLICATES, value) for name, value in best.items()}
-    predictive = simulate_kept(simulate, draws, fresh_seeds(seed, _PREDICTIVE, count), keep)
-    replicates = simulate_kept(simulate, at_best, fresh_seeds(seed, _REPLICATE, REPLICATES), keep)
+    predictive = simulate_kept(
+        simulate, draws, simulation_seeds(seed, Phase.PREDICTIVE, count), keep
+    )
+    own = simulation_seeds(seed, Phase.REPLICATES, REPLICATES)
+    replicates = simulate_kept(simulate, at_best, own, keep)
     return Check(predictive.signals, replicates.signals, predictive.seconds + replicates.seconds)

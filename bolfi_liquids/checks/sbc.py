@@ -31,14 +31,13 @@ from ..inputs.settings import (
 from ..progress import progress_bar
 from ..run.directory import SIMULATIONS, enter_run
 from ..run.provenance import LIBRARIES, versions
-from ..run.simulations import fresh_seeds
 from ..run.workers import processes
+from ..seeds import Phase, generator, simulation_seeds
 from .sbc_pipelines import (
     SAMPLING,
     Calibrate,
     CameraNoise,
     FromBank,
-    Quietly,
 )
 from .sbc_tree import SurrogateCheck, checked, write_results
 
@@ -48,7 +47,6 @@ if TYPE_CHECKING:
 
 
 AT_ONCE = 16  # stirs in one call
-_PURPOSE = 61  # of seeds
 
 
 def check_sbc(
@@ -112,7 +110,7 @@ def _replicates(  # noqa: PLR0913  what the two surrogates share
     else:
         pipeline = Calibrate(stirring, prior, calibration)
     return inference.replicates(
-        Quietly(pipeline),
+        pipeline,
         stirring.simulate,
         prior,
         count,
@@ -154,10 +152,12 @@ def stirs_everywhere(  # noqa: PLR0913  what makes simulations
     from ..inference import SimulationBank
     from ..inference.simulations import Job, run_missing
 
-    u = qmc.Sobol(len(prior), rng=settings.seed).random(settings.design)
+    u = qmc.Sobol(len(prior), rng=generator(settings.seed, Phase.SBC_DESIGN)).random(
+        settings.design
+    )
     theta = prior.from_unit(u)
     count = RUNS_PER_POINT * settings.design
-    seeds = fresh_seeds(settings.seed, _PURPOSE, count)
+    seeds = simulation_seeds(settings.seed, Phase.SBC_STIRS, count)
     jobs = [
         Job({name: float(values[at // RUNS_PER_POINT]) for name, values in theta.items()}, seed)
         for at, seed in enumerate(seeds)

@@ -183,12 +183,18 @@ def criticise(  # noqa: PLR0913  one parameter for each option
     for name, given in (("liquid", liquid), ("cups", cups), ("held-out-pours", held_out_pours)):
         if pours is None and given:
             raise typer.BadParameter(f"--{name} needs --pours, which is missing")
+    tables = [
+        None if path is None else open_pours(path, liquid) for path in (pours, held_out_pours)
+    ]
+    for table in filter(None, tables):
+        if table.unused:
+            typer.echo(f"{table.path}: columns not used: {', '.join(table.unused)}", err=True)
     criticism = run_criticise(
         run,
         held_out=held_out or (),
         baseline=baseline or (),
-        pours=None if pours is None else open_pours(pours, liquid),
-        held_out_pours=None if held_out_pours is None else open_pours(held_out_pours, liquid),
+        pours=tables[0],
+        held_out_pours=tables[1],
         cups=None if cups is None else open_cups(cups),
         effects=effects or None,
         accept=accept or None,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..inputs.pour_table import PourTable
 from ..inputs.prior import split_parameters
+from ..seeds import Phase, simulation_seeds
 from .pour_noise import PourNoise
 
 if TYPE_CHECKING:
@@ -53,12 +54,12 @@ class Pouring:
         liquid, effects = split_parameters(
             {name: np.repeat(values, len(rates)) for name, values in theta.items()}
         )
-        own = np.add.outer(np.asarray(seeds) * 1009 % 2**31, np.arange(len(rates))) % 2**31
+        own = [simulation_seeds(int(one), Phase.RUNS_OF_POURS, len(rates)) for one in seeds]
         landed = models.landings(
             models.Liquid(**liquid, density=self.density),
             np.tile(rates, runs),
             self.cups,
-            own.ravel(),
+            np.ravel(own),
             effects=effects,
         )
         rows = np.add.outer(len(rates) * np.arange(runs), at).ravel()
@@ -73,7 +74,7 @@ class Pouring:
         """A text that two equal experiments share."""
         actions = [self.angular_velocity.tolist(), self.distance.tolist()]
         return json.dumps(
-            ["landed pours", self.cups.settings(), self.density, actions], sort_keys=True
+            [Phase.RUNS_OF_POURS.value, self.cups.settings(), self.density, actions], sort_keys=True
         )
 
 

@@ -17,6 +17,7 @@ from ..inputs.cups import bundled_cups, open_cups
 from ..inputs.settings import PourSettings
 from ..progress import Advance, progress_bar
 from ..run.directory import POUR, open_bank
+from ..seeds import Phase, simulation_seeds
 from .result import Judged, Pour, PourSummary
 from .spillage import (
     FARTHEST,
@@ -49,8 +50,6 @@ LANDINGS_PER_POUR = 5
 
 SEARCH_STRATUM, AGAIN_STRATUM = 1, 2
 """Strata of the posterior draws that choose; all others judge."""
-
-_SEARCH, _JUDGE, _AGAIN = 11, 12, 13  # purposes of seeds
 
 
 def choose_pour(  # noqa: PLR0913  the one call that most users make
@@ -212,29 +211,29 @@ class _Pours:
         """Pour these liquids at every angular velocity of the grid."""
         low, high = self.cups.angular_velocity_range
         rates = np.geomspace(low, high, self.settings.iterations)
-        return surface(self._profiles(rates, liquids, _SEARCH), self.cups)
+        return surface(self._profiles(rates, liquids, Phase.SEARCHED_POURS), self.cups)
 
     def try_again(self, first: Surface, plug_in: float, liquids: Mapping[str, NDArray]) -> Surface:
         """Pour these liquids too where least was spilled, and at the angular velocity `plug_in`."""
         by_promise = np.argsort(first.risk(self.settings.risk).min(axis=1), kind="stable")
         named = [*first.angular_velocity[by_promise[:N_FINALISTS]], plug_in]
         rates = np.intersect1d(named, first.angular_velocity)
-        return first.with_draws(surface(self._profiles(rates, liquids, _AGAIN), self.cups))
+        return first.with_draws(
+            surface(self._profiles(rates, liquids, Phase.SEARCHED_AGAIN), self.cups)
+        )
 
     def judge(self, action: Mapping[str, float], liquids: Mapping[str, NDArray]) -> Judged:
         """Pour every liquid, with seeds of their own."""
         rate, distance = action["angular_velocity"], action["distance"]
-        profiles = self._profiles(np.array([rate]), liquids, _JUDGE)
+        profiles = self._profiles(np.array([rate]), liquids, Phase.JUDGED_POURS)
         spread = FARTHEST * landing_sd(self.cups)
         off = np.clip(landing_sd(self.cups) * normal_scores(LANDINGS_PER_POUR), -spread, spread)
         return Judged(
             rate, distance, landed(profiles.fractions[0], profiles.distance, distance, off)
         )
 
-    def _profiles(self, rates: NDArray, liquids: Mapping[str, NDArray], purpose: int) -> Profiles:
-        from ..run.simulations import fresh_seeds
-
+    def _profiles(self, rates: NDArray, liquids: Mapping[str, NDArray], purpose: Phase) -> Profiles:
         count = len(next(iter(liquids.values())))
-        seeds = np.array(fresh_seeds(self.settings.seed, purpose, count), np.int64)
+        seeds = np.array(simulation_seeds(self.settings.seed, purpose, count), np.int64)
         outcomes = Outcomes(liquids, self.density, self.cups, seeds)
         return pour_all(outcomes, rates, self.bank, self.advance)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..drawing import BLUE, INK, ORANGE
+from ..seeds import Phase, generator
 from .spillage import ACTION, RISK
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ def not_surely_worse(
     """
     if len(spilled) < MIN_COMPARED_DRAWS:
         return np.zeros(spilled.shape[1:], bool)
-    again = np.random.default_rng(seed).integers(
+    again = generator(seed, Phase.BOOTSTRAP).integers(
         len(spilled), size=(BOOTSTRAP_SAMPLES, len(spilled))
     )
     risks = np.stack([RISK[risk](spilled[draws]) for draws in again])

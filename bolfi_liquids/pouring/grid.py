@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..run.simulations import fresh_seeds
+from ..seeds import Phase, simulation_seeds
 from .spillage import (
     Outcomes,
     Profiles,
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from ..inference import Prior, SimulationBank
     from ..models import Cups
     from ..progress import Advance
-
-_PURPOSE = 31  # of seeds
 
 
 class GridSize(NamedTuple):
@@ -103,7 +101,7 @@ def make_grid(
     cohesion = np.linspace(low["cohesion"], high["cohesion"], size.cohesions)
     mesh = np.meshgrid(viscosity, cohesion, indexing="ij")
     theta = {"viscosity": mesh[0].ravel(), "cohesion": mesh[1].ravel()}
-    seeds = np.array(fresh_seeds(0, _PURPOSE, mesh[0].size), np.int64)
+    seeds = np.array(simulation_seeds(0, Phase.GRID_POURS, mesh[0].size), np.int64)
     rates = np.geomspace(*cups.angular_velocity_range, size.rates)
     made = pour_all(Outcomes(theta, density, cups, seeds), rates, bank, advance)
     return PourGrid(cups, np.log(viscosity), cohesion, made)

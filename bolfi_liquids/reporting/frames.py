@@ -24,7 +24,7 @@ from ..pouring.result import read_pour
 from ..progress import Advance, progress_bar
 from ..run.directory import FRAMES, POUR
 from ..run.recordings import kept_recordings
-from ..run.simulations import fresh_seeds
+from ..seeds import Phase, simulation_seeds
 from ..words import unit_of
 
 if TYPE_CHECKING:
@@ -44,8 +44,6 @@ MAX_STIR_SECONDS = 10.0
 FRAMES_FORMAT = 1
 """Of the file; another is made again."""
 
-_PURPOSE = 81  # of seeds
-
 
 def frames_of(run: str | Path, *, progress: bool = True) -> "Dataset":
     """The run's frames; simulated if there are none of this calibration and pour.
@@ -63,7 +61,7 @@ def frames_of(run: str | Path, *, progress: bool = True) -> "Dataset":
     seed = int(calibration.record["settings"]["seed"])
     theta = calibration.draws(N_DRAWS_SHOWN, seed)
     pour = _chosen(calibration.path)
-    seeds = fresh_seeds(seed, _PURPOSE, N_DRAWS_SHOWN)
+    seeds = simulation_seeds(seed, Phase.MOVING_PICTURES, N_DRAWS_SHOWN)
     made_from = _digest(theta, seeds, recording, calibration.record["settings"], pour)
     path = calibration.path / FRAMES
     if path.is_file():

@@ -11,6 +11,7 @@ import tomli_w
 
 from ..errors import InputError
 from ..files import write_text
+from .formats import upgraded
 from .summary import NAME as SUMMARY
 
 if TYPE_CHECKING:
@@ -113,7 +114,7 @@ def _unusable(path: Path, err: Exception) -> InputError:
 
 
 def read_run(run: Path) -> dict[str, Any]:
-    """The run's settings, as written when it started.
+    """The run's settings, as written when it started, in this version's form.
 
     Raises:
         InputError: There is no run.toml, or it is not TOML.
@@ -126,7 +127,7 @@ def read_run(run: Path) -> dict[str, Any]:
             fix="give the directory of a run, as made by: bolfi-liquids calibrate ... --out RUN",
         )
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return upgraded(tomllib.loads(path.read_text(encoding="utf-8")))
     except tomllib.TOMLDecodeError as err:
         raise InputError(f"not TOML ({err})", where=str(path), fix="restore the file") from err
 

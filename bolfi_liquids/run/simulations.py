@@ -83,15 +83,3 @@ def _jobs(theta: Mapping[str, NDArray], seeds: Sequence[int]) -> list[Job]:
         Job({name: float(values[at]) for name, values in theta.items()}, seed)
         for at, seed in enumerate(seeds)
     ]
-
-
-def fresh_seeds(seed: int, purpose: int, count: int) -> list[int]:
-    """Seeds in [0, 2^31) that neither the engine nor another purpose uses.
-
-    Args:
-        seed: Of the run.
-        purpose: Tells the uses of one run apart.
-        count: How many.
-    """
-    words = np.random.SeedSequence(seed, spawn_key=(purpose,)).generate_state(count)
-    return [int(word >> 1) for word in words]

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..prior import Prior
 from ..simulations.bank import SimulationBank
-from ..simulations.job import Job
+from ..simulations.job import BATCH, jobs
 from ..simulations.runner import run_missing
 from ..types import Simulator
 from .experiment import Experiment, Proposal
@@ -35,7 +35,7 @@ class Keeping:
     """
 
     bank: SimulationBank = field(default_factory=SimulationBank)
-    batch: int = 8
+    batch: int = BATCH
     seed: int = 0
     report: Report = silent
 
@@ -73,14 +73,11 @@ class Laboratory:
             RuntimeError: all of them failed.
         """
         seeds = phase_seeds(self.keeping.seed, phase, len(next(iter(theta.values()))))
-        jobs = [
-            Job({name: float(column[i]) for name, column in theta.items()}, int(seed))
-            for i, seed in enumerate(seeds)
-        ]
+        asked = jobs(theta, [int(seed) for seed in seeds])
         keeping = self.keeping
         results = run_missing(
             self.simulate,
-            jobs,
+            asked,
             None,
             keeping.bank,
             self.identity,
@@ -94,8 +91,8 @@ class Laboratory:
         }
         if not good:
             raise RuntimeError(
-                f"all {len(jobs)} simulations of the phase {phase!r} failed, the first at "
-                f"{jobs[0].theta}: {results[0].error or 'its output is not finite'}"
+                f"all {len(asked)} simulations of the phase {phase!r} failed, the first at "
+                f"{asked[0].theta}: {results[0].error or 'its output is not finite'}"
             )
         rows = list(good)
         kept = {name: np.asarray(column, float)[rows] for name, column in theta.items()}

@@ -3,6 +3,7 @@ from .bank import SimulationBank as SimulationBank
 from .bank import Simulations as Simulations
 from .job import Job as Job
 from .job import OneByOne as OneByOne
+from .job import columns as columns
 from .job import jobs as jobs
 from .job import stacked as stacked
 from .runner import Runner as Runner

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from ..types import Simulator
 from .bank import Simulation, SimulationBank
 from .executors import killed_its_worker
-from .failures import TIMEOUT, kind, raised
+from .failures import Failure, kind, raised
 from .job import Job, OneByOne, run_batch
 
 POLL = 0.2  # seconds between looks at what somebody else is simulating
@@ -216,7 +216,7 @@ def is_final(found: Simulation, timeout: float | None) -> bool:
     """
     if found.error is None:
         return True
-    if kind(found.error) != TIMEOUT:
+    if kind(found.error) is not Failure.TIMEOUT:
         return False
     return timeout is not None and timeout <= found.seconds
 

@@ -11,6 +11,7 @@ from bolfi_liquids.calibration.summary import ParameterSummary
 from bolfi_liquids.criticism.source_summary import Gap, SourceVerdict, Window
 from bolfi_liquids.criticism.summary import CameraNoise, CriticismSummary
 from bolfi_liquids.criticism.verdict import Verdict
+from bolfi_liquids.reporting.frames import frames_of
 from bolfi_liquids.run.directory import CRITICISM_FORMAT
 
 BUNDLED = Path(str(files("bolfi_liquids.data"))) / "glycerin_v10.nc"
@@ -50,6 +51,12 @@ def calibration(short_recording, tmp_path_factory):
 def pour(calibration):
     """A real pour, chosen over the calibration."""
     return bl.choose_pour(calibration, iterations=7, draws=4, progress=False)
+
+
+@pytest.fixture(scope="session")
+def frames(pour):
+    """What draws of the calibration look like, stirred and poured."""
+    return frames_of(pour.path, progress=False)
 
 
 @pytest.fixture

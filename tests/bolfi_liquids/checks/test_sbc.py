@@ -16,7 +16,6 @@ from bolfi_liquids.checks.sbc import check_sbc
 from bolfi_liquids.checks.sbc_pipelines import (
     CameraNoise,
     FromBank,
-    Quietly,
     _nearest,
 )
 from bolfi_liquids.inputs.settings import RUNS_PER_POINT, CalibrationSettings, SbcSettings
@@ -66,7 +65,7 @@ def test_every_batch_is_asked_with_random_numbers_of_its_own(monkeypatch):
     stirring = SimpleNamespace(discrepancy=lambda: None)
     settings = CalibrationSettings(budget=20, surrogate="signal")
     signals = clean[:, None, :, None] + noise
-    pipeline = Quietly(FromBank(stirring, prior, theta, signals, settings))
+    pipeline = FromBank(stirring, prior, theta, signals, settings)
     pipeline(clean[7][:, None], seed=1)
     assert len(Watching.keys) == len(set(Watching.keys)) == 3  # after the start design of eight
 
