@@ -63,7 +63,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         prior: Over `viscosity` [Pa s] and `cohesion` [1]; None is `default_prior()`.
         budget: Simulations that the engine may learn from. A dozen more judge the result, anew
             where a run grew.
-        seed: Of everything random.
+        seed: Of all random draws.
         surrogate: "discrepancy", the paper's, or "signal", which emulates the inclination itself.
         batch: Simulations run at the same time.
         particles: Of the simulated liquid.
@@ -188,7 +188,7 @@ def fit_recordings(  # noqa: PLR0913  what a calibration is made of
         keep: Finished simulations are taken from there and put there.
         budget: Simulations to learn from.
         surrogate: One of `settings.SURROGATES`.
-        seed: Of everything random.
+        seed: Of all random draws.
         simulate: In place of the stirring's own, such as one that reports.
         warn: Whether the emulator's complaints are raised as warnings.
     """
