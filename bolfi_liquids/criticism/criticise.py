@@ -1,4 +1,4 @@
-"""From a calibration to what its simulator lacks."""
+"""From a calibration to the effect that its simulator lacks."""
 
 import time
 from collections.abc import Sequence
@@ -64,10 +64,10 @@ def criticise(  # noqa: PLR0913  the one call that most users make
 
     Args:
         calibration: Of the stirs, or its RUN directory.
-        held_out: Recordings of the same liquid and rig by another path or speed, to which
-            nothing is fitted: what is named must hold on them.
-        baseline: Recordings of the same rig that are believed to lack nothing, of any liquid:
-            they teach what the simulator usually gets wrong.
+        held_out: Recordings of the same liquid and rig by another path or speed. They are not
+            fitted, and an effect that is named must hold on them.
+        baseline: Clean recordings of the same rig, of any liquid, in which no effect is believed
+            to be missing: their residuals count as simulator error.
         pours: A table of pours of the liquid, or its path; a second source.
         held_out_pours: Another, to which nothing is fitted.
         cups: With which they were poured; None takes the bundled ones.
@@ -180,7 +180,7 @@ def _pours(
     inputs: Inputs,
     keeping: "inference.criticism.Keeping",
 ) -> "inference.criticism.Criticism":
-    """The same for pours, of a liquid of which the stirs are known to have taught something."""
+    """The same for pours, with the posterior of the stirs as the prior."""
     from .. import inference
 
     density, settings = calibration.liquid_density, inputs.settings
