@@ -192,26 +192,50 @@ def test_a_run_is_not_overwritten(short_recording, tmp_path):
         OnlineCalibration.start(recording.gripper, recording.attrs, out=tmp_path)
 
 
-# the story above goes as far as the third stroke of a target that is never met
-@pytest.mark.parametrize(
-    "target",
-    [pytest.param(1e-9, marks=pytest.mark.minutes), pytest.param(0.9, marks=SIMULATES)],
-)
-def test_stops_at_the_target_or_at_the_last_stroke(short_recording, tmp_path, target):
+@pytest.fixture(scope="module")
+def finish(short_recording, tmp_path_factory):
+    """Replays the stir until a target is met, and calibrates; the estimates and the run."""
     recording = bl.open_recording(short_recording)
-    settings = replace(SMALL, budget=8, target=target, least_strokes=1)
-    with start(recording, tmp_path / "run", settings) as of:
-        assert of.wait_until_ready(PATIENCE_S), of.status
-        estimates = list(online.replay(recording, of))
-        strokes = [one.strokes for one in estimates]
-        assert strokes == ([1] if target == 0.9 else [1, 2, 3])
-        run = of.finish(recording, budget=8, progress=False)
+
+    def finish(target):
+        out = tmp_path_factory.mktemp("online") / "run"
+        settings = replace(SMALL, budget=8, target=target, least_strokes=1)
+        with start(recording, out, settings) as of:
+            assert of.wait_until_ready(PATIENCE_S), of.status
+            estimates = list(online.replay(recording, of))
+            return estimates, of.finish(recording, budget=8, progress=False)
+
+    return finish
+
+
+@pytest.fixture(scope="module")
+def met(finish):
+    return finish(0.9)
+
+
+@pytest.mark.slow
+@pytest.mark.alone
+def test_stops_at_the_target(met):
+    estimates, run = met
+    assert [one.strokes for one in estimates] == [1]
     calibration = bl.Calibration.open(run)
     assert calibration.summary["n_simulations"] == 8
-    online_last = estimates[-1].parameters["viscosity"]
+    last = estimates[-1].parameters["viscosity"]
     ordinary = calibration.summary["parameters"]["viscosity"]
-    assert online_last.q05 < ordinary["q95"] and ordinary["q05"] < online_last.q95
-    pour = bl.choose_pour(calibration, iterations=7, draws=2, progress=False)
+    assert last.q05 < ordinary["q95"] and ordinary["q05"] < last.q95
+
+
+@pytest.mark.minutes  # the story above goes as far, without the calibration
+def test_stops_at_the_last_stroke(finish):
+    estimates, run = finish(1e-9)
+    assert [one.strokes for one in estimates] == [1, 2, 3]
+    assert bl.Calibration.open(run).summary["n_simulations"] == 8
+
+
+@pytest.mark.minutes  # other tests have it of a calibration that was never online
+def test_a_pour_is_chosen_and_reported_after_an_online_calibration(met):
+    _, run = met
+    pour = bl.choose_pour(bl.Calibration.open(run), iterations=7, draws=2, progress=False)
     assert bl.report(run, moving=False).is_file() and 0.0 <= pour.chosen.expected_spillage <= 1.0
 
 
