@@ -18,9 +18,8 @@ from bolfi_liquids import models, online
 from bolfi_liquids.online import FAILED, READY, REFUSED, OnlineCalibration, OnlineSettings, SoFar
 from bolfi_liquids.online_outbox import Outbox, newest
 
-# the process that simulates gives way to others: beside another test it may get nothing for minutes
-SIMULATES = (pytest.mark.slow, pytest.mark.alone)
-PATIENCE_S = 120
+# the process that simulates gives way to others: beside another test it gets little
+PATIENCE_S = 600
 SMALL = OnlineSettings(particles=200, pours=64, design=8, budget=24, target=1e-9)
 
 
@@ -87,14 +86,12 @@ def story(short_recording, tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.alone
 def test_it_prepares_before_the_robot_moves(story):
     assert story.early.phase == "preparing"
     assert story.ready and story.status.simulations == SMALL.design
 
 
 @pytest.mark.slow
-@pytest.mark.alone
 def test_every_stroke_is_answered(story):
     assert [one.strokes for one in story.estimates] == [1, 2]
     for one in story.estimates:
@@ -107,13 +104,11 @@ def test_every_stroke_is_answered(story):
 
 
 @pytest.mark.slow
-@pytest.mark.alone
 def test_simulations_go_on_while_the_robot_stirs(story):
     assert story.later.simulations > SMALL.design
 
 
 @pytest.mark.slow
-@pytest.mark.alone
 def test_nothing_is_simulated_twice(story):
     connection = sqlite3.connect(story.out / online.BANK)
     rows = connection.execute("SELECT theta, seed FROM simulation").fetchall()
@@ -124,7 +119,6 @@ def test_nothing_is_simulated_twice(story):
 
 
 @pytest.mark.slow
-@pytest.mark.alone
 def test_estimates_are_logged(story):
     lines = (story.out / online.LOG).read_text().splitlines()
     logged = [json.loads(line) for line in lines]
@@ -134,13 +128,11 @@ def test_estimates_are_logged(story):
 
 
 @pytest.mark.slow
-@pytest.mark.alone
 def test_data_off_the_plan_are_refused_with_a_reason(story):
     assert "mm off its plan" in story.refused.detail
 
 
 @pytest.mark.slow
-@pytest.mark.alone
 def test_without_its_simulator_it_goes_on(story):
     assert story.last.strokes == 3
     assert (story.alone.phase, story.alone.in_flight) == (READY, 0)
@@ -148,7 +140,6 @@ def test_without_its_simulator_it_goes_on(story):
 
 
 @pytest.mark.slow
-@pytest.mark.alone
 def test_death_is_a_status_and_disturbs_nobody(story):
     assert "has died (exit code -9)" in story.dead.detail
     assert story.after is None
@@ -214,7 +205,6 @@ def met(finish):
 
 
 @pytest.mark.slow
-@pytest.mark.alone
 def test_stops_at_the_target(met):
     estimates, run = met
     assert [one.strokes for one in estimates] == [1]
