@@ -29,9 +29,8 @@ ROOT = Path(__file__).parents[2]
 PARTS = ("bolfi_liquids", "hardware", "inference", "models")
 SOURCES = {str(p.relative_to(ROOT)): p for part in PARTS for p in (ROOT / part).rglob("*.py")}
 REFUSED = 2
-PICTURES = (
-    900  # they are read at once: cameras that ended before the pre-flight list would be waited for
-)
+# they are read at once, and the pre-flight list would wait for cameras that have ended
+PICTURES = 900
 DIFFERENT = 20
 
 # what makes each command that knows of a rig do the most that it can without being armed
