@@ -82,7 +82,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         InputError: Something given cannot be used.
         RuntimeError: Simulations failed; the message says how.
     """
-    from ..inference import Keeping
+    from ..inference.criticism import Keeping
     from ..inference.simulations import open_executor
 
     if not isinstance(calibration, Calibration):

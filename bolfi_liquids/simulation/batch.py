@@ -104,8 +104,8 @@ def simulated(simulate: Simulate, batch: Batch, where: Where) -> NDArray[np.floa
     Raises:
         RuntimeError: A simulation failed.
     """
-    from ..inference import Job, SimulationBank
-    from ..inference.simulations import Keep, open_executor, run_missing
+    from ..inference import SimulationBank
+    from ..inference.simulations import Job, Keep, open_executor, run_missing
 
     jobs = [
         Job({"viscosity": one.viscosity, "cohesion": one.cohesion, **one.effects}, one.seed)

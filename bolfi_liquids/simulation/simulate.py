@@ -17,7 +17,7 @@ from ..inputs.cups import bundled_cups, open_cups
 from ..inputs.described_liquid import check_effects
 from ..inputs.open import Source, open_recordings
 from ..inputs.prior import split_parameters
-from ..inputs.recording import Gripper, Recording
+from ..inputs.recording import Recording, Trajectory
 from ..run.time_limit import TimeLimited
 from .batch import Where, batch_of, simulated
 from .files import check_targets, pour_dataset, stir_dataset
@@ -117,7 +117,7 @@ def _planned(
     recording: Recording, path: str | TimedPath | None, attrs: Mapping[str, float]
 ) -> Recording:
     """The recording with another path and other attributes."""
-    from ..hardware import circle, star
+    from ..hardware.motion import circle, star
 
     changed = replace(recording, attrs=MappingProxyType({**recording.attrs, **attrs}))
     if path is None:
@@ -125,13 +125,13 @@ def _planned(
     patterns = {"star": star, "circle": circle}
     if isinstance(path, str) and path not in patterns:
         raise InputError(
-            f"{path!r}", where="path", fix="give star, circle, or what hardware.star returns"
+            f"{path!r}", where="path", fix="give star, circle, or what hardware.motion.star returns"
         )
     name, timed = "path", path
     if isinstance(path, str):
         height = float(recording.gripper.position[0, 2])
         name, timed = path, patterns[path](speed=PATTERN_SPEED, height=height)
-    gripper = Gripper(
+    gripper = Trajectory(
         np.asarray(timed.time, np.float64),
         np.asarray(timed.position, np.float64),  # type: ignore[union-attr]
     )

@@ -10,7 +10,7 @@ import bolfi_liquids as bl
 from bolfi_liquids import hardware, models
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.cups import bundled_cups
-from bolfi_liquids.inputs.recording import Gripper
+from bolfi_liquids.inputs.recording import Trajectory
 
 SHORT = hardware.star(speed=0.2, height=0.235, radius=0.02, points=5, rest=0.2)
 FEW = {"particles": 120, "progress": False}
@@ -25,7 +25,7 @@ def pair():
 
 def test_a_stir_is_what_the_simulator_returns(pair):
     recording = bundled_recording("glycerin")
-    gripper = Gripper(SHORT.time, SHORT.position)
+    gripper = Trajectory(SHORT.time, SHORT.position)
     planned = replace(recording, gripper=gripper)
     setup = models.StirSetup.from_recording(planned, particles=FEW["particles"])
     liquid = models.Liquid(np.array([0.05, 2.0]), 0.3, 1100.0)
