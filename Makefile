@@ -4,32 +4,36 @@
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
-SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
+PYENV_VERSIONS := $(or $(PYENV_ROOT),$(HOME)/.pyenv)/versions
+# ArviZ 1 needs Python 3.12; pyenv's command `python3.12` fails where that version is not selected
+SUPPORTED := import sys, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
 
-FAST := not slow and not minutes and not gpu and not hardware and not benchmark
+# `make test ALSO=slow` adds the slow tests to the same session, as .ci/run does
+SELECTED := $(if $(filter slow,$(ALSO)),,not slow and )not minutes and not gpu and not hardware and not benchmark
 # tests that must keep time have the computer for themselves, the others share its processors
 ALONE := (punctual or alone)
 SHARED := -n logical --maxprocesses 4 --dist worksteal
 
 PEERS := .venv-peers
 PEERS_SUPPORTED := import sys, ensurepip; sys.exit(not (3, 9) <= sys.version_info[:2] <= (3, 10))
-PYENV_VERSIONS := $(or $(PYENV_ROOT),$(HOME)/.pyenv)/versions
 
-.PHONY: setup demo browser test test-slow test-long lint peers clean
+.PHONY: setup demo browser test test-long lint peers clean
 
 setup: $(INSTALLED)
 
 $(INSTALLED): pyproject.toml constraints.txt
 	@python=; \
-	for candidate in $(PYTHON) python3.12 python3.11 python3.13 python3 python; do \
-		if $$candidate -c "$(SUPPORTED)" >/dev/null 2>&1; then python=$$candidate; break; fi; \
+	for candidate in $(PYTHON) python3.12 "$(PYENV_VERSIONS)"/3.12.*/bin/python \
+		python3.13 "$(PYENV_VERSIONS)"/3.13.*/bin/python \
+		python3.11 "$(PYENV_VERSIONS)"/3.11.*/bin/python python3 python; do \
+		if "$$candidate" -c "$(SUPPORTED)" >/dev/null 2>&1; then python=$$candidate; break; fi; \
 	done; \
 	if [ -z "$$python" ]; then \
 		echo "make: no Python 3.11, 3.12 or 3.13 found; install one, or name it: make PYTHON=/path/to/python" >&2; \
 		exit 1; \
 	fi; \
-	echo "Setting up $(VENV) with $$($$python --version)"; \
-	$$python -m venv $(VENV)
+	echo "Setting up $(VENV) with $$("$$python" --version)"; \
+	"$$python" -m venv --clear $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	@touch $@
 
@@ -43,12 +47,8 @@ browser: setup
 	|| $(BIN)/playwright install --with-deps chromium
 
 test: setup
-	$(BIN)/pytest $(SHARED) -m "$(FAST) and not $(ALONE)"
-	$(BIN)/pytest -m "$(FAST) and $(ALONE)"
-
-test-slow: setup
-	$(BIN)/pytest $(SHARED) --durations 20 -m "slow and not $(ALONE)"
-	$(BIN)/pytest -m "slow and $(ALONE)"
+	$(BIN)/pytest $(SHARED) --durations 20 -m "$(SELECTED) and not $(ALONE)"
+	$(BIN)/pytest --durations 20 -m "$(SELECTED) and $(ALONE)"
 
 test-long: setup
 	$(BIN)/pytest -m minutes

@@ -11,5 +11,7 @@ from .pouring.result import Pour as Pour
 from .reporting.report import report as report
 from .robot.pour import execute_pour as execute_pour
 from .robot.record import record as record
+from .simulation.simulate import simulate_pour as simulate_pour
+from .simulation.simulate import simulate_stir as simulate_stir
 
 __version__: str

@@ -12,7 +12,7 @@ from .fluid.checks import check_numbers
 from .fluid.liquid import Liquid
 from .fluid.numerics import POUR_PARTICLES
 from .fluid.runtime import Watch
-from .pouring import watched_landings
+from .pouring import PourBatch, watched_landings
 from .stir_setup import StirSetup
 from .stirring import watched_stir
 from .trajectory import Trajectory
@@ -56,7 +56,7 @@ class PourFrames:
 Frames = TypeVar("Frames", StirFrames, PourFrames)
 
 
-def stir_frames(  # noqa: PLR0913  as of `stir`
+def stir_frames(
     liquid: Liquid,
     gripper: Trajectory,
     setup: StirSetup,
@@ -136,7 +136,8 @@ def pour_frames(  # noqa: PLR0913  as of `landings`
         seen.append(PourFrames(np.array(time), position, np.array(angle)))
 
     watch = Watch(rate, look)
-    landed = watched_landings(liquid, angular_velocity, cups, [seed], particles, effects, watch)
+    batch = PourBatch(liquid, angular_velocity, cups, [seed], particles, effects)
+    landed = watched_landings(batch, watch)
     frames = _joined(seen)
     if np.isnan(landed.retained).any():
         frames.position[:] = np.nan

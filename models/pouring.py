@@ -7,6 +7,7 @@ it is, changes nothing in the fluid: one simulation tells what any receiver woul
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -139,23 +140,26 @@ def landings(
     `Landings.into` makes of them what `pour` would have returned, the receiver's distance and
     radius in `cups` aside.
     """
-    return watched_landings(liquid, angular_velocity, cups, seeds, particles, effects)
+    return watched_landings(PourBatch(liquid, angular_velocity, cups, seeds, particles, effects))
 
 
-def watched_landings(  # noqa: PLR0913  `landings` with one more
-    liquid: Liquid,
-    angular_velocity: ArrayLike,
-    cups: Cups,
-    seeds: ArrayLike,
-    particles: int,
-    effects: Mapping[str, ArrayLike] | None,
-    watch: Watch | None = None,
-) -> Landings:
+class PourBatch(NamedTuple):
+    """Pours that are simulated together: the arguments of `landings`."""
+
+    liquid: Liquid
+    angular_velocity: ArrayLike
+    cups: Cups
+    seeds: ArrayLike
+    particles: int
+    effects: Mapping[str, ArrayLike] | None
+
+
+def watched_landings(batch: PourBatch, watch: Watch | None = None) -> Landings:
     """What `landings` returns, while `watch` looks at each of its scenes."""
-    seeds = checked_seeds(seeds)
-    acting = acting_in("pour", with_adhesion(liquid, effects, len(seeds)), len(seeds))
-    liquid = liquid.batch(len(seeds))
-    rate = _batch("angular_velocity", angular_velocity, len(seeds))
+    cups, particles, seeds = batch.cups, batch.particles, checked_seeds(batch.seeds)
+    acting = acting_in("pour", with_adhesion(batch.liquid, batch.effects, len(seeds)), len(seeds))
+    liquid = batch.liquid.batch(len(seeds))
+    rate = _batch("angular_velocity", batch.angular_velocity, len(seeds))
     if (rate <= 0).any():
         raise ValueError(f"angular_velocity must be positive [rad/s], got {rate.min()}")
     wrong = rate[(rate < SLOWEST) | (rate > FASTEST)]

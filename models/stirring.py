@@ -54,7 +54,7 @@ def stir(
     return watched_stir(liquid, gripper, setup, seeds, effects)
 
 
-def watched_stir(  # noqa: PLR0913  `stir` with one more
+def watched_stir(
     liquid: Liquid,
     gripper: Trajectory,
     setup: StirSetup,

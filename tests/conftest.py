@@ -52,7 +52,7 @@ def pytest_terminal_summary(terminalreporter, config):
     if repeated:
         terminalreporter.section("repeated, since this computer stood still")
         terminalreporter.write_line("\n".join(repeated))
-        terminalreporter.write_line(f"repeats: {len(repeated)}; above {MOST_REPEATS} is a failure")
+    terminalreporter.write_line(f"repeats: {len(repeated)}; above {MOST_REPEATS} is a failure")
 
 
 def pytest_sessionfinish(session, exitstatus):

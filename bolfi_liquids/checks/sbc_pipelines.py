@@ -1,7 +1,7 @@
 """Calibrations as pipelines of `inference.replicates`."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,28 +44,22 @@ class Calibrate:
         stirring: The simulator; its recording's inclination is not looked at.
         prior: Of the parameters.
         settings: Budget and surrogate; the seed is each replicate's.
+        timeout: Seconds that one simulation may take; None sets no limit.
     """
 
     stirring: Stirring
     prior: "Prior"
     settings: CalibrationSettings
+    timeout: float | None = field(default=None, compare=False)  # it decides no draw
 
     def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
         from ..inference import SimulationBank
-        from ..run.simulations import Keep
+        from ..inference.simulations import Keep
 
         with SimulationBank(":memory:") as bank:
-            keep = Keep(bank, self.stirring.identity, self.settings.batch)
-            fit = fit_recordings(
-                self.stirring,
-                observed,
-                self.prior,
-                keep,
-                budget=self.settings.budget,
-                surrogate=self.settings.surrogate,
-                seed=seed,
-                warn=False,
-            )
+            keep = Keep(bank, self.stirring.identity, timeout=self.timeout)
+            settings = replace(self.settings, seed=seed)
+            fit = fit_recordings(self.stirring, observed, self.prior, keep, settings, warn=False)
         return fit.sample(seed=seed, **SAMPLING), fit.log_prob
 
 

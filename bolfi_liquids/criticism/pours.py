@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..inputs.pour_table import PourTable
 from ..inputs.prior import split_parameters
+from ..run.time_limit import TimeLimited
 from ..seeds import Phase, simulation_seeds
 from .pour_noise import PourNoise
 
@@ -20,12 +21,14 @@ if TYPE_CHECKING:
     from ..inference.criticism import Experiment
     from ..models import Cups
 
-NARROWEST = 0.05  # sd of the log of a parameter, and share of another's prior interquartile range
+MIN_PRIOR_SD = 0.05
+"""Of the log of a log-uniform parameter, or as a share of another's prior interquartile range."""
+
 OUTCOMES = ("spilled", "retained")
 
 
 @dataclass(frozen=True)
-class Pouring:
+class Pouring(TimeLimited):
     """Pours of one liquid as a simulator.
 
     Attributes:
@@ -97,10 +100,10 @@ def pour_experiment(table: PourTable, cups: "Cups", density: float) -> "Experime
 
 
 def as_prior(theta: Mapping[str, NDArray], weights: NDArray, prior: "Prior") -> "Prior":
-    """What stirring taught, as the prior of the next experiment.
+    """The posterior of stirring, as the prior of the next experiment.
 
     Each parameter by itself: log-normal where its prior is log-uniform, else normal within the
-    prior's bounds. Stirring hardly correlates them.
+    prior's bounds. Their correlation after stirring is small.
 
     Args:
         theta: Points of the posterior, name -> (n,).
@@ -120,9 +123,11 @@ def as_prior(theta: Mapping[str, NDArray], weights: NDArray, prior: "Prior") -> 
     def learned(name: str, before: "Distribution") -> "Distribution":
         if isinstance(before, dist.LogUniform):
             mean, sd = moments(np.log(theta[name]))
-            return dist.LogNormal(mean, max(sd, NARROWEST))
+            return dist.LogNormal(mean, max(sd, MIN_PRIOR_SD))
         mean, sd = moments(theta[name])
         low, lower, upper, high = (float(quantile) for quantile in quantiles[name])
-        return dist.TruncatedNormal(mean, max(sd, NARROWEST * (upper - lower)), low=low, high=high)
+        return dist.TruncatedNormal(
+            mean, max(sd, MIN_PRIOR_SD * (upper - lower)), low=low, high=high
+        )
 
     return Prior({name: learned(name, before) for name, before in prior.distributions.items()})

@@ -33,7 +33,7 @@ from .spillage import (
 from .tree import pour_tree
 
 if TYPE_CHECKING:
-    from ..inference import SimulationBank
+    from ..inference.simulations import Keep, Workers
     from ..models import Cups
 
 PLUG_IN_SEEDS = 4
@@ -60,6 +60,8 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     draws: int = 16,
     risk: str = "mean",
     seed: int = 0,
+    executor: "Workers | None" = None,
+    timeout: float | None = None,
     progress: bool = True,
 ) -> Pour:
     """Choose angular velocity and distance so that little is spilled whatever the liquid is.
@@ -78,13 +80,17 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         iterations: Angular velocities tried, as many again for the plug-in.
         draws: Posterior draws that each action is tried on, and again those that promise most.
         risk: "mean", or "cvar": the mean over the worst tenth of the draws.
-        seed: Of all random draws.
+        seed: Seed of all random draws.
+        executor: Where pours are simulated, see `calibrate`; the result has the same bits.
+        timeout: Seconds that one pour may take; None sets no limit.
         progress: Whether to show a bar on stderr.
 
     Raises:
         InputError: A setting or the file of the cups cannot be used.
         RuntimeError: Pours failed at every angular velocity, or at all of the promising ones.
     """
+    from ..inference.simulations import Keep, open_executor
+
     if not isinstance(calibration, Calibration):
         calibration = latest_calibration(calibration)
     settings = PourSettings(iterations=iterations, draws=draws, risk=risk, seed=seed)
@@ -93,9 +99,11 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     drawn = strata(calibration, draws, seed)
     with (
         open_bank(calibration.path) as bank,
+        open_executor(executor) as workers,
         progress_bar("trying actions", 2 * iterations + N_FINALISTS + 3, shown=progress) as advance,
     ):
-        pours = _Pours(cups, calibration.liquid_density, settings, bank, advance)
+        keep = Keep(bank, executor=workers, timeout=timeout)
+        pours = _Pours(cups, calibration.liquid_density, settings, keep, advance)
         choice = _search(pours, drawn, calibration.best)
         pour = _judge(pours, choice, drawn.judge, calibration.path)
     _keep(pour, choice, drawn, pours)
@@ -204,7 +212,7 @@ class _Pours:
     cups: "Cups"
     density: float
     settings: PourSettings
-    bank: "SimulationBank"
+    keep: "Keep"
     advance: Advance
 
     def try_all(self, liquids: Mapping[str, NDArray]) -> Surface:
@@ -236,4 +244,4 @@ class _Pours:
         count = len(next(iter(liquids.values())))
         seeds = np.array(simulation_seeds(self.settings.seed, purpose, count), np.int64)
         outcomes = Outcomes(liquids, self.density, self.cups, seeds)
-        return pour_all(outcomes, rates, self.bank, self.advance)
+        return pour_all(outcomes, rates, self.keep, self.advance)

@@ -146,7 +146,7 @@ def make_pours(
     Raises:
         InputError: `pours` is too small.
     """
-    from ..inference.simulations import columns, run_missing, stacked
+    from ..inference.simulations import Keep, columns, run_missing, stacked
 
     if pours < LEAST_POURS:
         raise InputError(f"{pours}", where="pours", fix=f"give at least {LEAST_POURS}")
@@ -162,7 +162,8 @@ def make_pours(
     identity = json.dumps(["spillage map", cups.settings(), density], sort_keys=True)
     missing = sum(bank.get(identity, *job) is None for job in jobs)
     with progress_bar("pours for the map", pours, shown=progress and missing > 0) as advance:
-        results = run_missing(simulate, jobs, (1,), bank, identity, batch=AT_ONCE, advance=advance)
+        keep = Keep(bank, identity, AT_ONCE)
+        results = run_missing(simulate, jobs, keep, (1,), advance=advance)
     return columns(jobs)[0], stacked(results, (1,))[:, 0]
 
 

@@ -18,7 +18,8 @@ from .hover import short
 if TYPE_CHECKING:
     from xarray import Dataset
 
-STEPS = 254  # of a byte that a coordinate is rounded to; the last value marks what has gone
+BYTE_LEVELS = 254
+"""Values of a byte that a coordinate is rounded to; 255 marks a particle that is gone."""
 
 
 def moving_context(calibration: Calibration, frames: "Dataset") -> dict[str, Any] | None:
@@ -117,7 +118,7 @@ def _packed(position: NDArray) -> dict[str, Any]:
     """Positions (draws, frames, n, 3) as bytes between the ends of each axis, in base64."""
     there = position[np.isfinite(position).all(axis=-1)]
     low, high = (there.min(axis=0), there.max(axis=0)) if len(there) else (np.zeros(3), np.ones(3))
-    scaled = np.round(STEPS * (position - low) / np.maximum(high - low, 1e-9))
+    scaled = np.round(BYTE_LEVELS * (position - low) / np.maximum(high - low, 1e-9))
     bytes_ = np.where(np.isnan(scaled), 255, scaled).astype(np.uint8)
     return {
         "low": low.tolist(),

@@ -25,7 +25,7 @@ from .warnings import Results, warnings_of
 if TYPE_CHECKING:
     from xarray import DataTree
 
-TEMPLATE = "report.html.jinja"
+PAGE_TEMPLATE = "report.html.jinja"
 
 
 def report(run: str | Path, *, moving: bool = True, progress: bool = True) -> Path:
@@ -52,7 +52,7 @@ def report(run: str | Path, *, moving: bool = True, progress: bool = True) -> Pa
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    page = environment.get_template(TEMPLATE).render(
+    page = environment.get_template(PAGE_TEMPLATE).render(
         calibration=_calibration_context(calibration),
         criticism=criticism,
         pour=poured and _pour_context(*poured),

@@ -57,7 +57,8 @@ class ByStirring:
 
     def _one(self, truth: dict[str, NDArray], seed: int) -> NDArray[np.float64]:
         from ..inference import Bolfi, SimulationBank
-        from ..run.simulations import Keep, keeping
+        from ..inference.simulations import Keep
+        from ..run.simulations import keeping
 
         stirring = self.stirring
         with SimulationBank(self.bank) as bank:
@@ -106,7 +107,8 @@ class ByPouring:
 
     def _one(self, truth: dict[str, NDArray], seed: int) -> NDArray[np.float64]:
         from ..inference import Bolfi, SimulationBank
-        from ..run.simulations import Keep, keeping
+        from ..inference.simulations import Keep
+        from ..run.simulations import keeping
 
         rules: dict[str, Any] = {**PAPER_RULES}
         with SimulationBank(self.bank) as bank:

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..inference.simulations import Keep
 from ..pouring.spillage import (
     STEP,
     Outcomes,
     Profiles,
     pour_all,
 )
+from ..progress import silent
 from ..seeds import Phase, generator, simulation_seeds
 from .calibrations import NAMES
 from .truths import DENSITY, Truths
@@ -101,7 +103,7 @@ def spilled_by(
 ) -> NDArray[np.float64]:
     """Spilled fraction of each action, the mean over the outcomes' seeds."""
     rates = np.unique([action["angular_velocity"] for action in actions])
-    made = pour_all(outcomes, rates, bank, lambda steps: None)
+    made = pour_all(outcomes, rates, Keep(bank), silent)
     return np.array([_spilled(made, action) for action in actions])
 
 

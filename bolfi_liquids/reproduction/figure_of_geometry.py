@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from ..drawing import INK, new_figure, styled
+from ..inference.simulations import Keep
 from ..inputs.cups import bundled_cups
 from ..pouring.spillage import STEP, landing_sd
-from ..progress import progress_bar, reported
-from ..run.simulations import Keep, simulate_kept
+from ..progress import progress_bar
+from ..run.simulations import simulate_kept
 from ..seeds import Phase, simulation_seeds
 from .figure import Drawn
 from .truths import DENSITY
@@ -76,8 +77,8 @@ def geometry(workshop: Workshop) -> Drawn:
             poured = Poured(cups)
             rates = np.geomspace(*cups.angular_velocity_range, RATES)
             keep = Keep(workshop.bank, poured.identity, 1)
-            simulate = reported(poured.simulate, advance)
-            made = simulate_kept(simulate, {"angular_velocity": rates}, [0] * RATES, keep)
+            theta = {"angular_velocity": rates}
+            made = simulate_kept(poured.simulate, theta, [0] * RATES, keep, advance=advance)
             regret[row] = _regret(made.signals, cups)
     with styled():
         figure = new_figure(5.6, 3.9)

@@ -34,7 +34,7 @@ def write_board(path: Path) -> Path:
     return path
 
 
-def calibrate_view(  # noqa: PLR0913  one for each thing a person may give
+def calibrate_view(
     rig: Path | None,
     view: str,
     square: float,

@@ -44,7 +44,7 @@ class RenderedCamera:
     camera is more than `LATEST` behind, as a real one drops what nobody fetched.
     """
 
-    def __init__(  # noqa: PLR0913  three of them only replace the computer's clock and the disk
+    def __init__(
         self,
         stage: Stage,
         world: World,

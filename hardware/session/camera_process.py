@@ -32,7 +32,7 @@ PATIENCE = 0.3  # [s]; how long a camera that does not answer may hold up the en
 WHO: dict[View, Who] = {"xz": Who.CAMERA_XZ, "yz": Who.CAMERA_YZ}
 
 
-def run_camera(  # noqa: PLR0913  what a spawned process needs comes as arguments
+def run_camera(
     rig: Rig,
     view: View,
     make_camera: Callable[[], Camera],

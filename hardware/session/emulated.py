@@ -60,7 +60,7 @@ class EmulatedRig(NamedTuple):
 
 
 @contextmanager
-def emulated(  # noqa: PLR0913  what a person may choose
+def emulated(
     rig: Rig,
     pose: np.ndarray,
     *,

@@ -40,7 +40,7 @@ def sampled_rows(image: np.ndarray, sign: float, rows: Rows) -> np.ndarray:
     return np.float32(sign) * image[rows.first : rows.last : ROW_STEP]
 
 
-def search_rays(  # noqa: PLR0913  the picture, the pivot, and three sizes
+def search_rays(
     lines: np.ndarray,
     columns: np.ndarray,
     pivot_row: float,

@@ -1,7 +1,6 @@
 """The engine as a pipeline, with simulations of its own or with a design that is shared."""
 
 from collections.abc import Mapping
-from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from inspect import signature
 from pathlib import Path
@@ -15,8 +14,9 @@ from ..bolfi import MIN_LEARN, Bolfi
 from ..loop import fit
 from ..prior import Prior
 from ..simulations.bank import SimulationBank
+from ..simulations.executors import Workers, open_executor
 from ..simulations.job import jobs, simulation_seed, stacked
-from ..simulations.runner import run_missing
+from ..simulations.runner import Keep, run_missing
 from ..sobol import sobol
 from ..surrogates.families import resolve
 from ..types import Simulator
@@ -103,7 +103,7 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
     seed: int = 0,
     options: Options | None = None,
     sampling: Options | None = None,
-    executor: Executor | None = None,
+    executor: Workers | None = None,
     bank: str | Path = ":memory:",
     identity: str = "",
     warn: bool = True,
@@ -128,8 +128,9 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
     n, seed = checked_integer("n", n, MIN_LEARN), checked_integer("seed", seed, 0)
     theta = prior.from_unit(sobol(seed, 0, n, len(prior)))
     seeds = [simulation_seed(seed, i) for i in range(n)]
-    with SimulationBank(bank) as kept:
-        made = run_missing(simulate, jobs(theta, seeds), None, kept, identity, executor)
+    with SimulationBank(bank) as kept, open_executor(executor) as workers:
+        keep = Keep(kept, identity, executor=workers)
+        made = run_missing(simulate, jobs(theta, seeds), keep)
     good = sum(result.signal is not None for result in made)
     if good < MIN_LEARN:
         first = next((result.error for result in made if result.error), "none")

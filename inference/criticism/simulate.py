@@ -1,6 +1,7 @@
 """Runs of a simulator and of its extensions, kept in a bank."""
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -9,7 +10,7 @@ import numpy as np
 from ..prior import Prior
 from ..simulations.bank import SimulationBank
 from ..simulations.job import BATCH, jobs
-from ..simulations.runner import run_missing
+from ..simulations.runner import Keep, run_missing
 from ..types import Simulator
 from .experiment import Experiment, Proposal
 from .extension import Extensions
@@ -31,13 +32,21 @@ class Keeping:
         bank: Takes every finished one; what it holds is not simulated again.
         batch: Simulated in one call.
         seed: All of their seeds derive from it.
-        report: Told of every batch.
+        report: Told of every simulation.
+        executor: Simulates each run in a call of its own; None simulates in this process.
+        timeout: Seconds that one run may take; None sets no limit.
     """
 
     bank: SimulationBank = field(default_factory=SimulationBank)
     batch: int = BATCH
     seed: int = 0
     report: Report = silent
+    executor: Executor | None = None
+    timeout: float | None = None
+
+    def of(self, identity: str) -> Keep:
+        """The same for one simulator, by its name in the bank."""
+        return Keep(self.bank, identity, self.batch, self.executor, self.timeout)
 
 
 @dataclass(frozen=True)
@@ -75,15 +84,8 @@ class Laboratory:
         seeds = phase_seeds(self.keeping.seed, phase, len(next(iter(theta.values()))))
         asked = jobs(theta, [int(seed) for seed in seeds])
         keeping = self.keeping
-        results = run_missing(
-            self.simulate,
-            asked,
-            None,
-            keeping.bank,
-            self.identity,
-            batch=keeping.batch,
-            advance=partial(keeping.report, phase),
-        )
+        report = partial(keeping.report, phase)
+        results = run_missing(self.simulate, asked, keeping.of(self.identity), advance=report)
         good = {
             i: result.signal
             for i, result in enumerate(results)

@@ -101,7 +101,7 @@ def _sampler(
     ]
     sampler = emcee.EnsembleSampler(walkers, d, log_prob, moves=moves, vectorize=True)
     seed = int(rng.integers(2**31))
-    sampler.random_state = np.random.RandomState(seed).get_state()  # noqa: NPY002  emcee's own
+    sampler.random_state = np.random.RandomState(seed).get_state()  # emcee wants this one
     return sampler
 
 

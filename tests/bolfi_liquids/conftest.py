@@ -1,4 +1,8 @@
+import fcntl
 import json
+import os
+import shutil
+from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
 
@@ -42,9 +46,27 @@ def settings():
 
 @pytest.fixture(scope="session")
 def calibration(short_recording, tmp_path_factory):
-    """A real calibration, as small as the engine allows it to be useful."""
-    out = tmp_path_factory.mktemp("runs") / "calibrated"
-    return bl.calibrate(short_recording, out=out, progress=False, **SETTINGS)
+    """A real calibration, as small as the engine allows it to be useful.
+
+    Of the workers of a session the first makes it and each takes a copy, for tests change theirs.
+    """
+    own = tmp_path_factory.mktemp("runs") / "calibrated"
+    base = tmp_path_factory.getbasetemp()
+    shared = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "calibrated"
+    with alone_with(shared.with_suffix(".lock")):
+        if not (shared / "summary.json").exists():
+            shutil.rmtree(shared, ignore_errors=True)  # of a worker that was killed in the middle
+            bl.calibrate(short_recording, out=shared, progress=False, **SETTINGS)
+        shutil.copytree(shared, own)
+    return bl.Calibration.open(own)
+
+
+@contextmanager
+def alone_with(path):
+    """Only one process at a time; the lock ends with its process."""
+    with path.open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bolfi_liquids.models.fluid.runtime import Watch
-from bolfi_liquids.models.pouring import watched_landings
+from bolfi_liquids.models.pouring import PourBatch, watched_landings
 
 from bolfi_liquids import models
 
@@ -71,7 +71,7 @@ def test_looking_changes_no_bit(oil, cups):
     flying = np.isfinite(some.position[-1]).all(axis=-1).sum()
     assert np.isfinite(landed.position[0]).all(axis=-1).sum() == PARTICLES - flying
     watch = Watch(10.0, lambda scene, step: None)
-    watched = watched_landings(oil, RATE, cups, [2], PARTICLES, None, watch)
+    watched = watched_landings(PourBatch(oil, RATE, cups, [2], PARTICLES, None), watch)
     np.testing.assert_array_equal(watched.position, landed.position)
 
 

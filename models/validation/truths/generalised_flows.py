@@ -15,7 +15,7 @@ from scipy.optimize import root_scalar
 NODES = 2001  # across half a channel, for the profiles that are integrated
 
 
-def herschel_bulkley_channel(  # noqa: PLR0913  the liquid's three numbers and the channel's
+def herschel_bulkley_channel(
     z: ArrayLike,
     *,
     gap: float,

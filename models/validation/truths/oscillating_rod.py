@@ -45,7 +45,7 @@ def stokes_reaction(radius: float, angular_frequency: float, kinematic: float) -
     return Reaction(float(reaction.real), float(-reaction.imag))
 
 
-def swing_in_liquid(  # noqa: PLR0913  a rod, a liquid and the cup around it
+def swing_in_liquid(
     rod: Rod,
     submerged: float,
     *,

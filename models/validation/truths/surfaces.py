@@ -33,7 +33,7 @@ def jeffreys_thickness(
     return np.sqrt(np.asarray(viscosity, float) * z / (density * gravity * time))
 
 
-def jeffreys_volume(  # noqa: PLR0913  a wall and a liquid
+def jeffreys_volume(
     width: float,
     height: float,
     time: ArrayLike,

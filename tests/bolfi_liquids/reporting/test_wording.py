@@ -16,7 +16,7 @@ TEMPLATES = {
     path.name.removesuffix("_sentences.jinja"): path.read_text(encoding="utf-8")
     for path in Path(str(files("bolfi_liquids.data"))).glob("*_sentences.jinja")
 }
-KEY = re.compile(rf"({'|'.join(TEMPLATES)})\.[a-z_]+")
+KEY = re.compile(rf"({'|'.join(TEMPLATES)})\.(?!nc$)[a-z_]+")
 
 
 def keys_in_the_source():

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from bolfi_liquids.inference import SimulationBank
+from bolfi_liquids.inference.simulations import Keep
 
 from bolfi_liquids.run.simulations import (
-    Keep,
     keeping,
     simulate_kept,
 )

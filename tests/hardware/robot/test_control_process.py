@@ -261,7 +261,7 @@ def controlled(tmp_path):
 
 @pytest.mark.punctual  # what a signal does to a process, and to the arm that it moves
 @pytest.mark.parametrize(
-    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)]
+    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.minutes)]
 )
 def test_a_signal_stops_the_arm(controlled, number):
     controlled.wait_for(Checked)
