@@ -10,7 +10,7 @@ from .recording import Recording
 MIN_SAMPLES = 10
 MAX_GRIPPER_GAP = 0.2
 """Longest gap in the gripper's path that is interpolated [s]: less than half a stroke."""
-MAX_BLIND = 0.5
+MAX_UNSEEN_TIME = 0.5
 """Longest time that the stick may be out of sight [s]: a longer one hides most of a stroke."""
 MIN_SEEN = 0.5
 """Smallest share of a plane's samples in which the stick must have been seen."""
@@ -157,11 +157,11 @@ def _check_inclination(recording: Recording) -> None:
                 fix=f"the stick must be seen in at least {MIN_SEEN:.0%} of them: record again",
             )
         gap, start = longest_gap(recording.time, seen)
-        if gap > MAX_BLIND:
+        if gap > MAX_UNSEEN_TIME:
             raise InputError(
                 f"NaN for {gap:.2f} s from {start:.2f} s on",
                 where=where,
-                fix=f"gaps up to {MAX_BLIND} s can be skipped: cut the recording before it",
+                fix=f"gaps up to {MAX_UNSEEN_TIME} s can be skipped: cut the recording before it",
             )
         largest = np.abs(values[seen]).max()
         if np.isinf(largest):

@@ -12,7 +12,7 @@ from .table import Table, read_table
 
 ACTIONS = ("angular_velocity_deg_s", "distance_cm")
 AMOUNTS = ("spilled", "received", "retained")
-RANGES = (1.0, 1000.0), (-20.0, 50.0)  # of the actions, in their units
+ACTION_RANGES = (1.0, 1000.0), (-20.0, 50.0)  # of the actions, in their units
 LIQUID = "liquid"
 MIN_POURS = 3  # from which anything can be learned
 FIX_LINE = "mend or remove the line"
@@ -119,7 +119,7 @@ def _of_liquid(table: Table, liquid: str | None) -> tuple[Table, str]:
 def _check_actions(table: Table, actions: NDArray) -> None:
     """Raise InputError for what no robot could do."""
     for line, row in zip(table.lines, actions, strict=True):
-        for name, value, (least, most) in zip(ACTIONS, row, RANGES, strict=True):
+        for name, value, (least, most) in zip(ACTIONS, row, ACTION_RANGES, strict=True):
             if not least <= value <= most:
                 raise InputError(
                     f"{value:g} is not between {least:g} and {most:g}",

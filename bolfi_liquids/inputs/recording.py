@@ -66,15 +66,13 @@ class Recording:
     def _rows(self) -> dict[str, str]:
         """What it is of, by subject; without what the file does not say."""
         length = f"{self.time[-1] - self.time[0]:.1f} s" if len(self.time) else "0 s"
+        parts = {
+            subject: [_told(name, self.attrs[name]) for name in names if name in self.attrs]
+            for subject, names in SUBJECTS.items()
+        }
         return {
             "duration": f"{length} ({len(self.time)} samples)",
-            **{
-                subject: ", ".join(parts)
-                for subject, names in SUBJECTS.items()
-                if (
-                    parts := [_told(name, self.attrs[name]) for name in names if name in self.attrs]
-                )
-            },
+            **{subject: ", ".join(told) for subject, told in parts.items() if told},
         }
 
     def number(self, name: str) -> float:

@@ -7,9 +7,12 @@ from numpy.typing import NDArray
 
 from .recording import Recording
 
-MOVING = 0.5  # of the greatest speed: corners are too short for samples to see them at rest
-STILL = 1e-4  # m
-PARTS = 8  # of a stir without separate strokes
+MOVING_SHARE = 0.5
+"""Share of the greatest speed above which the gripper moves: it rests too shortly at corners."""
+MAX_REST_TRAVEL = 1e-4
+"""Distance from its first position within which the gripper rests [m]."""
+EVEN_PARTS = 8
+"""Parts into which a stir without separate strokes is cut."""
 
 
 class Stroke(NamedTuple):
@@ -25,7 +28,7 @@ class Stroke(NamedTuple):
 
 
 def speed(recording: Recording) -> NDArray[np.float64]:
-    """Of the gripper at each sample [m/s], shape (T,)."""
+    """Speed of the gripper at each sample [m/s], shape (T,)."""
     velocity = np.gradient(recording.gripper.position, recording.time, axis=0)
     return np.linalg.norm(velocity, axis=1)
 
@@ -33,21 +36,21 @@ def speed(recording: Recording) -> NDArray[np.float64]:
 def resting(recording: Recording) -> NDArray[np.bool_]:
     """Samples before the gripper first moves, bool (T,)."""
     position = recording.gripper.position
-    moved = np.linalg.norm(position - position[0], axis=1) > STILL
+    moved = np.linalg.norm(position - position[0], axis=1) > MAX_REST_TRAVEL
     return np.cumsum(moved) == 0
 
 
 def strokes(recording: Recording) -> list[Stroke]:
     """The recording cut where the gripper stands still, or evenly where it never does."""
     fast = speed(recording)
-    moving = fast > MOVING * fast.max()
+    moving = fast > MOVING_SHARE * fast.max()
     begins = moving & ~np.append(False, moving[:-1])
     number = np.cumsum(begins)
     count = int(number[-1])
     if count < 2:
-        edges = np.linspace(recording.time[0], recording.time[-1], PARTS + 1)[1:-1]
+        edges = np.linspace(recording.time[0], recording.time[-1], EVEN_PARTS + 1)[1:-1]
         number = 1 + np.digitize(recording.time, edges)
-        count = PARTS
+        count = EVEN_PARTS
     else:
         after = np.flatnonzero(moving)[-1]
         number[after + 1 :] = count + 1

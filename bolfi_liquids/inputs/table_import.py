@@ -90,7 +90,7 @@ def _check_target(out: Path) -> None:
 
 
 def _attributes(path: Path) -> dict[str, Any]:
-    """Of a NetCDF file; none if it is something else."""
+    """Attributes of a NetCDF file; none if it is something else."""
     from xarray import open_dataset
 
     try:
@@ -161,7 +161,7 @@ def _sizes(recording: Recording) -> Iterator[str]:
 
 
 def _trailing(recording: Recording) -> Iterator[str]:
-    """How the inclinations go with the gripper, and what is strange about that."""
+    """Correlation of inclinations and gripper, and a warning where it is unusual."""
     for name, angle, at in zip(PLANES, recording.inclination.T, (0, 1), strict=True):
         along, across = (
             _correlation(angle, recording.gripper.position[:, axis]) for axis in (at, 1 - at)

@@ -23,7 +23,7 @@ class Scale:
         particles: Of the stirs by which bundled recordings are calibrated.
         drawn_particles: Of the stirs of drawn truths, and of those by which they are calibrated.
         grid: Of the pours by which actions are chosen.
-        seed: Of everything random.
+        seed: Seed of all random draws.
     """
 
     repetitions: int = 5

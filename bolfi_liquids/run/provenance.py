@@ -8,7 +8,7 @@ LIBRARIES = ("bolfi-liquids", "numpy", "scipy", "jax", "numpyro", "emcee", "taic
 
 
 def generations() -> dict[str, str]:
-    """Of engine and model: what another one made is not to be taken for this one's."""
+    """Versions of engine and model; results of another version are other results."""
     from ..inference.engine_version import ENGINE_VERSION
     from ..models import MODEL_VERSION
 
@@ -16,5 +16,5 @@ def generations() -> dict[str, str]:
 
 
 def versions(libraries: Iterable[str]) -> dict[str, str]:
-    """Of Python and the named libraries."""
+    """Versions of Python and of the named libraries."""
     return {"python": platform.python_version()} | {name: version(name) for name in libraries}

@@ -11,7 +11,7 @@ from bolfi_liquids.calibration.stir_simulator import stirring_of
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.recording import Recording, Trajectory
 from bolfi_liquids.inputs.strokes import (
-    PARTS,
+    EVEN_PARTS,
     resting,
     speed,
     stroke_numbers,
@@ -40,7 +40,7 @@ def test_a_star_of_nine_points_has_its_strokes_and_a_rest_on_each_side():
 
 def test_a_circle_has_no_strokes_and_is_cut_evenly():
     recording = recorded(circle(speed=0.1, height=0.2))
-    assert [stroke.number for stroke in strokes(recording)] == list(range(1, PARTS + 1))
+    assert [stroke.number for stroke in strokes(recording)] == list(range(1, EVEN_PARTS + 1))
     assert speed(recording).max() < 0.2
 
 
