@@ -69,7 +69,7 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
         cohesion: Cohesion of the liquid, 0 to 1; a number or shape (B,).
         density: Density of the liquid [kg/m3]; None is the recording's.
         effects: Coefficients of `models.EFFECTS` by name.
-        path: "star" or "circle", at 10 cm/s, or a path such as `hardware.star(speed=0.05,
+        path: "star" or "circle", at 10 cm/s, or a path such as `hardware.motion.star(speed=0.05,
             height=0.235)` returns; None is the recording's.
         rig: Attributes of a recording, such as `cup_radius` [m], in place of the recording's.
         recording: Whose path and rig are used, or its file; None is a bundled stir of glycerin.

@@ -1,8 +1,12 @@
-"""Quasi-Newton minimisation of many small problems at once, and of one over the unit box."""
+"""Quasi-Newton minimisation of many small problems at once, and of one over the unit box.
+
+With Optimistix's BFGS under `vmap` and LAPACK's Cholesky factor, hyperparameters of eight processes
+with 60 points took 0.11 s of CPU time instead of 0.07 s, and twice as long to compile.
+"""
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -13,7 +17,7 @@ from ..sobol import sobol
 SCREENED, REFINED = 512, 3
 EDGE = 1e-6  # the box is [EDGE, 1 - EDGE]: beyond lie only tails of unbounded priors
 ITERATIONS, BACKTRACKS = 40, 8
-LONGEST = 1.0  # of a step, in every coordinate
+LONGEST_STEP = 1.0  # of a step, in every coordinate
 ARMIJO = 1e-4
 
 Objective = Callable[[Any, jax.Array], jax.Array]
@@ -41,24 +45,29 @@ def minimise_many(
     """
     x = np.array(start, np.float64)
     k, d = x.shape
-    value, gradient = _evaluate(value_and_grad, x, wanted)
-    inverse = np.tile(np.eye(d), (k, 1, 1)) / np.maximum(1.0, _norm(gradient))[:, None, None]
-    active = wanted & np.isfinite(value)
+    now = Points(x, *_evaluate(value_and_grad, x, wanted))
+    inverse = np.tile(np.eye(d), (k, 1, 1)) / np.maximum(1.0, _norm(now.gradient))[:, None, None]
+    active = wanted & np.isfinite(now.value)
     for _ in range(ITERATIONS):
         if not active.any():
             break
-        step = -np.einsum("kij,kj->ki", inverse, gradient)
-        step /= np.maximum(1.0, np.abs(step).max(1, keepdims=True) / LONGEST)
-        slope = np.sum(step * gradient, 1)
-        moved, new_value, new_gradient = _search(
-            value_and_grad, x, value, gradient, step, slope, active
-        )
-        change, turn = moved - x, new_gradient - gradient
-        gain = np.subtract(value, new_value, where=active, out=np.zeros(k))
+        step = -np.einsum("kij,kj->ki", inverse, now.gradient)
+        step /= np.maximum(1.0, np.abs(step).max(1, keepdims=True) / LONGEST_STEP)
+        moved = _search(value_and_grad, now, step, active)
+        change, turn = moved.x - now.x, moved.gradient - now.gradient
+        gain = np.subtract(now.value, moved.value, where=active, out=np.zeros(k))
         inverse = _update(inverse, change, turn)
-        x, value, gradient = moved, new_value, new_gradient
+        now = moved
         active &= gain > tolerance
-    return x, value
+    return now.x, now.value
+
+
+class Points(NamedTuple):
+    """Where k searches are, and what they found there."""
+
+    x: np.ndarray  # [k, d]
+    value: np.ndarray  # [k]
+    gradient: np.ndarray  # [k, d]
 
 
 def _evaluate(
@@ -73,25 +82,20 @@ def _norm(gradient: np.ndarray) -> np.ndarray:
     return np.sqrt(np.sum(gradient**2, 1))
 
 
-def _search(  # noqa: PLR0913  the state of a line search
-    value_and_grad: ValueAndGrad,
-    x: np.ndarray,
-    value: np.ndarray,
-    gradient: np.ndarray,
-    step: np.ndarray,
-    slope: np.ndarray,
-    active: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _search(
+    value_and_grad: ValueAndGrad, now: Points, step: np.ndarray, active: np.ndarray
+) -> Points:
     """Backtrack until every active problem has gained enough; those that cannot stay."""
+    slope = np.sum(step * now.gradient, 1)
     length = np.where(active, 1.0, 0.0)
     done = ~active
-    best = x.copy(), value.copy(), gradient.copy()
+    best = Points(*(part.copy() for part in now))
     for _ in range(BACKTRACKS):
-        trial = x + length[:, None] * step
-        new_value, new_gradient = _evaluate(value_and_grad, trial, ~done)
-        enough = ~done & (new_value <= value + ARMIJO * length * slope)
-        for kept, new in zip(best, (trial, new_value, new_gradient), strict=True):
-            kept[enough] = new[enough]
+        trial = now.x + length[:, None] * step
+        new = Points(trial, *_evaluate(value_and_grad, trial, ~done))
+        enough = ~done & (new.value <= now.value + ARMIJO * length * slope)
+        for kept, found in zip(best, new, strict=True):
+            kept[enough] = found[enough]
         done |= enough
         if done.all():
             break

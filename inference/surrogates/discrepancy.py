@@ -37,7 +37,7 @@ from .threshold import (
 from .transform import Transform, candidates
 from .warnings import EQUAL, complaints
 
-RETHINK = 2.0  # the transform is chosen anew when data have grown by this factor
+TRANSFORM_GROWTH = 2.0  # the transform is chosen anew when data have grown by this factor
 
 
 class Scale(NamedTuple):
@@ -150,12 +150,11 @@ def _surely(gp: GP, u: jax.Array) -> jax.Array:
 
 
 @in_float64
-def learn(  # noqa: PLR0913  what is known, and how to learn from it
+def learn(
     u: np.ndarray,
     discrepancy: np.ndarray,
     rows: int,
     transform: str | None = None,
-    rule: Threshold = None,
     previous: DiscrepancySurrogate | None = None,
     normal: np.ndarray | None = None,
 ) -> DiscrepancySurrogate:
@@ -164,26 +163,30 @@ def learn(  # noqa: PLR0913  what is known, and how to learn from it
     A run that blew up is learned as the worst of the others: the process need not follow it, but
     shall know that it is bad there. Of the transforms identity, sqrt and log the one with the
     highest leave-one-out log predictive density of the discrepancy itself (Jacobian included)
-    is taken, unless given.
+    is taken, unless given. The threshold is that of the default rule, see `with_threshold`.
 
     Args:
         u: Prior quantiles [n, d].
         discrepancy: Finite values [n], n >= 2.
         rows: Reserved for data, at least n.
         transform: A name, or None to choose.
-        rule: For the threshold, see `likelihood.choose_threshold`.
         previous: Learned from the first of these data; its hyperparameters are kept until the
-            data have grown by GROWTH, its transform until they have by RETHINK.
+            data have grown by GROWTH, its transform until they have by TRANSFORM_GROWTH.
         normal: Which parameters the kernel sees as normal scores [d], see `gp.coordinates`.
 
     Raises:
-        ValueError: bad transform or threshold.
+        ValueError: bad transform.
     """
     values = np.minimum(discrepancy, discrepancy[sane(discrepancy)].max())
     n = len(u)
     with np.errstate(divide="ignore", invalid="ignore"):  # where the transform is undefined
         old = previous is not None and np.isfinite(previous.scale(values)).all()
-    if previous is not None and old and not previous.equal and n < RETHINK * previous.chosen_at:
+    if (
+        previous is not None
+        and old
+        and not previous.equal
+        and n < TRANSFORM_GROWTH * previous.chosen_at
+    ):
         data = pad(u, previous.scale(values)[None], rows, normal)
         if n >= GROWTH * previous.learned_at:
             gp, learned_at = condition(maximum_a_posteriori(data, previous.gp.hyper), data), n
@@ -192,20 +195,27 @@ def learn(  # noqa: PLR0913  what is known, and how to learn from it
         learned = DiscrepancySurrogate(
             gp, previous.scale, values, np.nan, learned_at, previous.chosen_at
         )
-        return _with_threshold(learned, rule)
+        return with_threshold(learned, None)
     options = [_standardise(option, values) for option in candidates(transform, values)]
     fitted = [_fit(pad(u, scale(values)[None], rows, normal)) for scale in options]
     scores = [_score(gp, scale, values) for gp, scale in zip(fitted, options, strict=True)]
     best = int(np.argmax(scores))
     chosen = DiscrepancySurrogate(fitted[best], options[best], values, np.nan, n, n)
-    return _with_threshold(chosen, rule)
+    return with_threshold(chosen, None)
 
 
 def _fit(data: Data) -> GP:
     return condition(maximum_a_posteriori(data), data)
 
 
-def _with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> DiscrepancySurrogate:
+@in_float64
+def with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> DiscrepancySurrogate:
+    """The surrogate with the threshold that a rule chooses, see `threshold.choose_threshold`.
+
+    Raises:
+        ValueError: the transform is undefined at the given threshold.
+    """
+
     def at_minimum() -> tuple[float, float]:
         mean, sd = learned.predict(np.asarray(learned.gp.data.u)[: len(learned.discrepancy)])
         best = np.argmin(mean)
@@ -223,7 +233,7 @@ def marginalised(
     hyper = posterior_draws(surrogate.gp.data, draws, seed)
     data = surrogate.gp.data
     spread = data._replace(y=jnp.tile(data.y, (draws, 1)))
-    return _with_threshold(replace(surrogate, gp=condition(hyper, spread)), rule)
+    return with_threshold(replace(surrogate, gp=condition(hyper, spread)), rule)
 
 
 def _standardise(transform: Transform, values: np.ndarray) -> Scale:

@@ -63,41 +63,49 @@ class Emulator(NamedTuple):
         return self.basis.used == 0 and self.remainder.total == 0.0
 
 
+class Limits(NamedTuple):
+    """How much an emulator may hold.
+
+    Attributes:
+        components: At most.
+        rows: Reserved for data, at least as many as there are runs.
+        predicted: Share of a component's variance that the parameters must predict, lest it
+            count as noise; None emulates every component.
+    """
+
+    components: int
+    rows: int
+    predicted: float | None = PREDICTED
+
+
 @in_float64
-def emulate(  # noqa: PLR0913  what is known, and how to learn from it
+def emulate(
     u: np.ndarray,
     outputs: np.ndarray,
     scale: Callable[[np.ndarray], np.ndarray],
-    components: int,
-    rows: int,
+    limits: Limits,
     previous: Emulator | None = None,
     normal: np.ndarray | None = None,
-    predicted: float | None = PREDICTED,
 ) -> Emulator:
     """Learn outputs [n, m] at u [n, d].
 
     Args:
         scale: Outputs [n, m] -> [m], what makes values comparable.
-        components: At most.
-        rows: Reserved for data, at least n.
+        limits: Of components and data.
         previous: Learned from the first of these data; its components and hyperparameters are
             kept until the data have grown by GROWTH.
         normal: Which parameters the kernels see as normal scores [d], see `gp.coordinates`.
-        predicted: Share of a component's variance that the parameters must predict, lest it
-            count as noise; None emulates every component.
     """
-    n = len(u)
+    n, rows = len(u), limits.rows
     if previous is not None and _goes_on(previous, outputs):
         basis, learned_at, excess = previous.basis, previous.learned_at, previous.excess
         gp = extend(previous.gp, pad(u, _targets(basis, outputs, learned_at, excess), rows, normal))
         remainder = shrunk_covariance(basis.residuals(outputs), basis.used + 1)
     else:
-        basis, learned_at = principal_components(outputs, scale(outputs), components, SHARE), n
-        data = pad(u, basis.scores(outputs).T, rows, normal)
-        hyper = maximum_a_posteriori(data)
-        if predicted is not None:
-            basis, hyper = _predicted(basis, hyper, data, predicted)
-        remainder = shrunk_covariance(basis.residuals(outputs), basis.used + 1)
+        components = principal_components(outputs, scale(outputs), limits.components, SHARE)
+        data = pad(u, components.scores(outputs).T, rows, normal)
+        basis, hyper = _taught(components, data, limits.predicted)
+        learned_at, remainder = n, shrunk_covariance(basis.residuals(outputs), basis.used + 1)
         excess = own_noise(basis, np.exp(2.0 * np.asarray(hyper.log_noise)), remainder, n)
         smaller = jnp.log1p(-jnp.asarray(excess))
         hyper = Hyper(hyper.log_length, hyper.log_amplitude + smaller, hyper.log_noise + smaller)
@@ -105,6 +113,12 @@ def emulate(  # noqa: PLR0913  what is known, and how to learn from it
     remainder = left_over(basis, np.exp(2.0 * np.asarray(gp.hyper.log_noise)), remainder, excess)
     noise = run_to_run(gp, basis, remainder.white, n)
     return Emulator(gp, basis, remainder, noise, outputs, learned_at, excess)
+
+
+def _taught(basis: Basis, data: Data, predicted: float | None) -> tuple[Basis, Hyper]:
+    """Components that the parameters predict, and the hyperparameters of their scores."""
+    hyper = maximum_a_posteriori(data)
+    return (basis, hyper) if predicted is None else _predicted(basis, hyper, data, predicted)
 
 
 def _predicted(basis: Basis, hyper: Hyper, data: Data, least: float) -> tuple[Basis, Hyper]:

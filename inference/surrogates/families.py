@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 from ..arguments import check_callable, checked_integer
 from ..types import Discrepancy
 from .base import Surrogate
-from .discrepancy import DiscrepancySurrogate, learn, marginalised
-from .emulator import PREDICTED, emulate
+from .discrepancy import DiscrepancySurrogate, learn, marginalised, with_threshold
+from .emulator import PREDICTED, Limits, emulate
 from .given_noise import GivenNoise, given_noise
 from .held_back import foretold
 from .outliers import sane
@@ -95,7 +95,8 @@ class DiscrepancyLearner:
         self, known: Learnable, rows: int, previous: DiscrepancySurrogate | None
     ) -> DiscrepancySurrogate:
         transform, rule = self.family.transform, self.family.threshold
-        return learn(known.u, known.discrepancy, rows, transform, rule, previous, known.normal)
+        learned = learn(known.u, known.discrepancy, rows, transform, previous, known.normal)
+        return learned if rule is None else with_threshold(learned, rule)
 
     def finish(self, known: Learnable, rows: int, seed: int) -> Surrogate:
         """The surrogate on which a fit rests."""
@@ -190,15 +191,14 @@ class SignalLearner:
         learnable = self.learnable(known.discrepancy)
         features = known.features[learnable]
         old = None if previous is None else previous.emulator
-        limits = self.family.components, rows
+        limits = Limits(self.family.components, rows, self.family.predicted)
         emulator = emulate(
             known.u[learnable],
             features,
             self.output.scale,
-            *limits,
+            limits,
             old,
             known.normal,
-            self.family.predicted,
         )
         kept = previous if old is not None and emulator.learned_at == old.learned_at else None
         return observe(emulator, self.output, self.values, self.noise, kept)

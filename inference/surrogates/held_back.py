@@ -8,6 +8,7 @@ import numpy as np
 from .._float64 import in_float64
 from .emulator import (
     Emulator,
+    Limits,
     beyond_components,
     emulate,
     innovations,
@@ -61,7 +62,7 @@ def foretold(
     if first < FEWEST or freedom < 1 or not within.any():
         return Foretold(errors, freedom)
     normal = np.asarray(data.normal)
-    early = emulate(u[:first], outputs[:first], scale, k, rows, None, normal, predicted)
+    early = emulate(u[:first], outputs[:first], scale, Limits(k, rows, predicted), None, normal)
     errors[within, : early.basis.used] = innovations(early, u[within], outputs[within])
     errors[within, k] = beyond_components(early, outputs[within])
     return Foretold(errors, freedom)

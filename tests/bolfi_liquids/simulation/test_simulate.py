@@ -12,7 +12,7 @@ from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.recording import Trajectory
 
-SHORT = hardware.star(speed=0.2, height=0.235, radius=0.02, points=5, rest=0.2)
+SHORT = hardware.motion.star(speed=0.2, height=0.235, radius=0.02, points=5, rest=0.2)
 FEW = {"particles": 120, "progress": False}
 PLANES = ("inclination_xz", "inclination_yz")
 
@@ -67,7 +67,9 @@ def test_a_simulated_stir_is_a_recording(tmp_path):
 @pytest.mark.slow
 def test_patterns_have_names_and_a_rig_may_be_another():
     star = bl.simulate_stir(path="star", particles=100, progress=False)
-    expected = hardware.star(speed=0.1, height=bundled_recording("glycerin").gripper.position[0, 2])
+    expected = hardware.motion.star(
+        speed=0.1, height=bundled_recording("glycerin").gripper.position[0, 2]
+    )
     np.testing.assert_array_equal(star["x"], expected.position[:, 0])
     heavy = bl.simulate_stir(path="star", rig={"stick_density": 4800.0}, particles=100)
     assert np.abs(heavy["inclination_xz"]).max() < np.abs(star["inclination_xz"]).max()

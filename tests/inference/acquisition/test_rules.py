@@ -15,7 +15,7 @@ from bolfi_liquids.inference.acquisition.rules import (
 )
 from bolfi_liquids.inference.gp.process import predict
 from bolfi_liquids.inference.sobol import sobol
-from bolfi_liquids.inference.surrogates.discrepancy import learn
+from bolfi_liquids.inference.surrogates.discrepancy import learn, with_threshold
 from bolfi_liquids.inference.surrogates.feasibility import feasibility, log_feasible
 from scipy.stats import kstest, multivariate_normal, norm, qmc, truncnorm
 
@@ -30,7 +30,7 @@ GRID = np.stack(np.meshgrid(AXIS, AXIS), -1).reshape(-1, 2)
 def fitted(n=12, noise=0.0, rule=None):
     u = sobol(0, 0, n, 2)
     values = 1.0 + ((u - 0.4) ** 2).sum(-1) + noise * np.random.default_rng(0).normal(size=n)
-    return learn(u, values, ROWS, "identity", rule)
+    return with_threshold(learn(u, values, ROWS, "identity"), rule)
 
 
 def all_succeed(surrogate):

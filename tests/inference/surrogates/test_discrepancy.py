@@ -3,7 +3,7 @@ import warnings
 import numpy as np
 import pytest
 from bolfi_liquids.inference.sobol import sobol
-from bolfi_liquids.inference.surrogates.discrepancy import learn, marginalised
+from bolfi_liquids.inference.surrogates.discrepancy import learn, marginalised, with_threshold
 from bolfi_liquids.inference.surrogates.transform import Transform, candidates
 
 ROWS = 64
@@ -81,7 +81,7 @@ def test_a_discrepancy_outside_the_transform_changes_it():
 def test_minimum_and_threshold_agree_with_a_grid():
     u = sobol(0, 0, 30, 2)
     values = bowl(u, np.random.default_rng(0), 1.0)
-    fitted = learn(u, values, ROWS, "identity", "min_mean")
+    fitted = with_threshold(learn(u, values, ROWS, "identity"), "min_mean")
     axis = np.linspace(0.0, 1.0, 101)
     grid = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2)
     mean, sd = fitted.predict(grid)

@@ -7,7 +7,7 @@ import pytest
 from bolfi_liquids.inference.gp.condition import predict as predict_scores
 from bolfi_liquids.inference.gp.process import JITTER, predict_joint
 from bolfi_liquids.inference.sobol import sobol
-from bolfi_liquids.inference.surrogates.emulator import emulate, innovations
+from bolfi_liquids.inference.surrogates.emulator import Limits, emulate, innovations
 from bolfi_liquids.inference.surrogates.held_back import FEWEST, foretold
 from bolfi_liquids.inference.surrogates.warnings import surprised
 from scipy.stats import binom
@@ -36,7 +36,7 @@ def gathered(seed, n=20):
 
 
 def errors(u, outputs, predicted=0.3):
-    return foretold(emulate(u, outputs, scale, COMPONENTS, 64), scale, predicted)
+    return foretold(emulate(u, outputs, scale, Limits(COMPONENTS, 64)), scale, predicted)
 
 
 @pytest.mark.slow
@@ -54,7 +54,7 @@ def test_innovations_are_errors_of_one_run_after_another():
     """Conditioning on each new run in turn, by the plain formulae."""
     u, _ = gathered(0)
     outputs = decays(u, np.random.default_rng(0))
-    early, new = emulate(u[:13], outputs[:13], scale, COMPONENTS, 64), u[13:]
+    early, new = emulate(u[:13], outputs[:13], scale, Limits(COMPONENTS, 64)), u[13:]
     with jax.enable_x64(True):
         found = innovations(early, new, outputs[13:])
         joint = np.asarray(predict_joint(early.gp, jnp.asarray(new), jnp.asarray(new)))

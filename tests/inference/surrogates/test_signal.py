@@ -11,7 +11,7 @@ from bolfi_liquids.inference.gp.condition import predict as predict_scores
 from bolfi_liquids.inference.gp.hyperparameters import NOISE
 from bolfi_liquids.inference.gp.process import predict
 from bolfi_liquids.inference.sobol import sobol
-from bolfi_liquids.inference.surrogates.emulator import emulate, noise_share
+from bolfi_liquids.inference.surrogates.emulator import Limits, emulate, noise_share
 from bolfi_liquids.inference.surrogates.families import Learnable, SignalFamily
 from bolfi_liquids.inference.surrogates.signal_likelihood import log_likelihood, log_second_moment
 from scipy.stats import binom, multivariate_normal
@@ -310,7 +310,7 @@ def test_components_that_lean_towards_their_own_noise_do_not_steepen_the_emulato
     for seed in range(60):
         rng = np.random.default_rng(seed)
         outputs = theta[:, None] * shape + 0.8 * rng.normal(size=(20, 200))
-        found = emulate(u, outputs, lambda outputs: np.ones(200), 1, ROWS)
+        found = emulate(u, outputs, lambda outputs: np.ones(200), Limits(1, ROWS))
         expected = found.basis.scores((at - 0.5) * shape)[:, 0]
         with jax.enable_x64(True):
             mean = predict_scores(found.gp, at)[0][0]
@@ -333,12 +333,12 @@ def test_components_are_found_anew_where_what_they_came_from_changed():
     def unit(values):
         return values.std(0)
 
-    first = emulate(u[:20], signals[:20], unit, 3, ROWS)
-    grown = emulate(u, signals, unit, 3, ROWS, first)
+    first = emulate(u[:20], signals[:20], unit, Limits(3, ROWS))
+    grown = emulate(u, signals, unit, Limits(3, ROWS), first)
     assert grown.basis is first.basis
     left = np.delete(np.arange(21), 3)
-    again = emulate(u[left], signals[left], unit, 3, ROWS, first)
-    fresh = emulate(u[left], signals[left], unit, 3, ROWS)
+    again = emulate(u[left], signals[left], unit, Limits(3, ROWS), first)
+    fresh = emulate(u[left], signals[left], unit, Limits(3, ROWS))
     np.testing.assert_array_equal(again.basis.vectors, fresh.basis.vectors)
     np.testing.assert_array_equal(again.basis.scale, fresh.basis.scale)
 

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from bolfi_liquids.inference.sobol import sobol
-from bolfi_liquids.inference.surrogates.discrepancy import learn
+from bolfi_liquids.inference.surrogates.discrepancy import learn, with_threshold
 from bolfi_liquids.inference.surrogates.threshold import log_cdf, log_likelihood
 from scipy.special import erfcx
 from scipy.stats import norm
@@ -61,7 +61,9 @@ def test_slope_of_log_cdf_agrees_with_the_mills_ratio():
     ],
 )
 def test_threshold_rules(rule, expected):
-    np.testing.assert_allclose(learn(U, DELTA, ROWS, "sqrt", rule).threshold, expected)
+    np.testing.assert_allclose(
+        with_threshold(learn(U, DELTA, ROWS, "sqrt"), rule).threshold, expected
+    )
 
 
 @pytest.mark.parametrize("rule", ["nonsense", inference.surrogates.Quantile(1.5), np.nan])
@@ -72,4 +74,4 @@ def test_bad_rules_are_refused(prior, observed, rule):
 
 def test_a_threshold_that_the_transform_cannot_take_is_refused():
     with pytest.raises(ValueError, match="must be positive for the transform 'log'"):
-        learn(U, DELTA, ROWS, "log", -1.0)
+        with_threshold(learn(U, DELTA, ROWS, "log"), -1.0)
