@@ -7,8 +7,11 @@ from .inputs.recording import Recording as Recording
 from .inputs.table_import import import_table as import_table
 from .models import Cups as Cups
 from .pouring.choose import choose_pour as choose_pour
+from .pouring.result import Pour as Pour
 from .reporting.report import report as report
 from .robot.pour import execute_pour as execute_pour
 from .robot.record import record as record
+from .simulation.simulate import simulate_pour as simulate_pour
+from .simulation.simulate import simulate_stir as simulate_stir
 
 __version__: str

@@ -4,13 +4,16 @@ import io
 import re
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from .files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
 
 INK, GREY, LIGHT = "#1f2933", "#8a94a0", "#e4e7eb"
 BLUE, ORANGE = "#2463a6", "#d1591a"
@@ -47,6 +50,56 @@ def new_figure(width: float, height: float) -> "Figure":
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
+
+
+class Panels(NamedTuple):
+    """The axes of a plot.
+
+    Attributes:
+        figure: Whose axes they are.
+        grid: The axes, shape (rows, columns).
+        own: Whether the figure was made for the plot alone.
+    """
+
+    figure: "Figure"
+    grid: np.ndarray
+    own: bool
+
+    def legend(self, handles: list, labels: list[str], ncols: int = 3) -> None:
+        """Above the plot, or within the first axes of somebody else's figure."""
+        if self.own:
+            self.figure.legend(handles, labels, loc="outside upper center", ncols=ncols)
+        else:
+            self.grid.flat[0].legend(handles, labels)
+
+
+def panels(
+    axes: "ArrayLike | None",
+    shape: tuple[int, int],
+    size: tuple[float, float],
+    **options: Any,
+) -> Panels:
+    """The axes that a caller gives, or those of a new figure.
+
+    Args:
+        axes: One or several `matplotlib.axes.Axes`, row by row; None makes a figure.
+        shape: Rows and columns of axes that the plot needs.
+        size: Width and height of a new figure [inch].
+        **options: Of `Figure.subplots`, for a new figure.
+
+    Raises:
+        ValueError: The plot needs another number of axes than are given.
+    """
+    if axes is None:
+        figure = new_figure(*size)
+        return Panels(figure, figure.subplots(*shape, squeeze=False, **options), True)
+    given = np.atleast_1d(np.asarray(axes, dtype=object))
+    if given.size != shape[0] * shape[1]:
+        raise ValueError(
+            f"this plot needs {shape[0]} x {shape[1]} axes, got {given.size}; "
+            f"make them with plt.subplots{shape}"
+        )
+    return Panels(given.flat[0].figure, given.reshape(shape), False)
 
 
 def to_svg(figure: "Figure", name: str) -> str:

@@ -12,6 +12,10 @@ Simulate = Callable[[dict[str, NDArray], NDArray], NDArray]
 """(theta, seeds) -> signals, one row for each seed."""
 
 
+def silent(steps: int) -> None:
+    """Shows nothing."""
+
+
 @contextmanager
 def phases(*, shown: bool) -> Iterator[Callable[[str, int], None]]:
     """The phase of long work with a running count of simulations; one line for each phase where
@@ -43,12 +47,30 @@ def phases(*, shown: bool) -> Iterator[Callable[[str, int], None]]:
         yield report
 
 
-def reported(simulate: Simulate, advance: Advance) -> Simulate:
-    """The same simulator, which moves a bar on after each batch."""
+@contextmanager
+def fraction_bar(task: str, *, shown: bool) -> Iterator[Callable[[float], None]]:
+    """A bar that the yielded function sets to a fraction; one line where there is no terminal.
 
-    def simulate_and_report(theta: dict[str, NDArray], seeds: NDArray) -> NDArray:
-        signals = simulate(theta, seeds)
-        advance(len(seeds))
-        return signals
+    Args:
+        task: What is being done, in a few words.
+        shown: False for silence.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
-    return simulate_and_report
+    console = Console(stderr=True)
+    if not shown or not console.is_terminal:
+        if shown:
+            console.print(task, highlight=False)
+        yield lambda fraction: None
+        return
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console) as bar:
+        handle = bar.add_task(task, total=1.0)
+        yield lambda fraction: bar.update(handle, completed=min(max(fraction, 0.0), 1.0))
+        bar.update(handle, completed=1.0)

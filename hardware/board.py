@@ -4,11 +4,12 @@ Each participant writes its own row only. A number is one aligned double, so tha
 the old value or the new one; rows need no lock, and nobody waits for a process that has died.
 """
 
-import time
 from ctypes import c_double
 from enum import IntEnum
 from multiprocessing import current_process, get_context
 from typing import Any, NamedTuple
+
+from .host_clock import REAL_CLOCK
 
 SPAWN = get_context("spawn")  # a fork would copy threads and open sockets of JAX and RTDE
 
@@ -95,4 +96,4 @@ class Board:
 
 def host_time() -> float:
     """The clock that all processes of this computer share [s]."""
-    return time.monotonic()
+    return REAL_CLOCK.now()

@@ -14,12 +14,13 @@ import numpyro.distributions as dist
 from .distributions import describe as describe_distribution
 from .prior import Prior
 
+OWN = __name__.partition(".")[0]
 ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
 
 def describe(value: Any) -> str:
     """Module and name of functions, fields of dataclasses and named tuples, parameters of priors,
-    shape and a hash of arrays; `repr` of the rest.
+    shape and a hash of arrays; `repr` of the rest. Fields that do not compare are left out.
 
     It knows nothing of what a function does: code that changed under one name reads the same.
     """
@@ -32,7 +33,7 @@ def describe(value: Any) -> str:
             f"partial({describe(value.func)}, {describe(value.args)}, {describe(value.keywords)})"
         )
     if is_dataclass(value) and not isinstance(value, type):
-        held = {field.name: getattr(value, field.name) for field in fields(value)}
+        held = {field.name: getattr(value, field.name) for field in fields(value) if field.compare}
         return f"{_name(type(value))}({describe(held)})"
     if callable(value) and hasattr(value, "__qualname__"):
         return _name(value) + _held(value)
@@ -69,4 +70,8 @@ def _plain(value: Any) -> str:
 
 
 def _name(value: Any) -> str:
-    return f"{value.__module__}.{value.__qualname__}"
+    """Module and name; of this package without the module's place, which is no part of what is
+    kept: a module that moves orphans nothing."""
+    module = value.__module__
+    place = OWN if module.startswith(f"{OWN}.") else module
+    return f"{place}.{value.__qualname__}"

@@ -2,8 +2,8 @@
 
 import math
 from collections import deque
-from collections.abc import Iterator, Mapping
-from concurrent.futures import Executor, Future
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -17,9 +17,9 @@ from .prior import Prior
 from .progress import progress_bar
 from .result import Fit
 from .simulations.bank import Simulation, SimulationBank
-from .simulations.executors import opened
+from .simulations.executors import Workers, open_executor
 from .simulations.job import BATCH, Job, OneByOne, columns, jobs, simulation_seed, stacked
-from .simulations.runner import Runner
+from .simulations.runner import Keep, Runner
 from .sobol import start_size
 from .surrogates.base import Acquisition
 from .surrogates.families import Family
@@ -37,14 +37,15 @@ def fit(  # noqa: PLR0913  the one call that most users make
     surrogate: str | Family | None = None,
     acquisition: str | Acquisition | None = None,
     initial: int | None = None,
-    executor: Executor | str | None = None,
+    executor: Workers | None = None,
     bank: str | Path | SimulationBank = ":memory:",
     identity: str = "",
     timeout: float | None = None,
     earlier: tuple[Theta, ArrayLike] | tuple[Theta, ArrayLike, ArrayLike] | None = None,
     vectorised: bool = True,
+    in_rounds: bool = False,
     warn: bool = True,
-    progress: bool = True,
+    progress: bool | Callable[[int], object] = True,
     **options: Any,
 ) -> Fit:
     """Infer the parameters of `simulate` from `observed` with `budget` simulations.
@@ -59,6 +60,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
     simulation is a call of its own and `batch` of them are kept in flight: point i is asked as
     soon as all up to i - batch have been told, while the others still run. Which points these
     are depends on `batch`, but neither on the kind of executor nor on who finishes first.
+    `in_rounds` makes them the same as without an executor.
 
     Args:
         simulate: Callable (theta: name -> [b], seeds: [b]) -> signals [b, *signal_shape]; or,
@@ -72,7 +74,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         seed: Fixes the whole run.
         surrogate, acquisition: See `Bolfi`.
         initial: Points of the start design; None is 2 d + 6, or the budget if that is less.
-        executor: A thread or process pool, a Dask client's `get_executor()` or any other
+        executor: A thread or process pool, a Dask client or any other
             `concurrent.futures.Executor`, left open; or a Dask scheduler's address such as
             "tcp://host:8786". Start processes by "spawn" or "forkserver": JAX does not survive
             a fork. Workers import `simulate`, but not JAX.
@@ -90,9 +92,12 @@ def fit(  # noqa: PLR0913  the one call that most users make
             then be 0.
         vectorised: Whether `simulate` makes a batch of runs in one call; False calls it once
             for each run, such as `simulate({"a": 1.0}, seed)`.
+        in_rounds: Whether to ask whole rounds of an executor, too: it then simulates the same
+            points, and the fit has the same bits, as without an executor.
         warn: Whether each of the surrogate's complaints is raised as an `EmulatorWarning`;
             `Fit.warnings` holds them in any case.
-        progress: Whether to show a bar on stderr.
+        progress: Whether to show a bar on stderr; or a function that is called with 1 for each
+            simulation.
         options: Of the surrogate's family, see `Bolfi`. Editors know those of
             `surrogate=SignalFamily(noise=0)` or `DiscrepancyFamily(...)`, which are checked
             before anything is simulated.
@@ -135,11 +140,14 @@ def fit(  # noqa: PLR0913  the one call that most users make
     with ExitStack() as stack:
         if not isinstance(bank, SimulationBank):
             bank = stack.enter_context(SimulationBank(bank))
-        advance = stack.enter_context(progress_bar("simulations", budget, shown=progress))
-        workers = stack.enter_context(opened(executor))
+        bar = stack.enter_context(progress_bar("simulations", budget, shown=progress is True))
+        advance = bar if isinstance(progress, bool) else progress
+        workers = stack.enter_context(open_executor(executor))
         simulator = simulate if vectorised else OneByOne(simulate)
-        runner = stack.enter_context(Runner(simulator, bank, identity, workers, timeout))
-        finished = (_in_rounds if workers is None else _in_flight)(engine, runner, budget, batch)
+        keep = Keep(bank, identity, batch, workers, timeout)
+        runner = stack.enter_context(Runner(simulator, keep))
+        schedule = _in_rounds if workers is None or in_rounds else _in_flight
+        finished = schedule(engine, runner, budget, batch)
         seconds = 0.0
         for simulation in finished:
             seconds += simulation.seconds

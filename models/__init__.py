@@ -6,6 +6,7 @@ from .effects import EFFECTS, register
 from .fluid.faults import FailedSimulation
 from .fluid.liquid import Liquid
 from .fluid.numerics import MODEL_VERSION, PUBLISHED_DRAG, Numerics
+from .fluid.runtime import TimeLimitExceeded, time_limit
 from .frames import PourFrames, StirFrames, pour_frames, stir_frames
 from .pouring import Landings, PourAction, PourResult, landings, pour
 from .rig import Rig
@@ -30,10 +31,12 @@ __all__ = [
     "Stick",
     "StirFrames",
     "StirSetup",
+    "TimeLimitExceeded",
     "landings",
     "pour",
     "pour_frames",
     "register",
     "stir",
     "stir_frames",
+    "time_limit",
 ]

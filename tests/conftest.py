@@ -5,10 +5,12 @@ import time
 from pathlib import Path
 from threading import Event, Thread
 
+import pytest
 from _pytest.runner import runtestprotocol
 
-TRIES = 5
+MOST_REPEATS = 3  # of a session; with more of them, tests hide what fails
 CALM, MOST_CALM = 1.0, 30.0  # s, without a stall before a repetition; and waited for at most
+REPEATED = pytest.StashKey[list[str]]()
 STALL = 0.03  # s; a watchdog of 0.1 s and several processes wait for each other
 
 
@@ -16,8 +18,9 @@ def pytest_configure(config):
     config.addinivalue_line("markers", "alone: runs after the others, with no test beside it")
     config.addinivalue_line(
         "markers",
-        "punctual: alone, and repeated if it failed on a computer that stood still meanwhile",
+        "punctual: alone, and repeated once if it failed on a computer that stood still meanwhile",
     )
+    config.stash[REPEATED] = []
     # many processes compile the same functions: half of the time of the engine's tests
     if hasattr(config, "cache"):
         os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(config.cache.mkdir("jax")))
@@ -29,17 +32,32 @@ def pytest_runtest_protocol(item, nextitem):
     if item.get_closest_marker("punctual") is None:
         return None
     item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
-    for left in reversed(range(TRIES)):
-        with _Stillness() as stillness:
-            reports = runtestprotocol(item, nextitem=nextitem, log=False)
-        if not left or not any(report.failed for report in reports) or not stillness.disturbed():
-            break
+    with _Stillness() as stillness:
+        reports = runtestprotocol(item, nextitem=nextitem, log=False)
+    if any(report.failed for report in reports) and stillness.disturbed():
+        item.config.stash[REPEATED].append(item.nodeid)
         _wait_for_calm()
+        # a fixture that failed would fail again without a new setup
+        item.session._setupstate.teardown_exact(None)
         item._initrequest()
+        reports = runtestprotocol(item, nextitem=nextitem, log=False)
     for report in reports:
         item.ihook.pytest_runtest_logreport(report=report)
     item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
     return True
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    repeated = config.stash[REPEATED]
+    if repeated:
+        terminalreporter.section("repeated, since this computer stood still")
+        terminalreporter.write_line("\n".join(repeated))
+        terminalreporter.write_line(f"repeats: {len(repeated)}; above {MOST_REPEATS} is a failure")
+
+
+def pytest_sessionfinish(session, exitstatus):
+    if exitstatus == pytest.ExitCode.OK and len(session.config.stash[REPEATED]) > MOST_REPEATS:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 class _Stillness:

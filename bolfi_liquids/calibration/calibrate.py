@@ -1,11 +1,12 @@
 """From recordings to a posterior over the simulator's parameters."""
 
-import sys
+import logging
 from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from tempfile import mkdtemp
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from numpy.typing import NDArray
 
@@ -14,7 +15,7 @@ from ..inputs.open import Source, open_recordings
 from ..inputs.prior import check_prior, default_prior, describe_prior
 from ..inputs.recording import Recording
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
-from ..progress import Simulate, progress_bar, reported
+from ..progress import progress_bar
 from ..run.directory import (
     POSTERIOR,
     enter_run,
@@ -23,21 +24,22 @@ from ..run.directory import (
 )
 from ..run.provenance import LIBRARIES, versions
 from ..run.recordings import keep_recordings
-from ..run.summary import write_section
 from .draws import pick_draws
 from .result import Calibration, is_calibrated
-from .section import calibration_section
 from .stir_simulator import Stirring, stirring_of
+from .summary import CalibrationSummary
 
 if TYPE_CHECKING:
-    from ..inference import Fit, Prior, SimulationBank
-    from ..run.simulations import Keep
+    from ..inference import Fit, Prior
+    from ..inference.simulations import Keep, Workers
+
+logger = logging.getLogger(__name__)
 
 
 def calibrate(  # noqa: PLR0913  the one call that most users make
     recordings: Source | Sequence[Source],
     *,
-    out: str | Path,
+    out: str | Path | None = None,
     prior: "Prior | None" = None,
     budget: int = 20,
     seed: int = 0,
@@ -48,6 +50,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     chains: int = 4,
     draws: int = 1000,
     resume: bool = False,
+    executor: "Workers | None" = None,
+    timeout: float | None = None,
     progress: bool = True,
 ) -> Calibration:
     """Learn a liquid's parameters from recordings of it being stirred.
@@ -60,19 +64,22 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     Args:
         recordings: One or several of one liquid, opened or as paths. Their discrepancies are
             added up.
-        out: The RUN directory.
+        out: The RUN directory; None is a new one among the computer's temporary files.
         prior: Over `viscosity` [Pa s] and `cohesion` [1]; None is `default_prior()`.
         budget: Simulations that the engine may learn from. A dozen more judge the result, anew
             where a run grew.
-        seed: Of everything random.
+        seed: Seed of all random draws.
         surrogate: "discrepancy", the paper's, or "signal", which emulates the inclination itself.
-        batch: Simulations run at the same time.
-        particles: Of the simulated liquid.
+        batch: Simulations that are asked, and run, at the same time.
+        particles: Number of particles of the simulated liquid.
         sampler: "nuts" or "emcee".
-        chains: Of the sampler.
-        draws: Kept, for each chain.
+        chains: Number of the sampler's chains.
+        draws: Number of draws that each chain keeps.
         resume: Whether `out` may hold a run of the same settings, but for a smaller budget, to go
             on with.
+        executor: Where simulations run: a pool of processes, a Dask client or the address of a
+            Dask scheduler; None is this process. The result has the same bits.
+        timeout: Seconds that one simulation may take; None sets no limit.
         progress: Whether to show bars on stderr.
 
     Raises:
@@ -93,16 +100,24 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     prior = default_prior() if prior is None else prior
     check_prior(prior)
     stirring = stirring_of(opened, particles)
-    run = Path(out)
+    run = Path(mkdtemp(prefix="bolfi_liquids_") if out is None else out)
     record = run_record(settings, prior, stirring)
     removed = enter_run(run, record, resume=resume, growing="settings.budget")
-    if removed and progress:
+    if removed:
         what = f"removed {', '.join(removed)}, concluded from fewer simulations"
-        print(f"{run}: {what}; every simulation is kept", file=sys.stderr)
+        logger.warning("%s: %s; every simulation is kept", run, what)
     keep_recordings(run, stirring.recordings)
     if not is_calibrated(run):
-        _calibrate(run, stirring, prior, settings, progress)
+        _calibrate(run, stirring, prior, settings, _Means(executor, timeout, progress))
     return Calibration.open(run)
+
+
+class _Means(NamedTuple):
+    """How simulations are made; nothing here changes a bit of the result."""
+
+    executor: "Workers | None"
+    timeout: float | None
+    progress: bool
 
 
 def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring) -> dict[str, Any]:
@@ -121,33 +136,27 @@ def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring
 
 
 def _calibrate(
-    run: Path, stirring: Stirring, prior: "Prior", settings: CalibrationSettings, progress: bool
+    run: Path, stirring: Stirring, prior: "Prior", settings: CalibrationSettings, means: _Means
 ) -> None:
-    from ..run.simulations import Keep
-    from .check import PREDICTIVE_DRAWS, check_by_simulation
+    from ..inference.simulations import Keep, open_executor
+    from .check import PREDICTIVE_DRAWS, REPLICATES, check_by_simulation
     from .tree import results_tree, write_tree
 
+    needed = settings.budget + PREDICTIVE_DRAWS + REPLICATES
     with (
         open_bank(run) as bank,
-        progress_bar("simulating stirs", _left(run, settings, bank), shown=progress) as advance,
+        open_executor(means.executor) as workers,
+        progress_bar("simulating stirs", needed, shown=means.progress) as advance,
     ):
-        simulate = reported(stirring.simulate, advance)
-        keep = Keep(bank, stirring.identity, settings.batch)
-        fit = fit_recordings(
-            stirring,
-            stirring.observed,
-            prior,
-            keep,
-            budget=settings.budget,
-            surrogate=settings.surrogate,
-            seed=settings.seed,
-            simulate=simulate,
-        )
+        keep = Keep(bank, stirring.identity, settings.batch, workers, means.timeout)
+        fit = fit_recordings(stirring, stirring.observed, prior, keep, settings, progress=advance)
         sampled = fit.sample(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
         )
         drawn = pick_draws(sampled["posterior"].to_dataset(), PREDICTIVE_DRAWS, settings.seed)
-        check = check_by_simulation(simulate, drawn, fit.best, settings.seed, keep)
+        check = check_by_simulation(
+            stirring.simulate, drawn, fit.best, settings.seed, keep, advance=advance
+        )
     tree = results_tree(sampled, fit, stirring, check)
     if (now := read_run(run)["settings"]["budget"]) != settings.budget:
         raise InputError(
@@ -156,55 +165,45 @@ def _calibrate(
             fix="nothing was written; go on with that budget and --resume",
         )
     write_tree(tree, run / POSTERIOR)
-    write_section(run, "calibrate", calibration_section(tree, fit, stirring, check))
+    CalibrationSummary.from_fit(tree, fit, stirring, check).write(run)
 
 
-def _left(run: Path, settings: CalibrationSettings, bank: "SimulationBank") -> int:
-    """Simulations that a run still needs; some of those before it grew were judging, or pours."""
-    from .check import PREDICTIVE_DRAWS, REPLICATES
-
-    before = read_run(run).get("grown", [{"learned_from": 0, "simulations": 0}])[-1]
-    needed = settings.budget - before["learned_from"] + PREDICTIVE_DRAWS + REPLICATES
-    return needed - (len(bank) - before["simulations"])
-
-
-def fit_recordings(  # noqa: PLR0913  what a calibration is made of
+def fit_recordings(
     stirring: Stirring,
     observed: NDArray,
     prior: "Prior",
     keep: "Keep",
-    *,
-    budget: int,
-    surrogate: str,
-    seed: int,
-    simulate: Simulate | None = None,
+    settings: CalibrationSettings,
+    **report: Any,
 ) -> "Fit":
     """The engine's fit of a stir, with the options that go with the surrogate.
 
     Args:
         stirring: The simulator, and how two signals are compared.
         observed: Inclinations (T, 2) [rad], NaN where missing.
-        prior: Of the parameters.
-        keep: Finished simulations are taken from there and put there.
-        budget: Simulations to learn from.
-        surrogate: One of `settings.SURROGATES`.
-        seed: Of everything random.
-        simulate: In place of the stirring's own, such as one that reports.
+        prior: Prior of the parameters.
+        keep: Where simulations are made and kept.
+        settings: Budget, surrogate and seed.
+        report: Arguments `progress` and `warn` of `inference.fit`; none shows no bar.
     """
     from .. import inference
 
-    options = engine_options(stirring, surrogate)
+    options = engine_options(stirring, settings.surrogate)
     if "initial" in options:
-        options["initial"] = min(options["initial"], budget)
+        options["initial"] = min(options["initial"], settings.budget)
     return inference.fit(
-        simulate or stirring.simulate,
+        stirring.simulate,
         prior,
         observed,
-        budget=budget,
-        batch=keep.batch,
-        seed=seed,
+        budget=settings.budget,
+        batch=settings.batch,
+        seed=settings.seed,
+        executor=keep.executor,
+        in_rounds=True,
         bank=keep.bank,
         identity=keep.identity,
+        timeout=keep.timeout,
+        **{"progress": False, **report},
         **options,
     )
 

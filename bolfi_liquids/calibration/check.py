@@ -6,12 +6,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..progress import Simulate
-from ..run.simulations import Keep, fresh_seeds, simulate_kept
+from ..inference.simulations import Keep
+from ..progress import Advance, Simulate, silent
+from ..run.simulations import simulate_kept
+from ..seeds import Phase, simulation_seeds
 
 PREDICTIVE_DRAWS = 8
 REPLICATES = 4  # seeds at theta*, for the noise between seeds
-_PREDICTIVE, _REPLICATE = 1, 2  # purposes of seeds
 
 
 class Check(NamedTuple):
@@ -28,6 +29,8 @@ def check_by_simulation(
     best: Mapping[str, float],
     seed: int,
     keep: Keep,
+    *,
+    advance: Advance = silent,
 ) -> Check:
     """Simulate at `draws` and, with several seeds, at `best`; all with fresh seeds.
 
@@ -36,10 +39,15 @@ def check_by_simulation(
         draws: Posterior draws, name -> shape (n,).
         best: theta*.
         seed: Of the run.
-        keep: Finished simulations are taken from there and put there.
+        keep: Where simulations are made and kept.
+        advance: Called with 1 for each simulation.
     """
     count = len(next(iter(draws.values())))
     at_best = {name: np.full(REPLICATES, value) for name, value in best.items()}
-    predictive = simulate_kept(simulate, draws, fresh_seeds(seed, _PREDICTIVE, count), keep)
-    replicates = simulate_kept(simulate, at_best, fresh_seeds(seed, _REPLICATE, REPLICATES), keep)
+    seeds = (
+        simulation_seeds(seed, Phase.PREDICTIVE, count),
+        simulation_seeds(seed, Phase.REPLICATES, REPLICATES),
+    )
+    predictive = simulate_kept(simulate, draws, seeds[0], keep, advance=advance)
+    replicates = simulate_kept(simulate, at_best, seeds[1], keep, advance=advance)
     return Check(predictive.signals, replicates.signals, predictive.seconds + replicates.seconds)

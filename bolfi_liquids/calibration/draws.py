@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..seeds import Phase, generator
+
 if TYPE_CHECKING:
     from xarray import Dataset
 
@@ -30,7 +32,7 @@ def pick_draws(posterior: "Dataset", count: int, seed: int) -> dict[str, NDArray
     first = next(iter(flat.values()))
     if not 1 <= count <= first.size:
         raise ValueError(f"draws must be from 1 to {first.size}, got {count}")
-    rng = np.random.default_rng(seed)
+    rng = generator(seed, Phase.POSTERIOR_DRAWS)
     strata = np.array_split(np.argsort(first, kind="stable"), count)
     chosen = np.array([rng.choice(stratum) for stratum in strata])
     return {name: values[chosen] for name, values in flat.items()}

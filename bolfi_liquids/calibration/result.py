@@ -14,6 +14,7 @@ from ..inputs.settings import CalibrationSettings
 from ..run.directory import POSTERIOR, read_run
 from ..run.summary import read_summary
 from .draws import pick_draws
+from .summary import CalibrationSummary
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
@@ -37,7 +38,7 @@ class Calibration:
     path: Path
     tree: "DataTree"
     record: Mapping[str, Any]
-    summary: Mapping[str, Any]
+    summary: CalibrationSummary
 
     @classmethod
     def open(cls, run: str | Path) -> "Calibration":
@@ -60,8 +61,7 @@ class Calibration:
         loaded = read_tree(
             run / POSTERIOR, fix="delete it and go on with --resume: no simulation is lost"
         )
-        summary = read_summary(run)["calibrate"]
-        return cls(run, loaded, MappingProxyType(record), MappingProxyType(summary))
+        return cls(run, loaded, MappingProxyType(record), CalibrationSummary.read(run))
 
     @property
     def posterior(self) -> "Dataset":
@@ -71,7 +71,7 @@ class Calibration:
     @property
     def best(self) -> dict[str, float]:
         """The paper's theta*: the parameters at which the surrogate expects the best fit."""
-        return dict(self.summary["best"])
+        return dict(self.summary.best)
 
     @property
     def prior(self) -> "Prior":
@@ -97,4 +97,4 @@ def _given_options(record: Mapping[str, Any]) -> str:
 
 def is_calibrated(run: Path) -> bool:
     """Whether a run's calibration was finished."""
-    return (run / POSTERIOR).is_file() and "calibrate" in read_summary(run)
+    return (run / POSTERIOR).is_file() and CalibrationSummary.SECTION in read_summary(run)

@@ -1,21 +1,23 @@
-"""`check physics`: the fluid against everything that is known about it."""
+"""`check physics`: the fluid against analytic solutions and measurements."""
 
 import time
 import traceback
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..files import write_text
-from ..physics_progress import case_progress
-from .physics_identity import case_identity, has_identity
+from ..progress import fraction_bar, progress_bar
 from .physics_records import (
     CASES,
     RESULTS,
+    case_identity,
     failed_record,
     finished_record,
+    has_identity,
     is_finished,
     read_record,
     write_record,
@@ -23,6 +25,7 @@ from .physics_records import (
 )
 
 if TYPE_CHECKING:
+    from ..inference.simulations import Workers
     from ..models.validation import Case
 
 
@@ -65,23 +68,27 @@ def check_physics(
     *,
     seed: int = 0,
     cases: "Mapping[str, Case] | None" = None,
+    executor: "Workers | None" = None,
     progress: bool = True,
 ) -> PhysicsCheck:
     """Run validation cases, those that have not finished in `out` before.
 
     A case that raises costs itself alone: it is recorded with its error and tried again by the
-    next check. Everything is kept at once, so a check that was killed goes on where it was.
+    next check. Every record is kept at once, so a check that was killed goes on where it was.
 
     Args:
         out: Directory of results; made if missing.
         names: Cases to run; none for all.
-        seed: Of the cases' initial packings.
+        seed: Seed of the cases' initial packings.
         cases: The registry; None for all there are.
-        progress: Show it on stderr.
+        executor: Runs each case in a call of its own, see `calibrate`; None is this process.
+        progress: Whether to show progress on stderr.
 
     Raises:
         InputError: an unknown name, a negative seed, or a directory that holds something else.
     """
+    from ..inference.simulations import open_executor
+
     registry = all_cases() if cases is None else cases
     chosen = _chosen(names, registry)
     if seed < 0:
@@ -91,19 +98,43 @@ def check_physics(
         raise InputError("not a directory", where=str(out), fix="choose another --out")
     (out / CASES).mkdir(parents=True, exist_ok=True)
 
-    held = [read_record(out, case.name) for case in chosen]
-    records, ran = [], []
-    for number, (case, record) in enumerate(zip(chosen, held, strict=True), 1):
-        if record is None or not is_finished(record, case_identity(case, seed)):
-            label = f"{case.name} ({number} of {len(chosen)})"
-            record = _run(case, seed, label, shown=progress)
+    held = {case.name: read_record(out, case.name) for case in chosen}
+    records = {name: record for name, record in held.items() if record is not None}
+    missing = [case for case in chosen if not _is_held(held[case.name], case, seed)]
+    with open_executor(executor) as workers:
+        for record in _run_all(missing, seed, workers, progress):
+            name = record["name"]
             write_record(out, record)
-            ran.append(case.name)
-            _plot_path(out, case.name).unlink(missing_ok=True)
-        _plot(out, record)
-        records.append(record)
-        write_results(out, _all_records(out, registry, seed), seed)
-    return PhysicsCheck(out, tuple(records), tuple(ran))
+            _plot_path(out, name).unlink(missing_ok=True)
+            records[name] = record
+            _plot(out, record)
+            write_results(out, _all_records(out, registry, seed), seed)
+    for case in chosen:
+        _plot(out, records[case.name])
+    write_results(out, _all_records(out, registry, seed), seed)
+    ran = tuple(case.name for case in missing)
+    return PhysicsCheck(out, tuple(records[case.name] for case in chosen), ran)
+
+
+def _is_held(record: "Mapping[str, Any] | None", case: "Case", seed: int) -> bool:
+    return record is not None and is_finished(record, case_identity(case, seed))
+
+
+def _run_all(
+    missing: "Sequence[Case]", seed: int, workers: "Executor | None", progress: bool
+) -> Iterator[dict[str, Any]]:
+    """Records of cases as they finish."""
+    if workers is None:
+        for number, case in enumerate(missing, 1):
+            label = f"{case.name} ({number} of {len(missing)})"
+            with fraction_bar(label, shown=progress) as tell:
+                yield run_case(case, seed, tell)
+        return
+    futures = [workers.submit(run_case, case, seed) for case in missing]
+    with progress_bar("validation cases", len(missing), shown=progress) as advance:
+        for future in as_completed(futures):
+            yield future.result()
+            advance(1)
 
 
 def _chosen(names: Iterable[str], registry: "Mapping[str, Case]") -> "list[Case]":
@@ -116,18 +147,25 @@ def _chosen(names: Iterable[str], registry: "Mapping[str, Case]") -> "list[Case]
     return [registry[name] for name in wanted or registry]
 
 
-def _run(case: "Case", seed: int, label: str, *, shown: bool) -> dict[str, Any]:
-    """The record of one case, which ran or failed."""
+def run_case(
+    case: "Case", seed: int, tell: Callable[[float], object] = lambda fraction: None
+) -> dict[str, Any]:
+    """The record of one case, which ran or failed.
+
+    Args:
+        case: What to run.
+        seed: Seed of its initial packings.
+        tell: Called with the fraction that is done.
+    """
     began = time.perf_counter()
-    with case_progress(label, shown=shown) as tell:
-        try:
-            result = case.run(tell, seed)
-            return finished_record(case, result, seed, time.perf_counter() - began)
-        except Exception as err:  # whatever it is, the other cases are still worth running
-            seconds = time.perf_counter() - began
-            said = " ".join(str(err).split())
-            record = failed_record(case, f"{type(err).__name__}: {said}", seed, seconds)
-            return record | {"traceback": traceback.format_exc()}
+    try:
+        result = case.run(tell, seed)
+        return finished_record(case, result, seed, time.perf_counter() - began)
+    except Exception as err:  # whatever it is, the other cases are still worth running
+        seconds = time.perf_counter() - began
+        said = " ".join(str(err).split())
+        record = failed_record(case, f"{type(err).__name__}: {said}", seed, seconds)
+        return record | {"traceback": traceback.format_exc()}
 
 
 def _all_records(out: Path, registry: "Mapping[str, Case]", seed: int) -> Iterator[dict[str, Any]]:

@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..drawing import (
-    BLUE,
-    GREY,
     INK,
-    ORANGE,
+    PALETTE,
     new_figure,
     plain_log_ticks,
     styled,
@@ -19,16 +17,15 @@ from ..drawing import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-COLOURS = (BLUE, ORANGE, "#2d8659", "#8a4fa3", "#b8860b", GREY)
-MARKED = 60  # more points than this are a line
-PANEL = (4.6, 3.6)  # inch
+MAX_MARKERS = 60  # a curve of more points is drawn as a line
+PANEL_SIZE = (4.6, 3.6)  # inch
 
 
 def physics_figure(record: Mapping[str, Any]) -> str:
-    """An SVG file of the panels of a case's record, as `physics_files` keeps them."""
+    """An SVG file of the panels of a case's record, as `physics_records` keeps them."""
     panels = record["panels"]
     with styled(record["name"]):
-        figure = new_figure(PANEL[0] * len(panels), PANEL[1])
+        figure = new_figure(PANEL_SIZE[0] * len(panels), PANEL_SIZE[1])
         figure.suptitle(record["title"], fontsize=10, color=INK)
         grid = figure.subplots(1, len(panels), squeeze=False)
         for axes, panel in zip(grid[0], panels, strict=True):
@@ -40,12 +37,12 @@ def physics_figure(record: Mapping[str, Any]) -> str:
 
 def _draw(axes: "Axes", panel: Mapping[str, Any]) -> None:
     for curve in panel["curves"]:
-        colour = COLOURS[curve["series"] % len(COLOURS)]
+        colour = PALETTE[curve["series"] % len(PALETTE)]
         x, y = (np.array(curve[key], float) for key in ("x", "y"))  # null becomes a gap
         label = curve["label"] or None
         if curve["truth"]:
             axes.plot(x, y, color=colour, alpha=0.35, linewidth=3.0, label=label, zorder=1)
-        elif len(x) > MARKED:
+        elif len(x) > MAX_MARKERS:
             axes.plot(x, y, color=colour, linewidth=1.0, label=label, zorder=2)
         else:
             axes.plot(x, y, "o", color=colour, markersize=3.5, label=label, zorder=2)

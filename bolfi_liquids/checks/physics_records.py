@@ -2,10 +2,12 @@
 
 OUT/cases/NAME.json is written whole when its case has finished, so that a killed check repeats
 no finished case, and two checks may run different cases side by side. OUT/physics.json is made
-from these.
+from these. A record is used again for the same seed, settings of the case, version of the
+simulator and version of the package.
 """
 
 import json
+import math
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
@@ -14,8 +16,6 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError
 from ..files import write_text
 from ..run.provenance import versions
-from .physics_identity import case_identity, has_identity
-from .physics_json import plain
 
 if TYPE_CHECKING:
     from ..models.validation import Case, CaseResult
@@ -23,6 +23,24 @@ if TYPE_CHECKING:
 CASES = "cases"
 RESULTS = "physics.json"
 LIBRARIES = ("bolfi-liquids", "numpy", "scipy", "taichi")
+IDENTITY = ("seed", "model", "version", "settings")
+
+
+def case_identity(case: "Case", seed: int) -> dict[str, Any]:
+    """What a finished record must agree with to be used again."""
+    from ..models import MODEL_VERSION
+
+    return {
+        "seed": seed,
+        "model": MODEL_VERSION,
+        "version": versions(("bolfi-liquids",))["bolfi-liquids"],
+        "settings": plain(case.settings),
+    }
+
+
+def has_identity(record: Mapping[str, Any], identity: Mapping[str, Any]) -> bool:
+    """Whether the record is of the same seed, versions and settings."""
+    return all(record.get(field) == identity[field] for field in IDENTITY)
 
 
 def finished_record(
@@ -83,7 +101,7 @@ def read_record(out: Path, name: str) -> dict[str, Any] | None:
 
 
 def is_finished(record: Mapping[str, Any], identity: Mapping[str, Any]) -> bool:
-    """The record is of a case that ran to its end with the same seed, model, settings and code."""
+    """Whether the record is of a case that ran to its end and has the same identity."""
     return record.get("error") is None and has_identity(record, identity)
 
 
@@ -116,10 +134,29 @@ def _about(case: "Case", seed: int) -> dict[str, Any]:
         "unit": case.unit,
         "tolerance": case.tolerance,
         **case_identity(case, seed),
-        "version": versions(("bolfi-liquids",))["bolfi-liquids"],
         "created": _now(),
     }
 
 
 def _now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def plain(value: Any) -> Any:
+    """Numbers and arrays as JSON gives them back.
+
+    Returns:
+        Lists for arrays and tuples, None for what is not finite.
+
+    Raises:
+        TypeError: something else than numbers, text, and mappings and sequences of them.
+    """
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if not isinstance(value, str | int | float | None):
+        raise TypeError(f"a case's settings and notes must be numbers and text, got {value!r}")
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -9,7 +9,7 @@ draws another set.
 
 from collections.abc import Mapping
 from concurrent.futures import Executor
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,24 +31,21 @@ from ..inputs.settings import (
 from ..progress import progress_bar
 from ..run.directory import SIMULATIONS, enter_run
 from ..run.provenance import LIBRARIES, versions
-from ..run.simulations import fresh_seeds
-from ..run.workers import processes
+from ..seeds import Phase, generator, simulation_seeds
 from .sbc_pipelines import (
     SAMPLING,
     Calibrate,
     CameraNoise,
     FromBank,
-    Quietly,
 )
 from .sbc_tree import SurrogateCheck, checked, write_results
 
 if TYPE_CHECKING:
     from ..inference import Prior
     from ..inference.checks import Replicates
+    from ..inference.simulations import Workers
 
-
-AT_ONCE = 16  # stirs in one call
-_PURPOSE = 61  # of seeds
+STIRS_PER_CALL = 16  # of the simulator, where there is no executor
 
 
 def check_sbc(
@@ -56,7 +53,8 @@ def check_sbc(
     recording: str | Path | Recording | None = None,
     *,
     settings: SbcSettings | None = None,
-    workers: int | None = None,
+    executor: "Workers | None" = None,
+    timeout: float | None = None,
     progress: bool = True,
 ) -> dict[str, SurrogateCheck]:
     """Simulation-based calibration and coverage of both surrogates with the particle fluid.
@@ -67,8 +65,9 @@ def check_sbc(
         out: Directory of results; made if missing.
         recording: Whose gripper path and rig are simulated; None is the bundled stir of water.
         settings: How many of what; None is the default.
-        workers: Processes that share the work; None is one for each processor.
-        progress: Show bars on stderr.
+        executor: Shares the work, see `calibrate`; None is this process.
+        timeout: Seconds that one simulation may take; None sets no limit.
+        progress: Whether to show bars on stderr.
 
     Returns:
         By the surrogate's name.
@@ -77,52 +76,23 @@ def check_sbc(
         InputError: A recording or setting cannot be used, or `out` holds other results.
         ValueError: Of a surrogate, no replicate finished.
     """
+    from ..inference.simulations import open_executor
+
     settings = settings or SbcSettings()
     given = bundled_recording("water") if recording is None else recording
     stirring = stirring_of(open_recordings(given), settings.particles)
     prior, out = default_prior(), Path(out)
-    enter_run(out, _record(settings, prior, stirring), resume=True)
+    record = _record(settings, prior, stirring)
+    enter_run(out, record, resume=True)
     found = {}
-    with processes(workers) as pool:
+    with open_executor(executor) as workers:
+        study = SbcStudy(out, stirring, prior, settings, workers, timeout, progress)
         for name in SURROGATES:
-            count = settings.replicates[name]
-            if count:
-                made = _replicates(name, count, out, stirring, prior, settings, pool, progress)
+            if settings.replicates[name]:
+                made = study.replicates(name)
                 found[name] = checked(made, conservative=name == "discrepancy")
-                write_results(out, found, _record(settings, prior, stirring))
+                write_results(out, found, record)
     return found
-
-
-def _replicates(  # noqa: PLR0913  what the two surrogates share
-    name: str,
-    count: int,
-    out: Path,
-    stirring: Stirring,
-    prior: "Prior",
-    settings: SbcSettings,
-    pool: Executor | None,
-    progress: bool,
-) -> "Replicates":
-    from .. import inference
-
-    calibration = settings.calibration(name)
-    if name == "signal":
-        shared = stirs_everywhere(stirring, prior, settings, out / SIMULATIONS, pool, progress)
-        pipeline: Any = FromBank(stirring, prior, *shared, calibration)
-    else:
-        pipeline = Calibrate(stirring, prior, calibration)
-    return inference.replicates(
-        Quietly(pipeline),
-        stirring.simulate,
-        prior,
-        count,
-        seed=settings.seed,
-        observe=CameraNoise(np.radians(settings.noise_deg)),
-        executor=pool,
-        store=out / f"{name}.sqlite",
-        identity=stirring.identity,
-        progress=progress,
-    )
 
 
 def _record(settings: SbcSettings, prior: "Prior", stirring: Stirring) -> Mapping[str, Any]:
@@ -140,42 +110,76 @@ def _record(settings: SbcSettings, prior: "Prior", stirring: Stirring) -> Mappin
     }
 
 
-def stirs_everywhere(  # noqa: PLR0913  what makes simulations
-    stirring: Stirring,
-    prior: "Prior",
-    settings: SbcSettings,
-    path: Path,
-    pool: Executor | None,
-    progress: bool,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Points of the prior [n, d] and stirs of each [n, RUNS_PER_POINT, T, 2]; failed: NaN."""
-    from scipy.stats import qmc
+@dataclass(frozen=True)
+class SbcStudy:
+    """What the replicates of both surrogates share.
 
-    from ..inference import SimulationBank
-    from ..inference.simulations import Job, run_missing
+    Attributes:
+        out: Directory of results.
+        stirring: The simulator.
+        prior: Prior of the parameters.
+        settings: How many of what.
+        executor: Shares the work; None is this process.
+        timeout: Seconds that one simulation may take; None sets no limit.
+        progress: Whether to show bars on stderr.
+    """
 
-    u = qmc.Sobol(len(prior), rng=settings.seed).random(settings.design)
-    theta = prior.from_unit(u)
-    count = RUNS_PER_POINT * settings.design
-    seeds = fresh_seeds(settings.seed, _PURPOSE, count)
-    jobs = [
-        Job({name: float(values[at // RUNS_PER_POINT]) for name, values in theta.items()}, seed)
-        for at, seed in enumerate(seeds)
-    ]
-    with (
-        SimulationBank(path) as bank,
-        progress_bar("simulating stirs for all", count, shown=progress) as advance,
-    ):
-        made = run_missing(
-            stirring.simulate,
-            jobs,
-            None,
-            bank,
-            stirring.identity,
-            pool,
-            batch=AT_ONCE,
-            advance=advance,
+    out: Path
+    stirring: Stirring
+    prior: "Prior"
+    settings: SbcSettings
+    executor: Executor | None = None
+    timeout: float | None = None
+    progress: bool = True
+
+    def replicates(self, name: str) -> "Replicates":
+        """Calibrations of stirs whose truths are known, by one of `SURROGATES`."""
+        from .. import inference
+
+        calibration = self.settings.calibration(name)
+        if name == "signal":
+            pipeline: Any = FromBank(
+                self.stirring, self.prior, *self.stirs_everywhere(), calibration
+            )
+        else:
+            pipeline = Calibrate(self.stirring, self.prior, calibration, self.timeout)
+        return inference.replicates(
+            pipeline,
+            self.stirring.simulate,
+            self.prior,
+            self.settings.replicates[name],
+            seed=self.settings.seed,
+            observe=CameraNoise(np.radians(self.settings.noise_deg)),
+            executor=self.executor,
+            store=self.out / f"{name}.sqlite",
+            identity=self.stirring.identity,
+            progress=self.progress,
         )
-    nothing = np.full(stirring.observed.shape, np.nan)
-    signals = np.stack([nothing if one.signal is None else one.signal for one in made])
-    return prior.to_array(theta), signals.reshape(settings.design, RUNS_PER_POINT, *nothing.shape)
+
+    def stirs_everywhere(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Points that fill the prior, and `RUNS_PER_POINT` stirs of each.
+
+        Returns:
+            Points [n, d], and signals [n, RUNS_PER_POINT, T, 2]; NaN for a stir that failed.
+        """
+        from scipy.stats import qmc
+
+        from ..inference import SimulationBank
+        from ..inference.simulations import Keep, jobs, run_missing, stacked
+
+        stirring, design = self.stirring, self.settings.design
+        rng = generator(self.settings.seed, Phase.SBC_DESIGN)
+        u = qmc.Sobol(len(self.prior), rng=rng).random(design)
+        theta = self.prior.from_unit(u)
+        count = RUNS_PER_POINT * design
+        seeds = simulation_seeds(self.settings.seed, Phase.SBC_STIRS, count)
+        repeated = {name: np.repeat(values, RUNS_PER_POINT) for name, values in theta.items()}
+        with (
+            SimulationBank(self.out / SIMULATIONS) as bank,
+            progress_bar("simulating stirs for all", count, shown=self.progress) as advance,
+        ):
+            keep = Keep(bank, stirring.identity, STIRS_PER_CALL, self.executor, self.timeout)
+            made = run_missing(stirring.simulate, jobs(repeated, seeds), keep, advance=advance)
+        shape = stirring.observed.shape
+        signals = stacked(made, shape).reshape(design, RUNS_PER_POINT, *shape)
+        return self.prior.to_array(theta), signals

@@ -1,8 +1,7 @@
 """Calibrations as pipelines of `inference.replicates`."""
 
-import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from ..calibration.calibrate import engine_options, fit_recordings
 from ..calibration.stir_simulator import Stirring
 from ..inputs.settings import RUNS_PER_POINT, CalibrationSettings
+from ..seeds import Phase, simulation_seeds
 
 if TYPE_CHECKING:
     from xarray import DataTree
@@ -44,27 +44,22 @@ class Calibrate:
         stirring: The simulator; its recording's inclination is not looked at.
         prior: Of the parameters.
         settings: Budget and surrogate; the seed is each replicate's.
+        timeout: Seconds that one simulation may take; None sets no limit.
     """
 
     stirring: Stirring
     prior: "Prior"
     settings: CalibrationSettings
+    timeout: float | None = field(default=None, compare=False)  # it decides no draw
 
     def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
         from ..inference import SimulationBank
-        from ..run.simulations import Keep
+        from ..inference.simulations import Keep
 
         with SimulationBank(":memory:") as bank:
-            keep = Keep(bank, self.stirring.identity, self.settings.batch)
-            fit = fit_recordings(
-                self.stirring,
-                observed,
-                self.prior,
-                keep,
-                budget=self.settings.budget,
-                surrogate=self.settings.surrogate,
-                seed=seed,
-            )
+            keep = Keep(bank, self.stirring.identity, timeout=self.timeout)
+            settings = replace(self.settings, seed=seed)
+            fit = fit_recordings(self.stirring, observed, self.prior, keep, settings, warn=False)
         return fit.sample(seed=seed, **SAMPLING), fit.log_prob
 
 
@@ -92,7 +87,6 @@ class FromBank:
 
     def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
         from ..inference import Bolfi
-        from ..run.simulations import fresh_seeds
 
         u = self.prior.to_unit(self.prior.to_dict(self.theta))
         left = np.asarray(np.isfinite(self.signals).all(axis=(2, 3)))
@@ -110,11 +104,12 @@ class FromBank:
 
         while len(told) < self.settings.budget:
             # a new engine of the same seed would draw the same random numbers for every batch
-            asking = engine(seed if not told else fresh_seeds(seed, len(told), 1)[0])
+            (own,) = simulation_seeds(seed, Phase.SBC_SEARCH, 1, len(told))
+            asking = engine(seed if not told else own)
             wanted = asking.initial if not told else self.settings.batch
             asked = asking.ask(min(wanted, self.settings.budget - len(told)))
             told += _nearest(self.prior.to_unit(asked), u, left)
-        fit = engine(seed).fit()
+        fit = engine(seed).fit(warn=False)
         return fit.sample(seed=seed, **SAMPLING), fit.log_prob
 
 
@@ -131,21 +126,3 @@ def _nearest(asked: NDArray, points: NDArray, left: NDArray[np.bool_]) -> Iterat
         run = int(np.argmax(left[point]))
         left[point, run] = False
         yield point, run
-
-
-@dataclass(frozen=True)
-class Quietly:
-    """A pipeline whose emulator's complaints are not repeated for every replicate.
-
-    Attributes:
-        pipeline: See `inference.replicates`.
-    """
-
-    pipeline: Any
-
-    def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
-        from ..inference import EmulatorWarning
-
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", EmulatorWarning)
-            return self.pipeline(observed, seed)

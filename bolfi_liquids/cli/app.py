@@ -1,49 +1,39 @@
 """The command line; each command calls the function of the same name."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from .. import __version__
-from ..inputs.settings import (
-    RISKS,
-    SAMPLERS,
-    SURROGATES,
-    CalibrationSettings,
-    CriticismSettings,
-    PourSettings,
-)
 from ..run.directory import RUN_TOML
 from ..run.jax_cache import keep_compilations
-from . import (
-    check as cli_check,
-)
-from . import (
-    guide,
-    import_table,
-    reproduce,
-)
-from . import (
-    record as cli_record,
-)
-from . import (
-    rig as cli_rig,
-)
-from . import (
-    simulate as cli_simulate,
-)
+from . import check as cli_check
+from . import guide, import_table, reproduce
+from . import record as cli_record
+from . import rig as cli_rig
+from . import simulate as cli_simulate
+from .compute import Compute
 from .errors import OneLineErrors
 from .examples import examples, session
+from .grouped import grouped
+from .notices import print_notices
+from .options import (
+    CalibrationOptions,
+    CriticismData,
+    EffectOptions,
+    ExecutionOptions,
+    PourData,
+    PourOptions,
+    RunArgument,
+)
 from .printed import (
     complaints_among_results,
     print_findings,
     print_next,
     print_section,
 )
-from .rig import RigOption
-
-RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="Directory of a run.")]
 
 app = typer.Typer(
     cls=OneLineErrors,
@@ -77,6 +67,7 @@ def _global_options(
 ) -> None:
     """`--debug` is read by `OneLineErrors`."""
     keep_compilations()
+    print_notices()
 
 
 @app.command(
@@ -85,27 +76,14 @@ def _global_options(
         "calibrate stir.nc --budget 40 --out runs/mine --resume",
     )
 )
-def calibrate(  # noqa: PLR0913  one parameter for each option
+@grouped
+def calibrate(
     recordings: Annotated[
         list[Path], typer.Argument(metavar="RECORDING", help="NetCDF files, of one liquid.")
     ],
     out: Annotated[Path, typer.Option(metavar="RUN", help="Directory of the run.")],
-    budget: Annotated[
-        int, typer.Option(help="Simulations to learn from.")
-    ] = CalibrationSettings.budget,
-    surrogate: Annotated[
-        str, typer.Option(metavar="|".join(SURROGATES), help="What the engine emulates.")
-    ] = CalibrationSettings.surrogate,
-    sampler: Annotated[
-        str, typer.Option(metavar="|".join(SAMPLERS), help="Of the posterior's draws.")
-    ] = CalibrationSettings.sampler,
-    seed: Annotated[int, typer.Option(help="Of all random numbers.")] = CalibrationSettings.seed,
-    particles: Annotated[
-        int, typer.Option(help="Of which the simulated liquid is made.")
-    ] = CalibrationSettings.particles,
-    batch: Annotated[
-        int, typer.Option(help="Simulations run at the same time.")
-    ] = CalibrationSettings.batch,
+    options: CalibrationOptions,
+    compute: Compute,
     resume: Annotated[
         bool,
         typer.Option(
@@ -121,17 +99,14 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
     opened = open_recordings(recordings)
     if resume and not (out / RUN_TOML).exists():
         typer.echo(f"{out}: holds no run to resume: this is a new one", err=True)
-    with complaints_among_results():
+    with complaints_among_results(), compute.executor() as executor:
         run_calibrate(
             opened,
             out=out,
-            budget=budget,
-            surrogate=surrogate,
-            sampler=sampler,
-            seed=seed,
-            particles=particles,
-            batch=batch,
             resume=resume,
+            executor=executor,
+            timeout=compute.timeout,
+            **asdict(options),
         )
     print_section(out, "calibrate")
     for line in aborted_recordings(opened):
@@ -145,55 +120,41 @@ def calibrate(  # noqa: PLR0913  one parameter for each option
         "criticise runs/mine --accept camera_delay",
     )
 )
-def criticise(  # noqa: PLR0913  one parameter for each option
+@grouped
+def criticise(
     run: RunArgument,
-    held_out: Annotated[
-        list[Path] | None,
-        typer.Option(metavar="RECORDING", help="Same liquid, other path or speed: the proof."),
-    ] = None,
-    baseline: Annotated[
-        list[Path] | None,
-        typer.Option(metavar="RECORDING", help="Believed to lack nothing, of any liquid."),
-    ] = None,
-    pours: Annotated[
-        Path | None, typer.Option(metavar="CSV", help="What pours of the liquid spilled.")
-    ] = None,
-    held_out_pours: Annotated[
-        Path | None, typer.Option(metavar="CSV", help="Other pours of the liquid: the proof.")
-    ] = None,
-    liquid: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Whose pours, if CSV has several.")
-    ] = None,
-    cups: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="cups.toml; without it, the bundled one.")
-    ] = None,
-    effects: Annotated[
-        list[str] | None, typer.Option(metavar="EFFECT", help="To consider; all if not given.")
-    ] = None,
-    accept: Annotated[
-        list[str] | None, typer.Option(metavar="EFFECT", help="Joins the model in any case.")
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Of all random numbers.")] = CriticismSettings.seed,
+    data: CriticismData,
+    poured: PourData,
+    options: EffectOptions,
+    compute: Compute,
 ) -> None:
     """Find where simulation and recording disagree, and which effect is missing."""
     from ..criticism.criticise import criticise as run_criticise
     from ..inputs.cups import open_cups
     from ..inputs.pour_table import open_pours
 
-    for name, given in (("liquid", liquid), ("cups", cups), ("held-out-pours", held_out_pours)):
-        if pours is None and given:
-            raise typer.BadParameter(f"--{name} needs --pours, which is missing")
-    criticism = run_criticise(
-        run,
-        held_out=held_out or (),
-        baseline=baseline or (),
-        pours=None if pours is None else open_pours(pours, liquid),
-        held_out_pours=None if held_out_pours is None else open_pours(held_out_pours, liquid),
-        cups=None if cups is None else open_cups(cups),
-        effects=effects or None,
-        accept=accept or None,
-        seed=seed,
-    )
+    tables = [
+        None if path is None else open_pours(path, poured.liquid)
+        for path in (poured.pours, poured.held_out_pours)
+    ]
+    for table in filter(None, tables):
+        if table.unused:
+            typer.echo(f"{table.path}: columns not used: {', '.join(table.unused)}", err=True)
+    cups = None if poured.cups is None else open_cups(poured.cups)
+    with compute.executor() as executor:
+        criticism = run_criticise(
+            run,
+            held_out=data.held_out or (),
+            baseline=data.baseline or (),
+            pours=tables[0],
+            held_out_pours=tables[1],
+            cups=cups,
+            effects=options.effects or None,
+            accept=options.accept or None,
+            seed=options.seed,
+            executor=executor,
+            timeout=compute.timeout,
+        )
     print_findings(criticism)
     print_next(run, "pour")
 
@@ -201,48 +162,29 @@ def criticise(  # noqa: PLR0913  one parameter for each option
 @app.command(
     epilog=examples("pour runs/mine --cups cups.toml", "pour runs/mine --execute --emulator")
 )
-def pour(  # noqa: PLR0913  one parameter for each option
-    run: RunArgument,
-    cups: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="cups.toml; without it, the bundled one.")
-    ] = None,
-    iterations: Annotated[
-        int, typer.Option(help="Angular velocities tried.")
-    ] = PourSettings.iterations,
-    risk: Annotated[
-        str,
-        typer.Option(
-            metavar="|".join(RISKS), help="Spillage to keep low: the mean, or the worst tenth's."
-        ),
-    ] = PourSettings.risk,
-    execute: Annotated[
-        bool, typer.Option("--execute", help="Carry out the pour that RUN has chosen already.")
-    ] = False,
-    rig: RigOption = None,
-    arm: Annotated[
-        bool, typer.Option("--arm", help="With --execute: move the arm, once a sentence is typed.")
-    ] = False,
-    emulator: Annotated[
-        bool, typer.Option("--emulator", help="With --execute: move an emulated arm.")
-    ] = False,
+@grouped
+def pour(
+    run: RunArgument, options: PourOptions, execution: ExecutionOptions, compute: Compute
 ) -> None:
     """Choose the pour that spills least over all that the liquid might be.
 
     What a criticism accepted is part of the liquid. With --execute nothing is chosen anew: it is
     a dry run of the chosen pour, unless armed.
     """
-    if execute:
-        cli_record.execute(run, rig, arm=arm, emulator=emulator)
+    if execution.execute:
+        cli_record.execute(run, execution.rig, arm=execution.arm, emulator=execution.emulator)
         return
-    for option, given in (("arm", arm), ("emulator", emulator), ("rig", rig)):
-        if given:
-            raise typer.BadParameter(f"--{option} needs --execute, which is missing")
-    from ..criticism.result import latest_calibration
-    from ..inputs.cups import bundled_cups, open_cups
     from ..pouring.choose import choose_pour
 
-    chosen_cups = bundled_cups() if cups is None else open_cups(cups)
-    choose_pour(latest_calibration(run), chosen_cups, iterations=iterations, risk=risk)
+    with compute.executor() as executor:
+        choose_pour(
+            run,
+            options.cups,
+            iterations=options.iterations,
+            risk=options.risk,
+            executor=executor,
+            timeout=compute.timeout,
+        )
     print_section(run, "pour")
     print_next(run, "report")
 
@@ -265,7 +207,9 @@ def report(
 
 
 @app.command(epilog=examples("demo --out runs/demo"))
+@grouped
 def demo(
+    compute: Compute,
     out: Annotated[Path, typer.Option(metavar="RUN", help="Directory of the run.")] = Path(
         "runs/demo"
     ),
@@ -274,8 +218,8 @@ def demo(
     from ..criticism.result import Criticism
     from ..demo import run_demo
 
-    with complaints_among_results():
-        path = run_demo(out)
+    with complaints_among_results(), compute.executor() as executor:
+        path = run_demo(out, executor=executor, timeout=compute.timeout)
     print_section(out, "calibrate")
     print_findings(Criticism.open(out))
     print_section(out, "pour")

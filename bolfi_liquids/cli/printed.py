@@ -34,10 +34,14 @@ def print_section(run: Path, name: str) -> None:
     """Section "calibrate" or "pour" of a run's summary."""
     from rich.console import Console
 
-    from ..run.summary import read_summary
+    from ..calibration.summary import CalibrationSummary
+    from ..pouring.result import PourSummary
     from .tables import print_calibration, print_pour
 
-    {"calibrate": print_calibration, "pour": print_pour}[name](read_summary(run)[name], Console())
+    if name == CalibrationSummary.SECTION:
+        print_calibration(CalibrationSummary.read(run), Console())
+    else:
+        print_pour(PourSummary.read(run), Console())
 
 
 def print_findings(criticism: "Criticism") -> None:

@@ -5,12 +5,16 @@ from typing import Annotated
 
 import typer
 
+from .compute import AllProcessors
 from .examples import examples
+from .grouped import grouped
 
 EPILOG = examples("reproduce --quick", "reproduce inclination posterior --out runs/reproduce")
 
 
+@grouped
 def reproduce(
+    compute: AllProcessors,
     figures: Annotated[
         list[str] | None, typer.Argument(metavar="FIGURE", help="Names; all without any.")
     ] = None,
@@ -45,9 +49,11 @@ def reproduce(
 
     # of one scale each, so that no figure of the one stands beside some of the other
     out = out or Path("runs/reproduce_quick" if quick else "runs/reproduce")
-    draw(
-        figures or (),
-        out,
-        scale=QUICK if quick else FULL,
-        done=lambda name, drawn: typer.echo(f"{out / name}.png\n{drawn.says}\n"),
-    )
+    with compute.executor() as executor:
+        draw(
+            figures or (),
+            out,
+            scale=QUICK if quick else FULL,
+            executor=executor,
+            done=lambda name, drawn: typer.echo(f"{out / name}.png\n{drawn.says}\n"),
+        )

@@ -1,43 +1,103 @@
 """The command group `simulate`: one stir or one pour of a liquid given by numbers."""
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from .compute import Workers
 from .examples import examples
+from .grouped import grouped
+from .options import CupsOption
+
+if TYPE_CHECKING:
+    from xarray import Dataset
 
 app = typer.Typer(help="Simulate one stir or one pour, and look at it.", no_args_is_help=True)
 
-Viscosity = Annotated[float, typer.Option(help="Of the liquid, in Pa s.")]
-Cohesion = Annotated[float, typer.Option(help="Of the liquid, 0 to 1.")]
-Effects = Annotated[
-    list[str] | None,
-    typer.Option("--effect", metavar="NAME=VALUE", help="An effect; may be repeated."),
-]
-Particles = Annotated[int, typer.Option(help="Of which the simulated liquid is made.")]
-Seed = Annotated[int, typer.Option(help="Of the particles' first places.")]
-Movie = Annotated[Path | None, typer.Option(metavar="FILE", help="Show it: .mp4, .gif or .webp.")]
-GLYCERIN = {"viscosity": 1.0, "cohesion": 0.2, "density": 1260.0}
+GLYCERIN_DENSITY = 1260.0  # kg/m3
+
+
+@dataclass(frozen=True)
+class LiquidOptions:
+    """A liquid by numbers."""
+
+    viscosity: Annotated[float, typer.Option(help="Of the liquid, in Pa s.")] = 1.0
+    cohesion: Annotated[float, typer.Option(help="Of the liquid, 0 to 1.")] = 0.2
+    effect: Annotated[
+        list[str] | None,
+        typer.Option("--effect", metavar="NAME=VALUE", help="An effect; may be repeated."),
+    ] = None
+    seed: Annotated[int, typer.Option(help="Seed of the particles' first places.")] = 0
+
+    def given(self, scene: str) -> dict[str, Any]:
+        """Arguments of `simulate_stir` and `simulate_pour`."""
+        from ..inputs.described_liquid import read_effects
+
+        return {
+            "viscosity": self.viscosity,
+            "cohesion": self.cohesion,
+            "effects": read_effects(self.effect or (), scene),
+            "seed": self.seed,
+        }
+
+    def lines(self, simulated: "Dataset") -> list[str]:
+        """The liquid, for a person."""
+        import json
+
+        from ..inputs.described_liquid import Described
+
+        attrs = simulated.attrs
+        return Described(
+            self.viscosity,
+            self.cohesion,
+            float(attrs["liquid_density"]),
+            json.loads(attrs["effects"]),
+            int(attrs["particles"]),
+            self.seed,
+        ).lines()
+
+
+@dataclass(frozen=True)
+class FileOptions:
+    """Files that a simulation leaves."""
+
+    movie: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Show it: .mp4, .gif or .webp.")
+    ] = None
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="NC", help="The result; of a stir, a recording without noise."),
+    ] = None
+
+
+@dataclass(frozen=True)
+class ActionOptions:
+    """How a source is turned, and where the receiver stands."""
+
+    angular_velocity: Annotated[
+        float, typer.Option(help="Of the source about its lip, in deg/s.")
+    ] = 60.0
+    distance: Annotated[float, typer.Option(help="From the lip to the receiver's axis, in cm.")] = (
+        3.0
+    )
+    cups: CupsOption = None
 
 
 @app.command(epilog=examples("simulate stir --viscosity 0.1 --movie oil.webp"))
-def stir(  # noqa: PLR0913  one parameter for each option
-    viscosity: Viscosity = GLYCERIN["viscosity"],
-    cohesion: Cohesion = GLYCERIN["cohesion"],
+@grouped
+def stir(
+    liquid: LiquidOptions,
+    files: FileOptions,
+    compute: Workers,
     density: Annotated[
         float | None, typer.Option(help="Of the liquid, in kg/m³; else the recording's.")
     ] = None,
-    effect: Effects = None,
-    particles: Particles = 1000,
-    seed: Seed = 0,
+    particles: Annotated[int, typer.Option(help="Of which the simulated liquid is made.")] = 1000,
     recording: Annotated[
         Path | None,
         typer.Option(metavar="NC", help="Whose path and rig are used; else a bundled one."),
-    ] = None,
-    movie: Movie = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="NC", help="The inclination, as a recording.")
     ] = None,
 ) -> None:
     """Stir a liquid along a recorded path.
@@ -47,20 +107,25 @@ def stir(  # noqa: PLR0913  one parameter for each option
     """
     import numpy as np
 
-    from ..inputs.bundled import bundled_recording
-    from ..inputs.described_liquid import Described, read_effects
-    from ..inputs.open import open_recording
     from ..simulation.simulate import simulate_stir
 
-    opened = bundled_recording("glycerin") if recording is None else open_recording(recording)
-    density = opened.number("liquid_density") if density is None else density
-    effects = read_effects(effect or (), "stir")
-    described = Described(viscosity, cohesion, density, effects, particles, seed)
-    angles = simulate_stir(described, opened, movie=movie, out=out)
-    xz, yz = np.degrees(np.abs(angles).max(axis=0))
-    _tell([*described.lines(), f"path of {opened.path.name}, {opened.time[-1]:.1f} s"])
+    with compute.executor() as executor:
+        made = simulate_stir(
+            **liquid.given("stir"),
+            density=density,
+            particles=particles,
+            recording=recording,
+            executor=executor,
+            movie=files.movie,
+            out=files.out,
+        )
+    seconds = float(made["time"][-1])
+    _tell([*liquid.lines(made), f"path of {made.attrs['path_of']}, {seconds:.1f} s"])
+    xz, yz = (
+        np.degrees(np.abs(made[f"inclination_{plane}"]).max().item()) for plane in ("xz", "yz")
+    )
     typer.echo(f"largest inclination: {xz:.2f} deg in xz, {yz:.2f} deg in yz")
-    _tell_files(movie, out)
+    _tell_files(files)
 
 
 @app.command(
@@ -68,26 +133,14 @@ def stir(  # noqa: PLR0913  one parameter for each option
         "simulate pour --viscosity 20 --distance 2 --effect adhesion=0.3 --movie gel.gif"
     )
 )
-def pour(  # noqa: PLR0913  one parameter for each option
-    viscosity: Viscosity = GLYCERIN["viscosity"],
-    cohesion: Cohesion = GLYCERIN["cohesion"],
-    density: Annotated[float, typer.Option(help="Of the liquid, in kg/m³.")] = GLYCERIN["density"],
-    effect: Effects = None,
-    particles: Particles = 664,
-    seed: Seed = 0,
-    angular_velocity: Annotated[
-        float, typer.Option(help="Of the source about its lip, in deg/s.")
-    ] = 60.0,
-    distance: Annotated[
-        float, typer.Option(help="From the lip to the receiver's axis, in cm.")
-    ] = 3.0,
-    cups: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="cups.toml; without it, the bundled one.")
-    ] = None,
-    movie: Movie = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="NC", help="The fractions, and where it landed.")
-    ] = None,
+@grouped
+def pour(
+    liquid: LiquidOptions,
+    action: ActionOptions,
+    files: FileOptions,
+    compute: Workers,
+    density: Annotated[float, typer.Option(help="Of the liquid, in kg/m³.")] = GLYCERIN_DENSITY,
+    particles: Annotated[int, typer.Option(help="Of which the simulated liquid is made.")] = 664,
 ) -> None:
     """Pour a liquid from one cup into another.
 
@@ -96,25 +149,32 @@ def pour(  # noqa: PLR0913  one parameter for each option
     """
     import numpy as np
 
-    from ..inputs.cups import bundled_cups, open_cups
-    from ..inputs.described_liquid import Described, read_effects
+    from ..pouring.spillage import FRACTIONS
     from ..simulation.simulate import simulate_pour
 
-    opened = bundled_cups() if cups is None else open_cups(cups)
-    effects = read_effects(effect or (), "pour")
-    described = Described(viscosity, cohesion, density, effects, particles, seed)
-    action = float(np.radians(angular_velocity)), distance / 100.0
-    fractions = simulate_pour(described, opened, *action, movie=movie, out=out)
-    _tell([*described.lines(), f"{angular_velocity:g} deg/s, lip to axis {distance:g} cm"])
-    typer.echo(", ".join(f"{name} {share:.1%}" for name, share in fractions.items()))
-    _tell_files(movie, out)
+    with compute.executor() as executor:
+        made = simulate_pour(
+            **liquid.given("pour"),
+            angular_velocity=float(np.radians(action.angular_velocity)),
+            distance=action.distance / 100.0,
+            density=density,
+            cups=action.cups,
+            particles=particles,
+            executor=executor,
+            movie=files.movie,
+            out=files.out,
+        )
+    turn = f"{action.angular_velocity:g} deg/s, lip to axis {action.distance:g} cm"
+    _tell([*liquid.lines(made), turn])
+    typer.echo(", ".join(f"{name} {made[name].item():.1%}" for name in FRACTIONS))
+    _tell_files(files)
 
 
 def _tell(lines: list[str]) -> None:
     typer.echo("\n".join(lines))
 
 
-def _tell_files(movie: Path | None, out: Path | None) -> None:
-    for name, path in (("movie", movie), ("file", out)):
+def _tell_files(files: FileOptions) -> None:
+    for name, path in (("movie", files.movie), ("file", files.out)):
         if path is not None:
             typer.echo(f"{name}: {path}")

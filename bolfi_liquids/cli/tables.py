@@ -1,120 +1,106 @@
 """What the command line prints of a calibration, a criticism, a pour, a rig and a recording."""
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Sequence
+from dataclasses import astuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Column, Table
 
+from ..criticism.verdict import Verdict
 from ..reporting import criticism_sentences as criticism
 from ..reporting.sentences import (
-    UNITS,
-    emulator_sentences,
-    floor_sentence,
-    sampler_sentence,
+    least_viscosity_sentences,
+    sampler_sentences,
+    surrogate_sentences,
 )
+from ..words import LIQUID_UNITS, Sentence
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
+    from ..calibration.summary import CalibrationSummary
+    from ..criticism.summary import CriticismSummary
     from ..hardware import Check
     from ..inputs.recording import Recording
+    from ..pouring.result import PourSummary
 
 
-def print_calibration(section: Mapping[str, Any], console: Console) -> None:
-    """The posterior as a table, and how it was come by; from the section "calibrate"."""
+def print_calibration(summary: "CalibrationSummary", console: Console) -> None:
+    """The posterior as a table, and how it was made."""
     table = _table("parameter", "mean", "sd", "5 %", "50 %", "95 %", "closest")
-    for name, values in section["parameters"].items():
-        numbers = [values[key] for key in ("mean", "sd", "q05", "q50", "q95")]
-        row = [*numbers, section["closest"][name]]
-        table.add_row(f"{name} {UNITS.get(name, '')}".strip(), *(f"{v:.3g}" for v in row))
-    seconds = section["seconds"]
+    for name, values in summary.parameters.items():
+        row = [*astuple(values), summary.closest[name]]
+        table.add_row(f"{name} {LIQUID_UNITS.get(name, '')}".strip(), *(f"{v:.3g}" for v in row))
+    seconds = summary.seconds
     console.print(table)
     console.print(
-        f"closest hypothesis: {section['fit_rms_deg']:.2f} deg RMS from the recording"
-        f" (noise alone: {section['noise_deg']:.2f} deg)\n"
-        f"simulations: {section['n_simulations']} to learn from,"
-        f" {section['n_check_simulations']} to check with\n"
-        f"seconds: simulator {seconds['simulator']:.1f}, engine {seconds['engine']:.1f},"
-        f" sampling {seconds['sampling']:.1f}",
+        f"closest hypothesis: {summary.fit_rms_deg:.2f} deg RMS from the recording"
+        f" (noise alone: {summary.noise_deg:.2f} deg)\n"
+        f"simulations: {summary.n_simulations} to learn from,"
+        f" {summary.n_check_simulations} to check with\n"
+        f"seconds: simulator {seconds.simulator:.1f}, engine {seconds.engine:.1f},"
+        f" sampling {seconds.sampling:.1f}",
         highlight=False,
     )
-    if floor := floor_sentence(section):
-        console.print(floor, highlight=False, soft_wrap=True)
-    for warning in filter(None, [sampler_sentence(section), *emulator_sentences(section)]):
-        console.print(f"warning: {warning}", highlight=False, markup=False, soft_wrap=True)
+    _print(least_viscosity_sentences(summary), console)
+    _print([*sampler_sentences(summary), *surrogate_sentences(summary)], console, "warning: ")
 
 
-def print_pour(section: Mapping[str, Any], console: Console) -> None:
-    """The chosen pour beside the plug-in; from the section "pour"."""
+def _print(sentences: Iterable[Sentence], console: Console, before: str = "") -> None:
+    """Each on a line of its own, however long."""
+    for sentence in sentences:
+        console.print(f"{before}{sentence}", highlight=False, markup=False, soft_wrap=True)
+
+
+def print_pour(summary: "PourSummary", console: Console) -> None:
+    """The chosen pour beside the plug-in."""
     table = _table("pour", "deg/s", "cm", "expected spillage", "95 % of outcomes below")
-    for label, action in (("chosen", section), ("at theta* alone", section["plug_in"])):
+    for label, action in (("chosen", summary), ("at theta* alone", summary.plug_in)):
         table.add_row(
             label,
-            f"{action['angular_velocity_deg_s']:.1f}",
-            f"{action['distance_cm']:.2f}",
-            f"{action['expected_spillage']:.2%}",
-            f"{action['spillage_q95']:.2%}",
+            f"{action.angular_velocity_deg_s:.1f}",
+            f"{action.distance_cm:.2f}",
+            f"{action.expected_spillage:.2%}",
+            f"{action.spillage_q95:.2%}",
         )
     console.print(table)
-    console.print(f"simulations: {section['n_simulations']} pours", highlight=False)
+    console.print(f"simulations: {summary.n_simulations} pours", highlight=False)
 
 
 def print_criticism(
-    section: Mapping[str, Any], effects: "Dataset | None", console: Console
+    summary: "CriticismSummary", effects: "Dataset | None", console: Console
 ) -> None:
-    """The verdict, its evidence and what to do next; from the section "criticise".
+    """The verdict, its evidence and what to do next.
 
     Args:
-        section: Of summary.json.
-        effects: The group of that name; without it, nothing is said of those that nearly explain.
+        summary: Of the criticism.
+        effects: The group of that name; without it, nothing is printed of the effects.
         console: Where to print.
     """
-    lines = [
-        criticism.verdict_sentence(section),
-        criticism.baseline_sentence(section),
-        criticism.considered_sentence(section),
-        criticism.accepted_sentence(section),
+    sentences = [
+        criticism.verdict_sentence(summary),
+        *criticism.baseline_sentences(summary),
+        *criticism.considered_sentences(summary),
+        *criticism.requested_sentences(summary),
+        *criticism.parameter_sentences(summary),
+        *criticism.gap_sentences(summary.gap, summary.accepted),
     ]
-    lines += [
-        f"{criticism.words(name)}: {criticism.interval(name, values)}"
-        for name, values in section["parameters"].items()
-        if section["accepted"]
-    ]
-    lines += _gap_lines(section["gap_deg"])
-    lines += [
-        f"surest {criticism.window(found)}: {found['rms_deg']:.2f} deg RMS"
-        for found in section["where"][: criticism.NAMED]
-    ]
+    if summary.where:
+        sentences.append(criticism.where_sentence(summary.where))
     if effects is not None:
-        lines.append(criticism.seen_sentence(effects))
-    if section["verdict"] in ("tie", "unknown") and effects is not None:
-        if nearest := criticism.best_gains(effects):
-            lines.append(f"explain most: {'; '.join(nearest)}")
-    if section["pours"] is not None:
-        lines += [criticism.stirs_sentence(section), criticism.pours_sentence(section["pours"])]
-    if section["suggestions"]:
-        lines.append(criticism.suggestion_sentence(section))
-    for line in filter(None, lines):
-        console.print(line, highlight=False, markup=False)
-
-
-def _gap_lines(gap: Mapping[str, float | None]) -> list[str]:
-    """Beyond noise, before and after, on the data and on those held out."""
-    rows = {
-        "gap beyond noise": ("before", "after"),
-        "held out": ("held_out_before", "held_out_after"),
-    }
-    lines = []
-    for label, (before, after) in rows.items():
-        if gap[before] is None:
-            continue
-        then = "" if gap[after] is None else f", after {gap[after]:.2f} deg"
-        own = gap["held_out_noise" if label == "held out" else "noise"]
-        lines.append(f"{label}: before {gap[before]:.2f} deg RMS{then} (noise: {own:.2f} deg)")
-    return lines
+        sentences.append(criticism.detectable_sentence(effects))
+        if summary.verdict in (Verdict.TIE, Verdict.UNKNOWN):
+            sentences += criticism.largest_gains_sentences(effects)
+    if summary.pours is not None:
+        sentences += criticism.stirs_sentences(summary)
+        sentences += criticism.pours_sentences(summary.pours)
+    if summary.suggestions:
+        sentences.append(criticism.suggestion_sentence(summary))
+    for sentence in sentences:
+        console.print(str(sentence), highlight=False, markup=False)
 
 
 def _table(label: str, *numbers: str) -> Table:

@@ -1,4 +1,4 @@
-"""Recordings believed to lack nothing: what the simulator gets wrong on them is usual."""
+"""Clean recordings: the residual that the simulator leaves on them counts as usual."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""From a calibration to what its simulator lacks."""
+"""From a calibration to the effect that its simulator lacks."""
 
 import time
 from collections.abc import Sequence
@@ -16,7 +16,6 @@ from ..inputs.recording import Recording
 from ..inputs.settings import CriticismSettings
 from ..progress import phases
 from ..run.directory import CRITICISM, open_bank
-from ..run.summary import write_section
 from .baseline import (
     Clean,
     clean_residuals,
@@ -28,17 +27,18 @@ from .given import Inputs, Pours, open_inputs
 from .pours import as_prior, pour_experiment
 from .proposals import pour_proposals, stir_proposals
 from .result import Criticism, finished_criticism
-from .section import criticism_section
 from .stirs import (
     camera_noise,
     effects_of,
     held_out_noise,
     stir_experiment,
 )
+from .summary import CriticismSummary
 from .tree import criticism_tree
 
 if TYPE_CHECKING:
     from .. import inference
+    from ..inference.simulations import Workers
     from ..models import Cups
 
 
@@ -53,6 +53,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     effects: str | Sequence[str] | None = None,
     accept: str | Sequence[str] | None = None,
     seed: int = 0,
+    executor: "Workers | None" = None,
+    timeout: float | None = None,
     progress: bool = True,
 ) -> Criticism:
     """Find where a calibrated simulator and the data disagree, and which effect it lacks.
@@ -62,22 +64,27 @@ def criticise(  # noqa: PLR0913  the one call that most users make
 
     Args:
         calibration: Of the stirs, or its RUN directory.
-        held_out: Recordings of the same liquid and rig by another path or speed, to which
-            nothing is fitted: what is named must hold on them.
-        baseline: Recordings of the same rig that are believed to lack nothing, of any liquid:
-            they teach what the simulator usually gets wrong.
+        held_out: Recordings of the same liquid and rig by another path or speed. They are not
+            fitted, and an effect that is named must hold on them.
+        baseline: Clean recordings of the same rig, of any liquid, in which no effect is believed
+            to be missing: their residuals count as simulator error.
         pours: A table of pours of the liquid, or its path; a second source.
         held_out_pours: Another, to which nothing is fitted.
         cups: With which they were poured; None takes the bundled ones.
         effects: Names in `models.EFFECTS` to consider; None is all of them.
         accept: Effects that join the model whatever the verdict.
-        seed: Of everything random.
+        seed: Seed of all random draws.
+        executor: Where simulations run, see `calibrate`; the result has the same bits.
+        timeout: Seconds that one simulation may take; None sets no limit.
         progress: Whether to show phases on stderr.
 
     Raises:
         InputError: Something given cannot be used.
         RuntimeError: Simulations failed; the message says how.
     """
+    from ..inference import Keeping
+    from ..inference.simulations import open_executor
+
     if not isinstance(calibration, Calibration):
         calibration = Calibration.open(calibration)
     started = time.perf_counter()
@@ -98,14 +105,16 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     run = calibration.path
     if finished := finished_criticism(run, inputs.made_from):
         return finished
-    with open_bank(run) as bank, phases(shown=progress) as report:
-        from ..inference.criticism import Keeping
-
-        findings = _find(calibration, inputs, Keeping(bank, settings.batch, seed, report))
+    with (
+        open_bank(run) as bank,
+        open_executor(executor) as workers,
+        phases(shown=progress) as report,
+    ):
+        keeping = Keeping(bank, settings.batch, seed, report, workers, timeout)
+        findings = _find(calibration, inputs, keeping)
         tree = criticism_tree(findings)
     write_tree(tree, run / CRITICISM)
-    section = criticism_section(findings, tree, time.perf_counter() - started)
-    write_section(run, "criticise", section)
+    CriticismSummary.from_findings(findings, tree, time.perf_counter() - started).write(run)
     return Criticism.open(run)
 
 
@@ -171,7 +180,7 @@ def _pours(
     inputs: Inputs,
     keeping: "inference.criticism.Keeping",
 ) -> "inference.criticism.Criticism":
-    """The same for pours, of a liquid of which the stirs are known to have taught something."""
+    """The same for pours, with the posterior of the stirs as the prior."""
     from .. import inference
 
     density, settings = calibration.liquid_density, inputs.settings

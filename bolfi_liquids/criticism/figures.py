@@ -12,53 +12,60 @@ from ..drawing import (
     INK,
     LIGHT,
     ORANGE,
-    new_figure,
+    panels,
     styled,
 )
 from ..inputs.settings import FALSE_ALARM_RATE
-from ..reporting.criticism_sentences import words
+from ..words import spoken
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
     from xarray import Dataset, DataTree
 
-MODELS = {"before": (ORANGE, "before"), "after": (BLUE, "with the missing effect")}
-BAND = 2.0  # sd
+MODEL_STYLES = {"before": (ORANGE, "before"), "after": (BLUE, "with the missing effect")}
+BOTH_PLANES = "both planes"
+BAND_SD = 2.0  # half width of a band
 
 
-def residual_plot(node: "DataTree") -> "Figure":
+def residual_plot(node: "DataTree", axes: "ArrayLike | None" = None) -> "Figure":
     """Observed less expected against time, a row for each recording, a column for each plane.
 
     Args:
         node: The group `stirs`.
+        axes: Where to draw, see `drawing.panels`.
     """
     residual, where = (node[name].to_dataset() for name in ("residual", "where"))
     members, planes = np.unique(residual["recording"]), residual["plane"].to_numpy()
     with styled():
-        figure = new_figure(8.6, 2.5 * len(members) + 0.5)
-        shape = (len(members), len(planes))
-        grid = figure.subplots(*shape, sharex="row", sharey=True, squeeze=False)
-        for row, member in zip(grid, members, strict=True):
+        shape, size = (len(members), len(planes)), _size(len(members))
+        drawn = panels(axes, shape, size, sharex="row", sharey=True)
+        for row, member in zip(drawn.grid, members, strict=True):
             frames = np.flatnonzero(residual["recording"].to_numpy() == member)
             windows = _of_recording(where, int(member))
-            for axes, plane in zip(row, planes, strict=True):
-                _draw_residual(axes, residual.isel(frame=frames).sel(plane=plane))
-                _shade(axes, _strokes(windows, str(plane)))
-                axes.set_title(f"{plane} plane", loc="left")
-                axes.set_xlabel("time [s]")
+            for panel, plane in zip(row, planes, strict=True):
+                _draw_residual(panel, residual.isel(frame=frames).sel(plane=plane))
+                _shade(panel, _strokes(windows, str(plane)))
+                panel.set_title(f"{plane} plane", loc="left")
+                panel.set_xlabel("time [s]")
             row[0].set_ylabel("observed less expected [deg]")
             if len(members) > 1:
                 row[0].set_title(f"{_recording(windows)}\n{planes[0]} plane", loc="left")
-        figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    return figure
+        drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
+    return drawn.figure
+
+
+def _size(recordings: int) -> tuple[float, float]:
+    """Of a figure with a row for each recording [inch]."""
+    return 8.6, 2.5 * recordings + 0.5
 
 
 def _draw_residual(axes: "Axes", part: "Dataset") -> None:
     time = part["time"].to_numpy()
-    drawn = {when: style for when, style in MODELS.items() if f"expected_{when}" in part}
+    drawn = {when: style for when, style in MODEL_STYLES.items() if f"expected_{when}" in part}
     last = list(drawn)[-1]
-    width = BAND * np.degrees(part[f"sd_{last}"].to_numpy())
+    width = BAND_SD * np.degrees(part[f"sd_{last}"].to_numpy())
     axes.fill_between(
         time, -width, width, color=GREY, alpha=0.3, linewidth=0, label="±2 sd of noise and model"
     )
@@ -84,46 +91,46 @@ def _shade(axes: "Axes", strokes: "Dataset") -> None:
         )
 
 
-def stroke_plot(node: "DataTree") -> "Figure":
+def stroke_plot(node: "DataTree", axes: "ArrayLike | None" = None) -> "Figure":
     """RMS of observed less expected, by stroke and plane and by the gripper's speed.
 
     Args:
         node: The group `stirs`.
+        axes: Where to draw, see `drawing.panels`.
     """
     residual, where = (node[name].to_dataset() for name in ("residual", "where"))
     members = np.unique(residual["recording"])
     with styled():
-        figure = new_figure(8.6, 2.5 * len(members) + 0.5)
-        count = residual.sizes["plane"] + 1
-        grid = figure.subplots(len(members), count, sharey=True, squeeze=False)
-        for row, member in zip(grid, members, strict=True):
+        shape = len(members), residual.sizes["plane"] + 1
+        drawn = panels(axes, shape, _size(len(members)), sharey=True)
+        for row, member in zip(drawn.grid, members, strict=True):
             windows = _of_recording(where, int(member))
-            for axes, (title, part, ticks) in zip(row, _panels(residual, windows), strict=True):
-                _draw_bars(axes, part, ticks)
-                axes.set_title(title, loc="left")
-                by_speed = title == "both planes"
-                axes.set_xlabel("gripper's speed [cm/s]" if by_speed else "stroke")
+            for panel, (title, part, ticks) in zip(row, _bars(residual, windows), strict=True):
+                _draw_bars(panel, part, ticks)
+                panel.set_title(title, loc="left")
+                by_speed = title == BOTH_PLANES
+                panel.set_xlabel("gripper's speed [cm/s]" if by_speed else "stroke")
             row[0].set_ylabel("RMS [deg]")
             if len(members) > 1:
                 title = row[0].get_title(loc="left")
                 row[0].set_title(f"{_recording(windows)}\n{title}", loc="left")
-        figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    return figure
+        drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
+    return drawn.figure
 
 
-def _panels(residual: "Dataset", windows: "Dataset") -> Iterator[tuple[str, "Dataset", list[str]]]:
+def _bars(residual: "Dataset", windows: "Dataset") -> Iterator[tuple[str, "Dataset", list[str]]]:
     """Title, windows and their names, of each panel of a recording."""
     for plane in residual["plane"].to_numpy():
         strokes = _strokes(windows, str(plane))
         yield f"{plane} plane", strokes, [f"{int(k)}" for k in strokes["stroke"]]
     by_speed = windows.isel(window=np.flatnonzero(windows["speed"].to_numpy() != ""))
     speeds = [str(speed).removesuffix(" cm/s") for speed in by_speed["speed"].to_numpy()]
-    yield "both planes", by_speed, speeds
+    yield BOTH_PLANES, by_speed, speeds
 
 
 def _draw_bars(axes: "Axes", part: "Dataset", ticks: list[str]) -> None:
     at = np.arange(len(ticks))
-    drawn = {when: style for when, style in MODELS.items() if f"rms_{when}" in part}
+    drawn = {when: style for when, style in MODEL_STYLES.items() if f"rms_{when}" in part}
     width = 0.8 / len(drawn)
     for k, (when, (colour, label)) in enumerate(drawn.items()):
         shift = (k - (len(drawn) - 1) / 2.0) * width
@@ -153,35 +160,36 @@ def _strokes(windows: "Dataset", plane: str) -> "Dataset":
     return windows.isel(window=np.flatnonzero(~by_speed & (windows["channel"] == plane).to_numpy()))
 
 
-def held_out_plot(node: "DataTree") -> "Figure":
-    """RMS on recordings that nothing was fitted to, against what noise leaves.
+def held_out_plot(node: "DataTree", axes: "ArrayLike | None" = None) -> "Figure":
+    """RMS on recordings that were not fitted, against the RMS of noise.
 
     Args:
         node: A source that has the group `held_out`.
+        axes: Where to draw, see `drawing.panels`.
     """
     held = node["held_out"].to_dataset()
     rows = [
-        (f"{words(str(name))}\n{recording}", held.sel(explanation=name, recording=recording))
+        (f"{spoken(str(name))}\n{recording}", held.sel(explanation=name, recording=recording))
         for name in held["explanation"].to_numpy()
         for recording in held["recording"].to_numpy()
     ]
     with styled():
-        figure = new_figure(8.6, 0.55 * len(rows) + 1.2)
-        axes = figure.subplots()
+        drawn = panels(axes, (1, 1), (8.6, 0.55 * len(rows) + 1.2))
+        panel = drawn.grid[0, 0]
         for at, (_, row) in enumerate(rows):
-            values = {name: float(np.degrees(row[name])) for name in _MARKS}
-            _draw_held_out(axes, at, values)
-        axes.set_yticks(range(len(rows)), [label for label, _ in rows])
-        axes.set_ylim(len(rows) - 0.4, -0.6)
-        axes.set_xlim(left=0.0)
-        axes.set_xlabel("RMS of observed less expected [deg]")
-        handles, labels = axes.get_legend_handles_labels()
+            values = {name: float(np.degrees(row[name])) for name in HELD_OUT_MARKS}
+            _draw_held_out(panel, at, values)
+        panel.set_yticks(range(len(rows)), [label for label, _ in rows])
+        panel.set_ylim(len(rows) - 0.4, -0.6)
+        panel.set_xlim(left=0.0)
+        panel.set_xlabel("RMS of observed less expected [deg]")
+        handles, labels = panel.get_legend_handles_labels()
         once = dict(zip(labels, handles, strict=True))
-        figure.legend(once.values(), once.keys(), loc="outside upper center", ncols=len(once))
-    return figure
+        drawn.legend(list(once.values()), list(once), ncols=len(once))
+    return drawn.figure
 
 
-_MARKS = {
+HELD_OUT_MARKS = {
     "noise": ("|", GREY, "noise alone"),
     "floor": ("|", INK, "noise is below in 99 %"),
     "before": ("s", ORANGE, "before"),
@@ -192,7 +200,7 @@ _MARKS = {
 def _draw_held_out(axes: "Axes", at: int, values: Mapping[str, float]) -> None:
     axes.barh(at, values["floor"], 0.5, color=LIGHT, zorder=0)
     axes.plot([values["before"], values["after"]], [at, at], color=GREY, linewidth=1.0)
-    for name, (marker, colour, label) in _MARKS.items():
+    for name, (marker, colour, label) in HELD_OUT_MARKS.items():
         size, edge = (18, 2.0) if marker == "|" else (8, 0.0)
         axes.plot(
             values[name],
@@ -205,35 +213,35 @@ def _draw_held_out(axes: "Axes", at: int, values: Mapping[str, float]) -> None:
         )
 
 
-def pour_residual_plot(node: "DataTree") -> "Figure":
+def pour_residual_plot(node: "DataTree", axes: "ArrayLike | None" = None) -> "Figure":
     """Observed against expected fractions of each pour, a panel for each outcome.
 
     Args:
         node: The group `pours`.
+        axes: Where to draw, see `drawing.panels`.
     """
     residual = node["residual"].to_dataset()
     outcomes = residual["outcome"].to_numpy()
     with styled():
-        figure = new_figure(4.3 * len(outcomes), 3.9)
-        grid = figure.subplots(1, len(outcomes), squeeze=False)
-        for axes, outcome in zip(grid[0], outcomes, strict=True):
-            _draw_pours(axes, residual.sel(outcome=outcome))
-            axes.set_title(str(outcome), loc="left")
-            axes.set_xlabel("expected [% of the liquid]")
-        grid[0, 0].set_ylabel("observed [% of the liquid]")
-        figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    return figure
+        drawn = panels(axes, (1, len(outcomes)), (4.3 * len(outcomes), 3.9))
+        for panel, outcome in zip(drawn.grid[0], outcomes, strict=True):
+            _draw_pours(panel, residual.sel(outcome=outcome))
+            panel.set_title(str(outcome), loc="left")
+            panel.set_xlabel("expected [% of the liquid]")
+        drawn.grid[0, 0].set_ylabel("observed [% of the liquid]")
+        drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
+    return drawn.figure
 
 
 def _draw_pours(axes: "Axes", part: "Dataset") -> None:
     observed = 100.0 * part["observed"].to_numpy()
     drawn: list[NDArray] = [observed]
     markers = {"before": "s", "after": "o"}
-    for when, (colour, label) in MODELS.items():
+    for when, (colour, label) in MODEL_STYLES.items():
         if f"expected_{when}" not in part:
             continue
         expected = 100.0 * part[f"expected_{when}"].to_numpy()
-        spread = BAND * 100.0 * part[f"sd_{when}"].to_numpy()
+        spread = BAND_SD * 100.0 * part[f"sd_{when}"].to_numpy()
         drawn += [expected - spread, expected + spread]
         axes.errorbar(
             expected,

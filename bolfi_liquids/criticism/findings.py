@@ -1,4 +1,4 @@
-"""All that a criticism came to know, before it is written."""
+"""The results of a criticism before they are written."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """All that a criticism came to know."""
+    """The results of a criticism, by source."""
 
     calibration: "Calibration"
     inputs: "Inputs"

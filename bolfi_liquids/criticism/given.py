@@ -24,8 +24,11 @@ if TYPE_CHECKING:
     from ..models import Cups
 
 Pours = PourTable | str | Path
-RIG = ("cup_radius", "stick_radius", "stick_length")
-SAME_RIG = 0.02  # relative difference up to which a size is the same
+RIG_SIZES = ("cup_radius", "stick_radius", "stick_length")
+"""Attributes of a recording that make two rigs the same."""
+
+SIZE_TOLERANCE = 0.02
+"""Relative difference up to which two sizes are the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,9 +192,9 @@ def _check_effects(settings: CriticismSettings) -> None:
 def _check_baseline(stirring: Stirring, baseline: Sequence[Recording]) -> None:
     first = stirring.recordings[0]
     for recording in baseline:
-        for name in RIG:
+        for name in RIG_SIZES:
             there, here = recording.number(name), first.number(name)
-            if abs(there - here) > SAME_RIG * abs(here):
+            if abs(there - here) > SIZE_TOLERANCE * abs(here):
                 raise InputError(
                     f"{name} is {there:g}, but {here:g} in the run",
                     where=f"--baseline {recording.path}",

@@ -1,4 +1,4 @@
-"""What lies between simulated pours and real ones when nothing is missing."""
+"""Difference between simulated and real pours when no effect is missing."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -9,18 +9,25 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from numpy.random import Generator
 
-REPEATED = 0.02  # sd of a fraction: what pours repeat to
-MISSED = 0.09, 0.06  # sd of what this simulator misses of the spilled and the retained fraction
-ALIKE = 1.5, 4.0  # over which distance between actions it misses the same
-STEP = 0.5, 0.01  # that count as distance 1: of the log of the angular velocity; and m
+REPEATABILITY_SD = 0.02
+"""Standard deviation of a fraction when a real pour is repeated."""
+
+SIMULATOR_ERROR_SD = 0.09, 0.06
+"""Standard deviation of the simulator's error in the spilled and in the retained fraction."""
+
+CORRELATION_LENGTH = 1.5, 4.0
+"""Distance between actions, in `ACTION_STEP`, over which these errors are correlated."""
+
+ACTION_STEP = 0.5, 0.01
+"""Differences that count as distance 1: of the log of the angular velocity; of distances [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class PourNoise:
     """Noise of the spilled and retained fractions of pours, correlated between like actions.
 
-    Measured on 90 pours of an independent solver (water, oil, glycerin and gel): the simulator
-    misses where spilling begins by millimetres, so neighbouring actions are wrong together.
+    Measured on 90 pours of an independent solver (water, oil, glycerin and gel). The simulator
+    misplaces the onset of spilling by millimetres, so its errors at neighbouring actions are alike.
 
     Attributes:
         angular_velocity, distance: Of each pour [rad/s], [m], shape (A,).
@@ -31,12 +38,12 @@ class PourNoise:
 
     def covariance(self, at) -> NDArray[np.float64]:
         """[n, n] of n fractions; `at` holds each one's pour (channel) and outcome (sample)."""
-        actions = np.column_stack([np.log(self.angular_velocity), self.distance]) / STEP
+        actions = np.column_stack([np.log(self.angular_velocity), self.distance]) / ACTION_STEP
         apart = np.sum((actions[at.channel, None] - actions[at.channel]) ** 2, axis=-1)
-        sd, length = (np.array(sizes)[at.sample] for sizes in (MISSED, ALIKE))
+        sd, length = np.array([SIMULATOR_ERROR_SD, CORRELATION_LENGTH])[:, at.sample]
         missed = np.exp(-0.5 * apart / np.outer(length, length)) * np.outer(sd, sd)
         same = np.equal.outer(at.sample, at.sample)
-        return missed * same + REPEATED**2 * np.eye(len(at.sample))
+        return missed * same + REPEATABILITY_SD**2 * np.eye(len(at.sample))
 
     def draw(self, rng: "Generator", at, count: int) -> NDArray[np.float64]:
         """[count, n]."""

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from ..inputs.pour_table import PourTable
 from ..inputs.prior import split_parameters
+from ..run.time_limit import TimeLimited
+from ..seeds import Phase, simulation_seeds
 from .pour_noise import PourNoise
 
 if TYPE_CHECKING:
@@ -19,12 +21,14 @@ if TYPE_CHECKING:
     from ..inference.criticism import Experiment
     from ..models import Cups
 
-NARROWEST = 0.05  # sd of the log of a parameter, and share of another's prior interquartile range
+MIN_PRIOR_SD = 0.05
+"""Of the log of a log-uniform parameter, or as a share of another's prior interquartile range."""
+
 OUTCOMES = ("spilled", "retained")
 
 
 @dataclass(frozen=True)
-class Pouring:
+class Pouring(TimeLimited):
     """Pours of one liquid as a simulator.
 
     Attributes:
@@ -51,12 +55,12 @@ class Pouring:
         liquid, effects = split_parameters(
             {name: np.repeat(values, len(rates)) for name, values in theta.items()}
         )
-        own = np.add.outer(np.asarray(seeds) * 1009 % 2**31, np.arange(len(rates))) % 2**31
+        own = [simulation_seeds(int(one), Phase.RUNS_OF_POURS, len(rates)) for one in seeds]
         landed = models.landings(
             models.Liquid(**liquid, density=self.density),
             np.tile(rates, runs),
             self.cups,
-            own.ravel(),
+            np.ravel(own),
             effects=effects,
         )
         rows = np.add.outer(len(rates) * np.arange(runs), at).ravel()
@@ -71,7 +75,7 @@ class Pouring:
         """A text that two equal experiments share."""
         actions = [self.angular_velocity.tolist(), self.distance.tolist()]
         return json.dumps(
-            ["landed pours", self.cups.settings(), self.density, actions], sort_keys=True
+            [Phase.RUNS_OF_POURS.value, self.cups.settings(), self.density, actions], sort_keys=True
         )
 
 
@@ -96,10 +100,10 @@ def pour_experiment(table: PourTable, cups: "Cups", density: float) -> "Experime
 
 
 def as_prior(theta: Mapping[str, NDArray], weights: NDArray, prior: "Prior") -> "Prior":
-    """What stirring taught, as the prior of the next experiment.
+    """The posterior of stirring, as the prior of the next experiment.
 
     Each parameter by itself: log-normal where its prior is log-uniform, else normal within the
-    prior's bounds. Stirring hardly correlates them.
+    prior's bounds. Their correlation after stirring is small.
 
     Args:
         theta: Points of the posterior, name -> (n,).
@@ -119,9 +123,11 @@ def as_prior(theta: Mapping[str, NDArray], weights: NDArray, prior: "Prior") -> 
     def learned(name: str, before: "Distribution") -> "Distribution":
         if isinstance(before, dist.LogUniform):
             mean, sd = moments(np.log(theta[name]))
-            return dist.LogNormal(mean, max(sd, NARROWEST))
+            return dist.LogNormal(mean, max(sd, MIN_PRIOR_SD))
         mean, sd = moments(theta[name])
         low, lower, upper, high = (float(quantile) for quantile in quantiles[name])
-        return dist.TruncatedNormal(mean, max(sd, NARROWEST * (upper - lower)), low=low, high=high)
+        return dist.TruncatedNormal(
+            mean, max(sd, MIN_PRIOR_SD * (upper - lower)), low=low, high=high
+        )
 
     return Prior({name: learned(name, before) for name, before in prior.distributions.items()})

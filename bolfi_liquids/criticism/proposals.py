@@ -1,4 +1,4 @@
-"""Stirs and pours that could be made next."""
+"""Proposals of further stirs and pours."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -15,8 +15,14 @@ if TYPE_CHECKING:
     from ..inference.criticism import Noise, Proposal, UsualResidual
     from ..models import Cups
 
-FASTER, SLOWER, FASTEST = 1.6, 0.5, 0.2  # times the recording's speed; and at most, m/s
-ROOM = 0.8  # of the way from the axis to the wall that the stick may go
+FASTER_FACTOR, SLOWER_FACTOR = 1.6, 0.5
+"""Speeds of proposed stirs, relative to the recording's."""
+
+MAX_SPEED = 0.2
+"""Of a proposed stir [m/s]."""
+
+MAX_RADIUS_SHARE = 0.8
+"""Of the way from the axis to the wall that the stick may go."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +54,9 @@ def stir_proposals(
     height = float(recording.gripper.position[0, 2])
     position = recording.gripper.position[:, :2]
     wide = float(np.linalg.norm(position, axis=1).max())
-    most = ROOM * (setup.cup.radius - setup.stick.radius)
+    most = MAX_RADIUS_SHARE * (setup.cup.radius - setup.stick.radius)
     radius = min(max(wide, 0.01), most)
-    faster, slower = min(FASTER * fast, FASTEST), SLOWER * fast
+    faster, slower = min(FASTER_FACTOR * fast, MAX_SPEED), SLOWER_FACTOR * fast
     paths = {
         f"the star at {100 * faster:.0f} cm/s": star(speed=faster, height=height, radius=radius),
         f"the star at {100 * slower:.0f} cm/s": star(speed=slower, height=height, radius=radius),

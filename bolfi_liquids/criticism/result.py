@@ -4,36 +4,52 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from ..calibration.result import Calibration
+from ..calibration.tree import read_tree
 from ..errors import InputError
 from ..run.directory import CRITICISM, CRITICISM_FORMAT
 from ..run.summary import read_summary
+from ..words import html_table, sentence, spoken
+from .summary import CriticismSummary
+from .verdict import Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
     from xarray import Dataset, DataTree
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Criticism:
     """A finished criticism; nothing here simulates.
 
+    The plots draw in `axes`, where they are given, or else in a figure of their own.
+
     Attributes:
         base: The calibration that was criticised.
-        tree: criticism.nc; its groups are listed in `criticism_results`.
+        tree: criticism.nc; its groups are listed in `criticism.tree`.
         summary: The section "criticise" of summary.json.
     """
 
     base: Calibration
     tree: "DataTree"
-    summary: Mapping[str, Any]
+    summary: CriticismSummary
 
     def __repr__(self) -> str:
         found = ", ".join((self.verdict, *self.effects))
-        return f"Criticism({str(self.base.path)!r}: {found}, p = {self.summary['p_value']:.2g})"
+        return f"Criticism({str(self.base.path)!r}: {found}, p = {self.summary.p_value:.2g})"
+
+    def _repr_html_(self) -> str:
+        rows = {"run": self.base.path, "verdict": self.verdict, "p": f"{self.summary.p_value:.2g}"}
+        rows |= {
+            spoken(name): sentence("criticism.interval", name=name, values=values)
+            for name, values in self.summary.coefficient.items()
+        }
+        if self.effects and not self.summary.coefficient:
+            rows["effects"] = ", ".join(map(spoken, self.effects))
+        return html_table("Criticism", rows | {"next": self.verdict.advice})
 
     @classmethod
     def open(cls, run: str | Path) -> "Criticism":
@@ -42,8 +58,6 @@ class Criticism:
         Raises:
             InputError: There is none in the directory.
         """
-        from ..calibration.tree import read_tree
-
         run = Path(run)
         if not is_criticised(run):
             raise InputError(
@@ -52,18 +66,17 @@ class Criticism:
                 fix=f"run: bolfi-liquids criticise {run}",
             )
         tree = read_tree(run / CRITICISM, fix=f"write it again: bolfi-liquids criticise {run}")
-        summary = read_summary(run)["criticise"]
-        return cls(Calibration.open(run), tree, MappingProxyType(summary))
+        return cls(Calibration.open(run), tree, CriticismSummary.read(run))
 
     @property
-    def verdict(self) -> str:
-        """ "none", "effect", "tie" or "unknown"."""
-        return str(self.summary["verdict"])
+    def verdict(self) -> Verdict:
+        """The conclusion; equal to "none", "effect", "tie" or "unknown"."""
+        return self.summary.verdict
 
     @property
     def effects(self) -> tuple[str, ...]:
         """What the verdict names: the effect, or those that are tied."""
-        return tuple(self.summary["effects"])
+        return self.summary.effects
 
     @property
     def table(self) -> "Dataset":
@@ -73,38 +86,38 @@ class Criticism:
     @property
     def calibration(self) -> Calibration:
         """The extended calibration, with the accepted effects; the base one without."""
-        if not self.summary["accepted"]:
+        if not self.summary.accepted:
             return self.base
         tree = self.base.tree.copy()
         tree["posterior"] = self.tree["posterior"]
-        section = {**self.base.summary, "best": self.summary["best"]}
-        return replace(self.base, tree=tree, summary=MappingProxyType(section))
+        summary = replace(self.base.summary, best=self.summary.best)
+        return replace(self.base, tree=tree, summary=summary)
 
-    def plot_residuals(self) -> "Figure":
+    def plot_residuals(self, axes: "ArrayLike | None" = None) -> "Figure":
         """Observed less expected against time, before and after, strokes that differ marked."""
         from .figures import residual_plot
 
-        return residual_plot(self.tree.children["stirs"])
+        return residual_plot(self.tree.children["stirs"], axes)
 
-    def plot_strokes(self) -> "Figure":
+    def plot_strokes(self, axes: "ArrayLike | None" = None) -> "Figure":
         """Size of the difference by stroke, plane and speed, before and after."""
         from .figures import stroke_plot
 
-        return stroke_plot(self.tree.children["stirs"])
+        return stroke_plot(self.tree.children["stirs"], axes)
 
-    def plot_scores(self, source: str = "stirs") -> "Figure":
+    def plot_scores(self, source: str = "stirs", axes: "ArrayLike | None" = None) -> "Figure":
         """How well each effect alone would explain the difference."""
         from .effect_figures import score_plot
 
-        return score_plot(self.tree.children[source])
+        return score_plot(self.tree.children[source], axes)
 
-    def plot_confusion(self, source: str = "stirs") -> "Figure":
+    def plot_confusion(self, source: str = "stirs", axes: "ArrayLike | None" = None) -> "Figure":
         """Which effects look alike in these data."""
         from .effect_figures import confusion_plot
 
-        return confusion_plot(self.tree.children[source])
+        return confusion_plot(self.tree.children[source], axes)
 
-    def plot_coefficient(self) -> "Figure":
+    def plot_coefficient(self, axes: "ArrayLike | None" = None) -> "Figure":
         """Posterior of the accepted effects' coefficients.
 
         Raises:
@@ -112,12 +125,12 @@ class Criticism:
         """
         from .effect_figures import coefficient_plot
 
-        if not self.summary["accepted"]:
+        if not self.summary.accepted:
             raise ValueError("no effect was accepted, so there is no coefficient to plot")
-        return coefficient_plot(self.tree, self.summary["accepted"])
+        return coefficient_plot(self.tree, self.summary.accepted, axes)
 
-    def plot_held_out(self) -> "Figure":
-        """What is left on recordings that nothing was fitted to, before and after.
+    def plot_held_out(self, axes: "ArrayLike | None" = None) -> "Figure":
+        """RMS on recordings that were not fitted, before and after.
 
         Raises:
             ValueError: nothing was tried on such recordings.
@@ -126,11 +139,11 @@ class Criticism:
 
         if "held_out" not in self.tree["stirs"].children:
             raise ValueError(
-                "no explanation was tried on a recording held out; criticise the run with held_out"
+                "no explanation was tested on held-out recordings; criticise the run with held_out"
             )
-        return held_out_plot(self.tree.children["stirs"])
+        return held_out_plot(self.tree.children["stirs"], axes)
 
-    def plot_pours(self) -> "Figure":
+    def plot_pours(self, axes: "ArrayLike | None" = None) -> "Figure":
         """Observed against expected fractions of each pour, before and after.
 
         Raises:
@@ -140,12 +153,12 @@ class Criticism:
 
         if "pours" not in self.tree.children:
             raise ValueError("no pours were criticised; criticise the run with pours")
-        return pour_residual_plot(self.tree.children["pours"])
+        return pour_residual_plot(self.tree.children["pours"], axes)
 
 
 def is_criticised(run: Path) -> bool:
     """Whether a run holds a finished criticism in today's form."""
-    section = read_summary(run).get("criticise", {})
+    section = read_summary(run).get(CriticismSummary.SECTION, {})
     current = section.get("made_from", {}).get("format") == CRITICISM_FORMAT
     return current and (run / CRITICISM).is_file()
 
@@ -158,7 +171,7 @@ def finished_criticism(run: Path, made_from: Mapping[str, Any]) -> Criticism | N
         found = Criticism.open(run)
     except InputError:  # damaged: it is made again
         return None
-    written = found.summary.get("made_from"), json.loads(found.tree.attrs.get("made_from", "null"))
+    written = found.summary.made_from, json.loads(found.tree.attrs.get("made_from", "null"))
     return found if written == (made_from, made_from) else None
 
 

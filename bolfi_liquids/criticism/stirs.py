@@ -20,10 +20,17 @@ if TYPE_CHECKING:
         UsualResidual,
     )
 
-TREND = 2  # degree of what the hanging stick does by itself in the second before it is moved
-SHORTEST = 8  # samples at rest from which noise can be learned
-SAME_PATH, SAME_TIME = 1e-3, 0.01  # m and s, up to which two paths are the same
-SAME_RATE = 0.02  # relative difference up to which a frame rate is the same
+REST_TREND_DEGREE = 2
+"""Of the polynomial that the hanging stick follows in the second before it is moved."""
+
+MIN_REST_SAMPLES = 8
+"""Samples at rest from which noise can be learned."""
+
+PATH_TOLERANCE, TIME_TOLERANCE = 1e-3, 0.01
+"""Differences in position [m] and time [s] up to which two paths are the same."""
+
+RATE_TOLERANCE = 0.02
+"""Relative difference up to which two frame rates are the same."""
 
 
 def camera_noise(recordings: Sequence[Recording]) -> "AutoregressiveNoise":
@@ -35,10 +42,10 @@ def camera_noise(recordings: Sequence[Recording]) -> "AutoregressiveNoise":
     from ..inference.criticism import rest_noise
 
     seen = [(r.path.name, _longest_seen(r.inclination[resting(r)])) for r in recordings]
-    rests = [(name, rest) for name, rest in seen if len(rest) >= SHORTEST]
+    rests = [(name, rest) for name, rest in seen if len(rest) >= MIN_REST_SAMPLES]
     if not rests:
         raise InputError(
-            f"fewer than {SHORTEST} samples before the gripper moves, too few to learn the "
+            f"fewer than {MIN_REST_SAMPLES} samples before the gripper moves, too few to learn the "
             "cameras' noise from",
             where=", ".join(name for name, _ in seen),
             fix="let the gripper rest for a second before it stirs",
@@ -50,7 +57,7 @@ def camera_noise(recordings: Sequence[Recording]) -> "AutoregressiveNoise":
                 where=name,
                 fix="record what the cameras see, noise included",
             )
-    return rest_noise([rest for _, rest in rests], trend=TREND)
+    return rest_noise([rest for _, rest in rests], trend=REST_TREND_DEGREE)
 
 
 def _longest_seen(rest: np.ndarray) -> np.ndarray:
@@ -62,9 +69,9 @@ def _longest_seen(rest: np.ndarray) -> np.ndarray:
 
 
 def held_out_noise(one: Recording, fitted: Sequence[Recording]) -> "AutoregressiveNoise":
-    """Noise of the cameras in a recording held out, for which those that are fitted speak, too.
+    """Noise of the cameras in a held-out recording, learned from the fitted ones as well.
 
-    Not the other way round: what is fitted learns nothing from what is held out.
+    Not the other way round: the fitted recordings learn nothing from the held-out one.
 
     Raises:
         InputError: None of them rests long enough.
@@ -75,7 +82,7 @@ def held_out_noise(one: Recording, fitted: Sequence[Recording]) -> "Autoregressi
 def stir_experiment(
     stirring: Stirring, cameras: "AutoregressiveNoise", usual: "UsualResidual | None", label: str
 ) -> "Experiment":
-    """Recordings of one liquid, with the cameras' noise and what the simulator usually lacks."""
+    """Recordings of one liquid, with the cameras' noise and the simulator's usual residual."""
     from ..inference.criticism import Experiment, SumOfNoises
 
     noise: Noise = cameras if usual is None else SumOfNoises((cameras, usual))
@@ -110,7 +117,7 @@ def effects_of(scene: str, names: Sequence[str] | None = None) -> dict[str, "Ext
 def same_rate(one: Recording, other: Recording) -> bool:
     """Whether two recordings have one frame rate."""
     step, other_step = frame_interval(one), frame_interval(other)
-    return abs(step - other_step) <= SAME_RATE * other_step
+    return abs(step - other_step) <= RATE_TOLERANCE * other_step
 
 
 def frame_interval(recording: Recording) -> float:
@@ -124,4 +131,4 @@ def same_experiment(one: Recording, other: Recording) -> bool:
         return False
     apart = np.abs(one.gripper.position - other.gripper.position).max()
     late = np.abs((one.time - one.time[0]) - (other.time - other.time[0])).max()
-    return bool(apart < SAME_PATH and late < SAME_TIME)
+    return bool(apart < PATH_TOLERANCE and late < TIME_TOLERANCE)

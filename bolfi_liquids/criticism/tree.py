@@ -21,6 +21,7 @@ import numpy as np
 
 from ..inputs.fields import PLANE_NAMES
 from .findings import Findings
+from .verdict import EffectStatus, Verdict
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 
 UNITS = {"stirs": {"units": "rad"}, "pours": {"units": "1"}}
-ONE = {"units": "1"}
+DIMENSIONLESS = {"units": "1"}
 
 
 def criticism_tree(findings: Findings) -> "DataTree":
@@ -111,18 +112,18 @@ def _where(source: "inference.criticism.Criticism", units: dict[str, str]) -> "D
 
     keys = {key: type(value) for found in source.before for key, value in found.label.items()}
     columns: dict[str, Any] = {
-        key: ("window", [found.label.get(key, _NOTHING[kind]) for found in source.before])
+        key: ("window", [found.label.get(key, _MISSING_LABEL[kind]) for found in source.before])
         for key, kind in keys.items()
     }
     for when, windows in (("before", source.before), ("after", source.after)):
         if windows:
-            for field, of in (("rms", units), ("z", ONE), ("p_value", ONE)):
+            for field, of in (("rms", units), ("z", DIMENSIONLESS), ("p_value", DIMENSIONLESS)):
                 values = [getattr(found, field) for found in windows]
                 columns[f"{field}_{when}"] = ("window", values, of)
     return Dataset(columns)
 
 
-_NOTHING: dict[type, Any] = {str: "", int: -1, float: float("nan")}
+_MISSING_LABEL: dict[type, Any] = {str: "", int: -1, float: float("nan")}
 
 
 def _effects(source: "inference.criticism.Criticism") -> "Dataset":
@@ -133,7 +134,7 @@ def _effects(source: "inference.criticism.Criticism") -> "Dataset":
 
     def of(name: str) -> dict[str, Any]:
         if name not in signatures:
-            return {"status": "untested: its simulations failed"}
+            return {"status": EffectStatus.FAILED}
         found = {
             "typical": signatures[name].coefficient,
             "snr": signatures[name].snr,
@@ -142,7 +143,7 @@ def _effects(source: "inference.criticism.Criticism") -> "Dataset":
         }
         candidate = singles.get(name)
         if candidate is None:
-            return {**found, "status": "not needed"}
+            return {**found, "status": EffectStatus.NOT_NEEDED}
         return {
             **found,
             "gain": candidate.gain,
@@ -154,24 +155,25 @@ def _effects(source: "inference.criticism.Criticism") -> "Dataset":
     rows = [of(name) for name in names]
     numbers = ("typical", "snr", "score", "side", "gain", "p_value", "coefficient")
     columns = {key: ("effect", [row.get(key, np.nan) for row in rows]) for key in numbers}
-    status = ("effect", [row["status"] for row in rows])
+    status = ("effect", [str(row["status"]) for row in rows])
     units = ("effect", [source.units[name] for name in names])
     return Dataset({**columns, "unit": units, "status": status}, coords={"effect": names})
 
 
 def _status(
     candidate: "inference.criticism.Candidate", source: "inference.criticism.Criticism"
-) -> str:
+) -> EffectStatus:
     """What became of an explanation by one effect."""
     if candidate.names[0] in source.verdict.effects:
-        return "named" if source.verdict.kind == "effect" else "possible"
+        named = source.verdict.kind == Verdict.EFFECT
+        return EffectStatus.NAMED if named else EffectStatus.POSSIBLE
     if not candidate.passes:
-        return "rejected"
+        return EffectStatus.REJECTED
     if candidate.names in source.refuted:
-        return "refuted by held-out data"
+        return EffectStatus.REFUTED
     if not candidate.refitted:
-        return "untested by a refit"
-    return "less likely"
+        return EffectStatus.NOT_REFITTED
+    return EffectStatus.LESS_LIKELY
 
 
 def _confusion(source: "inference.criticism.Criticism") -> "Dataset":
@@ -193,7 +195,7 @@ def _held_out(source: "inference.criticism.Criticism", units: dict[str, str]) ->
         field: (
             ("explanation", "recording"),
             [[getattr(gap, field) for gap in row] for row in gaps],
-            ONE if field in ("p_value", "lpd_gain") else units,
+            DIMENSIONLESS if field in ("p_value", "lpd_gain") else units,
         )
         for field in ("before", "after", "noise", "floor", "p_value", "lpd_gain")
     }

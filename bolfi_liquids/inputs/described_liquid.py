@@ -77,8 +77,7 @@ def read_effects(given: Iterable[str], scene: str) -> dict[str, float]:
         scene: "stir" or "pour".
 
     Raises:
-        InputError: One is of another form, unknown, given twice, out of its range, or acts in
-            the other scene only.
+        InputError: One is of another form or given twice, or see `check_effects`.
     """
     from ..models import EFFECTS
 
@@ -86,23 +85,53 @@ def read_effects(given: Iterable[str], scene: str) -> dict[str, float]:
     for text in given:
         name, _, value = (part.strip() for part in text.partition("="))
         where = f"--effect {text}"
-        if name not in EFFECTS:
-            raise InputError("unknown", where=where, fix=f"there are {', '.join(sorted(EFFECTS))}")
-        effect = EFFECTS[name]
         try:
             number = float(value)
         except ValueError:
             number = np.nan
-        if not effect.lowest <= number <= effect.highest or not np.isfinite(number):
-            span = f"{effect.lowest:g} to {effect.highest:g}"
-            raise InputError(
-                f"{value!r} is no coefficient of it",
-                where=where,
-                fix=f"give {name}=NUMBER, from {span} in the unit {effect.unit}",
-            )
+        if name not in EFFECTS:
+            raise _unknown(where)
+        if not np.isfinite(number):
+            raise _out_of_range(name, value, where)
         if name in read:
             raise InputError("given twice", where=where, fix="give it once")
+        read |= check_effects({name: number}, scene)
+    return read
+
+
+def check_effects(effects: Mapping[str, float], scene: str) -> dict[str, float]:
+    """Coefficients that can act in a scene, "stir" or "pour".
+
+    Raises:
+        InputError: One is unknown, out of its range, or acts in the other scene only.
+    """
+    from ..models import EFFECTS
+
+    for name, value in effects.items():
+        where = f"--effect {name}={value:g}"
+        if name not in EFFECTS:
+            raise _unknown(where)
+        effect = EFFECTS[name]
+        if not effect.lowest <= value <= effect.highest:
+            raise _out_of_range(name, value, where)
         if scene not in effect.scenes:
             raise InputError(f"does not act in a {scene}", where=where, fix="leave it out")
-        read[name] = number
-    return read
+    return dict(effects)
+
+
+def _unknown(where: str) -> InputError:
+    from ..models import EFFECTS
+
+    return InputError("unknown", where=where, fix=f"there are {', '.join(sorted(EFFECTS))}")
+
+
+def _out_of_range(name: str, value: str | float, where: str) -> InputError:
+    from ..models import EFFECTS
+
+    effect = EFFECTS[name]
+    span = f"{effect.lowest:g} to {effect.highest:g}"
+    return InputError(
+        f"{value!r} is no coefficient of it",
+        where=where,
+        fix=f"give {name}=NUMBER, from {span} in the unit {effect.unit}",
+    )

@@ -1,21 +1,21 @@
 """Tables of pours that were made: what each spilled, caught and kept."""
 
-import csv
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..files import existing_file
+from .table import Table, read_table
 
 ACTIONS = ("angular_velocity_deg_s", "distance_cm")
 AMOUNTS = ("spilled", "received", "retained")
 RANGES = (1.0, 1000.0), (-20.0, 50.0)  # of the actions, in their units
-LEAST = 3  # pours from which anything can be learned
+LIQUID = "liquid"
+MIN_POURS = 3  # from which anything can be learned
+FIX_LINE = "mend or remove the line"
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +29,7 @@ class PourTable:
         distance: From the lip to the receiver's axis [m], shape (A,).
         fractions: Spilled, received and retained, shape (A, 3); rows sum to 1.
         hash: SHA-256 of the file's bytes, in hexadecimal.
+        unused: Columns of the file that nobody reads.
     """
 
     path: Path
@@ -37,6 +38,7 @@ class PourTable:
     distance: NDArray[np.float64]
     fractions: NDArray[np.float64]
     hash: str
+    unused: tuple[str, ...] = ()
 
     @property
     def observed(self) -> NDArray[np.float64]:
@@ -45,7 +47,7 @@ class PourTable:
 
 
 def open_pours(path: str | Path, liquid: str | None = None) -> PourTable:
-    """Read a CSV file of pours, in the form of the README.
+    """Read a table of pours, in the form of the README.
 
     Args:
         path: The file: columns `angular_velocity_deg_s`, `distance_cm`, and `spilled`,
@@ -56,92 +58,96 @@ def open_pours(path: str | Path, liquid: str | None = None) -> PourTable:
         InputError: The file is missing or cannot be used; the message names file, line, column
             and value.
     """
-    path = existing_file(path)
-    with path.open(newline="", encoding="utf-8") as file:
-        reader = csv.DictReader(file)
-        missing = [c for c in (*ACTIONS, *AMOUNTS) if c not in (reader.fieldnames or ())]
-        if not reader.fieldnames:
-            raise InputError("is empty", where=str(path), fix="write a header and a line each pour")
-        if missing:
-            raise InputError(
-                f"has no column {', '.join(missing)}",
-                where=str(path),
-                fix=f"give a column for each of {', '.join((*ACTIONS, *AMOUNTS))}",
-            )
-        rows = list(enumerate(reader, start=2))
-    rows, liquid = _of_liquid(path, rows, liquid)
-    if len(rows) < LEAST:
+    table = read_table(path)
+    needed = (*ACTIONS, *AMOUNTS)
+    if not table.header:
+        fix = "write a header and a line for each pour"
+        raise InputError("is empty", where=str(table.path), fix=fix)
+    if missing := [name for name in needed if not table.has(name)]:
         raise InputError(
-            f"too few pours: {len(rows)}", where=str(path), fix=f"give at least {LEAST} of them"
+            f"has no column {', '.join(missing)}",
+            where=str(table.path),
+            fix=f"give a column for each of {', '.join(needed)}",
         )
-    numbers = np.array([[_number(path, n, row, c) for c in ACTIONS] for n, row in rows])
-    _check_actions(path, [n for n, _ in rows], numbers)
-    amounts = np.array([[_amount(path, n, row, c) for c in AMOUNTS] for n, row in rows])
+    table, liquid = _of_liquid(table, liquid)
+    if len(table.lines) < MIN_POURS:
+        raise InputError(
+            f"too few pours: {len(table.lines)}",
+            where=str(table.path),
+            fix=f"give at least {MIN_POURS} of them",
+        )
+    actions = np.stack([_finite(table, name) for name in ACTIONS], axis=1)
+    _check_actions(table, actions)
+    amounts = np.stack([_amounts(table, name) for name in AMOUNTS], axis=1)
     total = amounts.sum(axis=1, keepdims=True)
     if (total <= 0.0).any():
-        line = rows[int(np.argmin(total))][0]
         raise InputError(
             "spilled, received and retained are all 0",
-            where=f"{path}: line {line}",
+            where=f"{table.path}: line {table.lines[int(np.argmin(total))]}",
             fix="weigh what was poured",
         )
     return PourTable(
-        path=path,
+        path=table.path,
         liquid=liquid,
-        angular_velocity=np.radians(numbers[:, 0]),
-        distance=numbers[:, 1] / 100.0,
+        angular_velocity=np.radians(actions[:, 0]),
+        distance=actions[:, 1] / 100.0,
         fractions=amounts / total,
-        hash=hashlib.sha256(path.read_bytes()).hexdigest(),
+        hash=hashlib.sha256(table.path.read_bytes()).hexdigest(),
+        unused=table.others((*needed, LIQUID)),
     )
 
 
-def _of_liquid(path: Path, rows: list[Any], liquid: str | None) -> tuple[list[Any], str]:
-    names = sorted({(row.get("liquid") or "").strip() for _, row in rows})
+def _of_liquid(table: Table, liquid: str | None) -> tuple[Table, str]:
+    """The rows of one liquid, and its name."""
+    if not table.has(LIQUID):
+        return table, ""  # the whole file is of one liquid, whatever its name
+    of = table.column(LIQUID)
+    names = sorted(set(of))
     if liquid is None and len(names) <= 1:
-        return rows, "".join(names)
+        return table, "".join(names)
     if names == [""]:
-        return rows, ""  # the whole file is of one liquid, whatever its name
+        return table, ""
     if liquid is None or liquid not in names:
         raise InputError(
             f"holds pours of {', '.join(names)}" + (f", not of {liquid}" if liquid else ""),
-            where=str(path),
+            where=str(table.path),
             fix="say whose to take: --liquid NAME",
         )
-    return [(n, row) for n, row in rows if (row.get("liquid") or "").strip() == liquid], liquid
+    return replace(table, lines=table.lines[of == liquid], cells=table.cells[of == liquid]), liquid
 
 
-def _check_actions(path: Path, lines: list[int], actions: NDArray) -> None:
+def _check_actions(table: Table, actions: NDArray) -> None:
     """Raise InputError for what no robot could do."""
-    for line, (speed, distance) in zip(lines, actions, strict=True):
-        for column, value, (least, most) in zip(ACTIONS, (speed, distance), RANGES, strict=True):
+    for line, row in zip(table.lines, actions, strict=True):
+        for name, value, (least, most) in zip(ACTIONS, row, RANGES, strict=True):
             if not least <= value <= most:
                 raise InputError(
                     f"{value:g} is not between {least:g} and {most:g}",
-                    where=f"{path}: line {line}, column {column}",
-                    fix="mend or remove the line",
+                    where=table.where(line, name),
+                    fix=FIX_LINE,
                 )
 
 
-def _number(path: Path, line: int, row: dict, column: str) -> float:
-    try:
-        value = float(row[column])
-    except (TypeError, ValueError):
-        value = float("nan")
-    if not np.isfinite(value):
+def _finite(table: Table, name: str) -> NDArray[np.float64]:
+    """Numbers of a column, none of which may be missing."""
+    values = table.numbers(name)
+    if not np.isfinite(values).all():
+        at = int(np.flatnonzero(~np.isfinite(values))[0])
         raise InputError(
-            f"{row[column]!r} is no number",
-            where=f"{path}: line {line}, column {column}",
-            fix="mend or remove the line",
+            f"{table.column(name)[at]!r} is no number",
+            where=table.where(table.lines[at], name),
+            fix=FIX_LINE,
         )
-    return value
+    return values
 
 
-def _amount(path: Path, line: int, row: dict, column: str) -> float:
-    value = _number(path, line, row, column)
-    if value < 0.0:
+def _amounts(table: Table, name: str) -> NDArray[np.float64]:
+    values = _finite(table, name)
+    if (values < 0.0).any():
+        at = int(np.flatnonzero(values < 0.0)[0])
         raise InputError(
-            f"{row[column]} is negative",
-            where=f"{path}: line {line}, column {column}",
+            f"{table.column(name)[at]} is negative",
+            where=table.where(table.lines[at], name),
             fix="give masses, volumes or counts",
         )
-    return value
+    return values

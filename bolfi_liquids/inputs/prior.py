@@ -2,14 +2,27 @@
 
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
 
 from ..errors import InputError
 
 if TYPE_CHECKING:
+    from numpyro.distributions import Distribution
+
     from ..inference import Prior
 
+Described = Mapping[str, Any]
+"""Family and arguments of a distribution: texts, numbers, and such a table for another one."""
+
 PARAMETERS = ("viscosity", "cohesion")
+TRUNCATED = (
+    "LeftTruncatedDistribution",
+    "RightTruncatedDistribution",
+    "TwoSidedTruncatedDistribution",
+)
+TEXT_OF_VERSION_0_1 = re.compile(r"(\w+)\((.*)\)")
 V = TypeVar("V")
 
 
@@ -33,28 +46,40 @@ def default_prior() -> "Prior":
     return Prior({"viscosity": dist.LogUniform(3e-3, 20.0), "cohesion": dist.Uniform(0.0, 1.0)})
 
 
-_DESCRIBED = re.compile(r"(\w+)\((.*)\)")
+def describe_prior(prior: "Prior") -> dict[str, Described]:
+    """Each parameter's distribution as a table of its family and arguments.
+
+    Such as `{"family": "LogUniform", "high": 20.0, "low": 0.003}`, in which `family` is the name of
+    a distribution of numpyro and the rest are its arguments.
+    """
+    return {name: _described(one) for name, one in prior.distributions.items()}
 
 
-def read_prior(described: Mapping[str, str]) -> "Prior":
-    """The prior that `describe_prior` described.
+def read_prior(described: Mapping[str, Described | str]) -> "Prior":
+    """The prior that `describe_prior` described, or version 0.1 by a text for each parameter.
 
     Raises:
-        ValueError: a distribution that numpyro does not know by that name.
+        ValueError: A distribution that numpyro does not know by that name.
+        TypeError: Arguments that it does not take.
     """
-    import numpyro.distributions as dist
-
     from ..inference import Prior
 
-    distributions = {}
-    for name, text in described.items():
-        found = _DESCRIBED.fullmatch(text)
-        made = getattr(dist, found[1], None) if found else None
-        if found is None or made is None:
-            raise ValueError(f"the prior of {name} is {text!r}, which no distribution describes")
-        pairs = (pair.split("=") for pair in found[2].split(", ") if pair)
-        distributions[name] = made(**{key: float(value) for key, value in pairs})
-    return Prior(distributions)
+    tables = {
+        name: table_of_text(one) if isinstance(one, str) else one for name, one in described.items()
+    }
+    return Prior({name: _distribution(name, table) for name, table in tables.items()})
+
+
+def table_of_text(text: str) -> Described:
+    """The table of a text such as "LogUniform(high=20.0, low=0.003)", which version 0.1 wrote.
+
+    Raises:
+        ValueError: The text has another form.
+    """
+    if not (found := TEXT_OF_VERSION_0_1.fullmatch(text)):
+        raise ValueError(f"a prior {text!r}, which no distribution describes")
+    pairs = dict(pair.split("=") for pair in found[2].split(", ") if pair)
+    return {"family": found[1], **{name: float(value) for name, value in pairs.items()}}
 
 
 def check_prior(prior: "Prior") -> None:
@@ -73,22 +98,52 @@ def check_prior(prior: "Prior") -> None:
             where="prior",
             fix="give one distribution for each of them",
         )
-    for name, text in describe_prior(prior).items():
-        try:
-            read_prior({name: text})
-        except (TypeError, ValueError) as err:
-            raise InputError(
-                f"{text.partition('(')[0]} cannot be written down by its numbers",
-                where=f"prior of {name}",
-                fix="give another, such as LogUniform, Uniform, Normal, LogNormal, Beta or Gamma",
-            ) from err
+    for name, distribution in prior.distributions.items():
+        _check_kept(name, distribution)
 
 
-def describe_prior(prior: "Prior") -> dict[str, str]:
-    """Each parameter's distribution and its arguments, as text."""
-    return {
-        name: f"{type(distribution).__name__}("
-        + ", ".join(f"{k}={getattr(distribution, k)}" for k in sorted(distribution.arg_constraints))
-        + ")"
-        for name, distribution in prior.distributions.items()
+def _check_kept(name: str, distribution: "Distribution") -> None:
+    """Raise `InputError` unless a distribution is the same after it was written down and read."""
+    from ..inference import Prior
+
+    u = np.linspace(0.01, 0.99, 9)[:, None]
+    try:
+        again = read_prior({name: _described(distribution)}).from_unit(u)[name]
+        same = np.allclose(again, Prior({name: distribution}).from_unit(u)[name], rtol=1e-5)
+    except (AttributeError, TypeError, ValueError):
+        same = False
+    if not same:
+        raise InputError(
+            f"{type(distribution).__name__} cannot be written down by its numbers",
+            where=f"prior of {name}",
+            fix="give another, such as LogUniform, Uniform, Normal, TruncatedNormal, LogNormal, "
+            "Beta or Gamma",
+        )
+
+
+def _described(distribution: "Distribution") -> Described:
+    family = type(distribution).__name__
+    names = sorted(distribution.arg_constraints)
+    table = {name: _number(getattr(distribution, name)) for name in names}
+    if family in TRUNCATED:  # by a function of numpyro, whose name is not that of a class
+        base = _described(getattr(distribution, "base_dist"))  # noqa: B009  of no common type
+        return {"family": "TruncatedDistribution", "base_dist": base, **table}
+    return {"family": family, **table}
+
+
+def _number(value: Any) -> float:
+    return float(str(value))  # of a float32 its shortest text: 0.003 stays 0.003
+
+
+def _distribution(name: str, table: Described) -> "Distribution":
+    import numpyro.distributions as dist
+
+    arguments = {
+        key: _distribution(name, value) if isinstance(value, Mapping) else value
+        for key, value in table.items()
+        if key != "family"
     }
+    family = getattr(dist, str(table.get("family")), None)
+    if not callable(family):
+        raise ValueError(f"the prior of {name} is {dict(table)!r}, which no distribution describes")
+    return family(**arguments)

@@ -180,7 +180,7 @@ class CriticismSettings:
     effects: tuple[str, ...] | None = None
     accept: tuple[str, ...] | None = None
     seed: Seed = 0
-    batch: Count = 8
+    batch: Count = 4
 
     @property
     def stir_plan(self) -> "Plan":

@@ -1,9 +1,7 @@
 """Recordings made elsewhere: a table of numbers becomes a NetCDF file that can be simulated."""
 
-import csv
 import hashlib
 from collections.abc import Iterator
-from difflib import get_close_matches
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
@@ -29,6 +27,7 @@ from .fields import (
 from .open import open_recording
 from .recording import Recording, as_recording, recording_dataset
 from .strokes import speed
+from .table import read_table
 from .table_map import ATTRIBUTE_UNITS, TableMap, open_table_map
 
 if TYPE_CHECKING:
@@ -37,9 +36,9 @@ if TYPE_CHECKING:
 TEMPLATE = "columns.toml"
 OTHER_NAME = "choose another name"
 STICK_WEIGHT_UNITS = {"stick_density": "kg/m3", "stick_mass": "kg"}
-LEAST_WAY = 5e-3  # m, of the gripper, on which an inclination can be seen to trail
-AHEAD = 0.2  # correlation from which a stick does not trail; thin liquids let it swing
-MISSING = ("", "nan", "na", "n/a", "null", "none", "-")
+MIN_TRAVEL = 5e-3  # of the gripper [m], on which an inclination can be seen to trail
+MAX_CORRELATION = 0.2  # between a stick that trails and the gripper; thin liquids let it swing
+HEADER_FIX = "correct the map: `column`, `skip` or `delimiter`, or leave `delimiter` out"
 
 
 def write_template(path: str | Path) -> Path:
@@ -120,64 +119,13 @@ def _dataset(table: Path, meaning: TableMap) -> "Dataset":
     return recording_dataset(values, attributes | made)
 
 
-def _cells(table: Path, meaning: TableMap) -> dict[str, NDArray[np.float64]]:
+def _cells(path: Path, meaning: TableMap) -> dict[str, NDArray[np.float64]]:
     """The columns that the map names, as numbers; missing samples are NaN."""
-    wanted = list(dict.fromkeys(column.column for column in meaning.columns.values()))
-    try:
-        text = table.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as err:
-        raise InputError("not a text file", where=str(table), fix="save it as CSV, UTF-8") from err
-    lines = text.splitlines()[meaning.skip :]
-    reader = csv.reader(lines, delimiter=meaning.delimiter, skipinitialspace=True)
-    header = [name.strip() for name in next(reader, [])]
-    for name in wanted:
-        _check_column(table, name, header, meaning.delimiter)
-    at = {name: header.index(name) for name in wanted}
-    found: dict[str, list[float]] = {name: [] for name in wanted}
-    for number, row in enumerate(reader, start=meaning.skip + 2):
-        if not any(cell.strip() for cell in row):
-            continue
-        if len(row) <= max(at.values()):
-            raise InputError(
-                f"{len(row)} cells, where the header has {len(header)}",
-                where=f"{table}: line {number}",
-                fix="complete the line, with empty cells for what is missing",
-            )
-        for name, k in at.items():
-            where = f"{table}: line {number}: {name}"
-            found[name].append(_number(row[k].strip(), meaning.decimal, where))
-    return {name: np.array(numbers) for name, numbers in found.items()}
-
-
-def _check_column(table: Path, name: str, header: list[str], delimiter: str) -> None:
-    if header.count(name) == 1:
-        return
-    if name in header:
-        raise InputError(
-            f"{header.count(name)} columns are named {name!r}",
-            where=f"{table}: header",
-            fix="give each a name of its own",
-        )
-    near = get_close_matches(name, header, n=1, cutoff=0.6)
-    likely = f"; did you mean {near[0]!r}?" if near else ""
-    raise InputError(
-        f"no column {name!r} among {', '.join(map(repr, header)) or 'none'}{likely}",
-        where=f"{table}: header",
-        fix=f"correct the map: `column`, `skip` or `delimiter` (now {delimiter!r})",
+    table = read_table(
+        path, delimiter=meaning.delimiter, decimal=meaning.decimal, skip=meaning.skip
     )
-
-
-def _number(cell: str, decimal: str, where: str) -> float:
-    if cell.lower() in MISSING:
-        return float("nan")
-    try:
-        return float(cell.replace(decimal, ".") if decimal != "." else cell)
-    except ValueError:
-        raise InputError(
-            f"{cell!r:.40} is no number",
-            where=where,
-            fix="leave the cell empty where a sample is missing, or set `decimal` in the map",
-        ) from None
+    wanted = dict.fromkeys(column.column for column in meaning.columns.values())
+    return {name: table.numbers(name, fix=HEADER_FIX) for name in wanted}
 
 
 def outline(recording: Recording) -> str:
@@ -221,7 +169,7 @@ def _trailing(recording: Recording) -> Iterator[str]:
         if not np.isfinite(along):
             continue
         yield f"{name}: correlation with the gripper's {AXES[at]} {along:+.2f} (usual: -0.4 to -1)"
-        if along > AHEAD:
+        if along > MAX_CORRELATION:
             yield f"warning: {name}: the stick leans ahead of the gripper; is `flip` right?"
         elif abs(along) < abs(across):
             yield (
@@ -233,6 +181,6 @@ def _trailing(recording: Recording) -> Iterator[str]:
 def _correlation(angle: NDArray, position: NDArray) -> float:
     """NaN where the gripper hardly moves that way."""
     seen = np.isfinite(angle) & np.isfinite(position)
-    if np.ptp(position[seen]) < LEAST_WAY or np.ptp(angle[seen]) == 0.0:
+    if np.ptp(position[seen]) < MIN_TRAVEL or np.ptp(angle[seen]) == 0.0:
         return float("nan")
     return float(np.corrcoef(angle[seen], position[seen])[0, 1])

@@ -63,16 +63,16 @@ class TableMap(Given):
     """How to read a recording out of a table.
 
     Attributes:
-        delimiter: Between two cells.
-        decimal: In a number.
+        delimiter: Between two cells; None is found in the header.
+        decimal: In a number; None is found in the cells.
         skip: Lines before the header.
         columns: Of `time`, `x`, `y`, `z`, `inclination_xz` and `inclination_yz`.
         attributes: Sizes and densities.
         source: Where the data come from.
     """
 
-    delimiter: Annotated[str, Field(min_length=1, max_length=1)] = ","
-    decimal: Literal[".", ","] = "."
+    delimiter: Annotated[str, Field(min_length=1, max_length=1)] | None = None
+    decimal: Literal[".", ","] | None = None
     skip: Annotated[int, Field(ge=0)] = 0
     columns: dict[str, Column]
     attributes: dict[str, Quantity]

@@ -6,7 +6,6 @@ Delta(t) = int_0^t (y - y~)^2 dt, and no array changes its shape: nothing is com
 """
 
 import time
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 from ..calibration.stir_simulator import Stirring
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from ..pouring.map import SpillageMap
-from ..run.simulations import fresh_seeds
+from ..seeds import Phase, generator, simulation_seeds
 from .plan import Followed
 from .settings import OnlineSettings
 
@@ -26,7 +25,6 @@ if TYPE_CHECKING:
     from ..inference.simulations import Job, Simulation
 
 DRAWS = 500  # of each of two chains
-_SIMULATION = 31  # purpose of seeds
 MARGIN = 8  # rows of the engine's arrays beyond the budget, for what is pending
 
 
@@ -138,7 +136,7 @@ def proposals(problem: Problem, made: Made, observed: NDArray, first: int, n: in
         n: How many.
     """
     # the rule's own jitter must differ from one call to the next
-    (seed,) = fresh_seeds(problem.settings.seed, _SIMULATION + 1 + first, 1)
+    (seed,) = simulation_seeds(problem.settings.seed, Phase.ONLINE_SEARCH, 1, first)
     return _jobs(problem, _told(problem, made, observed, seed).ask(n), first)
 
 
@@ -157,14 +155,12 @@ def estimate(
     Raises:
         ValueError: Fewer than three simulations succeeded, or nothing was seen.
     """
-    from ..inference import EmulatorWarning, SamplingWarning
+    from ..inference.sampling.convergence import Status
 
     engine = _told(problem, made, followed.observed, problem.settings.seed)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", EmulatorWarning)  # they are among the complaints
-        warnings.simplefilter("ignore", SamplingWarning)
-        fit = engine.fit()
-        tree = fit.sample("quadrature", chains=2, draws=DRAWS, seed=problem.settings.seed)
+    fit = engine.fit(warn=False)  # warnings are among the estimate's complaints
+    seed = problem.settings.seed
+    tree = fit.sample("quadrature", chains=2, draws=DRAWS, seed=seed, warn=False)
     posterior = tree["posterior"]
     status = str(posterior.attrs["status"])
     draws = {name: posterior[name].to_numpy().ravel() for name in problem.prior.names}
@@ -180,7 +176,7 @@ def estimate(
         lag=time.monotonic() - ended,
         delay=followed.delay,
         apart=followed.apart,
-        complaints=(*fit.warnings, *([] if status == "converged" else [status])),
+        complaints=(*fit.warnings, *([] if status == Status.CONVERGED else [status])),
     )
 
 
@@ -193,7 +189,7 @@ def enough(estimate: OnlineEstimate, settings: OnlineSettings) -> bool:
 
 def warm_up(problem: Problem, spillage: SpillageMap) -> None:
     """Compile all that estimates and proposals need, on signals made up for that."""
-    rng = np.random.default_rng(0)
+    rng = generator(0, Phase.WARM_UP)
     n = problem.settings.design
     theta = problem.prior.from_unit(rng.random((n, len(problem.prior))))
     time_ = problem.stirring.time
@@ -236,7 +232,7 @@ def _jobs(problem: Problem, theta: Mapping[str, NDArray], first: int) -> "list[J
     from ..inference.simulations import Job
 
     count = len(theta[problem.prior.names[0]])
-    seeds = fresh_seeds(problem.settings.seed, _SIMULATION, first + count)[first:]
+    seeds = simulation_seeds(problem.settings.seed, Phase.ONLINE_STIRS, first + count)[first:]
     return [
         Job({name: float(values[at]) for name, values in theta.items()}, seed)
         for at, seed in enumerate(seeds)

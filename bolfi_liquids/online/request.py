@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..inputs.prior import Described
 from ..inputs.recording import Recording
 from .plan import planned
 from .settings import OnlineSettings
@@ -54,7 +55,7 @@ class Request:
     position: NDArray[np.float64]
     attrs: Mapping[str, float | str]
     cups: "Cups"
-    prior: Mapping[str, str]
+    prior: Mapping[str, Described]
     settings: OnlineSettings
     bank: Path
     log: Path

@@ -16,7 +16,7 @@ def simulate_plan(link: Connection, request: Request) -> None:
     Ends when the other end of `link` is closed.
     """
     from ..inference import SimulationBank
-    from ..inference.simulations import run_missing
+    from ..inference.simulations import Keep, run_missing
 
     step_back(NICENESS)
     stirring = stirring_of([request.plan()], request.settings.particles)
@@ -24,7 +24,7 @@ def simulate_plan(link: Connection, request: Request) -> None:
         while True:
             try:
                 jobs = link.recv()
-                link.send(run_missing(stirring.simulate, jobs, None, bank, stirring.identity))
+                link.send(run_missing(stirring.simulate, jobs, Keep(bank, stirring.identity)))
             except GONE:
                 return
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..run.simulations import fresh_seeds
+from ..seeds import Phase, simulation_seeds
 from .spillage import (
     Outcomes,
     Profiles,
@@ -25,11 +25,10 @@ from .spillage import (
 if TYPE_CHECKING:
     from scipy.interpolate import RegularGridInterpolator
 
-    from ..inference import Prior, SimulationBank
+    from ..inference import Prior
+    from ..inference.simulations import Keep
     from ..models import Cups
     from ..progress import Advance
-
-_PURPOSE = 31  # of seeds
 
 
 class GridSize(NamedTuple):
@@ -82,7 +81,7 @@ def make_grid(
     cups: "Cups",
     density: float,
     prior: "Prior",
-    bank: "SimulationBank",
+    keep: "Keep",
     advance: "Advance",
     *,
     size: GridSize = FINE,
@@ -93,7 +92,7 @@ def make_grid(
         cups: Of the pours.
         density: Of every liquid [kg/m3].
         prior: Its bounds are the grid's.
-        bank: Where the pours are kept.
+        keep: Where the pours are made and kept.
         advance: Called after each angular velocity.
         size: Two of each at least.
     """
@@ -103,7 +102,7 @@ def make_grid(
     cohesion = np.linspace(low["cohesion"], high["cohesion"], size.cohesions)
     mesh = np.meshgrid(viscosity, cohesion, indexing="ij")
     theta = {"viscosity": mesh[0].ravel(), "cohesion": mesh[1].ravel()}
-    seeds = np.array(fresh_seeds(0, _PURPOSE, mesh[0].size), np.int64)
+    seeds = np.array(simulation_seeds(0, Phase.GRID_POURS, mesh[0].size), np.int64)
     rates = np.geomspace(*cups.angular_velocity_range, size.rates)
-    made = pour_all(Outcomes(theta, density, cups, seeds), rates, bank, advance)
+    made = pour_all(Outcomes(theta, density, cups, seeds), rates, keep, advance)
     return PourGrid(cups, np.log(viscosity), cohesion, made)

@@ -10,7 +10,6 @@ they are kept in a simulation bank, under a name that holds cups, density and th
 """
 
 import json
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -21,10 +20,12 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..inputs.prior import PARAMETERS
 from ..progress import progress_bar
+from ..seeds import Phase, generator, simulation_seeds
 from .spillage import ACTION, normal_scores
 
 if TYPE_CHECKING:
-    from ..inference import Fit, Prior, SimulationBank
+    from ..inference import Prior, SimulationBank
+    from ..inference.regression import Regression
     from ..inference.simulations import Job
     from ..models import Cups
 
@@ -37,7 +38,6 @@ LIQUID_GRID = 33, 5  # viscosity and cohesion, which acts slowly
 ACTION_GRID = 16  # along each axis
 LITTLE = 0.1  # spilled fraction below which a pour counts as one that spills little
 OUTCOMES = 16  # equally probable ones of each predicted pour
-_PURPOSE = 21  # of seeds
 
 
 class MapError(NamedTuple):
@@ -146,7 +146,7 @@ def make_pours(
     Raises:
         InputError: `pours` is too small.
     """
-    from ..inference.simulations import run_missing
+    from ..inference.simulations import Keep, columns, run_missing, stacked
 
     if pours < LEAST_POURS:
         raise InputError(f"{pours}", where="pours", fix=f"give at least {LEAST_POURS}")
@@ -162,9 +162,9 @@ def make_pours(
     identity = json.dumps(["spillage map", cups.settings(), density], sort_keys=True)
     missing = sum(bank.get(identity, *job) is None for job in jobs)
     with progress_bar("pours for the map", pours, shown=progress and missing > 0) as advance:
-        results = run_missing(simulate, jobs, (1,), bank, identity, batch=AT_ONCE, advance=advance)
-    theta = {name: np.array([job.theta[name] for job in jobs]) for name in jobs[0].theta}
-    return theta, np.array([np.nan if r.signal is None else r.signal[0] for r in results])
+        keep = Keep(bank, identity, AT_ONCE)
+        results = run_missing(simulate, jobs, keep, (1,), advance=advance)
+    return columns(jobs)[0], stacked(results, (1,))[:, 0]
 
 
 def make_map(
@@ -183,14 +183,14 @@ def make_map(
     """
     theta, spilled = make_pours(cups, density, bank, prior=prior, pours=pours, progress=progress)
     prior, joint = _liquid(prior), _joint(prior, cups)
-    left_out = np.random.default_rng(0).permutation(pours) % LEFT_OUT == 0
+    left_out = generator(0, Phase.HELD_BACK_POURS).permutation(pours) % LEFT_OUT == 0
     error = _left_out_error(_learn(joint, theta, spilled, ~left_out), theta, spilled, left_out)
     learned = _learn(joint, theta, spilled, np.ones(pours, bool))
     axes = np.linspace(0.0, 1.0, LIQUID_GRID[0]), np.linspace(0.0, 1.0, LIQUID_GRID[1])
     actions = _action_grid(joint, prior)
     moments = _table(learned, prior, axes, actions)
     moments[:, :, 1] *= max(1.0, error.spread)
-    return SpillageMap(prior, axes, actions, moments, learned.surrogate.transform.inverse, error)
+    return SpillageMap(prior, axes, actions, moments, learned.transform.inverse, error)
 
 
 def _liquid(prior: "Prior") -> "Prior":
@@ -220,11 +220,12 @@ def _jobs(joint: "Prior", pours: int) -> "list[Job]":
     from scipy.stats import qmc
 
     from ..inference.simulations import Job
-    from ..run.simulations import fresh_seeds
 
-    design = qmc.Sobol(len(joint), rng=0).random_base2(int(np.ceil(np.log2(pours))))[:pours]
+    design = qmc.Sobol(len(joint), rng=generator(0, Phase.MAP_DESIGN)).random_base2(
+        int(np.ceil(np.log2(pours)))
+    )[:pours]
     theta = joint.from_unit(design)
-    seeds = fresh_seeds(0, _PURPOSE, PACKINGS)
+    seeds = simulation_seeds(0, Phase.MAP_POURS, PACKINGS)
     return [
         Job({name: float(values[at]) for name, values in theta.items()}, seeds[at % PACKINGS])
         for at in np.argsort(theta["angular_velocity"], kind="stable")
@@ -233,36 +234,26 @@ def _jobs(joint: "Prior", pours: int) -> "list[Job]":
 
 def _learn(
     joint: "Prior", theta: Mapping[str, NDArray], spilled: NDArray, chosen: NDArray[np.bool_]
-) -> "Fit":
-    """A Gaussian process on the root of the spilled fraction, by the engine's own surrogate."""
-    from ..inference import EmulatorWarning, fit
+) -> "Regression":
+    """A Gaussian process on the root of the spilled fraction.
+
+    It is too smooth near the onset of spilling; left-out pours measure the error.
+    """
+    from ..inference import regress
 
     known = {name: values[chosen] for name, values in theta.items()}
-    with warnings.catch_warnings():
-        # where spilling begins the fraction bends more sharply than the process believes: the
-        # left-out pours say how much
-        warnings.simplefilter("ignore", EmulatorWarning)
-        return fit(
-            _never,
-            joint,
-            np.zeros(1),
-            budget=0,
-            earlier=(known, spilled[chosen, None]),
-            discrepancy=lambda _, fraction: float(fraction[0]),
-            transform="sqrt",
-        )
-
-
-def _never(theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray:
-    raise RuntimeError("a map is learned from pours that were made before")
+    return regress(joint, known, spilled[chosen], transform="sqrt")
 
 
 def _left_out_error(
-    learned: "Fit", theta: Mapping[str, NDArray], spilled: NDArray, left_out: NDArray[np.bool_]
+    learned: "Regression",
+    theta: Mapping[str, NDArray],
+    spilled: NDArray,
+    left_out: NDArray[np.bool_],
 ) -> MapError:
     seen = left_out & np.isfinite(spilled)
-    mean, sd = learned.surrogate.predict({name: values[seen] for name, values in theta.items()})
-    transform = learned.surrogate.transform
+    mean, sd = learned.predict({name: values[seen] for name, values in theta.items()})
+    transform = learned.transform
     expected = _fraction(
         transform.inverse, mean[:, None] + sd[:, None] * normal_scores(OUTCOMES)
     ).mean(1)
@@ -286,13 +277,13 @@ def _action_grid(joint: "Prior", prior: "Prior") -> NDArray[np.float64]:
 
 
 def _table(
-    learned: "Fit", prior: "Prior", axes: tuple[NDArray, NDArray], actions: NDArray
+    learned: "Regression", prior: "Prior", axes: tuple[NDArray, NDArray], actions: NDArray
 ) -> NDArray[np.float64]:
     """Predicted moments (V, C, 2, A)."""
     u = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 2)
     theta = {name: np.repeat(values, len(actions)) for name, values in prior.from_unit(u).items()}
     theta |= {name: np.tile(actions[:, at], len(u)) for at, name in enumerate(ACTION)}
-    moments = np.stack(learned.surrogate.predict(theta))
+    moments = np.stack(learned.predict(theta))
     shaped = moments.reshape(2, *(len(axis) for axis in axes), len(actions))
     return np.moveaxis(shaped, 0, 2)
 

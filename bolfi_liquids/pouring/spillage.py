@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..inputs.prior import split_parameters
-from ..progress import Advance, reported
+from ..progress import Advance
+from ..run.time_limit import TimeLimited
 
 if TYPE_CHECKING:
-    from ..inference import SimulationBank
+    from ..inference.simulations import Keep
     from ..models import Cups
 
 FRACTIONS = ("spilled", "received", "retained")
@@ -140,7 +141,7 @@ def landed(fractions: NDArray, distances: NDArray, distance: float, off: NDArray
 
 
 @dataclass(frozen=True)
-class Outcomes:
+class Outcomes(TimeLimited):
     """The liquids and seeds that every action is tried on.
 
     Actions that meet the same liquids and the same seeds (common random numbers) differ by
@@ -198,19 +199,29 @@ class Outcomes:
         return json.dumps(["profiles", *made_of], sort_keys=True)
 
 
-def pour_all(
-    outcomes: Outcomes, rates: NDArray, bank: "SimulationBank", advance: Advance
-) -> Profiles:
+def pour_all(outcomes: Outcomes, rates: NDArray, keep: "Keep", advance: Advance) -> Profiles:
     """Pour every liquid at every angular velocity [rad/s]; what the bank holds is not repeated.
 
     Those at which a pour failed are left out.
 
-    Raises:
-        RuntimeError: That is all of them.
-    """
-    from ..run.simulations import Keep, simulate_kept
+    Args:
+        outcomes: The liquids and seeds.
+        rates: Angular velocities [rad/s], shape (W,).
+        keep: Where pours are made and kept; its identity and batch are not used, and its timeout
+            is that of one pour.
+        advance: Called with 1 for each angular velocity.
 
-    keep = Keep(bank, outcomes.identity, 1)  # each is as many pours as there are liquids
-    simulate = reported(outcomes.simulate, advance)
-    made = simulate_kept(simulate, {"angular_velocity": rates}, [0] * len(rates), keep)
+    Raises:
+        RuntimeError: Pours failed at all of them.
+    """
+    from ..run.simulations import simulate_kept
+
+    at_once = len(outcomes.seeds)  # one call is as many pours as there are liquids
+    keep = keep._replace(
+        identity=outcomes.identity,
+        batch=1,
+        timeout=None if keep.timeout is None else keep.timeout * at_once,
+    )
+    theta = {"angular_velocity": rates}
+    made = simulate_kept(outcomes.simulate, theta, [0] * len(rates), keep, advance=advance)
     return Profiles(rates[made.places], outcomes.distances, made.signals)

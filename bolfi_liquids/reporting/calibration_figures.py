@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from xarray import Dataset, DataTree
 
-BAND = 0.9  # of the posterior predictions
+PREDICTIVE_SHARE = 0.9
+"""Share of the posterior predictions inside the band."""
+
 PLANE_COLOURS = (BLUE, ORANGE)
 
 

@@ -1,12 +1,12 @@
 """What the report shows of a criticism."""
 
 import json
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..calibration.result import Calibration
+from ..calibration.summary import CalibrationSummary
 from ..calibration.tree import read_tree
 from ..criticism.effect_figures import (
     any_fitted,
@@ -21,10 +21,11 @@ from ..criticism.figures import (
     stroke_plot,
 )
 from ..criticism.result import is_criticised
+from ..criticism.summary import CriticismSummary
 from ..drawing import to_svg
 from ..run.directory import CRITICISM
-from ..run.summary import read_summary
-from . import criticism_sentences as narrative
+from ..words import Sentence, spoken, unit_of
+from . import criticism_sentences as sentences
 from .hover import lines_of, to_chart
 
 if TYPE_CHECKING:
@@ -38,44 +39,46 @@ def criticism_context(calibration: Calibration) -> dict[str, Any] | None:
     run = calibration.path
     if not is_criticised(run):
         return None
-    section = read_summary(run)["criticise"]
+    summary = CriticismSummary.read(run)
     tree = read_tree(run / CRITICISM, fix=f"write it again: bolfi-liquids criticise {run}")
-    return {"section": section, **criticism_chapter(section, tree, calibration.summary)}
+    return {"summary": summary, **criticism_chapter(summary, tree, calibration.summary)}
 
 
 def criticism_chapter(
-    section: Mapping[str, Any], tree: "DataTree", calibrated: Mapping[str, Any]
+    summary: CriticismSummary, tree: "DataTree", calibrated: CalibrationSummary
 ) -> dict[str, Any]:
     """Sentences, figures and tables.
 
     Args:
-        section: "criticise" of summary.json.
+        summary: Of the criticism.
         tree: criticism.nc.
-        calibrated: "calibrate" of summary.json.
+        calibrated: Of the calibration that was criticised.
     """
-    stirs, accepted = tree.children["stirs"], section["accepted"]
+    stirs, accepted = tree.children["stirs"], summary.accepted
     held, residual = held_out_of(stirs), residual_plot(stirs)
     return {
-        "results": _results(section, calibrated),
-        "superseded": narrative.superseded_sentence(section),
-        "caution": narrative.baseline_sentence(section),
-        "gap_sentence": narrative.gap_sentence(section),
-        "where_sentence": narrative.where_sentence(section),
-        "held_sentence": narrative.held_out_sentence(held),
-        "unseen_sentence": narrative.unseen_sentence(stirs["effects"].to_dataset()),
-        "untested_sentence": narrative.untested_sentence(section),
-        "suggestion_sentence": narrative.suggestion_sentence(section),
-        "noise_sentence": narrative.noise_sentence(section),
+        "results": _results(summary, calibrated),
+        "superseded": sentences.superseded_sentences(summary),
+        "baseline": sentences.baseline_sentences(summary),
+        "gap": sentences.gap_sentences(summary.gap, accepted),
+        "where": sentences.where_sentence(summary.where),
+        "held": sentences.held_out_sentence(held),
+        "doubtful_effects": [
+            *sentences.undetectable_sentences(stirs["effects"].to_dataset()),
+            *sentences.untested_sentences(summary),
+        ],
+        "suggestion": sentences.suggestion_sentence(summary),
+        "noise": sentences.camera_noise_sentence(summary),
         "residual": to_chart(residual, "residual", lines_of(residual)),
         "strokes": to_svg(stroke_plot(stirs), "strokes"),
         "coefficient": to_svg(coefficient_plot(tree, accepted), "coefficient") if accepted else "",
         "held_out": "" if held is None else to_svg(held_out_plot(stirs), "held-out"),
         "held_rows": [] if held is None else _held_rows(held),
-        "suggestions": _suggestion_rows(section),
+        "suggestions": _suggestion_rows(summary),
         "sources": [
             _effects_part(name, tree.children[name]) for name in SOURCES if name in tree.children
         ],
-        "pours": _pours_part(section, tree),
+        "pours": _pours_part(summary, tree),
         "made_with": _made_with(tree),
     }
 
@@ -85,17 +88,16 @@ def held_out_of(node: "DataTree") -> "Dataset | None":
     return node["held_out"].to_dataset() if "held_out" in node.children else None
 
 
-def _results(section: Mapping[str, Any], calibrated: Mapping[str, Any]) -> list[str]:
-    """What the top of the page says beside the verdict, which comes first."""
-    sentences = [
-        narrative.verdict_sentence(section),
-        narrative.stirs_sentence(section),
-        narrative.considered_sentence(section),
-        narrative.accepted_sentence(section),
-        *(narrative.coefficient_sentence(*item) for item in section["coefficient"].items()),
-        *narrative.refit_sentences(section, calibrated),
+def _results(summary: CriticismSummary, calibrated: CalibrationSummary) -> list[Sentence]:
+    """The verdict, and what else stands at the top of the page."""
+    return [
+        sentences.verdict_sentence(summary),
+        *sentences.stirs_sentences(summary),
+        *sentences.considered_sentences(summary),
+        *sentences.requested_sentences(summary),
+        *(sentences.coefficient_sentence(*item) for item in summary.coefficient.items()),
+        *sentences.refit_sentences(summary, calibrated.parameters),
     ]
-    return [sentence for sentence in sentences if sentence]
 
 
 def _held_rows(held: "Dataset") -> list[list[str]]:
@@ -106,7 +108,7 @@ def _held_rows(held: "Dataset") -> list[list[str]]:
             angles = [np.degrees(float(gap[k])) for k in ("before", "after", "noise", "floor")]
             rows.append(
                 [
-                    narrative.words(str(name)),
+                    spoken(str(name)),
                     str(recording),
                     *(f"{angle:.2f}" for angle in angles),
                     f"{float(gap['p_value']):.2g}",
@@ -117,15 +119,10 @@ def _held_rows(held: "Dataset") -> list[list[str]]:
     return rows
 
 
-def _suggestion_rows(section: Mapping[str, Any]) -> list[list[str]]:
-    ranked = sorted(section["suggestions"], key=lambda one: -one["snr"])
+def _suggestion_rows(summary: CriticismSummary) -> list[list[str]]:
+    ranked = sorted(summary.suggestions, key=lambda one: -one.snr)
     return [
-        [
-            one["experiment"],
-            " or ".join(narrative.words(name) for name in one["between"]),
-            f"{one['snr']:.1f}",
-        ]
-        for one in ranked
+        [one.experiment, " or ".join(map(spoken, one.between)), f"{one.snr:.1f}"] for one in ranked
     ]
 
 
@@ -146,13 +143,13 @@ def _effects_part(name: str, node: "DataTree") -> dict[str, Any]:
 
 def _effect_row(name: str, found: "Dataset", confusion: "Dataset") -> list[str]:
     return [
-        narrative.words(name),
-        _number(found["typical"].item(), ".3g", narrative.unit_of(name)),
+        spoken(name),
+        _number(found["typical"].item(), ".3g", unit_of(name)),
         _number(found["snr"].item(), ".1f"),
         _most_similar(name, confusion),
         _number(found["gain"].item(), ".1f"),
         _number(found["p_value"].item(), ".2g"),
-        _number(found["coefficient"].item(), ".3g", narrative.unit_of(name)),
+        _number(found["coefficient"].item(), ".3g", unit_of(name)),
         str(found["status"].item()),
     ]
 
@@ -169,14 +166,14 @@ def _most_similar(name: str, confusion: "Dataset") -> str:
     cosine = confusion["cosine"].sel(effect=name).to_numpy()
     others = np.where(np.array(names) == name, 0.0, np.abs(cosine))
     closest = int(np.argmax(others))
-    return f"{narrative.words(names[closest])} ({cosine[closest]:.2f})"
+    return f"{spoken(names[closest])} ({cosine[closest]:.2f})"
 
 
-def _pours_part(section: Mapping[str, Any], tree: "DataTree") -> dict[str, Any] | None:
-    if section["pours"] is None or "pours" not in tree.children:
+def _pours_part(summary: CriticismSummary, tree: "DataTree") -> dict[str, Any] | None:
+    if summary.pours is None or "pours" not in tree.children:
         return None
     return {
-        "sentence": narrative.pours_sentence(section["pours"]),
+        "sentences": sentences.pours_sentences(summary.pours),
         "figure": to_svg(pour_residual_plot(tree.children["pours"]), "pour-residual"),
     }
 
@@ -188,7 +185,7 @@ def _made_with(tree: "DataTree") -> list[tuple[str, str]]:
     rows = [(key, _text(value)) for key, value in settings.items()]
     for group in ("held_out", "baseline", "pours", "held_out_pours"):
         files = made_from[group].items()
-        label = narrative.words(group)
+        label = spoken(group)
         rows += [(f"{label} {name}, SHA-256", digest) for name, digest in files] or [
             (label, "none")
         ]

@@ -20,23 +20,29 @@ from ..criticism.result import latest_calibration
 from ..inputs.cups import kept_cups
 from ..inputs.prior import split_parameters
 from ..inputs.recording import Recording
-from ..pouring.tree import read_pour
+from ..pouring.result import read_pour
 from ..progress import Advance, progress_bar
 from ..run.directory import FRAMES, POUR
 from ..run.recordings import kept_recordings
-from ..run.simulations import fresh_seeds
-from .criticism_sentences import unit_of
+from ..seeds import Phase, simulation_seeds
+from ..words import unit_of
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
     from ..calibration.result import Calibration
 
-DRAWS = 3
-RATE = 15.0  # frames/s
-LONGEST = 10.0  # s of a stir that are shown
-FORMAT = 1  # of the file
-_PURPOSE = 81  # of seeds
+N_DRAWS_SHOWN = 3
+"""Posterior draws that are shown."""
+
+FRAME_RATE = 15.0
+"""Of the pictures [1/s]."""
+
+MAX_STIR_SECONDS = 10.0
+"""Of a stir that is shown [s]."""
+
+FRAMES_FORMAT = 1
+"""Of the file; another is made again."""
 
 
 def frames_of(run: str | Path, *, progress: bool = True) -> "Dataset":
@@ -51,18 +57,18 @@ def frames_of(run: str | Path, *, progress: bool = True) -> "Dataset":
     """
     calibration = latest_calibration(run)
     whole = kept_recordings(calibration.path, dict(calibration.record))[0]
-    recording = whole.first(int(np.sum(whole.time - whole.time[0] <= LONGEST)))
+    recording = whole.first(int(np.sum(whole.time - whole.time[0] <= MAX_STIR_SECONDS)))
     seed = int(calibration.record["settings"]["seed"])
-    theta = calibration.draws(DRAWS, seed)
+    theta = calibration.draws(N_DRAWS_SHOWN, seed)
     pour = _chosen(calibration.path)
-    seeds = fresh_seeds(seed, _PURPOSE, DRAWS)
+    seeds = simulation_seeds(seed, Phase.MOVING_PICTURES, N_DRAWS_SHOWN)
     made_from = _digest(theta, seeds, recording, calibration.record["settings"], pour)
     path = calibration.path / FRAMES
     if path.is_file():
         kept = read_tree(path, fix="delete it: it is made again").to_dataset()
         if kept.attrs.get("made_from") == made_from:
             return kept
-    steps = DRAWS * (1 if pour is None else 2)
+    steps = N_DRAWS_SHOWN * (1 if pour is None else 2)
     with progress_bar("moving pictures", steps, shown=progress) as advance:
         frames = _stirred(calibration, recording, theta, seeds, advance)
         if pour is not None:
@@ -108,7 +114,7 @@ def _digest(
     from ..models import MODEL_VERSION
 
     liquids = {name: values.tolist() for name, values in theta.items()}
-    shown = [FORMAT, MODEL_VERSION, RATE, LONGEST, settings["particles"]]
+    shown = [FRAMES_FORMAT, MODEL_VERSION, FRAME_RATE, MAX_STIR_SECONDS, settings["particles"]]
     told = [*shown, liquids, seeds, recording.hash, pour]
     return hashlib.sha256(json.dumps(told, sort_keys=True, default=float).encode()).hexdigest()
 
@@ -121,7 +127,7 @@ def _each(theta: Mapping[str, NDArray]) -> list[tuple[dict[str, float], dict[str
             {name: float(values[at]) for name, values in liquid.items()},
             {name: float(values[at]) for name, values in effects.items()},
         )
-        for at in range(DRAWS)
+        for at in range(N_DRAWS_SHOWN)
     ]
 
 
@@ -143,7 +149,7 @@ def _stirred(
         one = models.Liquid(**liquid, density=density)
         made.append(
             models.stir_frames(
-                one, recording.gripper, stirring.setups[0], seed, rate=RATE, effects=effects
+                one, recording.gripper, stirring.setups[0], seed, rate=FRAME_RATE, effects=effects
             )
         )
         advance(1)
@@ -174,7 +180,7 @@ def _poured(
     made, caught, outcomes = [], [], []
     for (liquid, effects), seed in zip(_each(theta), seeds, strict=True):
         one = models.Liquid(**liquid, density=density)
-        frames = models.pour_frames(one, rate, cups, seed, rate=RATE, effects=effects)
+        frames = models.pour_frames(one, rate, cups, seed, rate=FRAME_RATE, effects=effects)
         landed = models.landings(one, rate, cups, [seed], effects=effects)
         made.append(frames)
         inside = landed.inside(distance, cups.receiver.radius)[0]

@@ -13,8 +13,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-POINTS = 72.0  # of an inch: the unit of the SVG
-DIGITS = 4
+POINTS_PER_INCH = 72.0
+"""The unit of an SVG."""
+
+SIGNIFICANT_DIGITS = 4
+"""Of a number in the page's data."""
 
 
 class Readout(NamedTuple):
@@ -97,7 +100,7 @@ def script_json(value: Any) -> str:
 
 def _frame(figure: "Figure", axes: "Axes") -> dict[str, Any]:
     """Where the axes lie in the SVG [pt, y downwards], and their limits, scales and labels."""
-    scale = POINTS / figure.dpi
+    scale = POINTS_PER_INCH / figure.dpi
     height = figure.bbox.height
     box = axes.bbox
     edges = (box.x0, height - box.y1, box.x1, height - box.y0)
@@ -116,5 +119,5 @@ def short(values: ArrayLike) -> Any:
     """Nested lists of numbers to a few digits; what is not finite becomes null."""
     array: NDArray[np.float64] = np.asarray(values, np.float64)
     if array.ndim == 0:
-        return float(f"{array:.{DIGITS}g}") if np.isfinite(array) else None
+        return float(f"{array:.{SIGNIFICANT_DIGITS}g}") if np.isfinite(array) else None
     return [short(part) for part in array]

@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 
 from ..calibration.result import Calibration
 from ..inputs.cups import kept_cups
-from ..pouring.tree import read_pour
+from ..pouring.result import read_pour
 from ..run.recordings import kept_recordings
-from .criticism_sentences import with_unit
+from ..words import sentence, with_unit
 from .hover import short
-from .sentences import percent
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
-STEPS = 254  # of a byte that a coordinate is rounded to; the last value marks what has gone
+BYTE_LEVELS = 254
+"""Values of a byte that a coordinate is rounded to; 255 marks a particle that is gone."""
 
 
 def moving_context(calibration: Calibration, frames: "Dataset") -> dict[str, Any] | None:
@@ -41,7 +41,7 @@ def moving_context(calibration: Calibration, frames: "Dataset") -> dict[str, Any
     if "poured" in frames:
         scenes["pour"] = _pour_scene(run, frames)
     draws = [_draw(frames.isel(draw=at)) for at in range(frames.sizes["draw"])]
-    extended = set(draws[0]["theta"]) != set(calibration.summary["parameters"])
+    extended = set(draws[0]["theta"]) != set(calibration.summary.parameters)
     return {"draws": draws, "scenes": scenes, "extended": extended}
 
 
@@ -72,7 +72,7 @@ def _outcome(one: "Dataset") -> str:
     if "spilled" not in one:
         return ""
     spilled, retained = float(one["spilled"]), float(one["retained"])
-    return f"{percent(spilled)} is spilled, {percent(retained)} stays in the source"
+    return str(sentence("pour.outcome", spilled=spilled, retained=retained))
 
 
 def _stir_scene(calibration: Calibration, frames: "Dataset") -> dict[str, Any]:
@@ -122,7 +122,7 @@ def _packed(position: NDArray) -> dict[str, Any]:
     """Positions (draws, frames, n, 3) as bytes between the ends of each axis, in base64."""
     there = position[np.isfinite(position).all(axis=-1)]
     low, high = (there.min(axis=0), there.max(axis=0)) if len(there) else (np.zeros(3), np.ones(3))
-    scaled = np.round(STEPS * (position - low) / np.maximum(high - low, 1e-9))
+    scaled = np.round(BYTE_LEVELS * (position - low) / np.maximum(high - low, 1e-9))
     bytes_ = np.where(np.isnan(scaled), 255, scaled).astype(np.uint8)
     return {
         "low": low.tolist(),

@@ -20,9 +20,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from xarray import Dataset, DataTree
 
-LABELS = {"viscosity": "viscosity [Pa s]", "cohesion": "cohesion [dimensionless]"}
-LOGARITHMIC = ("viscosity",)
-INSIDE = (0.9, 0.5)  # probability inside each contour
+AXIS_LABELS = {"viscosity": "viscosity [Pa s]", "cohesion": "cohesion [dimensionless]"}
+LOGARITHMIC_PARAMETERS = ("viscosity",)
+
+CONTOUR_SHARES = (0.9, 0.5)
+"""Probability inside each contour."""
 
 
 def posterior_figure(tree: "DataTree") -> str:
@@ -59,7 +61,7 @@ def posterior_figure(tree: "DataTree") -> str:
 def _coordinate(surface: "Dataset", name: str) -> NDArray[np.float64]:
     """The axis as it is drawn: logarithms where it is logarithmic."""
     values = surface[name].to_numpy()
-    return np.log(values) if name in LOGARITHMIC else values
+    return np.log(values) if name in LOGARITHMIC_PARAMETERS else values
 
 
 def grid_density(
@@ -68,7 +70,7 @@ def grid_density(
     """Density over the drawn coordinates, up to a constant, in the grid's shape; and these."""
     log_density = surface[name].to_numpy().copy()
     for axis, parameter in enumerate(surface[name].dims):
-        if parameter in LOGARITHMIC:
+        if parameter in LOGARITHMIC_PARAMETERS:
             # Jacobian of the logarithm
             shape = [-1 if axis == at else 1 for at in range(log_density.ndim)]
             log_density = log_density + np.log(surface[parameter].to_numpy()).reshape(shape)
@@ -89,7 +91,7 @@ def marginal(density: NDArray, kept: NDArray, integrated: NDArray) -> NDArray[np
 
 
 def contour_levels(mass: NDArray, density: NDArray) -> list[float]:
-    """Densities above which the shares `INSIDE` of the probability lie, ascending.
+    """Densities above which the shares `CONTOUR_SHARES` of the probability lie, ascending.
 
     Args:
         mass: Probability of each cell of the grid, up to a constant.
@@ -98,7 +100,7 @@ def contour_levels(mass: NDArray, density: NDArray) -> list[float]:
     order = np.argsort(-density, axis=None)
     inside = np.cumsum(mass.ravel()[order]) / mass.sum()
     ranked = density.ravel()[order]
-    return [float(ranked[np.searchsorted(inside, share)]) for share in INSIDE]
+    return [float(ranked[np.searchsorted(inside, share)]) for share in CONTOUR_SHARES]
 
 
 def _draw_joint(
@@ -128,10 +130,10 @@ def _mark(joint: "Axes", tree: "DataTree", names: tuple[str, str]) -> Readout:
 def _finish(figure, joint: "Axes", names: tuple[str, str]) -> None:
     first, second = names
     for name, which in ((first, "x"), (second, "y")):
-        if name in LOGARITHMIC:
+        if name in LOGARITHMIC_PARAMETERS:
             plain_log_ticks(joint, which)
-    joint.set_xlabel(LABELS.get(first, first))
-    joint.set_ylabel(LABELS.get(second, second))
+    joint.set_xlabel(AXIS_LABELS.get(first, first))
+    joint.set_ylabel(AXIS_LABELS.get(second, second))
     joint.plot([], [], color=BLUE, label="posterior, 50 % and 90 %")
     joint.plot([], [], color=GREY, linestyle="--", label="prior")
     figure.legend(loc="outside upper center", ncols=4)

@@ -1,28 +1,31 @@
 """report.html: one file that shows a run, without anything from outside it."""
 
 from collections.abc import Mapping
+from dataclasses import astuple
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..calibration.result import Calibration
+from ..calibration.summary import CalibrationSummary
 from ..criticism.result import latest_calibration
 from ..files import write_text
-from ..pouring.tree import read_pour
+from ..pouring.result import PourSummary, read_pour
 from ..run.directory import POUR, REPORT
 from ..run.summary import read_summary
-from . import sentences as narrative
+from ..words import LIQUID_UNITS, sentence
+from . import sentences
 from .calibration_figures import inclination_figure, stroke_figure
 from .criticism_chapter import criticism_context
 from .hover import script_json
 from .posterior_figure import posterior_figure
 from .search_figure import search_figure
-from .warnings import worries
+from .warnings import Results, warnings_of
 
 if TYPE_CHECKING:
     from xarray import DataTree
 
-TEMPLATE = "report.html.jinja"
+PAGE_TEMPLATE = "report.html.jinja"
 
 
 def report(run: str | Path, *, moving: bool = True, progress: bool = True) -> Path:
@@ -40,8 +43,7 @@ def report(run: str | Path, *, moving: bool = True, progress: bool = True) -> Pa
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     calibration = Calibration.open(run)
-    sections = read_summary(calibration.path)
-    pour, criticism = _pour_tree(calibration.path), criticism_context(calibration)
+    poured, criticism = _poured(calibration.path), criticism_context(calibration)
     pictures = _moving(calibration, progress) if moving else None
     environment = Environment(
         loader=PackageLoader("bolfi_liquids", "data"),
@@ -50,18 +52,11 @@ def report(run: str | Path, *, moving: bool = True, progress: bool = True) -> Pa
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    page = environment.get_template(TEMPLATE).render(
+    page = environment.get_template(PAGE_TEMPLATE).render(
         calibration=_calibration_context(calibration),
         criticism=criticism,
-        pour=None if pour is None else _pour_context(sections["pour"], pour),
-        worries=worries(
-            calibration.summary,
-            criticism and criticism["section"],
-            None if pour is None else sections["pour"],
-            pour,
-            latest_calibration(calibration.path).posterior,
-            calibration.summary["n_simulations"] - int(calibration.tree.attrs["initial"]),
-        ),
+        pour=poured and _pour_context(*poured),
+        warnings=warnings_of(_results(calibration, criticism, poured)),
         moving=pictures,
         moving_json=script_json(pictures),
         style=_text("report.css"),
@@ -73,54 +68,68 @@ def report(run: str | Path, *, moving: bool = True, progress: bool = True) -> Pa
 
 
 def _calibration_context(calibration: Calibration) -> dict[str, Any]:
-    section, tree = calibration.summary, calibration.tree
+    summary, tree = calibration.summary, calibration.tree
     prior = tree["prior"]
-    sentences = [
-        narrative.parameter_sentence(name, values, prior[name].to_numpy().ravel())
-        for name, values in section["parameters"].items()
-    ]
     return {
-        "section": section,
-        "sentences": sentences,
-        "fit_sentence": narrative.fit_sentence(section),
+        "summary": summary,
+        "parameters": [
+            sentences.parameter_sentence(name, values, prior[name].to_numpy().ravel())
+            for name, values in summary.parameters.items()
+        ],
+        "fit": sentences.fit_sentence(summary),
         "inclination": inclination_figure(tree),
         "by_stroke": stroke_figure(tree),
         "posterior": posterior_figure(tree),
         "search": search_figure(tree),
-        "start": min(int(tree.attrs["initial"]), section["n_simulations"]),
-        "rows": [_row(name, section) for name in section["parameters"]],
+        "start": min(int(tree.attrs["initial"]), summary.n_simulations),
+        "rows": [_row(name, summary) for name in summary.parameters],
     }
 
 
-def _row(name: str, section: Mapping[str, Any]) -> dict[str, Any]:
-    values = section["parameters"][name]
-    numbers = [values[key] for key in ("mean", "sd", "q05", "q50", "q95")]
-    numbers += [section["best"][name], section["closest"][name]]
+def _row(name: str, summary: CalibrationSummary) -> dict[str, Any]:
+    numbers = [*astuple(summary.parameters[name]), summary.best[name], summary.closest[name]]
     return {
         "name": name,
-        "unit": narrative.UNITS.get(name, "1"),
+        "unit": LIQUID_UNITS.get(name, "1"),
         "numbers": [f"{number:.3g}" for number in numbers],
     }
 
 
-def _pour_tree(run: Path) -> "DataTree | None":
-    """pour.nc, where a pour was chosen."""
-    if "pour" not in read_summary(run) or not (run / POUR).is_file():
+def _results(
+    calibration: Calibration,
+    criticism: Mapping[str, Any] | None,
+    poured: "tuple[PourSummary, DataTree] | None",
+) -> Results:
+    calibrated, initial = calibration.summary, int(calibration.tree.attrs["initial"])
+    summary, tree = poured or (None, None)
+    return Results(
+        calibrated=calibrated,
+        criticised=criticism["summary"] if criticism else None,
+        poured=summary,
+        pour=tree,
+        posterior=latest_calibration(calibration.path).posterior,
+        searched=calibrated.n_simulations - initial,
+    )
+
+
+def _poured(run: Path) -> "tuple[PourSummary, DataTree] | None":
+    """The section "pour" and pour.nc, where a pour was chosen."""
+    if PourSummary.SECTION not in read_summary(run) or not (run / POUR).is_file():
         return None
-    return read_pour(run)
+    return PourSummary.read(run), read_pour(run)
 
 
-def _pour_context(section: Mapping[str, Any], tree: "DataTree") -> dict[str, Any]:
+def _pour_context(summary: PourSummary, tree: "DataTree") -> dict[str, Any]:
     from .pour_figure import pour_figure
 
     return {
-        "section": section,
-        "sentence": narrative.pour_sentence(section),
-        "sure_sentence": narrative.sure_sentence(section),
-        "limits": narrative.LIMITS,
+        "summary": summary,
+        "chosen": sentences.pour_sentence(summary),
+        "plug_in": sentences.plug_in_sentence(summary),
+        "limits": sentence("pour.limits"),
         "figure": pour_figure(tree),
         "made_with": dict(tree.attrs),
-        "rows": [("chosen pour", section), ("best at θ* alone", section["plug_in"])],
+        "rows": [("chosen pour", summary), ("best at θ* alone", summary.plug_in)],
     }
 
 

@@ -12,15 +12,16 @@ from ..drawing import (
     plain_log_ticks,
     styled,
 )
+from ..words import with_unit
 from .hover import Readout, marks, to_chart
-from .posterior_figure import LABELS, LOGARITHMIC
-from .sentences import with_unit
+from .posterior_figure import AXIS_LABELS, LOGARITHMIC_PARAMETERS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from xarray import Dataset, DataTree
 
-INSIDE = 0.05, 0.95  # quantiles of the posterior that are shaded
+POSTERIOR_INTERVAL = 0.05, 0.95
+"""Quantiles of the posterior between which the panels are shaded."""
 
 
 def search_figure(tree: "DataTree") -> str:
@@ -47,11 +48,11 @@ def search_figure(tree: "DataTree") -> str:
         plain_log_ticks(panels[0], "y")
         panels[0].set_ylabel("discrepancy [deg² s]")
         for axes, name in zip(panels[1:], names, strict=True):
-            low, high = np.quantile(tree["posterior"][name].to_numpy(), INSIDE)
+            low, high = np.quantile(tree["posterior"][name].to_numpy(), POSTERIOR_INTERVAL)
             axes.axhspan(low, high, color=BLUE, alpha=0.15, linewidth=0, label="posterior, 90 %")
             readouts.append(_dots(axes, iteration, simulations[name].to_numpy(), start, texts))
-            axes.set_ylabel(LABELS.get(name, name))
-            if name in LOGARITHMIC:
+            axes.set_ylabel(AXIS_LABELS.get(name, name))
+            if name in LOGARITHMIC_PARAMETERS:
                 plain_log_ticks(axes, "y")
         panels[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
         panels[-1].set_xlabel("simulation")

@@ -1,123 +1,134 @@
-"""What to worry about before a run's pour is trusted, in plain sentences."""
+"""Warnings of the report: what to consider before a run's pour is trusted.
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+Their wording is in `data/warning_sentences.jinja`.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..calibration.summary import CalibrationSummary
+from ..criticism.summary import CriticismSummary
+from ..criticism.verdict import Verdict
+from ..pouring.result import PourSummary
 from ..pouring.spillage import ACTION
-from . import criticism_sentences, sentences
+from ..words import Sentence, sentence
+from .criticism_sentences import verdict_sentence
+from .sentences import (
+    FIT_NEAR_NOISE,
+    least_viscosity_sentences,
+    sampler_sentences,
+    surrogate_sentences,
+)
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
-SEARCHED = 3  # simulations that the engine chose, of which fewer are no search
-MUCH = 0.05  # spilled, which a person would mop up
-KEPT = 0.2  # by the source; what flows has left it then, and a gel leaves less than this
-STALE = (
-    "The pour was chosen over another posterior than that of the latest calibration or criticism:"
-    " choose it again."
-)
-EDGE = {
-    ("angular_velocity", 0): "the slowest",
-    ("angular_velocity", 1): "the fastest",
-    ("distance", 0): "the nearest",
-    ("distance", 1): "the farthest",
+MIN_SEARCHED = 3
+"""Simulations that the engine chose, of which fewer are no search."""
+
+MUCH_SPILLED = 0.05
+"""Expected spillage that a person would mop up."""
+
+MUCH_RETAINED = 0.2
+"""Share that stays in the source; a gel, once it flows, leaves less than this."""
+
+ENDS = {
+    ("angular_velocity", 0): "slowest",
+    ("angular_velocity", 1): "fastest",
+    ("distance", 0): "nearest",
+    ("distance", 1): "farthest",
 }
+"""What an action at either end of the range of each quantity is called."""
 
 
-def worries(
-    calibrated: Mapping[str, Any],
-    criticised: Mapping[str, Any] | None,
-    poured: Mapping[str, Any] | None,
-    tree: "DataTree | None",
-    posterior: "Dataset",
-    searched: int,
-) -> list[str]:
-    """Sentences, the gravest first; none if nothing is known to be wrong.
+@dataclass(frozen=True)
+class Results:
+    """What a run holds.
 
-    Args:
+    Attributes:
         calibrated, criticised, poured: Sections of summary.json; None where there is none.
-        tree: pour.nc.
+        pour: pour.nc; None where there is none.
         posterior: Draws of the latest calibration.
-        searched: Simulations at points that were chosen by what was learned.
+        searched: Number of simulations at points that were chosen by what was learned.
     """
-    told = [
-        sentences.sampler_sentence(calibrated),
-        *sentences.emulator_sentences(calibrated),
-        _search_sentence(calibrated, searched),
-        "" if tree is None or poured_of(tree, posterior) else STALE,
-        *_of_the_model(calibrated, criticised),
-        sentences.floor_sentence(calibrated),
-        *_of_the_pour(poured, tree),
+
+    calibrated: CalibrationSummary
+    criticised: CriticismSummary | None
+    poured: PourSummary | None
+    pour: "DataTree | None"
+    posterior: "Dataset"
+    searched: int
+
+
+def warnings_of(run: Results) -> list[Sentence]:
+    """The gravest first; none if nothing is known to be wrong."""
+    return [
+        *sampler_sentences(run.calibrated),
+        *surrogate_sentences(run.calibrated),
+        *_of_the_search(run.calibrated, run.searched),
+        *_of_a_stale_pour(run.pour, run.posterior),
+        *_of_the_model(run.calibrated, run.criticised),
+        *least_viscosity_sentences(run.calibrated),
+        *_of_the_pour(run.poured, run.pour),
     ]
-    return [sentence for sentence in told if sentence]
 
 
-def _search_sentence(calibrated: Mapping[str, Any], searched: int) -> str:
-    if searched >= SEARCHED:
-        return ""
-    return (
-        f"Of {calibrated['n_simulations']} simulations only {searched} went where the liquid may"
-        " be: calibrate with a larger --budget before relying on the posterior."
-    )
+def _of_the_search(calibrated: CalibrationSummary, searched: int) -> list[Sentence]:
+    if searched >= MIN_SEARCHED:
+        return []
+    return [sentence("warning.no_search", total=calibrated.n_simulations, searched=searched)]
 
 
-def poured_of(tree: "DataTree", posterior: "Dataset") -> bool:
+def _of_a_stale_pour(pour: "DataTree | None", posterior: "Dataset") -> list[Sentence]:
+    if pour is None or was_poured_over(pour, posterior):
+        return []
+    return [sentence("warning.stale_pour")]
+
+
+def was_poured_over(pour: "DataTree", posterior: "Dataset") -> bool:
     """Whether a pour was chosen over draws of this posterior."""
-    liquids = tree["liquids"].to_dataset()
+    liquids = pour["liquids"].to_dataset()
     if set(liquids.data_vars) != set(posterior.data_vars):
         return False
     return all(np.isin(liquids[name], posterior[name]).all() for name in liquids.data_vars)
 
 
-def _of_the_model(calibrated: Mapping[str, Any], criticised: Mapping[str, Any] | None) -> list[str]:
+def _of_the_model(
+    calibrated: CalibrationSummary, criticised: CriticismSummary | None
+) -> list[Sentence]:
     if criticised is None:
-        if calibrated["fit_rms_deg"] > sentences.AS_GOOD_AS_NOISE * calibrated["noise_deg"]:
-            return [
-                "The closest hypothesis is farther from the recording than noise explains, and the "
-                "fit was not criticised: which effect the simulator lacks is not known."
-            ]
-        return ["The fit was not criticised: whether the simulator lacks an effect is not known."]
-    told = []
-    if criticised["verdict"] != "none" and not criticised["accepted"]:
-        told.append(criticism_sentences.verdict_sentence(criticised))
-    if not criticised["baseline"]:
-        told.append(criticism_sentences.NO_BASELINE)
-    return told
+        if calibrated.fit_rms_deg > FIT_NEAR_NOISE * calibrated.noise_deg:
+            return [sentence("warning.misfit_not_criticised")]
+        return [sentence("warning.not_criticised")]
+    found = []
+    if criticised.verdict != Verdict.NONE and not criticised.accepted:
+        found.append(verdict_sentence(criticised))
+    if not criticised.baseline:
+        found.append(sentence("criticism.no_baseline"))
+    return found
 
 
-def _of_the_pour(poured: Mapping[str, Any] | None, tree: "DataTree | None") -> list[str]:
-    if poured is None or tree is None:
+def _of_the_pour(poured: PourSummary | None, pour: "DataTree | None") -> list[Sentence]:
+    if poured is None or pour is None:
         return []
-    told = [_edge_sentence(tree)]
-    if poured["expected_spillage"] > MUCH:
-        share = sentences.percent(poured["expected_spillage"])
-        told.append(
-            f"Even the best pour is expected to spill {share}: stir longer, or bring the cups"
-            " nearer to each other."
-        )
-    retained = float(tree["chosen"].to_dataset()["retained"].mean())
-    if retained > KEPT:
-        told.append(
-            f"Of the liquid {sentences.percent(retained)} stays in the source, and what stays is "
-            "not spilled: is the final angle of the cups' file large, and held long, enough?"
-        )
-    return told
+    found = _of_the_edge(pour)
+    if poured.expected_spillage > MUCH_SPILLED:
+        found.append(sentence("warning.much_spilled", share=poured.expected_spillage))
+    retained = float(pour["chosen"].to_dataset()["retained"].mean())
+    if retained > MUCH_RETAINED:
+        found.append(sentence("warning.much_retained", share=retained))
+    return found
 
 
-def _edge_sentence(tree: "DataTree") -> str:
+def _of_the_edge(pour: "DataTree") -> list[Sentence]:
     """That the chosen pour is at an end of what was allowed, where a better one may be beyond."""
-    actions, chosen = tree["actions"], tree["chosen"].attrs
-    ends = [
-        EDGE[name, end]
+    actions, chosen = pour["actions"], pour["chosen"].attrs
+    ends = tuple(
+        ENDS[name, end]
         for name in ACTION
         for end, limit in enumerate(actions[name].to_numpy()[[0, -1]])
         if np.isclose(chosen[name], limit)
-    ]
-    if not ends:
-        return ""
-    return (
-        f"The chosen pour is {' and '.join(ends)} that the cups' file allows; a better one may lie "
-        "beyond."
     )
+    return [sentence("warning.at_the_edge", ends=ends)] if ends else []

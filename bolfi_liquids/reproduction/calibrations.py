@@ -5,7 +5,6 @@ what was concluded with each budget comes out.
 """
 
 import json
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ from ..checks.sbc_pipelines import SAMPLING, CameraNoise
 from ..inputs.prior import describe_prior
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from ..progress import Simulate
+from ..seeds import Phase, generator
 from .truths import DENSITY
 
 if TYPE_CHECKING:
@@ -57,7 +57,8 @@ class ByStirring:
 
     def _one(self, truth: dict[str, NDArray], seed: int) -> NDArray[np.float64]:
         from ..inference import Bolfi, SimulationBank
-        from ..run.simulations import Keep, keeping
+        from ..inference.simulations import Keep
+        from ..run.simulations import keeping
 
         stirring = self.stirring
         with SimulationBank(self.bank) as bank:
@@ -66,7 +67,7 @@ class ByStirring:
             clean = simulate(truth, np.array([seed]))[0]
             engine = Bolfi(
                 self.prior,
-                NOISE(clean, np.random.default_rng(seed)),
+                NOISE(clean, generator(seed, Phase.CAMERA_NOISE)),
                 seed=seed,
                 capacity=self.budgets[-1],
                 **engine_options(stirring, self.surrogate),
@@ -106,7 +107,8 @@ class ByPouring:
 
     def _one(self, truth: dict[str, NDArray], seed: int) -> NDArray[np.float64]:
         from ..inference import Bolfi, SimulationBank
-        from ..run.simulations import Keep, keeping
+        from ..inference.simulations import Keep
+        from ..run.simulations import keeping
 
         rules: dict[str, Any] = {**PAPER_RULES}
         with SimulationBank(self.bank) as bank:
@@ -166,25 +168,19 @@ def after_each(engine: "Bolfi", simulate: Simulate, budgets: Sequence[int]) -> "
         simulate: Theta and seeds -> signals.
         budgets: Simulations in all.
     """
-    from ..inference import EmulatorWarning
 
-    rng = np.random.default_rng([engine.seed, 1])
+    rng = generator(engine.seed, Phase.TRUTH_STIRS)
     for budget in budgets:
         while (left := budget - engine.told) > 0:
             theta = engine.ask(min(BATCH, left))
             seeds = rng.integers(2**31, size=min(BATCH, left))
             engine.tell(theta, simulate(theta, seeds), seeds)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", EmulatorWarning)  # of hundreds of fits
-            fit = engine.fit()
-        yield fit
+        yield engine.fit(warn=False)
 
 
 def concluded(fit: "Fit", seed: int) -> NDArray[np.float64]:
     """theta* and draws, shape (1 + DRAWS, 2)."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of a hundred fits, and nothing here depends on them
-        sampled = fit.sample(seed=seed, **SAMPLING)
+    sampled = fit.sample(seed=seed, warn=False, **SAMPLING)
     drawn = pick_draws(sampled["posterior"].to_dataset(), DRAWS, seed)
     return np.column_stack([np.append(fit.best[name], drawn[name]) for name in NAMES])
 

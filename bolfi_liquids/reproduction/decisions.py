@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..inference.simulations import Keep
 from ..pouring.spillage import (
     STEP,
     Outcomes,
     Profiles,
     pour_all,
 )
-from ..run.simulations import fresh_seeds
+from ..progress import silent
+from ..seeds import Phase, generator, simulation_seeds
 from .calibrations import NAMES
 from .truths import DENSITY, Truths
 
@@ -28,7 +30,6 @@ posterior; and its mean over the worst tenth."""
 
 UNKNOWING = 64  # draws of the prior over which a pour is chosen without any calibration
 EXECUTIONS = 4  # seeds with which a chosen pour is carried out
-_PURPOSE = 41  # of seeds
 
 Action = Mapping[str, float]
 
@@ -47,7 +48,7 @@ def decide(concluded: NDArray, grid: "PourGrid") -> dict[str, Action]:
 
 def decide_unknowing(grid: "PourGrid", prior: "Prior", seed: int) -> dict[str, float]:
     """The action that spills least in expectation over the prior."""
-    drawn = prior.from_unit(np.random.default_rng(seed).uniform(size=(UNKNOWING, len(prior))))
+    drawn = prior.from_unit(generator(seed, Phase.UNKNOWING).uniform(size=(UNKNOWING, len(prior))))
     return grid.surface(drawn).least("mean")
 
 
@@ -77,7 +78,11 @@ def execute(
 
 
 def executions(
-    theta: Mapping[str, float], density: float, cups: "Cups", seed: int, purpose: int = _PURPOSE
+    theta: Mapping[str, float],
+    density: float,
+    cups: "Cups",
+    seed: int,
+    purpose: Phase = Phase.EXECUTION,
 ) -> Outcomes:
     """Pours of one liquid, with seeds that nothing else uses.
 
@@ -86,9 +91,9 @@ def executions(
         density: [kg/m3].
         cups: From and into which is poured.
         seed: Of the truth.
-        purpose: Of the seeds; another one lets an action be chosen by other pours.
+        purpose: Another one lets an action be chosen by other pours.
     """
-    seeds = np.array(fresh_seeds(seed, purpose, EXECUTIONS), np.int64)
+    seeds = np.array(simulation_seeds(seed, purpose, EXECUTIONS), np.int64)
     tiled = {name: np.full(EXECUTIONS, value) for name, value in theta.items()}
     return Outcomes(tiled, density, cups, seeds)
 
@@ -98,7 +103,7 @@ def spilled_by(
 ) -> NDArray[np.float64]:
     """Spilled fraction of each action, the mean over the outcomes' seeds."""
     rates = np.unique([action["angular_velocity"] for action in actions])
-    made = pour_all(outcomes, rates, bank, lambda steps: None)
+    made = pour_all(outcomes, rates, Keep(bank), silent)
     return np.array([_spilled(made, action) for action in actions])
 
 

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from ..drawing import INK, new_figure, styled
+from ..inference.simulations import Keep
 from ..inputs.cups import bundled_cups
 from ..pouring.spillage import STEP, landing_sd
-from ..progress import progress_bar, reported
-from ..run.simulations import Keep, fresh_seeds, simulate_kept
+from ..progress import progress_bar
+from ..run.simulations import simulate_kept
+from ..seeds import Phase, simulation_seeds
 from .figure import Drawn
 from .truths import DENSITY
 from .workshop import Workshop
@@ -26,7 +28,6 @@ RATES = 7
 RADII = np.array([0.020, 0.025, 0.030, 0.035, 0.045])  # m, of the receiver
 COHESION = 0.5
 DISTANCES = np.arange(-0.02, 0.0901, STEP)  # m
-_PURPOSE = 51  # of seeds
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Poured:
         from .. import models
 
         liquid = models.Liquid(VISCOSITIES, COHESION, DENSITY)
-        own = np.array(fresh_seeds(0, _PURPOSE, len(VISCOSITIES)), np.int64)
+        own = np.array(simulation_seeds(0, Phase.GEOMETRY, len(VISCOSITIES)), np.int64)
         made = []
         for rate in theta["angular_velocity"]:
             landings = models.landings(liquid, rate, self.cups, own)
@@ -56,7 +57,7 @@ class Poured:
     def identity(self) -> str:
         """A text that two equal experiments share."""
         liquids, receivers = [VISCOSITIES.tolist(), COHESION, DENSITY], [RADII, DISTANCES]
-        made_by = ["geometry", liquids, *(values.tolist() for values in receivers)]
+        made_by = [Phase.GEOMETRY.value, liquids, *(values.tolist() for values in receivers)]
         return json.dumps([*made_by, self.cups.settings()], sort_keys=True)
 
 
@@ -76,8 +77,8 @@ def geometry(workshop: Workshop) -> Drawn:
             poured = Poured(cups)
             rates = np.geomspace(*cups.angular_velocity_range, RATES)
             keep = Keep(workshop.bank, poured.identity, 1)
-            simulate = reported(poured.simulate, advance)
-            made = simulate_kept(simulate, {"angular_velocity": rates}, [0] * RATES, keep)
+            theta = {"angular_velocity": rates}
+            made = simulate_kept(poured.simulate, theta, [0] * RATES, keep, advance=advance)
             regret[row] = _regret(made.signals, cups)
     with styled():
         figure = new_figure(5.6, 3.9)

@@ -9,8 +9,8 @@ from ..drawing import GREY, INK, PALETTE, new_figure, styled
 from ..inputs.bundled import POURED, bundled_pours
 from ..inputs.prior import default_prior
 from ..pouring.choose import choose_pour
+from ..pouring.result import read_pour
 from ..pouring.spillage import ACTION, Surface
-from ..pouring.tree import read_pour
 from .decisions import RULES, Action, decide_unknowing
 from .figure import Drawn
 from .table_between import between

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..drawing import GREY, INK, LIGHT, ORANGE, PALETTE, new_figure, plain_log_ticks, styled
 from ..inputs.bundled import RECORDED
-from ..reporting.posterior_figure import LABELS, contour_levels, grid_density
+from ..reporting.posterior_figure import AXIS_LABELS, contour_levels, grid_density
 from .figure import Drawn
 from .workshop import Workshop
 
@@ -60,10 +60,10 @@ def posterior(workshop: Workshop) -> Drawn:
                 tree = workshop.calibration(liquid, budget, surrogate).tree
                 _contours(axes, tree["surface"].to_dataset(), liquid, colour)
                 found.append(tree["surface"].to_dataset().assign_coords(liquid=liquid))
-            axes.set(xlabel=LABELS["viscosity"], title=f"{surrogate}, N = {budget}")
+            axes.set(xlabel=AXIS_LABELS["viscosity"], title=f"{surrogate}, N = {budget}")
             plain_log_ticks(axes, "x")
             kept.append(concat(found, "liquid").assign_coords(surrogate=surrogate))
-        panels[0].set_ylabel(LABELS["cohesion"])
+        panels[0].set_ylabel(AXIS_LABELS["cohesion"])
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
     data = cast("Dataset", concat(kept, "surrogate"))
     return Drawn(data, figure, f"posteriors of {', '.join(RECORDED)} after {budget} simulations")

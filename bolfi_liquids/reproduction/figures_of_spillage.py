@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..drawing import GREY, PALETTE, new_figure, plain_log_ticks, styled
+from ..seeds import Phase, generator
 from .figure import Drawn
 from .truths import LIQUIDS
 from .workshop import Workshop
@@ -39,7 +40,7 @@ def interval(values: NDArray, seed: int = 0) -> tuple[float, float]:
     """
     if not len(values):
         return np.nan, np.nan
-    rng = np.random.default_rng(seed)
+    rng = generator(seed, Phase.BOOTSTRAP)
     means = values[rng.integers(0, len(values), (RESAMPLED, len(values)))].mean(axis=1)
     low, high = np.quantile(means, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
     return float(low), float(high)

@@ -7,9 +7,9 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ..errors import InputError
+from ..inference.simulations import Workers, open_executor
 from ..run.directory import open_bank
 from ..run.provenance import LIBRARIES, generations, versions
-from ..run.workers import processes
 from .figure import Drawn
 from .figure_of_adhesion import adhesion
 from .figure_of_geometry import geometry
@@ -40,6 +40,7 @@ def reproduce(
     out: str | Path,
     *,
     scale: Scale = FULL,
+    executor: Workers | None = None,
     progress: bool = True,
     done: Callable[[str, Drawn], object] = lambda name, drawn: None,
 ) -> None:
@@ -52,7 +53,8 @@ def reproduce(
         names: Of `FIGURES`; none, or "all", for all of them.
         out: Directory of the results; made if missing.
         scale: How much is simulated: `FULL`, `QUICK`, or one of your own.
-        progress: Show bars on stderr.
+        executor: Shares the work, see `calibrate`; None is this process.
+        progress: Whether to show bars on stderr.
         done: Called with each figure.
 
     Raises:
@@ -68,7 +70,7 @@ def reproduce(
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
     made_with = {"scale": asdict(scale), **generations(), "versions": versions(LIBRARIES)}
-    with open_bank(out) as bank, processes() as pool:
+    with open_bank(out) as bank, open_executor(executor) as pool:
         workshop = Workshop(out, scale, bank, pool, progress)
         if "adhesion" in chosen:
             workshop.begin_sticky()

@@ -14,7 +14,7 @@ from ..files import write_netcdf, write_whole
 from ..inputs.bundled import bundled_recording
 from ..inputs.open import open_recording
 from ..inputs.recording import Recording, along_path, recording_dataset
-from ..run.simulations import fresh_seeds
+from ..seeds import Phase, generator, simulation_seeds
 from .calibrations import NOISE
 from .truths import LIQUIDS, SPREAD
 
@@ -28,7 +28,6 @@ ADHESION = 0.6, 0.9  # of the truths
 TRAINING = [(w, d) for w in (40.0, 70.0, 110.0) for d in (0.5, 1.5, 2.5, 4.0)]
 """Pours that are seen after the stirring: deg/s, cm."""
 
-_STIRRED, _POURED = 71, 72  # purposes of seeds
 _COLUMNS = ("angular_velocity_deg_s", "distance_cm", "spilled", "received", "retained")
 
 
@@ -51,7 +50,7 @@ class Sticky(NamedTuple):
 
 def draw_sticky(repetition: int, seed: int) -> Sticky:
     """The same whatever the number of repetitions."""
-    rng = np.random.default_rng([seed, 7, repetition])
+    rng = generator(seed, Phase.STICKY_TRUTHS, repetition)
     viscosity = LIQUIDS[LIKE] * np.exp(SPREAD * rng.standard_normal())
     theta = {
         "viscosity": float(viscosity),
@@ -64,7 +63,7 @@ def draw_sticky(repetition: int, seed: int) -> Sticky:
 def recipe(cups: "Cups", particles: int, seed: int) -> str:
     """Short name of what decides the drawn liquid and its pours; runs of another model are kept
     elsewhere."""
-    made_by = [LIKE, LIQUIDS[LIKE], SPREAD, ADHESION, TRAINING, NOISE.sd]
+    made_by = [Phase.STICKY_TRUTHS.value, LIKE, LIQUIDS[LIKE], SPREAD, ADHESION, TRAINING, NOISE.sd]
     text = json.dumps([*made_by, cups.settings(), particles, seed], sort_keys=True)
     return sha256(text.encode()).hexdigest()[:8]
 
@@ -92,9 +91,9 @@ def _dataset(like: Recording, truth: Sticky, particles: int) -> "Dataset":
     setup = models.StirSetup.from_recording(like, particles=particles)
     liquid = models.Liquid(**truth.liquid, density=like.number("liquid_density"))
     effects = {"adhesion": truth.theta["adhesion"]}
-    own = fresh_seeds(truth.seed, _STIRRED, 1)
+    own = simulation_seeds(truth.seed, Phase.STICKY_STIR, 1)
     clean = models.stir(liquid, like.gripper, setup, own, effects)[0]
-    noisy = NOISE(clean, np.random.default_rng(truth.seed))
+    noisy = NOISE(clean, generator(truth.seed, Phase.CAMERA_NOISE))
     attrs = {**like.attrs, "source": "simulated truth that sticks to its cup"}
     return recording_dataset(along_path(like, noisy), attrs)
 
@@ -104,7 +103,7 @@ def _pours(truth: Sticky, density: float, cups: "Cups") -> NDArray[np.float64]:
     from .. import models
 
     rate, distance = np.array(TRAINING).T
-    own = fresh_seeds(truth.seed, _POURED, len(TRAINING))
+    own = simulation_seeds(truth.seed, Phase.STICKY_POURS, len(TRAINING))
     made = models.pour(
         models.Liquid(**truth.liquid, density=density),
         models.PourAction(np.radians(rate), distance / 100.0),

@@ -7,15 +7,16 @@ import numpy as np
 
 from ..calibration.calibrate import calibrate
 from ..criticism.criticise import criticise
+from ..inference.simulations import Keep
 from ..inputs.cups import bundled_cups
 from ..pouring.choose import choose_pour
 from ..pouring.spillage import pour_all, surface
+from ..progress import silent
 from ..run.directory import open_bank
+from ..seeds import Phase
 from .decisions import executions, spilled_by
 from .scale import Scale
 from .sticky import Sticky, draw_sticky, poured, recipe, stirred
-
-_REHEARSAL = 73  # purpose of seeds
 
 
 class Stuck(NamedTuple):
@@ -67,10 +68,10 @@ def spilled_where_it_sticks(
     after = choose_pour(criticism.calibration, cups, **tried)
     sticks = executions(truth.theta, density, cups, truth.seed)
     flows = executions(truth.liquid, density, cups, truth.seed)
-    rehearsed = executions(truth.theta, density, cups, truth.seed, _REHEARSAL)
+    rehearsed = executions(truth.theta, density, cups, truth.seed, Phase.REHEARSAL)
     rates = np.geomspace(*cups.angular_velocity_range, scale.grid.rates)
     with open_bank(out) as bank:
-        known = surface(pour_all(rehearsed, rates, bank, lambda steps: None), cups).least("mean")
+        known = surface(pour_all(rehearsed, rates, Keep(bank), silent), cups).least("mean")
         actions = [before.chosen.action, after.chosen.action, known]
         spilled = [*spilled_by(flows, actions[:1], bank), *spilled_by(sticks, actions, bank)]
     return Stuck(truth, spilled, ", ".join(criticism.effects))

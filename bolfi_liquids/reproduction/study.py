@@ -77,7 +77,7 @@ def conclusions(
     progress: bool,
 ) -> list[NDArray | None]:
     """Of each truth; None where its calibration failed."""
-    from ..inference.simulations import Job, run_missing
+    from ..inference.simulations import Job, Keep, run_missing
 
     truths = tasks.truths
     jobs = [
@@ -85,16 +85,8 @@ def conclusions(
         for at, seed in enumerate(truths.seed)
     ]
     with progress_bar(f"calibrating ({name})", len(jobs), shown=progress) as advance:
-        found = run_missing(
-            learner.simulate,
-            jobs,
-            None,
-            tasks.bank,
-            learner.identity,
-            pool,
-            batch=1,
-            advance=advance,
-        )
+        keep = Keep(tasks.bank, learner.identity, 1, pool)
+        found = run_missing(learner.simulate, jobs, keep, advance=advance)
     return [result.signal for result in found]
 
 

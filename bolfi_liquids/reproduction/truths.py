@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..seeds import Phase, generator
+
 LIQUIDS = {"water": 0.005, "thin oil": 0.03, "oil": 0.15, "glycerin": 1.0, "gel": 10.0}
 """Median viscosity [Pa s] of each kind."""
 
@@ -40,7 +42,7 @@ def draw_truths(repetitions: int, seed: int) -> Truths:
     rows = []
     for number, (name, median) in enumerate(LIQUIDS.items()):
         for repetition in range(repetitions):
-            rng = np.random.default_rng([seed, number, repetition])
+            rng = generator(seed, Phase.TRUTHS, number, repetition)
             viscosity = median * np.exp(SPREAD * rng.standard_normal())
             rows.append((name, repetition, viscosity, rng.uniform(), int(rng.integers(2**31))))
     return Truths(*map(np.array, zip(*rows, strict=True)))

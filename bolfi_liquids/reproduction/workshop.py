@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..calibration.calibrate import calibrate
 from ..calibration.result import Calibration
+from ..inference.simulations import Keep
 from ..inputs.bundled import bundled_recording
 from ..inputs.cups import bundled_cups
 from ..inputs.prior import default_prior
@@ -52,9 +53,8 @@ class Workshop:
         """Of pours with the bundled cups, by which actions are chosen."""
         size = self.scale.grid
         with progress_bar("pouring a grid of liquids", size.rates, shown=self.progress) as advance:
-            return make_grid(
-                bundled_cups(), DENSITY, default_prior(), self.bank, advance, size=size
-            )
+            cups, prior = bundled_cups(), default_prior()
+            return make_grid(cups, DENSITY, prior, Keep(self.bank), advance, size=size)
 
     @cached_property
     def study(self) -> "Dataset":

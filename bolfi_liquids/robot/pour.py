@@ -20,6 +20,7 @@ from .live_view import SessionView
 if TYPE_CHECKING:
     from ..hardware import Check, Rig
     from ..hardware.motion import PosePath
+    from ..pouring.result import PourSummary
 
 POURS = "pours"  # directories of what the arm did, in the RUN
 
@@ -52,11 +53,11 @@ def plan_pour(run: str | Path, rig: "Rig") -> PourPlan:
     from ..hardware import check_path
     from ..hardware.motion import pour_path, ready_to_pour
 
-    tree, cups = _chosen(Path(run))
+    chosen, cups = _chosen(Path(run))
     turn = cups["pour"]
     action = {
-        "angular_velocity": float(np.radians(tree["angular_velocity_deg_s"])),
-        "distance": float(tree["distance_cm"]) / 100,
+        "angular_velocity": float(np.radians(chosen.angular_velocity_deg_s)),
+        "distance": chosen.distance_cm / 100,
         "lip_height": float(turn["lip_height"]),
     }
     path = pour_path(
@@ -132,10 +133,9 @@ def dry_pour(run: str | Path, rig: "Rig", out: Path) -> "tuple[str, list[Check]]
         return describe([plan.path], rig, "pouring"), session.preflight()
 
 
-def _chosen(run: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+def _chosen(run: Path) -> "tuple[PourSummary, dict[str, Any]]":
     """The section "pour" of a run, and the cups that it was chosen for."""
-    from ..pouring.tree import read_pour
-    from ..run.summary import read_summary
+    from ..pouring.result import PourSummary, read_pour
 
     if not (run / RUN_TOML).exists() and not (run / POUR).exists():
         raise InputError(
@@ -146,7 +146,7 @@ def _chosen(run: Path) -> tuple[dict[str, Any], dict[str, Any]]:
             "no pour was chosen", where=str(run), fix=f"choose one: bolfi-liquids pour {run}"
         )
     tree = read_pour(run)
-    return read_summary(run)["pour"], json.loads(tree.attrs["cups"])
+    return PourSummary.read(run), json.loads(tree.attrs["cups"])
 
 
 def _next_directory(run: Path) -> Path:

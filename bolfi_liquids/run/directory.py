@@ -11,11 +11,13 @@ import tomli_w
 
 from ..errors import InputError
 from ..files import write_text
+from .formats import upgraded
 from .summary import NAME as SUMMARY
 
 if TYPE_CHECKING:
     from ..inference import SimulationBank
 
+PROGRAM = "bolfi-liquids"
 RUN_TOML = "run.toml"
 SIMULATIONS = "simulations.sqlite"
 POSTERIOR = "posterior.nc"
@@ -70,7 +72,7 @@ def enter_run(
         grows = growing in differing and _larger(*differing[growing])
         others = {field: both for field, both in differing.items() if field != growing or not grows}
         if others:
-            raise _refused(others, run, growing)
+            raise _refused(others, held, run, growing)
         return _grow(run, held, record, differing[growing][0]) if grows else []
     if (run / SIMULATIONS).exists():
         raise InputError(
@@ -113,7 +115,7 @@ def _unusable(path: Path, err: Exception) -> InputError:
 
 
 def read_run(run: Path) -> dict[str, Any]:
-    """The run's settings, as written when it started.
+    """The run's settings, as written when it started, in this version's form.
 
     Raises:
         InputError: There is no run.toml, or it is not TOML.
@@ -126,7 +128,7 @@ def read_run(run: Path) -> dict[str, Any]:
             fix="give the directory of a run, as made by: bolfi-liquids calibrate ... --out RUN",
         )
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return upgraded(tomllib.loads(path.read_text(encoding="utf-8")))
     except tomllib.TOMLDecodeError as err:
         raise InputError(f"not TOML ({err})", where=str(path), fix="restore the file") from err
 
@@ -141,14 +143,19 @@ def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, tu
     return {field: values for field, values in both.items() if values[0] != values[1]}
 
 
-def _refused(differing: Mapping[str, tuple[Any, Any]], run: Path, growing: str) -> InputError:
+def _refused(
+    differing: Mapping[str, tuple[Any, Any]], record: Mapping[str, Any], run: Path, growing: str
+) -> InputError:
+    """A refusal that names the first field that differs from the run's `record`."""
     field, (held, wanted) = next(iter(differing.items()))
     if field.startswith("inputs."):
         what = "is of other recordings"
         fix = f"give those that {RUN_TOML} names under files, unchanged, or choose another --out"
         return InputError(what, where=str(run), fix=fix)
-    if field.startswith("engine."):
-        what, fix = f"{field} was {held!r} and is {wanted!r} now", "choose another --out"
+    if field.startswith(("engine.", "simulator.")):  # settings and recordings are the same
+        version = record.get("versions", {}).get(PROGRAM, "of the program")
+        what = f"{field} was {held!r} and is {wanted!r} now"
+        fix = f"go on with version {version}, which made the run, or choose another --out"
     else:
         what = f"{field} is {held!r} in the run, but {wanted!r} was asked"
         own = "the run's own value" + (" or a larger one" if field == growing else "")

@@ -6,17 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..inference import SimulationBank
-from ..inference.simulations import Job, run_missing
-from ..progress import Simulate
-
-
-class Keep(NamedTuple):
-    """Where simulations are kept, and how many run at the same time."""
-
-    bank: SimulationBank
-    identity: str  # the simulator's name in the bank
-    batch: int
+from ..inference.simulations import Job, Keep, run_missing
+from ..progress import Advance, Simulate, silent
 
 
 class Kept(NamedTuple):
@@ -28,7 +19,12 @@ class Kept(NamedTuple):
 
 
 def simulate_kept(
-    simulate: Simulate, theta: Mapping[str, NDArray], seeds: Sequence[int], keep: Keep
+    simulate: Simulate,
+    theta: Mapping[str, NDArray],
+    seeds: Sequence[int],
+    keep: Keep,
+    *,
+    advance: Advance = silent,
 ) -> Kept:
     """Signals for each theta and seed; those found in the bank are not simulated again.
 
@@ -36,7 +32,8 @@ def simulate_kept(
         simulate: As given to `inference.fit`.
         theta: Name -> values, shape (n,).
         seeds: n seeds.
-        keep: Finished simulations are taken from there and put there.
+        keep: Where simulations are made and kept.
+        advance: Called with 1 for each simulation, also for those found in the bank.
 
     Returns:
         The simulations in order; failed ones are left out of the signals.
@@ -45,7 +42,7 @@ def simulate_kept(
         RuntimeError: Every simulation failed.
     """
     jobs = _jobs(theta, seeds)
-    results = run_missing(simulate, jobs, None, keep.bank, keep.identity, batch=keep.batch)
+    results = run_missing(simulate, jobs, keep, advance=advance)
     good = {
         at: r.signal
         for at, r in enumerate(results)
@@ -66,12 +63,12 @@ def keeping(simulate: Simulate, shape: tuple[int, ...], keep: Keep) -> Simulate:
     Args:
         simulate: As given to `inference.fit`.
         shape: Of a signal; a failed run's is NaN.
-        keep: Where simulations are kept.
+        keep: Where simulations are made and kept.
     """
 
     def kept(theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         jobs = _jobs(theta, [int(seed) for seed in seeds])
-        results = run_missing(simulate, jobs, shape, keep.bank, keep.identity, batch=keep.batch)
+        results = run_missing(simulate, jobs, keep, shape)
         failed = np.full(shape, np.nan)
         return np.stack([failed if one.signal is None else one.signal for one in results])
 
@@ -83,15 +80,3 @@ def _jobs(theta: Mapping[str, NDArray], seeds: Sequence[int]) -> list[Job]:
         Job({name: float(values[at]) for name, values in theta.items()}, seed)
         for at, seed in enumerate(seeds)
     ]
-
-
-def fresh_seeds(seed: int, purpose: int, count: int) -> list[int]:
-    """Seeds in [0, 2^31) that neither the engine nor another purpose uses.
-
-    Args:
-        seed: Of the run.
-        purpose: Tells the uses of one run apart.
-        count: How many.
-    """
-    words = np.random.SeedSequence(seed, spawn_key=(purpose,)).generate_state(count)
-    return [int(word >> 1) for word in words]

@@ -2,14 +2,65 @@
 
 import json
 import math
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar, Self
+
+from pydantic import BeforeValidator, TypeAdapter, ValidationError
 
 from ..errors import InputError
 from ..files import write_text
 
 NAME = "summary.json"
 RESTORE = "delete it; calibrate --resume, criticise and pour write it again from what was simulated"
+
+Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
+"""A number that may be NaN, for which JSON has `null`."""
+
+
+class Section:
+    """A section of summary.json; its subclasses are frozen dataclasses that list the fields."""
+
+    SECTION: ClassVar[str]
+    """Of the section, which is that of the command."""
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any], where: str = NAME) -> Self:
+        """The section from what `json.loads` read.
+
+        Raises:
+            InputError: A field is missing or is not what it should be; `where` is named.
+        """
+        try:
+            return _adapter(cls).validate_python(values)
+        except ValidationError as err:
+            first = err.errors(include_url=False)[0]
+            field = ".".join(map(str, (cls.SECTION, *first["loc"])))
+            raise InputError(f"{field}: {first['msg']}", where=where, fix=RESTORE) from err
+
+    def to_json(self) -> dict[str, Any]:
+        """The section as `json.dumps` takes it."""
+        return _adapter(type(self)).dump_python(self, mode="json", by_alias=True)
+
+    @classmethod
+    def read(cls, run: Path) -> Self:
+        """The section of a run.
+
+        Raises:
+            InputError: The file is damaged.
+            KeyError: The run has no such section.
+        """
+        return cls.from_json(read_summary(run)[cls.SECTION], str(run / NAME))
+
+    def write(self, run: Path) -> None:
+        """Replace the section of a run."""
+        write_section(run, self.SECTION, self.to_json())
+
+
+@cache
+def _adapter(kind: type) -> TypeAdapter:
+    return TypeAdapter(kind)
 
 
 def read_summary(run: Path) -> dict[str, Any]:

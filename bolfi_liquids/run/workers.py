@@ -1,4 +1,7 @@
-"""Processes that share long work."""
+"""Processes that share long work.
+
+Not by loky: with 3.7.0, workers go on for at least 20 s after their parent is killed.
+"""
 
 import os
 import signal

@@ -1,69 +1,125 @@
 """What a single simulation leaves: files that are checked before it, and written after it."""
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from ..files import new_file, new_netcdf
-from ..inputs.described_liquid import Described
+from ..inputs.fields import PLANES
 from ..inputs.recording import Recording, along_path, recording_dataset
 from ..movie.file import check_movie
+from ..pouring.spillage import FRACTIONS
+from .batch import Batch
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
-    from ..models import Cups, Landings
+    from ..models import Cups, Landings, PourAction
 
 
-def check_targets(movie: Path | None, out: Path | None) -> None:
+VARIED = ("viscosity", "cohesion", "seed")  # what may differ between simulations of one call
+
+
+class Targets(NamedTuple):
+    """Files that are to be written; None for neither."""
+
+    movie: Path | None
+    out: Path | None
+
+    def check_single(self, single: bool) -> None:
+        """Refuse files where several liquids are simulated.
+
+        Raises:
+            InputError: There are several, and a file was asked for.
+        """
+        if not single and (self.movie or self.out):
+            raise InputError(
+                "arrays were given, but a file shows one simulation",
+                where=str(self.movie or self.out),
+                fix="give numbers, or write what is returned with to_netcdf",
+            )
+
+
+def check_targets(movie: str | Path | None, out: str | Path | None) -> Targets:
     """Refuse files that could not be written, before anything is simulated.
 
     Raises:
         InputError, ImportError: Where and why.
     """
-    if movie is not None:
-        check_movie(movie)
-        new_file(movie)
-    if out is not None:
-        new_netcdf(out)
+    targets = Targets(*(None if file is None else Path(file) for file in (movie, out)))
+    if targets.movie is not None:
+        check_movie(targets.movie)
+        new_file(targets.movie)
+    if targets.out is not None:
+        new_netcdf(targets.out)
+    return targets
 
 
-def stir_dataset(described: Described, recording: Recording, angles: NDArray) -> "Dataset":
-    """The simulated stir as a recording: of the same path, without noise."""
+def stir_dataset(batch: Batch, recording: Recording, angles: NDArray) -> "Dataset":
+    """Simulated stirs as a recording: of the same path, without noise.
+
+    Args:
+        batch: The liquids.
+        recording: Whose path was simulated.
+        angles: Inclinations [rad], shape (simulations, T, 2).
+    """
     of_the_original = ("status", "reason")
     rig = {
         name: value
         for name, value in recording.attrs.items()
         if name not in of_the_original and not name.startswith("imported_")
     }
-    attrs = {**rig, "path_of": recording.path.name, **described.attributes()}
-    return recording_dataset(along_path(recording, angles), attrs)
+    attrs = {**rig, "path_of": recording.path.name, **_attributes(batch)}
+    found = recording_dataset(along_path(recording, angles[0]), attrs)
+    if batch.single:
+        return found
+    planes = {
+        name: ((*batch.leading, "time"), angles[..., plane], found[name].attrs)
+        for plane, name in enumerate(PLANES)
+    }
+    return found.assign(planes).assign_coords(_coordinates(batch))
 
 
 def pour_dataset(
-    described: Described,
-    landings: "Landings",
-    turned: tuple[float, "Cups"],
-    distance: float,
-    fractions: Mapping[str, float],
+    batch: Batch, landings: "Landings", action: "PourAction", cups: "Cups"
 ) -> "Dataset":
-    """The outcome of a pour, and where each particle passed the height of the receiver's rim."""
+    """The outcome of pours, and where each particle passed the height of the receiver's rim."""
     from xarray import Dataset
 
-    angular_velocity, cups = turned
+    result = landings.into(action.distance, cups.receiver.radius)
+    fractions = {
+        name: (batch.leading, batch.shaped(np.asarray(getattr(result, name))), {"units": "1"})
+        for name in FRACTIONS
+    }
+    dims = (*batch.leading, "particle", "axis")
+    landing = (dims, batch.shaped(landings.position), {"units": "m"})
     return Dataset(
-        {
-            **{name: ((), value, {"units": "1"}) for name, value in fractions.items()},
-            "landing": (("particle", "axis"), landings.position[0], {"units": "m"}),
-        },
-        coords={"axis": ["ahead", "across"]},
+        {**fractions, "landing": landing},
+        coords={"axis": ["ahead", "across"], **_coordinates(batch)},
         attrs={
-            **described.attributes(),
-            "angular_velocity": angular_velocity,
-            "distance": distance,
-            "cups": json.dumps(cups.settings(described.particles)),
+            **_attributes(batch),
+            "angular_velocity": float(np.asarray(action.angular_velocity)),
+            "distance": float(np.asarray(action.distance)),
+            "cups": json.dumps(cups.settings(batch.one.particles)),
         },
     )
+
+
+def _attributes(batch: Batch) -> dict[str, float | int | str]:
+    """What all liquids share."""
+    varied = () if batch.single else VARIED
+    return {name: v for name, v in batch.one.attributes().items() if name not in varied}
+
+
+def _coordinates(batch: Batch) -> dict[str, tuple[tuple[str, ...], list[float]]]:
+    """What tells the simulations apart; none where there is one."""
+    if batch.single:
+        return {}
+    return {
+        name: (batch.leading, [getattr(liquid, name) for liquid in batch.liquids])
+        for name in VARIED
+    }

@@ -1,11 +1,11 @@
 """The controller: program, safety and arm, one tick after the other."""
 
 import sys
-import time
 from typing import NamedTuple
 
 import numpy as np
 
+from ..host_clock import REAL_CLOCK, HostClock
 from ..motion.kinematics import ARMS
 from .arm import Arm
 from .force import ForceReading
@@ -91,7 +91,8 @@ class Options(NamedTuple):
 class Controller:
     """State of the emulated controller; servers read and write it between ticks."""
 
-    def __init__(self, options: Options):
+    def __init__(self, options: Options, clock: HostClock = REAL_CLOCK):
+        self.clock = clock
         model = MODELS[options.controller]
         self.model = model
         self.version = model.version[:2]
@@ -145,14 +146,14 @@ class Controller:
 
     def protective_stop(self, reason: str) -> None:
         self._note(f"protective stop: {reason}")
-        self._protective_since = time.monotonic()
+        self._protective_since = self.clock.now()
         self.program, self._watchdog = None, None
         self.arm.stop(PROTECTIVE_RATE)
 
     def unlock(self) -> bool:
         """End a protective stop; nothing moves by that. False if it is too early."""
         since = self._protective_since
-        if since is not None and time.monotonic() - since < self._unlock_after:
+        if since is not None and self.clock.now() - since < self._unlock_after:
             return False
         self._protective_since = None
         return True
@@ -208,7 +209,7 @@ class Controller:
         playing = self.program is not None
         return Snapshot(
             time=self._ticks * self.dt,
-            host=time.monotonic(),
+            host=self.clock.now(),
             joints=tuple(arm.state.joints.tolist()),
             joint_speeds=tuple(arm.state.speed.tolist()),
             pose=tuple(arm.pose.tolist()),

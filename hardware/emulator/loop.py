@@ -1,9 +1,9 @@
 """The emulator's event loop: sockets between ticks at absolute times."""
 
 import sys
-import time
 from collections.abc import Callable
 
+from ..host_clock import REAL_CLOCK, HostClock
 from .controller import Controller, Options
 from .servers.admin import AdminSession, Faults
 from .servers.dashboard import DashboardSession
@@ -17,41 +17,52 @@ LATE = 0.05  # s; ticks that are later are left out, not made up for
 class Emulator:
     """A controller with its four ports open.
 
+    Attributes:
+        controller: Behind the ports.
+        network: The ports.
+        faults: Of the link, as the admin port injects them.
+
     Raises:
         RigError: The address is not one of 127.0.0.0/8, or a port is taken.
     """
 
-    def __init__(self, address: str, options: Options):
-        self.controller = Controller(options)
-        self._faults = Faults()
+    def __init__(self, address: str, options: Options, clock: HostClock = REAL_CLOCK):
+        self.controller = Controller(options, clock)
+        self._clock = clock
+        self.faults = Faults()
         self.network = Network(
             address,
             {
                 RTDE: lambda one: RtdeSession(one, self.controller, self._rtde),
                 SCRIPT: lambda one: ScriptSession(one, self.controller),
                 DASHBOARD: lambda one: DashboardSession(one, self.controller),
-                ADMIN: lambda one: AdminSession(one, self.controller, self._faults),
+                ADMIN: lambda one: AdminSession(one, self.controller, self.faults),
             },
+            clock,
         )
-        self._faults.network = self.network
+        self.faults.network = self.network
 
     def run(self, wanted: Callable[[], bool]) -> None:
         """Serve while `wanted()`, which is asked every tick."""
-        deadline = time.monotonic()
-        dt = self.controller.dt
+        deadline = self._clock.now()
         while wanted():
-            deadline += dt
-            while (left := deadline - time.monotonic()) > 0.0:
+            deadline += self.controller.dt
+            while (left := deadline - self._clock.now()) > 0.0:
                 self.network.poll(left)
-            # what came while this process had no time counts before the tick
-            self.network.poll(0.0)
-            self._tick()
-            late = time.monotonic() - deadline
-            if late > LATE:
-                ticks = int(late / dt)
-                self.controller.skip(ticks)
-                deadline += ticks * dt
-                print(f"emulator: {ticks} ticks late, left out", file=sys.stderr, flush=True)
+            deadline = self.turn(deadline)
+
+    def turn(self, deadline: float) -> float:
+        """One tick, which was due at `deadline` [s]; that, or later if ticks were left out."""
+        # what came while this process had no time counts before the tick
+        self.network.poll(0.0)
+        self._tick()
+        late = self._clock.now() - deadline
+        if late <= LATE:
+            return deadline
+        ticks = int(late / self.controller.dt)
+        self.controller.skip(ticks)
+        print(f"emulator: {ticks} ticks late, left out", file=sys.stderr, flush=True)
+        return deadline + ticks * self.controller.dt
 
     def close(self) -> None:
         self.network.close()
@@ -66,7 +77,7 @@ class Emulator:
             if frozen:
                 session.miss()
             else:
-                session.publish(snapshot, self._faults.late)
+                session.publish(snapshot, self.faults.late)
         for session in self.network.sessions(ADMIN):
             if isinstance(session, AdminSession):
                 session.publish(snapshot)

@@ -64,7 +64,7 @@ class EmulatorProcess:
         Raises:
             RigError: It did not start; the message holds what it said.
         """
-        address = _free_address() if address is None else address
+        address = free_address() if address is None else address
         command = [sys.executable, "-m", __package__, "--while-stdin", f"--address={address}"]
         command.append(f"--controller={controller}")
         if joints is not None:
@@ -125,7 +125,7 @@ class EmulatorProcess:
             )
 
 
-def _free_address() -> str:
+def free_address() -> str:
     """An address on which none of the emulator's ports is taken just now."""
     # the system's own source: seeding `random` must not make two processes collide
     source = random.SystemRandom()

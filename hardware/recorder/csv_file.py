@@ -88,7 +88,8 @@ def _drop_cut_row(file: int) -> int:
 def read_csv(path: Path, fields: Sequence[str]) -> dict[str, NDArray[np.float64]]:
     """The columns of a table that a `CsvAppender` wrote, each of shape (N,).
 
-    A row that is cut off or damaged is left out. A file without rows gives empty columns.
+    A row that is cut off or damaged is left out, which pandas could not tell from a missing value.
+    A file without rows gives empty columns.
 
     Raises:
         OSError: There is no such file.

@@ -1,6 +1,7 @@
 """What main tells the control process, and what that answers."""
 
 import hashlib
+from multiprocessing.connection import Connection
 from typing import NamedTuple
 
 import numpy as np
@@ -105,6 +106,14 @@ class Left(NamedTuple):
 
 
 Report = Checked | Told | Began | Done | Stopped | Left
+
+
+def report_to(orders: Connection, report: Report) -> None:
+    """Tell main, if it is still there."""
+    try:
+        orders.send(report)
+    except OSError:
+        pass  # main is gone, which the inbox tells
 
 
 def fingerprint(path: PosePath) -> str:

@@ -1,6 +1,5 @@
 """Before the arm may move: connect, go through the pre-flight list, arm the watchdog."""
 
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -8,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arm import ArmState, LinkLost
-from ..board import Board, Row, Who, host_time
+from ..board import Board, Row, Who
 from ..errors import RigError
+from ..host_clock import REAL_CLOCK, HostClock
 from ..safety.guards import CAMERAS
 from ..safety.preflight import (
     Check,
@@ -48,7 +48,9 @@ class Prepared(NamedTuple):
         return tuple(np.mean([state.wrench for state in self.states], axis=0).tolist())
 
 
-def prepare(to: Assignment, rows: Callable[[], Mapping[Who, Row]]) -> Prepared:
+def prepare(
+    to: Assignment, rows: Callable[[], Mapping[Who, Row]], clock: HostClock = REAL_CLOCK
+) -> Prepared:
     """Connect and go through the list, down to the first thing that makes going on unsafe.
 
     Nothing moves. Control of the arm is taken only if all that a look can tell is well, and never
@@ -57,20 +59,21 @@ def prepare(to: Assignment, rows: Callable[[], Mapping[Who, Row]]) -> Prepared:
     Args:
         to: The rig and whether the arm may be commanded.
         rows: Gives the other processes' signs of life.
+        clock: Of this process.
     """
     rig, checks, states = to.rig, [], []
     arm = URArm(rig, to.address, to.tool) if to.armed else URReader(to.address, rig.robot.rate)
     try:
         arm.connect()
-        states.extend(_look(arm, 1.0 / rig.robot.rate))
+        states.extend(_look(arm, 1.0 / rig.robot.rate, clock))
         checks.extend(arm_checks(states, rig))
-        checks.extend(_others(to, rows))
+        checks.extend(_others(to, rows, clock))
         checks.append(disk_check(Path(to.directory)))
         checks.append(payload_check(arm.payload(), rig))
         if not isinstance(arm, URArm):
             checks.extend(mounted_checks(states[-1], None, rig, to.tool))
         elif not failures(checks):
-            states[:] = _take_control(arm, to, checks)
+            states[:] = _take_control(arm, to, checks, clock)
             if failures(checks):
                 arm.give_up()
     except (RigError, LinkLost, ImportError, RuntimeError) as err:
@@ -86,9 +89,11 @@ def others(to: Assignment, board: Board) -> dict[Who, Row]:
     return {who: board.read(who) for who in watched}
 
 
-def _take_control(arm: URArm, to: Assignment, checks: list[Check]) -> list[ArmState]:
+def _take_control(
+    arm: URArm, to: Assignment, checks: list[Check], clock: HostClock
+) -> list[ArmState]:
     arm.take_control()
-    states = _look(arm, 1.0 / to.rig.robot.rate)
+    states = _look(arm, 1.0 / to.rig.robot.rate, clock)
     checks.append(program_check(states[-1]))
     checks.append(payload_check(arm.payload(), to.rig, ours=True))
     checks.extend(mounted_checks(states[-1], arm.tcp(), to.rig, to.tool))
@@ -97,20 +102,20 @@ def _take_control(arm: URArm, to: Assignment, checks: list[Check]) -> list[ArmSt
     return states
 
 
-def _look(arm: URReader, period: float) -> list[ArmState]:
+def _look(arm: URReader, period: float, clock: HostClock) -> list[ArmState]:
     states = []
-    end = host_time() + LOOK
-    while host_time() < end:
+    end = clock.now() + LOOK
+    while clock.now() < end:
         states.append(arm.read())
-        time.sleep(period)
+        clock.sleep(period)
     return states
 
 
-def _others(to: Assignment, rows: Callable[[], Mapping[Who, Row]]) -> list[Check]:
+def _others(to: Assignment, rows: Callable[[], Mapping[Who, Row]], clock: HostClock) -> list[Check]:
     """Waits for the others, since all start at once."""
-    end = host_time() + WAIT_FOR_OTHERS
+    end = clock.now() + WAIT_FOR_OTHERS
     while True:
-        checks = process_checks(rows(), to.rig, host_time())
-        if not failures(checks) or host_time() > end:
+        checks = process_checks(rows(), to.rig, clock.now())
+        if not failures(checks) or clock.now() > end:
             return checks
-        time.sleep(0.02)
+        clock.sleep(0.02)

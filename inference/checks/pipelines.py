@@ -1,7 +1,6 @@
 """The engine as a pipeline, with simulations of its own or with a design that is shared."""
 
 from collections.abc import Mapping
-from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from inspect import signature
 from pathlib import Path
@@ -15,8 +14,9 @@ from ..bolfi import MIN_LEARN, Bolfi
 from ..loop import fit
 from ..prior import Prior
 from ..simulations.bank import SimulationBank
-from ..simulations.job import jobs, simulation_seed
-from ..simulations.runner import run_missing
+from ..simulations.executors import Workers, open_executor
+from ..simulations.job import jobs, simulation_seed, stacked
+from ..simulations.runner import Keep, run_missing
 from ..sobol import sobol
 from ..surrogates.families import resolve
 from ..types import Simulator
@@ -34,6 +34,7 @@ class FitPipeline:
         budget: Simulations per set of data.
         options: Other options of `fit`, such as {"surrogate": "signal"}.
         sampling: Options of `Fit.sample`, such as {"chains": 2, "draws": 250}.
+        warn: Whether a replicate's complaints are raised as warnings.
     """
 
     simulate: Simulator
@@ -41,6 +42,7 @@ class FitPipeline:
     budget: int = 40
     options: Options = field(default_factory=dict)
     sampling: Options = field(default_factory=dict)
+    warn: bool = True
 
     def __post_init__(self) -> None:
         """Raise ValueError where every replicate would."""
@@ -51,10 +53,10 @@ class FitPipeline:
         resolve(self.options.get("surrogate"), of_family)
 
     def __call__(self, observed: np.ndarray, seed: int) -> tuple[xr.DataTree, LogDensity]:
-        made = fit(
-            self.simulate, self.prior, observed, budget=self.budget, seed=seed, **self.options
-        )
-        return made.sample(seed=seed, **self.sampling), made.log_prob
+        options = {"progress": False, "warn": self.warn, **self.options}
+        made = fit(self.simulate, self.prior, observed, budget=self.budget, seed=seed, **options)
+        sampling = {"warn": self.warn, **self.sampling}
+        return made.sample(seed=seed, **sampling), made.log_prob
 
 
 @dataclass(frozen=True, repr=False)
@@ -69,6 +71,7 @@ class SharedDesign:
         seeds: [n].
         options: Options of `Bolfi`, such as {"surrogate": "signal"}.
         sampling: Options of `Fit.sample`.
+        warn: Whether a replicate's complaints are raised as warnings.
     """
 
     simulate: Simulator
@@ -78,6 +81,7 @@ class SharedDesign:
     seeds: np.ndarray
     options: Options = field(default_factory=dict)
     sampling: Options = field(default_factory=dict)
+    warn: bool = True
 
     def __repr__(self) -> str:
         n, *shape = self.signals.shape
@@ -86,8 +90,9 @@ class SharedDesign:
     def __call__(self, observed: np.ndarray, seed: int) -> tuple[xr.DataTree, LogDensity]:
         engine = Bolfi(self.prior, observed, seed=seed, **self.options)
         engine.tell(self.prior.to_dict(self.theta), self.signals, self.seeds)
-        made = engine.fit()
-        return made.sample(seed=seed, **self.sampling), made.log_prob
+        made = engine.fit(warn=self.warn)
+        sampling = {"warn": self.warn, **self.sampling}
+        return made.sample(seed=seed, **sampling), made.log_prob
 
 
 def shared_design(  # noqa: PLR0913  one flat place for what defines a design
@@ -98,9 +103,10 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
     seed: int = 0,
     options: Options | None = None,
     sampling: Options | None = None,
-    executor: Executor | None = None,
+    executor: Workers | None = None,
     bank: str | Path = ":memory:",
     identity: str = "",
+    warn: bool = True,
 ) -> SharedDesign:
     """A pipeline whose n simulations are made here, once, for all replicates.
 
@@ -114,6 +120,7 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
         seed: Fixes the points and the simulations' seeds.
         options: Of `Bolfi`, such as {"surrogate": "signal"}.
         sampling: Of `Fit.sample`, such as {"chains": 2, "draws": 250}.
+        warn: Whether a replicate's complaints are raised as warnings.
 
     Raises:
         RuntimeError: fewer than three simulations succeeded.
@@ -121,23 +128,22 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
     n, seed = checked_integer("n", n, MIN_LEARN), checked_integer("seed", seed, 0)
     theta = prior.from_unit(sobol(seed, 0, n, len(prior)))
     seeds = [simulation_seed(seed, i) for i in range(n)]
-    with SimulationBank(bank) as kept:
-        made = run_missing(simulate, jobs(theta, seeds), None, kept, identity, executor)
-    good = [result.signal for result in made if result.signal is not None]
-    if len(good) < MIN_LEARN:
+    with SimulationBank(bank) as kept, open_executor(executor) as workers:
+        keep = Keep(kept, identity, executor=workers)
+        made = run_missing(simulate, jobs(theta, seeds), keep)
+    good = sum(result.signal is not None for result in made)
+    if good < MIN_LEARN:
         first = next((result.error for result in made if result.error), "none")
         raise RuntimeError(
-            f"{len(good)} of {n} simulations succeeded, {MIN_LEARN} are needed; "
-            f"the first error: {first}"
+            f"{good} of {n} simulations succeeded, {MIN_LEARN} are needed; the first error: {first}"
         )
-    empty = np.full(good[0].shape, np.nan)
-    signals = np.stack([empty if result.signal is None else result.signal for result in made])
     return SharedDesign(
         simulate,
         prior,
         prior.to_array(theta),
-        signals,
+        stacked(made),
         np.array(seeds),
         options or {},
         sampling or {},
+        warn,
     )

@@ -12,6 +12,7 @@ from ..arguments import check_callable, check_function, checked_integer
 from ..describe import describe
 from ..prior import Prior
 from ..progress import progress_bar
+from ..simulations.executors import Workers, open_executor
 from ..types import Simulator
 from .replicate import Observe, Pipeline, Plan, Replicate, run_replicate
 from .replicated import Replicates
@@ -30,7 +31,7 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
     draws: int = 63,
     independent: bool = False,
     observe: Observe | None = None,
-    executor: Executor | None = None,
+    executor: Workers | None = None,
     store: str | Path = ":memory:",
     identity: str = "",
     retry: bool = False,
@@ -52,8 +53,8 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
             sample size, which must be about 2 L. Choose 2^k - 1: bins then divide L + 1.
         independent: The pipeline's draws are independent: do not thin by autocorrelation.
         observe: Callable (signal, rng) -> observed that adds measurement noise; None adds none.
-        executor: Runs each replicate as a call of its own; None runs them here, one by one.
-            Processes must be spawned, not forked, since JAX runs threads.
+        executor: Runs each replicate as a call of its own, see `fit`; None runs them here, one
+            by one. Processes must be spawned, not forked, since JAX runs threads.
         store: File that keeps every finished replicate. The same call on the same file goes
             on where the last one ended, also after a crash.
         identity: Names what the store cannot see: anything in the code that would change the
@@ -70,8 +71,6 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
     prior = _own(pipeline, "prior", prior)
     check_function("simulate", simulator)
     check_callable("observe", observe)
-    if executor is not None and not hasattr(executor, "submit"):
-        raise ValueError(f"executor must be an Executor or None, got {executor!r:.100}")
     if not isinstance(prior, Prior):
         raise ValueError(f"prior must be a Prior, got {type(prior).__name__}")
     n, seed = checked_integer("n", n), checked_integer("seed", seed, 0)
@@ -81,6 +80,7 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
     settings |= {"prior": describe(prior), "identity": identity}
     truths = _truths(prior, n, seed)
     with ExitStack() as stack:
+        workers = stack.enter_context(open_executor(executor))
         kept = stack.enter_context(ReplicateStore(store, settings))
         done = {
             number: replicate
@@ -89,7 +89,7 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
         }
         advance = stack.enter_context(progress_bar("replicates", n, shown=progress, done=len(done)))
         missing = [number for number in range(n) if number not in done]
-        for replicate in _run(plan, missing, truths, executor):
+        for replicate in _run(plan, missing, truths, workers):
             kept.put(replicate)
             done[replicate.number] = replicate
             advance(1)

@@ -106,6 +106,6 @@ def _difference(path: str, stored: Mapping[str, str], settings: Mapping[str, str
         if stored.get(name) != settings.get(name)
     ]
     return (
-        f"{path} holds replicates made with other settings ({'; '.join(unlike)}); "
-        "restore these, or choose another file"
+        f"{path} holds replicates made with other settings or by another version "
+        f"({'; '.join(unlike)}); restore these, or choose another file"
     )

@@ -23,3 +23,4 @@ from .usual_residual import UsualResidual as UsualResidual
 from .usual_residual import usual_residual as usual_residual
 from .verdict import Candidate as Candidate
 from .verdict import Verdict as Verdict
+from .verdict import VerdictKind as VerdictKind

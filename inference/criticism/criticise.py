@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
+from ..display import as_html, as_text
 from ..prior import Prior
 from .experiment import Experiment, Proposal
 from .extension import Extensions, check_extensions
@@ -19,10 +20,10 @@ from .search import Base, Plan, Study, examine, explain
 from .signatures import confusion
 from .simulate import Keeping, Laboratory
 from .usual_residual import without_usual
-from .verdict import ALARM, Candidate, Verdict, conclude, tied
+from .verdict import REJECTION_LEVEL, Candidate, Verdict, VerdictKind, conclude, tied
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Criticism:
     """What was found.
 
@@ -61,6 +62,31 @@ class Criticism:
     tied: tuple[tuple[str, ...], ...]
     simulations: int
 
+    def __repr__(self) -> str:
+        return as_text("Criticism", self._rows())
+
+    def _repr_html_(self) -> str:
+        return as_html("Criticism", self._rows())
+
+    def _rows(self) -> list[tuple[str, str]]:
+        sizes = [
+            (
+                f"{name}",
+                f"{one.mean:.3g} [{one.q05:.3g}, {one.q95:.3g}] {self.units[name]}".rstrip(),
+            )
+            for name, one in self.coefficients.items()
+        ]
+        suggested = [str(one.label) for one in self.suggestions[:1]]
+        return [
+            ("verdict", f"{self.verdict.kind.value}. {self.verdict.reason}"),
+            ("next", self.verdict.kind.advice),
+            ("accepted", ", ".join(self.accepted) or "none"),
+            *sizes,
+            ("explanations tested", str(len(self.candidates))),
+            *(("suggested experiment", one) for one in suggested),
+            ("simulations", str(self.simulations)),
+        ]
+
     @property
     def coefficients(self) -> dict[str, Interval]:
         """Of the accepted effects."""
@@ -83,7 +109,7 @@ class Criticism:
     @property
     def leading(self) -> Candidate | None:
         """The accepted explanation, or the best of those that are tied."""
-        tied = self.tied[0] if self.verdict.kind == "tie" else None
+        tied = self.tied[0] if self.verdict.kind is VerdictKind.TIE else None
         return _among(self.candidates, self.accepted) or _among(self.candidates, tied)
 
     @property
@@ -106,7 +132,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     held_out: Sequence[Experiment] = (),
     proposals: Sequence[Proposal] = (),
     accept: Sequence[str] | None = None,
-    level: float = ALARM,
+    level: float = REJECTION_LEVEL,
     plan: Plan | None = None,
     keeping: Keeping | None = None,
 ) -> Criticism:
@@ -196,9 +222,9 @@ def _rivals(
     verdict: Verdict, candidates: Sequence[Candidate], members: Sequence[Candidate]
 ) -> list[Candidate]:
     """Explanations that a further experiment should tell apart."""
-    if verdict.kind == "tie":
+    if verdict.kind is VerdictKind.TIE:
         return tied(members)
-    if verdict.kind == "unknown":
+    if verdict.kind is VerdictKind.UNKNOWN:
         return sorted(candidates, key=lambda c: -c.gain)[:2]
     return []
 
@@ -209,7 +235,7 @@ def _left_out(candidates: Sequence[Candidate]) -> list[str]:
 
 
 def _named(verdict: Verdict) -> tuple[str, ...]:
-    return verdict.effects if verdict.kind == "effect" else ()
+    return verdict.effects if verdict.kind is VerdictKind.EFFECT else ()
 
 
 def _among(candidates: Sequence[Candidate], names: Sequence[str] | None) -> Candidate | None:

@@ -13,7 +13,7 @@ from .misfit import MODES, exceedance, orthonormal, slow_modes
 from .run_noise import errors_of, smooth_covariance
 from .simulate import Laboratory
 from .usual_residual import without_usual
-from .verdict import ACCEPTED
+from .verdict import ACCEPTANCE_LEVEL
 
 FLOOR = 0.99  # quantile of the noise's RMS below which a gap may be noise
 SHARE = 0.5  # of a gap beyond noise that an explanation may leave, unless it may be noise
@@ -50,7 +50,7 @@ class Gap(NamedTuple):
     @property
     def fits(self) -> bool:
         """Whether noise, and what is usual, may be all that is left."""
-        return self.p_value > ACCEPTED
+        return self.p_value > ACCEPTANCE_LEVEL
 
 
 def beyond(rms: float, noise: float) -> float:

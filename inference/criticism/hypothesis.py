@@ -1,6 +1,5 @@
 """A model, base or extended, fitted to data: what is left, and how large that may be."""
 
-import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,7 +18,6 @@ from ..surrogates.families import SignalFamily
 from ..surrogates.measurement_noise import Layout, Reduced
 from ..surrogates.signal import SignalSurrogate
 from ..surrogates.signal_likelihood import SignalState
-from ..surrogates.warnings import EmulatorWarning
 from .measurement_noise import Noise
 from .run_noise import own_errors, resized, smooth_covariance
 from .run_table import Runs
@@ -139,10 +137,7 @@ def hypothesise(
     engine = Bolfi(prior, observed, surrogate=family, capacity=1)
     theta = {name: told.theta[name] for name in prior.names}
     engine.tell(theta, told.signals, told.seeds)
-    with warnings.catch_warnings():
-        # that a model cannot reach the data is what is being looked for
-        warnings.simplefilter("ignore", EmulatorWarning)
-        fit = engine.fit()
+    fit = engine.fit(warn=False)  # that a model cannot reach the data is what is looked for
     surrogate = fit.learned
     assert isinstance(surrogate, SignalSurrogate) and surrogate.known is not None
     emulator = surrogate.emulator

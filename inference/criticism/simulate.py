@@ -1,6 +1,7 @@
 """Runs of a simulator and of its extensions, kept in a bank."""
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -8,8 +9,8 @@ import numpy as np
 
 from ..prior import Prior
 from ..simulations.bank import SimulationBank
-from ..simulations.job import Job
-from ..simulations.runner import run_missing
+from ..simulations.job import BATCH, jobs
+from ..simulations.runner import Keep, run_missing
 from ..types import Simulator
 from .experiment import Experiment, Proposal
 from .extension import Extensions
@@ -31,13 +32,21 @@ class Keeping:
         bank: Takes every finished one; what it holds is not simulated again.
         batch: Simulated in one call.
         seed: All of their seeds derive from it.
-        report: Told of every batch.
+        report: Told of every simulation.
+        executor: Simulates each run in a call of its own; None simulates in this process.
+        timeout: Seconds that one run may take; None sets no limit.
     """
 
     bank: SimulationBank = field(default_factory=SimulationBank)
-    batch: int = 8
+    batch: int = BATCH
     seed: int = 0
     report: Report = silent
+    executor: Executor | None = None
+    timeout: float | None = None
+
+    def of(self, identity: str) -> Keep:
+        """The same for one simulator, by its name in the bank."""
+        return Keep(self.bank, identity, self.batch, self.executor, self.timeout)
 
 
 @dataclass(frozen=True)
@@ -73,20 +82,10 @@ class Laboratory:
             RuntimeError: all of them failed.
         """
         seeds = phase_seeds(self.keeping.seed, phase, len(next(iter(theta.values()))))
-        jobs = [
-            Job({name: float(column[i]) for name, column in theta.items()}, int(seed))
-            for i, seed in enumerate(seeds)
-        ]
+        asked = jobs(theta, [int(seed) for seed in seeds])
         keeping = self.keeping
-        results = run_missing(
-            self.simulate,
-            jobs,
-            None,
-            keeping.bank,
-            self.identity,
-            batch=keeping.batch,
-            advance=partial(keeping.report, phase),
-        )
+        report = partial(keeping.report, phase)
+        results = run_missing(self.simulate, asked, keeping.of(self.identity), advance=report)
         good = {
             i: result.signal
             for i, result in enumerate(results)
@@ -94,8 +93,8 @@ class Laboratory:
         }
         if not good:
             raise RuntimeError(
-                f"all {len(jobs)} simulations of the phase {phase!r} failed, the first at "
-                f"{jobs[0].theta}: {results[0].error or 'its output is not finite'}"
+                f"all {len(asked)} simulations of the phase {phase!r} failed, the first at "
+                f"{asked[0].theta}: {results[0].error or 'its output is not finite'}"
             )
         rows = list(good)
         kept = {name: np.asarray(column, float)[rows] for name, column in theta.items()}

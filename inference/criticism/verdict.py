@@ -2,15 +2,36 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from enum import StrEnum
 
 from .hypothesis import Hypothesis
 from .misfit import Check
 
-ALARM = 0.05  # p-value below which the base model is rejected
-ACCEPTED = 0.01  # p-value above which an extended model is not
-LEAST_GAIN = 2.0  # log likelihood below which an effect explains nothing
-MARGIN = 4.0  # log likelihood by which one explanation must excel another
+REJECTION_LEVEL = 0.05  # p-value below which the base model is rejected
+ACCEPTANCE_LEVEL = 0.01  # p-value above which an extended model is not
+MIN_GAIN = 2.0  # log likelihood below which an effect explains nothing
+TIE_MARGIN = 4.0  # log likelihood by which one explanation must excel another
+
+
+class VerdictKind(StrEnum):
+    """What a criticism concludes; `advice` is what to do about it."""
+
+    AGREEMENT = "none"
+    EFFECT = "effect"
+    TIE = "tie"
+    UNKNOWN = "unknown"
+
+    @property
+    def advice(self) -> str:
+        return _ADVICE[self]
+
+
+_ADVICE = {
+    VerdictKind.AGREEMENT: "Nothing needs to be added; more data may show a smaller difference.",
+    VerdictKind.EFFECT: "Calibrate anew with the named effect.",
+    VerdictKind.TIE: "Make the suggested experiment, which tells the named effects apart.",
+    VerdictKind.UNKNOWN: "Look where model and data differ, and add an extension that acts there.",
+}
 
 
 @dataclass(frozen=True)
@@ -41,7 +62,7 @@ class Candidate:
     @property
     def passes(self) -> bool:
         """The test that the base model failed, and it explains something."""
-        return self.check.p_value > ACCEPTED and self.gain > LEAST_GAIN
+        return self.check.p_value > ACCEPTANCE_LEVEL and self.gain > MIN_GAIN
 
     @property
     def accepted(self) -> bool:
@@ -53,14 +74,15 @@ class Verdict:
     """The conclusion.
 
     Attributes:
-        kind: "none": model and data agree. "effect": `effects` explain the difference. "tie": one
-            of `effects` does. "unknown": they differ, and no known effect explains it.
+        kind: AGREEMENT: no difference between model and data was detected. EFFECT: `effects`
+            explain the difference. TIE: one of `effects` does. UNKNOWN: they differ, and no
+            known effect explains it.
         effects: Their names.
         p_value: Of the base model.
         reason: The conclusion in a sentence.
     """
 
-    kind: Literal["none", "effect", "tie", "unknown"]
+    kind: VerdictKind
     effects: tuple[str, ...]
     p_value: float
     reason: str
@@ -76,26 +98,28 @@ def near_best(candidates: Sequence[Candidate], count: int) -> list[Candidate]:
 def tied(candidates: Sequence[Candidate]) -> list[Candidate]:
     """The accepted ones that the data cannot tell from the best of them, best first."""
     accepted = sorted((c for c in candidates if c.accepted), key=lambda c: -c.gain)
-    return [c for c in accepted if c.gain > accepted[0].gain - MARGIN]
+    return [c for c in accepted if c.gain > accepted[0].gain - TIE_MARGIN]
 
 
-def conclude(base: Check, explanations: Sequence[Candidate], level: float = ALARM) -> Verdict:
+def conclude(
+    base: Check, explanations: Sequence[Candidate], level: float = REJECTION_LEVEL
+) -> Verdict:
     """From the base model's test and the explanations that were tried, also on held-out data."""
     p, members = base.p_value, tied(explanations)
     if p >= level:
-        return Verdict("none", (), p, f"Model and data agree (p = {p:.2g}).")
+        return Verdict(VerdictKind.AGREEMENT, (), p, f"Model and data agree (p = {p:.2g}).")
     if not members:
-        return Verdict("unknown", (), p, _unexplained(p, explanations))
+        return Verdict(VerdictKind.UNKNOWN, (), p, _unexplained(p, explanations))
     if len(members) == 1:
         names = members[0].names
         reason = f"Model and data differ (p = {p:.2g}); {' with '.join(names)} explains it."
-        return Verdict("effect", names, p, reason)
+        return Verdict(VerdictKind.EFFECT, names, p, reason)
     names = tuple(dict.fromkeys(name for member in members for name in member.names))
     reason = (
         f"Model and data differ (p = {p:.2g}); one of {', '.join(names)} explains it, and these "
         "data cannot say which."
     )
-    return Verdict("tie", names, p, reason)
+    return Verdict(VerdictKind.TIE, names, p, reason)
 
 
 def _unexplained(p: float, explanations: Sequence[Candidate]) -> str:

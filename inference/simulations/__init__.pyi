@@ -1,9 +1,13 @@
 from .bank import Simulation as Simulation
 from .bank import SimulationBank as SimulationBank
 from .bank import Simulations as Simulations
+from .executors import Workers as Workers
+from .executors import open_executor as open_executor
 from .job import Job as Job
 from .job import OneByOne as OneByOne
+from .job import columns as columns
 from .job import jobs as jobs
 from .job import stacked as stacked
+from .runner import Keep as Keep
 from .runner import Runner as Runner
 from .runner import run_missing as run_missing

@@ -1,17 +1,32 @@
-"""Where simulations run: any `concurrent.futures.Executor`, or a Dask cluster by its address."""
+"""Where simulations run: any `concurrent.futures.Executor`, or a Dask cluster."""
 
 import sys
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
+from typing import Any, Protocol, runtime_checkable
+
+
+@runtime_checkable
+class DaskClient(Protocol):
+    """`distributed.Client`, as far as it is used here."""
+
+    def get_executor(self, **options: Any) -> Executor:
+        """An executor that submits to the client's cluster."""
+        ...
+
+
+Workers = Executor | DaskClient | str
+"""An executor, a Dask client, or the address of a Dask scheduler."""
 
 
 @contextmanager
-def opened(executor: Executor | str | None) -> Iterator[Executor | None]:
-    """The executor itself, left open; or one at a Dask scheduler's address, closed afterwards.
+def open_executor(executor: Workers | None) -> Iterator[Executor | None]:
+    """The executor itself, or a Dask client's, left open; or one at a Dask scheduler's address,
+    closed afterwards.
 
     Raises:
-        ValueError: neither of them, or a process pool that forks.
+        ValueError: none of them, or a process pool that forks.
         ImportError: an address, but Dask is not installed.
         ConnectionError: no scheduler answers there.
     """
@@ -19,10 +34,13 @@ def opened(executor: Executor | str | None) -> Iterator[Executor | None]:
         with _dask(executor) as found:
             yield found
         return
+    if isinstance(executor, DaskClient) and not isinstance(executor, Executor | type):
+        yield executor.get_executor(pure=False)
+        return
     if executor is not None and not isinstance(executor, Executor):
         raise ValueError(
-            "executor must be a concurrent.futures.Executor, the address of a Dask scheduler or "
-            f"None, got {type(executor).__name__}; a Dask client has get_executor()"
+            "executor must be a concurrent.futures.Executor, a Dask client, the address of a Dask "
+            f"scheduler or None, got {type(executor).__name__}"
         )
     if isinstance(executor, ProcessPoolExecutor) and _forks(executor):
         raise ValueError(

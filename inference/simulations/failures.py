@@ -4,10 +4,16 @@ import os
 import traceback
 from collections import Counter
 from collections.abc import Iterable
+from enum import StrEnum
 from pathlib import Path
 
-RAISED, NOT_FINITE, TIMEOUT = "raised", "not finite", "timeout"
-"""Kinds: the simulator raised; it returned NaN or infinity; it took too long."""
+
+class Failure(StrEnum):
+    """Kinds of failed runs, by the word that begins or stands for the sentence that is kept."""
+
+    RAISED = "raised"
+    NOT_FINITE = "not finite"  # the simulator returned NaN or infinity
+    TIMEOUT = "timeout"
 
 
 _ENGINE = str(Path(__file__).parent)
@@ -29,19 +35,20 @@ def _line(error: BaseException) -> str:
 
 
 def timed_out(timeout: float) -> str:
-    return f"{TIMEOUT}: no signal after {timeout:g} s"
+    return f"{Failure.TIMEOUT}: no signal after {timeout:g} s"
 
 
 def not_finite(what: str) -> str:
-    return f"{NOT_FINITE}: {what}"
+    return f"{Failure.NOT_FINITE}: {what}"
 
 
-def kind(error: str) -> str:
-    """`RAISED`, `NOT_FINITE` or `TIMEOUT`, of a sentence made above."""
+def kind(error: str) -> Failure:
+    """The kind of a failure of which a sentence is kept."""
     prefix = error.partition(":")[0]
-    return prefix if prefix in (NOT_FINITE, TIMEOUT) else RAISED
+    told = Failure.NOT_FINITE, Failure.TIMEOUT
+    return next((one for one in told if one == prefix), Failure.RAISED)
 
 
 def count(errors: Iterable[str]) -> dict[str, int]:
     """Failures by kind; kinds that did not occur, and "" for success, are left out."""
-    return dict(Counter(kind(error) for error in errors if error))
+    return dict(Counter(kind(error).value for error in errors if error))

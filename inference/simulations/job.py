@@ -7,6 +7,7 @@ library (tested), so that they start quickly and stay small.
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
@@ -18,6 +19,9 @@ from .failures import raised, timed_out
 
 R = TypeVar("R")
 BATCH = 4  # runs in one call, or in flight, where nobody says how many
+
+Limit = Callable[[float], AbstractContextManager[object]]
+"""Inside `limit(seconds)` a simulator raises TimeoutError once it has taken so long."""
 
 
 class Job(NamedTuple):
@@ -108,6 +112,7 @@ def run_batch(
         signals = within(
             None if timeout is None else timeout * len(batch),
             lambda: np.asarray(simulate(theta, seeds), np.float64),
+            limit_of(simulate),
         )
     # whatever the user's code raises is a failed run, and kept; many programs end by SystemExit
     except (Exception, SystemExit) as error:
@@ -126,18 +131,34 @@ def run_batch(
     return [Simulation(signal, None, seconds) for signal in signals]
 
 
-def within(timeout: float | None, call: Callable[[], R]) -> R:
+def limit_of(simulate: Simulator) -> Limit | None:
+    """How a simulator stops itself: the method `time_limit` of it, or of the object whose method
+    it is; None if there is no such method."""
+    return getattr(getattr(simulate, "__self__", simulate), "time_limit", None)
+
+
+def within(timeout: float | None, call: Callable[[], R], limit: Limit | None = None) -> R:
     """What `call` returns or raises, if it does so in `timeout` seconds.
 
-    The call then runs in a thread of its own. Python cannot stop a thread: one that is overdue
-    is abandoned, and goes on, unheard, until it returns or the process ends. Code that never
-    releases the interpreter's lock cannot be timed out.
+    With a `limit` the call stops itself, in this thread. Else it runs in a thread of its own.
+    Python cannot stop a thread: one that is overdue is abandoned, and goes on, unheard, until it
+    returns or the process ends. Code that never releases the interpreter's lock cannot be timed
+    out.
 
     Raises:
         Overdue: it did not.
     """
     if timeout is None:
         return call()
+    if limit is not None:
+        ends = time.monotonic() + timeout
+        try:
+            with limit(timeout):
+                return call()
+        except TimeoutError as error:
+            if time.monotonic() < ends:
+                raise
+            raise Overdue from error
     returned: list[R] = []
     failed: list[BaseException] = []
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from ..types import Simulator
 from .bank import Simulation, SimulationBank
 from .executors import killed_its_worker
-from .failures import TIMEOUT, kind, raised
+from .failures import Failure, kind, raised
 from .job import Job, OneByOne, run_batch
 
 POLL = 0.2  # seconds between looks at what somebody else is simulating
@@ -26,6 +26,25 @@ class Order(NamedTuple):
     outcome: "Future[Simulation]"
 
 
+class Keep(NamedTuple):
+    """Where simulations are made, and where they are kept.
+
+    Attributes:
+        bank: Takes every finished simulation; what it holds is not simulated again.
+        identity: The simulator's name in the bank.
+        batch: Simulations in one call of the simulator, and kept together, where there is no
+            executor; None is all of them.
+        executor: Simulates each job in a call of its own; None simulates in this process.
+        timeout: Seconds that one simulation may take; None sets no limit.
+    """
+
+    bank: SimulationBank
+    identity: str = ""
+    batch: int | None = None
+    executor: Executor | None = None
+    timeout: float | None = None
+
+
 class Runner:
     """A simulator with the bank that keeps what it returns; close it, or use it in a `with`.
 
@@ -35,25 +54,12 @@ class Runner:
 
     Args:
         simulate: The user's simulator.
-        bank: Where finished simulations are kept.
-        identity: The simulator's name in the bank.
-        executor: Simulates each job in a call of its own; None simulates here, in one call.
-        timeout: Seconds that a simulation may take; None sets no limit.
+        keep: Where simulations are made and kept; the caller decides on batches.
     """
 
-    def __init__(
-        self,
-        simulate: Simulator,
-        bank: SimulationBank,
-        identity: str,
-        executor: Executor | None = None,
-        timeout: float | None = None,
-    ):
+    def __init__(self, simulate: Simulator, keep: Keep):
         self.simulate = simulate
-        self.bank = bank
-        self.identity = identity
-        self.executor = executor
-        self.timeout = timeout
+        self.bank, self.identity, _, self.executor, self.timeout = keep
         self._elsewhere: list[Order] = []  # claimed by somebody else
         self._mine: dict[Future[Simulation], Job] = {}  # claimed here, by outcome
         self._submitted: set[Future[list[Simulation]]] = set()
@@ -216,33 +222,31 @@ def is_final(found: Simulation, timeout: float | None) -> bool:
     """
     if found.error is None:
         return True
-    if kind(found.error) != TIMEOUT:
+    if kind(found.error) is not Failure.TIMEOUT:
         return False
     return timeout is not None and timeout <= found.seconds
 
 
-def run_missing(  # noqa: PLR0913  the runner's arguments and the call's
+def run_missing(
     simulate: Simulator,
     jobs: Sequence[Job],
-    shape: Shape,
-    bank: SimulationBank,
-    identity: str,
-    executor: Executor | None = None,
-    timeout: float | None = None,
+    keep: Keep,
+    shape: Shape = None,
     *,
-    batch: int | None = None,
     advance: Callable[[int], object] = lambda count: None,
 ) -> list[Simulation]:
     """Results of all jobs, in order; those that the bank lacks are simulated, see `Runner`.
 
     Args:
-        batch: Jobs that are simulated in one call, and kept together, where there is no executor;
-            None is all of them.
+        simulate: The user's simulator.
+        jobs: What is wanted.
+        keep: Where simulations are made and kept.
+        shape: Of one signal; None accepts any.
         advance: Called with 1 for each result, in order; those of a batch come together.
     """
-    at_once = len(jobs) if batch is None or executor is not None else batch
+    at_once = len(jobs) if keep.batch is None or keep.executor is not None else keep.batch
     results = []
-    with Runner(simulate, bank, identity, executor, timeout) as runner:
+    with Runner(simulate, keep) as runner:
         for start in range(0, len(jobs), max(at_once, 1)):
             for outcome in runner.start(jobs[start : start + at_once], shape):
                 results.append(runner.result(outcome))

@@ -2,9 +2,12 @@
 
 import contextlib
 import io
+import math
 import os
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from contextvars import ContextVar
 from functools import cache
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -16,6 +19,30 @@ CHUNK = 240  # substeps a kernel call, so that Ctrl-C is prompt
 
 LOCK = threading.Lock()
 """Held while a scene runs: Taichi's runtime and a scene's fields serve one thread at a time."""
+
+
+_ends: ContextVar[float] = ContextVar("ends", default=math.inf)  # of `time.monotonic`
+
+
+class TimeLimitExceeded(TimeoutError):
+    """A simulation took longer than `time_limit` allowed."""
+
+
+@contextlib.contextmanager
+def time_limit(seconds: float) -> Iterator[None]:
+    """Inside, simulations of this thread that take longer raise.
+
+    They stop between two kernel calls, and leave the simulator as usable as before. A thread
+    that is abandoned would keep it, and Taichi compiles only in the thread that started it.
+
+    Raises:
+        TimeLimitExceeded: `seconds` were over.
+    """
+    token = _ends.set(min(_ends.get(), time.monotonic() + seconds))
+    try:
+        yield
+    finally:
+        _ends.reset(token)
 
 
 class Watch(NamedTuple):
@@ -34,6 +61,9 @@ def run_chunks(scene, steps: int, run: Callable[[int, int], None], watch: Watch 
     """Call `run(start, stop)` until `steps` substeps of a scene are done.
 
     Where one call ends and the next begins changes no bit, so neither does a watch.
+
+    Raises:
+        TimeLimitExceeded: the time of `time_limit` is over.
     """
     looks = set[int]()
     if watch is not None:
@@ -41,6 +71,8 @@ def run_chunks(scene, steps: int, run: Callable[[int, int], None], watch: Watch 
         looks = {steps, *(int(step) for step in np.rint(np.arange(0.0, steps, every)))}
         watch.look(scene, 0)
     for begin, end in pairwise(sorted({0, *range(0, steps, CHUNK), *looks, steps})):
+        if time.monotonic() > _ends.get():
+            raise TimeLimitExceeded(f"stopped after {begin} of {steps} substeps")
         run(begin, end)
         if watch is not None and end in looks:
             watch.look(scene, end)

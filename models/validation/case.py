@@ -122,7 +122,7 @@ class Case:
         unit: Of the errors: "relative", "deg", "fraction".
         tolerance: Largest error of a row that sets no other.
         settings: What decides the outcome besides the seed, as plain numbers and text. A
-            finished result is kept for as long as these and the case's source stay as they are.
+            finished result is used again while these and the versions stay as they are.
         run: The comparison itself, a function of one to tell progress to and of a seed. It may
             raise.
     """

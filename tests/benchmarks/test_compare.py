@@ -60,7 +60,7 @@ def test_what_failed_is_named_and_counts_in_no_median():
     assert line[3:5] == ["1", "0.50"]
 
 
-@pytest.mark.slow
+@pytest.mark.minutes  # the benchmark's own command, no part of the package
 def test_a_comparison_ends_in_a_table_and_is_not_made_twice(tmp_path):
     chosen = "--tasks gauss2 --engines discrepancy --budgets 12 --seeds 0 --timed-seeds 1"
     command = [sys.executable, str(HERE / "compare.py"), *chosen.split(), "--out", str(tmp_path)]

@@ -1,4 +1,8 @@
+import fcntl
 import json
+import os
+import shutil
+from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
 
@@ -7,6 +11,11 @@ import pytest
 import xarray as xr
 
 import bolfi_liquids as bl
+from bolfi_liquids.calibration.summary import ParameterSummary
+from bolfi_liquids.criticism.source_summary import Gap, SourceVerdict, Window
+from bolfi_liquids.criticism.summary import CameraNoise, CriticismSummary
+from bolfi_liquids.criticism.verdict import Verdict
+from bolfi_liquids.reporting.frames import frames_of
 from bolfi_liquids.run.directory import CRITICISM_FORMAT
 
 BUNDLED = Path(str(files("bolfi_liquids.data"))) / "glycerin_v10.nc"
@@ -37,15 +46,39 @@ def settings():
 
 @pytest.fixture(scope="session")
 def calibration(short_recording, tmp_path_factory):
-    """A real calibration, as small as the engine allows it to be useful."""
-    out = tmp_path_factory.mktemp("runs") / "calibrated"
-    return bl.calibrate(short_recording, out=out, progress=False, **SETTINGS)
+    """A real calibration, as small as the engine allows it to be useful.
+
+    Of the workers of a session the first makes it and each takes a copy, for tests change theirs.
+    """
+    own = tmp_path_factory.mktemp("runs") / "calibrated"
+    base = tmp_path_factory.getbasetemp()
+    shared = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "calibrated"
+    with alone_with(shared.with_suffix(".lock")):
+        if not (shared / "summary.json").exists():
+            shutil.rmtree(shared, ignore_errors=True)  # of a worker that was killed in the middle
+            bl.calibrate(short_recording, out=shared, progress=False, **SETTINGS)
+        shutil.copytree(shared, own)
+    return bl.Calibration.open(own)
+
+
+@contextmanager
+def alone_with(path):
+    """Only one process at a time; the lock ends with its process."""
+    with path.open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
 
 
 @pytest.fixture(scope="session")
 def pour(calibration):
     """A real pour, chosen over the calibration."""
     return bl.choose_pour(calibration, iterations=7, draws=4, progress=False)
+
+
+@pytest.fixture(scope="session")
+def frames(pour):
+    """What draws of the calibration look like, stirred and poured."""
+    return frames_of(pour.path, progress=False)
 
 
 @pytest.fixture
@@ -57,50 +90,53 @@ EFFECTS = ("camera_delay", "gripper_scale", "stick_mass")
 FILES = ("1-first.nc", "2-second.nc")
 
 
-def _spread(q50):
-    return {"mean": q50, "sd": 0.1 * q50, "q05": 0.8 * q50, "q50": q50, "q95": 1.2 * q50}
+def spread(q50):
+    """Of a parameter whose posterior is about this median."""
+    return ParameterSummary(mean=q50, sd=0.1 * q50, q05=0.8 * q50, q50=q50, q95=1.2 * q50)
 
 
 @pytest.fixture
-def criticism_section():
+def criticism_summary():
     """Of a criticism that names and accepts one effect."""
-    window = {"channel": "xz", "recording": FILES[0], "stroke": 1, "start_s": 1.0, "stop_s": 2.0}
-    speed = {"recording": FILES[1], "speed": "0 to 3 cm/s"}
-    return {
-        "verdict": "effect",
-        "effects": ["camera_delay"],
-        "accepted": ["camera_delay"],
-        "requested": [],
-        "unsupported": [],
-        "refuted": [],
-        "held_out": 1,
-        "reason": "",
-        "p_value": 0.002,
-        "where": [
-            {**window, "rms_deg": 2.5, "p_value": 0.01},
-            {**speed, "rms_deg": 1.5, "p_value": 0.02},
-        ],
-        "coefficient": {"camera_delay": _spread(0.05)},
-        "parameters": {"viscosity": _spread(0.1), "camera_delay": _spread(0.05)},
-        "best": {"viscosity": 0.1, "camera_delay": 0.05},
-        "n_simulations": 77,
-        "gap_deg": {
-            "before": 1.25,
-            "after": 0.31,
-            "held_out_before": 1.5,
-            "held_out_after": 0.42,
-            "noise": 0.33,
-            "held_out_noise": 0.4,
-        },
-        "pours": None,
-        "suggestions": [],
-        "untested": [],
-        "baseline": 2,
-        "baseline_left_out": [],
-        "noise": {"sd_deg": 0.2, "sd_uncertainty": 0.4, "correlation": 0.25, "samples": 32},
-        "seconds": 8.0,
-        "made_from": {"settings": {"effects": None}, "format": CRITICISM_FORMAT},
-    }
+    nowhere = {"channel": None, "start_s": None, "stop_s": None, "stroke": None}
+    stroke = {"channel": "xz", "start_s": 1.0, "stop_s": 2.0, "stroke": 1}
+    verdict = SourceVerdict(Verdict.EFFECT, ("camera_delay",), 0.002, (), 1)
+    return CriticismSummary(
+        **vars(verdict),
+        accepted=("camera_delay",),
+        requested=(),
+        unsupported=(),
+        reason="",
+        where=(
+            Window(**stroke, recording=FILES[0], rms_deg=2.5, p_value=0.01),
+            Window(**nowhere, recording=FILES[1], speed="0 to 3 cm/s", rms_deg=1.5, p_value=0.02),
+        ),
+        coefficient={"camera_delay": spread(0.05)},
+        parameters={"viscosity": spread(0.1), "camera_delay": spread(0.05)},
+        best={"viscosity": 0.1, "camera_delay": 0.05},
+        n_simulations=77,
+        gap=Gap(
+            before=1.25,
+            after=0.31,
+            held_out_before=1.5,
+            held_out_after=0.42,
+            noise=0.33,
+            rms_before=1.29,
+            rms_after=0.45,
+            held_out_rms_before=1.55,
+            held_out_rms_after=0.58,
+            held_out_noise=0.4,
+        ),
+        stirs=verdict,
+        pours=None,
+        suggestions=(),
+        untested=(),
+        baseline=2,
+        baseline_left_out=(),
+        noise=CameraNoise(sd_deg=0.2, sd_uncertainty=0.4, correlation=0.25, samples=32),
+        seconds=8.0,
+        made_from={"settings": {"effects": None}, "format": CRITICISM_FORMAT},
+    )
 
 
 def _windows(after):

@@ -32,7 +32,7 @@ class Plain:
         (partial(np.mean, axis=0), "partial(numpy.mean, [], axis=0)"),
         (
             inference.surrogates.Quantile(0.1),
-            "bolfi_liquids.inference.surrogates.threshold.Quantile(q=0.1)",
+            "bolfi_liquids.Quantile(q=0.1)",
         ),
         (inference.Prior({"a": dist.Uniform(0.0, 2.0)}), "Prior(a=Uniform(low=0, high=2))"),
     ],

@@ -1,5 +1,6 @@
 """The whole loop: budget, bank, failures, and dying in the middle."""
 
+import contextlib
 import os
 import re
 import signal
@@ -8,11 +9,13 @@ import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 from pathlib import Path
 
 import jax
 import numpy as np
 import pytest
+import xarray as xr
 from bolfi_liquids.inference.simulations.job import simulation_seed
 
 from bolfi_liquids import inference
@@ -96,7 +99,7 @@ def test_recovers_the_truth(line_fit, prior):
 
 def test_rounds_seeds_and_seconds_are_reported(line_fit):
     runs = line_fit.simulations
-    np.testing.assert_array_equal(runs["round"], np.repeat(np.arange(10), 2))
+    np.testing.assert_array_equal(runs["round"], np.repeat(np.arange(5), 4))
     assert len(np.unique(runs["seed"])) == 20
     assert set(line_fit.seconds) == {"simulator", "engine"}
     closest = line_fit.closest
@@ -108,7 +111,7 @@ def test_rounds_seeds_and_seconds_are_reported(line_fit):
 def test_a_larger_budget_goes_on_where_the_smaller_ended(
     tmp_path, prior, observed, simulate, workers
 ):
-    """Also from within a round, 9 being no multiple of 2, whose points are chosen jointly."""
+    """Also from within a round, 9 being no multiple of 4, whose points are chosen jointly."""
     calls = []
 
     def jointly(key, surrogate, n, feasibility):
@@ -407,31 +410,85 @@ def test_predictions_at_points_of_another_shape_are_refused(fixture, request, pr
     assert np.shape(fit.surrogate.predict({"slope": 0.5, "offset": 0.5})[0]) in ((), (30,))
 
 
-def test_progress_is_shown_only_on_request(prior, observed, simulate, capsys):
+def test_progress_is_told_on_stderr_unless_silenced(prior, observed, simulate, capsys):
+    inference.fit(simulate, prior, observed, budget=7, progress=False)
+    assert capsys.readouterr() == ("", "")
     inference.fit(simulate, prior, observed, budget=7)
-    assert capsys.readouterr().out == ""
-    inference.fit(simulate, prior, observed, budget=7, progress=True)
-    assert "7/7" in capsys.readouterr().out
+    said = capsys.readouterr()
+    assert said.out == "" and "7" in said.err
 
 
-def test_importing_loads_neither_simulator_nor_cameras_and_jax_only_on_use():
-    code = (
-        "import sys; from bolfi_liquids import inference; before = 'jax' in sys.modules; "
-        "[getattr(inference, name) for name in dir(inference)]; "
-        "print(before, [m for m in ('taichi', 'cv2', 'rtde_control') if m in sys.modules])"
+def single(theta, seed):
+    """One straight line; the third of these seeds fails."""
+    if seed == simulation_seed(0, 2):
+        raise ArithmeticError
+    return theta["offset"] + theta["slope"] * np.linspace(-1.0, 1.0, 30)
+
+
+def test_a_simulator_of_single_runs_is_looped_over(prior, observed, tmp_path):
+    """Like its batched twin, and a run that fails costs that run alone and is not repeated."""
+    calls = []
+
+    def counted(theta, seed):
+        assert isinstance(theta["slope"], float) and isinstance(seed, int)
+        calls.append(seed)
+        return single(theta, seed)
+
+    def batched(theta, seeds):
+        rows = ({name: column[i] for name, column in theta.items()} for i in range(len(seeds)))
+        return np.stack([single(row, seed) for row, seed in zip(rows, seeds, strict=True)])
+
+    given = {"budget": 9, "warn": False, "progress": False}
+    fit = inference.fit(counted, prior, observed, vectorised=False, **given)
+    assert calls == [simulation_seed(0, i) for i in range(9)]
+    assert fit.failures == {"raised": 1}
+    twin = inference.fit(batched, prior, observed, **given)
+    xr.testing.assert_equal(fit.simulations.drop_vars("error"), twin.simulations.drop_vars("error"))
+
+
+def test_complaints_are_kept_without_a_warning(prior, observed):
+    """Warnings are errors here, so that one would fail the test."""
+    fit = inference.fit(
+        lambda theta, seeds: np.ones((len(seeds), 30)), prior, observed, budget=12, warn=False
     )
+    assert fit.warnings
+
+
+HEAVY = "taichi", "cv2", "pandas", "matplotlib", "xarray", "arviz_base", "arviz_stats", "emcee"
+
+
+@pytest.mark.parametrize(
+    ("imported", "light"),
+    [
+        ("from bolfi_liquids.inference import fit, Prior", [*HEAVY, "rich", "scipy.stats._stats"]),
+        ("import bolfi_liquids.inference", [*HEAVY, "jax", "numpyro", "scipy"]),
+        (
+            "from bolfi_liquids import inference; [getattr(inference, n) for n in dir(inference)]",
+            ["taichi", "cv2", "rtde_control"],
+        ),
+    ],
+)
+def test_importing_loads_only_what_is_used(imported, light):
+    code = f"import sys; {imported}; print([name for name in {light} if name in sys.modules])"
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=Path("/"), check=True
     )
-    assert done.stdout.strip() == "False []"
+    assert done.stdout.strip() == "[]"
 
 
-def test_every_public_name_is_there_and_hides_no_module():
-    """Importing a submodule sets it as an attribute, which would shadow a name of its own."""
-    folder = Path(inference.__file__).parent
-    assert set(inference.__all__) == set(inference._HOME)
-    for name in inference.__all__:
-        assert getattr(inference, name) is not None
-        assert not (folder / f"{name}.py").exists()
-    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
-        inference.nothing  # noqa: B018
+@pytest.mark.parametrize(
+    "face",
+    ["", ".inference", ".inference.checks", ".inference.criticism", ".inference.simulations"]
+    + [".inference.surrogates", ".hardware", ".hardware.motion", ".hardware.vision"],
+)
+def test_every_public_name_is_there(face):
+    """Also where a submodule of the same name was imported before, which must not hide it."""
+    package = import_module(f"bolfi_liquids{face}")
+    for name in package.__all__:
+        found = getattr(package, name)
+        if name == getattr(found, "__name__", None):  # a function or class, not a module
+            with contextlib.suppress(ModuleNotFoundError):
+                import_module(f"{package.__name__}.{name}")
+            assert getattr(package, name) is found
+    with pytest.raises(AttributeError, match="nothing"):
+        package.nothing  # noqa: B018

@@ -61,11 +61,19 @@ def pour(cups):
     return run
 
 
-# an effect in the liquid compiles a scene; the next test has one of all together
-ALONE = [
-    pytest.param(name, marks=[pytest.mark.slow] if effect.acts_in == "liquid" else [])
-    for name, effect in models.EFFECTS.items()
-]
+# an effect in the liquid compiles a scene; the next test has one of all together, so that one of
+# each hook alone is enough for continuous integration
+IN_CI = ("adhesion", "shear_thinning")
+
+
+def when(effect):
+    """How often an effect is tried alone; one that is new, in the long tests at the least."""
+    if effect.acts_in != "liquid":
+        return []
+    return pytest.mark.slow if effect.name in IN_CI else pytest.mark.minutes
+
+
+ALONE = [pytest.param(name, marks=when(effect)) for name, effect in models.EFFECTS.items()]
 
 
 @pytest.mark.parametrize("name", ALONE)

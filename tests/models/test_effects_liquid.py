@@ -132,7 +132,7 @@ def retained(cups, adhesion, viscosity, hold=0.9):
     return models.pour(liquid, action, held, np.zeros(len(viscosity), int)).retained
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_a_film_sticks_and_drains(cups):
     viscosity = np.array([0.01, 0.1, 1.0])
     bare, sticky = retained(cups, 0.0, viscosity), retained(cups, 1.0, viscosity)

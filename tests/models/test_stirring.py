@@ -74,10 +74,12 @@ def test_without_liquid_the_stick_is_the_driven_spherical_pendulum(glycerin):
     assert rms_deg(signal - expected) < 0.05 * swing
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("numerics", "tolerance"),
-    [(models.Numerics(), 0.2), (models.PUBLISHED_DRAG, 0.1)],
+    [
+        pytest.param(models.Numerics(), 0.2, marks=pytest.mark.slow),
+        pytest.param(models.PUBLISHED_DRAG, 0.1, marks=pytest.mark.minutes),
+    ],
 )
 def test_a_submerged_stick_is_buoyed_as_archimedes_says(glycerin, numerics, tolerance):
     """At 15 degrees, where buoyancy outweighs the packing's own push of a particle's weight."""

@@ -5,22 +5,23 @@ from pathlib import Path
 import pytest
 
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "notebooks").glob("*.ipynb"))
+IN_CI = {"quickstart", "your_simulator"}  # `make test-long` runs the others
 RECORDS = {"dry_run"}  # on the emulator, which must keep time
 LONGEST = 600  # s after which a cell hangs, on a slow computer that does something else as well
 
 
 def test_there_are_notebooks_and_they_are_small():
-    assert NOTEBOOKS
+    assert {path.stem for path in NOTEBOOKS} >= IN_CI | RECORDS
     assert all(path.stat().st_size < 500_000 for path in NOTEBOOKS)
 
 
-@pytest.mark.slow
+def marks(path):
+    when = pytest.mark.slow if path.stem in IN_CI else pytest.mark.minutes
+    return [when, pytest.mark.alone] if path.stem in RECORDS else [when]
+
+
 @pytest.mark.parametrize(
-    "path",
-    [
-        pytest.param(path, id=path.stem, marks=[pytest.mark.alone] if path.stem in RECORDS else [])
-        for path in NOTEBOOKS
-    ],
+    "path", [pytest.param(path, id=path.stem, marks=marks(path)) for path in NOTEBOOKS]
 )
 # Jupyter's own, about its event loop
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")

@@ -1,21 +1,140 @@
-"""Validation cases run to their end; whether they pass is for `check physics` to say."""
+"""Validation cases keep the tolerances that they state; those known to miss are named below."""
+
+from typing import NamedTuple
 
 import pytest
 
 from bolfi_liquids.checks.physics import all_cases, check_physics
 
-# a minute or more each: `make test-long` runs them, and so does `check physics`
-LONG = ("adhesion", "couette", "cylinder_drag", "herschel_bulkley", "resolution")
-OTHERS = sorted(set(all_cases()) - set(LONG))
-CASES = [
-    *(pytest.param(name, marks=pytest.mark.minutes) for name in LONG),
-    *(pytest.param(name, marks=pytest.mark.slow) for name in OTHERS),
-]
+# the cheapest that compare with a truth, about 10 s of processor time each, seed 0;
+# `make test-long` runs the others, and `check physics` all
+IN_CI = (
+    "hydrostatic_column",
+    "pendulum_in_air",
+    "recorded_stirs",
+    "retained_film",
+    "volume_in_cup",
+)
+WORSE = 1.25  # times the error below that a missed comparison may have, on another computer
+
+RUB = "particles pass each other with friction, the more weight they bear"
+TUNED = "the stick's drag was tuned to the recorded stirs; as published it keeps more"
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_a_case_runs_to_its_end(tmp_path, name):
-    check = check_physics(tmp_path, [name], progress=False)
-    (record,) = check.records
-    assert record["error"] is None
-    assert record["rows"] and (tmp_path / f"{name}.svg").exists()
+class Miss(NamedTuple):
+    """A comparison beyond its case's tolerance: the error measured at seed 0, and the reason."""
+
+    error: float
+    reason: str
+
+
+MISSES = {
+    "buoyancy": {
+        "torque at 8 deg [N m]": Miss(-0.304, TUNED),
+        "torque at 15 deg [N m]": Miss(0.166, TUNED),
+        "torque at 25 deg [N m]": Miss(0.101, TUNED),
+        "torque at 8 deg, drag as published [N m]": Miss(-0.228, "why is not known"),
+    },
+    "dam_break": {
+        "speed of the front, column 2 high": Miss(-0.219, "why is not known"),
+    },
+    "film_flow": {
+        "0.03 Pa s by the flux [Pa s]": Miss(6.64, RUB),
+        "0.1 Pa s by the flux [Pa s]": Miss(2.12, RUB),
+        "0.3 Pa s by the flux [Pa s]": Miss(0.905, RUB),
+        "1 Pa s by the flux [Pa s]": Miss(0.370, RUB),
+        "5 Pa s by the flux [Pa s]": Miss(0.123, RUB),
+    },
+    "floating_stick": {
+        "angle at rest, from below [deg]": Miss(-5.13, TUNED),
+        "angle at rest, from above [deg]": Miss(2.09, TUNED),
+    },
+    "hydrostatic_column": {
+        "speed at 0.003 Pa s, cohesion 0 [m/s]": Miss(0.0657, "thin deep liquid keeps moving"),
+        "density at 0.003 Pa s, cohesion 1": Miss(0.0361, "thin deep liquid keeps moving"),
+        "speed at 0.003 Pa s, cohesion 1 [m/s]": Miss(0.0759, "thin deep liquid keeps moving"),
+    },
+    "pendulum_in_liquid": {
+        "swing left after it at 0.01 Pa s": Miss(-0.554, TUNED),
+        "half a period at 0.1 Pa s [s]": Miss(-0.115, TUNED),
+        "swing left after it at 0.1 Pa s": Miss(-0.751, TUNED),
+        "half a period at 0.1 Pa s, drag as published [s]": Miss(-0.126, "why is not known"),
+    },
+    "retained_film": {
+        "largest fall with viscosity": Miss(0.0486, "why is not known"),
+    },
+}
+
+
+def judge(record, known):
+    """Raise AssertionError unless a case's record keeps its tolerances but for the known misses.
+
+    Those must miss, or their entries are out of date, and by no more than was measured.
+    """
+    assert record["error"] is None, record["error"]
+    rows = {row["quantity"]: row for row in record["rows"]}
+    assert rows and known.keys() <= rows.keys()
+    new = {name: row for name, row in rows.items() if not row["passed"] and name not in known}
+    assert not new, new
+    for name, miss in known.items():
+        assert not rows[name]["passed"], f"{name} keeps its tolerance now: take it off MISSES"
+        error = rows[name]["error"]  # None where a simulation failed
+        assert error is not None and abs(error) <= WORSE * abs(miss.error), rows[name]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow if name in IN_CI else pytest.mark.minutes)
+        for name in sorted(all_cases())
+    ],
+)
+def test_a_case_keeps_its_tolerances(tmp_path, name):
+    """A miss ends in xfail, and is strict: `judge` fails where it no longer misses."""
+    (record,) = check_physics(tmp_path, [name], progress=False).records
+    known = MISSES.get(name, {})
+    judge(record, known)
+    assert (tmp_path / f"{name}.svg").exists()
+    if known:
+        rows = {row["quantity"]: row for row in record["rows"]}
+        pytest.xfail(
+            "; ".join(
+                f"{quantity}: error {rows[quantity]['error']:.3g}, tolerance "
+                f"{rows[quantity]['tolerance']:g} ({miss.reason})"
+                for quantity, miss in known.items()
+            )
+        )
+
+
+def test_the_cases_named_here_exist():
+    assert {*IN_CI, *MISSES} <= set(all_cases())
+
+
+def made(**errors):
+    """A record of comparisons with these errors, of tolerance 0.1."""
+    rows = [
+        {"quantity": name, "error": error, "passed": error is not None and abs(error) <= 0.1}
+        for name, error in errors.items()
+    ]
+    return {"error": None, "rows": rows}
+
+
+def test_a_record_as_it_is_known_passes():
+    judge(made(mass=0.05, speed=-0.31), {"speed": Miss(-0.3, "a reason")})
+
+
+@pytest.mark.parametrize(
+    "record",
+    [
+        made(mass=0.11, speed=-0.3),  # a new miss
+        made(mass=None, speed=-0.3),  # a simulation that failed
+        made(mass=0.05, speed=0.05),  # a miss that healed
+        made(mass=0.05, speed=-0.4),  # one that grew
+        made(mass=0.05, speed=None),
+        made(mass=0.05),  # a comparison that is gone
+        made(mass=0.05, speed=-0.3) | {"error": "RuntimeError: broken"},
+    ],
+)
+def test_every_fault_of_a_record_is_caught(record):
+    with pytest.raises(AssertionError):
+        judge(record, {"speed": Miss(-0.3, "a reason")})

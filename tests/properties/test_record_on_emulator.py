@@ -1,4 +1,10 @@
-"""A whole recording, and a whole online calibration, on the emulator and rendered cameras."""
+"""A whole recording, and a whole online calibration, on the emulator and rendered cameras.
+
+The recording is the one that the README makes, by its own words.
+"""
+
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,15 +20,20 @@ pytest.importorskip("cv2")
 
 pytestmark = pytest.mark.punctual
 
+README = Path(__file__).parents[2] / "README.md"
 VIEWS = ("xz", "yz")
 TRUTH = ("index", "stamp", "time", "inclination_xz", "inclination_yz")
 
 
 @pytest.fixture(scope="module")
 def directory(tmp_path_factory):
-    out = tmp_path_factory.mktemp("record") / "stir"
-    bl.record(out=out, emulate=hardware.HiddenLiquid(viscosity=1.0), progress=False)
-    return out
+    blocks = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+    (records,) = (block for block in blocks if "bl.record(" in block)
+    where = tmp_path_factory.mktemp("record")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(where)
+        exec(compile(records, str(README), "exec"), {"__name__": "__main__"})
+    return where / "stir"
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +91,8 @@ def test_the_recording_is_complete_and_says_how_it_was_made(recorded):
     assert recorded["time"].to_numpy()[-1] == pytest.approx(10.7, abs=0.2)
 
 
-@pytest.mark.slow
+# `test_online` has the same with a recording that is there, this module the recording
+@pytest.mark.minutes
 def test_stirring_ends_when_the_pour_is_known_well_enough(tmp_path):
     from bolfi_liquids.online.record import OnlineChoice, record_online
     from bolfi_liquids.online.settings import OnlineSettings

@@ -73,12 +73,12 @@ def test_adhesion_is_found_in_pours_and_the_next_pour_spills_less(tmp_path):
     after = bl.choose_pour(criticism.calibration, bundled_cups(), progress=False)
     assert criticism.verdict == "effect"
     assert criticism.effects == ("adhesion",)
-    pours = criticism.summary["pours"]
-    assert pours["after"] < 0.5 * pours["before"]
-    coefficient = criticism.summary["coefficient"]["adhesion"]
+    pours = criticism.summary.pours
+    assert pours.after < 0.5 * pours.before
+    coefficient = criticism.summary.coefficient["adhesion"]
     # an interval of 99.9 %, since one of 90 % would miss on one computer of ten; the prior is
     # uniform from 0 to 1, and its lower half must be out of the question
-    assert abs(coefficient["mean"] - ADHESION["adhesion"]) < 3.3 * coefficient["sd"]
-    assert coefficient["q05"] > 0.5
+    assert abs(coefficient.mean - ADHESION["adhesion"]) < 3.3 * coefficient.sd
+    assert coefficient.q05 > 0.5
     spilled = [truly_spilled(pour) for pour in (before, after)]
     assert spilled[1] < 0.5 * spilled[0]

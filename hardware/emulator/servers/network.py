@@ -3,11 +3,11 @@
 import ipaddress
 import selectors
 import socket
-import time
 from collections.abc import Callable
 from typing import Protocol
 
 from ...errors import RigError
+from ...host_clock import REAL_CLOCK, HostClock
 
 MOST_UNSENT = 1 << 18  # bytes; a client that reads no more than this loses what comes later
 RTDE, SCRIPT, DASHBOARD, ADMIN = 30004, 30003, 29999, 29997
@@ -71,8 +71,14 @@ class Network:
         RigError: The address is not one of this computer alone, or a port is taken.
     """
 
-    def __init__(self, address: str, sessions: dict[int, Callable[[Connection], Session]]):
+    def __init__(
+        self,
+        address: str,
+        sessions: dict[int, Callable[[Connection], Session]],
+        clock: HostClock = REAL_CLOCK,
+    ):
         _check_address(address)
+        self._clock = clock
         self._factories = sessions
         self._selector = selectors.SelectSelector()
         self._listeners: dict[int, socket.socket] = {}
@@ -123,7 +129,7 @@ class Network:
             for connection, (port, _) in self._clients.items():
                 if port != ADMIN:
                     self._selector.unregister(connection.socket)
-        self._frozen_until = time.monotonic() + seconds
+        self._frozen_until = self._clock.now() + seconds
 
     def drop(self) -> None:
         """Close all connections but the admin's; the ports go on listening."""
@@ -138,7 +144,7 @@ class Network:
         self._selector.close()
 
     def _thaw(self) -> None:
-        if self._frozen_until is None or time.monotonic() < self._frozen_until:
+        if self._frozen_until is None or self._clock.now() < self._frozen_until:
             return
         self._frozen_until = None
         for port, listener in self._listeners.items():

@@ -1,7 +1,6 @@
 """Real-Time Data Exchange, port 30004."""
 
 import struct
-import time
 from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
@@ -93,7 +92,7 @@ class RtdeSession:
                 self._waited = 0
                 package = pack(DATA, self._recipe.pack(snapshot))
                 self._delayed.append((snapshot.host + delay, package))
-        now = time.monotonic()
+        now = self._controller.clock.now()
         while self._delayed and self._delayed[0][0] <= now:
             self._connection.send(self._delayed.popleft()[1])
 

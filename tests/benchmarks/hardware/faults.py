@@ -39,6 +39,7 @@ LOST = 1.0  # s of the recording before a fault that may be missing
 DEAD, ALIVE = 0.5, 0.3  # s to rest where our process is dead, and where it lives
 STALL = 0.3  # s, of the loop
 UNSEEN = 0.2  # s, at the end of the watch, of which the watcher may not have heard yet
+EARLIEST = 0.2  # s of a motion, for a fault
 PATIENCE = 5.0  # s, for the arm to move
 TRIES = 8  # of a run whose session ended before its fault
 
@@ -172,18 +173,18 @@ class Disturbed(Exception):
     """The session had ended before the fault: this computer stood still, or was too slow."""
 
 
-def run_fault(name: str, seed: int) -> Result:
+def run_fault(name: str, seed: int, latest: float) -> Result:
     """One run; what happens from the fault on counts, whatever else this computer did."""
     for tried in range(TRIES):
         try:
-            result = _run_once(name, seed + 1000 * tried)
+            result = _run_once(name, seed + 1000 * tried, latest)
             return result._replace(seed=seed, repeated=tried)
         except Disturbed as early:
             print(f"ended before the fault: {early}", file=sys.stderr, flush=True)
     raise RuntimeError(f"{name}: {TRIES} sessions ended before their fault")
 
 
-def _run_once(name: str, seed: int) -> Result:
+def _run_once(name: str, seed: int, latest: float) -> Result:
     chance = random.Random(f"{name} {seed}")
     rig = small_rig()
     space = workspace(rig, "stirring")
@@ -204,7 +205,7 @@ def _run_once(name: str, seed: int) -> Result:
                 raise Disturbed(f"{name}: the session did not start; {emulator.notes()}")
             under_test = UnderTest(json.loads(said), emulator.admin, Path(directory))
             try:
-                return _inject(name, under_test, chance.uniform(0.2, 5.0))
+                return _inject(name, under_test, chance.uniform(EARLIEST, latest))
             finally:
                 _end(main)
 
@@ -300,6 +301,7 @@ def main() -> int:
     parser.add_argument("--times", type=int, default=20)
     parser.add_argument("--only", choices=list(FAULTS), action="append")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--latest", type=float, default=5.0, help="of a motion, for a fault [s]")
     parser.add_argument("--out", type=Path, help="keep runs here; those that it holds count")
     chosen: Any = parser.parse_args()
     seeds = range(chosen.seed, chosen.seed + chosen.times)
@@ -308,7 +310,7 @@ def main() -> int:
     done = {(one.fault, one.seed) for one in results}
     for name, seed in asked:
         if (name, seed) not in done:
-            results.append(run_fault(name, seed))
+            results.append(run_fault(name, seed, chosen.latest))
             keep(results[-1], chosen.out)
             fails = results[-1].fails(FAULTS[name])
             print(f"{len(results)}/{len(asked)} {name}: {fails or 'well'}", file=sys.stderr)

@@ -30,7 +30,7 @@ from kept import keep, results
 from bolfi_liquids import inference, models
 from bolfi_liquids.calibration.stir_simulator import Stirring, stirring_of
 from bolfi_liquids.criticism.baseline import Clean, clean_residuals, usual_for
-from bolfi_liquids.criticism.pour_noise import REPEATED
+from bolfi_liquids.criticism.pour_noise import REPEATABILITY_SD
 from bolfi_liquids.criticism.pours import Pouring
 from bolfi_liquids.criticism.stirs import (
     camera_noise,
@@ -215,7 +215,7 @@ def _poured(actions: np.ndarray, truth: dict, rng: np.random.Generator) -> criti
         effects={"adhesion": truth["adhesion"]},
     )
     observed = np.stack([made.spilled, made.retained]) + 0.005 * rng.normal(size=(2, len(rate)))
-    noise = criticism.KnownNoise(REPEATED)
+    noise = criticism.KnownNoise(REPEATABILITY_SD)
     return criticism.Experiment(pouring.simulate, observed, noise, pouring.identity, "pours")
 
 

@@ -1,20 +1,20 @@
 """The runner of validation cases, on cases that take no time."""
 
 import json
-import runpy
 import signal
 import subprocess
 import sys
 import textwrap
 import time
 import xml.etree.ElementTree as ET
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 from bolfi_liquids.models.validation import Case, CaseResult, Curve, Panel, Row
 from typer.testing import CliRunner
 
-from bolfi_liquids.checks import physics
+from bolfi_liquids.checks import physics, physics_records
 from bolfi_liquids.checks.physics import all_cases, check_physics
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.errors import InputError
@@ -81,23 +81,31 @@ def test_a_finished_case_is_not_repeated(tmp_path, registry, calls):
     assert (tmp_path / "good.svg").read_text() == plot
 
 
-@pytest.mark.parametrize("change", ["seed", "settings", "model", "code"])
+@pytest.mark.parametrize("change", ["seed", "settings", "model", "version"])
 def test_other_settings_run_again(tmp_path, registry, calls, change, monkeypatch):
     run(tmp_path, registry, ["good"])
     if change == "seed":
         check = run(tmp_path, registry, ["good"], seed=1)
     elif change == "settings":
         check = run(tmp_path, {"good": fake("good", registry["good"].run, particles=9)})
-    elif change == "code":
-        other = tmp_path / "edited.py"
-        other.write_text("def run(progress, seed):\n    return run.good(progress, seed)\n")
-        edited = runpy.run_path(str(other))["run"]
-        edited.good = registry["good"].run
-        check = run(tmp_path, {"good": fake("good", edited)})
+    elif change == "version":
+        monkeypatch.setattr(physics_records, "versions", lambda names: {"bolfi-liquids": "9"})
+        check = run(tmp_path, registry, ["good"])
     else:
         monkeypatch.setattr("bolfi_liquids.models.MODEL_VERSION", "another")
         check = run(tmp_path, registry, ["good"])
     assert check.ran == ("good",) and len(calls) == 2
+
+
+def test_cases_that_an_executor_runs_are_recorded_alike(tmp_path, registry):
+    here = run(tmp_path / "here", registry)
+    with ThreadPoolExecutor(2) as pool:
+        there = run(tmp_path / "there", registry, executor=pool)
+    same = ("name", "rows", "notes", "panels", "passed")
+    assert there.ran == here.ran
+    for one, other in zip(here.records, there.records, strict=True):
+        assert {key: one[key] for key in same} == {key: other[key] for key in same}
+    assert run(tmp_path / "there", registry).ran == ()
 
 
 def test_some_cases_are_run_and_all_finished_ones_are_in_the_results(tmp_path, registry):

@@ -16,7 +16,6 @@ from bolfi_liquids.checks.sbc import check_sbc
 from bolfi_liquids.checks.sbc_pipelines import (
     CameraNoise,
     FromBank,
-    Quietly,
     _nearest,
 )
 from bolfi_liquids.inputs.settings import RUNS_PER_POINT, CalibrationSettings, SbcSettings
@@ -66,7 +65,7 @@ def test_every_batch_is_asked_with_random_numbers_of_its_own(monkeypatch):
     stirring = SimpleNamespace(discrepancy=lambda: None)
     settings = CalibrationSettings(budget=20, surrogate="signal")
     signals = clean[:, None, :, None] + noise
-    pipeline = Quietly(FromBank(stirring, prior, theta, signals, settings))
+    pipeline = FromBank(stirring, prior, theta, signals, settings)
     pipeline(clean[7][:, None], seed=1)
     assert len(Watching.keys) == len(set(Watching.keys)) == 3  # after the start design of eight
 
@@ -90,7 +89,7 @@ def test_bad_settings_are_named(setting, value):
 def test_a_check_goes_on_where_it_ended(tmp_path, short_recording):
     out = tmp_path / "sbc"
     few = SbcSettings(runs=3, sequential=1, **SMALL)
-    found = check_sbc(out, short_recording, settings=few, workers=1, progress=False)
+    found = check_sbc(out, short_recording, settings=few, progress=False)
     assert {name: len(one.replicates) for name, one in found.items()} == {
         "signal": 3,
         "discrepancy": 1,
@@ -98,7 +97,7 @@ def test_a_check_goes_on_where_it_ended(tmp_path, short_recording):
     assert rows(out / "simulations.sqlite", "simulation") == RUNS_PER_POINT * SMALL["design"]
 
     more = SbcSettings(runs=5, sequential=1, **SMALL)
-    again = check_sbc(out, short_recording, settings=more, workers=1, progress=False)
+    again = check_sbc(out, short_recording, settings=more, progress=False)
     first = [one.replicates.finished[0].draws for one in (found["signal"], again["signal"])]
     np.testing.assert_array_equal(*first)
     assert rows(out / "simulations.sqlite", "simulation") == RUNS_PER_POINT * SMALL["design"]
@@ -110,4 +109,4 @@ def test_a_check_goes_on_where_it_ended(tmp_path, short_recording):
 
     other = SbcSettings(runs=3, sequential=1, **{**SMALL, "seed": 4})
     with pytest.raises(ValueError, match="settings.seed is 3 in the run, but 4 was asked"):
-        check_sbc(out, short_recording, settings=other, workers=1, progress=False)
+        check_sbc(out, short_recording, settings=other, progress=False)

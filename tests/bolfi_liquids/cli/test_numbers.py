@@ -1,6 +1,7 @@
 """Noise estimates, picked draws and contour levels, against what is known of them."""
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,15 +10,16 @@ from rich.console import Console
 
 from bolfi_liquids.calibration.draws import pick_draws
 from bolfi_liquids.calibration.noise import irreducible_rms, replicate_noise, sensor_noise
+from bolfi_liquids.calibration.summary import ParameterSummary
 from bolfi_liquids.cli.tables import print_calibration
 from bolfi_liquids.pouring.spillage import mean_spillage, tail_spillage
 from bolfi_liquids.reporting.posterior_figure import contour_levels, marginal
 from bolfi_liquids.reporting.sentences import (
-    floor_sentence,
+    least_viscosity_sentences,
     parameter_sentence,
-    percent,
-    sampler_sentence,
+    sampler_sentences,
 )
+from bolfi_liquids.words import percent
 
 
 def test_sensor_noise_is_found_under_a_smooth_signal(rng):
@@ -82,32 +84,40 @@ def test_marginal_of_a_normal_has_unit_area():
 
 def test_a_posterior_at_the_end_of_its_prior_says_so():
     prior = np.geomspace(3e-3, 20.0, 2001)
-    cut, inside = {"q05": 0.0031, "q50": 0.005, "q95": 0.01}, {"q05": 0.8, "q50": 1.0, "q95": 1.5}
-    assert "may be beyond" in parameter_sentence("viscosity", cut, prior)
-    assert "may be beyond" not in parameter_sentence("viscosity", inside, prior)
+    cut = ParameterSummary(mean=0.006, sd=0.002, q05=0.0031, q50=0.005, q95=0.01)
+    inside = ParameterSummary(mean=1.1, sd=0.2, q05=0.8, q50=1.0, q95=1.5)
+    for values, key in ((cut, "parameter_at_the_end"), (inside, "parameter")):
+        assert parameter_sentence("viscosity", values, prior).key == f"calibration.{key}"
     assert percent(1.0) == "100 %" and percent(0.0034) == "0.34 %"
 
 
-def test_thin_liquids_that_look_alike_are_told():
-    section = {"least_viscosity": 0.0123, "below_least_viscosity": 0.42}
-    sentence = floor_sentence(section)
-    assert "Below about 0.0123 Pa s liquids look alike" in sentence
-    assert "42 % of the posterior" in sentence
-    assert floor_sentence(section | {"below_least_viscosity": 0.001}) == ""
+def test_thin_liquids_that_look_alike_are_told(calibration):
+    summary = replace(calibration.summary, least_viscosity=0.0123, below_least_viscosity=0.42)
+    (sentence,) = least_viscosity_sentences(summary)
+    assert sentence.values == {"least": 0.0123, "share": 0.42}
+    assert "0.0123 Pa s" in str(sentence) and "42 %" in str(sentence)
+    assert least_viscosity_sentences(replace(summary, below_least_viscosity=0.001)) == []
 
 
 @pytest.mark.parametrize("share", [0.0, 0.42])
 def test_the_printed_summary_tells_them_too(calibration, share):
     console = Console(file=io.StringIO())
-    print_calibration(dict(calibration.summary) | {"below_least_viscosity": share}, console)
-    assert ("liquids look alike" in console.file.getvalue()) == (share > 0.0)
+    summary = replace(calibration.summary, below_least_viscosity=share)
+    print_calibration(summary, console)
+    sentences = least_viscosity_sentences(summary)
+    assert len(sentences) == (share > 0.0)
+    assert all(str(sentence) in console.file.getvalue() for sentence in sentences)
 
 
-def test_a_sampler_that_did_not_converge_is_told():
-    good = {"rhat_max": 1.003, "ess_min": 900.0, "divergences": 3, "n_draws": 4000}
-    assert sampler_sentence(good) == ""
-    for worse in ({"rhat_max": 1.2}, {"rhat_max": None}, {"ess_min": 40.0}, {"divergences": 90}):
-        assert "did not converge" in sampler_sentence(good | worse)
+def test_a_sampler_that_did_not_converge_is_told(calibration):
+    numbers = {"rhat_max": 1.003, "ess_min": 900.0, "divergences": 3, "n_draws": 4000}
+    good = replace(calibration.summary, **numbers)
+    assert good.sampler_status == "converged" and sampler_sentences(good) == []
+    for worse in ({"rhat_max": 1.2}, {"rhat_max": np.nan}, {"ess_min": 40.0}, {"divergences": 90}):
+        summary = replace(good, **worse)
+        assert summary.sampler_status == "not converged" and summary.sampler_status.advice
+        (sentence,) = sampler_sentences(summary)
+        assert sentence.key == "calibration.not_converged" and str(sentence)
 
 
 def test_risks_of_known_outcomes():

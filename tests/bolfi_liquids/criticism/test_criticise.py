@@ -1,31 +1,13 @@
 """Criticism of a run: what it is given, and the whole way on few simulations."""
 
 import numpy as np
-import numpyro.distributions as dist
 import pytest
-from bolfi_liquids.inference import Prior
 
 import bolfi_liquids as bl
 from bolfi_liquids.criticism.pours import as_prior
 from bolfi_liquids.errors import InputError
-from bolfi_liquids.inputs.prior import default_prior, describe_prior, read_prior
+from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.run.recordings import kept_recordings
-
-
-def test_a_prior_survives_its_description():
-    for prior in (
-        default_prior(),
-        Prior({"viscosity": dist.LogNormal(-1.0, 0.3), "cohesion": dist.Beta(2.0, 3.0)}),
-    ):
-        again = read_prior(describe_prior(prior))
-        u = np.random.default_rng(0).random((16, 2))
-        for name, values in prior.from_unit(u).items():
-            np.testing.assert_allclose(again.from_unit(u)[name], values, rtol=1e-6)
-
-
-def test_a_prior_that_nothing_describes_is_refused():
-    with pytest.raises(ValueError, match="viscosity is 'Mine"):
-        read_prior({"viscosity": "Mine(low=1)"})
 
 
 @pytest.mark.slow

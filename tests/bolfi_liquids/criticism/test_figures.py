@@ -1,7 +1,7 @@
 """Figures of a criticism that was made by hand."""
 
 import re
-from types import MappingProxyType, SimpleNamespace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ import pytest
 import bolfi_liquids as bl
 from bolfi_liquids.criticism.effect_figures import coefficient_plot, confusion_plot, score_plot
 from bolfi_liquids.criticism.figures import residual_plot, stroke_plot
-from bolfi_liquids.drawing import to_svg
+from bolfi_liquids.drawing import new_figure, to_svg
 
 
 def drawn(figure):
@@ -75,7 +75,7 @@ def test_effects_that_were_not_fitted_are_sorted_by_score(made):
 
 
 def test_an_effect_that_was_not_fitted_beside_others_says_so(made):
-    tree = made(status=("named", "untested", "untested"))
+    tree = made(status=("named", "untested by a refit", "untested: its simulations failed"))
     tree["stirs/effects"]["gain"].values[1:] = np.nan
     texts = drawn(score_plot(tree["stirs"]))
     assert [text for text in texts if "not fitted" in text] == [" not fitted"] * 2
@@ -96,14 +96,37 @@ def test_coefficient_is_drawn_in_its_unit_beside_no_effect(made):
     assert set(neutral.get_xdata()) == {0.0}
 
 
-def test_plots_of_what_there_is_not_say_how_to_get_it(criticism_section, made):
-    missing = bl.Criticism(SimpleNamespace(), made(), MappingProxyType(criticism_section))
+def test_plots_of_what_there_is_not_say_how_to_get_it(criticism_summary, made):
+    missing = bl.Criticism(SimpleNamespace(), made(), criticism_summary)
     with pytest.raises(ValueError, match="held_out"):
         missing.plot_held_out()
     with pytest.raises(ValueError, match="pours"):
         missing.plot_pours()
-    there = bl.Criticism(
-        SimpleNamespace(), made(held=True, pours=True), MappingProxyType(criticism_section)
-    )
+    there = bl.Criticism(SimpleNamespace(), made(held=True, pours=True), criticism_summary)
     assert "third.nc" in "".join(drawn(there.plot_held_out()))
     assert "as expected" in drawn(there.plot_pours())
+
+
+@pytest.mark.parametrize("plot", ["residuals", "strokes", "scores", "confusion", "coefficient"])
+def test_plots_draw_in_the_axes_that_are_given(criticism_summary, made, plot):
+    criticism = bl.Criticism(SimpleNamespace(), made(), criticism_summary)
+    alone = getattr(criticism, f"plot_{plot}")()
+    panels = [axes for axes in alone.axes if axes.get_label() != "<colorbar>"]
+    figure = new_figure(9.0, 6.0)
+    given = figure.subplots(len(panels), 1, squeeze=False)
+    assert getattr(criticism, f"plot_{plot}")(axes=given) is figure
+    for axes, expected in zip(given.flat, panels, strict=True):
+        assert axes.get_xlabel() == expected.get_xlabel()
+        assert len(axes.get_lines()) == len(expected.get_lines())
+        assert len(axes.patches) == len(expected.patches)
+    with pytest.raises(ValueError, match=f"needs .* axes, got {len(panels) + 1}"):
+        getattr(criticism, f"plot_{plot}")(axes=figure.subplots(len(panels) + 1, 1))
+
+
+def test_a_criticism_shows_what_it_holds(criticism_summary, made):
+    criticism = bl.Criticism(SimpleNamespace(path="runs/<mine>"), made(), criticism_summary)
+    for shown in (repr(criticism), criticism._repr_html_()):
+        for part in ("mine", "effect", "0.002"):
+            assert part in shown
+    assert "<mine>" not in criticism._repr_html_()
+    assert criticism.verdict == "effect" and criticism.verdict.advice

@@ -8,7 +8,7 @@ import xarray as xr
 from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 
 from bolfi_liquids.criticism.findings import Findings
-from bolfi_liquids.criticism.pour_noise import MISSED, REPEATED, PourNoise
+from bolfi_liquids.criticism.pour_noise import REPEATABILITY_SD, SIMULATOR_ERROR_SD, PourNoise
 from bolfi_liquids.criticism.tree import _effects, _posterior
 from bolfi_liquids.inputs.settings import CriticismSettings
 
@@ -126,7 +126,7 @@ def test_pours_of_like_actions_are_wrong_together_and_outcomes_apart():
     at = Layout(np.tile([0, 1, 2], 2), np.repeat([0, 1], 3))  # pours, outcomes
     covariance = noise.covariance(at)
     sd = np.sqrt(np.diag(covariance))
-    np.testing.assert_allclose(sd, np.hypot(REPEATED, np.repeat(MISSED, 3)))
+    np.testing.assert_allclose(sd, np.hypot(REPEATABILITY_SD, np.repeat(SIMULATOR_ERROR_SD, 3)))
     correlation = covariance / np.outer(sd, sd)
     assert correlation[0, 1] > 0.9 > 0.2 > correlation[0, 2] >= 0.0
     assert (correlation[:3, 3:] == 0.0).all()

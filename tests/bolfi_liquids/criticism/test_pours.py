@@ -5,6 +5,7 @@ import numpy as np
 from bolfi_liquids import models
 from bolfi_liquids.criticism.pours import Pouring
 from bolfi_liquids.inputs.cups import bundled_cups
+from bolfi_liquids.seeds import Phase, simulation_seeds
 
 RATE = np.radians([80.0, 40.0, 80.0, 110.0, 40.0])  # neither sorted nor once each
 DISTANCE = np.array([0.01, 0.03, 0.04, 0.02, -0.01])
@@ -18,7 +19,8 @@ def test_each_pour_spills_what_it_spills_alone():
     rates = np.unique(RATE)
     for run, seed in enumerate(seeds):
         one = {name: values[run] for name, values in theta.items()}
-        own = (seed * 1009 + np.searchsorted(rates, RATE)) % 2**31
+        drawn = simulation_seeds(int(seed), Phase.RUNS_OF_POURS, len(rates))
+        own = np.array(drawn)[np.searchsorted(rates, RATE)]
         alone = models.pour(
             models.Liquid(**one, density=DENSITY), models.PourAction(RATE, DISTANCE), cups, own
         )

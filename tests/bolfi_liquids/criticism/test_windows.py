@@ -4,20 +4,17 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from bolfi_liquids.hardware import Path as GripperPath
-from bolfi_liquids.hardware import star
+from bolfi_liquids.hardware.motion import Trajectory, star
 
 from bolfi_liquids.calibration.stir_simulator import Stirring
 from bolfi_liquids.criticism.windows import windows
-from bolfi_liquids.inputs.recording import Gripper, Recording
+from bolfi_liquids.inputs.recording import Recording
 from bolfi_liquids.inputs.strokes import resting
 
 
-def recorded(path: GripperPath) -> Recording:
+def recorded(path: Trajectory) -> Recording:
     still = np.zeros((len(path.time), 2))
-    return Recording(
-        path.time, Gripper(*path), still, MappingProxyType({}), Path("stir.nc"), "hash"
-    )
+    return Recording(path.time, path, still, MappingProxyType({}), Path("stir.nc"), "hash")
 
 
 def test_windows_cover_every_sample_of_every_recording_once_by_stroke():

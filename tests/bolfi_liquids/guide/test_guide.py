@@ -13,7 +13,6 @@ from typer.testing import CliRunner
 
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.guide import PAGES, read_page
-from bolfi_liquids.reporting.frames import frames_of
 
 LINE = re.compile(r"^- `(?P<name>[^`]+)`(?: \((?P<dims>[^)]*)\))?(?: \[(?P<unit>[^\]]+)\])?:")
 BRACES = re.compile(r"\{([^{}]*)\}")
@@ -68,8 +67,7 @@ def test_files_are_told_variable_by_variable(calibration, pour, name):
 
 
 @pytest.mark.slow
-def test_frames_are_told_variable_by_variable(pour):
-    frames_of(pour.path, progress=False)
+def test_frames_are_told_variable_by_variable(pour, frames):
     in_page, in_file = told("frames.nc"), held(pour.path / "frames.nc")
     assert set(in_page) == set(in_file)
     for what, entry in in_page.items():
@@ -102,9 +100,9 @@ def told_lines(heading):
     return [line for line in section.splitlines() if line.startswith("- ")]
 
 
-def test_criticise_is_told_field_by_field(criticism_section):
+def test_criticise_is_told_field_by_field(criticism_summary):
     lines = " ".join(told_lines("criticise"))
-    for name in criticism_section:
+    for name in criticism_summary.to_json():
         assert re.search(rf"`{name}[`.]", lines), name
 
 

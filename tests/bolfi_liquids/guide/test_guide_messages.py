@@ -3,6 +3,7 @@
 import re
 import shutil
 import sys
+from dataclasses import replace
 from importlib.resources import files
 
 import numpy as np
@@ -159,15 +160,16 @@ def test_a_run_without_a_pour_executes_none(told, run):
     assert told("pour runs/mine --execute") in QUOTED
 
 
-def test_criticism_without_proof_or_with_none(told, run, criticism_section):
-    from bolfi_liquids.reporting.criticism_sentences import NO_BASELINE, verdict_sentence
+def test_criticism_without_proof_or_with_none(told, run, criticism_summary):
+    from bolfi_liquids.reporting.criticism_sentences import verdict_sentence
+    from bolfi_liquids.words import sentence
 
     copy = next((run / "recordings").iterdir())
     shutil.copy(copy, "stir.nc")
     assert told("criticise runs/mine --held-out stir.nc") in QUOTED
-    assert NO_BASELINE in QUOTED
-    said = verdict_sentence(criticism_section | {"held_out": 0})
-    assert any(said.endswith(message) for message in QUOTED)
+    assert str(sentence("criticism.no_baseline")) in QUOTED
+    unconfirmed = str(verdict_sentence(replace(criticism_summary, held_out=0)))
+    assert any(unconfirmed.endswith(message) for message in QUOTED)
 
 
 def test_cups_in_millimetres(told, run, tmp_path):
@@ -183,16 +185,25 @@ def test_missing_extra(told, monkeypatch):
     assert told("rig calibrate-cameras --print-board board.png") in QUOTED
 
 
-def test_warnings_of_the_engine():
+def test_warnings_of_the_engine(calibration):
     from bolfi_liquids.inference.surrogates.warnings import OUTSIDE
 
     from bolfi_liquids.reporting import sentences
 
     assert f"EmulatorWarning: {OUTSIDE}" in QUOTED
-    section = {"rhat_max": 1.024, "ess_min": 80.0, "divergences": 0, "n_draws": 80}
-    assert sentences.sampler_sentence(section) in QUOTED
-    said = sentences.floor_sentence({"below_least_viscosity": 0.34, "least_viscosity": 0.0494})
-    assert any(said.startswith(message) for message in QUOTED)
+    summary = replace(
+        calibration.summary,
+        rhat_max=1.024,
+        ess_min=80.0,
+        divergences=0,
+        n_draws=80,
+        below_least_viscosity=0.34,
+        least_viscosity=0.0494,
+    )
+    (unconverged,) = sentences.sampler_sentences(summary)
+    assert str(unconverged) in QUOTED
+    (thin,) = sentences.least_viscosity_sentences(summary)
+    assert any(str(thin).startswith(message) for message in QUOTED)
 
 
 def test_there_are_causes_and_cures():

@@ -61,3 +61,17 @@ def test_what_cannot_be_used_is_refused_by_name(tmp_path, rows, header, liquid, 
         open_pours(path, liquid)
     assert said in str(refused.value)
     assert str(path) in str(refused.value)
+
+
+def test_columns_that_nobody_reads_are_listed(tmp_path):
+    path = written(tmp_path, [f"{row},mine" for row in ROWS[:3]], HEADER.strip() + ",remark\n")
+    assert open_pours(path).unused == ("remark",)
+    assert open_pours(written(tmp_path, ROWS[:3])).unused == ()
+
+
+def test_names_in_upper_case_and_decimal_commas_are_read(tmp_path):
+    rows = [row.replace(",", ";").replace(".", ",") for row in ROWS[:3]]
+    path = written(tmp_path, rows, HEADER.replace(",", " ; ").upper())
+    np.testing.assert_array_equal(
+        open_pours(path).fractions, open_pours(written(tmp_path, ROWS[:3])).fractions
+    )

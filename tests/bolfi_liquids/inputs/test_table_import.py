@@ -97,7 +97,7 @@ def test_cells_without_a_number_are_missing_samples(tmp_path, written, truth):
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (lambda rows: rows[7].__setitem__(1, "1.5.2"), r"line 10: X: '1.5.2' is no number"),
+        (lambda rows: rows[7].__setitem__(1, "1.5.2"), r"line 10, column X: '1.5.2' is no number"),
         (lambda rows: rows[0].__setitem__(4, "Angle"), "no column 'A' among"),
         (lambda rows: rows[0].__setitem__(6, "X"), "2 columns are named 'X'"),
         (lambda rows: rows.insert(20, rows[21]), "times must increase"),

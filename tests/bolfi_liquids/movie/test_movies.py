@@ -7,6 +7,7 @@ from typer.testing import CliRunner
 from bolfi_liquids import models
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.errors import InputError
+from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.described_liquid import Described, read_effects
 from bolfi_liquids.inputs.open import open_recording
@@ -332,11 +333,6 @@ def test_commands_simulate_film_and_write(tmp_path, monkeypatch):
 
 def _short(tmp_path):
     """Options for the first two seconds of the bundled glycerin."""
-    from bolfi_liquids.inputs.bundled import bundled_recording
-    from bolfi_liquids.simulation.files import stir_dataset
-
-    whole = bundled_recording("glycerin")
-    described = Described(1.0, 0.2, 1260.0)
-    data = stir_dataset(described, whole, whole.inclination)
-    data.isel(time=slice(0, 90)).to_netcdf(tmp_path / "short.nc", engine="h5netcdf")
+    with xr.open_dataset(bundled_recording("glycerin").path, decode_times=False) as whole:
+        whole.isel(time=slice(0, 90)).to_netcdf(tmp_path / "short.nc", engine="h5netcdf")
     return ["--recording", "short.nc"]

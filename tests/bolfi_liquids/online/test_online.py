@@ -26,10 +26,8 @@ from bolfi_liquids.online.online import (
 )
 from bolfi_liquids.online.outbox import Outbox, newest
 
-# the process that simulates gives way to others: beside another test it may get nothing for minutes
-pytestmark = [pytest.mark.slow, pytest.mark.alone]
-
-PATIENCE_S = 120
+# the process that simulates gives way to others: beside another test it gets little
+PATIENCE_S = 600
 SMALL = OnlineSettings(particles=200, pours=64, design=8, budget=24, target=1e-9)
 
 
@@ -95,11 +93,13 @@ def story(short_recording, tmp_path_factory):
     return told
 
 
+@pytest.mark.slow
 def test_it_prepares_before_the_robot_moves(story):
     assert story.early.phase == "preparing"
     assert story.ready and story.status.simulations == SMALL.design
 
 
+@pytest.mark.slow
 def test_every_stroke_is_answered(story):
     assert [one.strokes for one in story.estimates] == [1, 2]
     for one in story.estimates:
@@ -111,10 +111,12 @@ def test_every_stroke_is_answered(story):
         assert one.simulations >= SMALL.design
 
 
+@pytest.mark.slow
 def test_simulations_go_on_while_the_robot_stirs(story):
     assert story.later.simulations > SMALL.design
 
 
+@pytest.mark.slow
 def test_nothing_is_simulated_twice(story):
     connection = sqlite3.connect(story.out / online.BANK)
     rows = connection.execute("SELECT theta, seed FROM simulation").fetchall()
@@ -124,6 +126,7 @@ def test_nothing_is_simulated_twice(story):
     assert story.later.simulations <= len(stirs) <= SMALL.budget
 
 
+@pytest.mark.slow
 def test_estimates_are_logged(story):
     lines = (story.out / online.LOG).read_text().splitlines()
     logged = [json.loads(line) for line in lines]
@@ -132,22 +135,26 @@ def test_estimates_are_logged(story):
     assert logged[1]["parameters"]["viscosity"] == spread._asdict()
 
 
+@pytest.mark.slow
 def test_data_off_the_plan_are_refused_with_a_reason(story):
     assert "mm off its plan" in story.refused.detail
 
 
+@pytest.mark.slow
 def test_without_its_simulator_it_goes_on(story):
     assert story.last.strokes == 3
     assert (story.alone.phase, story.alone.in_flight) == (READY, 0)
     assert "simulates has died" in story.alone.detail
 
 
+@pytest.mark.slow
 def test_death_is_a_status_and_disturbs_nobody(story):
     assert "has died (exit code -9)" in story.dead.detail
     assert story.after is None
     assert not any(worker.is_alive() for worker in story.workers.values())
 
 
+@pytest.mark.slow
 def test_a_process_that_never_reads_blocks_nobody():
     sent = []
     blocked = SimpleNamespace(send=lambda message: (sent.append(message), time.sleep(0.2)))
@@ -160,6 +167,7 @@ def test_a_process_that_never_reads_blocks_nobody():
     assert len(sent) < 4 and sent[-1] == 999
 
 
+@pytest.mark.slow
 def test_closing_ends_a_send_that_nobody_takes():
     mine, silent = multiprocessing.Pipe()
     outbox = Outbox(mine)
@@ -175,6 +183,7 @@ def test_closing_ends_a_send_that_nobody_takes():
     silent.close()
 
 
+@pytest.mark.slow
 def test_a_run_is_not_overwritten(short_recording, tmp_path):
     recording = bl.open_recording(short_recording)
     (tmp_path / "run.toml").touch()
@@ -182,21 +191,53 @@ def test_a_run_is_not_overwritten(short_recording, tmp_path):
         OnlineCalibration.start(recording.gripper, recording.attrs, out=tmp_path)
 
 
-@pytest.mark.parametrize("target", [1e-9, 0.9])
-def test_stops_at_the_target_or_at_the_last_stroke(short_recording, tmp_path, target):
+@pytest.fixture(scope="module")
+def finish(short_recording, tmp_path_factory):
+    """Replays the stir until a target is met, and calibrates; the estimates and the run."""
     recording = bl.open_recording(short_recording)
-    settings = replace(SMALL, budget=8, target=target, least_strokes=1)
-    with start(recording, tmp_path / "run", settings) as of:
-        assert of.wait_until_ready(PATIENCE_S), of.status
-        strokes = [one.strokes for one in online.replay(recording, of)]
-        assert strokes == ([1] if target == 0.9 else [1, 2, 3])
-        run = of.finish(recording, budget=8, progress=False)
+
+    def finish(target):
+        out = tmp_path_factory.mktemp("online") / "run"
+        settings = replace(SMALL, budget=8, target=target, least_strokes=1)
+        with start(recording, out, settings) as of:
+            assert of.wait_until_ready(PATIENCE_S), of.status
+            estimates = list(online.replay(recording, of))
+            return estimates, of.finish(recording, budget=8, progress=False)
+
+    return finish
+
+
+@pytest.fixture(scope="module")
+def met(finish):
+    return finish(0.9)
+
+
+@pytest.mark.slow
+def test_stops_at_the_target(met):
+    estimates, run = met
+    assert [one.strokes for one in estimates] == [1]
     calibration = bl.Calibration.open(run)
-    assert calibration.summary["n_simulations"] == 8
-    pour = bl.choose_pour(calibration, iterations=7, draws=2, progress=False)
+    assert calibration.summary.n_simulations == 8
+    last = estimates[-1].parameters["viscosity"]
+    ordinary = calibration.summary.parameters["viscosity"]
+    assert last.q05 < ordinary["q95"] and ordinary["q05"] < last.q95
+
+
+@pytest.mark.minutes  # the story above goes as far, without the calibration
+def test_stops_at_the_last_stroke(finish):
+    estimates, run = finish(1e-9)
+    assert [one.strokes for one in estimates] == [1, 2, 3]
+    assert bl.Calibration.open(run).summary.n_simulations == 8
+
+
+@pytest.mark.minutes  # other tests have it of a calibration that was never online
+def test_a_pour_is_chosen_and_reported_after_an_online_calibration(met):
+    _, run = met
+    pour = bl.choose_pour(bl.Calibration.open(run), iterations=7, draws=2, progress=False)
     assert bl.report(run, moving=False).is_file() and 0.0 <= pour.chosen.expected_spillage <= 1.0
 
 
+@pytest.mark.minutes  # at full size; the test above has it of a small one
 def test_the_last_estimate_agrees_with_the_ordinary_calibration(tmp_path):
     from importlib.resources import as_file, files
 
@@ -208,6 +249,6 @@ def test_the_last_estimate_agrees_with_the_ordinary_calibration(tmp_path):
             assert until(lambda: of.status.simulations > 16, of)
             ordinary = bl.Calibration.open(of.finish(recording, progress=False))
     last = estimates[-1].parameters["viscosity"]
-    other = ordinary.summary["parameters"]["viscosity"]
+    other = ordinary.summary.parameters["viscosity"]
     assert estimates[-1].strokes == len(of.ends)
     assert last.q05 < other["q95"] and other["q05"] < last.q95

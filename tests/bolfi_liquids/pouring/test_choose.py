@@ -10,9 +10,12 @@ import xarray as xr
 
 import bolfi_liquids as bl
 from bolfi_liquids import models
+from bolfi_liquids.drawing import new_figure
+from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.pouring import spillage
-from bolfi_liquids.pouring.choose import LANDINGS
+from bolfi_liquids.pouring.choose import LANDINGS_PER_POUR
+from bolfi_liquids.pouring.result import PourSummary
 from bolfi_liquids.run.directory import SIMULATIONS
 
 
@@ -42,7 +45,7 @@ def test_chosen_spills_no_more_than_the_plug_in(pour):
 
 def by_draw(judged):
     """Spilled fraction of each posterior draw, whose landings are no independent outcomes."""
-    return judged.fractions[:, 0].reshape(-1, LANDINGS).mean(axis=1)
+    return judged.fractions[:, 0].reshape(-1, LANDINGS_PER_POUR).mean(axis=1)
 
 
 def test_chosen_is_among_the_better_actions(pour):
@@ -149,3 +152,37 @@ def test_more_draws_than_there_are_is_said_in_the_setting_s_terms(calibration):
 def test_bad_setting_is_named(calibration, setting, value):
     with pytest.raises(ValueError, match=f"--{setting}: {value!r}"):
         bl.choose_pour(calibration, progress=False, **{setting: value})
+
+
+def test_a_pour_is_read_as_it_was_written(pour):
+    again = bl.Pour.open(pour.path)
+    for name in ("chosen", "plug_in"):
+        judged, read = getattr(pour, name), getattr(again, name)
+        assert read.action == judged.action
+        np.testing.assert_array_equal(read.fractions, judged.fractions)
+    summary = PourSummary.read(pour.path)
+    assert summary.expected_spillage == pour.chosen.expected_spillage
+    assert PourSummary.from_json(summary.to_json()) == summary
+
+
+def test_a_pour_shows_what_was_chosen(pour):
+    speed = f"{np.degrees(pour.chosen.angular_velocity):.1f} deg/s"
+    for shown in (repr(pour), pour._repr_html_()):
+        assert str(pour.path) in shown and speed in shown
+
+
+@pytest.mark.parametrize("given", [False, True])
+def test_the_map_marks_both_actions_among_the_risks(pour, given):
+    figure = new_figure(4.0, 3.0)
+    axes = figure.subplots() if given else None
+    drawn = pour.plot_map(axes)
+    assert (drawn is axes) == given
+    marked = {line.get_label(): line.get_xydata()[0] for line in drawn.get_lines()}
+    for label, judged in (("chosen pour", pour.chosen), ("best at θ* alone", pour.plug_in)):
+        at = np.degrees(judged.angular_velocity), 100.0 * judged.distance
+        np.testing.assert_allclose(marked[label], at)
+
+
+def test_a_run_without_a_pour_says_how_to_choose_one(tmp_path):
+    with pytest.raises(InputError, match="bolfi-liquids pour"):
+        bl.Pour.open(tmp_path)

@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+from bolfi_liquids.inference.simulations import Keep
 
 from bolfi_liquids import inference, models
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.pouring import spillage
 from bolfi_liquids.pouring.grid import FINE, GridSize, make_grid
+from bolfi_liquids.progress import silent
 from bolfi_liquids.reproduction.decisions import decide, execute
 from bolfi_liquids.reproduction.truths import draw_truths
 
@@ -33,7 +35,7 @@ def grid(request, monkeypatch):
     monkeypatch.setattr(spillage.Outcomes, "simulate", poured)
     with inference.SimulationBank(":memory:") as bank:
         made = make_grid(
-            bundled_cups(), 1000.0, default_prior(), bank, lambda steps: None, size=request.param
+            bundled_cups(), 1000.0, default_prior(), Keep(bank), silent, size=request.param
         )
         viscosities, cohesions, rates = request.param
         assert made.profiles.fractions.shape[:2] == (rates, viscosities * cohesions)
@@ -76,7 +78,7 @@ def test_a_real_grid_says_what_new_pours_spill():
     cups, rng = bundled_cups(), np.random.default_rng(5)
     drawn = default_prior().from_unit(rng.uniform(size=(24, 2)))
     with inference.SimulationBank(":memory:") as bank:
-        grid = make_grid(cups, 1000.0, default_prior(), bank, lambda steps: None)
+        grid = make_grid(cups, 1000.0, default_prior(), Keep(bank), silent)
     surface = grid.surface(drawn)
     rate = grid.profiles.angular_velocity[4]
     made = models.landings(models.Liquid(**drawn, density=1000.0), rate, cups, np.arange(24))

@@ -2,15 +2,17 @@
 
 import re
 import shutil
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import pytest
 
 import bolfi_liquids as bl
+from bolfi_liquids.calibration.summary import ParameterSummary
 from bolfi_liquids.calibration.tree import write_tree
-from bolfi_liquids.reporting.sentences import fit_sentence, parameter_sentence, sure_sentence
+from bolfi_liquids.pouring.result import ActionSummary, PourSummary
+from bolfi_liquids.reporting import criticism_sentences, sentences
 from bolfi_liquids.run.directory import CRITICISM
-from bolfi_liquids.run.summary import write_section
 
 FIGURES = {
     "inclination [deg]": "inclination against time",
@@ -58,9 +60,9 @@ def test_report_is_one_file_with_every_figure(pour):
 
 def test_report_shows_the_runs_numbers(pour, calibration):
     text, _ = read(bl.report(pour.path, moving=False))
-    section = calibration.summary
-    assert f"{section['fit_rms_deg']:.2f}° RMS" in text
-    assert f"{section['parameters']['viscosity']['q50']:.3g} Pa s" in text
+    summary = calibration.summary
+    assert f"{summary.fit_rms_deg:.2f}° RMS" in text
+    assert f"{summary.parameters['viscosity'].q50:.3g} Pa s" in text
     assert f"{pour.chosen.angular_velocity * 57.29578:.0f}°/s" in text
     assert calibration.record["inputs"]["sha256"][0] in text
 
@@ -69,11 +71,13 @@ def test_report_says_below_which_viscosity_liquids_look_alike(calibration, tmp_p
     run = tmp_path / "run"
     shutil.copytree(calibration.path, run)
     for share, told in ((0.3, True), (0.0, False)):
-        section = dict(calibration.summary) | {"below_least_viscosity": share}
-        write_section(run, "calibrate", section)
+        summary = replace(calibration.summary, below_least_viscosity=share)
+        summary.write(run)
         text, _ = read(bl.report(run, moving=False))
-        assert f"{section['least_viscosity']:.2g} (stir)" in text
-        assert (f"Below about {section['least_viscosity']:.3g} Pa s" in text) == told
+        assert f"{summary.least_viscosity:.2g} (stir)" in text
+        told_sentences = sentences.least_viscosity_sentences(summary)
+        assert len(told_sentences) == told
+        assert all(str(sentence) in text for sentence in told_sentences)
 
 
 def test_report_without_a_pour_says_how_to_get_one(calibration, tmp_path):
@@ -81,7 +85,7 @@ def test_report_without_a_pour_says_how_to_get_one(calibration, tmp_path):
     run.mkdir()
     for name in ("run.toml", "posterior.nc"):
         shutil.copy(calibration.path / name, run)
-    write_section(run, "calibrate", dict(calibration.summary))
+    calibration.summary.write(run)
     text, page = read(bl.report(run, moving=False))
     assert f"bolfi-liquids pour {run}" in text
     assert page.figures == len(FIGURES) - 1
@@ -97,53 +101,60 @@ def test_file_names_are_escaped(calibration, tmp_path):
     assert "&lt;script&gt;alert" in text
 
 
-@pytest.mark.parametrize(("high", "verdict"), [(0.98, "says little"), (0.3, "what the prior held")])
-def test_sentence_tells_learned_from_not_learned(rng, high, verdict):
-    values = {"q05": 0.1, "q50": 0.2, "q95": high}
-    assert verdict in parameter_sentence("cohesion", values, rng.uniform(size=2000))
+@pytest.mark.parametrize(
+    ("low", "high", "key"),
+    [
+        (0.1, 0.98, "parameter_not_learned"),
+        (0.1, 0.3, "parameter"),
+        (0.0, 0.3, "parameter_at_the_end"),
+    ],
+)
+def test_sentence_tells_learned_from_not_learned(rng, low, high, key):
+    values = ParameterSummary(mean=0.2, sd=0.1, q05=low, q50=0.2, q95=high)
+    sentence = sentences.parameter_sentence("cohesion", values, rng.uniform(size=2000))
+    assert sentence.key == f"calibration.{key}"
+    if key == "parameter":
+        assert sentence.values["share"] == pytest.approx((high - low) / 0.9, abs=0.05)
 
 
 @pytest.mark.parametrize(
-    ("fit", "verdict"),
-    [(0.3, "as closely as can be"), (0.4, "1.3 times as much"), (0.9, "lacks")],
+    ("fit", "key"), [(0.3, "fit_at_noise"), (0.4, "fit_near_noise"), (0.9, "fit_above_noise")]
 )
-def test_sentence_measures_the_fit_by_the_noise(fit, verdict):
-    section = {"fit_rms_deg": fit, "noise_deg": 0.3, "n_simulations": 20}
-    assert verdict in fit_sentence(section)
+def test_sentence_measures_the_fit_by_the_noise(calibration, fit, key):
+    summary = replace(calibration.summary, fit_rms_deg=fit, noise_deg=0.3)
+    assert sentences.fit_sentence(summary).key == f"calibration.{key}"
 
 
 def test_sentence_repeats_no_action():
-    chosen = {
-        "angular_velocity_deg_s": 30.0,
-        "distance_cm": 1.234,
-        "expected_spillage": 0.006,
-        "spillage_q95": 0.01,
-    }
-    assert sure_sentence(chosen | {"plug_in": chosen}).endswith("θ* alone is the same.")
-    other = chosen | {"distance_cm": 1.236, "expected_spillage": 0.02}
-    assert "(30°/s, 1.2 cm) would spill 2 %" in sure_sentence(chosen | {"plug_in": other})
+    chosen = ActionSummary(30.0, 1.234, 0.006, 0.01)
+    more = {"least_viscosity": 0.01, "n_simulations": 100, "risk": "mean", "seed": 0}
+    summary = PourSummary(**vars(chosen), **more, plug_in=chosen)
+    assert sentences.plug_in_sentence(summary).key == "pour.plug_in_same"
+    other = replace(summary, plug_in=replace(chosen, distance_cm=1.236, expected_spillage=0.02))
+    sentence = sentences.plug_in_sentence(other)
+    assert sentence.key == "pour.plug_in" and "2 %" in str(sentence)
 
 
 @pytest.fixture
-def criticised(calibration, criticism_section, tmp_path, made):
+def criticised(calibration, criticism_summary, tmp_path, made):
     """A copy of a calibrated run with a criticism in it."""
     run = tmp_path / "run"
     shutil.copytree(calibration.path, run)
-    names = calibration.summary["parameters"]
-    criticism_section["parameters"] = {
-        name: criticism_section["coefficient"]["camera_delay"] for name in names
-    } | criticism_section["coefficient"]
-    write_section(run, "criticise", criticism_section)
+    of_a_delay = criticism_summary.coefficient["camera_delay"]
+    parameters = dict.fromkeys(calibration.summary.parameters, of_a_delay)
+    replace(criticism_summary, parameters=parameters | dict(criticism_summary.coefficient)).write(
+        run
+    )
     write_tree(made(held=True), run / CRITICISM)
     return run
 
 
-def test_page_shows_the_criticism_before_the_pour(criticised):
+def test_page_shows_the_criticism_before_the_pour(criticised, criticism_summary):
     page = bl.report(criticised, moving=False).read_text(encoding="utf-8")
-    verdict = "<strong>Simulation and data differ (p = 0.002): the missing effect is camera delay."
-    assert page.count(verdict) == 2
+    assert page.count(f"<strong>{criticism_sentences.verdict_sentence(criticism_summary)}") == 2
     assert page.index("What the simulator lacks") < page.index("<h2>The pour")
-    assert "The calibration itself, without camera delay, had found:" in page
+    (superseded,) = criticism_sentences.superseded_sentences(criticism_summary)
+    assert str(superseded) in page
     how = page[page.index("How this was made") :]
     assert "77 to criticise it with" in how
     assert "baseline clean.nc, SHA-256" in how

@@ -8,18 +8,13 @@ import numpy as np
 import pytest
 
 import bolfi_liquids as bl
-from bolfi_liquids.reporting.frames import _stack, frames_of
-from bolfi_liquids.reporting.moving_pictures import STEPS, _packed, moving_context
+from bolfi_liquids.reporting.frames import _stack
+from bolfi_liquids.reporting.moving_pictures import BYTE_LEVELS, _packed, moving_context
 
 WIDTHS = {"laptop": (1280, 800), "phone": (390, 844)}
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def frames(pour):
-    return frames_of(pour.path, progress=False)
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +37,8 @@ def browser():
         started.close()
 
 
-@pytest.fixture(params=WIDTHS)
+# the phone differs by width and touch: one screen for continuous integration
+@pytest.fixture(params=["laptop", pytest.param("phone", marks=pytest.mark.minutes)])
 def opened(browser, page, request):
     """The page, and what its console said and what it asked for."""
     width, height = WIDTHS[request.param]
@@ -175,7 +171,7 @@ def test_a_packed_position_is_within_half_a_step(rng):
     packed = _packed(position)
     read = np.frombuffer(base64.b64decode(packed["positions"][0]), np.uint8).reshape(2, 5, 3)
     low, high = np.array(packed["low"]), np.array(packed["high"])
-    back = np.where(read == 255, np.nan, low + (high - low) / STEPS * read)
-    step = (high - low) / STEPS
+    back = np.where(read == 255, np.nan, low + (high - low) / BYTE_LEVELS * read)
+    step = (high - low) / BYTE_LEVELS
     assert np.isnan(back[1, 3]).all() and np.isnan(back).sum() == 3
     assert np.nanmax(np.abs(back - position[0]) / step) <= 0.5 + 1e-4

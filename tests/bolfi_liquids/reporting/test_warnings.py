@@ -1,12 +1,16 @@
 """What a report warns of."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
 
+from bolfi_liquids.criticism.verdict import Verdict
+from bolfi_liquids.pouring.figures import not_surely_worse
+from bolfi_liquids.pouring.result import ActionSummary, PourSummary
 from bolfi_liquids.reporting.calibration_figures import _rms_by
-from bolfi_liquids.reporting.pour_figure import not_surely_worse
-from bolfi_liquids.reporting.warnings import worries
+from bolfi_liquids.reporting.warnings import Results, warnings_of
 
 FINE = {
     "fit_rms_deg": 0.3,
@@ -17,9 +21,13 @@ FINE = {
     "divergences": 0,
     "n_draws": 4000,
     "n_simulations": 20,
+    "emulator_warnings": (),
 }
-AGREES = {"verdict": "none", "baseline": 2}
-POURED = {"expected_spillage": 0.01}
+AGREES = {"verdict": Verdict.NONE, "effects": (), "accepted": ()}
+ACTION = ActionSummary(60.0, 3.0, 0.01, 0.05)
+POURED = PourSummary(
+    **vars(ACTION), least_viscosity=0.01, n_simulations=99, risk="mean", seed=0, plug_in=ACTION
+)
 
 
 def poured(rate=1.0, distance=0.03, retained=0.05):
@@ -37,31 +45,70 @@ def poured(rate=1.0, distance=0.03, retained=0.05):
 POSTERIOR = xr.Dataset({"viscosity": (("chain", "draw"), [[1.0, 2.0, 3.0]])})
 
 
-def test_nothing_is_said_where_nothing_is_wrong():
-    assert worries(FINE, AGREES, POURED, poured(), POSTERIOR, 13) == []
+@pytest.fixture
+def fine(calibration, criticism_summary):
+    """Results without anything to warn of."""
+    return Results(
+        calibrated=replace(calibration.summary, **FINE),
+        criticised=replace(criticism_summary, **AGREES),
+        poured=POURED,
+        pour=poured(),
+        posterior=POSTERIOR,
+        searched=13,
+    )
+
+
+def test_nothing_is_said_where_nothing_is_wrong(fine):
+    assert warnings_of(fine) == []
 
 
 @pytest.mark.parametrize(
-    ("calibrated", "criticised", "spilled", "action", "told"),
+    ("field", "changes", "key", "values"),
     [
-        ({"rhat_max": 1.2}, AGREES, 0.01, {}, "did not converge"),
-        ({"below_least_viscosity": 0.5, "least_viscosity": 0.03}, AGREES, 0.01, {}, "look alike"),
-        ({"emulator_warnings": ["too few runs"]}, AGREES, 0.01, {}, "in doubt: too few runs."),
-        ({}, None, 0.01, {}, "was not criticised: whether"),
-        ({"fit_rms_deg": 0.9}, None, 0.01, {}, "farther from the recording than noise"),
-        ({}, {**AGREES, "baseline": 0}, 0.01, {}, "Without clean recordings"),
-        ({}, AGREES, 0.12, {}, "expected to spill 12 %"),
-        ({}, AGREES, 0.01, {"rate": 0.5}, "is the slowest that"),
-        ({}, AGREES, 0.01, {"retained": 0.4}, "40 % stays in the source"),
-        ({}, AGREES, 0.01, {"rate": 3.0, "distance": 0.07}, "is the fastest and the farthest"),
+        ("calibrated", {"rhat_max": 1.2}, "calibration.not_converged", {}),
+        (
+            "calibrated",
+            {"below_least_viscosity": 0.5, "least_viscosity": 0.03},
+            "calibration.least_viscosity",
+            {"least": 0.03, "share": 0.5},
+        ),
+        (
+            "calibrated",
+            {"emulator_warnings": ("too few runs",)},
+            "calibration.surrogate_in_doubt",
+            {"text": "too few runs"},
+        ),
+        ("criticised", None, "warning.not_criticised", {}),
+        ("criticised", {"baseline": 0}, "criticism.no_baseline", {}),
+        ("criticised", {"verdict": Verdict.UNKNOWN}, "criticism.unexplained", {}),
+        ("poured", {"expected_spillage": 0.12}, "warning.much_spilled", {"share": 0.12}),
     ],
 )
-def test_each_worry_is_said_alone(calibrated, criticised, spilled, action, told):
-    section = {"expected_spillage": spilled}
-    (sentence,) = worries(
-        {**FINE, **calibrated}, criticised, section, poured(**action), POSTERIOR, 13
-    )
-    assert told in sentence
+def test_each_warning_is_given_alone(fine, field, changes, key, values):
+    changed = changes and replace(getattr(fine, field), **changes)
+    (sentence,) = warnings_of(replace(fine, **{field: changed}))
+    assert sentence.key == key
+    assert values.items() <= sentence.values.items()
+    assert str(sentence)
+
+
+@pytest.mark.parametrize(
+    ("action", "key", "values"),
+    [
+        ({"rate": 0.5}, "at_the_edge", {"ends": ("slowest",)}),
+        ({"rate": 3.0, "distance": 0.07}, "at_the_edge", {"ends": ("fastest", "farthest")}),
+        ({"retained": 0.4}, "much_retained", {"share": pytest.approx(0.4)}),
+    ],
+)
+def test_each_warning_of_the_chosen_action(fine, action, key, values):
+    (sentence,) = warnings_of(replace(fine, pour=poured(**action)))
+    assert (sentence.key, sentence.values) == (f"warning.{key}", values)
+
+
+def test_a_misfit_that_was_not_criticised_is_told(fine):
+    far = replace(fine.calibrated, fit_rms_deg=0.9)
+    (sentence,) = warnings_of(replace(fine, calibrated=far, criticised=None))
+    assert sentence.key == "warning.misfit_not_criticised"
 
 
 @pytest.mark.parametrize(
@@ -69,18 +116,19 @@ def test_each_worry_is_said_alone(calibrated, criticised, spilled, action, told)
     [POSTERIOR.assign(adhesion=POSTERIOR["viscosity"]), POSTERIOR + 0.5],
     ids=["extended", "other"],
 )
-def test_a_pour_of_another_posterior_is_said_to_be_one(posterior):
-    (sentence,) = worries(FINE, AGREES, POURED, poured(), posterior, 13)
-    assert "choose it again" in sentence
+def test_a_pour_of_another_posterior_is_said_to_be_one(fine, posterior):
+    (sentence,) = warnings_of(replace(fine, posterior=posterior))
+    assert sentence.key == "warning.stale_pour"
 
 
-def test_a_search_of_no_more_than_its_start_is_none():
-    (sentence,) = worries(FINE, AGREES, POURED, poured(), POSTERIOR, 1)
-    assert "Of 20 simulations only 1" in sentence
+def test_a_search_of_no_more_than_its_start_is_none(fine):
+    (sentence,) = warnings_of(replace(fine, searched=1))
+    assert sentence.key == "warning.no_search"
+    assert sentence.values == {"total": 20, "searched": 1}
 
 
-def test_a_run_without_a_pour_has_nothing_to_worry_about_in_it():
-    assert worries(FINE, AGREES, None, None, POSTERIOR, 13) == []
+def test_a_run_without_a_pour_has_nothing_to_worry_about_in_it(fine):
+    assert warnings_of(replace(fine, poured=None, pour=None)) == []
 
 
 def test_an_action_is_surely_worse_only_as_far_as_paired_draws_tell(rng):

@@ -95,7 +95,7 @@ def test_a_sticky_truth_is_made_once(tmp_path):
     assert sticky.stirred(truth, 200, tmp_path / "stir.nc").hash == recording.hash
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_a_sticky_truth_keeps_more_in_the_cup_than_one_that_flows(tmp_path):
     truth = sticky.draw_sticky(0, seed=0)
     clean = truth._replace(theta={**truth.theta, "adhesion": 0.0})

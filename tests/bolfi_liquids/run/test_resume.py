@@ -8,6 +8,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,7 +17,9 @@ import bolfi_liquids as bl
 from bolfi_liquids import inference
 from bolfi_liquids.run.directory import SIMULATIONS
 
-PATIENCE_S = 120
+# On two cores, 24 processes beside it, a criticism began to simulate after 127 s; with a patience
+# of 120 s it was killed before, and the test failed.
+PATIENCE_S = 1800
 EFFECTS = ("camera_delay", "camera_tilt")
 STIRRINGS = "SELECT theta, seed, created FROM simulation WHERE theta LIKE '%viscosity%'"
 
@@ -48,16 +51,26 @@ def finished(run):
     return {(theta, seed): created for theta, seed, created in rows}
 
 
+def kill_after(process, run, count):
+    """Kill a process once so many stirrings are in its bank; what the bank holds then.
+
+    However slow the computer, only a process that ended by itself, or hangs, is waited for in vain.
+    """
+    deadline = time.monotonic() + PATIENCE_S
+    while len(finished(run)) < count:
+        assert process.poll() is None, f"ended with status {process.returncode} before its kill"
+        assert time.monotonic() < deadline, f"{len(finished(run))} stirrings in {PATIENCE_S} s"
+        time.sleep(0.02)
+    os.kill(process.pid, signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL
+    return finished(run)
+
+
 @pytest.mark.slow
 def test_killed_and_resumed_equals_undisturbed(short_recording, calibration, settings, tmp_path):
     run = tmp_path / "killed"
     process = subprocess.Popen(command(short_recording, run, settings), stderr=subprocess.DEVNULL)
-    deadline = time.monotonic() + PATIENCE_S
-    while len(before := finished(run)) < 2 and time.monotonic() < deadline:
-        time.sleep(0.02)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
-    before = finished(run)
+    before = kill_after(process, run, 2)
     whole = finished(calibration.path)
     assert 2 <= len(before) < len(whole)
 
@@ -70,7 +83,7 @@ def test_killed_and_resumed_equals_undisturbed(short_recording, calibration, set
     resumed = bl.Calibration.open(run)
     for name, draws in calibration.posterior.items():
         np.testing.assert_array_equal(resumed.posterior[name], draws)
-    assert resumed.summary["n_simulations"] == settings["budget"]
+    assert resumed.summary.n_simulations == settings["budget"]
 
 
 def test_finished_run_is_opened_not_repeated(short_recording, calibration, settings):
@@ -124,7 +137,6 @@ def test_a_larger_budget_goes_on_from_a_smaller_one(
 
 
 @pytest.mark.slow
-@pytest.mark.alone  # beside others it failed now and then, alone not yet; why is not known
 def test_criticism_killed_and_repeated_equals_undisturbed(calibration, tmp_path):
     quiet, killed = tmp_path / "quiet", tmp_path / "killed"
     shutil.copytree(calibration.path, quiet)
@@ -133,12 +145,7 @@ def test_criticism_killed_and_repeated_equals_undisturbed(calibration, tmp_path)
     whole = bl.criticise(quiet, effects=EFFECTS, progress=False)
 
     process = subprocess.Popen(criticise_command(killed), stderr=subprocess.DEVNULL)
-    deadline = time.monotonic() + PATIENCE_S
-    while len(finished(killed)) < len(known) + 10 and time.monotonic() < deadline:
-        time.sleep(0.02)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
-    before = finished(killed)
+    before = kill_after(process, killed, len(known) + 10)
     assert len(known) < len(before) < len(finished(quiet))
     assert "criticise" not in (killed / "summary.json").read_text()
 
@@ -149,8 +156,7 @@ def test_criticism_killed_and_repeated_equals_undisturbed(calibration, tmp_path)
     again = bl.Criticism.open(killed)
     for name, draws in whole.tree["posterior"].items():
         np.testing.assert_array_equal(again.tree["posterior"][name], draws)
-    timeless = [{k: v for k, v in c.summary.items() if k != "seconds"} for c in (whole, again)]
-    assert timeless[0] == timeless[1]
+    assert replace(whole.summary, seconds=again.summary.seconds) == again.summary
 
     written = (killed / "criticism.nc").stat().st_mtime_ns
     bl.criticise(killed, effects=EFFECTS, progress=False)  # what is there is opened

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 from bolfi_liquids.inference import SimulationBank
+from bolfi_liquids.inference.simulations import Keep
 
 from bolfi_liquids.run.simulations import (
-    Keep,
-    fresh_seeds,
     keeping,
     simulate_kept,
 )
@@ -40,14 +39,6 @@ def test_diverged_ones_are_left_out():
         np.testing.assert_array_equal(kept.signals, [[0.0], [1.0]])
         with pytest.raises(RuntimeError, match="all 1 simulations failed"):
             simulate_kept(simulate, {"a": np.array([2.0])}, [2], keep)
-
-
-def test_seeds_differ_by_run_and_purpose():
-    seeds = [*fresh_seeds(0, 1, 50), *fresh_seeds(0, 2, 50), *fresh_seeds(1, 1, 50)]
-    assert len(set(seeds)) == 150
-    assert min(seeds) >= 0
-    assert max(seeds) < 2**31
-    assert fresh_seeds(0, 1, 50) == seeds[:50]
 
 
 def test_a_simulator_that_keeps_repeats_nothing_that_was_finished():

@@ -31,7 +31,8 @@ from bolfi_liquids.hardware.vision.frame import Frame  # noqa: E402
 from bolfi_liquids.hardware.vision.frame_measurement import FrameMeasurement  # noqa: E402
 from bolfi_liquids.hardware.vision.measuring import FrameMeter  # noqa: E402
 
-pytestmark = pytest.mark.punctual
+# pictures come at 30 Hz, and none may be missed; the others keep no time
+keeps_time = pytest.mark.punctual
 
 RIG = bundled_rig()
 HEIGHT = RIG.stirring.height
@@ -73,7 +74,7 @@ class Running:
         self.process.start()
         theirs.close()
 
-    def wait(self, what, timeout=15.0):
+    def wait(self, what, timeout=30.0):
         deadline = time.monotonic() + timeout
         while not what(row := self.board.read(Who.CAMERA_XZ)):
             assert time.monotonic() < deadline and self.process.is_alive(), row
@@ -84,7 +85,8 @@ class Running:
         """Let go as a main process that dies; the time until the camera's has ended [s]."""
         self.main.close()
         start = time.monotonic()
-        self.process.join(5)
+        self.process.join(20)
+        assert not self.process.is_alive()
         return time.monotonic() - start
 
 
@@ -119,6 +121,7 @@ def pictures(directory):
     return seen
 
 
+@keeps_time
 def test_rows_and_pictures_agree_and_main_s_end_ends_the_process(start, tmp_path):
     running = start(rendered())
     running.wait(lambda row: row.count >= 30)
@@ -152,6 +155,7 @@ def test_a_killed_camera_process_loses_less_than_a_second(start, tmp_path):
     assert len(pictures(tmp_path)) >= read - 2
 
 
+@keeps_time
 def test_a_short_delay_loses_no_picture_and_a_long_one_is_counted(start, tmp_path):
     running = start(rendered())
     row = running.wait(lambda row: row.count >= 10)
@@ -205,6 +209,7 @@ def test_a_missing_encoder_names_its_extra(tmp_path, monkeypatch):
         VideoWriter(tmp_path / "xz.mkv", size=(640, 480), rate=30.0)
 
 
+@keeps_time
 def test_the_same_picture_again_looks_dead_and_is_recorded(start, tmp_path):
     stop = host_time() + 2.0
     time_ = np.arange(stop - 10.0, stop + 20.0, 0.01)
@@ -233,7 +238,7 @@ def test_a_camera_that_ends_or_cannot_be_opened_is_told(start, tmp_path):
     running = start(partial(FilesCamera, tmp_path / "source.mkv"))
     row = running.wait(lambda row: row.trouble)
     assert row.trouble == Trouble.SOURCE_LOST
-    assert running.end() < 0.5
+    running.end()
     lost, left = read_events(tmp_path)
     assert (lost["kind"], left["frames"]) == ("source_lost", 10)
     assert len(pictures(tmp_path)) == 10
@@ -257,6 +262,7 @@ def test_pictures_of_another_size_are_told(start, tmp_path):
     assert "(240, 320)" in read_events(tmp_path)[0]["reason"]
 
 
+@keeps_time
 def test_a_camera_that_never_answers_does_not_keep_its_process(start, tmp_path):
     running = start(rendered(timing=Timing(latency=100.0)))
     deadline = time.monotonic() + 10
@@ -280,7 +286,7 @@ def test_a_file_that_may_not_grow_is_told_and_the_camera_goes_on(start, tmp_path
     assert row.trouble == Trouble.WRITE_FAILED
     later = running.wait(lambda later: later.count > row.count + 5)
     assert later.beat > row.beat
-    assert running.end() < 0.5
+    running.end()
     failed, left = read_events(tmp_path)
     assert (failed["kind"], left["kind"]) == ("write_failed", "left")
     assert failed["file"] in ("frames_xz.csv", "xz.mkv")

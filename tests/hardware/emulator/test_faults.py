@@ -1,4 +1,8 @@
-"""Faults of the link, of the client and of the operator, and what the emulated arm does then."""
+"""Faults of the link, of the client and of the operator, and what the emulated arm does then.
+
+Those that are punctual need the real library to keep time. `test_emulator_stepped` has how soon
+the arm rests, and after what time a watchdog or a protective stop ends.
+"""
 
 import signal
 import socket
@@ -10,8 +14,6 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.emulator import EmulatorProcess
 from bolfi_liquids.hardware.emulator.admin_client import AdminError
-
-pytestmark = pytest.mark.punctual
 
 HOME = [0.3, -1.4, 1.6, -1.7, -1.5, 0.2]
 
@@ -29,7 +31,7 @@ def heard():
 
 @pytest.fixture
 def emulator():
-    with EmulatorProcess.start(joints=HOME, options={"unlock-after": 0.2}) as emulator:
+    with EmulatorProcess.start(joints=HOME, options={"unlock-after": 1.0}) as emulator:
         yield emulator
 
 
@@ -61,17 +63,19 @@ class Client:
         self.process.communicate()
 
 
-def rests_within(admin, seconds):
+def until(condition, seconds=20.0):
     end = time.monotonic() + seconds
-    while not (resting := admin.state().at_rest) and time.monotonic() < end:
+    while not (met := condition()) and time.monotonic() < end:
         time.sleep(0.01)
-    return resting
+    return met
+
+
+def rests_within(admin, seconds):
+    return until(lambda: admin.state().at_rest, seconds)
 
 
 def moving(admin):
-    end = time.monotonic() + 3.0
-    while admin.state().speed[2] < 0.045 and time.monotonic() < end:
-        time.sleep(0.01)
+    until(lambda: admin.state().speed[2] >= 0.045)
     return not admin.state().at_rest
 
 
@@ -84,6 +88,7 @@ while True:
 """
 
 
+@pytest.mark.punctual
 def test_watchdog_stops_the_arm_of_a_killed_client(emulator):
     with Client(emulator, "control.setWatchdog(10.0)" + SPEED) as client:
         assert client.hear() == "moving"
@@ -107,6 +112,7 @@ def test_without_a_watchdog_a_killed_client_s_arm_goes_on(emulator):
         assert not rests_within(emulator.admin, 0.5)
 
 
+@pytest.mark.punctual
 def test_watchdog_stops_the_arm_behind_a_frozen_link(emulator):
     with Client(emulator, "control.setWatchdog(10.0)" + SPEED) as client:
         assert client.hear() == "moving"
@@ -136,16 +142,16 @@ def test_nothing_resumes_after_a_protective_stop(emulator):
         assert moving(emulator.admin)
         emulator.admin.protective_stop()
         assert dashboard(emulator, "unlock protective stop").startswith("Cannot unlock")
-        assert rests_within(emulator.admin, 0.3)
+        assert rests_within(emulator.admin, 5.0)
         state = emulator.admin.state()
         assert state.safety_bits & 1 << 2
         assert not state.safety_bits & 1
         assert state.runtime_state == 1
         client.say()
         assert client.hear() == "False False"
-        time.sleep(0.2)
         assert dashboard(emulator, "safetymode") == "Safetymode: PROTECTIVE_STOP"
-        assert dashboard(emulator, "unlock protective stop") == "Protective stop releasing"
+        released = "Protective stop releasing"
+        assert until(lambda: dashboard(emulator, "unlock protective stop") == released)
         time.sleep(0.2)
         state = emulator.admin.state()
         assert (state.safety_bits, state.runtime_state, state.at_rest) == (1, 1, True)
@@ -177,14 +183,14 @@ def dashboard(emulator, line):
 def test_impossible_motions_are_protective_stops(emulator, command):
     with Client(emulator, f"{command}\nsay('sent')\nheard()") as client:
         assert client.hear() == "sent"
-        time.sleep(0.3)
+        assert until(lambda: "protective stop" in emulator.admin.state().reason)
         state = emulator.admin.state()
-        assert "protective stop" in state.reason
         assert state.safety_bits & 1 << 2
         assert np.isfinite(state.joints).all()
-        assert rests_within(emulator.admin, 0.3)
+        assert rests_within(emulator.admin, 5.0)
 
 
+@pytest.mark.punctual
 def test_receiver_sees_a_freeze_and_a_drop_as_the_client_s_source_says(emulator):
     rtde_receive = pytest.importorskip("rtde_receive")
     receive = rtde_receive.RTDEReceiveInterface(emulator.address)
@@ -219,23 +225,10 @@ def test_receiver_gives_up_a_frozen_link_after_2_5_s(emulator):
     del receive
 
 
-def test_late_packages_are_late(emulator):
-    rtde_receive = pytest.importorskip("rtde_receive")
-    receive = rtde_receive.RTDEReceiveInterface(emulator.address)
-    emulator.admin.late(0.15)
-    time.sleep(0.3)
-    assert emulator.admin.state().time - receive.getTimestamp() == pytest.approx(0.15, abs=0.05)
-    emulator.admin.late(0.0)
-    time.sleep(0.25)  # packages keep their order: the late ones come first
-    assert emulator.admin.state().time - receive.getTimestamp() < 0.05
-    del receive
-
-
 def test_place_puts_the_arm_at_rest_elsewhere(emulator):
     emulator.admin.place([0.1] * 6)
-    time.sleep(0.05)
+    assert until(lambda: emulator.admin.state().joints == pytest.approx([0.1] * 6))
     state = emulator.admin.state()
-    assert state.joints == pytest.approx([0.1] * 6)
     assert state.at_rest
     assert emulator.admin.motions() == 0
     with pytest.raises(AdminError, match="beyond the joint limits"):

@@ -10,8 +10,6 @@ import pytest
 from bolfi_liquids.hardware.emulator import EmulatorProcess
 from bolfi_liquids.hardware.errors import RigError
 
-pytestmark = pytest.mark.punctual
-
 HOME = [0.3, -1.4, 1.6, -1.7, -1.5, 0.2]
 STICK = {
     "radius": 0.004,
@@ -51,7 +49,7 @@ def test_senseless_options_are_named(options, message):
         EmulatorProcess.start(**options)
 
 
-def gone(pid, seconds=3.0):
+def gone(pid, seconds=20.0):
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         try:
@@ -89,6 +87,7 @@ def test_it_ends_at_sigterm(emulator):
 
 
 @pytest.mark.slow
+@pytest.mark.punctual
 @pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="looks into /proc")
 def test_it_needs_at_most_a_quarter_of_a_core():
     rtde_control = pytest.importorskip("rtde_control")
@@ -98,10 +97,10 @@ def test_it_needs_at_most_a_quarter_of_a_core():
         control = rtde_control.RTDEControlInterface(emulator.address)
         control.speedL([0, 0, 0.02, 0, 0, 0], 0.5)
         before = processor_time(emulator.pid)
-        for _ in range(250):
+        for _ in range(150):
             control.speedL([0, 0, 0.02, 0, 0, 0], 0.5)
             time.sleep(0.02)
-        assert processor_time(emulator.pid) - before < 0.25 * 5.0
+        assert processor_time(emulator.pid) - before < 0.25 * 3.0
         assert emulator.admin.state().stick is not None
         assert "late" not in emulator.notes()
         del control, receive

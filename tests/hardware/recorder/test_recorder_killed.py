@@ -30,7 +30,7 @@ pytestmark = pytest.mark.punctual
 
 RIG = bundled_rig()
 ROBOT = 700.25  # the robot's clock minus this computer's [s]
-STIRRED = 8.0  # s
+STIRRED = 5.0  # s
 
 
 def motion(robot_time):
@@ -77,8 +77,13 @@ class Sampler(threading.Thread):
                 break
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("killed", ["recorder", "camera_xz", "all"])
+@pytest.mark.parametrize(
+    "killed",
+    [
+        pytest.param("all", marks=pytest.mark.slow),
+        *(pytest.param(one, marks=pytest.mark.minutes) for one in ("recorder", "camera_xz")),
+    ],
+)
 def test_what_was_recorded_up_to_a_second_before_the_kill_can_be_used(tmp_path, killed):
     directory = start_directory(tmp_path / "session", RIG, {"source": "rendered"})
     board, mains, processes = Board(), [], {}

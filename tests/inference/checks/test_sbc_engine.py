@@ -4,14 +4,16 @@ Three simulators with a closed form, chosen for what they ask of the engine: a l
 whose noise is correlated in time, one whose posterior has two modes. The draws are quadrature's,
 so that the posterior is judged and not a sampler, which has tests of its own. 256 ranks find
 draws 30 % too narrow always and 20 % eight times in ten; the standard error of a rate of 0.9 is
-0.019. All of it takes some ten minutes on two cores, so continuous integration takes some
-of the cases: the hardest where the engine chooses its simulations, and those of a shared design.
-The surrogate of the discrepancy is judged there by `test_calibration` alone.
+0.019. All of it takes about ten minutes on two cores, so continuous integration takes one case
+alone: correlated noise and a shared design, 64 replicates. Their coverage finds intervals half as
+wide as they should be (planted below) nearly always, 30 % too narrow ones one time in four. The
+surrogate of the discrepancy is judged there by `test_calibration` alone.
 """
 
 import importlib
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -74,7 +76,16 @@ def covers(made):
     return ((covered >= low) & (covered <= high)).all()
 
 
-@every_task("bimodal")
+def narrowed(made, factor):
+    """The same replicates with a fault planted: draws nearer to their mean."""
+    finished = [
+        one._replace(draws=one.draws.mean(0) + factor * (one.draws - one.draws.mean(0)))
+        for one in made.finished
+    ]
+    return replace(made, finished=finished)
+
+
+@every_task()
 def test_signal_surrogate_is_calibrated(run, task):
     made = run(task, "signal")
     uniform = inference.sbc(made)
@@ -83,16 +94,18 @@ def test_signal_surrogate_is_calibrated(run, task):
     assert covers(made)
 
 
-@every_task("line", "decay")
-def test_signal_surrogate_of_a_shared_design_is_calibrated(toys, pool, task):
-    """One design for all data sets: no acquisition is involved."""
+@every_task("decay")
+def test_signal_surrogate_of_a_shared_design_is_calibrated(toys, task):
+    """One design for all data sets: no acquisition is involved. The fits run here, one by one:
+    each process of a pool would compile the engine for itself."""
     simulate, prior = toys.TASKS[task]
     options = {"surrogate": "signal"}
     pipeline = inference.shared_design(simulate, prior, BUDGET, options=options, sampling=SAMPLING)
-    made = inference.replicates(pipeline, n=SHARED, draws=DRAWS, executor=pool)
+    made = inference.replicates(pipeline, n=SHARED, draws=DRAWS)
     print(f"\n{task}\n{inference.sbc(made)}\n{inference.coverage(made)}")
     assert not made.failed, made.errors
     assert covers(made)
+    assert not covers(narrowed(made, 0.5))
 
 
 @every_task()

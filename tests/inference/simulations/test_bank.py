@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from bolfi_liquids.inference import simulations
+from bolfi_liquids.inference.simulations import Keep, run_missing
 
 from bolfi_liquids import inference
 
@@ -183,6 +184,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from bolfi_liquids import inference
 from bolfi_liquids.inference import simulations
+from bolfi_liquids.inference.simulations import Keep, run_missing
 
 def simulate(theta, seeds):
     time.sleep(0.02)
@@ -197,9 +199,9 @@ with inference.SimulationBank(sys.argv[1]) as bank, ThreadPoolExecutor(3) as poo
     if sys.argv[4] == "alone":
         made = []
         for first in range(0, 40, 4):
-            made += simulations.run_missing(simulate, jobs[first : first + 4], (1,), bank, "", None)
+            made += run_missing(simulate, jobs[first : first + 4], Keep(bank))
     else:
-        made = simulations.run_missing(simulate, jobs, (1,), bank, "", pool)
+        made = run_missing(simulate, jobs, Keep(bank, executor=pool), (1,))
 assert [m.signal[0] for m in made] == [job.seed + 0.5 for job in jobs]
 """
 
@@ -232,11 +234,9 @@ def test_results_come_in_order_and_batches_are_kept_as_they_finish(batch, calls)
 
     with inference.SimulationBank() as bank:
         with pytest.raises(KeyboardInterrupt):
-            simulations.run_missing(
-                simulate, jobs, (1,), bank, "", batch=batch, advance=interrupted
-            )
+            run_missing(simulate, jobs, Keep(bank, batch=batch), advance=interrupted)
         assert kept == ([7] * 4 if batch is None else [3, 3, 3, 6])
-        found = simulations.run_missing(simulate, jobs, (1,), bank, "", batch=batch)
+        found = run_missing(simulate, jobs, Keep(bank, batch=batch), (1,))
         assert made == calls  # nothing twice
         assert [one.signal[0] for one in found] == [job.seed + 0.5 for job in jobs]
 
@@ -250,8 +250,8 @@ def test_an_executor_takes_jobs_one_by_one_whatever_the_batch():
 
     jobs = [simulations.Job({"a": 1.0}, seed) for seed in range(6)]
     with inference.SimulationBank() as bank, ThreadPoolExecutor(2) as pool:
-        found = simulations.run_missing(
-            simulate, jobs, (1,), bank, "", pool, batch=4, advance=finished.append
+        found = run_missing(
+            simulate, jobs, Keep(bank, batch=4, executor=pool), (1,), advance=finished.append
         )
     assert [one.signal[0] for one in found] == [job.seed + 0.5 for job in jobs]
     assert made == finished == [1] * 6
@@ -270,9 +270,7 @@ def test_what_was_finished_just_before_the_claim_is_not_simulated():
 
     with Busy() as bank:
         for _ in range(2):
-            (found,) = simulations.run_missing(
-                simulate, [simulations.Job(THETA, 0)], (1,), bank, ""
-            )
+            (found,) = run_missing(simulate, [simulations.Job(THETA, 0)], Keep(bank), (1,))
             np.testing.assert_array_equal(found.signal, [7.0])
         assert bank.claim("", THETA, 0)  # nobody holds it any more
 
@@ -286,5 +284,5 @@ def test_the_same_job_twice_in_a_batch_is_simulated_once():
 
     with inference.SimulationBank() as bank:
         batch = [simulations.Job(THETA, seed) for seed in (0, 1, 0)]
-        found = simulations.run_missing(simulate, batch, (1,), bank, "")
+        found = run_missing(simulate, batch, Keep(bank), (1,))
     assert calls == [0, 1] and [result.signal[0] for result in found] == [THETA["a"]] * 3

@@ -101,11 +101,11 @@ def test_spawned_processes_that_load_no_jax(prior, observed, by_hand, worker_sid
     assert_same(fit, by_hand)
 
 
-def test_dask_by_its_executor_and_by_its_address(prior, observed, simulate, by_hand):
+def test_dask_by_its_client_and_by_its_address(prior, observed, simulate, by_hand):
     local = {"processes": False, "n_workers": 1, "threads_per_worker": 2, "protocol": "tcp://"}
     with LocalCluster(**local, dashboard_address=None) as cluster:
         with cluster.get_client() as client:
-            given = inference.fit(simulate, prior, observed, **options(client.get_executor()))
+            given = inference.fit(simulate, prior, observed, **options(client))
         address = cluster.scheduler_address
         found = inference.fit(simulate, prior, observed, **options(address))
         deadline = time.monotonic() + 10.0
@@ -131,6 +131,28 @@ def test_one_in_flight_is_one_per_round(prior, observed, simulate):
             simulate, prior, observed, budget=7, initial=5, batch=1, executor=pool
         )
     assert_same(plain, spread)
+
+
+def test_in_rounds_an_executor_has_the_bits_of_none(prior, observed, simulate):
+    plain = inference.fit(simulate, prior, observed, budget=8, initial=5, batch=3)
+    with ThreadPoolExecutor(3) as pool:
+        spread = inference.fit(
+            dithering(simulate),
+            prior,
+            observed,
+            budget=8,
+            initial=5,
+            batch=3,
+            executor=pool,
+            in_rounds=True,
+        )
+    assert_same(plain, spread)
+
+
+def test_progress_is_told_of_every_simulation(prior, observed, simulate):
+    told = []
+    inference.fit(simulate, prior, observed, budget=7, initial=5, batch=2, progress=told.append)
+    assert told == [1] * 7
 
 
 def test_keeps_batch_in_flight_and_no_more(prior, observed, simulate):
@@ -276,10 +298,11 @@ def simulate(theta, seeds):
 if __name__ == "__main__":
     import jax
     from bolfi_liquids import inference
-    jobs = [simulations.Job({"a": 1.0}, 0)]
+    from bolfi_liquids.inference.simulations import Job, Keep, run_missing
+    jobs = [Job({"a": 1.0}, 0)]
     with ProcessPoolExecutor(1, mp_context=get_context(sys.argv[1])) as pool:
         with inference.SimulationBank() as bank:
-            print(simulations.run_missing(simulate, jobs, (5,), bank, "", pool)[0].signal)
+            print(run_missing(simulate, jobs, Keep(bank, executor=pool), (5,))[0].signal)
 """
 
 

@@ -130,15 +130,24 @@ def kill_in_the_middle(server, files, pool, finished, delay):
     assert server.wait() in (signal.SIGKILL, 0)  # 0 if this process was not given the time
 
 
-@pytest.mark.slow
-def test_killed_at_twenty_moments(tmp_path, server, undisturbed):
-    """At a random moment after 0, 1, ... 19 of 20 simulations; with threads and with processes.
+FEW = 0, 7, 14, 19  # of threads and of processes two each, before, in the middle and at the end
+
+
+@pytest.mark.parametrize(
+    "moments",
+    [
+        pytest.param(FEW, id="few", marks=pytest.mark.slow),
+        pytest.param(range(BUDGET), id="all", marks=pytest.mark.minutes),
+    ],
+)
+def test_killed_at_any_moment(tmp_path, server, undisturbed, moments):
+    """At a random moment after so many of 20 simulations; with threads and with processes.
 
     What was running, at most one per worker, is simulated again; nothing else is.
     """
     chance = np.random.default_rng()
-    for finished in range(BUDGET):
-        pool = ("threads", "processes")[finished % 2]
+    for finished in moments:
+        pool = POOLS[finished % 2]
         delay = chance.uniform(0.0, 0.1 if finished else 1.0)
         case = f"{pool}, {finished} finished, {delay:.4f} s"
         log, bank, out = (tmp_path / f"{finished}.{suffix}" for suffix in ("log", "sqlite", "npz"))

@@ -4,12 +4,13 @@ import multiprocessing
 import threading
 import time
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
 import xarray as xr
 from bolfi_liquids.inference import SimulationBank
-from bolfi_liquids.inference.simulations import Job, Simulation, run_missing
+from bolfi_liquids.inference.simulations import Job, Keep, Simulation, run_missing
 from bolfi_liquids.inference.simulations.failures import timed_out
 from bolfi_liquids.inference.simulations.job import run_batch, simulation_seed
 
@@ -80,7 +81,7 @@ def test_an_error_that_is_no_text_is_kept_all_the_same():
         raise OSError("cannot read \udcff.dat")  # how Python spells a file name that is not UTF-8
 
     with SimulationBank() as bank:
-        (found,) = run_missing(simulate, JOBS[:1], (1,), bank, "")
+        (found,) = run_missing(simulate, JOBS[:1], Keep(bank), (1,))
         assert bank.get("", *JOBS[0]) == found
     assert found.error.startswith(r"OSError: cannot read \udcff.dat (")
 
@@ -89,13 +90,41 @@ def test_an_error_that_is_no_text_is_kept_all_the_same():
 def test_a_timeout_is_final_until_more_time_is_allowed(forever, allowed, again):
     calls = []
     with SimulationBank() as bank:
-        first = run_missing(stuck_at(0, forever), JOBS[:1], (1,), bank, "", timeout=0.1)
-        then = run_missing(stuck_at(-1, forever, calls), JOBS[:1], (1,), bank, "", timeout=allowed)
+        first = run_missing(stuck_at(0, forever), JOBS[:1], Keep(bank, timeout=0.1))
+        then = run_missing(stuck_at(-1, forever, calls), JOBS[:1], Keep(bank, timeout=allowed))
         assert bool(calls) == again
         assert (then == first) == (not again)
         # no limit is more time than any
-        (last,) = run_missing(stuck_at(-1, forever), JOBS[:1], (1,), bank, "")
+        (last,) = run_missing(stuck_at(-1, forever), JOBS[:1], Keep(bank))
     np.testing.assert_array_equal(last.signal, [0.0])
+
+
+class Patient:
+    """A simulator that stops itself, as one that must stay in its thread."""
+
+    def __init__(self, seconds):
+        self.seconds, self.allowed, self.threads = seconds, 0.0, set()
+
+    @contextmanager
+    def time_limit(self, seconds):
+        self.allowed = seconds
+        yield
+
+    def simulate(self, theta, seeds):
+        self.threads.add(threading.current_thread())
+        time.sleep(min(self.seconds, self.allowed + 0.01))
+        if self.seconds > self.allowed:
+            raise TimeoutError("stopped")
+        return theta["a"][:, None]
+
+
+@pytest.mark.parametrize(("seconds", "error"), [(0.0, None), (9.0, timed_out(0.1))])
+def test_a_simulator_that_stops_itself_stays_in_its_thread(seconds, error):
+    patient = Patient(seconds)
+    with SimulationBank() as bank:
+        (found,) = run_missing(patient.simulate, JOBS[:1], Keep(bank, timeout=0.1))
+    assert found.error == error
+    assert patient.threads == {threading.current_thread()}
 
 
 def test_every_kind_is_counted_and_written(tmp_path, prior, observed, simulate, forever):
@@ -152,7 +181,7 @@ def test_the_clock_runs_in_the_worker(tmp_path, monkeypatch):
     batch = [Job({"a": 0.3}, seed) for seed in range(4)] + [Job({"a": 30.0}, 4)]
     context = multiprocessing.get_context("spawn")
     with SimulationBank() as bank, ProcessPoolExecutor(1, mp_context=context) as pool:
-        found = run_missing(sleeper.sleep, batch, (1,), bank, "", pool, timeout=0.9)
+        found = run_missing(sleeper.sleep, batch, Keep(bank, executor=pool, timeout=0.9))
     assert [result.error for result in found] == [None] * 4 + [timed_out(0.9)]
 
 

@@ -1,0 +1,150 @@
+"""The section "calibrate" of summary.json."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from importlib.metadata import version
+from typing import TYPE_CHECKING, ClassVar, Self
+
+import numpy as np
+
+from ..run.summary import Number, Section
+from .check import Check
+from .noise import irreducible_rms, rms
+from .stir_simulator import Stirring
+
+if TYPE_CHECKING:
+    from xarray import DataArray, DataTree
+
+    from ..inference import Fit
+
+QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
+RHAT_MAX, ESS_MIN = 1.01, 400.0  # Vehtari et al. 2021
+DIVERGENT_SHARE_MAX = 0.01  # of the draws
+
+
+class SamplerStatus(StrEnum):
+    """Whether draws can be relied upon."""
+
+    CONVERGED = "converged"
+    NOT_CONVERGED = "not converged"
+
+    @property
+    def advice(self) -> str:
+        """What to do."""
+        return {
+            SamplerStatus.CONVERGED: "the intervals of the posterior may be used",
+            SamplerStatus.NOT_CONVERGED: "calibrate again with more draws or another sampler",
+        }[self]
+
+
+@dataclass(frozen=True)
+class ParameterSummary:
+    """Mean, standard deviation and quantiles of the draws of a parameter, in its unit."""
+
+    mean: Number
+    sd: Number
+    q05: Number
+    q50: Number
+    q95: Number
+
+    @classmethod
+    def of(cls, draws: "DataArray") -> Self:
+        """From all draws of the parameter."""
+        values = draws.to_numpy()
+        quantiles = {name: float(np.quantile(values, q)) for name, q in QUANTILES.items()}
+        return cls(mean=float(values.mean()), sd=float(values.std(ddof=1)), **quantiles)
+
+
+@dataclass(frozen=True)
+class Seconds:
+    """Time spent [s]."""
+
+    simulator: Number
+    engine: Number
+    sampling: Number
+
+
+@dataclass(frozen=True)
+class CalibrationSummary(Section):
+    """Numbers of a calibration.
+
+    Attributes:
+        parameters: By name.
+        least_viscosity: Below it the simulator cannot distinguish liquids [Pa s].
+        below_least_viscosity: Share of the posterior there.
+        best: theta*, where the surrogate expects the best fit.
+        closest: Parameters of the simulation with the least discrepancy.
+        n_simulations: Number that the engine learned from.
+        n_check_simulations: Number that judged the result.
+        fit_rms_deg: RMS between the recording and the closest simulation [deg].
+        noise_deg: RMS that the right model would leave [deg], see `noise.irreducible_rms`.
+        rhat_max, ess_min: Worst R-hat and effective sample size of the parameters.
+        n_draws: Number in all chains.
+        divergences: Number of divergent transitions of NUTS.
+        emulator_warnings: Warnings of the surrogate's checks.
+        seconds: Time spent.
+        seed: Of all random draws.
+        version: Of this package.
+    """
+
+    SECTION: ClassVar[str] = "calibrate"
+
+    parameters: Mapping[str, ParameterSummary]
+    least_viscosity: Number
+    below_least_viscosity: Number
+    best: Mapping[str, float]
+    closest: Mapping[str, float]
+    n_simulations: int
+    n_check_simulations: int
+    fit_rms_deg: Number
+    noise_deg: Number
+    rhat_max: Number
+    ess_min: Number
+    n_draws: int
+    divergences: int
+    emulator_warnings: tuple[str, ...]
+    seconds: Seconds
+    seed: int
+    version: str
+
+    @classmethod
+    def from_fit(cls, tree: "DataTree", fit: "Fit", stirring: Stirring, check: Check) -> Self:
+        """From posterior.nc, the engine's fit, what was stirred and the simulations that check."""
+        posterior, closest = tree["posterior"], fit.closest
+        attrs, seen = posterior.attrs, [one.inclination for one in stirring.recordings]
+        thin = posterior["viscosity"].to_numpy() < stirring.least_viscosity
+        spent = {name: tree.attrs[f"seconds_{name}"] for name in Seconds.__dataclass_fields__}
+        return cls(
+            parameters={
+                str(name): ParameterSummary.of(draws) for name, draws in posterior.data_vars.items()
+            },
+            least_viscosity=float(stirring.least_viscosity),
+            below_least_viscosity=float(thin.mean()),
+            best=fit.best,
+            closest=closest.theta,
+            n_simulations=int(fit.simulations.sizes["simulation"]),
+            n_check_simulations=len(check.predictive) + len(check.replicates),
+            fit_rms_deg=float(np.degrees(rms(stirring.observed - closest.signal))),
+            noise_deg=float(np.degrees(irreducible_rms(seen, check.replicates))),
+            rhat_max=float(attrs["rhat_max"]),
+            ess_min=float(min(attrs["ess_bulk_min"], attrs["ess_tail_min"])),
+            n_draws=int(posterior.sizes["chain"] * posterior.sizes["draw"]),
+            divergences=int(attrs["divergences"]),
+            emulator_warnings=tuple(fit.warnings),
+            seconds=Seconds(**{name: float(value) for name, value in spent.items()}),
+            seed=int(tree.attrs["seed"]),
+            version=version("bolfi-liquids"),
+        )
+
+    @property
+    def divergent_share(self) -> float:
+        """Share of the draws that are divergent."""
+        return self.divergences / self.n_draws
+
+    @property
+    def sampler_status(self) -> SamplerStatus:
+        """Whether R-hat, effective sample size and divergences are within their limits."""
+        mixed = self.rhat_max <= RHAT_MAX and self.ess_min >= ESS_MIN  # neither holds for NaN
+        good = mixed and self.divergent_share <= DIVERGENT_SHARE_MAX
+        return SamplerStatus.CONVERGED if good else SamplerStatus.NOT_CONVERGED

@@ -1,0 +1,92 @@
+"""Where a command simulates: the options `--workers`, `--dask` and `--timeout`."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+WorkersOption = Annotated[
+    int | None,
+    typer.Option(
+        "--workers", min=1, help="Processes that simulate; 1 is this one. Else one per processor."
+    ),
+]
+DaskOption = Annotated[
+    str | None,
+    typer.Option("--dask", metavar="ADDRESS", help="Simulate on the cluster of this scheduler."),
+]
+TimeoutOption = Annotated[
+    float | None, typer.Option("--timeout", help="Seconds that one simulation may take.")
+]
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Where something long runs.
+
+    Attributes:
+        workers: Number of processes; 1 is this process, None one for each processor.
+        dask: Address of a Dask scheduler, in place of processes.
+    """
+
+    workers: WorkersOption = 1
+    dask: DaskOption = None
+
+    @contextmanager
+    def executor(self) -> "Iterator[Executor | None]":
+        """The executor that `workers` and `dask` name; it is closed afterwards."""
+        with open_executor_of(self.workers, self.dask) as executor:
+            yield executor
+
+
+@dataclass(frozen=True)
+class Compute(Workers):
+    """Where simulations run, and for how long at the most.
+
+    Attributes:
+        timeout: Seconds that one simulation may take; None sets no limit.
+    """
+
+    timeout: TimeoutOption = None
+
+
+@dataclass(frozen=True)
+class AllProcessors(Workers):
+    """`Workers` of a long study, which takes all processors unless told otherwise."""
+
+    workers: WorkersOption = None
+
+
+@dataclass(frozen=True)
+class StudyCompute(Compute):
+    """`Compute` of a long study, which takes all processors unless told otherwise."""
+
+    workers: WorkersOption = None
+
+
+@contextmanager
+def open_executor_of(workers: int | None, dask: str | None) -> "Iterator[Executor | None]":
+    """Processes, a Dask cluster, or None for this process.
+
+    Raises:
+        BadParameter: Both are given.
+        ImportError: Dask is not installed.
+        ConnectionError: No scheduler answers there.
+    """
+    if dask is None:
+        from ..run.workers import processes
+
+        with processes(workers) as executor:
+            yield executor
+        return
+    if workers not in (None, 1):
+        raise typer.BadParameter("--workers and --dask name two places to simulate: give one")
+    from ..inference.simulations import open_executor
+
+    with open_executor(dask) as executor:
+        yield executor

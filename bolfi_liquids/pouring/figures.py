@@ -1,0 +1,141 @@
+"""Figures of a chosen pour: where it lies among the actions, and what it spills."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..drawing import BLUE, INK, ORANGE
+from ..seeds import Phase, generator
+from .spillage import ACTION, RISK
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.contour import QuadContourSet
+    from matplotlib.patches import Patch
+    from xarray import Dataset, DataTree
+
+PERCENT_LEVELS = (0, 1, 2, 5, 10, 20, 40, 70, 100)
+"""Spilled, of the contours: dense where little is spilled, which is what matters."""
+
+BAD_CASE = 0.9  # quantile over the draws of the second map
+SURE, BOOTSTRAP_SAMPLES = 0.95, 200
+"""Confidence that an action is worse, and the samples that it is computed from."""
+
+MIN_COMPARED_DRAWS = 8
+"""Draws, of which fewer cannot show that an action is worse."""
+
+CHOICES = {"chosen": (BLUE, "o", "chosen pour"), "plug_in": (ORANGE, "s", "best at θ* alone")}
+"""Colour, marker and label of the two actions, by their group in pour.nc."""
+
+
+def action_axes(tree: "DataTree") -> tuple[NDArray, NDArray]:
+    """Angular velocities [deg/s] and distances [cm] of the actions that were tried.
+
+    Args:
+        tree: pour.nc.
+    """
+    actions = tree["actions"].to_dataset()
+    return np.degrees(actions["angular_velocity"].to_numpy()), 100.0 * actions[
+        "distance"
+    ].to_numpy()
+
+
+def risk_label(tree: "DataTree") -> str:
+    """The name of what was minimised."""
+    return "expected" if tree.attrs["risk"] == "mean" else "CVaR"
+
+
+def draw_expected(axes: "Axes", tree: "DataTree") -> "QuadContourSet":
+    """The risk [%] of each action, with the chosen one and the plug-in."""
+    x, y = action_axes(tree)
+    shades = draw_map(axes, x, y, 100.0 * tree["actions"]["risk"].to_numpy())
+    mark_choices(axes, tree)
+    axes.set_title(f"spilled [%], {risk_label(tree)}", loc="left")
+    axes.set_xlabel("angular velocity [deg/s]")
+    axes.set_ylabel("distance from lip to receiver's axis [cm]")
+    return shades
+
+
+def draw_map(axes: "Axes", x: NDArray, y: NDArray, percent: NDArray) -> "QuadContourSet":
+    """Percentages (W, D) over angular velocities x (W,) [deg/s] and distances y (D,) [cm]."""
+    shades = axes.contourf(x, y, percent.T, levels=PERCENT_LEVELS, cmap="Greys", alpha=0.8)
+    lines = axes.contour(x, y, percent.T, levels=PERCENT_LEVELS[1:4], colors=INK, linewidths=0.6)
+    axes.clabel(lines, fmt="%g %%", fontsize=7.5)
+    return shades
+
+
+def dot_actions(axes: "Axes", x: NDArray, y: NDArray, where: NDArray) -> "Patch":
+    """Dots over actions, bool (W, D); what stands for them in a legend."""
+    from matplotlib.patches import Patch
+
+    levels = (0.5, 1.5)
+    axes.contourf(x, y, where.T.astype(float), levels=levels, colors="none", hatches=["...."])
+    return Patch(facecolor="none", edgecolor=INK, hatch="....", lw=0.0)
+
+
+def place_of(actions: "Dataset", chosen: dict) -> tuple[int, int]:
+    """Row and column of an action."""
+    row, column = (
+        int(np.argmin(np.abs(actions[name].to_numpy() - chosen[name]))) for name in ACTION
+    )
+    return row, column
+
+
+def not_surely_worse(
+    spilled: NDArray, risk: str, chosen: tuple[int, int], seed: int = 0
+) -> NDArray[np.bool_]:
+    """Actions that these draws do not show, at `SURE`, to be worse than the chosen one.
+
+    The difference of two actions is paired by draw, which removes what all actions spill of a
+    liquid alike; its interval is a bootstrap over draws.
+
+    Args:
+        spilled: Of each draw, shape (draws, W, D).
+        risk: Which measure of `spillage.RISK` is compared.
+        chosen: Row and column of the chosen action.
+        seed: Of the bootstrap.
+
+    Returns:
+        Shape (W, D); none of them where there are fewer than `MIN_COMPARED_DRAWS` draws.
+    """
+    if len(spilled) < MIN_COMPARED_DRAWS:
+        return np.zeros(spilled.shape[1:], bool)
+    again = generator(seed, Phase.BOOTSTRAP).integers(
+        len(spilled), size=(BOOTSTRAP_SAMPLES, len(spilled))
+    )
+    risks = np.stack([RISK[risk](spilled[draws]) for draws in again])
+    return np.quantile(risks - risks[:, *chosen][:, None, None], 1.0 - SURE, axis=0) <= 0.0
+
+
+def mark_choices(axes: "Axes", tree: "DataTree") -> None:
+    """The chosen action and the plug-in."""
+    for name, (colour, marker, label) in CHOICES.items():
+        action = tree[name].attrs
+        at = np.degrees(action["angular_velocity"]), 100.0 * action["distance"]
+        face = colour if name == "chosen" else "none"  # hollow: both stay visible in one place
+        axes.plot(
+            *at,
+            marker,
+            color=colour,
+            markerfacecolor=face,
+            markersize=8 if name == "chosen" else 12,
+            label=label,
+            clip_on=False,
+            zorder=5,
+        )
+
+
+def draw_outcomes(axes: "Axes", tree: "DataTree") -> None:
+    """Spilled percentage of each outcome of both actions, 90 % of them, and their means."""
+    for at, (name, (colour, marker, _)) in enumerate(CHOICES.items()):
+        percent = 100.0 * tree[name]["spilled"].to_numpy()
+        spread = np.linspace(-0.18, 0.18, len(percent))
+        axes.plot(percent, at + spread, ".", color=colour, alpha=0.45, markersize=5)
+        low, high = np.quantile(percent, (0.05, 0.95))
+        axes.plot([low, high], [at + 0.3] * 2, color=colour, linewidth=2.0)
+        axes.plot(percent.mean(), at + 0.3, marker, color=colour, markersize=7)
+    axes.set_yticks(range(len(CHOICES)), [label for _, _, label in CHOICES.values()])
+    axes.set_ylim(len(CHOICES) - 0.4, -0.5)
+    axes.set_xlim(left=0)
+    axes.set_xlabel("spilled [%]")

@@ -1,0 +1,202 @@
+"""A chosen pour: the action, what it spills, and where it lies among the actions."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibration.tree import read_tree
+from ..errors import InputError
+from ..inputs.settings import PourSettings
+from ..run.directory import POUR
+from ..run.summary import Number, Section
+from ..words import html_table, percent
+from .spillage import ACTION, FRACTIONS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from xarray import DataTree
+
+SPILLAGE_QUANTILE = 0.95
+"""Of the spilled fraction: one outcome in twenty exceeds it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """An action and what it spills, on draws and seeds that did not choose it.
+
+    Attributes:
+        angular_velocity: Of the source about its lip [rad/s].
+        distance: Horizontally from the lip to the receiver's axis [m].
+        fractions: Spilled, received and retained, shape (outcomes, 3); rows sum to 1. Each draw
+            has several outcomes, as the liquid may land elsewhere than simulated.
+    """
+
+    angular_velocity: float
+    distance: float
+    fractions: NDArray[np.float64]
+
+    @property
+    def action(self) -> dict[str, float]:
+        """`angular_velocity` and `distance`."""
+        return dict(zip(ACTION, (self.angular_velocity, self.distance), strict=True))
+
+    @property
+    def expected_spillage(self) -> float:
+        """Mean spilled fraction."""
+        return float(self.fractions[:, 0].mean())
+
+    @property
+    def spillage_q95(self) -> float:
+        """Spilled fraction that one outcome in twenty exceeds."""
+        return float(np.quantile(self.fractions[:, 0], SPILLAGE_QUANTILE))
+
+    def __str__(self) -> str:
+        return (
+            f"{np.degrees(self.angular_velocity):.1f} deg/s, {100 * self.distance:.2f} cm, "
+            f"expected to spill {percent(self.expected_spillage)}"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Pour:
+    """The chosen pour, and beside it the plug-in: the best one if theta* were the truth.
+
+    Attributes:
+        path: The RUN directory.
+        chosen: Found over the posterior draws.
+        plug_in: Found at theta* alone, judged over the same draws as `chosen`.
+    """
+
+    path: Path
+    chosen: Judged
+    plug_in: Judged
+
+    def __repr__(self) -> str:
+        return f"Pour({str(self.path)!r}: {self.chosen})"
+
+    def _repr_html_(self) -> str:
+        rows = {"run": self.path, "chosen": self.chosen, "best at θ* alone": self.plug_in}
+        return html_table("Pour", rows)
+
+    @classmethod
+    def open(cls, run: str | Path) -> Self:
+        """Read the pour that a run has chosen.
+
+        Raises:
+            InputError: There is none in the directory, or its file is damaged.
+        """
+        run = Path(run)
+        if not (run / POUR).is_file():
+            raise InputError(
+                "no pour was chosen", where=str(run), fix=f"choose one: bolfi-liquids pour {run}"
+            )
+        tree = read_pour(run)
+        return cls(run, *(_judged(tree, name) for name in ("chosen", "plug_in")))
+
+    def plot_map(self, ax: "Axes | None" = None) -> "Axes":
+        """Expected spillage over angular velocity and distance, with both actions.
+
+        Args:
+            ax: Where to draw; None makes a figure.
+
+        Returns:
+            The axes.
+        """
+        from ..drawing import panels, styled
+        from .figures import draw_expected
+
+        with styled():
+            drawn = panels(ax, (1, 1), (4.6, 3.6))
+            axes = drawn.grid[0, 0]
+            drawn.figure.colorbar(draw_expected(axes, read_pour(self.path)), ax=axes)
+            drawn.legend(*axes.get_legend_handles_labels())
+        return axes
+
+
+@dataclass(frozen=True)
+class ActionSummary:
+    """An action and what it is expected to spill.
+
+    Attributes:
+        angular_velocity_deg_s: Of the source about its lip [deg/s].
+        distance_cm: Horizontally from the lip to the receiver's axis [cm].
+        expected_spillage: Mean spilled fraction.
+        spillage_q95: Fraction that one outcome in twenty exceeds.
+    """
+
+    angular_velocity_deg_s: Number
+    distance_cm: Number
+    expected_spillage: Number
+    spillage_q95: Number
+
+    @classmethod
+    def of(cls, judged: Judged, **more) -> Self:
+        """From what was judged; `more` are the fields of a subclass."""
+        return cls(
+            angular_velocity_deg_s=float(np.degrees(judged.angular_velocity)),
+            distance_cm=100.0 * judged.distance,
+            expected_spillage=judged.expected_spillage,
+            spillage_q95=judged.spillage_q95,
+            **more,
+        )
+
+    @property
+    def action(self) -> tuple[float, float]:
+        """Angular velocity [deg/s] and distance [cm]."""
+        return self.angular_velocity_deg_s, self.distance_cm
+
+
+@dataclass(frozen=True)
+class PourSummary(ActionSummary, Section):
+    """The section "pour" of summary.json: the chosen action, beside the plug-in.
+
+    Attributes:
+        least_viscosity: Below it the simulator cannot distinguish liquids in this pour [Pa s].
+        n_simulations: Pours of one liquid, in the searches and in judging.
+        risk: "mean" or "cvar".
+        seed: Of all random draws.
+        plug_in: The action that would be best if theta* were the truth.
+    """
+
+    SECTION: ClassVar[str] = "pour"
+
+    least_viscosity: Number
+    n_simulations: int
+    risk: str
+    seed: int
+    plug_in: ActionSummary
+
+    @classmethod
+    def from_pour(
+        cls, pour: Pour, settings: PourSettings, *, n_simulations: int, least_viscosity: float
+    ) -> Self:
+        """From a pour, its settings, the number of simulations and the least viscosity [Pa s]."""
+        return cls.of(
+            pour.chosen,
+            least_viscosity=least_viscosity,
+            n_simulations=n_simulations,
+            risk=settings.risk,
+            seed=settings.seed,
+            plug_in=ActionSummary.of(pour.plug_in),
+        )
+
+
+def read_pour(run: Path) -> "DataTree":
+    """pour.nc of a run.
+
+    Raises:
+        InputError: The file is damaged.
+    """
+    return read_tree(run / POUR, fix=f"write it again: bolfi-liquids pour {run}")
+
+
+def _judged(tree: "DataTree", name: str) -> Judged:
+    """The action in one of the groups `chosen` and `plug_in`."""
+    outcomes = tree[name].to_dataset()
+    columns = [outcomes[fraction].to_numpy() for fraction in FRACTIONS]
+    action: Mapping = {at: float(outcomes.attrs[at]) for at in ACTION}
+    return Judged(**action, fractions=np.column_stack(columns))

@@ -1,0 +1,68 @@
+"""Seeds of what is random outside of the engine, each from the run's seed and a named phase."""
+
+from enum import Enum
+
+import numpy as np
+
+
+class Phase(Enum):
+    """What random numbers are for; its text is part of their seed and must not change."""
+
+    BOOTSTRAP = "bootstrap"
+    CAMERA_NOISE = "camera noise"
+    EXECUTION = "execution of a chosen pour"
+    GEOMETRY = "pours of other cups"
+    GRID_POURS = "pours of the grid"
+    HELD_BACK_POURS = "pours that judge the spillage map"
+    JUDGED_POURS = "pours that judge the chosen ones"
+    MOVING_PICTURES = "moving pictures"
+    MAP_DESIGN = "design of the spillage map"
+    MAP_POURS = "pours of the spillage map"
+    ONLINE_SEARCH = "search while the robot stirs"
+    ONLINE_STIRS = "stirs while the robot stirs"
+    POSTERIOR_DRAWS = "posterior draws"
+    PREDICTIVE = "posterior predictive"
+    REHEARSAL = "rehearsal of a chosen pour"
+    REPLICATES = "replicates at the best parameters"
+    RUNS_OF_POURS = "packings of a table's pours"
+    SBC_DESIGN = "design that calibrations share"
+    SBC_SEARCH = "search among shared stirs"
+    SBC_STIRS = "stirs that calibrations share"
+    SEARCHED_AGAIN = "pours among the best actions"
+    SEARCHED_POURS = "pours of the search"
+    STICKY_POURS = "pours of a liquid that sticks"
+    STICKY_STIR = "stir of a liquid that sticks"
+    STICKY_TRUTHS = "liquids that stick"
+    TRUTHS = "liquids of the study"
+    TRUTH_STIRS = "stirs and pours of a liquid of the study"
+    UNKNOWING = "draws of the prior"
+    WARM_UP = "signals that compile"
+
+
+def generator(seed: int, phase: Phase, *numbers: int) -> np.random.Generator:
+    """Random numbers of a phase.
+
+    Args:
+        seed: Seed of the run.
+        phase: What they are for.
+        numbers: Tell apart the steps of one phase.
+    """
+    return np.random.default_rng(_sequence(seed, phase, numbers))
+
+
+def simulation_seeds(seed: int, phase: Phase, count: int, *numbers: int) -> list[int]:
+    """Seeds of simulations in [0, 2^31), others for every phase; the first do not depend on count.
+
+    Args:
+        seed: Seed of the run.
+        phase: What the simulations are for.
+        count: Number of seeds.
+        numbers: Tell apart the steps of one phase.
+    """
+    words = _sequence(seed, phase, numbers).generate_state(count)
+    return [int(word >> 1) for word in words]
+
+
+def _sequence(seed: int, phase: Phase, numbers: tuple[int, ...]) -> np.random.SeedSequence:
+    text = " ".join([phase.value, *map(str, numbers)])
+    return np.random.SeedSequence([seed, *text.encode()])

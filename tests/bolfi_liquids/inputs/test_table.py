@@ -1,0 +1,105 @@
+"""Tables that a person writes, as spreadsheets and editors save them."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from bolfi_liquids.errors import InputError
+from bolfi_liquids.inputs.table import read_table
+
+POINTS = "t (ms),x,note\n0,1.5,a\n1,-2e-3,b\n"
+COMMAS = "t (ms);x;note\n0;1,5;a\n1;-2e-3;b\n"
+
+
+@pytest.mark.parametrize(
+    "text", [POINTS, COMMAS, COMMAS.replace(";", "\t"), POINTS.replace(",", "|")]
+)
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_delimiter_and_decimal_sign_are_found(tmp_path, text, newline):
+    path = tmp_path / "table.csv"
+    path.write_text(text, newline=newline)
+    table = read_table(path)
+    assert table.header == ("t (ms)", "x", "note")
+    np.testing.assert_array_equal(table.numbers("x"), [1.5, -2e-3])
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
+def test_the_encoding_is_found(tmp_path, encoding):
+    path = tmp_path / "table.csv"
+    rows = "".join(f"{k};Öl, zähflüssig und süß\n" for k in range(20))
+    path.write_bytes(f"Größe;Flüssigkeit\n{rows}".encode(encoding))
+    table = read_table(path)
+    assert table.header == ("Größe", "Flüssigkeit")
+    assert set(table.column("Flüssigkeit")) == {"Öl, zähflüssig und süß"}
+
+
+def test_every_double_comes_back_exactly(tmp_path):
+    values = np.random.default_rng(0).normal(size=300) * 10.0 ** np.arange(-150, 150)
+    path = tmp_path / "table.csv"
+    path.write_text("x\n" + "".join(f"{value!r}\n" for value in values.tolist()))
+    np.testing.assert_array_equal(read_table(path).numbers("x"), values)
+
+
+def test_names_are_compared_without_case_and_blanks(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text(" Distance_CM , x\n1,2\n")
+    table = read_table(path)
+    assert table.has("distance_cm") and table.numbers("distance_cm").tolist() == [1.0]
+    assert table.others(["DISTANCE_cm"]) == ("x",)
+
+
+def test_an_exact_name_comes_before_one_of_other_case(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("x,X\n1,2\n")
+    assert read_table(path).numbers("X").tolist() == [2.0]
+    path.write_text("x,X\n1,2\n".replace("X", " x"))
+    with pytest.raises(InputError, match="2 columns"):
+        read_table(path).numbers("X")
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("a,b\n1,2\n\n3,4,5\n", 4),  # surplus
+        ("a,b\n1,2\n3\n", 3),  # too short for b
+        ("a,b\n1,2\n,\n3,x\n", 4),  # no number
+        ('a,b\n1,2\n"3,x",4,5\n', 3),
+    ],
+)
+def test_a_bad_line_is_named_by_its_number_in_the_file(tmp_path, text, line):
+    path = tmp_path / "table.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as refused:
+        read_table(path).numbers("b")
+    assert refused.value.where.startswith(f"{path}: line {line}")
+
+
+def test_delimiters_behind_the_last_column_are_no_cells(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("a,b,\n1,2,\n3,4,,,\n")
+    assert read_table(path).numbers("b").tolist() == [2.0, 4.0]
+
+
+def test_a_cell_may_hold_the_delimiter_in_quotation_marks(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text('name,b\n"water, salted",2\n')
+    assert read_table(path).column("name").tolist() == ["water, salted"]
+
+
+def test_a_file_that_is_no_text_is_refused(tmp_path):
+    path = tmp_path / "table.xlsx"
+    path.write_bytes(b"PK\x03\x04" + bytes(range(256)) * 20)
+    with pytest.raises(InputError, match="table.xlsx"):
+        read_table(path)
+
+
+def test_an_empty_file_has_no_columns(tmp_path):
+    (tmp_path / "table.csv").touch()
+    assert read_table(tmp_path / "table.csv").header == ()
+
+
+def test_pandas_is_imported_when_a_table_is_read():
+    code = "import sys, bolfi_liquids.inputs.pour_table; sys.exit('pandas' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,115 @@
+"""Stirs and pours by numbers, from Python."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import bolfi_liquids as bl
+from bolfi_liquids import hardware, models
+from bolfi_liquids.inputs.bundled import bundled_recording
+from bolfi_liquids.inputs.cups import bundled_cups
+from bolfi_liquids.inputs.recording import Gripper
+
+SHORT = hardware.star(speed=0.2, height=0.235, radius=0.02, points=5, rest=0.2)
+FEW = {"particles": 120, "progress": False}
+PLANES = ("inclination_xz", "inclination_yz")
+
+
+@pytest.fixture(scope="module")
+def pair():
+    """Two liquids along a path of our own."""
+    return bl.simulate_stir([0.05, 2.0], 0.3, density=1100.0, path=SHORT, seed=[4, 5], **FEW)
+
+
+def test_a_stir_is_what_the_simulator_returns(pair):
+    recording = bundled_recording("glycerin")
+    gripper = Gripper(SHORT.time, SHORT.position)
+    planned = replace(recording, gripper=gripper)
+    setup = models.StirSetup.from_recording(planned, particles=FEW["particles"])
+    liquid = models.Liquid(np.array([0.05, 2.0]), 0.3, 1100.0)
+    expected = models.stir(liquid, SHORT, setup, [4, 5])
+    for plane, name in enumerate(PLANES):
+        assert pair[name].dims == ("simulation", "time")
+        np.testing.assert_array_equal(pair[name], expected[..., plane])
+    np.testing.assert_array_equal(pair["time"], SHORT.time)
+    assert pair["viscosity"].values.tolist() == [0.05, 2.0]
+    assert pair.attrs["liquid_density"] == 1100.0 and "viscosity" not in pair.attrs
+
+
+def test_one_of_a_pair_is_the_same_alone_and_elsewhere(pair):
+    with ThreadPoolExecutor(1) as pool:
+        alone = bl.simulate_stir(
+            2.0, 0.3, density=1100.0, path=SHORT, seed=5, executor=pool, timeout=60.0, **FEW
+        )
+    assert alone.attrs["viscosity"] == 2.0
+    for name in PLANES:
+        assert alone[name].dims == ("time",)
+        np.testing.assert_array_equal(alone[name], pair[name][1])
+
+
+def test_a_stir_that_takes_too_long_is_stopped_and_costs_nothing_else(pair):
+    options = {"density": 1100.0, "path": SHORT, "seed": 4, **FEW}
+    with pytest.raises(RuntimeError, match="timeout: no signal after 1e-09 s"):
+        bl.simulate_stir(0.05, 0.3, timeout=1e-9, **options)
+    again = bl.simulate_stir(0.05, 0.3, timeout=60.0, **options)
+    np.testing.assert_array_equal(again["inclination_xz"], pair["inclination_xz"][0])
+
+
+def test_a_simulated_stir_is_a_recording(tmp_path):
+    made = bl.simulate_stir(path=SHORT, out=tmp_path / "stir.nc", **FEW)
+    read = bl.open_recording(tmp_path / "stir.nc")
+    np.testing.assert_array_equal(read.inclination[:, 0], made["inclination_xz"])
+    assert read.number("liquid_density") == bundled_recording("glycerin").number("liquid_density")
+
+
+@pytest.mark.slow
+def test_patterns_have_names_and_a_rig_may_be_another():
+    star = bl.simulate_stir(path="star", particles=100, progress=False)
+    expected = hardware.star(speed=0.1, height=bundled_recording("glycerin").gripper.position[0, 2])
+    np.testing.assert_array_equal(star["x"], expected.position[:, 0])
+    heavy = bl.simulate_stir(path="star", rig={"stick_density": 4800.0}, particles=100)
+    assert np.abs(heavy["inclination_xz"]).max() < np.abs(star["inclination_xz"]).max()
+
+
+def test_a_pour_is_what_the_simulator_returns():
+    action = {"angular_velocity": 2.0, "distance": 0.03}
+    made = bl.simulate_pour([0.01, 1.0], 0.2, density=1100.0, seed=3, **action, **FEW)
+    expected = models.pour(
+        models.Liquid(np.array([0.01, 1.0]), 0.2, 1100.0),
+        models.PourAction(**action),
+        bundled_cups(),
+        [3, 3],
+        FEW["particles"],
+    )
+    for name in ("spilled", "received", "retained"):
+        np.testing.assert_array_equal(made[name], getattr(expected, name))
+    assert made["landing"].dims == ("simulation", "particle", "axis")
+    alone = bl.simulate_pour(1.0, 0.2, density=1100.0, seed=3, **action, **FEW)
+    assert alone["spilled"].item() == made["spilled"][1].item()
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"viscosity": -1.0}, "--viscosity: -1"),
+        ({"viscosity": [0.1, 0.2], "seed": [1, 2, 3]}, "arrays of one length"),
+        ({"path": "square"}, "path: 'square'.*star, circle"),
+        ({"effects": {"stickiness": 1.0}}, "--effect stickiness=1: unknown"),
+        ({"viscosity": [0.1, 0.2], "movie": "a.gif"}, "a.gif: arrays were given"),
+        ({"recording": "none.nc"}, "none.nc: no such file"),
+    ],
+)
+def test_what_cannot_be_simulated_is_refused_first(monkeypatch, tmp_path, given, message):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(models.fluid.runtime, "start", lambda: pytest.fail("Taichi was started"))
+    with pytest.raises(ValueError, match=message):
+        bl.simulate_stir(**given)
+
+
+def test_actions_in_the_wrong_unit_are_refused():
+    with pytest.raises(ValueError, match="--distance: 300"):
+        bl.simulate_pour(distance=3.0)
+    with pytest.raises(ValueError, match="--angular-velocity"):
+        bl.simulate_pour(angular_velocity=60.0)

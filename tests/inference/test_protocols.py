@@ -1,0 +1,332 @@
+"""Every exported rule, family, noise, check and pipeline is found by itself and keeps its protocol.
+
+Kinds are told by what a class or function takes, not by a list of names: what is exported and of
+a kind, but has no case here, fails.
+"""
+
+import inspect
+import typing
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from bolfi_liquids.inference.acquisition.rules import RULES
+from bolfi_liquids.inference.sobol import sobol
+from bolfi_liquids.inference.surrogates import base
+from bolfi_liquids.inference.surrogates.families import FAMILIES
+from bolfi_liquids.inference.surrogates.feasibility import feasibility
+from bolfi_liquids.inference.surrogates.measurement_noise import Layout
+
+from bolfi_liquids import inference
+
+pytestmark = pytest.mark.filterwarnings(
+    "ignore::bolfi_liquids.inference.EmulatorWarning",
+    "ignore::bolfi_liquids.inference.SamplingWarning",  # of a handful of draws
+)
+
+RUNS, ROWS = 12, 64
+KEYS = [jax.random.key(0), jax.random.key(1)]
+POINTS = np.array([[0.2, 0.7], [0.5, 0.5], [0.9, 0.1]])
+FACES = (inference, inference.surrogates, inference.checks, inference.criticism)
+LAYOUT = Layout(np.tile([0, 1], 8), np.repeat(np.arange(8), 2))  # two channels of 8 samples
+
+
+def exported(kind):
+    """Name -> what the engine's faces export of a kind, the protocols themselves left out."""
+    found = {name: getattr(face, name) for face in FACES for name in face.__all__}
+    concrete = {name: one for name, one in found.items() if not getattr(one, "_is_protocol", False)}
+    return {name: one for name, one in concrete.items() if kind(one)}
+
+
+def called_with(one):
+    """Names of the arguments that a class's objects are called with."""
+    call = getattr(one, "__call__", None) if inspect.isclass(one) else None  # noqa: B004
+    return tuple(inspect.signature(call).parameters)[1:] if inspect.isfunction(call) else ()
+
+
+def is_rule(one):
+    return called_with(one) == called_with(inference.surrogates.Acquisition)
+
+
+def is_family(one):
+    return inspect.isclass(one) and hasattr(one, "learner")
+
+
+def is_noise(one):
+    return inspect.isclass(one) and hasattr(one, "covariance") and hasattr(one, "draw")
+
+
+def is_pipeline(one):
+    return called_with(one) == called_with(inference.checks.Pipeline)
+
+
+def is_check(one):
+    """A function whose first argument may be `Replicates`."""
+    given = inspect.signature(one).parameters.values() if inspect.isfunction(one) else ()
+    return any(
+        inference.checks.Replicates in typing.get_args(argument.annotation) for argument in given
+    )
+
+
+# What is exported has a name or a case.
+
+
+def test_every_exported_rule_and_family_has_a_name_that_users_give():
+    assert set(exported(is_rule).values()) == set(RULES.values())
+    assert set(exported(is_family).values()) == set(FAMILIES.values())
+
+
+@pytest.fixture(scope="module")
+def noises():
+    white = inference.criticism.KnownNoise(0.3)
+    correlated = inference.criticism.AutoregressiveNoise(np.array([0.5]), np.array([0.8]))
+    residual = np.random.default_rng(0).normal(0.0, 0.2, (8, 2))
+    return {
+        inference.criticism.KnownNoise: white,
+        inference.criticism.AutoregressiveNoise: correlated,
+        inference.criticism.SumOfNoises: inference.criticism.SumOfNoises((white, correlated)),
+        inference.criticism.UsualResidual: inference.criticism.usual_residual(
+            [residual], [white], [True]
+        ),
+    }
+
+
+@pytest.fixture(scope="module")
+def pipelines(simulate, prior):
+    options = {"surrogate": "discrepancy"}
+    short = {"sampler": "emcee", "chains": 2, "draws": 64, "warmup": 20}
+    return {
+        inference.FitPipeline: inference.FitPipeline(simulate, prior, 8, options, short),
+        inference.checks.SharedDesign: inference.shared_design(
+            simulate, prior, 10, options=options, sampling=short
+        ),
+    }
+
+
+def test_every_exported_noise_and_pipeline_has_a_case(noises, pipelines):
+    assert set(exported(is_noise).values()) == set(noises)
+    assert set(exported(is_pipeline).values()) == set(pipelines)
+
+
+def test_the_kinds_are_found():
+    """By what is known to be exported today, so that no kind is found empty unnoticed."""
+    assert "PosteriorDraws" in exported(is_rule) and "SignalFamily" in exported(is_family)
+    assert "KnownNoise" in exported(is_noise) and "FitPipeline" in exported(is_pipeline)
+    assert set(exported(is_check)) >= {"sbc", "coverage", "tarp"}
+
+
+def test_a_new_rule_without_a_name_is_noticed(monkeypatch):
+    class Lazy:
+        def __call__(self, key, surrogate, n, feasibility, /):
+            return np.full((n, 2), 0.5)
+
+    monkeypatch.setattr(inference, "Lazy", Lazy, raising=False)
+    monkeypatch.setattr(inference, "__all__", [*inference.__all__, "Lazy"])
+    assert exported(is_rule)["Lazy"] is Lazy
+    assert set(exported(is_rule).values()) != set(RULES.values())
+
+
+# Surrogates, of every family.
+
+
+@pytest.fixture(scope="module", params=FAMILIES)
+def learned(request, simulate, prior, observed):
+    """The surrogate of a fit, by family."""
+    engine = inference.Bolfi(prior, observed, surrogate=FAMILIES[request.param](), capacity=ROWS)
+    u = sobol(0, 0, RUNS, len(prior))
+    engine.tell(prior.from_unit(u), simulate(prior.from_unit(u), range(RUNS)), range(RUNS))
+    return engine.fit().learned
+
+
+def finite(values):
+    return bool(np.isfinite(np.asarray(values, float)).all())
+
+
+def same(a, b):
+    return all(np.array_equal(x, y) for x, y in zip(*map(jax.tree.leaves, (a, b)), strict=True))
+
+
+def check_gp(of):
+    assert int(of.gp.data.used) == RUNS
+    assert of.gp.data.u.shape == (ROWS, 2)
+
+
+def check_state(of):
+    """Arrays alone, of float64, `gp` among them."""
+    leaves = jax.tree.leaves(of.state)
+    assert leaves and all(isinstance(leaf, jax.Array | np.ndarray) for leaf in leaves)
+    kinds = {np.asarray(leaf).dtype.kind for leaf in leaves}
+    assert all(leaf.dtype == np.float64 for leaf in leaves if leaf.dtype.kind == "f"), kinds
+    assert same(of.state.gp, of.gp)
+
+
+def densities(of):
+    with jax.enable_x64(True):
+        first = jax.vmap(of.log_likelihood, (None, 0))(of.state, jnp.asarray(POINTS))
+        moment = jax.vmap(of.log_second_moment, (None, 0, None))
+        return np.asarray(first), np.asarray(moment(of.state, jnp.asarray(POINTS), None))
+
+
+def check_log_likelihood(of):
+    values = densities(of)[0]
+    assert values.shape == (3,) and values.dtype == np.float64 and finite(values)
+    assert np.ptp(values) > 0.0
+
+
+def check_log_second_moment(of):
+    """E[L^2] >= E[L]^2, up to quadrature."""
+    first, second = densities(of)
+    assert second.shape == (3,) and finite(second)
+    assert (second > 2.0 * first - 1e-3).all()
+
+
+def check_minimum(of):
+    best = of.minimum()
+    assert best.shape == (2,) and ((best >= 0.0) & (best <= 1.0)).all()
+    np.testing.assert_array_equal(best, of.minimum())
+
+
+def check_believe(of):
+    """Its own predictions teach it nothing new but certainty."""
+    after = of.believe(POINTS[:2])
+    np.testing.assert_allclose(after.predict(POINTS)[0], of.predict(POINTS)[0], atol=1e-6)
+    assert (after.predict(POINTS)[1] <= of.predict(POINTS)[1] + 1e-9).all()
+    assert int(after.gp.data.used) == RUNS + 2 and int(of.gp.data.used) == RUNS
+
+
+def check_predict(of):
+    mean, sd = of.predict(POINTS)
+    assert mean.shape == sd.shape and len(mean) == 3
+    assert mean.dtype == sd.dtype == np.float64
+    assert finite(mean) and finite(sd) and (sd > 0.0).all()
+
+
+def check_constants(of):
+    assert of.constants()
+    assert all(finite(value) for value in of.constants().values())
+
+
+def check_checks(of):
+    z = of.checks()["loo_z"]
+    assert len(z) == RUNS and finite(z)
+
+
+def check_warnings(of):
+    assert isinstance(of.warnings(), list)
+    assert all(isinstance(said, str) and said for said in of.warnings())
+
+
+def check_predictive(of):
+    first, again, other = (of.predictive(key, POINTS) for key in (KEYS[0], *KEYS))
+    assert first
+    for name, values in first.items():
+        assert len(values) == 3 and finite(values)
+        np.testing.assert_array_equal(values, again[name])
+        assert not np.array_equal(values, other[name])
+
+
+MEMBERS = [name for name in vars(base.Surrogate) if not name.startswith("_")]
+
+
+@pytest.mark.parametrize("member", MEMBERS)
+def test_a_surrogate_keeps_its_protocol(learned, member):
+    """A member without a check fails here."""
+    globals()[f"check_{member}"](learned)
+
+
+# Acquisitions.
+
+
+def successes(surrogate):
+    u = np.asarray(surrogate.gp.data.u)[:RUNS]
+    return feasibility(u, np.ones(RUNS, bool), ROWS)
+
+
+@pytest.mark.parametrize("name", RULES)
+def test_a_rule_keeps_its_protocol(learned, name):
+    rule, runs, before = RULES[name](), successes(learned), jax.tree.leaves(learned.gp)
+    u = rule(KEYS[0], learned, 2, runs)
+    assert isinstance(u, np.ndarray) and u.shape == (2, 2) and u.dtype == np.float64
+    assert ((u > 0.0) & (u < 1.0)).all() and (u[0] != u[1]).any()
+    np.testing.assert_array_equal(u, RULES[name]()(KEYS[0], learned, 2, runs))
+    assert not np.array_equal(u, rule(KEYS[1], learned, 2, runs))
+    assert same(before, jax.tree.leaves(learned.gp))  # it chooses, and changes nothing
+
+
+# Noises.
+
+
+def excess(noise, covariance, count=4000):
+    """The trace of draws' covariance over what is stated, less 1, in standard errors."""
+    drawn = noise.draw(np.random.default_rng(0), LAYOUT, count)
+    squares = np.sum(drawn**2, axis=1)
+    error = squares.std() / np.sqrt(count)
+    return (squares.mean() - np.trace(covariance)) / error
+
+
+def test_a_noise_keeps_its_protocol(noises):
+    """Draws are as large as the covariance says, and 30 % larger ones would be found."""
+    for kind, noise in noises.items():
+        covariance = noise.covariance(LAYOUT)
+        assert covariance.shape == (16, 16) and finite(covariance), kind
+        np.testing.assert_allclose(covariance, covariance.T, atol=1e-12)
+        assert np.linalg.eigvalsh(covariance).min() > -1e-9
+        draws = [noise.draw(np.random.default_rng(seed), LAYOUT, 5) for seed in (0, 0, 1)]
+        assert draws[0].shape == (5, 16) and finite(draws[0])
+        np.testing.assert_array_equal(draws[0], draws[1])
+        assert not np.array_equal(draws[0], draws[2])
+
+
+@pytest.mark.parametrize("kind", exported(is_noise))
+def test_draws_of_a_noise_are_as_large_as_its_covariance_says(noises, kind):
+    """The two-sided chance of 4.5 standard errors is 7e-6; a size known badly has no variance to
+    judge by, so the trace is compared where the draws' size is known."""
+    noise = noises[exported(is_noise)[kind]]
+    if isinstance(noise, inference.criticism.UsualResidual):
+        pytest.skip("its draws have heavy tails of infinite fourth moment")
+    covariance = noise.covariance(LAYOUT)
+    assert abs(excess(noise, covariance)) < 4.5
+    assert abs(excess(noise, covariance / 1.3)) > 4.5
+
+
+# Checks of calibration.
+
+
+@pytest.fixture(scope="module")
+def made(prior, simulate):
+    """Replicates of a pipeline that draws from the prior, which no check can do without."""
+
+    def ignoring(observed, seed):
+        drawn = prior.sample(jax.random.key(seed), 31)
+        return {name: np.asarray(values, float) for name, values in drawn.items()}
+
+    return inference.replicates(ignoring, simulate, prior, 32, draws=31, independent=True)
+
+
+@pytest.mark.parametrize("name", exported(is_check))
+def test_a_check_keeps_its_protocol(made, name):
+    """A table that ends in its judgement, the same each time, on replicates left as they are."""
+    check, before = exported(is_check)[name], made.draws.copy()
+    result = check(made, alpha=1e-4)
+    assert result.replicates is made
+    assert isinstance(result.ok, bool | np.bool_) and result.ok  # prior draws are calibrated
+    assert str(result) == str(check(made, alpha=1e-4))
+    assert not check(made, alpha=1.0).ok  # of which every p-value is an alarm
+    np.testing.assert_array_equal(made.draws, before)
+
+
+# Pipelines.
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", exported(is_pipeline))
+def test_a_pipeline_keeps_its_protocol(pipelines, prior, observed, kind):
+    pipeline = pipelines[exported(is_pipeline)[kind]]
+    (drawn, log_density), (again, _), (other, _) = (pipeline(observed, seed) for seed in (0, 0, 1))
+    for name in prior.names:
+        values = drawn["posterior"][name]
+        assert values.dims == ("chain", "draw") and values.dtype == np.float64 and finite(values)
+        np.testing.assert_array_equal(values, again["posterior"][name])
+        assert not np.array_equal(values, other["posterior"][name])
+    assert log_density({name: np.full(3, 0.5) for name in prior.names}).shape == (3,)

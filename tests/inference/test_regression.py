@@ -1,0 +1,54 @@
+"""A number learned as a function of parameters."""
+
+import numpy as np
+import numpyro.distributions as dist
+import pytest
+
+from bolfi_liquids import inference
+
+PRIOR = inference.Prior({"rate": dist.LogUniform(0.1, 10.0), "size": dist.Uniform(0.0, 2.0)})
+THETA = PRIOR.from_unit(np.random.default_rng(0).random((60, 2)))
+SQUARED = (np.log(THETA["rate"]) + THETA["size"]) ** 2 + 1.0
+
+
+def test_a_smooth_function_is_learned_and_its_error_known():
+    learned = inference.regress(PRIOR, THETA, SQUARED, transform="sqrt")
+    new = PRIOR.from_unit(0.1 + 0.8 * np.random.default_rng(1).random((50, 2)))
+    mean, sd = learned.predict(new)
+    truth = np.sqrt((np.log(new["rate"]) + new["size"]) ** 2 + 1.0)
+    assert np.sqrt(np.mean((mean - truth) ** 2)) < 0.02 * truth.std()
+    assert np.abs(mean - truth).max() < 10.0 * sd.max()
+    np.testing.assert_allclose(learned.transform.inverse(learned.transform(SQUARED)), SQUARED)
+
+
+def test_equals_a_fit_of_the_same_numbers():
+    """The engine's own way to learn a discrepancy, with values that failed left out."""
+    values = SQUARED.copy()
+    values[7] = np.nan
+    fit = inference.fit(
+        None,
+        PRIOR,
+        np.zeros(1),
+        budget=0,
+        earlier=(THETA, values[:, None]),
+        discrepancy=lambda _, value: float(value[0]),
+        transform="sqrt",
+        warn=False,
+    )
+    learned = inference.regress(PRIOR, THETA, values, transform="sqrt")
+    for ours, theirs in zip(learned.predict(THETA), fit.surrogate.predict(THETA), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    assert learned.warnings == fit.surrogate.warnings
+
+
+@pytest.mark.parametrize(
+    ("theta", "values", "message"),
+    [
+        (THETA, SQUARED[:5], "one per theta"),
+        (THETA, np.full(60, np.nan), "3 finite numbers, got 0 of 60"),
+        ({**THETA, "size": THETA["size"] + 5.0}, SQUARED, "support of the prior"),
+    ],
+)
+def test_what_cannot_be_learned_is_refused(theta, values, message):
+    with pytest.raises(ValueError, match=message):
+        inference.regress(PRIOR, theta, values)
