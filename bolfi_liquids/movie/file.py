@@ -1,4 +1,7 @@
-"""Pictures into a file that plays."""
+"""Pictures into a file that plays, by PyAV and Pillow, which cameras and figures need anyway.
+
+imageio-ffmpeg would add 68 MB.
+"""
 
 from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction

