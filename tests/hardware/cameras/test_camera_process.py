@@ -305,15 +305,15 @@ def test_lost_and_repeated_pictures_are_counted():
 
 @pytest.mark.slow
 def test_memory_and_open_files_do_not_grow(start):
-    running = start(rendered(timing=Timing(rate=60.0), world=moving_world(60.0)))
+    running = start(rendered(timing=Timing(rate=60.0), world=moving_world(400.0)))
     process = Path(f"/proc/{running.process.pid}")
 
     def used():
         pages = int((process / "statm").read_text().split()[1])
         return pages * resource.getpagesize(), len(list((process / "fd").iterdir()))
 
-    running.wait(lambda row: row.count >= 300, timeout=60)
+    running.wait(lambda row: row.count >= 300, timeout=300)
     memory, files = used()
-    running.wait(lambda row: row.count >= 1500, timeout=60)
+    running.wait(lambda row: row.count >= 1500, timeout=300)
     assert used()[1] == files
     assert used()[0] - memory < 5e6

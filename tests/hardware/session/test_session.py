@@ -34,7 +34,7 @@ from bolfi_liquids.hardware.session.setup import SessionSetup
 keeps_time = pytest.mark.punctual
 
 RIG = bundled_rig()
-SHORT = {"rest": 0.1, "points": 5, "radius": 0.015, "approach_speed": 0.1}
+SHORT = {"rest": 0.1, "points": 5, "radius": 0.02, "approach_speed": 0.1}
 RIG = RIG.model_copy(update={"stirring": RIG.stirring.model_copy(update=SHORT)})
 PLAN = [stir(RIG), retract(RIG)]
 
