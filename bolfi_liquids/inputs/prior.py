@@ -143,7 +143,7 @@ def _distribution(name: str, table: Described) -> "Distribution":
         for key, value in table.items()
         if key != "family"
     }
-    family = getattr(dist, str(table.get("family")), None)
+    family: Any = getattr(dist, str(table.get("family")), None)
     if not callable(family):
         raise ValueError(f"the prior of {name} is {dict(table)!r}, which no distribution describes")
     return family(**arguments)

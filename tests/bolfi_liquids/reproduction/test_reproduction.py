@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from bolfi_liquids.inference import engine_version
 
 from bolfi_liquids import inference, models
 from bolfi_liquids.inputs.bundled import bundled_recording
@@ -39,13 +40,14 @@ def test_an_interval_of_nothing_is_nan():
     assert np.isnan(interval(np.empty(0))).all()
 
 
-@pytest.mark.parametrize("part", [inference, models])
-def test_what_another_version_made_is_left_alone(tmp_path, monkeypatch, part):
+@pytest.mark.parametrize(
+    ("part", "name"), [(engine_version, "ENGINE_VERSION"), (models, "MODEL_VERSION")]
+)
+def test_what_another_version_made_is_left_alone(tmp_path, monkeypatch, part, name):
     """Kept calibrations go by name; those of another engine or model are others."""
     workshop = Workshop(tmp_path, FULL, None)
     learner = by_stirring_and_pouring(bundled_cups(), FULL)["pour"]
     now = workshop.runs, learner.identity
-    name = "ENGINE_VERSION" if part is inference else "MODEL_VERSION"
     monkeypatch.setattr(part, name, "another", raising=False)
     assert workshop.runs != now[0]
     assert part is models or learner.identity != now[1]
