@@ -3,7 +3,6 @@
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..calibration.result import Calibration
@@ -15,7 +14,7 @@ from ..inputs.pour_table import PourTable
 from ..inputs.recording import Recording
 from ..inputs.settings import CriticismSettings
 from ..progress import phases
-from ..run.directory import CRITICISM, open_bank
+from ..run.directory import CRITICISM, Run, open_bank, run_path
 from .baseline import (
     Clean,
     clean_residuals,
@@ -43,7 +42,7 @@ if TYPE_CHECKING:
 
 
 def criticise(  # noqa: PLR0913  the one call that most users make
-    calibration: Calibration | str | Path,
+    calibration: Run,
     *,
     held_out: Source | Sequence[Source] = (),
     baseline: Source | Sequence[Source] = (),
@@ -86,7 +85,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     from ..inference.simulations import open_executor
 
     if not isinstance(calibration, Calibration):
-        calibration = Calibration.open(calibration)
+        calibration = Calibration.open(run_path(calibration))
     started = time.perf_counter()
     settings = CriticismSettings(
         effects=_names(effects),

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..inputs.open import open_recording
 from ..inputs.recording import Recording
-from ..robot.armed_session import Ask, check_one
+from ..inputs.rigs import rig_of
+from ..robot.armed_session import Ask, check_one, hidden_liquid
 from ..robot.live_view import SessionView
 from ..robot.record import kept
 from ..robot.stir import (
@@ -54,12 +55,12 @@ class OnlineChoice(NamedTuple):
 
 
 def record_online(  # noqa: PLR0913  as `record`, and what to calibrate
-    rig: "Rig",
+    rig: "Rig | str | Path | None" = None,
     *,
     out: str | Path,
     online: OnlineChoice,
     ask: Ask | None = None,
-    emulate: "HiddenLiquid | None" = None,
+    emulate: "HiddenLiquid | bool" = False,
     cycles: int | None = None,
     progress: bool = True,
     told: "Callable[[OnlineEstimate], None] | None" = None,
@@ -93,6 +94,7 @@ def record_online(  # noqa: PLR0913  as `record`, and what to calibrate
     from ..hardware.recorder.finalise import rig_attributes
 
     check_one(ask, emulate, "record")
+    rig, hidden = rig_of(rig), hidden_liquid(emulate)
     cycles = MOST_CYCLES if cycles is None else cycles
     plan, out = plan_stir(rig, cycles), Path(out)
     with OnlineCalibration.start(
@@ -108,7 +110,7 @@ def record_online(  # noqa: PLR0913  as `record`, and what to calibrate
             raise RuntimeError(f"the calibration is not ready: {calibration.status.detail}")
         with (
             kept(out),
-            stir_session(rig, plan, out, ask=ask, emulate=emulate) as session,
+            stir_session(rig, plan, out, ask=ask, emulate=hidden) as session,
             SessionView("stirring and calibrating", shown=progress) as view,
         ):
             _Stirring(session, plan, calibration, view, told).carry_out()
