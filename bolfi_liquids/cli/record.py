@@ -17,7 +17,7 @@ from .options import RigOption
 
 if TYPE_CHECKING:
     from ..hardware import Check, HiddenLiquid, Rig
-    from ..online.record import OnlineChoice
+    from ..online.choice import OnlineChoice
 
 OUT = Path("runs/recording")
 EPILOG = examples(
@@ -76,17 +76,20 @@ class OnlineOptions:
     def __post_init__(self) -> None:
         _needs("--calibrate", self.calibrate, {"--cups": self.cups, "--target": self.target})
 
-    @property
-    def choice(self) -> "OnlineChoice | None":
-        """What to calibrate; None for nothing."""
+    def choice(self, cycles: int | None) -> "OnlineChoice | None":
+        """What to calibrate, with so many cycles at the most; None for nothing."""
         from ..inputs.cups import open_cups
-        from ..online.record import OnlineChoice
+        from ..online.choice import MAX_CYCLES, OnlineChoice
 
         if self.calibrate is None:
             return None
         settings = OnlineSettings() if self.target is None else OnlineSettings(target=self.target)
-        cups = None if self.cups is None else open_cups(self.cups)
-        return OnlineChoice(self.calibrate, cups, settings)
+        return OnlineChoice(
+            self.calibrate,
+            None if self.cups is None else open_cups(self.cups),
+            settings,
+            cycles=MAX_CYCLES if cycles is None else cycles,
+        )
 
 
 @grouped
@@ -114,9 +117,9 @@ def record(
         _dry_run(opened, cycles, out)
         return
     ask = typed_sentence if moved.arm else None
-    given: dict[str, Any] = {"out": out, "ask": ask, "emulate": moved.emulate, "cycles": cycles}
-    if (choice := online.choice) is None:
-        recording = run_record(opened, **given)
+    given: dict[str, Any] = {"out": out, "ask": ask, "emulate": moved.emulate}
+    if (choice := online.choice(cycles)) is None:
+        recording = run_record(opened, cycles=cycles, **given)
     else:
         recording = record_online(opened, online=choice, **given)
     print_recording(recording, Console())

@@ -22,7 +22,7 @@ from .baseline import (
     usual_for,
 )
 from .findings import Findings
-from .given import Inputs, Pours, open_inputs
+from .given import Given, Inputs, Pours, open_inputs
 from .pours import as_prior, pour_experiment
 from .proposals import pour_proposals, stir_proposals
 from .result import Criticism, finished_criticism
@@ -92,15 +92,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         accept=_names(accept),
         seed=seed,
     )
-    inputs = open_inputs(
-        calibration,
-        settings,
-        held_out=held_out,
-        baseline=baseline,
-        pours=pours,
-        held_out_pours=held_out_pours,
-        cups=cups,
-    )
+    given = Given(held_out, baseline, pours, held_out_pours, cups)
+    inputs = open_inputs(calibration, settings, given)
     run = calibration.path
     if finished := finished_criticism(run, inputs.made_from):
         return finished
