@@ -2,20 +2,20 @@
 
 import numpy as np
 
-LARGEST = 2**31 - 1  # that every random number generator takes as a seed
+LARGEST_INTEGER = 2**31 - 1  # that every random number generator takes as a seed
 
 
 def checked_integer(name: str, value: object, least: int = 1) -> int:
     """`value` as int.
 
     Raises:
-        ValueError: not an integer, or not from `least` to `LARGEST`.
+        ValueError: not an integer, or not from `least` to `LARGEST_INTEGER`.
     """
     if isinstance(value, int | np.integer) and not isinstance(value, bool):
         number = int(value)
-        if least <= number <= LARGEST:
+        if least <= number <= LARGEST_INTEGER:
             return number
-    raise ValueError(f"{name} must be an integer from {least} to {LARGEST}, got {value!r}")
+    raise ValueError(f"{name} must be an integer from {least} to {LARGEST_INTEGER}, got {value!r}")
 
 
 def checked_array(name: str, value: object) -> np.ndarray:

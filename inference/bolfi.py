@@ -34,7 +34,7 @@ from .surrogates.outliers import sane
 from .surrogates.warnings import EmulatorWarning
 from .types import Theta
 
-DIGITS, EDGE = 7, 1e-7  # of the prior quantiles that are asked, and how near the bounds
+ASKED_DIGITS, ASKED_EDGE = 7, 1e-7  # of the prior quantiles that are asked, and how near the bounds
 MIN_LEARN = 3  # successful simulations before the surrogate may choose
 
 
@@ -107,12 +107,12 @@ class Bolfi:
         self._seconds = 0.0
 
     def __repr__(self) -> str:
-        return as_text("Bolfi", self._rows())
+        return as_text("Bolfi", self._shown())
 
     def _repr_html_(self) -> str:
-        return as_html("Bolfi", self._rows())
+        return as_html("Bolfi", self._shown())
 
-    def _rows(self) -> list[tuple[str, str]]:
+    def _shown(self) -> list[tuple[str, str]]:
         parameters = [f"{name} ~ {of['prior']}" for name, of in self.prior.describe().items()]
         told = (
             f"{self.told} told, {self.succeeded} to learn from, {len(self._state.pending)} pending"
@@ -200,7 +200,7 @@ class Bolfi:
             believing = self._learned.believe(self.prior.to_unit(self.prior.to_dict(pending)))
             u = np.asarray(in_float64(self._acquire)(key, believing, n - len(parts), runs))
             # coarser than rounding errors, so that arrays of another size ask the same
-            u = np.clip(np.round(u, DIGITS), EDGE, 1.0 - EDGE)
+            u = np.clip(np.round(u, ASKED_DIGITS), ASKED_EDGE, 1.0 - ASKED_EDGE)
             parts.append(self.prior.to_array(self.prior.from_unit(u)))
         return np.concatenate(parts)
 

@@ -89,12 +89,12 @@ class Fit:
     seconds: Mapping[str, float]
 
     def __repr__(self) -> str:
-        return as_text("Fit", self._rows())
+        return as_text("Fit", self._shown())
 
     def _repr_html_(self) -> str:
-        return as_html("Fit", self._rows())
+        return as_html("Fit", self._shown())
 
-    def _rows(self) -> list[tuple[str, str]]:
+    def _shown(self) -> list[tuple[str, str]]:
         parameters = [f"{name} ~ {of['prior']}" for name, of in self.prior.describe().items()]
         failed = ", ".join(f"{n} {kind}" for kind, n in self.failures.items())
         told = len(self.history.theta)

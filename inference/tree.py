@@ -30,7 +30,7 @@ from .sampling.convergence import diagnose
 from .sampling.target import Chains
 from .surrogates.base import Surrogate
 
-PREDICTED = 50  # draws of each chain for which the surrogate predicts
+PREDICTED_DRAWS = 50  # draws of each chain for which the surrogate predicts
 
 
 def simulations_dataset(prior: Prior, history: History) -> xr.Dataset:
@@ -115,7 +115,7 @@ def add_surrogate(
     if constants:
         tree["constant_data"] = arviz_base.from_dict({"constant_data": constants})["constant_data"]
     chains, draws, d = u.shape
-    rows = np.linspace(0, draws - 1, min(draws, PREDICTED)).round().astype(int)
+    rows = np.linspace(0, draws - 1, min(draws, PREDICTED_DRAWS)).round().astype(int)
     predicted = surrogate.predictive(key, u[:, rows].reshape(-1, d))
     groups = {
         name: np.asarray(values).reshape(chains, len(rows), *np.shape(values)[1:])

@@ -8,7 +8,7 @@ from .fluid.liquid import Liquid
 from .fluid.numerics import MODEL_VERSION, PUBLISHED_DRAG, Numerics
 from .fluid.runtime import TimeLimitExceeded, time_limit
 from .frames import PourFrames, StirFrames, pour_frames, stir_frames
-from .pouring import Landings, PourAction, PourResult, landings, pour
+from .pouring import Landings, PourAction, PourBatch, PourResult, landings, pour
 from .rig import Rig
 from .stir_setup import Cup, Stick, StirSetup
 from .stirring import stir
@@ -25,6 +25,7 @@ __all__ = [
     "Liquid",
     "Numerics",
     "PourAction",
+    "PourBatch",
     "PourFrames",
     "PourResult",
     "Rig",

@@ -7,10 +7,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .cups import Cups
 from .fluid.checks import check_numbers
 from .fluid.liquid import Liquid
-from .fluid.numerics import POUR_PARTICLES
 from .fluid.runtime import Watch
 from .pouring import PourBatch, watched_landings
 from .stir_setup import StirSetup
@@ -97,26 +95,14 @@ def stir_frames(
     return frames
 
 
-def pour_frames(  # noqa: PLR0913  as of `landings`
-    liquid: Liquid,
-    angular_velocity: float,
-    cups: Cups,
-    seed: int,
-    *,
-    rate: float = RATE,
-    particles: int = POUR_PARTICLES,
-    effects: Mapping[str, ArrayLike] | None = None,
-) -> PourFrames:
+def pour_frames(batch: PourBatch, *, rate: float = RATE) -> PourFrames:
     """Frames of the very simulation that `landings` makes of one liquid and seed.
 
     The first rows of `Landings.position` are what has landed by any frame, as many as are NaN in
     it: there they stand in the order of their landing.
 
     Args:
-        liquid: One liquid.
-        angular_velocity: Of the source [rad/s].
-        cups, particles, effects: As for `landings`.
-        seed: Decides the initial packing.
+        batch: One pour.
         rate: Frames per second, each at the nearest substep; the last is the end of the pour.
 
     Raises:
@@ -125,18 +111,17 @@ def pour_frames(  # noqa: PLR0913  as of `landings`
         FailedSimulation: the simulation went wrong; positions are NaN.
     """
     check_numbers("frames", rate=rate)
-    seen = list[PourFrames]()
+    seen, turning = list[PourFrames](), float(np.ravel(batch.angular_velocity)[0])
 
     def look(scene: Any, step: int) -> None:
         position = scene.position.to_numpy()[0]
         position[scene.alive.to_numpy()[0] :] = np.nan
         time = step / scene.rate
         # not the scene's own angle, which stands still once nothing is left to simulate
-        angle = min(float(angular_velocity) * time, cups.pour.final_angle)
+        angle = min(turning * time, batch.cups.pour.final_angle)
         seen.append(PourFrames(np.array(time), position, np.array(angle)))
 
     watch = Watch(rate, look)
-    batch = PourBatch(liquid, angular_velocity, cups, [seed], particles, effects)
     landed = watched_landings(batch, watch)
     frames = _joined(seen)
     if np.isnan(landed.retained).any():

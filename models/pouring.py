@@ -144,14 +144,14 @@ def landings(
 
 
 class PourBatch(NamedTuple):
-    """Pours that are simulated together: the arguments of `landings`."""
+    """Pours that are simulated together: the arguments of `landings`, which explains them."""
 
     liquid: Liquid
     angular_velocity: ArrayLike
     cups: Cups
     seeds: ArrayLike
-    particles: int
-    effects: Mapping[str, ArrayLike] | None
+    particles: int = POUR_PARTICLES
+    effects: Mapping[str, ArrayLike] | None = None
 
 
 def watched_landings(batch: PourBatch, watch: Watch | None = None) -> Landings:

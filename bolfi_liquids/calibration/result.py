@@ -13,24 +13,29 @@ from ..inputs.prior import read_prior
 from ..inputs.settings import CalibrationSettings
 from ..run.directory import POSTERIOR, read_run
 from ..run.summary import read_summary
+from ..words import html_table, with_unit
 from .draws import pick_draws
 from .summary import CalibrationSummary
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import ArrayLike
     from xarray import Dataset, DataTree
 
     from ..inference import Prior
 
-OPTIONS = ("budget", "surrogate", "sampler", "seed", "particles", "batch")  # of the command
+RESUMED_OPTIONS = ("budget", "surrogate", "sampler", "seed", "particles", "batch")  # of the command
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
-    """A finished calibration; everything that pours and reports need, without simulating.
+    """A finished calibration; nothing here simulates.
+
+    The plots draw in `axes`, where they are given, or else in a figure of their own.
 
     Attributes:
         path: The RUN directory.
-        tree: posterior.nc, in ArviZ's schema; the groups are listed in `results`.
+        tree: posterior.nc, in ArviZ's schema; the groups are listed in `calibration.tree`.
         record: run.toml: settings, versions, seed and hashes.
         summary: The section "calibrate" of summary.json.
     """
@@ -39,6 +44,22 @@ class Calibration:
     tree: "DataTree"
     record: Mapping[str, Any]
     summary: CalibrationSummary
+
+    def __repr__(self) -> str:
+        rows = ", ".join(f"{name} {text}" for name, text in self._quantiles().items())
+        return f"Calibration({str(self.path)!r}: {rows}; {self.summary.sampler_status})"
+
+    def _repr_html_(self) -> str:
+        status = self.summary.sampler_status
+        rows = {"run": self.path, **self._quantiles(), "sampler": status, "next": status.advice}
+        return html_table("Calibration (median, 5 % to 95 %)", rows)
+
+    def _quantiles(self) -> dict[str, str]:
+        """Median, and 5 % to 95 % of the posterior, by parameter."""
+        return {
+            name: f"{with_unit(name, s.q50)} ({s.q05:.3g} to {s.q95:.3g})"
+            for name, s in self.summary.parameters.items()
+        }
 
     @classmethod
     def open(cls, run: str | Path) -> "Calibration":
@@ -75,13 +96,58 @@ class Calibration:
 
     @property
     def prior(self) -> "Prior":
-        """Of the parameters."""
+        """Prior of the parameters."""
         return read_prior(self.record["settings"]["prior"])
 
     @property
     def liquid_density(self) -> float:
         """Density of the stirred liquid, as weighed [kg/m3]."""
         return float(self.tree.attrs["liquid_density"])
+
+    def plot_fit(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
+        """Inclination against time: recorded, closest simulation and posterior predictions.
+
+        Args:
+            axes: Where to draw, one row for each recording and one column for each plane.
+
+        Returns:
+            The axes.
+        """
+        from ..drawing import styled
+        from .fit_figures import draw_fit
+
+        with styled():
+            return draw_fit(self.tree, axes)[0].grid
+
+    def plot_posterior(self, ax: "Axes | None" = None) -> "NDArray[Any]":
+        """Contours of the joint posterior; in a figure of its own with the marginals.
+
+        Args:
+            ax: Where to draw the contours alone.
+
+        Returns:
+            The axes.
+        """
+        from ..drawing import styled
+        from .posterior_figure import draw_posterior
+
+        with styled():
+            return draw_posterior(self.tree, ax)[0].grid
+
+    def plot_search(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
+        """Discrepancy of each simulation in turn, and the parameters that it tried.
+
+        Args:
+            axes: Where to draw, one for the discrepancy and one for each parameter.
+
+        Returns:
+            The axes.
+        """
+        from ..drawing import styled
+        from .search_figure import draw_search
+
+        with styled():
+            return draw_search(self.tree, axes)[0].grid
 
     def draws(self, count: int, seed: int = 0) -> dict[str, NDArray]:
         """A stratified sample of the posterior: parameter -> values, shape (count,)."""
@@ -91,7 +157,7 @@ class Calibration:
 def _given_options(record: Mapping[str, Any]) -> str:
     """Options of `calibrate` with which a run was started, where they are not the default."""
     settings, usual = record.get("settings", {}), asdict(CalibrationSettings())
-    given = {name: settings.get(name, usual[name]) for name in OPTIONS}
+    given = {name: settings.get(name, usual[name]) for name in RESUMED_OPTIONS}
     return "".join(f" --{name} {value}" for name, value in given.items() if value != usual[name])
 
 

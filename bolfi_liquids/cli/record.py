@@ -2,8 +2,9 @@
 
 import sys
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,11 +12,12 @@ from ..errors import InputError
 from ..online.settings import OnlineSettings
 from .errors import FAILED
 from .examples import examples
-from .rig import RigOption
+from .grouped import grouped
+from .options import RigOption
 
 if TYPE_CHECKING:
-    from ..hardware import Check, Rig
-    from ..online.record import OnlineChoice
+    from ..hardware import Check, HiddenLiquid, Rig
+    from ..online.choice import OnlineChoice
 
 OUT = Path("runs/recording")
 EPILOG = examples(
@@ -24,78 +26,103 @@ EPILOG = examples(
 )
 
 
-def record(  # noqa: PLR0913  one parameter for each option
-    rig: RigOption = None,
-    out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Directory of the recording; new or empty.")
-    ] = OUT,
+@dataclass(frozen=True)
+class ArmOptions:
+    """What moves: nothing, a real arm, or an emulated one with a liquid."""
+
     arm: Annotated[
         bool, typer.Option("--arm", help="Move the arm, once a typed sentence allows it.")
-    ] = False,
+    ] = False
     emulator: Annotated[
         bool, typer.Option("--emulator", help="All of it with an emulator and rendered cameras.")
-    ] = False,
-    cycles: Annotated[
-        int | None, typer.Option(help="How often the star is stirred; else as in rig.toml.")
-    ] = None,
+    ] = False
     viscosity: Annotated[
         float | None, typer.Option(help="Of the emulated liquid [Pa s]; else 1.")
-    ] = None,
+    ] = None
+
+    def __post_init__(self) -> None:
+        _one_of(self.arm, self.emulator)
+        _needs("--emulator", self.emulator or None, {"--viscosity": self.viscosity})
+
+    @property
+    def emulate(self) -> "HiddenLiquid | bool":
+        """As `record` takes it."""
+        from ..hardware import HiddenLiquid
+
+        if self.viscosity is None:
+            return self.emulator
+        return HiddenLiquid(viscosity=self.viscosity)
+
+
+@dataclass(frozen=True)
+class OnlineOptions:
+    """Whether to calibrate while stirring, and for which pour."""
+
     calibrate: Annotated[
         Path | None,
         typer.Option(metavar="RUN", help="Calibrate while stirring, and stop when it is enough."),
-    ] = None,
+    ] = None
     cups: Annotated[
         Path | None, typer.Option(metavar="FILE", help="cups.toml of the pour, for --calibrate.")
-    ] = None,
+    ] = None
     target: Annotated[
         float | None,
         typer.Option(
             help="Spilled share at which stirring may end, for --calibrate; "
             f"else {OnlineSettings().target:g}."
         ),
+    ] = None
+
+    def __post_init__(self) -> None:
+        _needs("--calibrate", self.calibrate, {"--cups": self.cups, "--target": self.target})
+
+    def choice(self, cycles: int | None) -> "OnlineChoice | None":
+        """What to calibrate, with so many cycles at the most; None for nothing."""
+        from ..inputs.cups import open_cups
+        from ..online.choice import MAX_CYCLES, OnlineChoice
+
+        if self.calibrate is None:
+            return None
+        settings = OnlineSettings() if self.target is None else OnlineSettings(target=self.target)
+        return OnlineChoice(
+            self.calibrate,
+            None if self.cups is None else open_cups(self.cups),
+            settings,
+            cycles=MAX_CYCLES if cycles is None else cycles,
+        )
+
+
+@grouped
+def record(
+    moved: ArmOptions,
+    online: OnlineOptions,
+    rig: RigOption = None,
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="Directory of the recording; new or empty.")
+    ] = OUT,
+    cycles: Annotated[
+        int | None, typer.Option(help="How often the star is stirred; else as in rig.toml.")
     ] = None,
 ) -> None:
     """Stir, and record it. A dry run unless armed: it plans, checks everything, moves nothing."""
-    from ..inputs.cups import open_cups
-    from ..inputs.rigs import rig_of
-    from ..online.record import OnlineChoice
-    from .tables import print_recording
-
-    _one_of(arm, emulator)
-    _needs("--calibrate", calibrate, {"--cups": cups, "--target": target})
-    _needs("--emulator", emulator or None, {"--viscosity": viscosity})
-    opened = rig_of(rig)
-    if not (arm or emulator):
-        _dry_run(opened, cycles, out)
-        return
-    online = None
-    if calibrate is not None:
-        settings = OnlineSettings() if target is None else OnlineSettings(target=target)
-        online = OnlineChoice(calibrate, None if cups is None else open_cups(cups), settings)
-    liquid = (1.0 if viscosity is None else viscosity) if emulator else None
-    recording = _record(opened, out, cycles, online, liquid)
     from rich.console import Console
 
-    print_recording(recording, Console())
-
-
-def _record(
-    rig: "Rig",
-    out: Path,
-    cycles: int | None,
-    online: "OnlineChoice | None",
-    viscosity: float | None,
-):
-    from ..hardware import HiddenLiquid
+    from ..inputs.rigs import rig_of
     from ..online.record import record_online
     from ..robot.record import record as run_record
+    from .tables import print_recording
 
-    emulate: HiddenLiquid | None = None if viscosity is None else HiddenLiquid(viscosity=viscosity)
-    ask = None if emulate is not None else typed_sentence
-    if online is None:
-        return run_record(rig, out=out, ask=ask, emulate=emulate, cycles=cycles)
-    return record_online(rig, out=out, ask=ask, emulate=emulate, cycles=cycles, online=online)
+    opened = rig_of(rig)
+    if not (moved.arm or moved.emulator):
+        _dry_run(opened, cycles, out)
+        return
+    ask = typed_sentence if moved.arm else None
+    given: dict[str, Any] = {"out": out, "ask": ask, "emulate": moved.emulate}
+    if (choice := online.choice(cycles)) is None:
+        recording = run_record(opened, cycles=cycles, **given)
+    else:
+        recording = record_online(opened, online=choice, **given)
+    print_recording(recording, Console())
 
 
 def execute(run: Path, rig: Path | None, *, arm: bool, emulator: bool) -> None:

@@ -1,5 +1,6 @@
 """The command group `rig`: the robot and the cameras, before anything is recorded."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -7,10 +8,28 @@ import typer
 
 from .errors import FAILED
 from .examples import examples
+from .grouped import grouped
+from .options import RigOption
 
-RigOption = Annotated[
-    Path | None, typer.Option("--rig", metavar="FILE", help="rig.toml; without it, the bundled.")
-]
+
+@dataclass(frozen=True)
+class PictureOptions:
+    """Pictures of a board and of a plumb line, and the lens that they tell."""
+
+    boards: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Pictures of the board; without it, they are taken."),
+    ] = None
+    plumb_line: Annotated[
+        Path | None,
+        typer.Option(metavar="PICTURE", help="Of a thread that hangs; without it, it is taken."),
+    ] = None
+    square: Annotated[float, typer.Option(help="Side of a printed square, in cm.")] = 2.5
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Of the lens; without it, camera_VIEW.json."),
+    ] = None
+
 
 app = typer.Typer(help="The robot and the cameras.", no_args_is_help=True)
 
@@ -50,33 +69,23 @@ def template(
         "rig calibrate-cameras --rig rig.toml --view xz",
     ),
 )
-def calibrate_cameras(  # noqa: PLR0913  one parameter for each option
+@grouped
+def calibrate_cameras(
+    pictures: PictureOptions,
     rig: RigOption = None,
     view: Annotated[str, typer.Option(metavar="xz|yz", help="Which camera.")] = "xz",
-    boards: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Pictures of the board; without it, they are taken."),
-    ] = None,
-    plumb_line: Annotated[
-        Path | None,
-        typer.Option(metavar="PICTURE", help="Of a thread that hangs; without it, it is taken."),
-    ] = None,
-    square: Annotated[float, typer.Option(help="Side of a printed square, in cm.")] = 2.5,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Of the lens; without it, camera_VIEW.json."),
-    ] = None,
     print_board: Annotated[
         Path | None, typer.Option(metavar="PNG", help="Only write the board, to be printed.")
     ] = None,
 ) -> None:
     """Learn a camera's lens from a printed board, and its roll from a plumb line."""
-    from ..robot.camera_calibration import calibrate_view, write_board
+    from ..robot.camera_calibration import Pictures, calibrate_view, write_board
 
     if print_board is not None:
         typer.echo(f"{write_board(print_board)}: print it, measure a square, glue it on a plate")
         return
-    for line in calibrate_view(rig, view, square / 100, boards=boards, plumb=plumb_line, out=out):
+    given = Pictures(pictures.square / 100, pictures.boards, pictures.plumb_line)
+    for line in calibrate_view(rig, view, given, out=pictures.out):
         typer.echo(line)
 
 

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..calibration.result import Calibration
@@ -15,7 +14,7 @@ from ..inputs.pour_table import PourTable
 from ..inputs.recording import Recording
 from ..inputs.settings import CriticismSettings
 from ..progress import phases
-from ..run.directory import CRITICISM, open_bank
+from ..run.directory import CRITICISM, Run, open_bank, run_path
 from .baseline import (
     Clean,
     clean_residuals,
@@ -23,7 +22,7 @@ from .baseline import (
     usual_for,
 )
 from .findings import Findings
-from .given import Inputs, Pours, open_inputs
+from .given import Given, Inputs, Pours, open_inputs
 from .pours import as_prior, pour_experiment
 from .proposals import pour_proposals, stir_proposals
 from .result import Criticism, finished_criticism
@@ -43,7 +42,7 @@ if TYPE_CHECKING:
 
 
 def criticise(  # noqa: PLR0913  the one call that most users make
-    calibration: Calibration | str | Path,
+    calibration: Run,
     *,
     held_out: Source | Sequence[Source] = (),
     baseline: Source | Sequence[Source] = (),
@@ -86,22 +85,15 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     from ..inference.simulations import open_executor
 
     if not isinstance(calibration, Calibration):
-        calibration = Calibration.open(calibration)
+        calibration = Calibration.open(run_path(calibration))
     started = time.perf_counter()
     settings = CriticismSettings(
         effects=_names(effects),
         accept=_names(accept),
         seed=seed,
     )
-    inputs = open_inputs(
-        calibration,
-        settings,
-        held_out=held_out,
-        baseline=baseline,
-        pours=pours,
-        held_out_pours=held_out_pours,
-        cups=cups,
-    )
+    given = Given(held_out, baseline, pours, held_out_pours, cups)
+    inputs = open_inputs(calibration, settings, given)
     run = calibration.path
     if finished := finished_criticism(run, inputs.made_from):
         return finished

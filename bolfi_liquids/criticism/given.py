@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, same_liquid, stirring_of
@@ -84,16 +84,17 @@ class Inputs:
         return json.loads(json.dumps(made_from))  # as it will be read
 
 
-def open_inputs(  # noqa: PLR0913  all that a criticism may be given
-    calibration: Calibration,
-    settings: CriticismSettings,
-    *,
-    held_out: Source | Sequence[Source],
-    baseline: Source | Sequence[Source],
-    pours: Pours | None,
-    held_out_pours: Pours | None,
-    cups: "Cups | None",
-) -> Inputs:
+class Given(NamedTuple):
+    """Data beside the calibrated recordings; see `criticise`."""
+
+    held_out: Source | Sequence[Source] = ()
+    baseline: Source | Sequence[Source] = ()
+    pours: Pours | None = None
+    held_out_pours: Pours | None = None
+    cups: "Cups | None" = None
+
+
+def open_inputs(calibration: Calibration, settings: CriticismSettings, given: Given) -> Inputs:
     """Read what is given as a path, and check all of it.
 
     Raises:
@@ -104,13 +105,13 @@ def open_inputs(  # noqa: PLR0913  all that a criticism may be given
     stirring = stirring_of(
         kept_recordings(calibration.path, record), int(record["settings"]["particles"])
     )
-    kept_back = open_recordings(held_out, "--held-out")
+    kept_back = open_recordings(given.held_out, "--held-out")
     _check_held_out(stirring, kept_back)
-    believed = open_recordings(baseline, "--baseline")
+    believed = open_recordings(given.baseline, "--baseline")
     others = _others(believed, [*stirring.recordings, *kept_back])
     _check_baseline(stirring, others)
-    table = _opened(pours, "--pours")
-    held_out_table = _opened(held_out_pours, "--held-out-pours")
+    table = _opened(given.pours, "--pours")
+    held_out_table = _opened(given.held_out_pours, "--held-out-pours")
     _check_pours(table, held_out_table, settings)
     return Inputs(
         stirring=stirring,
@@ -119,7 +120,7 @@ def open_inputs(  # noqa: PLR0913  all that a criticism may be given
         left_out=_names_of(r for r in believed if r.hash not in {one.hash for one in others}),
         table=table,
         held_out_table=held_out_table,
-        cups=bundled_cups() if cups is None else cups,
+        cups=bundled_cups() if given.cups is None else given.cups,
         settings=settings,
     )
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..calibration.result import Calibration
 from ..calibration.tree import read_tree
 from ..errors import InputError
-from ..run.directory import CRITICISM, CRITICISM_FORMAT
+from ..run.directory import CRITICISM, CRITICISM_FORMAT, Run, run_path
 from ..run.summary import read_summary
 from ..words import html_table, sentence, spoken
 from .summary import CriticismSummary
@@ -40,6 +40,11 @@ class Criticism:
     def __repr__(self) -> str:
         found = ", ".join((self.verdict, *self.effects))
         return f"Criticism({str(self.base.path)!r}: {found}, p = {self.summary.p_value:.2g})"
+
+    @property
+    def path(self) -> Path:
+        """The RUN directory."""
+        return self.base.path
 
     def _repr_html_(self) -> str:
         rows = {"run": self.base.path, "verdict": self.verdict, "p": f"{self.summary.p_value:.2g}"}
@@ -175,7 +180,15 @@ def finished_criticism(run: Path, made_from: Mapping[str, Any]) -> Criticism | N
     return found if written == (made_from, made_from) else None
 
 
-def latest_calibration(run: str | Path) -> Calibration:
-    """The calibration of a run, extended by what a criticism accepted."""
-    run = Path(run)
+def latest_calibration(given: "Run") -> Calibration:
+    """The calibration of a run, extended by what a criticism accepted.
+
+    Args:
+        given: A calibration, which is returned as it is; a criticism; or a RUN directory.
+    """
+    if isinstance(given, Calibration):
+        return given
+    if isinstance(given, Criticism):
+        return given.calibration
+    run = run_path(given)
     return Criticism.open(run).calibration if is_criticised(run) else Calibration.open(run)

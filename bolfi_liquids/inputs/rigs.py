@@ -12,15 +12,17 @@ if TYPE_CHECKING:
     from ..hardware import Rig
 
 
-def rig_of(path: str | Path | None) -> "Rig":
-    """The rig of a file, or the bundled one.
+def rig_of(given: "Rig | str | Path | None") -> "Rig":
+    """A rig as it is, the rig of a file, or the bundled one for None.
 
     Raises:
         RigError: The file cannot be used.
     """
     from ..hardware import bundled_rig, open_rig
 
-    return bundled_rig() if path is None else open_rig(path)
+    if given is None:
+        return bundled_rig()
+    return open_rig(given) if isinstance(given, str | Path) else given
 
 
 def write_template(path: Path) -> Path:

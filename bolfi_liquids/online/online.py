@@ -30,6 +30,7 @@ from ..inputs.prior import (
 from ..inputs.recording import Recording
 from ..pouring.map import make_pours
 from ..run.directory import RUN_TOML
+from .choice import OnlineChoice
 from .learner import learn_online
 from .outbox import Outbox
 from .plan import SoFar, planned, stroke_ends
@@ -46,8 +47,6 @@ from .settings import OnlineSettings
 from .simulator import simulate_plan
 
 if TYPE_CHECKING:
-    from ..inference import Prior
-    from ..models import Cups
     from ..models.trajectory import Trajectory
     from .estimate import OnlineEstimate
 
@@ -90,16 +89,12 @@ class OnlineCalibration:
         self._outbox = Outbox(self._link)
 
     @classmethod
-    def start(  # noqa: PLR0913  the one call that most users make
+    def start(
         cls,
         path: "Trajectory",
         attrs: Mapping[str, float | str],
+        choice: OnlineChoice,
         *,
-        out: str | Path,
-        cups: "Cups | None" = None,
-        prior: "Prior | None" = None,
-        settings: OnlineSettings | None = None,
-        bank: str | Path | None = None,
         progress: bool = True,
     ) -> "OnlineCalibration":
         """Make the pours of the spillage map, unless the bank has them, and start to prepare.
@@ -113,25 +108,20 @@ class OnlineCalibration:
             path: Planned: times [s] and gripper positions [m], sampled about as often as the
                 cameras do, up to the end of the last cycle that may be stirred.
             attrs: As a recording's: geometry and densities.
-            out: The RUN directory to be made.
-            cups: Of the pour; None are the bundled ones.
-            prior: Over `viscosity` [Pa s] and `cohesion` [1]; None is `default_prior()`.
-            settings: None are the defaults.
-            bank: Simulations to reuse and to keep: pours of the same cups and density, and the
-                design of the same plan, rig and density. None is a file in `out`.
+            choice: What to calibrate, for which pour, and where.
             progress: Whether to show a bar on stderr while pours are made.
 
         Raises:
-            InputError: The plan, the prior or `out` cannot be used.
+            InputError: The plan, the prior or the directory of the run cannot be used.
         """
         from ..inference import SimulationBank
 
-        settings = OnlineSettings() if settings is None else settings
-        prior = default_prior() if prior is None else prior
+        settings = choice.settings
+        prior = default_prior() if choice.prior is None else choice.prior
         check_prior(prior)
-        cups = bundled_cups() if cups is None else cups
-        plan, out = planned(path.time, path.position, attrs), _fresh(Path(out))
-        bank = out / BANK if bank is None else Path(bank)
+        cups = bundled_cups() if choice.cups is None else choice.cups
+        plan, out = planned(path.time, path.position, attrs), _fresh(Path(choice.run))
+        bank = out / BANK if choice.bank is None else Path(choice.bank)
         (out / LOG).unlink(missing_ok=True)
         density = plan.number("liquid_density")
         with SimulationBank(bank) as kept:

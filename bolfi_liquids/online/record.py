@@ -3,13 +3,14 @@
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..inputs.open import open_recording
 from ..inputs.recording import Recording
-from ..robot.armed_session import Ask, check_one
+from ..inputs.rigs import rig_of
+from ..robot.armed_session import Ask, check_one, hidden_liquid
 from ..robot.live_view import SessionView
 from ..robot.record import kept
 from ..robot.stir import (
@@ -18,57 +19,33 @@ from ..robot.stir import (
     plan_stir,
     stir_session,
 )
-from .online import (
-    FAILED,
-    REFUSED,
-    OnlineCalibration,
-    OnlineSettings,
-    SoFar,
-)
+from .choice import OnlineChoice
+from .online import FAILED, REFUSED, OnlineCalibration, SoFar
 
 if TYPE_CHECKING:
     from ..hardware import HiddenLiquid, Rig, Session
     from ..hardware.motion import PosePath, Trajectory
-    from ..models import Cups
     from .estimate import OnlineEstimate
 
-MOST_CYCLES = 5  # unless somebody asks for more
 RATE = 30.0  # Hz, of the simulated plan; the cameras'
 FOLLOWED = 0.2  # s, after which arm, cameras and files have followed a stroke's last set-point
 
 
-class OnlineChoice(NamedTuple):
-    """What to calibrate, and where.
-
-    Attributes:
-        run: The RUN directory to be made.
-        cups: Of the pour; None are the bundled ones.
-        settings: Target and engine.
-        bank: Simulations to keep for other stirs; None is a file in `run`.
-    """
-
-    run: Path
-    cups: "Cups | None" = None
-    settings: OnlineSettings = OnlineSettings()
-    bank: Path | None = None
-
-
-def record_online(  # noqa: PLR0913  as `record`, and what to calibrate
-    rig: "Rig",
+def record_online(
+    rig: "Rig | str | Path | None" = None,
     *,
     out: str | Path,
     online: OnlineChoice,
     ask: Ask | None = None,
-    emulate: "HiddenLiquid | None" = None,
-    cycles: int | None = None,
+    emulate: "HiddenLiquid | bool" = False,
     progress: bool = True,
-    told: "Callable[[OnlineEstimate], None] | None" = None,
 ) -> Recording:
     """Stir, record, and infer meanwhile; stop stirring when the pour is known well enough.
 
     After every stroke the engine gets the data so far; the posterior and the expected spillage
     of the best pour come back, late by what inference takes. Stirring ends when the spillage is
-    under the target, or after `cycles`. The finished recording is then calibrated on as usual.
+    under the target, or after `online.cycles`. The finished recording is then calibrated on as
+    usual.
 
     Args:
         rig: What is there.
@@ -76,9 +53,7 @@ def record_online(  # noqa: PLR0913  as `record`, and what to calibrate
         online: What to calibrate, and where.
         ask: As of `record`.
         emulate: As of `record`.
-        cycles: At the most; None are `MOST_CYCLES`.
         progress: Whether to show progress on stderr.
-        told: Called with each estimate.
 
     Returns:
         The recording; the run is in `online.run`.
@@ -93,25 +68,22 @@ def record_online(  # noqa: PLR0913  as `record`, and what to calibrate
     from ..hardware.recorder.finalise import rig_attributes
 
     check_one(ask, emulate, "record")
-    cycles = MOST_CYCLES if cycles is None else cycles
-    plan, out = plan_stir(rig, cycles), Path(out)
+    rig, hidden = rig_of(rig), hidden_liquid(emulate)
+    plan, out = plan_stir(rig, online.cycles), Path(out)
     with OnlineCalibration.start(
         _simulated(plan),
         rig_attributes(rig),
-        out=online.run,
-        cups=online.cups,
-        settings=online.settings,
-        bank=online.bank,
+        online,
         progress=progress,
     ) as calibration:
         if not calibration.wait_until_ready():
             raise RuntimeError(f"the calibration is not ready: {calibration.status.detail}")
         with (
             kept(out),
-            stir_session(rig, plan, out, ask=ask, emulate=emulate) as session,
+            stir_session(rig, plan, out, ask=ask, emulate=hidden) as session,
             SessionView("stirring and calibrating", shown=progress) as view,
         ):
-            _Stirring(session, plan, calibration, view, told).carry_out()
+            _Stirring(session, plan, calibration, view, online.told).carry_out()
         recording = open_recording(finalise(out))
         calibration.finish(recording, progress=progress)
     return recording

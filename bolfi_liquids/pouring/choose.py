@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..inputs.cups import bundled_cups, open_cups
 from ..inputs.settings import PourSettings
 from ..progress import Advance, progress_bar
-from ..run.directory import POUR, open_bank
+from ..run.directory import POUR, Run, open_bank
 from ..seeds import Phase, simulation_seeds
 from .result import Judged, Pour, PourSummary
 from .spillage import (
@@ -53,7 +53,7 @@ SEARCH_STRATUM, AGAIN_STRATUM = 1, 2
 
 
 def choose_pour(  # noqa: PLR0913  the one call that most users make
-    calibration: Calibration | str | Path,
+    calibration: Run,
     cups: "Cups | str | Path | None" = None,
     *,
     iterations: int = 15,
@@ -74,7 +74,8 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     by the choice. Finished simulations are kept in the run.
 
     Args:
-        calibration: Whose posterior is poured; or a RUN directory, whose latest is.
+        calibration: A calibration; a criticism, or a RUN directory, whose latest posterior is
+            poured.
         cups: Source, receiver and ranges of the action, or a TOML file of them; None takes the
             bundled ones.
         iterations: Angular velocities tried, as many again for the plug-in.
@@ -91,8 +92,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     """
     from ..inference.simulations import Keep, open_executor
 
-    if not isinstance(calibration, Calibration):
-        calibration = latest_calibration(calibration)
+    calibration = latest_calibration(calibration)
     settings = PourSettings(iterations=iterations, draws=draws, risk=risk, seed=seed)
     if cups is None or isinstance(cups, str | Path):
         cups = bundled_cups() if cups is None else open_cups(cups)

@@ -23,10 +23,10 @@ from ..criticism.figures import (
 from ..criticism.result import is_criticised
 from ..criticism.summary import CriticismSummary
 from ..drawing import to_svg
+from ..hover import lines_of, to_chart
 from ..run.directory import CRITICISM
 from ..words import Sentence, spoken, unit_of
 from . import criticism_sentences as sentences
-from .hover import lines_of, to_chart
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree

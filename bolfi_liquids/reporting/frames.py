@@ -180,7 +180,8 @@ def _poured(
     made, caught, outcomes = [], [], []
     for (liquid, effects), seed in zip(_each(theta), seeds, strict=True):
         one = models.Liquid(**liquid, density=density)
-        frames = models.pour_frames(one, rate, cups, seed, rate=FRAME_RATE, effects=effects)
+        batch = models.PourBatch(one, rate, cups, [seed], effects=effects)
+        frames = models.pour_frames(batch, rate=FRAME_RATE)
         landed = models.landings(one, rate, cups, [seed], effects=effects)
         made.append(frames)
         inside = landed.inside(distance, cups.receiver.radius)[0]

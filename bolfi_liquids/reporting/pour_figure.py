@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..drawing import new_figure, styled
+from ..hover import Readout, field, to_chart
 from ..pouring.figures import (
     BAD_CASE,
     action_axes,
@@ -17,7 +18,6 @@ from ..pouring.figures import (
     place_of,
     risk_label,
 )
-from .hover import Readout, field, to_chart
 
 if TYPE_CHECKING:
     from matplotlib.figure import SubFigure

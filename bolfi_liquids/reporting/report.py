@@ -6,20 +6,20 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..calibration.fit_figures import inclination_figure, stroke_figure
+from ..calibration.posterior_figure import posterior_figure
 from ..calibration.result import Calibration
+from ..calibration.search_figure import search_figure
 from ..calibration.summary import CalibrationSummary
 from ..criticism.result import latest_calibration
 from ..files import write_text
+from ..hover import script_json
 from ..pouring.result import PourSummary, read_pour
-from ..run.directory import POUR, REPORT
+from ..run.directory import POUR, REPORT, Run, run_path
 from ..run.summary import read_summary
 from ..words import LIQUID_UNITS, sentence
 from . import sentences
-from .calibration_figures import inclination_figure, stroke_figure
 from .criticism_chapter import criticism_context
-from .hover import script_json
-from .posterior_figure import posterior_figure
-from .search_figure import search_figure
 from .warnings import Results, warnings_of
 
 if TYPE_CHECKING:
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 PAGE_TEMPLATE = "report.html.jinja"
 
 
-def report(run: str | Path, *, moving: bool = True, progress: bool = True) -> Path:
+def report(run: Run, *, moving: bool = True, progress: bool = True) -> Path:
     """Write RUN/report.html from what the run holds.
 
     Args:
-        run: A RUN directory with a finished calibration.
+        run: A RUN directory with a finished calibration; or a calibration, criticism or pour.
         moving: Whether it has moving pictures, of a few stirs and pours that are simulated for
             them once and kept in RUN/frames.nc; nothing else is simulated.
         progress: Whether to show a bar on stderr while they are.
@@ -42,7 +42,7 @@ def report(run: str | Path, *, moving: bool = True, progress: bool = True) -> Pa
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    calibration = Calibration.open(run)
+    calibration = Calibration.open(run_path(run))
     poured, criticism = _poured(calibration.path), criticism_context(calibration)
     pictures = _moving(calibration, progress) if moving else None
     environment = Environment(

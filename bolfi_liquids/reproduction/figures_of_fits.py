@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from ..calibration.posterior_figure import AXIS_LABELS, contour_levels, grid_density
 from ..drawing import GREY, INK, LIGHT, ORANGE, PALETTE, new_figure, plain_log_ticks, styled
 from ..inputs.bundled import RECORDED
-from ..reporting.posterior_figure import AXIS_LABELS, contour_levels, grid_density
 from .figure import Drawn
 from .workshop import Workshop
 

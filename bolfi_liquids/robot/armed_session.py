@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    from ..hardware import EmulatedRig, Rig, Session, Tool
+    from ..hardware import EmulatedRig, HiddenLiquid, Rig, Session, Tool
     from ..hardware.motion import PosePath
 
 Ask = Callable[[str], str]
@@ -43,6 +43,18 @@ class Emulation(NamedTuple):
 
     start: "AbstractContextManager[EmulatedRig]"
     source: str
+
+
+EMULATED_VISCOSITY = 1.0  # Pa s, of a liquid of which nothing is said
+
+
+def hidden_liquid(emulate: "HiddenLiquid | bool") -> "HiddenLiquid | None":
+    """What `emulate` stands for: a liquid, the usual one for True, none for False."""
+    from ..hardware import HiddenLiquid
+
+    if isinstance(emulate, bool):
+        return HiddenLiquid(viscosity=EMULATED_VISCOSITY) if emulate else None
+    return emulate
 
 
 def check_one(ask: Ask | None, emulate: object, where: str) -> None:

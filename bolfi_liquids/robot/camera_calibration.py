@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -34,23 +34,29 @@ def write_board(path: Path) -> Path:
     return path
 
 
+class Pictures(NamedTuple):
+    """Pictures from which a camera is calibrated.
+
+    Attributes:
+        square: Side of a printed square [m].
+        boards: Directory of pictures of the board; None takes them with the camera.
+        plumb: Picture of a plumb line; None takes it with the camera, unless `boards` is given.
+    """
+
+    square: float
+    boards: Path | None = None
+    plumb: Path | None = None
+
+
 def calibrate_view(
-    rig: Path | None,
-    view: str,
-    square: float,
-    *,
-    boards: Path | None = None,
-    plumb: Path | None = None,
-    out: Path | None = None,
+    rig: Path | None, view: str, pictures: Pictures, *, out: Path | None = None
 ) -> Iterator[str]:
     """Calibrate a camera and write its lens; yields what to tell.
 
     Args:
         rig: Its file; None is the bundled one.
         view: "xz" or "yz".
-        square: Side of a printed square [m].
-        boards: Directory of pictures of the board; None takes them with the camera.
-        plumb: Picture of a plumb line; None takes it with the camera, unless `boards` is given.
+        pictures: Of the board and of a plumb line.
         out: File of the lens; None is beside the rig's file.
 
     Raises:
@@ -67,6 +73,7 @@ def calibrate_view(
 
     if view not in VIEWS:
         raise InputError(f"{view!r}", where="--view", fix="give xz or yz")
+    square, boards, plumb = pictures
     if not 0.002 <= square <= 0.2:
         raise InputError(
             f"{100 * square:g} cm", where="--square", fix="give the side of a printed square in cm"

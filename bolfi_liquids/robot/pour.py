@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from ..run.directory import POUR, RUN_TOML
+from ..inputs.rigs import rig_of
+from ..run.directory import POUR, RUN_TOML, Run, run_path
 from .armed_session import (
     Ask,
     Emulation,
@@ -18,7 +19,7 @@ from .armed_session import (
 from .live_view import SessionView
 
 if TYPE_CHECKING:
-    from ..hardware import Check, Rig
+    from ..hardware import Check, HiddenLiquid, Rig
     from ..hardware.motion import PosePath
     from ..pouring.result import PourSummary
 
@@ -72,11 +73,11 @@ def plan_pour(run: str | Path, rig: "Rig") -> PourPlan:
 
 
 def execute_pour(
-    run: str | Path,
-    rig: "Rig",
+    run: Run,
+    rig: "Rig | str | Path | None" = None,
     *,
     ask: Ask | None = None,
-    emulate: bool = False,
+    emulate: "HiddenLiquid | bool" = False,
     progress: bool = True,
 ) -> Path:
     """Carry out the pour that a run has chosen.
@@ -84,10 +85,10 @@ def execute_pour(
     The arm moves only if `ask` returns the sentence that the plan asks for; or it is emulated.
 
     Args:
-        run: Whose pour was chosen.
-        rig: Where source and receiver are.
+        run: A RUN directory, or a calibration, criticism or pour of it.
+        rig: Where source and receiver are, or its file; None is the bundled one.
         ask: Shows a person the plan, returns what the person typed.
-        emulate: Use an emulator instead.
+        emulate: Use an emulator instead, as in `record`; a pour shows nothing of the liquid.
         progress: Whether to show a live view on stderr.
 
     Returns:
@@ -103,8 +104,9 @@ def execute_pour(
     from ..hardware.motion import approach_pour
 
     check_one(ask, emulate, "execute_pour")
+    run, rig = run_path(run), rig_of(rig)
     plan = plan_pour(run, rig)
-    task = Task(rig, "pouring", [plan.path], _next_directory(Path(run)))
+    task = Task(rig, "pouring", [plan.path], _next_directory(run))
     emulation = None
     if emulate:
         start = emulated(rig, plan.ready, tool="pouring")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..inputs.open import open_recording
 from ..inputs.recording import Recording
 from ..inputs.rigs import rig_of
-from .armed_session import Ask, check_one
+from .armed_session import Ask, check_one, hidden_liquid
 from .live_view import SessionView
 from .stir import follow_plan, plan_stir, stir_session
 
@@ -21,7 +21,7 @@ def record(
     *,
     out: str | Path,
     ask: Ask | None = None,
-    emulate: "HiddenLiquid | None" = None,
+    emulate: "HiddenLiquid | bool" = False,
     cycles: int | None = None,
     progress: bool = True,
 ) -> Recording:
@@ -34,7 +34,8 @@ def record(
         rig: What is there, or its file; None is the bundled one.
         out: Directory of the recording; new or empty.
         ask: Shows a person the plan, returns what the person typed.
-        emulate: Use an emulator and rendered cameras, which look at this liquid.
+        emulate: Use an emulator and rendered cameras, which look at this liquid; True takes one
+            of 1 Pa s.
         cycles: How often the pattern is repeated; None as in the rig's file.
         progress: Whether to show a live view on stderr, if that is a terminal.
 
@@ -50,12 +51,12 @@ def record(
     from ..hardware import finalise
 
     check_one(ask, emulate, "record")
-    opened = rig if rig is not None and not isinstance(rig, str | Path) else rig_of(rig)
+    opened, hidden = rig_of(rig), hidden_liquid(emulate)
     plan, out = plan_stir(opened, cycles), Path(out)
-    title = "stirring" if emulate is None else "stirring, emulated"
+    title = "stirring" if hidden is None else "stirring, emulated"
     with (
         kept(out),
-        stir_session(opened, plan, out, ask=ask, emulate=emulate) as session,
+        stir_session(opened, plan, out, ask=ask, emulate=hidden) as session,
         SessionView(title, shown=progress) as view,
     ):
         follow_plan(session, plan, view)

@@ -5,7 +5,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import tomli_w
 
@@ -26,6 +26,25 @@ CRITICISM_FORMAT = 3  # of what a criticism is kept as; another is made again
 POUR = "pour.nc"
 FRAMES = "frames.nc"
 REPORT = "report.html"
+
+
+class HasRun(Protocol):
+    """A result that knows its RUN directory: a calibration, a criticism or a pour."""
+
+    @property
+    def path(self) -> Path:
+        """The RUN directory."""
+        ...
+
+
+Run = str | Path | HasRun
+"""A RUN directory, or what was opened from one."""
+
+
+def run_path(run: Run) -> Path:
+    """The directory itself."""
+    return Path(run) if isinstance(run, str | Path) else run.path
+
 
 MUST_AGREE = ("settings", "inputs", "simulator", "engine")
 """Sections of run.toml that decide the results; versions and dates may differ."""

@@ -53,15 +53,15 @@ def film_pour(
 
     rate, distance = (float(np.asarray(x)) for x in (action.angular_velocity, action.distance))
     with failures_raised():
-        frames = models.pour_frames(
+        batch = models.PourBatch(
             described.liquid(),
             rate,
             cups,
-            described.seed,
-            rate=RATE,
-            particles=described.particles,
-            effects=described.effects,
+            [described.seed],
+            described.particles,
+            described.effects,
         )
+        frames = models.pour_frames(batch, rate=RATE)
     turn = f"{np.degrees(rate):g}°/s, lip to axis {100 * distance:g} cm"
     pictures = pour_pictures(frames, landings, cups, distance, [*described.lines(), turn])
     _write(movie, pictures, len(frames.time), progress)

@@ -4,9 +4,9 @@ import numpy as np
 
 from ..history import History
 
-FIRST = 2  # replicates to begin with, which tell a deterministic simulator
-SHARE = 0.1  # of the simulations, where runs differ
-SAME = 1e-9  # relative difference up to which two runs count as equal
+FIRST_REPLICATES = 2  # replicates to begin with, which tell a deterministic simulator
+REPLICATE_SHARE = 0.1  # of the simulations, where runs differ
+EQUAL_RUNS_TOLERANCE = 1e-9  # relative difference up to which two runs count as equal
 
 
 def next_replicate(history: History, pending: np.ndarray) -> np.ndarray | None:
@@ -23,7 +23,7 @@ def next_replicate(history: History, pending: np.ndarray) -> np.ndarray | None:
     known = np.concatenate([history.theta[good | failed], pending])  # what failed was tried
     points, count = np.unique(known, axis=0, return_counts=True)
     repeated = points[count > 1]
-    wanted = max(FIRST, int(SHARE * len(known)))
+    wanted = max(FIRST_REPLICATES, int(REPLICATE_SHARE * len(known)))
     if len(known) - len(points) >= wanted or _deterministic(theta, features, repeated):
         return None
     for i in np.argsort(history.discrepancy[good], kind="stable"):
@@ -33,9 +33,9 @@ def next_replicate(history: History, pending: np.ndarray) -> np.ndarray | None:
 
 
 def _deterministic(theta: np.ndarray, features: np.ndarray, repeated: np.ndarray) -> bool:
-    """Whether the runs at FIRST or more repeated points are equal."""
+    """Whether the runs at FIRST_REPLICATES or more repeated points are equal."""
     groups = [features[(theta == point).all(1)] for point in repeated]
     told = [group for group in groups if len(group) > 1]
-    tolerance = SAME * features.std(0)
+    tolerance = EQUAL_RUNS_TOLERANCE * features.std(0)
     equal = [(np.abs(group - group[0]).max(0) <= tolerance).all() for group in told]
-    return len(told) >= FIRST and all(equal)
+    return len(told) >= FIRST_REPLICATES and all(equal)

@@ -28,9 +28,9 @@ from ..types import LogLikelihood, LogSecondMoment
 from .screen import ROUNDS, screen
 
 CANDIDATES = 128  # points among which a rule chooses
-NODES = 32  # points over which a variance is integrated
-ENOUGH = 32.0  # candidates that count, effectively
-LEAST_POWER = 1e-6
+INTEGRATION_NODES = 32  # points over which a variance is integrated
+MIN_EFFECTIVE = 32.0  # candidates that count, effectively
+MIN_POWER = 1e-6
 
 
 class LCBState(NamedTuple):
@@ -122,7 +122,7 @@ def candidates(
 ) -> Candidates:
     """Systematic resample, in proportion to sqrt(L) or a smaller power, of a quick screen.
 
-    The power is halved until at least ENOUGH points count, however narrow the posterior.
+    The power is halved until at least MIN_EFFECTIVE points count, however narrow the posterior.
     """
     dimension = surrogate.gp.data.u.shape[1]
     shifts = rng.uniform(size=(ROUNDS, dimension + 1))
@@ -130,7 +130,7 @@ def candidates(
     log_target, log_weights = np.asarray(found.log_target), np.asarray(found.log_weights)
     log_base = log_weights - np.where(np.isfinite(log_target), log_target, 0.0)
     power, weights = 1.0, _normalised(log_weights)
-    while np.sum(weights**2) > 1.0 / ENOUGH and power > LEAST_POWER:
+    while np.sum(weights**2) > 1.0 / MIN_EFFECTIVE and power > MIN_POWER:
         power = power / 2.0
         weights = _normalised(power * log_target + log_base)
     positions = (np.arange(CANDIDATES) + rng.uniform()) / CANDIDATES
@@ -283,7 +283,7 @@ class ExpectedIntegratedVariance:
 
     @staticmethod
     def _score(rng: np.random.Generator, surrogate: Surrogate, found: Candidates) -> np.ndarray:
-        rows = rng.permutation(len(found.u))[:NODES]
+        rows = rng.permutation(len(found.u))[:INTEGRATION_NODES]
         u, nodes = jnp.asarray(found.u), jnp.asarray(found.u[rows])
         resolved = _log_resolved(surrogate.log_second_moment, surrogate.state, u, nodes)
         weighted = np.asarray(resolved) - found.log_density[rows, None]

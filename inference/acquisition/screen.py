@@ -17,14 +17,14 @@ from ..gp.linalg import small_inverse_cholesky
 from ..sobol import sobol
 from ..types import LogLikelihood
 
-ROUND = 64
-EVEN, ROUNDS = 4, 8  # rounds that fill the prior evenly, and rounds in all
+ROUND_POINTS = 64
+EVEN_ROUNDS, ROUNDS = 4, 8  # rounds that fill the prior evenly, and rounds in all
 CENTRES = 32
-EFFECTIVE = 24.0  # points to which the target is tempered
-WIDTH = 0.5  # of the kernel, in the population's sds
-SHARE_OF_PRIOR = 0.1
-EDGE = 1e-9
-COLDEST, GRID = -20.0, 21  # logs of the inverse temperatures tried
+MIN_EFFECTIVE = 24.0  # points to which the target is tempered
+KERNEL_WIDTH = 0.5  # of the kernel, in the population's sds
+PRIOR_SHARE = 0.1
+BOX_EDGE = 1e-9
+MIN_LOG_POWER, POWERS = -20.0, 21  # logs of the inverse temperatures tried
 
 
 class Screen(NamedTuple):
@@ -48,30 +48,34 @@ def screen(shifts: jax.Array, log_target: LogLikelihood, state: Any) -> Screen:
         shifts: Uniform random numbers [ROUNDS, d + 1] that shift the Sobol points.
     """
     dimension = shifts.shape[1] - 1
-    n = ROUND * ROUNDS
-    even = jnp.asarray(sobol(0, 0, ROUND * EVEN, dimension)).reshape(EVEN, ROUND, dimension)
-    cloud = jnp.asarray(sobol(1, 0, ROUND, dimension + 1))
+    n = ROUND_POINTS * ROUNDS
+    even = jnp.asarray(sobol(0, 0, ROUND_POINTS * EVEN_ROUNDS, dimension)).reshape(
+        EVEN_ROUNDS, ROUND_POINTS, dimension
+    )
+    cloud = jnp.asarray(sobol(1, 0, ROUND_POINTS, dimension + 1))
 
     def one(i: jax.Array, now: tuple[jax.Array, jax.Array, jax.Array]):
         x, values, mass = now
 
         def spread() -> tuple[jax.Array, _Kernel]:
             u = (even[i] + shifts[0, :dimension]) % 1.0
-            return ndtri(jnp.clip(u, EDGE, 1.0 - EDGE)), unused
+            return ndtri(jnp.clip(u, BOX_EDGE, 1.0 - BOX_EDGE)), unused
 
         def zoomed() -> tuple[jax.Array, _Kernel]:
             kernel = _fit(x, values, mass)
-            uniforms = jnp.clip((cloud + shifts[i]) % 1.0, EDGE, 1.0 - EDGE)
+            uniforms = jnp.clip((cloud + shifts[i]) % 1.0, BOX_EDGE, 1.0 - BOX_EDGE)
             return _propose(kernel, uniforms), kernel
 
-        new, kernel = jax.lax.cond(i < EVEN, spread, zoomed)
-        x = jax.lax.dynamic_update_slice(x, new, (i * ROUND, 0))
+        new, kernel = jax.lax.cond(i < EVEN_ROUNDS, spread, zoomed)
+        x = jax.lax.dynamic_update_slice(x, new, (i * ROUND_POINTS, 0))
         found = jax.vmap(log_target, (None, 0))(state, ndtr(new))
         found = jnp.where(jnp.isfinite(found), found, -jnp.inf)
-        values = jax.lax.dynamic_update_slice(values, found, (i * ROUND,))
-        density = jax.lax.cond(i < EVEN, lambda: _log_prior(x), lambda: _log_density(kernel, x))
-        filled = jnp.arange(n) < (i + 1) * ROUND
-        together = jnp.logaddexp(mass, jnp.log(ROUND) + density)
+        values = jax.lax.dynamic_update_slice(values, found, (i * ROUND_POINTS,))
+        density = jax.lax.cond(
+            i < EVEN_ROUNDS, lambda: _log_prior(x), lambda: _log_density(kernel, x)
+        )
+        filled = jnp.arange(n) < (i + 1) * ROUND_POINTS
+        together = jnp.logaddexp(mass, jnp.log(ROUND_POINTS) + density)
         return x, values, jnp.where(filled, together, -jnp.inf)
 
     # points are charged with the kernel that proposed them and with later ones, not with earlier
@@ -96,9 +100,9 @@ def _fit(x: jax.Array, values: jax.Array, mass: jax.Array) -> _Kernel:
         w = _log_weights(x, values, mass, jnp.exp(log_power))
         return jnp.exp(2.0 * logsumexp(w) - logsumexp(2.0 * w))
 
-    grid = jnp.linspace(COLDEST, 0.0, GRID)
-    enough = jax.vmap(effective)(grid) >= EFFECTIVE
-    power = jnp.exp(grid[jnp.max(jnp.where(enough, jnp.arange(GRID), 0))])
+    grid = jnp.linspace(MIN_LOG_POWER, 0.0, POWERS)
+    enough = jax.vmap(effective)(grid) >= MIN_EFFECTIVE
+    power = jnp.exp(grid[jnp.max(jnp.where(enough, jnp.arange(POWERS), 0))])
     log_weights = _log_weights(x, values, mass, power)
     weights = jnp.exp(log_weights - jnp.max(log_weights))
     weights = jnp.where(jnp.isfinite(weights), weights, 0.0)
@@ -110,17 +114,17 @@ def _fit(x: jax.Array, values: jax.Array, mass: jax.Array) -> _Kernel:
     centred = x - mean
     covariance = (centred * share[:, None]).T @ centred
     covariance = covariance + jnp.diag(1e-4 * jnp.diag(covariance) + 1e-12)
-    return _Kernel(centres, small_inverse_cholesky(WIDTH**2 * covariance))
+    return _Kernel(centres, small_inverse_cholesky(KERNEL_WIDTH**2 * covariance))
 
 
 def _propose(kernel: _Kernel, uniforms: jax.Array) -> jax.Array:
     d = kernel.centres.shape[1]
     z = ndtri(uniforms[:, :d])
     choice = uniforms[:, d]
-    within = (choice - SHARE_OF_PRIOR) / (1.0 - SHARE_OF_PRIOR)
+    within = (choice - PRIOR_SHARE) / (1.0 - PRIOR_SHARE)
     centre = kernel.centres[jnp.clip((within * CENTRES).astype(int), 0, CENTRES - 1)]
     factor = jax.vmap(lambda row: _lower_product(kernel.whitener, row))(z)
-    return jnp.where(choice[:, None] < SHARE_OF_PRIOR, z, centre + factor)
+    return jnp.where(choice[:, None] < PRIOR_SHARE, z, centre + factor)
 
 
 def _lower_product(whitener: jax.Array, z: jax.Array) -> jax.Array:
@@ -138,6 +142,4 @@ def _log_density(kernel: _Kernel, x: jax.Array) -> jax.Array:
     log_det = jnp.sum(jnp.log(jnp.diag(kernel.whitener)))
     each = jnp.sum(norm.logpdf(white), -1) + log_det
     fitted = logsumexp(each, 1) - jnp.log(CENTRES)
-    return jnp.logaddexp(
-        jnp.log1p(-SHARE_OF_PRIOR) + fitted, jnp.log(SHARE_OF_PRIOR) + _log_prior(x)
-    )
+    return jnp.logaddexp(jnp.log1p(-PRIOR_SHARE) + fitted, jnp.log(PRIOR_SHARE) + _log_prior(x))

@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 from arviz_stats.base.array import array_stats
 
-SPACING = 2  # autocorrelation times between kept draws; an AR(1) chain then keeps exp(-4) = 0.02
-LEAST = 4  # draws per chain that an effective sample size can be estimated from
+DRAW_SPACING = (
+    2  # autocorrelation times between kept draws; an AR(1) chain then keeps exp(-4) = 0.02
+)
+MIN_DRAWS = 4  # draws per chain that an effective sample size can be estimated from
 
 
 def posterior_array(drawn: Any, names: Sequence[str]) -> np.ndarray:
@@ -50,10 +52,10 @@ def effective_size(draws: np.ndarray) -> float:
     """The least effective sample size of draws [chain, draw, d], over bulk, tails and parameters.
 
     Rank-normalised, split chains (Vehtari et al. 2021). A parameter that never moves counts as
-    one draw; chains shorter than `LEAST` show no autocorrelation and count in full.
+    one draw; chains shorter than `MIN_DRAWS` show no autocorrelation and count in full.
     """
     total = draws.shape[0] * draws.shape[1]
-    if draws.shape[1] < LEAST:
+    if draws.shape[1] < MIN_DRAWS:
         return float(total)
     sizes = [float(total)]
     for column in np.moveaxis(draws, -1, 0):
@@ -66,7 +68,7 @@ def effective_size(draws: np.ndarray) -> float:
 
 
 def thin(draws: np.ndarray, most: int, effective: float) -> np.ndarray:
-    """At most `most` draws, evenly spaced and `SPACING` autocorrelation times apart.
+    """At most `most` draws, evenly spaced and `DRAW_SPACING` autocorrelation times apart.
 
     Args:
         draws: [chain, draw, d].
@@ -77,5 +79,5 @@ def thin(draws: np.ndarray, most: int, effective: float) -> np.ndarray:
         [m, d], m >= 1.
     """
     joined = draws.reshape(-1, draws.shape[-1])
-    n = int(max(1.0, min(most, len(joined), effective / SPACING)))
+    n = int(max(1.0, min(most, len(joined), effective / DRAW_SPACING)))
     return joined[((np.arange(n) + 0.5) * len(joined) / n).astype(int)]

@@ -8,8 +8,6 @@ import numpy as np
 import xarray as xr
 from scipy.stats import beta, binom
 
-from ..prior import Prior
-from ..types import Simulator
 from .repeat import made_or_given
 from .replicate import Pipeline
 from .replicated import Quantity, Replicates
@@ -114,10 +112,8 @@ class Coverage:
         return plot_coverage(self.names, self.quantiles, rates, ax)
 
 
-def coverage(  # noqa: PLR0913  operands of `replicates`, then what is asked of them
+def coverage(
     of: Replicates | Pipeline,
-    simulate: Simulator | None = None,
-    prior: Prior | None = None,
     *,
     levels: Sequence[float] = (0.5, 0.8, 0.9, 0.95),
     conservative: bool = False,
@@ -134,7 +130,7 @@ def coverage(  # noqa: PLR0913  operands of `replicates`, then what is asked of 
 
     Args:
         of: Replicates, or a pipeline for which `replicates` makes them.
-        simulate, prior, run: Arguments of `replicates`; only with a pipeline.
+        run: Arguments of `replicates`, such as `simulate` and `prior`; only with a pipeline.
         levels: Nominal levels.
         conservative: Only too little coverage is a fault, as for a posterior that is wide by
             construction.
@@ -147,7 +143,7 @@ def coverage(  # noqa: PLR0913  operands of `replicates`, then what is asked of 
     nominal = np.array(levels, np.float64)
     if nominal.ndim != 1 or nominal.size == 0 or not ((nominal > 0) & (nominal < 1)).all():
         raise ValueError(f"levels must lie between 0 and 1, got {levels}")
-    made = made_or_given(of, simulate, prior, run)
+    made = made_or_given(of, run.pop("simulate", None), run.pop("prior", None), run)
     values = made.values(quantities)
     quantiles = made.quantiles(values)
     covered = np.sum(2 * np.abs(quantiles - 0.5) <= nominal[:, None, None], axis=1)

@@ -20,7 +20,7 @@ from .table import table
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-NOTICED = 3.0  # standard errors from which a shape of the ranks is named
+NAMED_SHAPE_Z = 3.0  # standard errors from which a shape of the ranks is named
 
 
 @dataclass(frozen=True)
@@ -106,9 +106,9 @@ def _shape(name: str, ranks: np.ndarray, draws: int) -> str:
     n = len(u)
     shift = u.mean() * np.sqrt(12 * n)
     spread = (12 * u**2 - 1).mean() * np.sqrt(n / 0.8)  # var of 12 u^2 is 4/5
-    if max(abs(shift), abs(spread)) < NOTICED:
+    if max(abs(shift), abs(spread)) < NAMED_SHAPE_Z:
         return ""
-    if name == LOG_DENSITY and abs(shift) > NOTICED:
+    if name == LOG_DENSITY and abs(shift) > NAMED_SHAPE_Z:
         return ": draws too wide" if shift > 0 else ": draws too narrow, or in the wrong place"
     if abs(shift) > abs(spread):
         return ": draws too low" if shift > 0 else ": draws too high"

@@ -7,9 +7,13 @@ import numpy as np
 from ..prior import Prior
 from ..sobol import sobol
 
-REACH = 10.0  # posterior sds: narrower boxes make slopes of noise (errors in variables)
-WIDE, NARROW, MOST = 0.25, 0.08, 0.5  # half a box's width: to begin with, later, and at most
-END = 0.02  # quantile of a coefficient's prior beyond which nothing is simulated
+MIN_POSTERIOR_SDS = 10.0  # posterior sds: narrower boxes make slopes of noise (errors in variables)
+FIRST_HALF_WIDTH, LATER_HALF_WIDTH, MAX_HALF_WIDTH = (
+    0.25,
+    0.08,
+    0.5,
+)  # half a box's width: to begin with, later, and at most
+PRIOR_END = 0.02  # quantile of a coefficient's prior beyond which nothing is simulated
 
 
 class Box(NamedTuple):
@@ -28,13 +32,13 @@ def around(centre: np.ndarray, sd: np.ndarray, least: float) -> Box:
 
     A missing effect displaces the base parameters by many of their sds, so the first box is wide.
     """
-    half = np.clip(REACH * sd, least, MOST)
+    half = np.clip(MIN_POSTERIOR_SDS * sd, least, MAX_HALF_WIDTH)
     return Box(np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0))
 
 
 def with_coefficient(box: Box) -> Box:
     """The box of the base parameters, and the whole prior of a coefficient."""
-    return Box(np.append(box.low, END), np.append(box.high, 1.0 - END))
+    return Box(np.append(box.low, PRIOR_END), np.append(box.high, 1.0 - PRIOR_END))
 
 
 def fill(box: Box, prior: Prior, seed: int, count: int) -> dict[str, np.ndarray]:

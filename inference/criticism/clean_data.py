@@ -8,7 +8,7 @@ from .extension import Extensions
 from .search import Plan, Study, fit_base
 from .simulate import Keeping, Laboratory
 
-REPEATS = 4  # runs where the model fits best, whose mean is free of the emulator's error
+CLEAN_RUNS = 4  # runs where the model fits best, whose mean is free of the emulator's error
 
 
 def own_residual(
@@ -22,6 +22,6 @@ def own_residual(
     laboratory = Laboratory(experiment.simulate, prior, extensions, experiment.identity, keeping)
     study = Study(laboratory, experiment.observed, experiment.noise, plan)
     best = fit_base(study, None)[0].best
-    at_best = {name: np.full(REPEATS, value) for name, value in best.items()}
+    at_best = {name: np.full(CLEAN_RUNS, value) for name, value in best.items()}
     mean = laboratory.run("repeat", at_best).signals.mean(0)
     return experiment.observed - mean

@@ -63,12 +63,12 @@ class Criticism:
     simulations: int
 
     def __repr__(self) -> str:
-        return as_text("Criticism", self._rows())
+        return as_text("Criticism", self._shown())
 
     def _repr_html_(self) -> str:
-        return as_html("Criticism", self._rows())
+        return as_html("Criticism", self._shown())
 
-    def _rows(self) -> list[tuple[str, str]]:
+    def _shown(self) -> list[tuple[str, str]]:
         sizes = [
             (
                 f"{name}",

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..surrogates.output import SERIES
+from ..surrogates.output import MIN_SERIES
 from .experiment import Experiment
 from .hypothesis import samples
 from .measurement_noise import gaussian
@@ -15,9 +15,11 @@ from .simulate import Laboratory
 from .usual_residual import without_usual
 from .verdict import ACCEPTANCE_LEVEL
 
-FLOOR = 0.99  # quantile of the noise's RMS below which a gap may be noise
-SHARE = 0.5  # of a gap beyond noise that an explanation may leave, unless it may be noise
-GAIN = 3.0  # log predictive density that an explanation must win on all held-out data together
+NOISE_QUANTILE = 0.99  # quantile of the noise's RMS below which a gap may be noise
+MAX_LEFT_SHARE = 0.5  # of a gap beyond noise that an explanation may leave, unless it may be noise
+MIN_LPD_GAIN = (
+    3.0  # log predictive density that an explanation must win on all held-out data together
+)
 REPLICATES = 999
 
 
@@ -67,8 +69,8 @@ def holds(gaps: Sequence[Gap]) -> bool:
     if not gaps:
         return True
     before, after = np.sqrt(np.mean(np.square([one.excess for one in gaps]), axis=0))
-    explained = after <= SHARE * before or all(one.after <= one.floor for one in gaps)
-    gained = sum(one.lpd_gain for one in gaps) > GAIN
+    explained = after <= MAX_LEFT_SHARE * before or all(one.after <= one.floor for one in gaps)
+    gained = sum(one.lpd_gain for one in gaps) > MIN_LPD_GAIN
     return bool(all(one.fits for one in gaps) and explained and gained)
 
 
@@ -90,7 +92,7 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
     observed = experiment.observed[np.isfinite(experiment.observed)]
     fewer = 1.0 + 1.0 / min(len(before), len(after))  # the mean of few runs is noisy, too
     at = samples(experiment.observed)
-    series = len(experiment.observed) >= SERIES
+    series = len(experiment.observed) >= MIN_SERIES
     simulated = fewer * smooth_covariance(errors_of([before, after]), at, series)
     covariance = experiment.noise.covariance(at) + simulated
     measured = without_usual(experiment.noise)
@@ -117,7 +119,7 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
         before=sizes[0],
         after=sizes[1],
         noise=float(np.sqrt(np.trace(measured.covariance(at) + simulated) / len(observed))),
-        floor=float(np.quantile(np.sqrt(np.mean(noise**2, axis=1)), FLOOR)),
+        floor=float(np.quantile(np.sqrt(np.mean(noise**2, axis=1)), NOISE_QUANTILE)),
         p_value=min(1.0, 2.0 * float(exceedance(measures(null), left).min())),
         lpd_gain=density(means[1]) - density(means[0]),
     )

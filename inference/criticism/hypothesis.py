@@ -23,9 +23,9 @@ from .run_noise import own_errors, resized, smooth_covariance
 from .run_table import Runs
 
 COMPONENTS = 10
-STEP = 0.02  # of prior quantiles, for slopes
-END = 1e-4  # quantile of a prior from which a parameter is at its end
-SEPARATE = 1e-8  # relative size below which a slope adds nothing to those before
+SLOPE_STEP = 0.02  # of prior quantiles, for slopes
+PRIOR_END = 1e-4  # quantile of a prior from which a parameter is at its end
+INDEPENDENT_SLOPE = 1e-8  # relative size below which a slope adds nothing to those before
 
 
 @dataclass(frozen=True)
@@ -78,8 +78,8 @@ class Hypothesis:
     def slopes(self) -> np.ndarray:
         """Whitened derivatives of the expected values by the prior quantiles [m, d]."""
         d = len(self.u)
-        above = np.minimum(self.u + STEP * np.eye(d), 1.0)
-        below = np.maximum(self.u - STEP * np.eye(d), 0.0)
+        above = np.minimum(self.u + SLOPE_STEP * np.eye(d), 1.0)
+        below = np.maximum(self.u - SLOPE_STEP * np.eye(d), 0.0)
         rise = self.expected(above) - self.expected(below)
         return self.whiten(rise / np.diag(above - below)[:, None])
 
@@ -89,9 +89,9 @@ class Hypothesis:
 
         A parameter at an end of its prior would have to leave it to absorb more.
         """
-        free = (self.u > END) & (self.u < 1.0 - END)
+        free = (self.u > PRIOR_END) & (self.u < 1.0 - PRIOR_END)
         left, size, _ = np.linalg.svd(self.slopes[:, free], full_matrices=False)
-        return left[:, size > SEPARATE * size.max(initial=1.0)]
+        return left[:, size > INDEPENDENT_SLOPE * size.max(initial=1.0)]
 
     @cached_property
     def sd(self) -> np.ndarray:

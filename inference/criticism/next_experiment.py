@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..surrogates.output import SERIES
+from ..surrogates.output import MIN_SERIES
 from .experiment import Proposal
 from .hypothesis import samples
 from .misfit import MODES, orthonormal, slow_modes
@@ -14,7 +14,7 @@ from .run_noise import errors_of, smooth_covariance
 from .simulate import Laboratory
 from .verdict import Candidate
 
-RUNS = 3  # of each explanation in each proposed experiment
+RUNS_EACH = 3  # of each explanation in each proposed experiment
 
 
 class Suggestion(NamedTuple):
@@ -48,7 +48,7 @@ def _separation(
     names = [" with ".join(rival.names) for rival in rivals]
     signals = []
     for name, rival in zip(names, rivals, strict=True):
-        theta = {key: np.full(RUNS, value) for key, value in rival.hypothesis.best.items()}
+        theta = {key: np.full(RUNS_EACH, value) for key, value in rival.hypothesis.best.items()}
         made = elsewhere.run(f"next {proposal.label} {name}", theta).signals
         signals.append(made.reshape(len(made), -1))
     snr = {
@@ -63,7 +63,7 @@ def _distance(proposal: Proposal, signals: Sequence[np.ndarray], a: int, b: int)
     """Length of the whitened difference of two means in its slow part, less what the noise of
     the runs adds to it."""
     at = samples(np.zeros(proposal.shape))
-    series = proposal.shape[0] >= SERIES
+    series = proposal.shape[0] >= MIN_SERIES
     runs = smooth_covariance(errors_of(signals), at, series)
     covariance = proposal.noise.covariance(at) + runs
     factor = np.linalg.cholesky(covariance)

@@ -9,10 +9,10 @@ from ..surrogates.emulator import Emulator
 from ..surrogates.measurement_noise import Layout
 from .usual_residual import positive_autocovariance
 
-ALIKE = 0.2  # of prior quantiles, over which a simulator's noise changes as a power
-FEW = 0.1  # runs
-TINY = 1e-6  # of the largest square
-SMOOTHED = 15  # samples over which the noise's size varies
+ALIKE_DISTANCE = 0.2  # of prior quantiles, over which a simulator's noise changes as a power
+PRIOR_RUNS = 0.1  # runs
+TINY_SQUARE = 1e-6  # of the largest square
+SMOOTHED_SAMPLES = 15  # samples over which the noise's size varies
 
 
 def smooth_covariance(errors: np.ndarray, layout: Layout, series: bool) -> np.ndarray:
@@ -39,13 +39,15 @@ def resized(errors: np.ndarray, u: np.ndarray, centre: np.ndarray) -> np.ndarray
     square = np.mean(errors**2, axis=1)
     if not square.any():
         return errors
-    logs = np.log(np.maximum(square, TINY * square.max()))
+    logs = np.log(np.maximum(square, TINY_SQUARE * square.max()))
     usual = logs.mean()
 
     def smoothed(point: np.ndarray) -> float:
-        x = np.column_stack([np.ones(len(u)), (u - point) / ALIKE])
+        x = np.column_stack([np.ones(len(u)), (u - point) / ALIKE_DISTANCE])
         weighted = x * np.exp(-0.5 * np.sum(x[:, 1:] ** 2, axis=1))[:, None]
-        known = np.diag([FEW] + [1.0] * u.shape[1])  # as if a run or less spoke for no change
+        known = np.diag(
+            [PRIOR_RUNS] + [1.0] * u.shape[1]
+        )  # as if a run or less spoke for no change
         return float(np.linalg.solve(weighted.T @ x + known, weighted.T @ (logs - usual))[0])
 
     there = np.array([smoothed(point) for point in u])
@@ -85,7 +87,7 @@ def _target(errors: np.ndarray, layout: Layout) -> np.ndarray:
     channels = [np.flatnonzero(layout.channel == c) for c in np.unique(layout.channel)]
     least = 1e-6 * np.mean(errors**2)
     for here in channels:
-        window = np.ones(min(SMOOTHED, len(here)))
+        window = np.ones(min(SMOOTHED_SAMPLES, len(here)))
         weight = np.convolve(np.ones(len(here)), window, "same")
         variance = np.convolve(np.mean(errors[:, here] ** 2, 0), window, "same") / weight
         size[here] = np.sqrt(np.maximum(variance, least))

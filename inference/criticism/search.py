@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .boxes import (
-    NARROW,
-    WIDE,
+    FIRST_HALF_WIDTH,
+    LATER_HALF_WIDTH,
     Box,
     around,
     fill,
@@ -24,8 +24,8 @@ from .signatures import Signature, signature
 from .simulate import Laboratory
 from .verdict import Candidate, near_best
 
-PASSES = 2  # of a refit, the second only if the first moved the best fit out of its box
-SECOND = 6.0  # log likelihood that a second effect must gain
+REFIT_PASSES = 2  # of a refit, the second only if the first moved the best fit out of its box
+SECOND_EFFECT_GAIN = 6.0  # log likelihood that a second effect must gain
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Box]
     everywhere = Box(np.zeros(dimension), np.ones(dimension))
     runs = study.run("start", everywhere, (), study.plan.start) if earlier is None else earlier
     first = study.hypothesis((), runs)
-    box = around(first.u, first.sd, WIDE)
+    box = around(first.u, first.sd, FIRST_HALF_WIDTH)
     runs = joined([runs, study.run("base", box, (), study.plan.base)])
     return study.hypothesis((), runs), runs, box
 
@@ -166,10 +166,10 @@ def _refit(
     """The candidate, simulated where it fits best and fitted again, until it stays there or
     more than `most` runs would be made."""
     names = candidate.names
-    for attempt in range(PASSES):
+    for attempt in range(REFIT_PASSES):
         if most is not None and len(runs) - base.given + study.plan.refit > most:
             break
-        box = around(candidate.hypothesis.u, candidate.hypothesis.sd, NARROW)
+        box = around(candidate.hypothesis.u, candidate.hypothesis.sd, LATER_HALF_WIDTH)
         phase = f"refit {' '.join(names)} {attempt}"
         runs = joined([runs, study.run(phase, box, names, study.plan.refit)])
         candidate = study.candidate(base, study.hypothesis(names, runs), refitted=True)
@@ -199,6 +199,6 @@ def _pairs(
                     alone = found[(name,)]
                     found[(name,)], runs = _refit(study, base, alone, runs, study.plan.most)
             best_alone = max(found[(name,)].gain for name in again.names)
-            again = replace(again, needed=again.gain > best_alone + SECOND)
+            again = replace(again, needed=again.gain > best_alone + SECOND_EFFECT_GAIN)
         tried.append(again)
     return tried, runs

@@ -10,8 +10,8 @@ from .extension import Extension
 from .hypothesis import Hypothesis
 
 STEPS = np.array([0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7, 0.9])  # of prior quantiles
-VISIBLE = 5.0  # signal-to-noise ratio at which a signature is taken
-FAINT = 0.3  # share of its visible length below which what is left of a change means nothing
+VISIBLE_SNR = 5.0  # signal-to-noise ratio at which a signature is taken
+FAINT_SHARE = 0.3  # share of its visible length below which what is left of a change means nothing
 
 
 class Signature(NamedTuple):
@@ -52,7 +52,7 @@ def signature(base: Hypothesis, extended: Hypothesis, extension: Extension) -> S
         if len(u):
             changes = _changes(base, extended, neutral, u)
             length = np.maximum(_visible(base, changes), 1e-12)
-            nearest = np.argmin(np.abs(np.log(length / VISIBLE)))
+            nearest = np.argmin(np.abs(np.log(length / VISIBLE_SNR)))
             units[side] = side * changes[nearest] / length[nearest]
     change = np.mean(list(units.values()), axis=0)
     middle = (neutral + float(neutral <= 0.5)) / 2.0
@@ -90,7 +90,7 @@ def directions(
             continue
         left = hypothesis.project(hypothesis.whiten(of.change))[:, 0]
         length = np.linalg.norm(left)
-        if length > FAINT * of.visible:
+        if length > FAINT_SHARE * of.visible:
             found[name] = left / length
     return found
 

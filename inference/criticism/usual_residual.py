@@ -8,7 +8,7 @@ import numpy as np
 from ..surrogates.measurement_noise import Layout
 from .measurement_noise import Noise, SumOfNoises, gaussian
 
-LEAST_FREEDOM = 3  # with fewer, draws have no variance and no effect would be found
+MIN_FREEDOM = 3  # with fewer, draws have no variance and no effect would be found
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class UsualResidual:
         shapes: Clean residuals of the same experiment at each sample, shape [k, T, channels];
             NaN where missing.
         freedom: Clean data sets that speak for this experiment: the size is known as well as a
-            variance from so many numbers, but never less than from LEAST_FREEDOM.
+            variance from so many numbers, but never less than from MIN_FREEDOM.
         others: For each shape the autocovariance of all clean data but it, shape [k, lags]; none
             where there are no other clean data.
     """
@@ -55,7 +55,7 @@ class UsualResidual:
 
     def draw(self, rng: np.random.Generator, at: Layout, count: int) -> np.ndarray:
         drawn = gaussian(rng, self.covariance(at), count)
-        freedom = max(self.freedom, LEAST_FREEDOM)
+        freedom = max(self.freedom, MIN_FREEDOM)
         return np.sqrt(freedom / rng.chisquare(freedom, count))[:, None] * drawn
 
     def shapes_at(self, at: Layout) -> np.ndarray:

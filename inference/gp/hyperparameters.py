@@ -15,7 +15,10 @@ stats = lazy_loader.load("scipy.stats", suppress_warning=True)  # takes as long 
 LENGTH = (np.log(1.0), 1.5)  # 95 %: a twentieth of the box to 20 times the box: no effect at all
 AMPLITUDE = (np.log(1.0), 0.7)
 NOISE = (np.log(0.2), 1.0)  # 95 %: 3 % of the targets' sd to more than all of it
-SCORED, REFINED = 8, 2  # starts that are evaluated, and of these the best to be optimised
+SCORED_STARTS, REFINED_STARTS = (
+    8,
+    2,
+)  # starts that are evaluated, and of these the best to be optimised
 
 
 def log_prior(hyper: Hyper) -> jax.Array:
@@ -61,9 +64,9 @@ def prior_moments(dimension: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def starts(dimension: int) -> np.ndarray:
-    """Fixed quasi-random draws from the priors, [SCORED, dimension + 2]."""
+    """Fixed quasi-random draws from the priors, [SCORED_STARTS, dimension + 2]."""
     mean, sd = prior_moments(dimension)
-    uniform = stats.qmc.Halton(dimension + 2, scramble=False).random(SCORED + 1)[1:]
+    uniform = stats.qmc.Halton(dimension + 2, scramble=False).random(SCORED_STARTS + 1)[1:]
     return mean + sd * stats.norm.ppf(uniform)
 
 
@@ -91,7 +94,7 @@ def maximum_a_posteriori(data: Data, previous: Hyper | None = None) -> Hyper:
         candidates = starts(d)
         scores = np.array([evaluate(np.tile(c, (k, 1)), taught)[0] for c in candidates])
         order = np.argsort(np.where(np.isfinite(scores), scores, np.inf), axis=0)
-        runs = [refine(candidates[order[i]]) for i in range(REFINED)]
+        runs = [refine(candidates[order[i]]) for i in range(REFINED_STARTS)]
         best = np.argmin([values for _, values in runs], axis=0)
         found = np.array([found for found, _ in runs])[best, np.arange(k)]
     return unpack(jnp.asarray(np.where(taught[:, None], found, prior_moments(d)[0])))

@@ -14,9 +14,9 @@ import numpy as np
 
 from ..sobol import sobol
 
-SCREENED, REFINED = 512, 3
-EDGE = 1e-6  # the box is [EDGE, 1 - EDGE]: beyond lie only tails of unbounded priors
-ITERATIONS, BACKTRACKS = 40, 8
+SCREENED_POINTS, REFINED_POINTS = 512, 3
+BOX_EDGE = 1e-6  # the box is [BOX_EDGE, 1 - BOX_EDGE]: beyond lie only tails of unbounded priors
+MAX_ITERATIONS, MAX_BACKTRACKS = 40, 8
 LONGEST_STEP = 1.0  # of a step, in every coordinate
 ARMIJO = 1e-4
 
@@ -48,7 +48,7 @@ def minimise_many(
     now = Points(x, *_evaluate(value_and_grad, x, wanted))
     inverse = np.tile(np.eye(d), (k, 1, 1)) / np.maximum(1.0, _norm(now.gradient))[:, None, None]
     active = wanted & np.isfinite(now.value)
-    for _ in range(ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         if not active.any():
             break
         step = -np.einsum("kij,kj->ki", inverse, now.gradient)
@@ -90,7 +90,7 @@ def _search(
     length = np.where(active, 1.0, 0.0)
     done = ~active
     best = Points(*(part.copy() for part in now))
-    for _ in range(BACKTRACKS):
+    for _ in range(MAX_BACKTRACKS):
         trial = now.x + length[:, None] * step
         new = Points(trial, *_evaluate(value_and_grad, trial, ~done))
         enough = ~done & (new.value <= now.value + ARMIJO * length * slope)
@@ -134,16 +134,16 @@ def minimise_in_box(objective: Objective, state: Any, dimension: int) -> np.ndar
     Of a fixed screen the best few points are refined, so the result is a pure function of
     objective and state.
     """
-    screen = sobol(0, 0, SCREENED, dimension)
-    order = np.argsort(np.asarray(_values(objective, state, screen)))[:REFINED]
+    screen = sobol(0, 0, SCREENED_POINTS, dimension)
+    order = np.argsort(np.asarray(_values(objective, state, screen)))[:REFINED_POINTS]
     x, value = minimise_many(
         lambda x, _: _value_and_grad(objective, state, x),
         _logit(screen[order]),
-        np.ones(REFINED, bool),
+        np.ones(REFINED_POINTS, bool),
         tolerance=1e-6,
     )
     best = x[np.argmin(value)]
-    return np.clip(np.asarray(jax.nn.sigmoid(jnp.asarray(best))), EDGE, 1.0 - EDGE)
+    return np.clip(np.asarray(jax.nn.sigmoid(jnp.asarray(best))), BOX_EDGE, 1.0 - BOX_EDGE)
 
 
 def _logit(u: np.ndarray) -> np.ndarray:

@@ -16,11 +16,11 @@ from .linalg import BLOCK, inverse_cholesky, log_normal_density
 
 TREND_SD = 3.0
 """Prior sd of a trend's coefficient, in units of the targets' sd: broad, yet proper."""
-RELEVANT = 0.5  # length scale from which on a parameter's trend fades
+RELEVANT_LENGTH = 0.5  # length scale from which on a parameter's trend fades
 JITTER = 1e-7
 """Variance added to every target, in units of the targets': below it rounding would rule."""
-FAR = 1e-9  # quantile beyond which normal scores end
-LEAST = 1e-10  # latent variance, which rounding may make negative
+SCORE_EDGE = 1e-9  # quantile beyond which normal scores end
+MIN_VARIANCE = 1e-10  # latent variance, which rounding may make negative
 
 
 class Data(NamedTuple):
@@ -68,7 +68,7 @@ def coordinates(u: jax.Array, normal: jax.Array) -> jax.Array:
     parameter is steep in its quantile there, and no stationary kernel follows. Scores are
     scaled to the quantiles' mean and sd, so that one prior of the length scales serves both.
     """
-    scores = 0.5 + ndtri(jnp.clip(u, FAR, 1.0 - FAR)) / jnp.sqrt(12.0)
+    scores = 0.5 + ndtri(jnp.clip(u, SCORE_EDGE, 1.0 - SCORE_EDGE)) / jnp.sqrt(12.0)
     return jnp.where(normal, scores, u)
 
 
@@ -98,7 +98,7 @@ def trend(hyper: Hyper, a: jax.Array) -> jax.Array:
     The relevance r_j is 1 at short lengths and falls with long ones l_j as the slope of the
     squared exponential does, 1 / l_j.
     """
-    relevance = 1.0 / jnp.sqrt(1.0 + (jnp.exp(hyper.log_length) / RELEVANT) ** 2)
+    relevance = 1.0 / jnp.sqrt(1.0 + (jnp.exp(hyper.log_length) / RELEVANT_LENGTH) ** 2)
     x = relevance * (2.0 * a - 1.0)
     return jnp.concatenate([jnp.ones((x.shape[0], 1)), x, x**2], axis=1)
 
@@ -157,7 +157,7 @@ def predict_many(gp: GP, u: jax.Array) -> tuple[jax.Array, jax.Array]:
     cross, alone = _cross(gp, u)
     mean = jnp.einsum("kp,kmp->km", gp.weights, cross)
     explained = jnp.sum(_whitened(gp, cross) ** 2, axis=2)
-    return mean, jnp.maximum(alone - explained, LEAST)
+    return mean, jnp.maximum(alone - explained, MIN_VARIANCE)
 
 
 def _whitened(gp: GP, cross: jax.Array) -> jax.Array:

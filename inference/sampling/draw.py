@@ -73,7 +73,7 @@ def draw_posterior(
     if divergent > DIVERGENT_SHARE:
         found[Status.DIVERGENT] = describe_divergences(divergent)
     checks: dict[str, float] = {}
-    if target.dimension in quadrature.BASE and sampler != "quadrature":
+    if target.dimension in quadrature.FIRST_GRID and sampler != "quadrature":
         effective = min(min(m["ess_bulk"], m["ess_tail"]) for m in measures.values())
         checks, complaint = _cross_checked(chains.u, target, effective)
         if complaint:
@@ -96,7 +96,7 @@ def _cross_checked(u: np.ndarray, target: Target, effective: float) -> tuple[dic
     """Measures of the comparison with quadrature, and a complaint or ""."""
     flat = u.reshape(-1, u.shape[-1])
     limit = quadrature.largest_expected(min(effective, len(flat)))
-    for budget in (quadrature.QUICK, quadrature.THOROUGH):
+    for budget in (quadrature.QUICK_BUDGET, quadrature.THOROUGH_BUDGET):
         cells = quadrature.integrate(target, budget)
         distance = quadrature.total_variation(flat, cells)
         if distance <= limit:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import emcee
 
 WALKERS = 32
-LONGEST_THIN = 64  # steps; beyond, R-hat and ESS judge instead
+MAX_THIN = 64  # steps; beyond, R-hat and ESS judge instead
 
 
 @partial(jax.jit, static_argnums=0)
@@ -106,12 +106,12 @@ def _sampler(
 
 
 def _autocorrelation_time(x: np.ndarray) -> int:
-    """In steps, of the slowest coordinate of x [step, walker, d]; from 1 to LONGEST_THIN."""
+    """In steps, of the slowest coordinate of x [step, walker, d]; from 1 to MAX_THIN."""
     import emcee
 
     times = emcee.autocorr.integrated_time(x, tol=0)
-    slowest = float(np.max(times)) if np.isfinite(times).all() else LONGEST_THIN
-    return int(np.clip(np.ceil(slowest), 1, LONGEST_THIN))
+    slowest = float(np.max(times)) if np.isfinite(times).all() else MAX_THIN
+    return int(np.clip(np.ceil(slowest), 1, MAX_THIN))
 
 
 def _join(values: np.ndarray, draws: int) -> np.ndarray:

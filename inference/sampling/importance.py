@@ -29,13 +29,13 @@ from .mixture import (
     to_unit,
 )
 
-ROUND = 256  # points of each round
-SCREENS = 4  # rounds that fill the prior evenly
-ROUNDS = 16  # at most; an easy posterior stops after six or seven
-ENOUGH = 400.0  # effective points at which one more round ends it
-EDGE = 1e-12  # quantile at which the box is cut, so that x = Phi^-1(u) stays finite
-COLDEST = -60.0  # log of the smallest inverse temperature
-SHARPENED = 0.5  # width of half the proposals, while the temperature still has to fall
+ROUND_POINTS = 256  # points of each round
+SCREEN_ROUNDS = 4  # rounds that fill the prior evenly
+MAX_ROUNDS = 16  # at most; an easy posterior stops after six or seven
+MIN_EFFECTIVE = 400.0  # effective points at which one more round ends it
+BOX_EDGE = 1e-12  # quantile at which the box is cut, so that x = Phi^-1(u) stays finite
+MIN_LOG_POWER = -60.0  # log of the smallest inverse temperature
+SHARPENED_WIDTH = 0.5  # width of half the proposals, while the temperature still has to fall
 
 
 class Population(NamedTuple):
@@ -86,13 +86,17 @@ def explore(
     points = jnp.asarray(_quasi_random(dimension))
 
     def unfinished(now: _Progress) -> jax.Array:
-        return (now.round <= SCREENS) | ((now.round < ROUNDS) & (now.before < ENOUGH))
+        return (now.round <= SCREEN_ROUNDS) | (
+            (now.round < MAX_ROUNDS) & (now.before < MIN_EFFECTIVE)
+        )
 
     def advance(now: _Progress) -> _Progress:
-        screening = now.round < SCREENS
+        screening = now.round < SCREEN_ROUNDS
         # the screen under one shift, so that its rounds continue one sequence
         shift = shifts[jnp.where(screening, 0, now.round)]
-        uniforms = jnp.clip((points[jnp.minimum(now.round, SCREENS)] + shift) % 1.0, EDGE, 1 - EDGE)
+        uniforms = jnp.clip(
+            (points[jnp.minimum(now.round, SCREEN_ROUNDS)] + shift) % 1.0, BOX_EDGE, 1 - BOX_EDGE
+        )
         z = ndtri(uniforms[:, :dimension])
         fresh = jax.lax.cond(screening, _screened, _proposed, now, z, uniforms[:, dimension:])
         values = jax.vmap(log_likelihood, in_axes=(None, 0))(state, to_unit(fresh.x))
@@ -103,54 +107,56 @@ def explore(
         x=last.x,
         log_likelihood=last.log_likelihood,
         log_weights=_log_weights(last, 1.0),
-        mixture=jax.tree.map(lambda leaf: leaf[last.round - SCREENS - 1], last.history),
+        mixture=jax.tree.map(lambda leaf: leaf[last.round - SCREEN_ROUNDS - 1], last.history),
         log_proposal=last.log_proposal,
         effective=last.effective,
-        evaluations=ROUND * last.round,
+        evaluations=ROUND_POINTS * last.round,
     )
 
 
 def _nothing(dimension: int) -> _Progress:
-    rows, later = ROUND * ROUNDS, ROUNDS - SCREENS
+    rows, later = ROUND_POINTS * MAX_ROUNDS, MAX_ROUNDS - SCREEN_ROUNDS
     square = jnp.zeros((later, COMPONENTS, dimension, dimension))
     history = Mixture(square[..., 0, 0], square[..., 0], square, square, jnp.ones(later))
     none, zero = jnp.full(rows, -jnp.inf), jnp.asarray(0.0)
     x = jnp.zeros((rows, dimension))
-    mass = math.log(ROUND * SCREENS) + log_prior(x)  # finite, though these rows are never used
+    mass = math.log(ROUND_POINTS * SCREEN_ROUNDS) + log_prior(
+        x
+    )  # finite, though these rows are never used
     return _Progress(jnp.asarray(0), x, none, mass, none, history, zero, zero)
 
 
 def _shifts(key: jax.Array, columns: int) -> jax.Array:
-    """Numbers [ROUNDS, columns] in [0, 1), each uniform over the keys.
+    """Numbers [MAX_ROUNDS, columns] in [0, 1), each uniform over the keys.
 
     Fixed odd multiples of the key's words, modulo 2^32: jax.random takes a quarter of a
     second to compile, for a few dozen numbers that only move quasi-random points.
     """
     words = jax.random.key_data(key).astype(jnp.uint32).reshape(-1)
-    shape = (len(words), ROUNDS, columns)
+    shape = (len(words), MAX_ROUNDS, columns)
     odd = 2 * np.random.default_rng(0).integers(2**31, size=shape, dtype=np.uint32) + 1
     mixed = jnp.sum(words[:, None, None] * odd, axis=0, dtype=jnp.uint32)
     return mixed / 2.0**32
 
 
 def _quasi_random(dimension: int) -> np.ndarray:
-    """Sobol points in (0, 1), [SCREENS + 1, ROUND, dimension + UNIFORMS].
+    """Sobol points in (0, 1), [SCREEN_ROUNDS + 1, ROUND_POINTS, dimension + UNIFORMS].
 
     Those of the screen continue each other over its first `dimension` columns; the last are
     shifted anew in each later round.
     """
     columns = dimension + UNIFORMS
-    points = np.full((SCREENS + 1, ROUND, columns), 0.5)
-    screen = sobol(0, 0, ROUND * SCREENS, dimension)
-    points[:SCREENS, :, :dimension] = screen.reshape(SCREENS, ROUND, dimension)
-    points[SCREENS] = sobol(1, 0, ROUND, columns)
+    points = np.full((SCREEN_ROUNDS + 1, ROUND_POINTS, columns), 0.5)
+    screen = sobol(0, 0, ROUND_POINTS * SCREEN_ROUNDS, dimension)
+    points[:SCREEN_ROUNDS, :, :dimension] = screen.reshape(SCREEN_ROUNDS, ROUND_POINTS, dimension)
+    points[SCREEN_ROUNDS] = sobol(1, 0, ROUND_POINTS, columns)
     return points
 
 
 class _Fresh(NamedTuple):
     """Points to evaluate, and what proposing them changed."""
 
-    x: jax.Array  # [ROUND, d]
+    x: jax.Array  # [ROUND_POINTS, d]
     log_mass: jax.Array  # [n], of the points so far
     log_proposal: jax.Array  # [n]
     history: Mixture
@@ -165,10 +171,10 @@ def _proposed(now: _Progress, z: jax.Array, uniforms: jax.Array) -> _Fresh:
     """Points of a mixture fitted to those so far."""
     mixture = fit_mixture(now.x, *_bearable(now))
     density = log_density(mixture, now.x)
-    row = now.round - SCREENS
+    row = now.round - SCREEN_ROUNDS
     return _Fresh(
         propose(mixture, z, uniforms),
-        jnp.logaddexp(now.log_mass, math.log(ROUND) + density),
+        jnp.logaddexp(now.log_mass, math.log(ROUND_POINTS) + density),
         density,
         jax.tree.map(lambda kept, leaf: kept.at[row].set(leaf), now.history, mixture),
     )
@@ -177,12 +183,12 @@ def _proposed(now: _Progress, z: jax.Array, uniforms: jax.Array) -> _Fresh:
 def _weighed(now: _Progress, fresh: _Fresh, values: jax.Array) -> _Progress:
     """Add points and their log likelihoods, and weigh all anew."""
     rounds = jax.vmap(log_density, in_axes=(0, None))(fresh.history, fresh.x)
-    done = jnp.arange(ROUNDS - SCREENS)[:, None] <= now.round - SCREENS
-    rounds = math.log(ROUND) + jnp.where(done, rounds, -jnp.inf)
-    screen = math.log(ROUND * SCREENS) + log_prior(fresh.x)
+    done = jnp.arange(MAX_ROUNDS - SCREEN_ROUNDS)[:, None] <= now.round - SCREEN_ROUNDS
+    rounds = math.log(ROUND_POINTS) + jnp.where(done, rounds, -jnp.inf)
+    screen = math.log(ROUND_POINTS * SCREEN_ROUNDS) + log_prior(fresh.x)
     mass = log_sum_exp(jnp.concatenate([screen[:, None], rounds.T], axis=1))
-    last = rounds[jnp.maximum(now.round - SCREENS, 0)] - math.log(ROUND)
-    row = ROUND * now.round
+    last = rounds[jnp.maximum(now.round - SCREEN_ROUNDS, 0)] - math.log(ROUND_POINTS)
+    row = ROUND_POINTS * now.round
 
     def added(old: jax.Array, new: jax.Array) -> jax.Array:
         return jax.lax.dynamic_update_slice(old, new, (row, 0)[: old.ndim])
@@ -213,8 +219,10 @@ def _bearable(now: _Progress) -> tuple[jax.Array, jax.Array]:
 
     cold = now.effective >= enough
     steps = jnp.where(cold, 0, 30)
-    low, _ = jax.lax.fori_loop(0, steps, halve, (jnp.asarray(COLDEST), jnp.asarray(0.0)))
-    return _log_weights(now, jnp.where(cold, 1.0, jnp.exp(low))), jnp.where(cold, 1.0, SHARPENED)
+    low, _ = jax.lax.fori_loop(0, steps, halve, (jnp.asarray(MIN_LOG_POWER), jnp.asarray(0.0)))
+    return _log_weights(now, jnp.where(cold, 1.0, jnp.exp(low))), jnp.where(
+        cold, 1.0, SHARPENED_WIDTH
+    )
 
 
 def _log_weights(now: _Progress, power: jax.Array | float) -> jax.Array:
@@ -224,7 +232,11 @@ def _log_weights(now: _Progress, power: jax.Array | float) -> jax.Array:
     return jnp.where(
         finite.any(),
         tempered + log_prior(now.x) - now.log_mass,
-        jnp.where(jnp.arange(len(now.x)) < ROUND * SCREENS, -math.log(ROUND * SCREENS), -jnp.inf),
+        jnp.where(
+            jnp.arange(len(now.x)) < ROUND_POINTS * SCREEN_ROUNDS,
+            -math.log(ROUND_POINTS * SCREEN_ROUNDS),
+            -jnp.inf,
+        ),
     )
 
 

@@ -13,10 +13,10 @@ import numpy as np
 
 COMPONENTS = 8
 FREEDOM = 6  # degrees of freedom, even: tails heavier than a posterior's, at little cost near it
-SHARE_OF_PRIOR = 0.05
-EVEN = 0.2  # share of the proposals spread evenly over the components, for small modes
-RESAMPLED = 512
-STEPS = 8  # of expectation maximisation
+PRIOR_SHARE = 0.05
+EVEN_SHARE = 0.2  # share of the proposals spread evenly over the components, for small modes
+RESAMPLED_POINTS = 512
+EM_STEPS = 8  # of expectation maximisation
 UNIFORMS = FREEDOM // 2 + 2
 """Numbers, besides d normals, that make one draw."""
 
@@ -39,8 +39,8 @@ def log_density(mixture: Mixture, x: jax.Array) -> jax.Array:
     sharp = sharp - x.shape[-1] * jnp.log(mixture.sharpness)
     components = jnp.logaddexp(wide, sharp) - math.log(2.0) + volume
     # one column more for the prior: one sum of exponentials is quicker to compile than two
-    shares = math.log1p(-SHARE_OF_PRIOR) + mixture.log_share + components
-    prior = math.log(SHARE_OF_PRIOR) + log_prior(x)[:, None]
+    shares = math.log1p(-PRIOR_SHARE) + mixture.log_share + components
+    prior = math.log(PRIOR_SHARE) + log_prior(x)[:, None]
     return log_sum_exp(jnp.concatenate([shares, prior], axis=-1))
 
 
@@ -68,12 +68,12 @@ def propose(mixture: Mixture, z: jax.Array, uniforms: jax.Array) -> jax.Array:
     # chi^2 of an even number of degrees is twice a sum of exponentials
     chi_square = -2.0 * jnp.sum(jnp.log(uniforms[:, 2:]), axis=-1)
     scale = jnp.sqrt(FREEDOM / chi_square) * jnp.where(half < 0.5, 1.0, mixture.sharpness)
-    within = (choice - SHARE_OF_PRIOR) / (1.0 - SHARE_OF_PRIOR)
+    within = (choice - PRIOR_SHARE) / (1.0 - PRIOR_SHARE)
     edges = jnp.cumsum(jnp.exp(mixture.log_share))[:-1]
     component = jnp.sum(within[:, None] > edges, axis=-1)
     shift = jnp.einsum("nij,nj->ni", mixture.factor[component], z)
     fitted = mixture.mean[component] + scale[:, None] * shift
-    return jnp.where(choice[:, None] < SHARE_OF_PRIOR, z, fitted)
+    return jnp.where(choice[:, None] < PRIOR_SHARE, z, fitted)
 
 
 def fit_mixture(x: jax.Array, log_weights: jax.Array, sharpness: jax.Array) -> Mixture:
@@ -86,7 +86,7 @@ def fit_mixture(x: jax.Array, log_weights: jax.Array, sharpness: jax.Array) -> M
     weights = jnp.exp(log_weights - jnp.max(log_weights))
     effective = jnp.sum(weights) ** 2 / jnp.sum(weights**2)
     cumulated = _cumulated(weights)
-    positions = (np.arange(RESAMPLED) + 0.5) / RESAMPLED  # systematic resampling
+    positions = (np.arange(RESAMPLED_POINTS) + 0.5) / RESAMPLED_POINTS  # systematic resampling
     drawn = jnp.searchsorted(cumulated, positions * cumulated[-1])
     points = x[jnp.minimum(drawn, len(x) - 1)]
     nearest = _nearest_seed(points / (jnp.std(points, axis=0) + 1e-12))
@@ -100,8 +100,8 @@ def fit_mixture(x: jax.Array, log_weights: jax.Array, sharpness: jax.Array) -> M
         return mixture, jax.nn.softmax(mixture.log_share + volume - 0.5 * square, axis=-1)
 
     start = Mixture(empty[:, 0], empty, factor, factor, sharpness)
-    fitted, _ = jax.lax.fori_loop(0, STEPS, step, (start, shares))
-    shares = (1.0 - EVEN) * jnp.exp(fitted.log_share) + EVEN / COMPONENTS
+    fitted, _ = jax.lax.fori_loop(0, EM_STEPS, step, (start, shares))
+    shares = (1.0 - EVEN_SHARE) * jnp.exp(fitted.log_share) + EVEN_SHARE / COMPONENTS
     return fitted._replace(log_share=jnp.log(shares))
 
 

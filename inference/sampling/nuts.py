@@ -33,9 +33,9 @@ from .target import (
 
 BLOCK = 250  # draws of one call of the compiled program, whatever number is asked for
 FIRST_STEP = 0.7  # in whitened coordinates
-ACCEPTED = 0.9  # share that the step size aims at; at 0.8 more than 1 % may diverge
-POOR = 60.0  # effective points below which a population is mended by a first warm-up
-REFITTED = 512  # draws to which the mixture is fitted then
+TARGET_ACCEPTANCE = 0.9  # share that the step size aims at; at 0.8 more than 1 % may diverge
+POOR_EFFECTIVE = 60.0  # effective points below which a population is mended by a first warm-up
+REFITTED_DRAWS = 512  # draws to which the mixture is fitted then
 
 STATISTICS = {
     "lp": lambda s: -s.potential_energy,
@@ -80,7 +80,7 @@ def _begin_one(
         warmup,
         step_size=FIRST_STEP,
         adapt_mass_matrix=False,
-        target_accept_prob=ACCEPTED,
+        target_accept_prob=TARGET_ACCEPTANCE,
         model_args=arguments,
         rng_key=key,
     )
@@ -153,7 +153,7 @@ def sample_nuts(rng: np.random.Generator, target: Target, length: Length) -> Ite
     """
     found = look_around(rng, target)
     start = resampled(rng, found, length.chains)
-    poor = float(found.effective) < POOR
+    poor = float(found.effective) < POOR_EFFECTIVE
     factor = local_factor(found) if poor else spread_factor(found)
     guide = Guide(jnp.asarray(factor), found.mixture)
     blocks = _blocks(rng, target, guide, start, length.warmup)
@@ -199,8 +199,8 @@ def _take(blocks: Iterator[Chains], count: int, left: list[Chains]) -> Chains:
 def _mended(guide: Guide, x: np.ndarray) -> Guide:
     """Metric and mixture from warm-up draws x [chain, draw, d]."""
     flat = x.reshape(-1, x.shape[-1])
-    rows = np.linspace(0, len(flat) - 1, REFITTED).astype(int)
-    mixture = _refit(flat[rows], np.zeros(REFITTED), 1.0)
+    rows = np.linspace(0, len(flat) - 1, REFITTED_DRAWS).astype(int)
+    mixture = _refit(flat[rows], np.zeros(REFITTED_DRAWS), 1.0)
     within = (x - x.mean(1, keepdims=True)).reshape(flat.shape)
     covariance = within.T @ within / len(within)
     floor = 1e-3 * guide.factor @ guide.factor.T

@@ -18,12 +18,12 @@ from .target import (
     log_likelihood,
 )
 
-BASE = {1: 256, 2: 32}  # cells along each axis at first
-TOLERANCE = 2e-5  # of a cell's error: its share of the mass, at most, times its unevenness^2
-FINEST = 2.0**-30  # width of a cell that is not divided any more
-QUICK, THOROUGH = 8192, 32768  # evaluations to check a sampler with, and to draw from
+FIRST_GRID = {1: 256, 2: 32}  # cells along each axis at first
+CELL_TOLERANCE = 2e-5  # of a cell's error: its share of the mass, at most, times its unevenness^2
+MIN_CELL_WIDTH = 2.0**-30  # width of a cell that is not divided any more
+QUICK_BUDGET, THOROUGH_BUDGET = 8192, 32768  # evaluations to check a sampler with, and to draw from
 BINS = 16
-SLACK = 0.02  # total variation that cells and finite autocorrelation may add
+VARIATION_SLACK = 0.02  # total variation that cells and finite autocorrelation may add
 
 
 class Quadrature(NamedTuple):
@@ -62,7 +62,7 @@ class _Cells(NamedTuple):
     uneven: np.ndarray  # by how much it may differ elsewhere in the cell
 
 
-def integrate(target: Target, budget: int = QUICK) -> Quadrature:
+def integrate(target: Target, budget: int = QUICK_BUDGET) -> Quadrature:
     """Cut the box.
 
     Modes need not be known, but to be found they must show on the first grid: as a slope of
@@ -78,7 +78,7 @@ def integrate(target: Target, budget: int = QUICK) -> Quadrature:
         ValueError: more than two parameters, or a log likelihood that is finite nowhere.
     """
     d = target.dimension
-    if d not in BASE:
+    if d not in FIRST_GRID:
         raise ValueError(
             f"quadrature needs one or two parameters, got {d}; sample with 'nuts' or 'emcee'"
         )
@@ -104,7 +104,7 @@ def integrate(target: Target, budget: int = QUICK) -> Quadrature:
 
 
 def _first(target: Target) -> _Cells:
-    d, n = target.dimension, BASE[target.dimension]
+    d, n = target.dimension, FIRST_GRID[target.dimension]
     axis = np.arange(n) / n
     low = np.stack(np.meshgrid(*[axis] * d, indexing="ij"), -1).reshape(-1, d)
     value = _finite(target, low + 0.5 / n)
@@ -120,15 +120,15 @@ def _first(target: Target) -> _Cells:
 
 
 def _worth_dividing(cells: _Cells, most: int) -> np.ndarray:
-    """Indices of the cells with the largest errors above TOLERANCE, at most `most`."""
+    """Indices of the cells with the largest errors above CELL_TOLERANCE, at most `most`."""
     log_mass = cells.value + cells.low.shape[1] * np.log(cells.width)
     shifted = log_mass - log_mass.max()
     total = np.exp(shifted).sum()
     # as if the whole cell were as high as its highest point may be
     share = np.exp(np.minimum(shifted + cells.uneven - np.log(total), 0.0))
-    error = np.where(cells.width > FINEST, share * np.minimum(cells.uneven, 1.0) ** 2, 0.0)
+    error = np.where(cells.width > MIN_CELL_WIDTH, share * np.minimum(cells.uneven, 1.0) ** 2, 0.0)
     order = np.argsort(-error)[: max(most, 0)]
-    return order[error[order] > TOLERANCE]
+    return order[error[order] > CELL_TOLERANCE]
 
 
 def _divided(target: Target, parents: _Cells) -> _Cells:
@@ -171,7 +171,7 @@ def sample_quadrature(rng: np.random.Generator, target: Target, length: Length) 
     Raises:
         ValueError: more than two parameters.
     """
-    cells = integrate(target, THOROUGH)
+    cells = integrate(target, THOROUGH_BUDGET)
     shape = (length.chains, length.draws)
     while True:
         u, values = draw(rng, cells, length.chains * length.draws)
@@ -200,10 +200,10 @@ def total_variation(u: np.ndarray, cells: Quadrature) -> float:
 
 def largest_expected(effective: float) -> float:
     """Total variation that `effective` independent draws stay below: twice its mean, some five
-    of its standard deviations beyond that, plus SLACK."""
+    of its standard deviations beyond that, plus VARIATION_SLACK."""
     p = 1.0 / BINS
     mean = 0.5 * BINS * np.sqrt(2.0 * p * (1.0 - p) / (np.pi * max(effective, 1.0)))
-    return float(2.0 * mean + SLACK)
+    return float(2.0 * mean + VARIATION_SLACK)
 
 
 def _distance(counts: np.ndarray, n: int) -> float:

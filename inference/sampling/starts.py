@@ -6,7 +6,9 @@ import numpy as np
 from .importance import Population, explore
 from .target import NOWHERE_FINITE, Target
 
-SEPARATE = 0.5  # gain in mean log density over one Gaussian from which on modes count as separate
+SEPARATE_MODES_GAIN = (
+    0.5  # gain in mean log density over one Gaussian from which on modes count as separate
+)
 
 
 def look_around(rng: np.random.Generator, target: Target) -> Population:
@@ -44,7 +46,7 @@ def spread_factor(found: Population) -> np.ndarray:
     gaussian = -0.5 * np.sum(white**2, axis=0) - constant
     used = weights > 0.0
     gain = weights[used] @ (np.asarray(found.log_proposal) - gaussian)[used]
-    return factor if gain < SEPARATE else local_factor(found)
+    return factor if gain < SEPARATE_MODES_GAIN else local_factor(found)
 
 
 def local_factor(found: Population) -> np.ndarray:

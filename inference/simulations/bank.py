@@ -84,12 +84,12 @@ class SimulationBank:
         return "nothing, for bank is in memory" if self.in_memory else self.path
 
     def __repr__(self) -> str:
-        return as_text("SimulationBank", self._rows())
+        return as_text("SimulationBank", self._shown())
 
     def _repr_html_(self) -> str:
-        return as_html("SimulationBank", self._rows())
+        return as_html("SimulationBank", self._shown())
 
-    def _rows(self) -> list[tuple[str, str]]:
+    def _shown(self) -> list[tuple[str, str]]:
         try:
             with self._lock:
                 found = self._connection.execute(

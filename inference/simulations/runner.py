@@ -12,7 +12,7 @@ from .executors import killed_its_worker
 from .failures import Failure, kind, raised
 from .job import Job, OneByOne, run_batch
 
-POLL = 0.2  # seconds between looks at what somebody else is simulating
+POLL_SECONDS = 0.2  # seconds between looks at what somebody else is simulating
 
 Shape = tuple[int, ...] | None
 """Of one signal; None accepts any."""
@@ -108,7 +108,7 @@ class Runner:
         Raises: see `run`.
         """
         while self._elsewhere and not outcome.done():
-            wait([outcome], timeout=POLL)
+            wait([outcome], timeout=POLL_SECONDS)
             self._begin()
         return outcome.result()
 

@@ -1,21 +1,21 @@
-"""Components lean towards the noise of the runs that they are made from: by how much."""
+"""How much run-to-run noise the principal components absorb."""
 
 import numpy as np
 
 from .components import Basis
 from .measurement_noise import Remainder
 
-MOST = 0.9  # of a score that may count as its own run's noise
+MAX_ABSORBED_SHARE = 0.9  # of a score that may count as its own run's noise
 
 
-def own_noise(basis: Basis, noise: np.ndarray, remainder: Remainder, n: int) -> np.ndarray:
-    """Share [k] of their own noise in what components made from n runs show of these.
+def absorbed_noise(basis: Basis, noise: np.ndarray, remainder: Remainder, n: int) -> np.ndarray:
+    """Share [k] of the scores of n runs that is these runs' own noise.
 
-    A component leans towards the noise of the runs that made it, and so do their scores, which
-    a new run's do not: to first order by the noise's variance across it over n times its own
-    variance (Nadler 2008, finite sample perturbation of principal components). Unheeded, the
-    emulator is too steep by that share, most of all in the weak components of few, long and
-    noisy outputs.
+    A principal component leans towards the noise of the runs that it is computed from, so their
+    scores contain that noise and a new run's do not: to first order by the noise's variance
+    across the component over n times the component's variance (Nadler 2008, finite sample
+    perturbation of principal components). Without a correction the emulator is too steep by that
+    share, most of all in the weak components of few, long and noisy outputs.
 
     Args:
         noise: Run-to-run variances of the scores [k].
@@ -25,7 +25,7 @@ def own_noise(basis: Basis, noise: np.ndarray, remainder: Remainder, n: int) -> 
     total = np.sum(noise * squared) + remainder.total
     across = np.maximum(total - noise * squared, 0.0)
     share = np.where(squared > 0.0, across / (n * np.where(squared > 0.0, squared, 1.0)), 0.0)
-    return np.minimum(share, MOST)
+    return np.minimum(share, MAX_ABSORBED_SHARE)
 
 
 def left_over(

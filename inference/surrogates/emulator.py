@@ -24,14 +24,14 @@ from ..gp.process import (
     pad,
     predict_joint,
 )
-from .component_noise import left_over, own_noise
+from .component_noise import absorbed_noise, left_over
 from .components import Basis, principal_components
 from .measurement_noise import Remainder, shrunk_covariance
 
-SHARE = 0.9995  # of the variance, to be explained by components
-PREDICTED = 0.3  # see `_predicted`
+EXPLAINED_SHARE = 0.9995  # of the variance, to be explained by components
+PREDICTED_SHARE = 0.3  # see `_predicted`
 PRIOR_RUNS = 5.0  # runs that speak for uncorrelated scores
-ROUNDING = 1e-24  # variance of standardised outputs that counts as none
+ROUNDING_VARIANCE = 1e-24  # variance of standardised outputs that counts as none
 
 _joint = jax.jit(predict_joint)
 
@@ -46,7 +46,7 @@ class Emulator(NamedTuple):
         noise: Covariance [k, k] of the scores' run-to-run noise, beyond the remainder's.
         outputs: What was learned from [n, m].
         learned_at: Simulations known when components and hyperparameters were found.
-        excess: Of those simulations' scores, see `own_noise` [k].
+        excess: Of those simulations' scores, see `absorbed_noise` [k].
     """
 
     gp: GP
@@ -75,7 +75,7 @@ class Limits(NamedTuple):
 
     components: int
     rows: int
-    predicted: float | None = PREDICTED
+    predicted: float | None = PREDICTED_SHARE
 
 
 @in_float64
@@ -102,11 +102,13 @@ def emulate(
         gp = extend(previous.gp, pad(u, _targets(basis, outputs, learned_at, excess), rows, normal))
         remainder = shrunk_covariance(basis.residuals(outputs), basis.used + 1)
     else:
-        components = principal_components(outputs, scale(outputs), limits.components, SHARE)
+        components = principal_components(
+            outputs, scale(outputs), limits.components, EXPLAINED_SHARE
+        )
         data = pad(u, components.scores(outputs).T, rows, normal)
         basis, hyper = _taught(components, data, limits.predicted)
         learned_at, remainder = n, shrunk_covariance(basis.residuals(outputs), basis.used + 1)
-        excess = own_noise(basis, np.exp(2.0 * np.asarray(hyper.log_noise)), remainder, n)
+        excess = absorbed_noise(basis, np.exp(2.0 * np.asarray(hyper.log_noise)), remainder, n)
         smaller = jnp.log1p(-jnp.asarray(excess))
         hyper = Hyper(hyper.log_length, hyper.log_amplitude + smaller, hyper.log_noise + smaller)
         gp = condition(hyper, pad(u, _targets(basis, outputs, n, excess), rows, normal))
@@ -210,8 +212,10 @@ def beyond_components(emulator: Emulator, outputs: np.ndarray) -> np.ndarray:
     basis, remainder = emulator.basis, emulator.remainder
     squared = np.sum(basis.vectors**2)
     there = np.sum(remainder.factors**2) + remainder.white * (len(basis.vectors) - basis.used)
-    least = (1.0 - SHARE) * (squared + remainder.total)
-    return np.linalg.norm(basis.residuals(outputs), axis=1) / np.sqrt(max(there, least, ROUNDING))
+    least = (1.0 - EXPLAINED_SHARE) * (squared + remainder.total)
+    return np.linalg.norm(basis.residuals(outputs), axis=1) / np.sqrt(
+        max(there, least, ROUNDING_VARIANCE)
+    )
 
 
 def noise_share(emulator: Emulator) -> float:

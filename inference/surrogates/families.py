@@ -10,9 +10,9 @@ from ..arguments import check_callable, checked_integer
 from ..types import Discrepancy
 from .base import Surrogate
 from .discrepancy import DiscrepancySurrogate, learn, marginalised, with_threshold
-from .emulator import PREDICTED, Limits, emulate
+from .emulator import PREDICTED_SHARE, Limits, emulate
 from .given_noise import GivenNoise, given_noise
-from .held_back import foretold
+from .held_back import held_back
 from .outliers import sane
 from .output import Output, Summary, describe
 from .signal import SignalSurrogate, observe
@@ -20,7 +20,7 @@ from .squared_difference import evaluate, squared_difference
 from .threshold import Threshold, check_rule
 from .transform import TRANSFORMS
 
-COMPONENTS = 8
+MAX_COMPONENTS = 8
 
 
 class Learnable(NamedTuple):
@@ -133,8 +133,8 @@ class SignalFamily:
 
     summary: Summary | None = None
     noise: ArrayLike | None = None
-    components: int = COMPONENTS
-    predicted: float | None = PREDICTED
+    components: int = MAX_COMPONENTS
+    predicted: float | None = PREDICTED_SHARE
     discrepancy: Discrepancy | None = None
 
     def __post_init__(self) -> None:
@@ -206,8 +206,8 @@ class SignalLearner:
     def finish(self, known: Learnable, rows: int, seed: int) -> Surrogate:
         """The surrogate on which a fit rests."""
         learned = self.learn(known, rows, None)
-        last = foretold(learned.emulator, self.output.scale, self.family.predicted)
-        return replace(learned, foretold=last)
+        last = held_back(learned.emulator, self.output.scale, self.family.predicted)
+        return replace(learned, held_back=last)
 
 
 Family = DiscrepancyFamily | SignalFamily

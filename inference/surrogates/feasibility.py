@@ -8,8 +8,8 @@ import numpy as np
 
 from .._float64 import in_float64
 
-WIDTH = 0.1  # in prior quantiles
-HOPE = 0.05  # successes that are assumed everywhere
+KERNEL_WIDTH = 0.1  # in prior quantiles
+PRIOR_SUCCESSES = 0.05  # successes that are assumed everywhere
 
 
 class Feasibility(NamedTuple):
@@ -33,6 +33,6 @@ def feasibility(u: np.ndarray, succeeded: np.ndarray, rows: int) -> Feasibility:
 
 def log_feasible(runs: Feasibility, u: jax.Array) -> jax.Array:
     """Log of the share of successes around u [d] (Nadaraya and Watson); 0 if nothing failed."""
-    near = jnp.exp(-0.5 * jnp.sum(((runs.u - u) / WIDTH) ** 2, -1))
-    good, bad = near @ runs.succeeded + HOPE, near @ runs.failed
+    near = jnp.exp(-0.5 * jnp.sum(((runs.u - u) / KERNEL_WIDTH) ** 2, -1))
+    good, bad = near @ runs.succeeded + PRIOR_SUCCESSES, near @ runs.failed
     return jnp.log(good) - jnp.log(good + bad)

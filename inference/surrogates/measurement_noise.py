@@ -15,7 +15,7 @@ FACTORS = 16
 CORRELATIONS = np.tanh([0.0, 0.3, 0.6, 0.9, 1.2, 1.6, 2.0, 2.5])  # of neighbouring samples
 SIZES = 2.0 ** np.arange(-3.0, 1.4, 1.0 / 3.0)  # sigma over the sd of the residual
 
-LEAST_SIZE = 1e-4  # of a residual, in units of the outputs' sd: data are never without noise
+MIN_SIZE = 1e-4  # of a residual, in units of the outputs' sd: data are never without noise
 
 
 class Remainder(NamedTuple):
@@ -95,7 +95,7 @@ def residual_size(target: np.ndarray, vectors: np.ndarray) -> float:
     """Sd of what no combination of `vectors` [m, k] can make of `target` [m]."""
     left = target - vectors @ np.linalg.lstsq(vectors, target)[0]
     size = np.sqrt(np.sum(left**2) / max(len(target) - vectors.shape[1], 1))
-    return float(max(size, LEAST_SIZE))
+    return float(max(size, MIN_SIZE))
 
 
 def reduce(

@@ -1,8 +1,8 @@
-"""Runs that ended, but blew up."""
+"""Runs that ended with an absurdly large discrepancy."""
 
 import numpy as np
 
-FARTHEST = 1e6  # median deviations
+MAX_DEVIATIONS = 1e6  # median deviations
 
 
 def sane(discrepancy: np.ndarray) -> np.ndarray:
@@ -10,4 +10,4 @@ def sane(discrepancy: np.ndarray) -> np.ndarray:
     centre = np.nanmedian(discrepancy)
     deviation = np.abs(discrepancy - centre)
     spread = np.nanmedian(deviation)
-    return ~(discrepancy > centre + FARTHEST * spread) | (spread == 0.0)
+    return ~(discrepancy > centre + MAX_DEVIATIONS * spread) | (spread == 0.0)

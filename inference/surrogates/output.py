@@ -8,8 +8,8 @@ import numpy as np
 from ..arguments import checked_array
 from .measurement_noise import Layout
 
-SERIES = 16  # samples from which an output counts as a series, whose noise can be estimated
-LONGEST = 2000  # values; neighbouring samples of longer series are averaged
+MIN_SERIES = 16  # samples from which an output counts as a series, whose noise can be estimated
+MAX_VALUES = 2000  # values; neighbouring samples of longer series are averaged
 
 Summary = Callable[[np.ndarray], np.ndarray]
 
@@ -95,13 +95,13 @@ def describe(observed: np.ndarray, summary: Summary | None) -> Output:
     if not finite.any():
         raise ValueError("observed must have a finite value, got none")
     filled = finite.reshape(len(finite), -1).any(1).sum()
-    series = summary is None and filled >= SERIES
+    series = summary is None and filled >= MIN_SERIES
     # channel after channel, time inside
     index = np.arange(summarised.size).reshape(summarised.shape)
     index = np.moveaxis(index, 0, -1).ravel() if series else index.ravel()
     present = index[finite.ravel()[index]]
     layout = _positions(summarised.shape, present, series)
-    block = -(-len(present) // LONGEST) if series else 1
+    block = -(-len(present) // MAX_VALUES) if series else 1
     starts = _block_starts(layout, block)
     layout = Layout(layout.channel[starts], layout.sample[starts] // block)
     return Output(summary, summarised.shape, present, layout, starts, series)

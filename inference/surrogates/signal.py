@@ -20,7 +20,7 @@ from .emulator import (
     predictive_draws,
 )
 from .given_noise import GivenNoise
-from .held_back import Foretold
+from .held_back import HeldBack
 from .measurement_noise import (
     NO_MEASUREMENT_NOISE,
     Nodes,
@@ -42,12 +42,12 @@ from .warnings import (
     OUTSIDE,
     UNPREDICTED,
     complaints,
-    noisy,
-    surprised,
+    held_back_warnings,
+    noise_warnings,
 )
 
-KEPT = 12  # nodes of unknown measurement noise that enter the likelihood
-SCREENED = 128
+KEPT_NODES = 12  # nodes of unknown measurement noise that enter the likelihood
+SCREENED_POINTS = 128
 
 
 @dataclass(frozen=True)
@@ -59,10 +59,10 @@ class SignalSurrogate:
         output: How outputs become values.
         observed: The observed values [m].
         known: Measurement noise that the user gave.
-        nodes: Sizes and correlations of the measurement noise, KEPT of them; one where there is
-            none, or it is known.
+        nodes: Sizes and correlations of the measurement noise, KEPT_NODES of them; one where
+            there is none, or it is known.
         reduced: The observed scores at each, with the scores' run-to-run noise.
-        foretold: Errors of the last simulations; None while simulations are being chosen.
+        held_back: Errors of the last simulations; None while simulations are being chosen.
     """
 
     emulator: Emulator
@@ -71,7 +71,7 @@ class SignalSurrogate:
     known: GivenNoise | None
     nodes: Nodes
     reduced: Reduced
-    foretold: Foretold | None = None
+    held_back: HeldBack | None = None
 
     @property
     def gp(self):
@@ -138,18 +138,20 @@ class SignalSurrogate:
     @in_float64
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised errors: leave-one-out ones `loo_z` [n, components in use], and `foretold_z`
-        [n, components + 1], see `Foretold`."""
+        [n, components + 1], see `HeldBack`."""
         loo = {"loo_z": loo_errors(self.emulator)}
-        return loo if self.foretold is None else {**loo, "foretold_z": self.foretold.errors}
+        return loo if self.held_back is None else {**loo, "foretold_z": self.held_back.errors}
 
     @in_float64
     def warnings(self) -> list[str]:
         """What the emulator's own checks complain of."""
         if self.emulator.basis.used == 0:
             return [EQUAL if self.emulator.equal else UNPREDICTED]
-        said = complaints(loo_errors(self.emulator), "output") + noisy(noise_share(self.emulator))
-        if self.foretold is not None:
-            said += surprised(self.foretold)
+        said = complaints(loo_errors(self.emulator), "output") + noise_warnings(
+            noise_share(self.emulator)
+        )
+        if self.held_back is not None:
+            said += held_back_warnings(self.held_back)
         return [OUTSIDE, *said] if self._outside() else said
 
     def _outside(self) -> bool:
@@ -236,7 +238,7 @@ def observe(
     else:
         reduced = reduce((vectors, target, factors), white, output.layout, nodes)
     reduced = _widen(reduced, emulator)
-    if len(reduced.log_weight) > KEPT:
+    if len(reduced.log_weight) > KEPT_NODES:
         kept = _keep(emulator, reduced)
         reduced = Reduced(*(part[kept] for part in reduced))
         nodes = Nodes(*(part[kept] for part in nodes))
@@ -258,6 +260,6 @@ def _widen(reduced: Reduced, emulator: Emulator) -> Reduced:
 def _keep(emulator: Emulator, reduced: Reduced) -> np.ndarray:
     """The nodes of most evidence, best first, on an even screen of the prior and at the data."""
     data = emulator.gp.data.u
-    points = np.concatenate([sobol(0, 0, SCREENED, data.shape[1]), np.asarray(data)])
+    points = np.concatenate([sobol(0, 0, SCREENED_POINTS, data.shape[1]), np.asarray(data)])
     terms = _node_log_densities(state_of(emulator, reduced), jnp.asarray(points))
-    return np.argsort(-np.logaddexp.reduce(np.asarray(terms), 0))[:KEPT]
+    return np.argsort(-np.logaddexp.reduce(np.asarray(terms), 0))[:KEPT_NODES]

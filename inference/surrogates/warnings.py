@@ -1,16 +1,18 @@
-"""What leave-one-out errors, foretold errors and the noise say against an emulator."""
+"""Warnings from leave-one-out errors, held-back errors and the noise of an emulator."""
 
 import lazy_loader
 import numpy as np
 
-from .held_back import Foretold
+from .held_back import HeldBack
 
 stats = lazy_loader.load("scipy.stats", suppress_warning=True)  # takes as long as NumPyro
 
 FALSE_ALARMS = 1e-3  # of each leave-one-out check, were its errors independent and normal
-SURPRISES = 1e-2  # nominal share of good fits that are warned, see `surprised`
-FAR = 3.0  # studentised errors beyond are rare
-TOO_SURE = 1.5  # mean square of the studentised errors that matters
+HELD_BACK_FALSE_ALARMS = (
+    1e-2  # nominal share of good fits that are warned, see `held_back_warnings`
+)
+FAR_ERROR = 3.0  # studentised errors beyond are rare
+OVERCONFIDENT_SQUARE = 1.5  # mean square of the studentised errors that matters
 OUTSIDE = (
     "what was observed lies far outside of what was simulated: compare units, scales and offsets, "
     "or widen the prior; the posterior says little"
@@ -21,66 +23,65 @@ UNPREDICTED = (
     "chance: simulate more, or choose a summary that averages the noise out; until then the "
     "posterior is the prior"
 )
-NOISY = (0.9, 0.5)  # shares of run-to-run noise in the variance that deserve a word
+NOISY_SHARES = (0.9, 0.5)  # shares of run-to-run noise in the variance that deserve a word
 
 
 class EmulatorWarning(UserWarning):
-    """The surrogate does not follow the simulations as it believes; the message says how."""
+    """The surrogate's errors are larger than its variance; the message says where."""
 
 
 def complaints(loo_z: np.ndarray, what: str) -> list[str]:
-    """Sentences, none where all is well; of usual complaints the same in every fit, so that a
-    study of hundreds is warned once.
+    """Warnings, or an empty list; usual texts are constant: Python's filter shows each once.
 
     Args:
         loo_z: Studentised leave-one-out errors [n, k].
-        what: Is emulated.
+        what: Name of the emulated quantity.
     """
     count = loo_z.size
     said = []
-    far = int(np.sum(np.abs(loo_z) > FAR))
-    if far > stats.binom.isf(FALSE_ALARMS, count, 2.0 * stats.norm.sf(FAR)):
+    far = int(np.sum(np.abs(loo_z) > FAR_ERROR))
+    if far > stats.binom.isf(FALSE_ALARMS, count, 2.0 * stats.norm.sf(FAR_ERROR)):
         said.append(
-            f"{far} of {count} leave-one-out errors of the {what} exceed {FAR:g} standard "
-            "deviations: it is not Gaussian, or changes faster than the emulator believes; "
+            f"{far} of {count} leave-one-out errors of the {what} exceed {FAR_ERROR:g} standard "
+            "deviations: it is not Gaussian, or changes faster than the emulator predicts; "
             "simulate more, or choose a summary or transform that behaves better"
         )
-    if _too_large(loo_z, TOO_SURE):
+    if _too_large(loo_z, OVERCONFIDENT_SQUARE):
         said.append(
             f"leave-one-out errors of the {what} are {np.sqrt(np.mean(loo_z**2)):.1f} times what "
-            "the emulator believes; simulate more"
+            "the emulator predicts; simulate more"
         )
     return said
 
 
-def surprised(foretold: Foretold) -> list[str]:
-    """A sentence where the foretold errors are too large, else none.
+def held_back_warnings(found: HeldBack) -> list[str]:
+    """A warning if the held-back errors are too large, else an empty list.
 
-    All components of a run go wrong together where the emulator does, and its hyperparameters come
-    from few runs. So a run counts as one error, their mean square over the components, and the
-    mean of q runs is held against Fisher's F of q and the first runs' degrees of freedom. That is
-    no theorem: outputs smooth on the scale of the box hardly ever alarm (tests), those that turn
-    within half of it more often than SURPRISES, for few runs show their length scales. What lies
-    beyond the components is judged likewise. Small failures of the emulator pass unseen.
+    The components of one run share their error, and hyperparameters come from few runs. So each
+    run counts once, by its mean square over the components, and the mean of q runs is compared
+    with Fisher's F of q and the first runs' degrees of freedom. This is an approximation: outputs
+    smooth on the scale of the box hardly ever alarm (tests); outputs that turn within half of it
+    alarm more often than HELD_BACK_FALSE_ALARMS. What lies beyond the components is judged in the
+    same way. The check detects gross failures only.
     """
-    seen = np.isfinite(foretold.errors[:, -1])
+    seen = np.isfinite(found.errors[:, -1])
     if not seen.any():
         return []
-    scores, beyond = foretold.errors[seen, :-1], foretold.errors[seen, -1]
+    scores, beyond = found.errors[seen, :-1], found.errors[seen, -1]
     scores = scores[:, np.isfinite(scores).all(0)]
-    limit = stats.f.isf(SURPRISES / 2.0, len(beyond), foretold.freedom)
+    limit = stats.f.isf(HELD_BACK_FALSE_ALARMS / 2.0, len(beyond), found.freedom)
     if max(np.mean(part**2) for part in (scores, beyond) if part.size) <= limit:
         return []
     return [
-        "the last third of the simulations came out further from what the others had led to "
-        "expect than the emulator believed possible: the output changes faster with the parameters "
+        "the last third of the simulations lies further from what the others predict than the "
+        "emulator's variance allows: the output changes faster with the parameters "
         "than so few simulations show, and the posterior may be too narrow; simulate more"
     ]
 
 
-def noisy(share: float) -> list[str]:
-    """A sentence where run-to-run noise has that much of the outputs' variance, else none."""
-    reached = [least for least in NOISY if share > least]
+def noise_warnings(share: float) -> list[str]:
+    """A warning if run-to-run noise has a large share of the outputs' variance, else none."""
+    reached = [least for least in NOISY_SHARES if share > least]
     if not reached:
         return []
     return [

@@ -63,7 +63,7 @@ def test_what_a_sensor_does_is_not_in_the_frames(oil, setup, path):
 def test_looking_changes_no_bit(oil, cups):
     """Whatever the rate of the frames, and of what lands."""
     some, many = (
-        models.pour_frames(oil, RATE, cups, 2, rate=rate, particles=PARTICLES)
+        models.pour_frames(PourBatch(oil, RATE, cups, [2], PARTICLES), rate=rate)
         for rate in (10.0, 73.0)
     )
     landed = models.landings(oil, RATE, cups, [2], PARTICLES)
@@ -77,7 +77,7 @@ def test_looking_changes_no_bit(oil, cups):
 
 def test_what_is_in_the_source_in_the_end_is_what_landings_retain(cups):
     thick = models.Liquid(5.0, 0.0, 1260.0)
-    frames = models.pour_frames(thick, RATE, cups, 0, particles=PARTICLES)
+    frames = models.pour_frames(PourBatch(thick, RATE, cups, [0], PARTICLES))
     landed = models.landings(thick, RATE, cups, [0], PARTICLES)
     turned = np.minimum(RATE * frames.time, cups.pour.final_angle)
     np.testing.assert_allclose(frames.angle, turned)
@@ -91,7 +91,7 @@ def test_what_is_in_the_source_in_the_end_is_what_landings_retain(cups):
 
 
 def test_nothing_comes_back_from_below_the_rim(oil, cups):
-    frames = models.pour_frames(oil, RATE, cups, 2, particles=PARTICLES)
+    frames = models.pour_frames(PourBatch(oil, RATE, cups, [2], PARTICLES))
     present = np.isfinite(frames.position).all(axis=-1).sum(axis=1)
     assert present[0] == PARTICLES and present[-1] < PARTICLES / 2
     assert (np.diff(present) <= 0).all()
@@ -103,7 +103,7 @@ def test_nothing_comes_back_from_below_the_rim(oil, cups):
 @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan])
 def test_a_rate_that_is_none_is_refused(oil, cups, setup, path, rate):
     with pytest.raises(ValueError, match="frames: rate must be"):
-        models.pour_frames(oil, RATE, cups, 0, rate=rate)
+        models.pour_frames(PourBatch(oil, RATE, cups, [0]), rate=rate)
     with pytest.raises(ValueError, match="frames: rate must be"):
         models.stir_frames(oil, path, setup, 0, rate=rate)
 

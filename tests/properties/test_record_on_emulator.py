@@ -94,7 +94,8 @@ def test_the_recording_is_complete_and_says_how_it_was_made(recorded):
 # `test_online` has the same with a recording that is there, this module the recording
 @pytest.mark.minutes
 def test_stirring_ends_when_the_pour_is_known_well_enough(tmp_path):
-    from bolfi_liquids.online.record import OnlineChoice, record_online
+    from bolfi_liquids.online.choice import OnlineChoice
+    from bolfi_liquids.online.record import record_online
     from bolfi_liquids.online.settings import OnlineSettings
 
     # a coarse map, and a target that any estimate meets once enough strokes were made
@@ -104,10 +105,8 @@ def test_stirring_ends_when_the_pour_is_known_well_enough(tmp_path):
         hardware.bundled_rig(),
         out=tmp_path / "stir",
         emulate=hardware.HiddenLiquid(viscosity=1.0),
-        cycles=2,
-        online=OnlineChoice(tmp_path / "run", settings=settings),
+        online=OnlineChoice(tmp_path / "run", settings=settings, cycles=2, told=told.append),
         progress=False,
-        told=told.append,
     )
     assert recording.attrs["status"] == "complete"
     strokes = [estimate.strokes for estimate in told]

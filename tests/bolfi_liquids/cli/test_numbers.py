@@ -10,10 +10,10 @@ from rich.console import Console
 
 from bolfi_liquids.calibration.draws import pick_draws
 from bolfi_liquids.calibration.noise import irreducible_rms, replicate_noise, sensor_noise
+from bolfi_liquids.calibration.posterior_figure import contour_levels, marginal
 from bolfi_liquids.calibration.summary import ParameterSummary
 from bolfi_liquids.cli.tables import print_calibration
 from bolfi_liquids.pouring.spillage import mean_spillage, tail_spillage
-from bolfi_liquids.reporting.posterior_figure import contour_levels, marginal
 from bolfi_liquids.reporting.sentences import (
     least_viscosity_sentences,
     parameter_sentence,

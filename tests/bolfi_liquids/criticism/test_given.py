@@ -8,7 +8,7 @@ import xarray as xr
 
 from bolfi_liquids.calibration.stir_simulator import stirring_of
 from bolfi_liquids.criticism.baseline import Clean, usual_elsewhere, usual_for
-from bolfi_liquids.criticism.given import open_inputs
+from bolfi_liquids.criticism.given import Given, open_inputs
 from bolfi_liquids.criticism.result import finished_criticism
 from bolfi_liquids.criticism.stirs import camera_noise, held_out_noise, stir_experiment
 from bolfi_liquids.errors import InputError
@@ -20,8 +20,7 @@ AT_REST, RHO, SD = 16, 0.6, np.radians(0.2)
 
 
 def given(calibration, settings=None, **some):
-    nothing = {"held_out": (), "baseline": (), "pours": None, "held_out_pours": None, "cups": None}
-    return open_inputs(calibration, settings or CriticismSettings(), **{**nothing, **some})
+    return open_inputs(calibration, settings or CriticismSettings(), Given(**some))
 
 
 @pytest.fixture

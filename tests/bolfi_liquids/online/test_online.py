@@ -16,6 +16,7 @@ import pytest
 import bolfi_liquids as bl
 from bolfi_liquids import models
 from bolfi_liquids.online import online
+from bolfi_liquids.online.choice import OnlineChoice
 from bolfi_liquids.online.online import (
     FAILED,
     READY,
@@ -42,7 +43,10 @@ def start(recording, out, settings):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(models, "pour", made_up)
         return OnlineCalibration.start(
-            recording.gripper, recording.attrs, out=out, settings=settings, progress=False
+            recording.gripper,
+            recording.attrs,
+            OnlineChoice(out, settings=settings),
+            progress=False,
         )
 
 
@@ -188,7 +192,7 @@ def test_a_run_is_not_overwritten(short_recording, tmp_path):
     recording = bl.open_recording(short_recording)
     (tmp_path / "run.toml").touch()
     with pytest.raises(ValueError, match="holds a run already"):
-        OnlineCalibration.start(recording.gripper, recording.attrs, out=tmp_path)
+        OnlineCalibration.start(recording.gripper, recording.attrs, OnlineChoice(tmp_path))
 
 
 @pytest.fixture(scope="module")

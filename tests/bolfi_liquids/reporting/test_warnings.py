@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from bolfi_liquids.calibration.fit_figures import _rms_by
 from bolfi_liquids.criticism.verdict import Verdict
 from bolfi_liquids.pouring.figures import not_surely_worse
 from bolfi_liquids.pouring.result import ActionSummary, PourSummary
-from bolfi_liquids.reporting.calibration_figures import _rms_by
 from bolfi_liquids.reporting.warnings import Results, warnings_of
 
 FINE = {

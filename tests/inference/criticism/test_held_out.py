@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bolfi_liquids.inference import criticism
-from bolfi_liquids.inference.criticism.held_out import FLOOR, gap, holds
+from bolfi_liquids.inference.criticism.held_out import NOISE_QUANTILE, gap, holds
 from bolfi_liquids.inference.criticism.hypothesis import samples
 from scipy.stats import binom, norm
 
@@ -37,7 +37,7 @@ def explained():
 
 def test_the_right_explanation_passes(explained):
     """But for the share that the floor sacrifices, and for what few runs get wrong."""
-    assert np.mean([holds([one]) for one in explained]) > 2.0 * FLOOR - 1.0 - 0.02
+    assert np.mean([holds([one]) for one in explained]) > 2.0 * NOISE_QUANTILE - 1.0 - 0.02
     assert all(one.lpd_gain > 0.0 for one in explained)
 
 
@@ -51,7 +51,7 @@ def test_what_noise_leaves_is_foretold(explained):
     expected = np.array([one.noise for one in explained])
     assert abs(np.mean(expected**2) / exact**2 - 1.0) < 0.05
     beyond = sum(one.after > one.floor for one in explained)
-    assert beyond <= binom.isf(ALPHA, SETS, 2.0 * (1.0 - FLOOR))
+    assert beyond <= binom.isf(ALPHA, SETS, 2.0 * (1.0 - NOISE_QUANTILE))
 
 
 def test_before_is_what_the_effect_leaves(explained):

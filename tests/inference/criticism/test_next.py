@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bolfi_liquids.inference import criticism
-from bolfi_liquids.inference.criticism.next_experiment import RUNS, _distance
+from bolfi_liquids.inference.criticism.next_experiment import RUNS_EACH, _distance
 
 SAMPLES, NOISE, REPEATS = 120, 0.1, 200
 WAVE = np.sqrt(2.0 / SAMPLES) * np.cos(np.pi * 6 * (np.arange(SAMPLES) + 0.5) / SAMPLES)
@@ -17,7 +17,7 @@ def found(ratio, own):
 
     def repeat(seed):
         rng = np.random.default_rng(seed)
-        runs = own * NOISE * rng.normal(size=(2, RUNS, SAMPLES))
+        runs = own * NOISE * rng.normal(size=(2, RUNS_EACH, SAMPLES))
         runs[1] += ratio * NOISE * WAVE
         return _distance(proposal, list(runs), 0, 1)
 

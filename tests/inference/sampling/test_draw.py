@@ -108,7 +108,7 @@ def test_agrees_with_quadrature_on_a_banana(sampler):
     """Sixteen equally probable bins: 4000 independent draws differ by 0.025, 1000 by 0.05."""
     target = banana()
     made = sample(sampler, target)
-    cells = in_float64(quadrature.integrate)(target, quadrature.THOROUGH)
+    cells = in_float64(quadrature.integrate)(target, quadrature.THOROUGH_BUDGET)
     assert not made.found
     assert quadrature.total_variation(made.chains.u.reshape(-1, 2), cells) < 0.05
     assert_means(made.chains.u, cells.mean())

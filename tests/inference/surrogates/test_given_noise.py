@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference.surrogates.families import SignalFamily
 from bolfi_liquids.inference.surrogates.given_noise import given_noise
-from bolfi_liquids.inference.surrogates.output import LONGEST, describe
+from bolfi_liquids.inference.surrogates.output import MAX_VALUES, describe
 
 from bolfi_liquids import inference
 
@@ -50,10 +50,10 @@ def test_a_covariance_stays_one_in_the_order_of_the_values(gappy):
 
 def test_averages_are_less_noisy():
     """Every value the mean of three samples, or of two where one is missing."""
-    observed = np.zeros(3 * LONGEST)
+    observed = np.zeros(3 * MAX_VALUES)
     observed[1] = np.nan
     output = describe(observed, None)
-    counts = np.r_[2.0, np.full(LONGEST - 1, 3.0)]
+    counts = np.r_[2.0, np.full(MAX_VALUES - 1, 3.0)]
     np.testing.assert_allclose(given_noise(0.6, output).white, 0.36 / counts)
     sds = RNG.uniform(1.0, 2.0, len(observed))
     expected = [np.sum(sds[[0, 2]] ** 2) / 4.0, np.sum(sds[3:6] ** 2) / 9.0]
@@ -68,7 +68,7 @@ def test_a_long_series_needs_no_matrix():
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert learner.noise.white.shape == (LONGEST,)
+    assert learner.noise.white.shape == (MAX_VALUES,)
     assert peak < 50e6
 
 

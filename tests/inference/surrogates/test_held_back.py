@@ -8,8 +8,8 @@ from bolfi_liquids.inference.gp.condition import predict as predict_scores
 from bolfi_liquids.inference.gp.process import JITTER, predict_joint
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.emulator import Limits, emulate, innovations
-from bolfi_liquids.inference.surrogates.held_back import FEWEST, foretold
-from bolfi_liquids.inference.surrogates.warnings import surprised
+from bolfi_liquids.inference.surrogates.held_back import MIN_FIRST_RUNS, held_back
+from bolfi_liquids.inference.surrogates.warnings import held_back_warnings
 from scipy.stats import binom
 
 TIME = np.linspace(0.0, 2.0, 40)
@@ -36,7 +36,7 @@ def gathered(seed, n=20):
 
 
 def errors(u, outputs, predicted=0.3):
-    return foretold(emulate(u, outputs, scale, Limits(COMPONENTS, 64)), scale, predicted)
+    return held_back(emulate(u, outputs, scale, Limits(COMPONENTS, 64)), scale, predicted)
 
 
 @pytest.mark.slow
@@ -46,7 +46,7 @@ def test_a_smooth_simulator_hardly_ever_surprises():
     alarms = 0
     for seed in range(100):
         u, _ = gathered(seed)
-        alarms += bool(surprised(errors(u, decays(u, np.random.default_rng(seed)))))
+        alarms += bool(held_back_warnings(errors(u, decays(u, np.random.default_rng(seed)))))
     assert binom.cdf(alarms, 100, 0.05) < 0.05
 
 
@@ -75,9 +75,9 @@ def test_a_peak_between_the_first_runs_is_a_surprise():
     first = first[np.linalg.norm(first - 0.5, axis=1) > 0.15]
     u = np.concatenate([first, last])
     outputs = decays(u, np.random.default_rng(0))
-    assert not surprised(errors(u, outputs))
+    assert not held_back_warnings(errors(u, outputs))
     near = np.exp(-0.5 * np.sum((u - 0.5) ** 2, 1, keepdims=True) / 0.05**2)
-    assert "simulate more" in surprised(errors(u, outputs + near * np.sin(3.0 * TIME)))[0]
+    assert "simulate more" in held_back_warnings(errors(u, outputs + near * np.sin(3.0 * TIME)))[0]
 
 
 def late(u, centre, outputs):
@@ -97,8 +97,8 @@ def test_what_no_component_shows_is_a_surprise():
     outputs = decays(u, np.random.default_rng(1))
     plain, found = (errors(u, made) for made in (outputs, outputs + late(u, centre, outputs)))
     np.testing.assert_allclose(found.errors[:, :-1], plain.errors[:, :-1], atol=1e-6)
-    assert not surprised(plain)
-    assert surprised(found)
+    assert not held_back_warnings(plain)
+    assert held_back_warnings(found)
 
 
 def test_where_no_component_is_in_use_the_last_runs_may_still_surprise():
@@ -107,18 +107,18 @@ def test_where_no_component_is_in_use_the_last_runs_may_still_surprise():
     both = outputs, outputs + late(u, centre, outputs)
     plain, found = (errors(u, made, predicted=0.9) for made in both)
     assert np.isnan(plain.errors[:, :-1]).all()
-    assert not surprised(plain)
-    assert surprised(found)
+    assert not held_back_warnings(plain)
+    assert held_back_warnings(found)
 
 
 @pytest.mark.parametrize(
     "u",
     [
         np.linspace(0.0, 1.0, 30)[:, None] * np.ones(2),  # the last ones lie beyond the first
-        sobol(0, 0, FEWEST, 2),
+        sobol(0, 0, MIN_FIRST_RUNS, 2),
     ],
 )
 def test_nothing_is_said_where_nothing_can_be_foretold(u):
     found = errors(u, decays(u, np.random.default_rng(0)))
     assert np.isnan(found.errors).all()
-    assert surprised(found) == []
+    assert held_back_warnings(found) == []

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from bolfi_liquids.inference.surrogates.components import principal_components
-from bolfi_liquids.inference.surrogates.output import LONGEST, describe
+from bolfi_liquids.inference.surrogates.output import MAX_VALUES, describe
 
 
 def test_channels_follow_each_other_and_missing_samples_are_left_out():
@@ -19,10 +19,10 @@ def test_channels_follow_each_other_and_missing_samples_are_left_out():
 
 
 def test_a_long_series_is_averaged_over_neighbours():
-    m = 3 * LONGEST
+    m = 3 * MAX_VALUES
     output = describe(np.zeros(m), None)
     values = output.values(np.arange(m, dtype=float))
-    assert len(values) == LONGEST
+    assert len(values) == MAX_VALUES
     np.testing.assert_array_equal(values[:3], [1.0, 4.0, 7.0])
     assert output.restore(values[None]).shape == (1, m)
 

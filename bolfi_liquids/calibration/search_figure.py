@@ -8,16 +8,18 @@ from numpy.typing import NDArray
 from ..drawing import (
     BLUE,
     GREY,
-    new_figure,
+    Panels,
+    panels,
     plain_log_ticks,
     styled,
 )
+from ..hover import Readout, marks, to_chart
 from ..words import with_unit
-from .hover import Readout, marks, to_chart
 from .posterior_figure import AXIS_LABELS, LOGARITHMIC_PARAMETERS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from numpy.typing import ArrayLike
     from xarray import Dataset, DataTree
 
 POSTERIOR_INTERVAL = 0.05, 0.95
@@ -25,8 +27,21 @@ POSTERIOR_INTERVAL = 0.05, 0.95
 
 
 def search_figure(tree: "DataTree") -> str:
+    """The chart of `draw_search`, for a page."""
+    with styled():
+        drawn, readouts = draw_search(tree)
+        return to_chart(drawn.figure, "search", readouts)
+
+
+def draw_search(tree: "DataTree", axes: "ArrayLike | None" = None) -> tuple[Panels, list[Readout]]:
     """Discrepancy of each simulation in turn with the least so far, and below it the parameters
-    that it tried, before the posterior; the start design is hollow."""
+    that it tried, before the posterior; the start design is hollow.
+
+    Args:
+        tree: posterior.nc.
+        axes: Where to draw, one for the discrepancy and one for each parameter; None makes a
+            figure.
+    """
     from matplotlib.ticker import MaxNLocator
 
     names = list(map(str, tree["posterior"].data_vars))
@@ -35,32 +50,27 @@ def search_figure(tree: "DataTree") -> str:
     iteration = np.arange(1, len(discrepancy) + 1)
     start = iteration <= int(tree.attrs["initial"])
     texts = _texts(names, simulations, discrepancy)
-    with styled():
-        figure = new_figure(6.4, 2.6 + 1.5 * len(names))
-        panels = figure.subplots(
-            1 + len(names), 1, sharex=True, height_ratios=[1.5] + [1.0] * len(names)
-        )
-        least = np.fmin.accumulate(discrepancy)
-        panels[0].step(
-            iteration, least, where="post", color=GREY, linewidth=1.0, label="least so far"
-        )
-        readouts = [_dots(panels[0], iteration, discrepancy, start, texts)]
-        plain_log_ticks(panels[0], "y")
-        panels[0].set_ylabel("discrepancy [deg² s]")
-        for axes, name in zip(panels[1:], names, strict=True):
-            low, high = np.quantile(tree["posterior"][name].to_numpy(), POSTERIOR_INTERVAL)
-            axes.axhspan(low, high, color=BLUE, alpha=0.15, linewidth=0, label="posterior, 90 %")
-            readouts.append(_dots(axes, iteration, simulations[name].to_numpy(), start, texts))
-            axes.set_ylabel(AXIS_LABELS.get(name, name))
-            if name in LOGARITHMIC_PARAMETERS:
-                plain_log_ticks(axes, "y")
-        panels[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
-        panels[-1].set_xlabel("simulation")
-        handles, labels = panels[0].get_legend_handles_labels()
-        more, more_labels = panels[1].get_legend_handles_labels()
-        figure.legend([*handles, more[0]], [*labels, more_labels[0]],
-                      loc="outside upper center", ncols=4)  # fmt: skip
-        return to_chart(figure, "search", readouts)
+    size, ratios = (6.4, 2.6 + 1.5 * len(names)), [1.5] + [1.0] * len(names)
+    drawn = panels(axes, (1 + len(names), 1), size, sharex=True, height_ratios=ratios)
+    first, *others = drawn.grid[:, 0]
+    least = np.fmin.accumulate(discrepancy)
+    first.step(iteration, least, where="post", color=GREY, linewidth=1.0, label="least so far")
+    readouts = [_dots(first, iteration, discrepancy, start, texts)]
+    plain_log_ticks(first, "y")
+    first.set_ylabel("discrepancy [deg² s]")
+    for axis, name in zip(others, names, strict=True):
+        low, high = np.quantile(tree["posterior"][name].to_numpy(), POSTERIOR_INTERVAL)
+        axis.axhspan(low, high, color=BLUE, alpha=0.15, linewidth=0, label="posterior, 90 %")
+        readouts.append(_dots(axis, iteration, simulations[name].to_numpy(), start, texts))
+        axis.set_ylabel(AXIS_LABELS.get(name, name))
+        if name in LOGARITHMIC_PARAMETERS:
+            plain_log_ticks(axis, "y")
+    others[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
+    others[-1].set_xlabel("simulation")
+    handles, labels = first.get_legend_handles_labels()
+    more, more_labels = others[0].get_legend_handles_labels()
+    drawn.legend([*handles, more[0]], [*labels, more_labels[0]], ncols=4)
+    return drawn, readouts
 
 
 def _texts(names: list[str], simulations: "Dataset", discrepancy: NDArray) -> list[str]:

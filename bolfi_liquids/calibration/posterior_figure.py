@@ -10,11 +10,12 @@ from ..drawing import (
     GREY,
     INK,
     ORANGE,
-    new_figure,
+    Panels,
+    panels,
     plain_log_ticks,
     styled,
 )
-from .hover import Readout, marks, to_chart
+from ..hover import Readout, marks, to_chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,34 +29,50 @@ CONTOUR_SHARES = (0.9, 0.5)
 
 
 def posterior_figure(tree: "DataTree") -> str:
-    """Contours of the joint posterior with its marginals and those of the prior."""
+    """The chart of `draw_posterior`, for a page."""
+    with styled():
+        drawn, simulated = draw_posterior(tree)
+        return to_chart(drawn.figure, "posterior", [simulated])
+
+
+def draw_posterior(tree: "DataTree", ax: "Axes | None" = None) -> tuple[Panels, Readout]:
+    """Contours of the joint posterior, in a figure of its own with marginals and the prior's.
+
+    Args:
+        tree: posterior.nc.
+        ax: Where to draw the contours alone; None makes a figure.
+    """
     surface = tree["surface"].to_dataset()
     first, second = map(str, surface["log_posterior"].dims)
     posterior, coordinates = grid_density(surface)
-    prior, _ = grid_density(surface, "log_prior")
     axes_of = dict(zip((first, second), coordinates, strict=True))
-    with styled():
-        figure = new_figure(6.2, 4.8)
-        grid = figure.subplots(
-            2,
-            2,
-            sharex="col",
-            sharey="row",
-            gridspec_kw={"width_ratios": (3, 1), "height_ratios": (1, 3)},
-        )
-        joint, top, right = grid[1, 0], grid[0, 0], grid[1, 1]
-        grid[0, 1].set_axis_off()
-        _draw_joint(joint, surface, posterior, axes_of)
-        simulated = _mark(joint, tree, (first, second))
-        for density, style in ((posterior, {"color": BLUE}), (prior, {"color": GREY, "ls": "--"})):
-            top.plot(surface[first], marginal(density, *axes_of.values()), **style)
-            right.plot(marginal(density.T, *reversed(axes_of.values())), surface[second], **style)
-        _finish(figure, joint, (first, second))
-        top.set_ylim(bottom=0)
-        top.set_yticks([])
-        right.set_xlim(left=0)
-        right.set_xticks([])
-        return to_chart(figure, "posterior", [simulated])
+    if ax is None:
+        ratios = {"width_ratios": (3, 1), "height_ratios": (1, 3)}
+        drawn = panels(None, (2, 2), (6.2, 4.8), sharex="col", sharey="row", gridspec_kw=ratios)
+        _draw_marginals(drawn, surface, posterior, axes_of)
+    else:
+        drawn = panels(ax, (1, 1), (4.6, 3.6))
+    joint = drawn.grid[-1, 0]
+    _draw_joint(joint, surface, posterior, axes_of)
+    simulated = _mark(joint, tree, (first, second))
+    _finish(drawn, joint, (first, second))
+    return drawn, simulated
+
+
+def _draw_marginals(
+    drawn: Panels, surface: "Dataset", posterior: NDArray, axes_of: dict[str, NDArray]
+) -> None:
+    first, second = axes_of
+    top, right = drawn.grid[0, 0], drawn.grid[1, 1]
+    drawn.grid[0, 1].set_axis_off()
+    prior, _ = grid_density(surface, "log_prior")
+    for density, style in ((posterior, {"color": BLUE}), (prior, {"color": GREY, "ls": "--"})):
+        top.plot(surface[first], marginal(density, *axes_of.values()), **style)
+        right.plot(marginal(density.T, *reversed(axes_of.values())), surface[second], **style)
+    top.set_ylim(bottom=0)
+    top.set_yticks([])
+    right.set_xlim(left=0)
+    right.set_xticks([])
 
 
 def _coordinate(surface: "Dataset", name: str) -> NDArray[np.float64]:
@@ -127,7 +144,7 @@ def _mark(joint: "Axes", tree: "DataTree", names: tuple[str, str]) -> Readout:
     return marks(joint, x, y, texts, parameters=names)
 
 
-def _finish(figure, joint: "Axes", names: tuple[str, str]) -> None:
+def _finish(drawn: Panels, joint: "Axes", names: tuple[str, str]) -> None:
     first, second = names
     for name, which in ((first, "x"), (second, "y")):
         if name in LOGARITHMIC_PARAMETERS:
@@ -135,6 +152,7 @@ def _finish(figure, joint: "Axes", names: tuple[str, str]) -> None:
     joint.set_xlabel(AXIS_LABELS.get(first, first))
     joint.set_ylabel(AXIS_LABELS.get(second, second))
     joint.plot([], [], color=BLUE, label="posterior, 50 % and 90 %")
-    joint.plot([], [], color=GREY, linestyle="--", label="prior")
-    figure.legend(loc="outside upper center", ncols=4)
+    if drawn.own:
+        joint.plot([], [], color=GREY, linestyle="--", label="prior")
+    drawn.legend(*joint.get_legend_handles_labels(), ncols=4)
     joint.tick_params(colors=INK)

@@ -10,13 +10,16 @@ from ..drawing import (
     INK,
     LIGHT,
     ORANGE,
+    Panels,
     new_figure,
+    panels,
     styled,
 )
-from .hover import Readout, series, to_chart
+from ..hover import Readout, series, to_chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from numpy.typing import ArrayLike
     from xarray import Dataset, DataTree
 
 PREDICTIVE_SHARE = 0.9
@@ -26,32 +29,42 @@ PLANE_COLOURS = (BLUE, ORANGE)
 
 
 def inclination_figure(tree: "DataTree") -> str:
+    """The chart of `draw_fit`, for a page."""
+    with styled():
+        drawn, readouts = draw_fit(tree)
+        return to_chart(drawn.figure, "inclination", readouts)
+
+
+def draw_fit(tree: "DataTree", axes: "ArrayLike | None" = None) -> tuple[Panels, list[Readout]]:
     """Inclination against time: recorded, closest hypothesis and posterior prediction.
 
-    One row for each recording, one column for each plane.
+    One row of axes for each recording, one column for each plane.
+
+    Args:
+        tree: posterior.nc.
+        axes: Where to draw; None makes a figure.
     """
     recorded = tree["recorded"].to_dataset()
     members = np.unique(recorded["recording"])
+    size = 8.6, 2.6 * len(members) + 0.4
+    drawn = panels(axes, (len(members), 2), size, sharex="row", sharey=True)
     readouts = []
-    with styled():
-        figure = new_figure(8.6, 2.6 * len(members) + 0.4)
-        grid = figure.subplots(len(members), 2, sharex="row", sharey=True, squeeze=False)
-        for row, member in zip(grid, members, strict=True):
-            frames = np.flatnonzero(recorded["recording"].to_numpy() == member)
-            for axes, plane in zip(row, recorded["plane"].to_numpy(), strict=True):
-                part = {
-                    name: tree[name].to_dataset().sel(plane=plane).isel(frame=frames)
-                    for name in ("recorded", "closest", "posterior_predictive")
-                }
-                readout = _draw_inclination(axes, part)
-                readout.content.update(plane=str(plane), recording=int(member))
-                readouts.append(readout)
-                axes.set_title(f"{plane} plane", loc="left")
-            row[0].set_ylabel("inclination [deg]")
-        for axes in grid[-1]:
-            axes.set_xlabel("time [s]")
-        figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
-        return to_chart(figure, "inclination", readouts)
+    for row, member in zip(drawn.grid, members, strict=True):
+        frames = np.flatnonzero(recorded["recording"].to_numpy() == member)
+        for axis, plane in zip(row, recorded["plane"].to_numpy(), strict=True):
+            part = {
+                name: tree[name].to_dataset().sel(plane=plane).isel(frame=frames)
+                for name in ("recorded", "closest", "posterior_predictive")
+            }
+            readout = _draw_inclination(axis, part)
+            readout.content.update(plane=str(plane), recording=int(member))
+            readouts.append(readout)
+            axis.set_title(f"{plane} plane", loc="left")
+        row[0].set_ylabel("inclination [deg]")
+    for axis in drawn.grid[-1]:
+        axis.set_xlabel("time [s]")
+    drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
+    return drawn, readouts
 
 
 def _draw_inclination(axes: "Axes", part: dict[str, "Dataset"]) -> Readout:

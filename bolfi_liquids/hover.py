@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..drawing import to_svg
+from .drawing import to_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
