@@ -8,6 +8,8 @@ import numpy as np
 import xarray as xr
 from scipy.stats import beta, binom
 
+from ..prior import Prior
+from ..types import Simulator
 from .repeat import made_or_given
 from .replicate import Pipeline
 from .replicated import Quantity, Replicates
