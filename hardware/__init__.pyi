@@ -18,8 +18,8 @@ from .session.emulated import EmulatedRig as EmulatedRig
 from .session.emulated import HiddenLiquid as HiddenLiquid
 from .session.emulated import emulated as emulated
 from .session.progress import Phase as Phase
+from .session.progress import SessionStopped as SessionStopped
+from .session.progress import Status as Status
 from .session.rig_check import check_rig as check_rig
 from .session.session import Session as Session
-from .session.session import SessionStopped as SessionStopped
-from .session.session import Status as Status
 from .session.setup import SessionSetup as SessionSetup
