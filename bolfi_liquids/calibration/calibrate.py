@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,7 +16,7 @@ from ..inputs.open import Source, open_recordings
 from ..inputs.prior import check_prior, default_prior, describe_prior
 from ..inputs.recording import Recording
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
-from ..progress import progress_bar
+from ..progress import after_first, progress_bar
 from ..run.directory import (
     POSTERIOR,
     enter_run,
@@ -30,7 +31,7 @@ from .stir_simulator import Stirring, stirring_of
 from .summary import CalibrationSummary
 
 if TYPE_CHECKING:
-    from ..inference import Fit, Prior
+    from ..inference import Fit, Prior, SimulationBank
     from ..inference.simulations import Keep, Workers
 
 logger = logging.getLogger(__name__)
@@ -143,11 +144,10 @@ def _calibrate(
     from .tree import results_tree, write_tree
 
     needed = settings.budget + PREDICTIVE_DRAWS + REPLICATES
-    with (
-        open_bank(run) as bank,
-        open_executor(means.executor) as workers,
-        progress_bar("simulating stirs", needed, shown=means.progress) as advance,
-    ):
+    with open_bank(run) as bank, open_executor(means.executor) as workers, ExitStack() as stack:
+        kept = max(needed - _left(run, settings, bank), 0)
+        bar = progress_bar("simulating stirs", needed, shown=means.progress, done=kept)
+        advance = after_first(kept, stack.enter_context(bar))
         keep = Keep(bank, stirring.identity, settings.batch, workers, means.timeout)
         fit = fit_recordings(stirring, stirring.observed, prior, keep, settings, progress=advance)
         sampled = fit.sample(
@@ -166,6 +166,15 @@ def _calibrate(
         )
     write_tree(tree, run / POSTERIOR)
     CalibrationSummary.from_fit(tree, fit, stirring, check).write(run)
+
+
+def _left(run: Path, settings: CalibrationSettings, bank: "SimulationBank") -> int:
+    """Simulations that a run still needs; some of those before it grew were judging, or pours."""
+    from .check import PREDICTIVE_DRAWS, REPLICATES
+
+    before = read_run(run).get("grown", [{"learned_from": 0, "simulations": 0}])[-1]
+    needed = settings.budget - before["learned_from"] + PREDICTIVE_DRAWS + REPLICATES
+    return needed - (len(bank) - before["simulations"])
 
 
 def fit_recordings(

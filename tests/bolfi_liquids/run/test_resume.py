@@ -113,7 +113,7 @@ def test_another_engine_is_refused(short_recording, calibration, settings, monke
 
 @pytest.mark.slow
 def test_a_larger_budget_goes_on_from_a_smaller_one(
-    short_recording, calibration, settings, tmp_path, capsys
+    short_recording, calibration, settings, tmp_path, capsys, caplog
 ):
     grown, larger = tmp_path / "grown", settings | {"budget": 14}
     shutil.copytree(calibration.path, grown)
@@ -124,7 +124,8 @@ def test_a_larger_budget_goes_on_from_a_smaller_one(
     assert {key: after[key] for key in before} == before  # none was simulated again
     told = capsys.readouterr().err
     assert f"simulating stirs: {len(after) - len(before)} to run" in told
-    removed = re.search("removed (.*), concluded from fewer simulations", told)[1].split(", ")
+    (notice,) = [one.getMessage() for one in caplog.records if one.name.endswith(".calibrate")]
+    removed = re.search("removed (.*), concluded from fewer simulations", notice)[1].split(", ")
     assert {"posterior.nc", "pour.nc", "summary.json"} <= set(removed)  # and a report, if any was
     assert not (grown / "pour.nc").exists()
 
