@@ -1,6 +1,7 @@
 """The check of whole calibrations: resumable, and each run of the shared set told once."""
 
 import sqlite3
+from contextlib import closing
 from types import SimpleNamespace
 from typing import ClassVar
 
@@ -24,7 +25,7 @@ SMALL = {"design": 8, "budget": 8, "particles": 100, "seed": 3}
 
 
 def rows(path, table):
-    with sqlite3.connect(path) as connection:
+    with closing(sqlite3.connect(path)) as connection:
         return connection.execute(f"SELECT count(*) FROM {table}").fetchone()[0]
 
 

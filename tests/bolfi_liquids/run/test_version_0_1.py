@@ -12,6 +12,7 @@ glycerin_v10.nc (kept within as recordings/1-short.nc):
 import json
 import sqlite3
 import tarfile
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -74,7 +75,7 @@ def test_its_simulations_are_those_of_the_same_simulator(run):
     """Else they would be made again, and the bank would hold both."""
     (recording,) = kept_recordings(run, read_run(run))
     now = stirring_of([recording], SETTINGS["particles"]).identity
-    with sqlite3.connect(run / SIMULATIONS) as bank:
+    with closing(sqlite3.connect(run / SIMULATIONS)) as bank:
         held = {
             identity for (identity,) in bank.execute("SELECT DISTINCT identity FROM simulation")
         }
