@@ -74,7 +74,7 @@ class Panels(NamedTuple):
 
 
 def panels(
-    axes: "ArrayLike | None",
+    axes: "Axes | ArrayLike | None",
     shape: tuple[int, int],
     size: tuple[float, float],
     **options: Any,

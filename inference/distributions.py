@@ -3,11 +3,10 @@
 from collections.abc import Callable
 from typing import Any
 
-import lazy_loader
 import numpy as np
 import numpyro.distributions as dist
 
-stats = lazy_loader.load("scipy.stats", suppress_warning=True)  # takes as long as NumPyro
+from ._lazy import stats
 
 SCIPY: dict[type, Callable[[Any], Any]] = {
     dist.Uniform: lambda d: stats.uniform(d.low, d.high - d.low),

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -143,7 +143,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         bar = stack.enter_context(progress_bar("simulations", budget, shown=progress is True))
         advance = bar if isinstance(progress, bool) else progress
         workers = stack.enter_context(open_executor(executor))
-        simulator = simulate if vectorised else OneByOne(simulate)
+        simulator: Any = simulate if vectorised else OneByOne(cast(SingleSimulator, simulate))
         keep = Keep(bank, identity, batch, workers, timeout)
         runner = stack.enter_context(Runner(simulator, keep))
         schedule = _in_rounds if workers is None or in_rounds else _in_flight

@@ -1,9 +1,8 @@
 """The space-filling start design."""
 
-import lazy_loader
 import numpy as np
 
-stats = lazy_loader.load("scipy.stats", suppress_warning=True)  # takes as long as NumPyro
+from ._lazy import stats
 
 
 def start_size(dimension: int) -> int:

@@ -148,7 +148,7 @@ def _chosen(names: Iterable[str], registry: "Mapping[str, Case]") -> "list[Case]
 
 
 def run_case(
-    case: "Case", seed: int, tell: Callable[[float], object] = lambda fraction: None
+    case: "Case", seed: int, tell: Callable[[float], None] = lambda fraction: None
 ) -> dict[str, Any]:
     """The record of one case, which ran or failed.
 

@@ -144,6 +144,6 @@ def _distribution(name: str, table: Described) -> "Distribution":
         if key != "family"
     }
     family: Any = getattr(dist, str(table.get("family")), None)
-    if not callable(family):
+    if family is None:
         raise ValueError(f"the prior of {name} is {dict(table)!r}, which no distribution describes")
     return family(**arguments)

@@ -123,18 +123,16 @@ def _planned(
     if path is None:
         return changed
     patterns = {"star": star, "circle": circle}
-    if isinstance(path, str) and path not in patterns:
+    if not isinstance(path, str):
+        name, timed = "path", path
+    elif path in patterns:
+        height = float(recording.gripper.position[0, 2])
+        name, timed = path, patterns[path](speed=PATTERN_SPEED, height=height)
+    else:
         raise InputError(
             f"{path!r}", where="path", fix="give star, circle, or what hardware.motion.star returns"
         )
-    name, timed = "path", path
-    if isinstance(path, str):
-        height = float(recording.gripper.position[0, 2])
-        name, timed = path, patterns[path](speed=PATTERN_SPEED, height=height)
-    gripper = Trajectory(
-        np.asarray(timed.time, np.float64),
-        np.asarray(timed.position, np.float64),  # type: ignore[union-attr]
-    )
+    gripper = Trajectory(np.asarray(timed.time, np.float64), np.asarray(timed.position, np.float64))
     unseen = np.full((len(gripper.time), 2), np.nan)
     named = {key: value for key, value in changed.attrs.items() if key != "speed"}
     return replace(

@@ -8,6 +8,8 @@ import numpy as np
 import xarray as xr
 from scipy.stats import beta, binom
 
+from ..prior import Prior
+from ..types import Simulator
 from .repeat import made_or_given
 from .replicate import Pipeline
 from .replicated import Quantity, Replicates
@@ -114,7 +116,7 @@ class Coverage:
 
 def coverage(
     of: Replicates | Pipeline,
-    *,
+    *data: Simulator | Prior | None,
     levels: Sequence[float] = (0.5, 0.8, 0.9, 0.95),
     conservative: bool = False,
     quantities: Mapping[str, Quantity] | None = None,
@@ -130,7 +132,8 @@ def coverage(
 
     Args:
         of: Replicates, or a pipeline for which `replicates` makes them.
-        run: Arguments of `replicates`, such as `simulate` and `prior`; only with a pipeline.
+        data: `simulate` and `prior` of `replicates`; only with a pipeline.
+        run: Further arguments of `replicates`, or these two by name.
         levels: Nominal levels.
         conservative: Only too little coverage is a fault, as for a posterior that is wide by
             construction.
@@ -143,6 +146,7 @@ def coverage(
     nominal = np.array(levels, np.float64)
     if nominal.ndim != 1 or nominal.size == 0 or not ((nominal > 0) & (nominal < 1)).all():
         raise ValueError(f"levels must lie between 0 and 1, got {levels}")
+    run |= zip(("simulate", "prior"), data, strict=False)
     made = made_or_given(of, run.pop("simulate", None), run.pop("prior", None), run)
     values = made.values(quantities)
     quantiles = made.quantiles(values)

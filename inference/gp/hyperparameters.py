@@ -2,13 +2,11 @@
 
 import jax
 import jax.numpy as jnp
-import lazy_loader
 import numpy as np
 
+from .._lazy import stats
 from .optimise import minimise_many
 from .process import Data, Hyper, log_marginal_likelihood
-
-stats = lazy_loader.load("scipy.stats", suppress_warning=True)  # takes as long as NumPyro
 
 # Normal priors of the logs: inputs are coordinates of the prior's sd (see `gp.coordinates`) and
 # targets of about unit variance, so one choice fits every parameter, unit and simulator.

@@ -66,7 +66,7 @@ class OneByOne:
 
     def __call__(self, theta: Mapping[str, np.ndarray], seeds: np.ndarray) -> np.ndarray:
         """theta: name -> [n]; seeds: int64 [n]  ->  signals [n, *signal_shape]."""
-        runs = [np.asarray(self.simulate(*job), np.float64) for job in jobs(theta, seeds)]
+        runs = [np.asarray(self.simulate(*job), np.float64) for job in jobs(theta, seeds.tolist())]
         return np.stack(runs)
 
 
@@ -82,9 +82,10 @@ def stacked(results: Sequence[Simulation], shape: tuple[int, ...] | None = None)
     found = {result.signal.shape for result in results if result.signal is not None}
     if len(found) > 1:
         raise ValueError(f"simulate must return signals of one shape, got {sorted(found)}")
-    if not found and shape is None:
+    known = next(iter(found), shape)
+    if known is None:
         raise ValueError(f"all {len(results)} simulations failed, so their shape is not known")
-    empty = np.full(found.pop() if found else shape, np.nan)
+    empty = np.full(known, np.nan)
     return np.stack([empty if result.signal is None else result.signal for result in results])
 
 

@@ -1,11 +1,9 @@
 """Warnings from leave-one-out errors, held-back errors and the noise of an emulator."""
 
-import lazy_loader
 import numpy as np
 
+from .._lazy import stats
 from .held_back import HeldBack
-
-stats = lazy_loader.load("scipy.stats", suppress_warning=True)  # takes as long as NumPyro
 
 FALSE_ALARMS = 1e-3  # of each leave-one-out check, were its errors independent and normal
 HELD_BACK_FALSE_ALARMS = (

@@ -191,7 +191,7 @@ def test_one_file_knows_the_library_that_moves_arms():
     armed = {name for name, path in SOURCES.items() if gives("armed", path)}
     # the others hand it on
     control = {f"hardware/robot/control_{name}.py" for name in ("loop", "process")}
-    inside = {"hardware/session/session.py", *control}
+    inside = {"hardware/session/session.py", "hardware/session/setup.py", *control}
     assert armed == {"bolfi_liquids/robot/armed_session.py", *inside}
 
 

@@ -1,6 +1,8 @@
 """What a calibration writes, and that it is what it says."""
 
 import json
+import shutil
+import tempfile
 import tomllib
 
 import numpy as np
@@ -11,7 +13,9 @@ from arviz_stats.base.array import array_stats
 
 import bolfi_liquids as bl
 from bolfi_liquids import inference, models
+from bolfi_liquids.calibration import calibrate as calibrating
 from bolfi_liquids.calibration.stir_simulator import stirring_of
+from bolfi_liquids.drawing import new_figure
 from bolfi_liquids.inputs.prior import default_prior
 
 
@@ -120,3 +124,35 @@ def test_a_run_that_was_not_finished_says_how_to_go_on(calibration, tmp_path):
     (tmp_path / "run.toml").write_bytes((calibration.path / "run.toml").read_bytes())
     with pytest.raises(ValueError, match="not finished.*--resume"):
         bl.Calibration.open(tmp_path)
+
+
+def test_it_prints_its_quantiles_and_whether_the_sampler_converged(calibration):
+    said = repr(calibration)
+    assert str(calibration.path) in said and str(calibration.summary.sampler_status) in said
+    for name, values in calibration.summary.parameters.items():
+        assert name in said and f"{values.q50:.3g}" in said
+        assert f"{values.q95:.3g}" in calibration._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("plot", "shape"), [("plot_fit", (1, 2)), ("plot_posterior", (1, 1)), ("plot_search", (3, 1))]
+)
+def test_plots_draw_in_axes_that_are_given_or_in_their_own(calibration, plot, shape):
+    own = getattr(calibration, plot)()
+    assert all(axes.figure is own.flat[0].figure for axes in own.flat)
+    figure = new_figure(6.0, 6.0)
+    given = figure.subplots(*shape, squeeze=False)
+    drawn = getattr(calibration, plot)(given if given.size > 1 else given[0, 0])
+    assert [*drawn.flat] == [*given.flat]
+    assert all(axes.has_data() for axes in given.flat)
+
+
+def test_without_a_directory_a_run_is_among_the_temporary_files(short_recording, monkeypatch):
+    found = []
+    monkeypatch.setattr(calibrating, "_calibrate", lambda run, *_: found.append(run))
+    with pytest.raises(ValueError, match="not finished"):
+        bl.calibrate(short_recording, progress=False)
+    (run,) = found
+    assert (run / "run.toml").is_file()
+    assert str(run).startswith(tempfile.gettempdir())
+    shutil.rmtree(run)

@@ -16,8 +16,13 @@ from bolfi_liquids.guide import PAGES, read_page
 
 LINE = re.compile(r"^- `(?P<name>[^`]+)`(?: \((?P<dims>[^)]*)\))?(?: \[(?P<unit>[^\]]+)\])?:")
 BRACES = re.compile(r"\{([^{}]*)\}")
-ARVIZ = ("created_at", "creation_library", "creation_library_version")
-ARVIZ += ("creation_library_language", "sample_dims")
+ARVIZ = (
+    "created_at",
+    "creation_library",
+    "creation_library_version",
+    "creation_library_language",
+    "sample_dims",
+)
 COMMAND = re.compile(r"`?bolfi-liquids((?: [a-z][a-z-]*)+)")
 
 

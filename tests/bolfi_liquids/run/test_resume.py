@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bolfi_liquids.inference import engine_version
 
 import bolfi_liquids as bl
-from bolfi_liquids import inference
 from bolfi_liquids.run.directory import SIMULATIONS
 
 # On two cores, 24 processes beside it, a criticism began to simulate after 127 s; with a patience
@@ -106,7 +106,7 @@ def test_another_seed_is_refused_and_changes_nothing(short_recording, calibratio
 
 
 def test_another_engine_is_refused(short_recording, calibration, settings, monkeypatch):
-    monkeypatch.setattr(inference, "ENGINE_VERSION", "0")
+    monkeypatch.setattr(engine_version, "ENGINE_VERSION", "0")
     with pytest.raises(ValueError, match=r"engine\.version was '.' and is '0' now"):
         bl.calibrate(short_recording, out=calibration.path, resume=True, progress=False, **settings)
 

@@ -108,7 +108,7 @@ def test_levels_are_checked(made):
 
 @pytest.mark.parametrize("check", [inference.sbc, inference.coverage, inference.tarp])
 def test_a_check_may_run_the_pipeline_itself(made, check):
-    own = check(prior_as_posterior, silent, PRIOR, n=80, draws=31, independent=True)
+    own = check(prior_as_posterior, simulate=silent, prior=PRIOR, n=80, draws=31, independent=True)
     xr.testing.assert_identical(own.to_dataset(), check(made).to_dataset())
 
 

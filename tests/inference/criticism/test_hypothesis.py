@@ -94,7 +94,7 @@ def averaged():
     here = np.isfinite(observed).ravel()
     noise = criticism.KnownNoise(np.tile(SD, SHAPE[0])[here])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(output, "LONGEST", 40)
+        patch.setattr(output, "MAX_VALUES", 40)
         return fitted(tilted, observed, noise, 0, count=16), noise
 
 

@@ -227,7 +227,7 @@ def test_what_does_nothing_has_no_trend(monkeypatch, fades):
     """Prior sd of the change from the middle to the edge of a parameter that is 20 times as long
     as the box, against the sd of the noise that is expected of a score."""
     if not fades:
-        monkeypatch.setattr(gp, "RELEVANT", np.inf)
+        monkeypatch.setattr(gp, "RELEVANT_LENGTH", np.inf)
     hyper = gp.Hyper(jnp.log(jnp.array([0.3, 20.0])), jnp.zeros(()), jnp.zeros(()))
     prior = gp.covariance(hyper, *2 * [jnp.array([[0.4, 0.5], [0.4, 1.0]])])
     change = np.sqrt(prior[0, 0] + prior[1, 1] - 2.0 * prior[0, 1])

@@ -1,0 +1,33 @@
+"""Arguments mean the same in `record` and in `execute_pour`."""
+
+import pytest
+
+import bolfi_liquids as bl
+from bolfi_liquids import hardware
+from bolfi_liquids.inputs.rigs import rig_of
+from bolfi_liquids.robot.armed_session import EMULATED_VISCOSITY, hidden_liquid
+
+
+def test_an_emulated_liquid_may_be_given_or_left_to_the_emulator():
+    thick = hardware.HiddenLiquid(viscosity=7.0)
+    assert hidden_liquid(thick) is thick
+    assert hidden_liquid(False) is None
+    usual = hidden_liquid(True)
+    assert usual is not None and usual.viscosity == EMULATED_VISCOSITY
+
+
+def test_a_rig_may_be_itself_or_its_file_or_none(tmp_path):
+    bundled = hardware.bundled_rig()
+    assert rig_of(bundled) is bundled
+    assert rig_of(None) == bundled
+    with pytest.raises(ValueError, match=r"none\.toml"):
+        rig_of(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize("emulate", [False, True])
+def test_neither_or_both_of_ask_and_emulate_are_refused(tmp_path, emulate):
+    ask = (lambda plan: "") if emulate else None
+    with pytest.raises(ValueError, match="neither or both"):
+        bl.execute_pour(tmp_path, ask=ask, emulate=emulate)
+    with pytest.raises(ValueError, match="neither or both"):
+        bl.record(out=tmp_path / "out", ask=ask, emulate=emulate)
