@@ -21,7 +21,7 @@ class Truths(NamedTuple):
         liquid: Name of the kind.
         repetition: From 0.
         viscosity: [Pa s].
-        cohesion: Uniform, as stirring hardly shows it.
+        cohesion: Uniform, because stirring data carry little information about it.
         seed: Of the data and of what is made of it.
     """
 

@@ -79,7 +79,7 @@ class Workshop:
 
     @cached_property
     def sticky(self) -> list[Stuck]:
-        """Liquids that stick to their cup, and what they spilled."""
+        """Adhesive liquids and their spillage."""
         found, shown = [], self.progress and self.pool is not None
         with progress_bar("liquids that stick", self.scale.sticky, shown=shown) as advance:
             for one in self._sticking:

@@ -1,7 +1,7 @@
 """The motion loop: it reads the arm, asks the guards, sends the next set-point, hands on a sample.
 
 It runs on an absolute clock. A set-point is also what keeps the controller's watchdog quiet.
-Whatever is not well stops the arm for good: nothing resumes here, a new session is needed.
+Any fault stops the arm permanently. Nothing resumes; start a new session.
 """
 
 from functools import partial

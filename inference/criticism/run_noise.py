@@ -65,9 +65,9 @@ def own_errors(emulator: Emulator) -> np.ndarray:
     """One draw of the noise from each run that was learned from [n, m].
 
     Of the scores, what is left when a run is left out, less what the emulator's own error adds
-    to it; of the rest, what the components leave. Components lean towards the noise of their own
-    runs: what the emulator took from the scores for it (`absorbed_noise`) is noise and is given
-    back, and then nothing is lost to the rest.
+    to it; of the rest, what the components leave. The components absorb part of the
+    noise of their own runs: what the emulator took from the scores for it (`absorbed_noise`) is
+    noise and is given back, and then nothing is lost to the rest.
     """
     basis, n = emulator.basis, len(emulator.outputs)
     used = basis.used

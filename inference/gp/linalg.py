@@ -5,7 +5,7 @@ cores are busy one solve then takes 16 ms instead of 0.1 ms (measured with 32 ro
 loops of matrix products have no such cliff, and a loop over blocks of rows ends where the data
 end: a matrix of 256 rows of which 20 are in use costs one block, not eight. Hyperparameters of
 eight processes with 60 points took 0.08 s of CPU time with 64 rows reserved and 0.33 s with 256;
-with `jnp.linalg.cholesky` and one BLAS thread it took 0.16 s and 4.9 s.
+with `jnp.linalg.cholesky` it took 0.16 s (one BLAS thread) and 4.9 s (BLAS threads not limited).
 
 Matrices have p rows, of which the first n are in use; the others are those of the identity. A
 matrix is given by its blocks of rows, start -> [BLOCK, p], so that no more of it is ever made.

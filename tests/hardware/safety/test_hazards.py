@@ -155,7 +155,7 @@ ANSWERS = {
         ("safety/guards: every_guard_has_a_case", "safety/guards: each_guard_trips_alone"),
     ),
     "S7": Answer(
-        "a guard stops the arm for good",
+        "a guard stops the arm permanently",
         "the process ends; nothing resumes",
         ("session/session: stop_is_final", "robot/ur_driver: stop_returns_at_once_and_is_final"),
     ),

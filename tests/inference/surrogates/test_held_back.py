@@ -1,4 +1,4 @@
-"""Of the last simulations, what those before them had led to expect."""
+"""The last third of the runs, predicted from the first two thirds."""
 
 import jax
 import jax.numpy as jnp
