@@ -31,6 +31,7 @@ from .sampling.target import Chains
 from .surrogates.base import Surrogate
 
 PREDICTED_DRAWS = 50  # draws of each chain for which the surrogate predicts
+SAMPLE_DIMS = ("chain", "draw")
 
 
 def simulations_dataset(prior: Prior, history: History) -> xr.Dataset:
@@ -135,6 +136,14 @@ def add_surrogate(
 
 
 def finished(tree: xr.DataTree, attributes: Mapping[str, object]) -> xr.DataTree:
-    """The tree with how it was made at its root."""
+    """The tree with how it was made at its root, and in each group which dimensions are draws.
+
+    ArviZ 1 writes and reads that as `sample_dims`; earlier versions, which Python 3.11 has, do not.
+    """
+    for group in tree.children.values():
+        sampled = [name for name in SAMPLE_DIMS if name in group.dims]
+        group.attrs.pop("sample_dims", None)
+        if sampled:
+            group.attrs["sample_dims"] = sampled
     tree.attrs.update(attributes, version=version("bolfi-liquids"))
     return tree

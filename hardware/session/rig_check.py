@@ -19,7 +19,7 @@ RTDE_PORT = 30004
 ANSWER = 2.0  # s
 PACKAGES = (
     ("ur-rtde", "robot", "moves the robot"),
-    ("opencv-contrib-python-headless", "cameras", "reads the cameras"),
+    ("opencv-python-headless", "cameras", "reads the cameras"),
     ("av", "cameras", "writes the videos"),
 )
 

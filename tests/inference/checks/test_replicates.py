@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass
 
 import numpy as np
@@ -123,9 +124,8 @@ def test_killed_and_repeated_equals_undisturbed(tmp_path, monkeypatch):
     assert victim.wait() == -signal.SIGKILL
     before = ran()
     assert 8 <= before < 24
-    with sqlite3.connect(tmp_path / "killed.sqlite") as connection:
+    with closing(sqlite3.connect(tmp_path / "killed.sqlite")) as connection:
         stored = connection.execute("SELECT count(*) FROM replicate").fetchone()[0]
-    connection.close()
     assert before - 4 <= stored <= before  # two were running, two may have been on their way
     resumed = start()
     monkeypatch.setattr(sys, "argv", arguments("whole"))
