@@ -224,7 +224,7 @@ def test_stops_at_the_target(met):
     assert calibration.summary.n_simulations == 8
     last = estimates[-1].parameters["viscosity"]
     ordinary = calibration.summary.parameters["viscosity"]
-    assert last.q05 < ordinary["q95"] and ordinary["q05"] < last.q95
+    assert last.q05 < ordinary.q95 and ordinary.q05 < last.q95
 
 
 @pytest.mark.minutes  # the story above goes as far, without the calibration
