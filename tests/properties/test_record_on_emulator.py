@@ -1,6 +1,6 @@
 """A whole recording, and a whole online calibration, on the emulator and rendered cameras.
 
-The recording is the one that the README makes, by its own words.
+The recording is the one that the guide makes, by its own words.
 """
 
 import re
@@ -20,19 +20,19 @@ pytest.importorskip("cv2")
 
 pytestmark = pytest.mark.punctual
 
-README = Path(__file__).parents[2] / "README.md"
+PAGE = Path(__file__).parents[2] / "bolfi_liquids" / "guide" / "robot.md"
 VIEWS = ("xz", "yz")
 TRUTH = ("index", "stamp", "time", "inclination_xz", "inclination_yz")
 
 
 @pytest.fixture(scope="module")
 def directory(tmp_path_factory):
-    blocks = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     (records,) = (block for block in blocks if "bl.record(" in block)
     where = tmp_path_factory.mktemp("record")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(where)
-        exec(compile(records, str(README), "exec"), {"__name__": "__main__"})
+        exec(compile(records, str(PAGE), "exec"), {"__name__": "__main__"})
     return where / "stir"
 
 

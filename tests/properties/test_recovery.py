@@ -67,6 +67,6 @@ def test_an_independent_solver_s_liquids_are_told_apart(tmp_path):
         calibration = bl.calibrate(DATA / f"{name}.nc", out=tmp_path / name, progress=False, **FULL)
         print(name, calibration.summary.fit_rms_deg, calibration.summary.parameters)
         assert calibration.summary.fit_rms_deg < closest_deg
-        medians[name] = calibration.summary.parameters["viscosity"]["q50"]
+        medians[name] = calibration.summary.parameters["viscosity"].q50
     assert medians["water_v10"] < 0.03
     assert 0.3 < medians["glycerin_v10"] < 10.0

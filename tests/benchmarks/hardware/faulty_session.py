@@ -86,7 +86,7 @@ def run_main(directory: Path, address: str) -> None:
         session.wait(0, timeout=0.05)
         # the faults' files lie beside the samples' for `_fill_disk`
         (directory / SAMPLES).symlink_to(recording / SAMPLES)
-        pids = {child.name: child.process.pid for child in session._children}
+        pids = {child.name: child.process.pid for child in session._processes.children}
         print(json.dumps(pids | {"main": os.getpid()}), flush=True)
         try:
             while not session.wait(timeout=0.005):
