@@ -110,8 +110,9 @@ class Problem:
 
 def with_results(made: Made, jobs: "list[Job]", results: "list[Simulation]") -> Made:
     """What was made, with the results of `jobs` at its end."""
-    blank = np.full(made.signals.shape[1:], np.nan)
-    signals = [blank if result.signal is None else result.signal for result in results]
+    from ..inference.simulations import stacked
+
+    signals = stacked(results, made.signals.shape[1:])
     return Made(
         {name: np.append(v, [job.theta[name] for job in jobs]) for name, v in made.theta.items()},
         np.concatenate([made.signals, signals]),
@@ -229,14 +230,11 @@ def _told(problem: Problem, made: Made, observed: NDArray, seed: int) -> "Bolfi"
 
 
 def _jobs(problem: Problem, theta: Mapping[str, NDArray], first: int) -> "list[Job]":
-    from ..inference.simulations import Job
+    from ..inference.simulations import jobs
 
     count = len(theta[problem.prior.names[0]])
     seeds = simulation_seeds(problem.settings.seed, Phase.ONLINE_STIRS, first + count)[first:]
-    return [
-        Job({name: float(values[at]) for name, values in theta.items()}, seed)
-        for at, seed in enumerate(seeds)
-    ]
+    return jobs(theta, seeds)
 
 
 def _spread(values: NDArray) -> Spread:

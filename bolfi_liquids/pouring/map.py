@@ -219,17 +219,15 @@ def _jobs(joint: "Prior", pours: int) -> "list[Job]":
     """A Sobol design; neighbours in the list turn at like rates, so that none waits for another."""
     from scipy.stats import qmc
 
-    from ..inference.simulations import Job
+    from ..inference.simulations import jobs
 
     design = qmc.Sobol(len(joint), rng=generator(0, Phase.MAP_DESIGN)).random_base2(
         int(np.ceil(np.log2(pours)))
     )[:pours]
     theta = joint.from_unit(design)
     seeds = simulation_seeds(0, Phase.MAP_POURS, PACKINGS)
-    return [
-        Job({name: float(values[at]) for name, values in theta.items()}, seeds[at % PACKINGS])
-        for at in np.argsort(theta["angular_velocity"], kind="stable")
-    ]
+    made = jobs(theta, [seeds[at % PACKINGS] for at in range(pours)])
+    return [made[at] for at in np.argsort(theta["angular_velocity"], kind="stable")]
 
 
 def _learn(

@@ -77,16 +77,13 @@ def conclusions(
     progress: bool,
 ) -> list[NDArray | None]:
     """Of each truth; None where its calibration failed."""
-    from ..inference.simulations import Job, Keep, run_missing
+    from ..inference.simulations import Keep, jobs, run_missing
 
     truths = tasks.truths
-    jobs = [
-        Job({key: float(values[at]) for key, values in truths.theta.items()}, int(seed))
-        for at, seed in enumerate(truths.seed)
-    ]
-    with progress_bar(f"calibrating ({name})", len(jobs), shown=progress) as advance:
+    asked = jobs(truths.theta, truths.seed)
+    with progress_bar(f"calibrating ({name})", len(asked), shown=progress) as advance:
         keep = Keep(tasks.bank, learner.identity, 1, pool)
-        found = run_missing(learner.simulate, jobs, keep, advance=advance)
+        found = run_missing(learner.simulate, asked, keep, advance=advance)
     return [result.signal for result in found]
 
 

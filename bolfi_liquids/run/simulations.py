@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..inference.simulations import Job, Keep, run_missing
+from ..inference.simulations import Keep, jobs, run_missing, stacked, succeeded
 from ..progress import Advance, Simulate, silent
 
 
@@ -41,16 +41,12 @@ def simulate_kept(
     Raises:
         RuntimeError: Every simulation failed.
     """
-    jobs = _jobs(theta, seeds)
-    results = run_missing(simulate, jobs, keep, advance=advance)
-    good = {
-        at: r.signal
-        for at, r in enumerate(results)
-        if r.signal is not None and np.isfinite(r.signal).all()
-    }
+    asked = jobs(theta, seeds)
+    results = run_missing(simulate, asked, keep, advance=advance)
+    good = succeeded(results)
     if not good:
         raise RuntimeError(
-            f"all {len(seeds)} simulations failed, the first at {jobs[0].theta}"
+            f"all {len(seeds)} simulations failed, the first at {asked[0].theta}"
             f" ({results[0].error or 'it diverged'}); use more particles"
         )
     seconds = sum(result.seconds for result in results)
@@ -67,16 +63,7 @@ def keeping(simulate: Simulate, shape: tuple[int, ...], keep: Keep) -> Simulate:
     """
 
     def kept(theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
-        jobs = _jobs(theta, [int(seed) for seed in seeds])
-        results = run_missing(simulate, jobs, keep, shape)
-        failed = np.full(shape, np.nan)
-        return np.stack([failed if one.signal is None else one.signal for one in results])
+        results = run_missing(simulate, jobs(theta, seeds), keep, shape)
+        return stacked(results, shape)
 
     return kept
-
-
-def _jobs(theta: Mapping[str, NDArray], seeds: Sequence[int]) -> list[Job]:
-    return [
-        Job({name: float(values[at]) for name, values in theta.items()}, seed)
-        for at, seed in enumerate(seeds)
-    ]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..prior import Prior
 from ..simulations.bank import SimulationBank
-from ..simulations.job import BATCH, jobs
+from ..simulations.job import BATCH, jobs, succeeded
 from ..simulations.runner import Keep, run_missing
 from ..types import Simulator
 from .experiment import Experiment, Proposal
@@ -82,15 +82,11 @@ class Laboratory:
             RuntimeError: all of them failed.
         """
         seeds = phase_seeds(self.keeping.seed, phase, len(next(iter(theta.values()))))
-        asked = jobs(theta, [int(seed) for seed in seeds])
+        asked = jobs(theta, seeds)
         keeping = self.keeping
         report = partial(keeping.report, phase)
         results = run_missing(self.simulate, asked, keeping.of(self.identity), advance=report)
-        good = {
-            i: result.signal
-            for i, result in enumerate(results)
-            if result.signal is not None and np.isfinite(result.signal).all()
-        }
+        good = succeeded(results)
         if not good:
             raise RuntimeError(
                 f"all {len(asked)} simulations of the phase {phase!r} failed, the first at "

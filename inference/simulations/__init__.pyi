@@ -8,6 +8,7 @@ from .job import OneByOne as OneByOne
 from .job import columns as columns
 from .job import jobs as jobs
 from .job import stacked as stacked
+from .job import succeeded as succeeded
 from .runner import Keep as Keep
 from .runner import Runner as Runner
 from .runner import run_missing as run_missing

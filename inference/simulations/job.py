@@ -89,6 +89,15 @@ def stacked(results: Sequence[Simulation], shape: tuple[int, ...] | None = None)
     return np.stack([empty if result.signal is None else result.signal for result in results])
 
 
+def succeeded(results: Sequence[Simulation]) -> dict[int, np.ndarray]:
+    """Place in the list -> signal, of the runs whose signal is finite."""
+    return {
+        place: result.signal
+        for place, result in enumerate(results)
+        if result.signal is not None and np.isfinite(result.signal).all()
+    }
+
+
 def run_batch(
     simulate: Simulator,
     batch: Sequence[Job],
