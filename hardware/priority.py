@@ -5,7 +5,7 @@ import os
 import sys
 
 FIFO_PRIORITY = 20
-NICE = -10
+CONTROL_NICENESS = -10
 BEFORE_OTHERS = -5
 SWITCH_INTERVAL = 5e-4  # s; the thread that checks orders must not hold up the loop
 
@@ -42,7 +42,7 @@ def hurry() -> str:
     except (OSError, AttributeError):  # not permitted; or a system without it
         pass
     try:
-        os.nice(NICE)
+        os.nice(CONTROL_NICENESS)
         return "nice"
     except OSError:
         return "normal"

@@ -7,7 +7,7 @@ from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 MAX_LENGTH = 3.0  # [m]; more looks like millimetres
 CONTROLLER_RATE = {"cb3": 125.0, "e-series": 500.0}  # Hz; others are rounded by the controller
-DENSEST = 25_000.0  # [kg/m3]; no stick is denser
+MAX_STICK_DENSITY = 25_000.0  # [kg/m3]; no stick is denser
 MAX_MASS = 30.0  # [kg]; more looks like grams
 
 
@@ -110,7 +110,7 @@ class Stick(Section, frozen=True):
 
     @model_validator(mode="after")
     def _weighs_as_a_stick(self) -> "Stick":
-        if self.density > DENSEST:
+        if self.density > MAX_STICK_DENSITY:
             raise ValueError(f"mass {self.mass:g} kg looks like grams; convert it to kg")
         return self
 

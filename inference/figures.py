@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 OBSERVED, CLOSEST, PREDICTED, GREY = "#1f2933", "#d1591a", "#2463a6", "#8a94a0"
 MAX_PANELS = 6  # channels of a signal that are drawn
-INTERVAL = 0.05, 0.5, 0.95  # quantiles of the predictive distribution
+PREDICTIVE_QUANTILES = 0.05, 0.5, 0.95  # quantiles of the predictive distribution
 
 
 def plot_search(rounds: np.ndarray, discrepancy: np.ndarray, ax: "Axes | None") -> "Axes":
@@ -68,7 +68,7 @@ def plot_predictive(
     for j, (ax, values) in enumerate(zip(given, panels, strict=False)):
         index = np.arange(len(values))
         if draws is not None:
-            low, middle, high = np.quantile(draws[j], INTERVAL, axis=0)
+            low, middle, high = np.quantile(draws[j], PREDICTIVE_QUANTILES, axis=0)
             label = "predicted, 90 %"
             ax.fill_between(index, low, high, color=PREDICTED, alpha=0.25, lw=0, label=label)
             ax.plot(index, middle, color=PREDICTED, lw=1.0)

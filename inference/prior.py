@@ -16,7 +16,9 @@ from .types import Theta
 RESERVED = frozenset(
     {"chain", "draw", "simulation", "seed", "discrepancy", "failed", "error", "round", "signal"}
 )
-TAIL = 1e-12  # quantile at which an unbounded prior is cut, so that u = 0 and 1 stay finite
+TAIL_QUANTILE = (
+    1e-12  # quantile at which an unbounded prior is cut, so that u = 0 and 1 stay finite
+)
 
 
 class Prior:
@@ -177,7 +179,7 @@ def _rather_normal(univariate: Univariate) -> bool:
 
 
 def _quantile(univariate: Univariate, u: np.ndarray) -> np.ndarray:
-    inner = univariate.icdf(np.clip(u, TAIL, 1.0 - TAIL))
+    inner = univariate.icdf(np.clip(u, TAIL_QUANTILE, 1.0 - TAIL_QUANTILE))
     value = np.clip(inner, *univariate.bounds)
     for bound, there in zip(univariate.bounds, (u <= 0.0, u >= 1.0), strict=True):
         if np.isfinite(bound) and np.isfinite(univariate.log_prob(np.asarray(bound))):

@@ -15,7 +15,7 @@ from .stir_setup import StirSetup
 from .stirring import watched_stir
 from .trajectory import Trajectory
 
-RATE = 25.0  # frames/s
+FRAME_RATE = 25.0  # frames/s
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def stir_frames(
     setup: StirSetup,
     seed: int,
     *,
-    rate: float = RATE,
+    rate: float = FRAME_RATE,
     effects: Mapping[str, ArrayLike] | None = None,
 ) -> StirFrames:
     """Frames of the very simulation that `stir` makes of one liquid and seed.
@@ -95,7 +95,7 @@ def stir_frames(
     return frames
 
 
-def pour_frames(batch: PourBatch, *, rate: float = RATE) -> PourFrames:
+def pour_frames(batch: PourBatch, *, rate: float = FRAME_RATE) -> PourFrames:
     """Frames of the very simulation that `landings` makes of one liquid and seed.
 
     The first rows of `Landings.position` are what has landed by any frame, as many as are NaN in

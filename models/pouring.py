@@ -24,10 +24,10 @@ from .fluid.packing import checked_seeds, pack_cylinder
 from .fluid.runtime import Watch
 from .fluid.settled import Packing, SettledPackings
 
-SETTLING = 0.6  # s
+SETTLING_TIME = 0.6  # s
 _packings = SettledPackings()
 SLOWEST, FASTEST = 0.01, 30.0  # rad/s: a pour of three minutes; a cup that is flung
-DRIP = 1.2  # s beyond the cups' hold; viscous liquids need it, and others end earlier
+DRIP_TIME = 1.2  # s beyond the cups' hold; viscous liquids need it, and others end earlier
 
 
 @dataclass(frozen=True)
@@ -218,7 +218,7 @@ def _run(
             pack_cylinder(source.radius, scene.spacing, scene.particles, int(seeds[k]))
             for k in places
         )
-        return scene.settled([points - shift for points in packed], SETTLING)
+        return scene.settled([points - shift for points in packed], SETTLING_TIME)
 
     # by scene too: with effects compiled in, the last bit of a rest may differ
     fixed = cups, scene.particles, tuple(effect.name for effect in scene.effects)
@@ -226,7 +226,7 @@ def _run(
     scene.place([p.position for p in packings], [p.multiplier for p in packings])
     scene.place_cups(rate)
     scene.pour_in(*held)
-    hold = cups.pour.hold + DRIP
+    hold = cups.pour.hold + DRIP_TIME
     steps = int((cups.pour.final_angle / rate.min() + hold) * scene.rate)
     runtime.run_chunks(scene, steps, lambda start, stop: scene.pour(size, start, stop, hold), watch)
     scene.count(size)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-FARTHEST = 10.0  # m; float32 locates a pivot to 1e-6 m there
+MAX_PIVOT_DISTANCE = 10.0  # m; float32 locates a pivot to 1e-6 m there
 
 
 class Rig(NamedTuple):
@@ -43,7 +43,10 @@ def check_rig(rig: Rig, deepest: float, effects: Sequence[str]) -> None:
         "stick_mass": (rig.stick_mass > 0, "must be positive [kg]"),
         "pivot_friction": (rig.pivot_friction >= 0, "must not be negative [N m]"),
         "fill": ((rig.fill >= 0) & (rig.fill <= deepest), f"must be 0 to {deepest:.4g} m"),
-        "path": (np.abs(rig.path) < FARTHEST, f"must be finite and within {FARTHEST:g} m"),
+        "path": (
+            np.abs(rig.path) < MAX_PIVOT_DISTANCE,
+            f"must be finite and within {MAX_PIVOT_DISTANCE:g} m",
+        ),
     }
     for name, (inside, rule) in ranges.items():
         values = getattr(rig, name)

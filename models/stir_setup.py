@@ -10,7 +10,7 @@ from .fluid.checks import check_numbers
 from .fluid.numerics import MODEL_VERSION, Numerics
 from .trajectory import Trajectory, mean_speed
 
-ROOM = 1.5  # times the setup's fill is the largest
+MAX_FILL_RATIO = 1.5  # times the setup's fill is the largest
 
 
 class HasRig(Protocol):
@@ -137,7 +137,7 @@ class StirSetup:
     @property
     def deepest(self) -> float:
         """Largest depth of liquid for which there is room [m]."""
-        return max(min(self.cup.height, ROOM * self.cup.fill), self.cup.fill)
+        return max(min(self.cup.height, MAX_FILL_RATIO * self.cup.fill), self.cup.fill)
 
     def least_viscosity(self, density: float, gripper: Trajectory) -> float:
         """Viscosity [Pa s] below which liquids of `density` [kg/m³] look alike while the gripper

@@ -19,7 +19,7 @@ from .rig import Rig, check_rig
 from .stir_setup import StirSetup
 from .trajectory import Trajectory, substep_path
 
-SETTLING = 1.0  # s that a packing relaxes around the held stick
+SETTLING_TIME = 1.0  # s that a packing relaxes around the held stick
 _packings = SettledPackings()
 
 
@@ -153,7 +153,7 @@ def _run(scene, setup, held, rig, seeds, *, watch: Watch | None = None) -> np.nd
         points = [_pack(setup, int(counts[k]), int(seeds[k]), pivots[k]) for k in places]
         scene.place_stick(pivots[places])
         scene.hold_stick(True)
-        return scene.settled(points, SETTLING)
+        return scene.settled(points, SETTLING_TIME)
 
     # by scene too: with effects compiled in, the last bit of a rest may differ
     fixed = setup, tuple(effect.name for effect in scene.effects)

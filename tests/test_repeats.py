@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-# each test fails as often as it is told, on a computer that stands still as long as it is told
+# {failures}: how often each test fails; {disturbed}: whether the computer stood still meanwhile
 TESTS = """
 import sys
 import pytest

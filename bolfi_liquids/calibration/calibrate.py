@@ -140,10 +140,10 @@ def _calibrate(
     run: Path, stirring: Stirring, prior: "Prior", settings: CalibrationSettings, means: _Means
 ) -> None:
     from ..inference.simulations import Keep, open_executor
-    from .check import PREDICTIVE_DRAWS, REPLICATES, check_by_simulation
+    from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES, check_by_simulation
     from .tree import results_tree, write_tree
 
-    needed = settings.budget + PREDICTIVE_DRAWS + REPLICATES
+    needed = settings.budget + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
     with open_bank(run) as bank, open_executor(means.executor) as workers, ExitStack() as stack:
         kept = max(needed - _left(run, settings, bank), 0)
         bar = progress_bar("simulating stirs", needed, shown=means.progress, done=kept)
@@ -170,10 +170,10 @@ def _calibrate(
 
 def _left(run: Path, settings: CalibrationSettings, bank: "SimulationBank") -> int:
     """Simulations that a run still needs; some of those before it grew were judging, or pours."""
-    from .check import PREDICTIVE_DRAWS, REPLICATES
+    from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES
 
     before = read_run(run).get("grown", [{"learned_from": 0, "simulations": 0}])[-1]
-    needed = settings.budget - before["learned_from"] + PREDICTIVE_DRAWS + REPLICATES
+    needed = settings.budget - before["learned_from"] + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
     return needed - (len(bank) - before["simulations"])
 
 

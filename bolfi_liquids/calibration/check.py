@@ -12,7 +12,7 @@ from ..run.simulations import simulate_kept
 from ..seeds import Phase, simulation_seeds
 
 PREDICTIVE_DRAWS = 8
-REPLICATES = 4  # seeds at theta*, for the noise between seeds
+THETA_STAR_REPLICATES = 4  # seeds at theta*, for the noise between seeds
 
 
 class Check(NamedTuple):
@@ -43,10 +43,10 @@ def check_by_simulation(
         advance: Called with 1 for each simulation.
     """
     count = len(next(iter(draws.values())))
-    at_best = {name: np.full(REPLICATES, value) for name, value in best.items()}
+    at_best = {name: np.full(THETA_STAR_REPLICATES, value) for name, value in best.items()}
     seeds = (
         simulation_seeds(seed, Phase.PREDICTIVE, count),
-        simulation_seeds(seed, Phase.REPLICATES, REPLICATES),
+        simulation_seeds(seed, Phase.REPLICATES, THETA_STAR_REPLICATES),
     )
     predictive = simulate_kept(simulate, draws, seeds[0], keep, advance=advance)
     replicates = simulate_kept(simulate, at_best, seeds[1], keep, advance=advance)

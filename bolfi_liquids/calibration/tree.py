@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from ..inference import Fit, Prior
 
-GRID = 121
+GRID_POINTS = 121
 
 
 def results_tree(sampled: "DataTree", fit: "Fit", stirring: Stirring, check: Check) -> "DataTree":
@@ -90,7 +90,7 @@ def surface(fit: "Fit") -> "Dataset":
 
 
 def _quantile_axes(prior: "Prior") -> dict[str, np.ndarray]:
-    quantiles = np.repeat(np.linspace(0.0, 1.0, GRID)[:, None], len(prior), axis=1)
+    quantiles = np.repeat(np.linspace(0.0, 1.0, GRID_POINTS)[:, None], len(prior), axis=1)
     return prior.from_unit(quantiles)
 
 

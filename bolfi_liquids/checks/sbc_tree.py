@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from ..inference.checks import SBC, Coverage, Replicates
 
 RESULTS = "sbc.nc"
-LEVEL = 0.9  # of the intervals that are looked at by region
-REGIONS = 4  # of equal prior probability
+INTERVAL_LEVEL = 0.9  # of the intervals that are looked at by region
+PRIOR_REGIONS = 4  # of equal prior probability
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +69,10 @@ def _regions(coverage: "Coverage") -> "Dataset":
     """Coverage by quarters of the prior, from the lowest truths to the highest."""
     from xarray import Dataset
 
-    inside = 2 * np.abs(coverage.quantiles - 0.5) <= LEVEL
+    inside = 2 * np.abs(coverage.quantiles - 0.5) <= INTERVAL_LEVEL
     truths = coverage.replicates.to_dataset()
     names = [name for name in coverage.names if f"{name}_truth" in truths]
-    count = min(REGIONS, len(inside))
+    count = min(PRIOR_REGIONS, len(inside))
     rate, upper = np.empty((count, len(names))), np.empty((count, len(names)))
     for j, name in enumerate(names):
         truth = truths[f"{name}_truth"].to_numpy()

@@ -152,7 +152,7 @@ def _needs(option: str, given: object, others: dict[str, object]) -> None:
 
 def typed_sentence(plan: str) -> str:
     """Show the plan, and read what the person types."""
-    from ..hardware.session.confirmation import SENTENCE
+    from ..hardware.session.confirmation import CONFIRMATION
 
     typer.echo(plan)
     if not sys.stdin.isatty():
@@ -161,7 +161,7 @@ def typed_sentence(plan: str) -> str:
             where="--arm",
             fix="run it in a terminal, where somebody reads the plan",
         )
-    return typer.prompt(f"Type '{SENTENCE}' to go on", default="", show_default=False)
+    return typer.prompt(f"Type '{CONFIRMATION}' to go on", default="", show_default=False)
 
 
 def _dry_run(rig: "Rig", cycles: int | None, out: Path) -> None:

@@ -9,18 +9,18 @@ from .recording import Recording
 if TYPE_CHECKING:
     from .pour_table import PourTable
 
-RECORDED = ("water", "oil", "glycerin", "gel")
-POURED = ("water", "oil", "glycerin")
+RECORDED_LIQUIDS = ("water", "oil", "glycerin", "gel")
+POURED_LIQUIDS = ("water", "oil", "glycerin")
 
 
 def bundled_recording(liquid: str) -> Recording:
-    """Stirred at 10 cm/s; one of `RECORDED`."""
+    """Stirred at 10 cm/s; one of `RECORDED_LIQUIDS`."""
     with as_file(files("bolfi_liquids.data") / f"{liquid}_v10.nc") as path:
         return open_recording(path)
 
 
 def bundled_pours(liquid: str) -> "PourTable":
-    """Poured with the bundled cups; one of `POURED`."""
+    """Poured with the bundled cups; one of `POURED_LIQUIDS`."""
     from .pour_table import open_pours
 
     with as_file(files("bolfi_liquids.data") / "pours.csv") as path:

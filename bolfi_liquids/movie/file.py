@@ -15,8 +15,8 @@ from ..errors import InputError
 from ..files import write_whole
 
 Pictures = Iterable[NDArray[np.uint8]]
-RATE = 25.0  # pictures/s; a GIF's clock counts hundredths of a second
-QUALITY = "20"  # constant rate factor of H.264: lower is better and larger
+PICTURE_RATE = 25.0  # pictures/s; a GIF's clock counts hundredths of a second
+H264_RATE_FACTOR = "20"  # constant rate factor of H.264: lower is better and larger
 
 
 def check_movie(path: Path) -> None:
@@ -36,7 +36,7 @@ def check_movie(path: Path) -> None:
         _av()
 
 
-def write_movie(path: Path, pictures: Pictures, rate: float = RATE) -> Path:
+def write_movie(path: Path, pictures: Pictures, rate: float = PICTURE_RATE) -> Path:
     """Write a movie whole, or nothing.
 
     Args:
@@ -69,7 +69,7 @@ def _write_mp4(path: Path, pictures: Pictures, rate: float) -> None:
     with av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as file:
         stream = file.add_stream("libx264", Fraction(rate).limit_denominator(1000))
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
-        stream.options = {"crf": QUALITY}
+        stream.options = {"crf": H264_RATE_FACTOR}
         for picture in iterator:
             even = np.ascontiguousarray(picture[:height, :width])
             file.mux(stream.encode(av.VideoFrame.from_ndarray(even, "rgb24")))

@@ -11,14 +11,14 @@ from .view import View
 Picture = NDArray[np.floating]
 """Red, green and blue from 0 to 1, shape [height, width, 3]."""
 
-ABSORBED = np.array([62.0, 21.0, 7.0], np.float32)  # 1/m: a blue dye, so that depth is seen
-SCATTERED = np.array([0.36, 0.62, 0.86], np.float32)
-SCATTER = 8.0  # 1/m
-BEND = 0.35  # displacement of what is behind, by the thickness
-DEEPEST = 0.02  # m of liquid that bend
+ABSORPTION = np.array([62.0, 21.0, 7.0], np.float32)  # 1/m: a blue dye, so that depth is seen
+SCATTERED_COLOUR = np.array([0.36, 0.62, 0.86], np.float32)
+SCATTERING = 8.0  # 1/m
+REFRACTION_SHIFT = 0.35  # displacement of what is behind, by the thickness
+MAX_BENDING_DEPTH = 0.02  # m of liquid that bend
 SKY, GROUND = np.array([1.0, 1.0, 1.0], np.float32), np.array([0.62, 0.68, 0.74], np.float32)
-LAMP = np.array([-0.45, 0.72, 0.53], np.float32)
-SHINE = 60.0
+LAMP_DIRECTION = np.array([-0.45, 0.72, 0.53], np.float32)
+SHININESS = 60.0
 LEAST_REFLECTED = 0.03  # of what meets the surface head on
 
 
@@ -59,11 +59,11 @@ def through_liquid(
     seen = Surface(*(field[part] for field in liquid))
     bent = _bent(view, seen, part)
     depth = seen.thickness[..., None]
-    passed = behind[bent] * np.exp(-ABSORBED * depth)
+    passed = behind[bent] * np.exp(-ABSORPTION * depth)
     if stick is not None:
-        dyed = stick.colour[bent] * np.exp(-ABSORBED * depth / 2.0)
+        dyed = stick.colour[bent] * np.exp(-ABSORPTION * depth / 2.0)
         passed = over(passed, dyed, stick.cover[bent])
-    passed += SCATTERED * (1.0 - np.exp(-SCATTER * depth))
+    passed += SCATTERED_COLOUR * (1.0 - np.exp(-SCATTERING * depth))
     picture = base.copy()
     picture[part] = over(base[part], _lit(passed, seen.normal), seen.cover)
     if stick is not None:
@@ -81,7 +81,9 @@ def _window(cover: NDArray) -> tuple[slice, slice]:
 
 def _bent(view: View, seen: Surface, part: tuple[slice, slice]) -> tuple[NDArray, NDArray]:
     """Row and column of what is seen through each pixel of a window: towards the thicker side."""
-    bend = BEND * view.scale * np.minimum(seen.thickness, DEEPEST) * seen.cover
+    bend = (
+        REFRACTION_SHIFT * view.scale * np.minimum(seen.thickness, MAX_BENDING_DEPTH) * seen.cover
+    )
     rows, columns = np.mgrid[part]
     moved = rows + bend * seen.normal[..., 1], columns - bend * seen.normal[..., 0]
     row, column = (
@@ -96,8 +98,10 @@ def _lit(passed: Picture, normal: NDArray) -> Picture:
     up, facing = normal[..., 1:2], np.clip(normal[..., 2:3], 0.0, 1.0)
     reflected = LEAST_REFLECTED + (1.0 - LEAST_REFLECTED) * (1.0 - facing) ** 5
     mirrored = GROUND + (0.5 + 0.5 * up) * (SKY - GROUND)
-    halfway = LAMP / np.linalg.norm(LAMP) + np.array([0.0, 0.0, 1.0], np.float32)
+    halfway = LAMP_DIRECTION / np.linalg.norm(LAMP_DIRECTION) + np.array(
+        [0.0, 0.0, 1.0], np.float32
+    )
     halfway /= np.linalg.norm(halfway)
-    glint = np.clip(normal @ halfway, 0.0, 1.0)[..., None] ** SHINE
+    glint = np.clip(normal @ halfway, 0.0, 1.0)[..., None] ** SHININESS
     lit = passed * (0.82 + 0.18 * up) + 0.7 * reflected * (mirrored - passed) + 0.55 * glint
     return np.clip(lit, 0.0, 1.0)

@@ -9,9 +9,9 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 from .landed import Landed, landed, level
 from .light import (
-    ABSORBED,
-    SCATTER,
-    SCATTERED,
+    ABSORPTION,
+    SCATTERED_COLOUR,
+    SCATTERING,
     Picture,
     over,
     through_liquid,
@@ -31,12 +31,12 @@ from .view import View
 if TYPE_CHECKING:
     from ..models import Cups, Landings, PourFrames
 
-SIZE = 480, 640
+PICTURE_SIZE = 480, 640
 AZIMUTH, ELEVATION = np.radians(12.0), np.radians(14.0)
-SPREAD = 0.012  # m by which what is spilled runs
+PUDDLE_SPREAD = 0.012  # m by which what is spilled runs
 TABLE_CELL = 0.002  # m
-DARKEST = 0.012  # m of liquid
-CAPTION = 0.09  # of the height is left free for it
+DARKEST_DEPTH = 0.012  # m of liquid
+CAPTION_HEIGHT = 0.09  # of the height is left free for it
 DYED, SHINING = (38, 92, 190, 215), (92, 160, 226, 235)
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -60,12 +60,12 @@ def pour_view(cups: "Cups", distance: float) -> View:
     source, receiver = cups.source, cups.receiver
     high = np.hypot(2.0 * source.radius, source.height)
     low = -cups.pour.lip_height - receiver.radius * np.sin(ELEVATION)
-    low -= CAPTION * (high - low)
+    low -= CAPTION_HEIGHT * (high - low)
     left = -max(2.0 * source.radius, receiver.radius - distance)
     right = max(distance + receiver.radius, source.height)
-    scale = min(SIZE[1] / (high - low), SIZE[0] / (right - left)) / 1.12
+    scale = min(PICTURE_SIZE[1] / (high - low), PICTURE_SIZE[0] / (right - left)) / 1.12
     centre = float(left + right) / 2.0, 0.0, float(high + low) / 2.0
-    return View(*SIZE, float(scale), centre, AZIMUTH, ELEVATION)
+    return View(*PICTURE_SIZE, float(scale), centre, AZIMUTH, ELEVATION)
 
 
 def pour_pictures(
@@ -124,12 +124,15 @@ def with_puddle(view: View, below: Picture, lying: Landed, cups: "Cups", count: 
     """What was spilled, as a film on the table of the volume that lies there."""
     if not len(lying.spilled):
         return below
-    centre, reach = lying.spilled.mean(axis=0), np.ptp(lying.spilled, axis=0).max() + 8.0 * SPREAD
+    centre, reach = (
+        lying.spilled.mean(axis=0),
+        np.ptp(lying.spilled, axis=0).max() + 8.0 * PUDDLE_SPREAD,
+    )
     bins = max(int(reach / TABLE_CELL), 1)
     edges = [np.linspace(c - reach / 2.0, c + reach / 2.0, bins + 1) for c in centre]
     hits, _, _ = np.histogram2d(*lying.spilled.T, bins=edges)
     volume = cups.liquid_volume / count / (reach / bins) ** 2
-    film = gaussian_filter(volume * hits, SPREAD * bins / reach)
+    film = gaussian_filter(volume * hits, PUDDLE_SPREAD * bins / reach)
 
     right, up = view.metres()
     axes, table = view.axes, -cups.pour.lip_height - view.centre[2]
@@ -140,8 +143,8 @@ def with_puddle(view: View, below: Picture, lying: Landed, cups: "Cups", count: 
     places = [(p - edge[0]) / (reach / bins) - 0.5 for p, edge in zip((x, y), edges, strict=True)]
     depth = map_coordinates(film, places, order=1)[..., None]
     # light passes it to the table and back, and no colour is darker than that of a full cup
-    dyed = below * np.exp(-2.0 * ABSORBED * np.minimum(depth, DARKEST)) + SCATTERED * (
-        1.0 - np.exp(-SCATTER * depth)
-    )
+    dyed = below * np.exp(
+        -2.0 * ABSORPTION * np.minimum(depth, DARKEST_DEPTH)
+    ) + SCATTERED_COLOUR * (1.0 - np.exp(-SCATTERING * depth))
     edge = np.clip(depth[..., 0] / 3e-4, 0.0, 1.0)
     return over(below, np.clip(dyed, 0.0, 1.0).astype(np.float32), edge.astype(np.float32))

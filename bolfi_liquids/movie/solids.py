@@ -12,11 +12,11 @@ from .light import Layer, Picture, over
 from .surface import Glass
 from .view import View
 
-FINER = 2  # times finer are lines drawn than shown
+LINE_SUPERSAMPLING = 2  # times finer are lines drawn than shown
 EDGE, FAINT = (92, 112, 130, 210), (92, 112, 130, 110)
-BODY = (150, 180, 205, 26)
-GLINT = (255, 255, 255, 120)
-STICK = np.array([0.80, 0.52, 0.30], np.float32)
+GLASS_COLOUR = (150, 180, 205, 26)
+GLINT_COLOUR = (255, 255, 255, 120)
+STICK_COLOUR = np.array([0.80, 0.52, 0.30], np.float32)
 WALL, TABLE = np.array([[0.965, 0.975, 0.985], [0.86, 0.885, 0.91]], np.float32)
 SHADOW, SHADE = np.array([0.35, 0.42, 0.5], np.float32), 0.28
 
@@ -33,10 +33,10 @@ def drawn(view: View, below: Picture, shapes: Sequence[Shape]) -> Picture:
     """A picture with shapes over it, in their order."""
     if not shapes:
         return below
-    size = FINER * view.width, FINER * view.height
+    size = LINE_SUPERSAMPLING * view.width, LINE_SUPERSAMPLING * view.height
     sheet = Image.new("RGBA", size)
     for shape in shapes:
-        at = [tuple(p) for p in FINER * (view.pixels(shape.points) + 0.5)]
+        at = [tuple(p) for p in LINE_SUPERSAMPLING * (view.pixels(shape.points) + 0.5)]
         own = Image.new("RGBA", size, shape.colour[:3] + (0,)) if not shape.width else None
         if own is None:
             ImageDraw.Draw(sheet).line(at, fill=shape.colour, width=shape.width, joint="curve")
@@ -44,7 +44,7 @@ def drawn(view: View, below: Picture, shapes: Sequence[Shape]) -> Picture:
             ImageDraw.Draw(own).polygon(at, fill=shape.colour)
             sheet = Image.alpha_composite(sheet, own)
     # premultiplied, so that no colour of empty pixels bleeds into the edges
-    small = np.asarray(sheet.convert("RGBa").reduce(FINER), np.float32) / 255.0
+    small = np.asarray(sheet.convert("RGBa").reduce(LINE_SUPERSAMPLING), np.float32) / 255.0
     return below * (1.0 - small[..., 3:]) + small[..., :3]
 
 
@@ -63,8 +63,8 @@ def glass_behind(glass: Glass, view: View) -> list[Shape]:
     """What of a cup is farther than its contents."""
     floor, rim = ring(glass, 0.0, view, "far"), ring(glass, glass.height, view, "far")
     return [
-        Shape(np.concatenate([floor, rim[::-1]]), BODY),
-        Shape(ring(glass, 0.0, view), BODY),
+        Shape(np.concatenate([floor, rim[::-1]]), GLASS_COLOUR),
+        Shape(ring(glass, 0.0, view), GLASS_COLOUR),
         Shape(floor, FAINT, 3),
         Shape(rim, FAINT, 3),
     ]
@@ -75,8 +75,8 @@ def glass_before(glass: Glass, view: View) -> list[Shape]:
     rim, floor = ring(glass, glass.height, view, "near"), ring(glass, 0.0, view, "near")
     glint = [at + share * (to - at) for at, to in [(floor[58], rim[58])] for share in (0.12, 0.9)]
     return [
-        Shape(np.concatenate([floor, rim[::-1]]), BODY),
-        Shape(np.array(glint), GLINT, 6),
+        Shape(np.concatenate([floor, rim[::-1]]), GLASS_COLOUR),
+        Shape(np.array(glint), GLINT_COLOUR, 6),
         Shape(floor, EDGE, 3),
         Shape(np.stack([floor[0], rim[0]]), EDGE, 3),
         Shape(np.stack([floor[-1], rim[-1]]), EDGE, 3),
@@ -99,7 +99,7 @@ def stick_layer(view: View, pivot: NDArray, tip: NDArray, radius: float) -> Laye
     round_off = np.sqrt(np.maximum(1.0 - (apart / radius) ** 2, 0.0))
     lit = 0.55 + 0.45 * round_off - 0.18 * (dx * along[1] - dy * along[0]) / radius
     front = start[2] + share * (end[2] - start[2]) + radius * round_off
-    colour = np.clip(lit[..., None] * STICK, 0.0, 1.0)
+    colour = np.clip(lit[..., None] * STICK_COLOUR, 0.0, 1.0)
     return Layer(*(part.astype(np.float32) for part in (colour, cover, front)))
 
 

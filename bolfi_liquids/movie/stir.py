@@ -21,15 +21,15 @@ from .view import View
 if TYPE_CHECKING:
     from ..models import StirFrames, StirSetup
 
-SIZE = 640, 480
+PICTURE_SIZE = 640, 480
 AZIMUTH, ELEVATION = np.radians(25.0), np.radians(22.0)
 
 
 def stir_view(setup: "StirSetup") -> View:
     """A camera that sees the cup, and the stick's lower half."""
     tall = setup.cup.height + 0.9 * setup.cup.radius
-    scale = SIZE[1] / (1.3 * tall + 2.0 * setup.cup.radius * np.sin(ELEVATION))
-    return View(*SIZE, float(scale), (0.0, 0.0, tall / 2.0), AZIMUTH, ELEVATION)
+    scale = PICTURE_SIZE[1] / (1.3 * tall + 2.0 * setup.cup.radius * np.sin(ELEVATION))
+    return View(*PICTURE_SIZE, float(scale), (0.0, 0.0, tall / 2.0), AZIMUTH, ELEVATION)
 
 
 def stir_pictures(

@@ -15,11 +15,13 @@ from scipy.ndimage import affine_transform, gaussian_filter, map_coordinates
 
 from .view import View
 
-CELLS = 3.5  # grid cells a particle spacing
-SMEAR = 0.6  # sd of a smeared particle, by the spacing
-LEVEL = 0.4  # of the rest density: here is the surface
-ALONE = 0.7  # least density at a particle, so that a single one is a drop of its own volume
-SOFTER = 1.0  # cells
+CELLS_PER_SPACING = 3.5  # grid cells a particle spacing
+SMEAR_SD = 0.6  # sd of a smeared particle, by the spacing
+SURFACE_LEVEL = 0.4  # of the rest density: here is the surface
+MIN_PARTICLE_DENSITY = (
+    0.7  # least density at a particle, so that a single one is a drop of its own volume
+)
+SURFACE_BLUR = 1.0  # cells
 LEAST_SHARE = 0.2  # of a smeared particle that is inside the cup's corners
 
 
@@ -71,7 +73,7 @@ class _Grid(NamedTuple):
 
     @classmethod
     def around(cls, points: NDArray, spacing: float) -> "_Grid":
-        cell, reach = spacing / CELLS, 3.0 * SMEAR * spacing
+        cell, reach = spacing / CELLS_PER_SPACING, 3.0 * SMEAR_SD * spacing
         # at multiples of the cell, so that liquid at rest does not shimmer
         low = np.floor((points.min(axis=0) - reach) / cell)
         high = np.ceil((points.max(axis=0) + reach) / cell)
@@ -89,7 +91,7 @@ class _Grid(NamedTuple):
             share = np.prod(np.where(corner, part, 1.0 - part), axis=1)
             total += np.bincount(cells, share * weights, len(total))
         density = (spacing / self.cell) ** 3 * total.reshape(self.shape)
-        sd = SMEAR * spacing / self.cell
+        sd = SMEAR_SD * spacing / self.cell
         return gaussian_filter(density.astype(np.float32), sd, mode="constant", truncate=3.0)
 
     def centres(self) -> NDArray:
@@ -123,14 +125,14 @@ def _density(view: View, points, seen, grid: _Grid, given) -> NDArray:
     side, up = glass.within(points)
     inside = (side > 0.0) & (up > 0.0) & (up < glass.height)
     cell_side, cell_up = glass.within(view.world(grid.centres() * (1.0, 1.0, -1.0)))
-    sd = SMEAR * spacing
+    sd = SMEAR_SD * spacing
     held = _share_within(cell_side / sd) * _share_within(cell_up / sd)
     near = (np.minimum(cell_side, cell_up) > -grid.cell) & (cell_up < glass.height)
     share = np.where(near, np.maximum(held, LEAST_SHARE), 1.0)
     whole = grid.smeared(seen, np.ones(len(points)), spacing) / share
     places = ((seen - grid.origin) / grid.cell).T
     found = map_coordinates(whole, places, order=1)
-    weights = np.maximum(1.0, ALONE / np.maximum(found, 1e-3))
+    weights = np.maximum(1.0, MIN_PARTICLE_DENSITY / np.maximum(found, 1e-3))
     whole = grid.smeared(seen, weights, spacing) / share
     within = np.clip(np.minimum(cell_side, cell_up) / grid.cell + 0.5, 0.0, 1.0)
     if inside.all():
@@ -149,7 +151,7 @@ def _share_within(distance: NDArray) -> NDArray:
 
 def _looked_at(view: View, grid: _Grid, density: NDArray) -> Surface:
     """The grid's columns, each as one line of sight, brought to the picture's pixels."""
-    solid = density > LEVEL
+    solid = density > SURFACE_LEVEL
     crossing = solid.any(axis=2)
     first = np.where(crossing, solid.argmax(axis=2), density.argmax(axis=2))
     before = np.maximum(first - 1, 0)
@@ -158,13 +160,13 @@ def _looked_at(view: View, grid: _Grid, density: NDArray) -> Surface:
         return np.take_along_axis(values, index[..., None], axis=2)[..., 0]
 
     here, there = at(density, first), at(density, before)
-    step = np.where(crossing, (here - LEVEL) / np.maximum(here - there, 1e-6), 0.0)
+    step = np.where(crossing, (here - SURFACE_LEVEL) / np.maximum(here - there, 1e-6), 0.0)
     front = -(grid.origin[2] + grid.cell * (first - np.clip(step, 0.0, 1.0)))
     # smoother than the surface, or light would show the grid
-    soft = gaussian_filter(density, SOFTER, mode="nearest")
+    soft = gaussian_filter(density, SURFACE_BLUR, mode="nearest")
     slope = np.stack([-at(np.gradient(soft, axis=axis), first) for axis in range(3)], axis=-1)
     slope[..., 2] *= -1.0
-    amount = np.clip(density / (2.0 * LEVEL), 0.0, 1.0)
+    amount = np.clip(density / (2.0 * SURFACE_LEVEL), 0.0, 1.0)
     thickness = grid.cell * amount.sum(axis=2)
     most = density.max(axis=2)
 
@@ -183,5 +185,5 @@ def _looked_at(view: View, grid: _Grid, density: NDArray) -> Surface:
     # a pixel is covered by how far inside the contour its centre is, in pixels
     across, down = np.gradient(most)
     steep = np.hypot(across, down)
-    cover = np.clip((most - LEVEL) / np.maximum(steep, 1e-3) + 0.5, 0.0, 1.0)
+    cover = np.clip((most - SURFACE_LEVEL) / np.maximum(steep, 1e-3) + 0.5, 0.0, 1.0)
     return Surface(cover, front, normal, thickness)

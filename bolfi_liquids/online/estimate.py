@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from ..inference import Bolfi, Prior
     from ..inference.simulations import Job, Simulation
 
-DRAWS = 500  # of each of two chains
-MARGIN = 8  # rows of the engine's arrays beyond the budget, for what is pending
+DRAWS_EACH = 500  # of each of two chains
+SPARE_ROWS = 8  # rows of the engine's arrays beyond the budget, for what is pending
 
 
 class Spread(NamedTuple):
@@ -161,7 +161,7 @@ def estimate(
     engine = _told(problem, made, followed.observed, problem.settings.seed)
     fit = engine.fit(warn=False)  # warnings are among the estimate's complaints
     seed = problem.settings.seed
-    tree = fit.sample("quadrature", chains=2, draws=DRAWS, seed=seed, warn=False)
+    tree = fit.sample("quadrature", chains=2, draws=DRAWS_EACH, seed=seed, warn=False)
     posterior = tree["posterior"]
     status = str(posterior.attrs["status"])
     draws = {name: posterior[name].to_numpy().ravel() for name in problem.prior.names}
@@ -216,7 +216,7 @@ def _engine(problem: Problem, observed: NDArray, seed: int) -> "Bolfi":
         surrogate=settings.surrogate,
         seed=seed,
         initial=MIN_SIMULATIONS,
-        capacity=settings.budget + MARGIN,
+        capacity=settings.budget + SPARE_ROWS,
         discrepancy=problem.stirring.discrepancy(),
         **(paper if settings.surrogate == "discrepancy" else {}),
     )

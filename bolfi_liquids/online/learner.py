@@ -12,7 +12,7 @@ from .outbox import newest
 from .plan import SoFar, follow, stroke_ends
 from .request import (
     FAILED,
-    GONE,
+    PARTNER_GONE,
     PREPARING,
     READY,
     REFUSED,
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .plan import Followed
 
 NICENESS = 5  # of this process; an estimate matters more than another simulation
-ALONE = "the process that simulates has died"
+SIMULATOR_DIED = "the process that simulates has died"
 
 
 def learn_online(parent: Connection, simulator: Connection, request: Request) -> None:
@@ -40,7 +40,7 @@ def learn_online(parent: Connection, simulator: Connection, request: Request) ->
         learner = _Learner(parent, simulator, request)
         if learner.prepare():
             learner.serve()
-    except GONE:
+    except PARTNER_GONE:
         return  # nobody is left to be told
     except Exception as error:
         parent.send(Status(FAILED, f"{type(error).__name__}: {error}"))
@@ -91,7 +91,7 @@ class _Learner:
             self._tell(PREPARING, "simulating the plan")
             self._land()
         if self.made.size < settings.design:
-            self._tell(FAILED, ALONE)
+            self._tell(FAILED, SIMULATOR_DIED)
             return False
         self._tell(READY, "")
         return True
@@ -145,7 +145,7 @@ class _Learner:
         self.asked += len(jobs)
         try:
             self.simulator.send(jobs)
-        except GONE:
+        except PARTNER_GONE:
             self._go_alone()
         else:
             self.flying.append(jobs)
@@ -155,7 +155,7 @@ class _Learner:
 
         try:
             results = self.simulator.recv()
-        except GONE:
+        except PARTNER_GONE:
             self._go_alone()
         else:
             self.made = with_results(self.made, self.flying.pop(0), results)
@@ -167,7 +167,7 @@ class _Learner:
 
     def _tell(self, phase: str, detail: str) -> None:
         if phase == READY and not self.simulating:
-            detail = ALONE
+            detail = SIMULATOR_DIED
         in_flight = sum(len(jobs) for jobs in self.flying)
         self.parent.send(Status(phase, detail, self.made.size, in_flight))
 

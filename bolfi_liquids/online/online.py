@@ -36,7 +36,7 @@ from .outbox import Outbox
 from .plan import SoFar, planned, stroke_ends
 from .request import (
     FAILED,
-    GONE,
+    PARTNER_GONE,
     PREPARING,
     READY,
     REFUSED,
@@ -63,8 +63,8 @@ __all__ = [
 ]
 
 BANK, LOG = "online.sqlite", "online.jsonl"
-POLL = 0.02  # s between looks while somebody waits
-PATIENCE = 2.0  # s that the processes have to end by themselves
+POLL_SECONDS = 0.02  # s between looks while somebody waits
+JOIN_SECONDS = 2.0  # s that the processes have to end by themselves
 
 
 class OnlineCalibration:
@@ -146,7 +146,7 @@ class OnlineCalibration:
         """
         until = np.inf if timeout is None else time.monotonic() + timeout
         while self.status.phase == PREPARING and time.monotonic() < until:
-            time.sleep(POLL)
+            time.sleep(POLL_SECONDS)
             self.poll()
         return self.status.phase == READY
 
@@ -177,8 +177,8 @@ class OnlineCalibration:
                     self.status = message
                 else:
                     self.estimates.append(message)
-        except (*GONE, OSError):
-            self._workers["learner"].join(POLL)
+        except (*PARTNER_GONE, OSError):
+            self._workers["learner"].join(POLL_SECONDS)
             code = self._workers["learner"].exitcode
             detail = f"the process that learns has died (exit code {code}); the recording goes on"
             self.status = self.status._replace(phase=FAILED, detail=detail)
@@ -220,9 +220,9 @@ class OnlineCalibration:
         """End the other processes; what they have simulated is kept. Closing twice does no harm."""
         self._outbox.close()
         for worker in self._workers.values():
-            worker.join(PATIENCE if worker.name == "learner" else 0.1)
+            worker.join(JOIN_SECONDS if worker.name == "learner" else 0.1)
             worker.terminate()  # a simulation is not worth waiting for
-            worker.join(PATIENCE)
+            worker.join(JOIN_SECONDS)
             if worker.is_alive():
                 worker.kill()
 
@@ -254,20 +254,20 @@ def replay(
             yield from _arriving(online, began + end)
         estimate = online.update(_until(recording, end))
         while not realtime and estimate is None and online.status.phase == READY:
-            time.sleep(POLL)
+            time.sleep(POLL_SECONDS)
             estimate = online.poll()
         if estimate is not None:
             yield estimate
         if online.status.phase != READY or any(map(online.enough, online.estimates[-1:])):
             return
     if realtime:
-        yield from _arriving(online, time.monotonic() + PATIENCE)
+        yield from _arriving(online, time.monotonic() + JOIN_SECONDS)
 
 
 def _arriving(online: OnlineCalibration, until: float) -> "Iterator[OnlineEstimate]":
     """Estimates that come before `until`, by `time.monotonic` [s]."""
     while time.monotonic() < until:
-        time.sleep(POLL)
+        time.sleep(POLL_SECONDS)
         if (estimate := online.poll()) is not None:
             yield estimate
             if estimate.strokes == len(online.ends):

@@ -13,12 +13,14 @@ from ..inputs.fields import DENSITIES
 from ..inputs.recording import Recording, Trajectory
 from ..inputs.strokes import strokes
 
-FARTHEST = 2e-3  # m that the arm may be off its plan; star strokes are 50 mm long
-LATEST = 0.2  # s that a stroke may change the delay by; a servoed arm follows by some 0.1 s
+MAX_OFF_PLAN = 2e-3  # m that the arm may be off its plan; star strokes are 50 mm long
+MAX_DELAY_CHANGE = (
+    0.2  # s that a stroke may change the delay by; a servoed arm follows by some 0.1 s
+)
 SEARCHED, STEP = 0.4, 0.02  # s, up to which such a change is looked for, and how finely at first
-GAP = 2.5  # sampling intervals of the plan; data farther apart are not interpolated between
-MOVED = 5e-3  # m from which the delay shows
-SLACK = 1e-3  # s by which a stroke may seem to lack its end, as the delay is only estimated
+MAX_GAP = 2.5  # sampling intervals of the plan; data farther apart are not interpolated between
+MOVED_DISTANCE = 5e-3  # m from which the delay shows
+END_SLACK = 1e-3  # s by which a stroke may seem to lack its end, as the delay is only estimated
 
 
 class SoFar(NamedTuple):
@@ -91,7 +93,7 @@ def stroke_ends(plan: Recording) -> NDArray[np.float64]:
     found = [stroke for stroke in strokes(plan) if stroke.number > 0]
     ends = [float(plan.time[stroke.samples][-1]) for stroke in found]
     position = plan.gripper.position[found[-1].samples]
-    still = np.linalg.norm(position - position[-1], axis=1).max() < MOVED
+    still = np.linalg.norm(position - position[-1], axis=1).max() < MOVED_DISTANCE
     # the rest after the last stroke is none
     return np.array(ends[:-1] if still and len(ends) > 1 else ends)
 
@@ -114,10 +116,10 @@ def follow(plan: Recording, ends: NDArray, so_far: SoFar) -> Followed:
     delays, apart = _delays(plan, ends, so_far)
     done = len(delays) - 1
     covered = float(ends[done - 1]) if done else float("-inf")
-    stroke = np.minimum(np.searchsorted(ends, plan.time - SLACK), done)
+    stroke = np.minimum(np.searchsorted(ends, plan.time - END_SLACK), done)
     wanted = plan.time + delays[stroke]
     observed = np.column_stack([_sampled(wanted, so_far.time, y) for y in so_far.inclination.T])
-    observed[plan.time > covered + SLACK] = np.nan
+    observed[plan.time > covered + END_SLACK] = np.nan
     change = np.diff(delays, prepend=0.0)
     refusal = _refusal(float(change[np.abs(change).argmax()]), apart)
     delay = float(delays[max(done - 1, 0)])
@@ -152,12 +154,12 @@ def _delays(plan: Recording, ends: NDArray, so_far: SoFar) -> tuple[NDArray[np.f
         since, until = until, end + delay
         within = (time > since) & (time <= until)
         # what has hardly moved yet shows neither a delay nor another path
-        if within.any() and np.ptp(position[within], axis=0).max() > MOVED:
+        if within.any() and np.ptp(position[within], axis=0).max() > MOVED_DISTANCE:
             delay = _delay(plan, time[within], position[within], delay)
             distance = _distance(plan, time[within] - delay, position[within])
             apart = max(apart, float(distance.max()))
         delays.append(delay)
-        if so_far.time[-1] + SLACK < end + delay:
+        if so_far.time[-1] + END_SLACK < end + delay:
             break
     return np.array(delays), apart
 
@@ -190,21 +192,21 @@ def _sampled(wanted: NDArray, time: NDArray, values: NDArray) -> NDArray[np.floa
         return np.full(len(wanted), np.nan)
     known = time[seen]
     after = np.clip(np.searchsorted(known, wanted), 1, len(known) - 1)
-    near = known[after] - known[after - 1] <= GAP * np.median(np.diff(wanted))
+    near = known[after] - known[after - 1] <= MAX_GAP * np.median(np.diff(wanted))
     inside = (wanted >= known[0]) & (wanted <= known[-1])
     return np.where(near & inside, np.interp(wanted, known, values[seen]), np.nan)
 
 
 def _refusal(change: float, apart: float) -> str:
-    if abs(change) > LATEST:
+    if abs(change) > MAX_DELAY_CHANGE:
         what = "lost" if change > 0 else "gained"
         return (
             f"the arm {what} {1e3 * abs(change):.0f} ms on its plan in one stroke, more than "
-            f"{1e3 * LATEST:.0f} ms: what is simulated is not what it does"
+            f"{1e3 * MAX_DELAY_CHANGE:.0f} ms: what is simulated is not what it does"
         )
-    if apart > FARTHEST:
+    if apart > MAX_OFF_PLAN:
         return (
-            f"the arm is {1e3 * apart:.1f} mm off its plan, more than {1e3 * FARTHEST:.0f} mm: "
+            f"the arm is {1e3 * apart:.1f} mm off its plan, more than {1e3 * MAX_OFF_PLAN:.0f} mm: "
             "what is simulated is not what it does"
         )
     return ""

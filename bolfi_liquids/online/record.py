@@ -14,7 +14,7 @@ from ..robot.armed_session import Ask, check_one, hidden_liquid
 from ..robot.live_view import SessionView
 from ..robot.record import kept
 from ..robot.stir import (
-    AHEAD,
+    PATHS_AHEAD,
     StirPlan,
     plan_stir,
     stir_session,
@@ -27,8 +27,10 @@ if TYPE_CHECKING:
     from ..hardware.motion import PosePath, Trajectory
     from .estimate import OnlineEstimate
 
-RATE = 30.0  # Hz, of the simulated plan; the cameras'
-FOLLOWED = 0.2  # s, after which arm, cameras and files have followed a stroke's last set-point
+PLAN_RATE = 30.0  # Hz, of the simulated plan; the cameras'
+FOLLOWED_AFTER = (
+    0.2  # s, after which arm, cameras and files have followed a stroke's last set-point
+)
 
 
 def record_online(
@@ -123,11 +125,11 @@ class _Stirring:
         ordered: list[int] = []
         for at, stroke in enumerate(self._plan.strokes):
             ordered.append(self._session.follow(stroke))
-            if at >= AHEAD:
-                self._await(ordered[at - AHEAD])
+            if at >= PATHS_AHEAD:
+                self._await(ordered[at - PATHS_AHEAD])
             if self._enough:
                 break
-        for number in ordered[-AHEAD:]:
+        for number in ordered[-PATHS_AHEAD:]:
             self._await(number)
         return len(ordered) - 1
 
@@ -135,7 +137,7 @@ class _Stirring:
         """Wait for a stroke's end, and hand over the data so far."""
         while not self._session.wait(number, timeout=0.05):
             self._take(self._calibration.poll())
-        time.sleep(FOLLOWED)
+        time.sleep(FOLLOWED_AFTER)
         if (so_far := _so_far(self._session.directory, time.monotonic())) is not None:
             self._take(self._calibration.update(so_far))
 
@@ -171,7 +173,7 @@ def _simulated(plan: StirPlan) -> "Trajectory":
     from ..hardware.motion import Trajectory, joined
 
     whole = joined(list(plan.strokes))
-    times = np.arange(0.0, whole.duration, 1.0 / RATE)
+    times = np.arange(0.0, whole.duration, 1.0 / PLAN_RATE)
     columns = [np.interp(times, whole.time, axis) for axis in whole.pose[:, :3].T]
     return Trajectory(times, np.column_stack(columns))
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..models import Cups
 
 PREPARING, READY, REFUSED, FAILED = "preparing", "ready", "refused", "failed"
-GONE = EOFError, BrokenPipeError, ConnectionResetError
+PARTNER_GONE = EOFError, BrokenPipeError, ConnectionResetError
 """What a pipe raises when nobody is at its other end."""
 
 

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from ..errors import InputError
 from ..inputs.settings import Count, Particles, Seed, Simulations, Surrogate, checked, one_of
-from ..pouring.map import LEAST_POURS, POURS
+from ..pouring.map import DEFAULT_POURS, MIN_POURS
 
 STOPS = ("bound", "mean")
 WHERE = "online setting {}"
@@ -39,7 +39,7 @@ class OnlineSettings:
     batch: Count = 1
     surrogate: Surrogate = "discrepancy"
     particles: Particles = 1000
-    pours: Annotated[int, Field(ge=LEAST_POURS)] = POURS
+    pours: Annotated[int, Field(ge=MIN_POURS)] = DEFAULT_POURS
     seed: Seed = 0
 
     def __post_init__(self):

@@ -5,7 +5,7 @@ import signal
 from multiprocessing.connection import Connection
 
 from ..calibration.stir_simulator import stirring_of
-from .request import GONE, Request
+from .request import PARTNER_GONE, Request
 
 NICENESS = 10  # of this process; control and cameras come first
 
@@ -25,7 +25,7 @@ def simulate_plan(link: Connection, request: Request) -> None:
             try:
                 jobs = link.recv()
                 link.send(run_missing(stirring.simulate, jobs, Keep(bank, stirring.identity)))
-            except GONE:
+            except PARTNER_GONE:
                 return
 
 

@@ -20,7 +20,7 @@ from ..run.directory import POUR, Run, open_bank
 from ..seeds import Phase, simulation_seeds
 from .result import Judged, Pour, PourSummary
 from .spillage import (
-    FARTHEST,
+    MAX_LANDING_SDS,
     Outcomes,
     Profiles,
     Surface,
@@ -234,7 +234,7 @@ class _Pours:
         """Pour every liquid, with seeds of their own."""
         rate, distance = action["angular_velocity"], action["distance"]
         profiles = self._profiles(np.array([rate]), liquids, Phase.JUDGED_POURS)
-        spread = FARTHEST * landing_sd(self.cups)
+        spread = MAX_LANDING_SDS * landing_sd(self.cups)
         off = np.clip(landing_sd(self.cups) * normal_scores(LANDINGS_PER_POUR), -spread, spread)
         return Judged(
             rate, distance, landed(profiles.fractions[0], profiles.distance, distance, off)

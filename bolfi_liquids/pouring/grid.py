@@ -39,7 +39,7 @@ class GridSize(NamedTuple):
     rates: int = 12
 
 
-FINE = GridSize()
+FINE_GRID = GridSize()
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ def make_grid(
     keep: "Keep",
     advance: "Advance",
     *,
-    size: GridSize = FINE,
+    size: GridSize = FINE_GRID,
 ) -> PourGrid:
     """Pour the grid's liquids, one call of the simulator for each angular velocity.
 

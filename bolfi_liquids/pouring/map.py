@@ -29,15 +29,15 @@ if TYPE_CHECKING:
     from ..inference.simulations import Job
     from ..models import Cups
 
-POURS = 512
-LEAST_POURS = 64  # of fewer the process learns next to nothing about four inputs
-PACKINGS = 64  # that the pours start from; a new one takes as long as a quick pour
+DEFAULT_POURS = 512
+MIN_POURS = 64  # of fewer the process learns next to nothing about four inputs
+MAP_PACKINGS = 64  # that the pours start from; a new one takes as long as a quick pour
 AT_ONCE = 16  # pours of like duration in one call
 LEFT_OUT = 8  # one pour in so many is left out to check the map by
 LIQUID_GRID = 33, 5  # viscosity and cohesion, which acts slowly
 ACTION_GRID = 16  # along each axis
-LITTLE = 0.1  # spilled fraction below which a pour counts as one that spills little
-OUTCOMES = 16  # equally probable ones of each predicted pour
+LITTLE_SPILLED = 0.1  # spilled fraction below which a pour counts as one that spills little
+OUTCOMES_EACH = 16  # equally probable ones of each predicted pour
 
 
 class MapError(NamedTuple):
@@ -94,7 +94,7 @@ class SpillageMap:
     error: MapError
 
     def outcomes(self, liquids: Mapping[str, NDArray]) -> NDArray[np.float64]:
-        """Equally probable spilled fractions (draws * OUTCOMES, A) of every action.
+        """Equally probable spilled fractions (draws * OUTCOMES_EACH, A) of every action.
 
         Args:
             liquids: Posterior draws of viscosity [Pa s] and cohesion, shape (draws,).
@@ -103,7 +103,7 @@ class SpillageMap:
 
         u = self.prior.to_unit(liquids)
         mean, sd = np.moveaxis(RegularGridInterpolator(self.axes, self.moments)(u), 1, 0)
-        predicted = mean[:, None] + sd[:, None] * normal_scores(OUTCOMES)[:, None]
+        predicted = mean[:, None] + sd[:, None] * normal_scores(OUTCOMES_EACH)[:, None]
         return _fraction(self.inverse, predicted).reshape(-1, len(self.actions))
 
     def best(self, liquids: Mapping[str, NDArray]) -> Expected:
@@ -126,7 +126,7 @@ def make_pours(
     bank: "SimulationBank",
     *,
     prior: "Prior",
-    pours: int = POURS,
+    pours: int = DEFAULT_POURS,
     progress: bool = True,
 ) -> tuple[dict[str, NDArray], NDArray[np.float64]]:
     """The pours that a map is learned from; those in the bank are not made again.
@@ -148,8 +148,8 @@ def make_pours(
     """
     from ..inference.simulations import Keep, columns, run_missing, stacked
 
-    if pours < LEAST_POURS:
-        raise InputError(f"{pours}", where="pours", fix=f"give at least {LEAST_POURS}")
+    if pours < MIN_POURS:
+        raise InputError(f"{pours}", where="pours", fix=f"give at least {MIN_POURS}")
     jobs = _jobs(_joint(prior, cups), pours)
 
     def simulate(theta: dict[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
@@ -173,7 +173,7 @@ def make_map(
     bank: "SimulationBank",
     *,
     prior: "Prior",
-    pours: int = POURS,
+    pours: int = DEFAULT_POURS,
     progress: bool = True,
 ) -> SpillageMap:
     """Learn the spilled fraction from pours; arguments as in `make_pours`.
@@ -225,8 +225,8 @@ def _jobs(joint: "Prior", pours: int) -> "list[Job]":
         int(np.ceil(np.log2(pours)))
     )[:pours]
     theta = joint.from_unit(design)
-    seeds = simulation_seeds(0, Phase.MAP_POURS, PACKINGS)
-    made = jobs(theta, [seeds[at % PACKINGS] for at in range(pours)])
+    seeds = simulation_seeds(0, Phase.MAP_POURS, MAP_PACKINGS)
+    made = jobs(theta, [seeds[at % MAP_PACKINGS] for at in range(pours)])
     return [made[at] for at in np.argsort(theta["angular_velocity"], kind="stable")]
 
 
@@ -253,9 +253,9 @@ def _left_out_error(
     mean, sd = learned.predict({name: values[seen] for name, values in theta.items()})
     transform = learned.transform
     expected = _fraction(
-        transform.inverse, mean[:, None] + sd[:, None] * normal_scores(OUTCOMES)
+        transform.inverse, mean[:, None] + sd[:, None] * normal_scores(OUTCOMES_EACH)
     ).mean(1)
-    missed, little = expected - spilled[seen], expected < LITTLE
+    missed, little = expected - spilled[seen], expected < LITTLE_SPILLED
     spread = np.sqrt(np.mean(((transform(spilled[seen]) - mean) / sd) ** 2))
 
     def rms(values: NDArray) -> float:

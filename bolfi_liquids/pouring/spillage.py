@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 FRACTIONS = ("spilled", "received", "retained")
 ACTION = ("angular_velocity", "distance")
-TAIL = 0.1  # share of the draws that CVaR averages
-MISSED = 0.03  # sd of where liquid lands about where it was simulated, over its fall to the rim
-STEP = 1e-3  # m, between the distances of a profile
-FARTHEST = 5.0  # sd by which liquid may land elsewhere
+CVAR_TAIL = 0.1  # share of the draws that CVaR averages
+LANDING_SD = 0.03  # sd of where liquid lands about where it was simulated, over its fall to the rim
+DISTANCE_STEP = 1e-3  # m, between the distances of a profile
+MAX_LANDING_SDS = 5.0  # sd by which liquid may land elsewhere
 
 
 def mean_spillage(spilled: NDArray) -> NDArray[np.float64]:
@@ -35,7 +35,7 @@ def mean_spillage(spilled: NDArray) -> NDArray[np.float64]:
 
 def tail_spillage(spilled: NDArray) -> NDArray[np.float64]:
     """Mean over the worst tenth of the draws (CVaR at 0.9), along the first axis."""
-    worst = int(np.ceil(TAIL * len(spilled)))
+    worst = int(np.ceil(CVAR_TAIL * len(spilled)))
     return np.sort(spilled, axis=0)[-worst:].mean(axis=0)
 
 
@@ -50,7 +50,7 @@ def landing_sd(cups: "Cups") -> float:
     and the error grows with the fall. Against 90 pours of an independent solver it is 0.03 of
     the fall, RMS over liquids and angular velocities, from two heights.
     """
-    return MISSED * (cups.pour.lip_height - cups.receiver.height)
+    return LANDING_SD * (cups.pour.lip_height - cups.receiver.height)
 
 
 def normal_scores(count: int) -> NDArray[np.float64]:
@@ -65,7 +65,7 @@ class Profiles(NamedTuple):
 
     Attributes:
         angular_velocity: [rad/s], shape (W,), ascending.
-        distance: [m], shape (D,), `STEP` apart and beyond the range of the decision.
+        distance: [m], shape (D,), `DISTANCE_STEP` apart and beyond the range of the decision.
         fractions: Shape (W, draws, D, 3); the last axis sums to 1.
     """
 
@@ -117,10 +117,12 @@ def surface(profiles: Profiles, cups: "Cups") -> Surface:
 
     spilled = np.moveaxis(profiles.fractions[..., 0], 1, 0)
     blurred = gaussian_filter1d(
-        spilled, landing_sd(cups) / STEP, axis=-1, mode="nearest", truncate=FARTHEST
+        spilled, landing_sd(cups) / DISTANCE_STEP, axis=-1, mode="nearest", truncate=MAX_LANDING_SDS
     )
     low, high = cups.distance_range
-    allowed = (profiles.distance > low - STEP / 2) & (profiles.distance < high + STEP / 2)
+    allowed = (profiles.distance > low - DISTANCE_STEP / 2) & (
+        profiles.distance < high + DISTANCE_STEP / 2
+    )
     distance = np.clip(profiles.distance[allowed], low, high)
     return Surface(profiles.angular_velocity, distance, blurred[..., allowed])
 
@@ -163,9 +165,9 @@ class Outcomes(TimeLimited):
     def distances(self) -> NDArray[np.float64]:
         """Those of the decision [m], and so far beyond as liquid may land elsewhere."""
         low, high = self.cups.distance_range
-        beyond = int(np.ceil(FARTHEST * landing_sd(self.cups) / STEP))
-        steps = np.arange(-beyond, round((high - low) / STEP) + beyond + 1)
-        return np.asarray(low + STEP * steps, np.float64)
+        beyond = int(np.ceil(MAX_LANDING_SDS * landing_sd(self.cups) / DISTANCE_STEP))
+        steps = np.arange(-beyond, round((high - low) / DISTANCE_STEP) + beyond + 1)
+        return np.asarray(low + DISTANCE_STEP * steps, np.float64)
 
     def simulate(self, action: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         """Fractions (actions, draws, D, 3) spilled, received and retained.

@@ -134,11 +134,13 @@ def _pour_context(summary: PourSummary, tree: "DataTree") -> dict[str, Any]:
 
 
 def _moving(calibration: Calibration, progress: bool) -> dict[str, Any] | None:
-    from ..run.recordings import FOLDER
+    from ..run.recordings import RECORDINGS_FOLDER
     from .frames import frames_of
     from .moving_pictures import moving_context
 
-    if not (calibration.path / FOLDER).is_dir():  # of a run that was made before they were kept
+    if not (
+        calibration.path / RECORDINGS_FOLDER
+    ).is_dir():  # of a run that was made before they were kept
         return None
     return moving_context(calibration, frames_of(calibration.path, progress=progress))
 

@@ -34,7 +34,7 @@ MUCH_SPILLED = 0.05
 MUCH_RETAINED = 0.2
 """Share that stays in the source; a gel, once it flows, leaves less than this."""
 
-ENDS = {
+PRIOR_ENDS = {
     ("angular_velocity", 0): "slowest",
     ("angular_velocity", 1): "fastest",
     ("distance", 0): "nearest",
@@ -126,7 +126,7 @@ def _of_the_edge(pour: "DataTree") -> list[Sentence]:
     """That the chosen pour is at an end of what was allowed, where a better one may be beyond."""
     actions, chosen = pour["actions"], pour["chosen"].attrs
     ends = tuple(
-        ENDS[name, end]
+        PRIOR_ENDS[name, end]
         for name in ACTION
         for end, limit in enumerate(actions[name].to_numpy()[[0, -1]])
         if np.isclose(chosen[name], limit)

@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from ..inference import Bolfi, Fit, Prior
     from ..models import Cups
 
-DRAWS = 16  # of each posterior
+DRAWS_EACH = 16  # of each posterior
 BATCH = 4  # simulations at the same time
-NOISE = CameraNoise(np.radians(0.1))
-NAMES = ("viscosity", "cohesion")
+CAMERA_NOISE = CameraNoise(np.radians(0.1))
+PARAMETER_NAMES = ("viscosity", "cohesion")
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class ByStirring:
     bank: str | Path = ":memory:"
 
     def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
-        """Conclusions (B, budgets, 1 + DRAWS, 2): theta*, then draws, of viscosity and cohesion."""
+        """theta*, then draws, of viscosity and cohesion: (B, budgets, 1 + DRAWS_EACH, 2)."""
         return np.stack([self._one(truth, int(seed)) for truth, seed in _each(theta, seeds)])
 
     def _one(self, truth: dict[str, NDArray], seed: int) -> NDArray[np.float64]:
@@ -67,7 +67,7 @@ class ByStirring:
             clean = simulate(truth, np.array([seed]))[0]
             engine = Bolfi(
                 self.prior,
-                NOISE(clean, generator(seed, Phase.CAMERA_NOISE)),
+                CAMERA_NOISE(clean, generator(seed, Phase.CAMERA_NOISE)),
                 seed=seed,
                 capacity=self.budgets[-1],
                 **engine_options(stirring, self.surrogate),
@@ -154,7 +154,7 @@ def _made_by(prior: "Prior") -> list[Any]:
     from ..inference.engine_version import ENGINE_VERSION
 
     learned_by = [ENGINE_VERSION, describe_prior(prior), BATCH, PAPER_RULES, MIN_SIMULATIONS]
-    return [*learned_by, SAMPLING, DRAWS, NOISE.sd, DENSITY]
+    return [*learned_by, SAMPLING, DRAWS_EACH, CAMERA_NOISE.sd, DENSITY]
 
 
 def after_each(engine: "Bolfi", simulate: Simulate, budgets: Sequence[int]) -> "Iterator[Fit]":
@@ -179,10 +179,10 @@ def after_each(engine: "Bolfi", simulate: Simulate, budgets: Sequence[int]) -> "
 
 
 def concluded(fit: "Fit", seed: int) -> NDArray[np.float64]:
-    """theta* and draws, shape (1 + DRAWS, 2)."""
+    """theta* and draws, shape (1 + DRAWS_EACH, 2)."""
     sampled = fit.sample(seed=seed, warn=False, **SAMPLING)
-    drawn = pick_draws(sampled["posterior"].to_dataset(), DRAWS, seed)
-    return np.column_stack([np.append(fit.best[name], drawn[name]) for name in NAMES])
+    drawn = pick_draws(sampled["posterior"].to_dataset(), DRAWS_EACH, seed)
+    return np.column_stack([np.append(fit.best[name], drawn[name]) for name in PARAMETER_NAMES])
 
 
 def _each(theta: Mapping[str, NDArray], seeds: NDArray) -> Any:

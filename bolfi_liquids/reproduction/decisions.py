@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 
 from ..inference.simulations import Keep
 from ..pouring.spillage import (
-    STEP,
+    DISTANCE_STEP,
     Outcomes,
     Profiles,
     pour_all,
 )
 from ..progress import silent
 from ..seeds import Phase, generator, simulation_seeds
-from .calibrations import NAMES
+from .calibrations import PARAMETER_NAMES
 from .truths import DENSITY, Truths
 
 if TYPE_CHECKING:
@@ -28,15 +28,15 @@ RULES = ("plug_in", "mean", "cvar")
 """The best pour if theta* were the truth, as in the paper; least expected spillage over the
 posterior; and its mean over the worst tenth."""
 
-UNKNOWING = 64  # draws of the prior over which a pour is chosen without any calibration
-EXECUTIONS = 4  # seeds with which a chosen pour is carried out
+PRIOR_DRAWS = 64  # draws of the prior over which a pour is chosen without any calibration
+EXECUTION_SEEDS = 4  # seeds with which a chosen pour is carried out
 
 Action = Mapping[str, float]
 
 
 def decide(concluded: NDArray, grid: "PourGrid") -> dict[str, Action]:
     """The action of each rule, from theta* and draws, shape (1 + draws, 2)."""
-    liquids = dict(zip(NAMES, concluded.T, strict=True))
+    liquids = dict(zip(PARAMETER_NAMES, concluded.T, strict=True))
     best = {name: values[:1] for name, values in liquids.items()}
     over = grid.surface({name: values[1:] for name, values in liquids.items()})
     return {
@@ -48,7 +48,9 @@ def decide(concluded: NDArray, grid: "PourGrid") -> dict[str, Action]:
 
 def decide_unknowing(grid: "PourGrid", prior: "Prior", seed: int) -> dict[str, float]:
     """The action that spills least in expectation over the prior."""
-    drawn = prior.from_unit(generator(seed, Phase.UNKNOWING).uniform(size=(UNKNOWING, len(prior))))
+    drawn = prior.from_unit(
+        generator(seed, Phase.UNKNOWING).uniform(size=(PRIOR_DRAWS, len(prior)))
+    )
     return grid.surface(drawn).least("mean")
 
 
@@ -93,8 +95,8 @@ def executions(
         seed: Of the truth.
         purpose: Another one lets an action be chosen by other pours.
     """
-    seeds = np.array(simulation_seeds(seed, purpose, EXECUTIONS), np.int64)
-    tiled = {name: np.full(EXECUTIONS, value) for name, value in theta.items()}
+    seeds = np.array(simulation_seeds(seed, purpose, EXECUTION_SEEDS), np.int64)
+    tiled = {name: np.full(EXECUTION_SEEDS, value) for name, value in theta.items()}
     return Outcomes(tiled, density, cups, seeds)
 
 
@@ -110,6 +112,6 @@ def spilled_by(
 def _spilled(made: Profiles, action: Action) -> float:
     row = np.flatnonzero(np.isclose(made.angular_velocity, action["angular_velocity"]))
     column = int(np.argmin(np.abs(made.distance - action["distance"])))
-    if len(row) == 0 or abs(made.distance[column] - action["distance"]) > STEP:
+    if len(row) == 0 or abs(made.distance[column] - action["distance"]) > DISTANCE_STEP:
         return float("nan")  # its pours failed
     return float(made.fractions[row[0], :, column, 0].mean())

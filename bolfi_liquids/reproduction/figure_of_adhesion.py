@@ -9,7 +9,7 @@ from .figures_of_spillage import interval
 from .sticky import TRAINING
 from .workshop import Workshop
 
-CASES = {
+ADHESION_CASES = {
     "believed": ("the same pour if it did not stick", GREY),
     "before": ("chosen after stirring", ORANGE),
     "after": (f"chosen after stirring, {len(TRAINING)} pours and criticism", BLUE),
@@ -28,7 +28,7 @@ def adhesion(workshop: Workshop) -> Drawn:
     with styled():
         figure = new_figure(6.4, 3.8)
         axes = figure.subplots()
-        for place, (label, colour) in enumerate(CASES.values()):
+        for place, (label, colour) in enumerate(ADHESION_CASES.values()):
             own = 100.0 * spilled[:, place]
             axes.bar(place, own.mean(), 0.7, color=colour, alpha=0.6, label=label)
             axes.plot(
@@ -44,7 +44,7 @@ def adhesion(workshop: Workshop) -> Drawn:
     data = Dataset(
         {"spilled": (("truth", "case"), spilled), "named": ("truth", named)},
         {
-            "case": list(CASES),
+            "case": list(ADHESION_CASES),
             **{key: ("truth", [truth.theta[key] for truth in truths]) for key in truths[0].theta},
         },
     )

@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 from ..drawing import INK, new_figure, styled
 from ..inference.simulations import Keep
 from ..inputs.cups import bundled_cups
-from ..pouring.spillage import STEP, landing_sd
+from ..pouring.spillage import DISTANCE_STEP, landing_sd
 from ..progress import progress_bar
 from ..run.simulations import simulate_kept
 from ..seeds import Phase, simulation_seeds
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from ..models import Cups
 
 VISCOSITIES = np.geomspace(5e-3, 15.0, 9)  # Pa s, those of the liquids that come
-RATES = 7
-RADII = np.array([0.020, 0.025, 0.030, 0.035, 0.045])  # m, of the receiver
+TURN_RATES = 7
+RECEIVER_RADII = np.array([0.020, 0.025, 0.030, 0.035, 0.045])  # m, of the receiver
 COHESION = 0.5
-DISTANCES = np.arange(-0.02, 0.0901, STEP)  # m
+DISTANCES = np.arange(-0.02, 0.0901, DISTANCE_STEP)  # m
 
 
 @dataclass(frozen=True)
@@ -49,14 +49,14 @@ class Poured:
         made = []
         for rate in theta["angular_velocity"]:
             landings = models.landings(liquid, rate, self.cups, own)
-            caught = landings.into(DISTANCES[:, None, None], RADII[:, None])
+            caught = landings.into(DISTANCES[:, None, None], RECEIVER_RADII[:, None])
             made.append(np.moveaxis(caught.spilled, 0, -1))
         return np.stack(made)
 
     @property
     def identity(self) -> str:
         """A text that two equal experiments share."""
-        liquids, receivers = [VISCOSITIES.tolist(), COHESION, DENSITY], [RADII, DISTANCES]
+        liquids, receivers = [VISCOSITIES.tolist(), COHESION, DENSITY], [RECEIVER_RADII, DISTANCES]
         made_by = [Phase.GEOMETRY.value, liquids, *(values.tolist() for values in receivers)]
         return json.dumps([*made_by, self.cups.settings()], sort_keys=True)
 
@@ -66,8 +66,8 @@ def geometry(workshop: Workshop) -> Drawn:
     from xarray import Dataset
 
     lips = np.array(workshop.scale.lips)
-    regret = np.empty((len(lips), len(RADII)))
-    total = len(lips) * RATES
+    regret = np.empty((len(lips), len(RECEIVER_RADII)))
+    total = len(lips) * TURN_RATES
     with progress_bar("pouring from several heights", total, shown=workshop.progress) as advance:
         for row, lip in enumerate(lips):
             cups = bundled_cups()
@@ -75,10 +75,10 @@ def geometry(workshop: Workshop) -> Drawn:
                 update={"pour": cups.pour.model_copy(update={"lip_height": float(lip)})}
             )
             poured = Poured(cups)
-            rates = np.geomspace(*cups.angular_velocity_range, RATES)
+            rates = np.geomspace(*cups.angular_velocity_range, TURN_RATES)
             keep = Keep(workshop.bank, poured.identity, 1)
             theta = {"angular_velocity": rates}
-            made = simulate_kept(poured.simulate, theta, [0] * RATES, keep, advance=advance)
+            made = simulate_kept(poured.simulate, theta, [0] * TURN_RATES, keep, advance=advance)
             regret[row] = _regret(made.signals, cups)
     with styled():
         figure = new_figure(5.6, 3.9)
@@ -89,24 +89,27 @@ def geometry(workshop: Workshop) -> Drawn:
             dark = value > 0.6 * regret.max()
             axes.text(column, row, f"{100 * value:.1f}", ha="center", va="center",
                       color="white" if dark else INK)  # fmt: skip
-        axes.set_xticks(range(len(RADII)), [f"{100 * radius:.1f}" for radius in RADII])
+        axes.set_xticks(
+            range(len(RECEIVER_RADII)), [f"{100 * radius:.1f}" for radius in RECEIVER_RADII]
+        )
         axes.set_yticks(range(len(lips)), [f"{100 * lip:.0f}" for lip in lips])
         axes.set(xlabel="receiver's radius [cm]", ylabel="lip above the receiver's floor [cm]")
     most = np.unravel_index(np.argmax(regret), regret.shape)
+    radius = 100 * RECEIVER_RADII[most[1]]
     says = (
         f"one pour for all liquids spills up to {100 * regret.max():.1f} % more than knowing the "
-        f"liquid (lip {100 * lips[most[0]]:.0f} cm, receiver {100 * RADII[most[1]]:.1f} cm), "
+        f"liquid (lip {100 * lips[most[0]]:.0f} cm, receiver {radius:.1f} cm), "
         f"at least {100 * regret.min():.1f} %"
     )
-    coords = {"lip_height": lips, "radius": RADII}
+    coords = {"lip_height": lips, "radius": RECEIVER_RADII}
     return Drawn(Dataset({"regret": (("lip_height", "radius"), regret)}, coords), figure, says)
 
 
 def _regret(spilled: NDArray, cups: "Cups") -> NDArray[np.float64]:
     """By radius, from fractions (rates, radii, liquids, distances)."""
-    blurred = gaussian_filter1d(spilled, landing_sd(cups) / STEP, axis=-1, mode="nearest")
+    blurred = gaussian_filter1d(spilled, landing_sd(cups) / DISTANCE_STEP, axis=-1, mode="nearest")
     low, high = cups.distance_range
-    inside = (DISTANCES >= low - STEP / 2) & (DISTANCES <= high + STEP / 2)
+    inside = (DISTANCES >= low - DISTANCE_STEP / 2) & (DISTANCES <= high + DISTANCE_STEP / 2)
     by_action = np.moveaxis(blurred[..., inside], 1, 0)  # radii, rates, liquids, distances
     single = by_action.mean(axis=2).min(axis=(1, 2))
     return single - by_action.min(axis=(1, 3)).mean(axis=1)

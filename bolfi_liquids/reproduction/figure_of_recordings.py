@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..drawing import GREY, INK, PALETTE, new_figure, styled
-from ..inputs.bundled import POURED, bundled_pours
+from ..inputs.bundled import POURED_LIQUIDS, bundled_pours
 from ..inputs.prior import default_prior
 from ..pouring.choose import choose_pour
 from ..pouring.result import read_pour
@@ -21,7 +21,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from xarray import DataArray, Dataset
 
-OTHERS = {"plug_in": ("x", "best at θ* alone"), "cvar": ("^", "least CVaR of the first draws")}
+OTHER_CHOICES = {
+    "plug_in": ("x", "best at θ* alone"),
+    "cvar": ("^", "least CVaR of the first draws"),
+}
 """Rules beside the least expected spillage -> marker and label."""
 
 
@@ -36,11 +39,11 @@ def _judged(workshop: Workshop) -> "Dataset":
 
     scale = workshop.scale
     runs = [(surrogate, n) for surrogate in scale.surrogates for n in scale.recorded]
-    shape = len(POURED), len(runs), len(RULES)
+    shape = len(POURED_LIQUIDS), len(runs), len(RULES)
     spilled, error, rates, distances = (np.empty(shape) for _ in range(4))
     unknowing = decide_unknowing(workshop.grid, default_prior(), scale.seed)
-    best, unknown = np.empty(len(POURED)), np.empty((len(POURED), 2))
-    for row, liquid in enumerate(POURED):
+    best, unknown = np.empty(len(POURED_LIQUIDS)), np.empty((len(POURED_LIQUIDS), 2))
+    for row, liquid in enumerate(POURED_LIQUIDS):
         table = bundled_pours(liquid)
         best[row] = table.fractions[:, 0].min()
         unknown[row] = between(table, *(unknowing[name] for name in ACTION))
@@ -63,7 +66,7 @@ def _judged(workshop: Workshop) -> "Dataset":
             "unknown_error": ("liquid", unknown[:, 1]),
         },
         {
-            "liquid": list(POURED),
+            "liquid": list(POURED_LIQUIDS),
             "run": [f"{surrogate}, N = {n}" for surrogate, n in runs],
             "rule": list(RULES),
         },
@@ -115,7 +118,7 @@ def _figure(data: "Dataset") -> "Figure":
             axes.bar(x, percent, 0.9 * width, color=colour, label=label)
             if error is not None:
                 _whiskers(axes, x, percent, 100.0 * error)
-            for rule, (marker, name) in OTHERS.items() if at >= 2 else ():
+            for rule, (marker, name) in OTHER_CHOICES.items() if at >= 2 else ():
                 other = 100.0 * data["spilled"].sel(run=labels[at - 2], rule=rule)
                 shown = name if at == 2 else None
                 axes.plot(x, other, marker, color=INK, mfc="none", ms=5, label=shown)
@@ -137,7 +140,9 @@ def _says(data: "Dataset") -> str:
         for run in data["run"].to_numpy():
             one = data.sel(liquid=liquid, run=run)
             chosen = one.sel(rule="mean")
-            plug_in, cautious = (100.0 * float(one["spilled"].sel(rule=rule)) for rule in OTHERS)
+            plug_in, cautious = (
+                100.0 * float(one["spilled"].sel(rule=rule)) for rule in OTHER_CHOICES
+            )
             lines.append(
                 f"  {liquid}, {run}: {100.0 * float(chosen['spilled']):.1f} "
                 f"({_reliability(float(chosen['error']))}) at "

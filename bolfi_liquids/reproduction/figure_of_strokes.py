@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from xarray import Dataset
 
-ENOUGH = (0.05, 0.01)  # spilled, on average over the liquids
+ENOUGH_SPILLED = (0.05, 0.01)  # spilled, on average over the liquids
 
 
 def strokes(workshop: Workshop) -> Drawn:
@@ -59,7 +59,7 @@ def _says(study: "Dataset", spilled: np.ndarray, budget: int) -> str:
     numbers, means = study["strokes"].to_numpy(), spilled.mean(axis=0)
     told = ", ".join(f"{k}: {100 * mean:.2f}" for k, mean in zip(numbers, means, strict=True))
     lines = [f"spilled [%] after strokes, signal surrogate, N = {budget}, least expected: {told}"]
-    for share in ENOUGH:
+    for share in ENOUGH_SPILLED:
         # enough means that more strokes did not bring it above again
         more = np.maximum.accumulate(means[::-1])[::-1] < share
         first = f"{numbers[more][0]} strokes" if more.any() else "more strokes than these"

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..calibration.posterior_figure import AXIS_LABELS, contour_levels, grid_density
 from ..drawing import GREY, INK, LIGHT, ORANGE, PALETTE, new_figure, plain_log_ticks, styled
-from ..inputs.bundled import RECORDED
+from ..inputs.bundled import RECORDED_LIQUIDS
 from .figure import Drawn
 from .workshop import Workshop
 
@@ -56,7 +56,7 @@ def posterior(workshop: Workshop) -> Drawn:
         panels = figure.subplots(1, len(surrogates), sharey=True, squeeze=False)[0]
         for axes, surrogate in zip(panels, surrogates, strict=True):
             found = []
-            for liquid, colour in zip(RECORDED, PALETTE, strict=False):
+            for liquid, colour in zip(RECORDED_LIQUIDS, PALETTE, strict=False):
                 tree = workshop.calibration(liquid, budget, surrogate).tree
                 _contours(axes, tree["surface"].to_dataset(), liquid, colour)
                 found.append(tree["surface"].to_dataset().assign_coords(liquid=liquid))
@@ -66,7 +66,9 @@ def posterior(workshop: Workshop) -> Drawn:
         panels[0].set_ylabel(AXIS_LABELS["cohesion"])
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
     data = cast("Dataset", concat(kept, "surrogate"))
-    return Drawn(data, figure, f"posteriors of {', '.join(RECORDED)} after {budget} simulations")
+    return Drawn(
+        data, figure, f"posteriors of {', '.join(RECORDED_LIQUIDS)} after {budget} simulations"
+    )
 
 
 def _contours(axes, surface: "Dataset", liquid: str, colour: str) -> None:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from xarray import DataArray, Dataset
 
-SHOWN = {
+SHOWN_LEARNERS = {
     ("discrepancy", "plug_in"): "stirring, the paper's: Φ, best at θ*",
     ("discrepancy", "mean"): "stirring, Φ, least expected",
     ("signal", "plug_in"): "stirring, signal, best at θ*",
@@ -26,10 +26,10 @@ SHOWN = {
     ("pour", "mean"): "pouring, least expected",
 }
 """(method, rule) -> label."""
-COLOURS = dict(zip(SHOWN, (*PALETTE, "#c2185b"), strict=True))  # the same in every figure
+COLOURS = dict(zip(SHOWN_LEARNERS, (*PALETTE, "#c2185b"), strict=True))  # the same in every figure
 FEW_PERCENT = (0, 0.5, 1, 2, 5, 10, 20, 50)  # ticks of an axis that is linear up to 1 %
-RESAMPLED = 4000  # bootstrap samples
-LEVEL = 0.9
+BOOTSTRAP_SAMPLES = 4000  # bootstrap samples
+BAND_LEVEL = 0.9
 
 
 def interval(values: NDArray, seed: int = 0) -> tuple[float, float]:
@@ -41,8 +41,8 @@ def interval(values: NDArray, seed: int = 0) -> tuple[float, float]:
     if not len(values):
         return np.nan, np.nan
     rng = generator(seed, Phase.BOOTSTRAP)
-    means = values[rng.integers(0, len(values), (RESAMPLED, len(values)))].mean(axis=1)
-    low, high = np.quantile(means, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    means = values[rng.integers(0, len(values), (BOOTSTRAP_SAMPLES, len(values)))].mean(axis=1)
+    low, high = np.quantile(means, [(1 - BAND_LEVEL) / 2, (1 + BAND_LEVEL) / 2])
     return float(low), float(high)
 
 
@@ -53,7 +53,7 @@ def spillage(workshop: Workshop) -> Drawn:
     with styled():
         figure = new_figure(7.4, 4.6)
         axes = figure.subplots()
-        for at, (method, rule) in enumerate(SHOWN):
+        for at, (method, rule) in enumerate(SHOWN_LEARNERS):
             chosen = study["spilled"].sel(learned_by=method, rule=rule)
             _against_budget(axes, chosen, (method, rule), at)
         for name, style in (("known", ":"), ("unknown", "--")):
@@ -70,16 +70,18 @@ def _against_budget(axes: "Axes", spilled: "DataArray", way: tuple[str, str], at
     """Means, with 90 % intervals, side by side for those that are compared."""
     percent = 100.0 * spilled.transpose("budget", "truth").to_numpy()
     means, ends = percent.mean(axis=1), np.array([interval(row) for row in percent])
-    x = np.arange(len(means)) + 0.06 * (at - (len(SHOWN) - 1) / 2)
+    x = np.arange(len(means)) + 0.06 * (at - (len(SHOWN_LEARNERS) - 1) / 2)
     colour = COLOURS[way]
     axes.plot(x, means, "-", color=colour, lw=0.8, alpha=0.5)
     off = np.abs(ends.T - means)
-    axes.errorbar(x, means, off, fmt="o", color=colour, ms=4, elinewidth=1.2, label=SHOWN[way])
+    axes.errorbar(
+        x, means, off, fmt="o", color=colour, ms=4, elinewidth=1.2, label=SHOWN_LEARNERS[way]
+    )
 
 
 def _table(study: "Dataset") -> str:
     lines = ["spilled [%], mean over liquids and repetitions:"]
-    for (method, rule), label in SHOWN.items():
+    for (method, rule), label in SHOWN_LEARNERS.items():
         means = 100.0 * study["spilled"].sel(learned_by=method, rule=rule).mean("truth")
         pairs = (
             f"N = {int(n)}: {float(m):.2f}" for n, m in zip(means["budget"], means, strict=True)
@@ -127,7 +129,7 @@ def liquids(workshop: Workshop) -> Drawn:
                     if not len(percent):
                         continue
                     x = place + 0.8 / len(rules) * (at - (len(rules) - 1) / 2)
-                    label = SHOWN[method, rule] if place == 0 else None
+                    label = SHOWN_LEARNERS[method, rule] if place == 0 else None
                     colour, width = COLOURS[method, rule], 0.7 / len(rules)
                     axes.bar(x, percent.mean(), width, color=colour, alpha=0.6, label=label)
                     axes.plot(np.full(len(percent), x), percent, ".", color=colour, ms=4)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ..pouring.grid import FINE, GridSize
+from ..pouring.grid import FINE_GRID, GridSize
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Scale:
     lips: tuple[float, ...] = (0.10, 0.14, 0.20, 0.26)
     particles: int = 1000
     drawn_particles: int = 1000
-    grid: GridSize = FINE
+    grid: GridSize = FINE_GRID
     seed: int = 0
 
 

@@ -15,16 +15,16 @@ from ..inputs.bundled import bundled_recording
 from ..inputs.open import open_recording
 from ..inputs.recording import Recording, along_path, recording_dataset
 from ..seeds import Phase, generator, simulation_seeds
-from .calibrations import NOISE
-from .truths import LIQUIDS, SPREAD
+from .calibrations import CAMERA_NOISE
+from .truths import LIQUIDS, LOG_VISCOSITY_SD
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
     from ..models import Cups
 
-LIKE = "glycerin"
-ADHESION = 0.6, 0.9  # of the truths
+STICKY_LIQUID = "glycerin"
+ADHESION_RANGE = 0.6, 0.9  # of the truths
 TRAINING = [(w, d) for w in (40.0, 70.0, 110.0) for d in (0.5, 1.5, 2.5, 4.0)]
 """Pours that are seen after the stirring: deg/s, cm."""
 
@@ -51,11 +51,11 @@ class Sticky(NamedTuple):
 def draw_sticky(repetition: int, seed: int) -> Sticky:
     """The same whatever the number of repetitions."""
     rng = generator(seed, Phase.STICKY_TRUTHS, repetition)
-    viscosity = LIQUIDS[LIKE] * np.exp(SPREAD * rng.standard_normal())
+    viscosity = LIQUIDS[STICKY_LIQUID] * np.exp(LOG_VISCOSITY_SD * rng.standard_normal())
     theta = {
         "viscosity": float(viscosity),
         "cohesion": float(rng.uniform()),
-        "adhesion": float(rng.uniform(*ADHESION)),
+        "adhesion": float(rng.uniform(*ADHESION_RANGE)),
     }
     return Sticky(theta, int(rng.integers(2**31)))
 
@@ -63,7 +63,15 @@ def draw_sticky(repetition: int, seed: int) -> Sticky:
 def recipe(cups: "Cups", particles: int, seed: int) -> str:
     """Short name of what decides the drawn liquid and its pours; runs of another model are kept
     elsewhere."""
-    made_by = [Phase.STICKY_TRUTHS.value, LIKE, LIQUIDS[LIKE], SPREAD, ADHESION, TRAINING, NOISE.sd]
+    made_by = [
+        Phase.STICKY_TRUTHS.value,
+        STICKY_LIQUID,
+        LIQUIDS[STICKY_LIQUID],
+        LOG_VISCOSITY_SD,
+        ADHESION_RANGE,
+        TRAINING,
+        CAMERA_NOISE.sd,
+    ]
     text = json.dumps([*made_by, cups.settings(), particles, seed], sort_keys=True)
     return sha256(text.encode()).hexdigest()[:8]
 
@@ -71,7 +79,7 @@ def recipe(cups: "Cups", particles: int, seed: int) -> str:
 def stirred(truth: Sticky, particles: int, path: Path) -> Recording:
     """A recording of it, of so many particles, written to `path` unless it is there."""
     if not path.exists():
-        dataset = _dataset(bundled_recording(LIKE), truth, particles)
+        dataset = _dataset(bundled_recording(STICKY_LIQUID), truth, particles)
         write_netcdf(dataset, path)
     return open_recording(path)
 
@@ -93,7 +101,7 @@ def _dataset(like: Recording, truth: Sticky, particles: int) -> "Dataset":
     effects = {"adhesion": truth.theta["adhesion"]}
     own = simulation_seeds(truth.seed, Phase.STICKY_STIR, 1)
     clean = models.stir(liquid, like.gripper, setup, own, effects)[0]
-    noisy = NOISE(clean, generator(truth.seed, Phase.CAMERA_NOISE))
+    noisy = CAMERA_NOISE(clean, generator(truth.seed, Phase.CAMERA_NOISE))
     attrs = {**like.attrs, "source": "simulated truth that sticks to its cup"}
     return recording_dataset(along_path(like, noisy), attrs)
 

@@ -146,7 +146,7 @@ def _judged(
 
 def _stacked(found: Sequence[NDArray | None], budgets: int) -> NDArray[np.float64]:
     """Conclusions with NaN in the place of failed ones."""
-    from .calibrations import DRAWS, NAMES
+    from .calibrations import DRAWS_EACH, PARAMETER_NAMES
 
-    empty = np.full((budgets, 1 + DRAWS, len(NAMES)), np.nan)
+    empty = np.full((budgets, 1 + DRAWS_EACH, len(PARAMETER_NAMES)), np.nan)
     return np.stack([empty if one is None else one for one in found])

@@ -10,7 +10,7 @@ from ..seeds import Phase, generator
 LIQUIDS = {"water": 0.005, "thin oil": 0.03, "oil": 0.15, "glycerin": 1.0, "gel": 10.0}
 """Median viscosity [Pa s] of each kind."""
 
-SPREAD = 0.2  # sd of the log of the viscosity within a kind
+LOG_VISCOSITY_SD = 0.2  # sd of the log of the viscosity within a kind
 DENSITY = 1000.0  # kg/m3; only the ratio of viscosity to density matters to the flow
 
 
@@ -43,6 +43,6 @@ def draw_truths(repetitions: int, seed: int) -> Truths:
     for number, (name, median) in enumerate(LIQUIDS.items()):
         for repetition in range(repetitions):
             rng = generator(seed, Phase.TRUTHS, number, repetition)
-            viscosity = median * np.exp(SPREAD * rng.standard_normal())
+            viscosity = median * np.exp(LOG_VISCOSITY_SD * rng.standard_normal())
             rows.append((name, repetition, viscosity, rng.uniform(), int(rng.integers(2**31))))
     return Truths(*map(np.array, zip(*rows, strict=True)))

@@ -9,7 +9,7 @@ from rich.live import Live
 if TYPE_CHECKING:
     from ..hardware import Session
 
-REFRESH = 5.0  # per second
+REFRESH_RATE = 5.0  # per second
 
 
 class SessionView:
@@ -48,7 +48,7 @@ class SessionView:
         Raises:
             SessionStopped: The arm was stopped.
         """
-        while not session.wait(number, timeout=1.0 / REFRESH):
+        while not session.wait(number, timeout=1.0 / REFRESH_RATE):
             self.show(session)
         self.show(session)
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..hardware.motion import PosePath
     from ..pouring.result import PourSummary
 
-POURS = "pours"  # directories of what the arm did, in the RUN
+POURS_FOLDER = "pours"  # directories of what the arm did, in the RUN
 
 
 class PourPlan(NamedTuple):
@@ -152,5 +152,5 @@ def _chosen(run: Path) -> "tuple[PourSummary, dict[str, Any]]":
 
 
 def _next_directory(run: Path) -> Path:
-    taken = [int(path.name) for path in (run / POURS).glob("[0-9]*") if path.name.isdigit()]
-    return run / POURS / f"{max(taken, default=0) + 1:03d}"
+    taken = [int(path.name) for path in (run / POURS_FOLDER).glob("[0-9]*") if path.name.isdigit()]
+    return run / POURS_FOLDER / f"{max(taken, default=0) + 1:03d}"

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..hardware.motion import PosePath
 
 
-AHEAD = 2  # paths ordered beyond the one that runs, so that the arm need not wait
+PATHS_AHEAD = 2  # paths ordered beyond the one that runs, so that the arm need not wait
 
 
 class StirPlan(NamedTuple):
@@ -142,6 +142,6 @@ def follow_plan(session: "Session", plan: StirPlan, view: SessionView) -> None:
     for path in (approach(session.rig, session.pose()), *plan.paths):
         ordered.append(session.follow(path))
         # all at once would be checked at once, which takes the cameras' time
-        if len(ordered) > AHEAD:
-            view.until_done(session, ordered[-1 - AHEAD])
+        if len(ordered) > PATHS_AHEAD:
+            view.until_done(session, ordered[-1 - PATHS_AHEAD])
     view.until_done(session, ordered[-1])

@@ -12,7 +12,7 @@ import tomli_w
 from ..errors import InputError
 from ..files import write_text
 from .formats import upgraded
-from .summary import NAME as SUMMARY
+from .summary import SUMMARY_FILE as SUMMARY
 
 if TYPE_CHECKING:
     from ..inference import SimulationBank

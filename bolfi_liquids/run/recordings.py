@@ -8,12 +8,12 @@ from ..files import write_whole
 from ..inputs.open import open_recording
 from ..inputs.recording import Recording
 
-FOLDER = "recordings"
+RECORDINGS_FOLDER = "recordings"
 
 
 def keep_recordings(run: Path, recordings: tuple[Recording, ...]) -> None:
     """Copy the files, byte for byte, numbered in their order."""
-    folder = run / FOLDER
+    folder = run / RECORDINGS_FOLDER
     folder.mkdir(exist_ok=True)
     for number, recording in enumerate(recordings, start=1):
         copy = folder / _name(number, recording.path.name)
@@ -35,7 +35,7 @@ def kept_recordings(run: Path, record: dict[str, Any]) -> list[Recording]:
     opened = []
     names, hashes = record["files"]["recordings"], record["inputs"]["sha256"]
     for number, (name, digest) in enumerate(zip(names, hashes, strict=True), start=1):
-        path = run / FOLDER / _name(number, name)
+        path = run / RECORDINGS_FOLDER / _name(number, name)
         recording = open_recording(path)
         if recording.hash != digest:
             raise InputError(

@@ -12,8 +12,10 @@ from pydantic import BeforeValidator, TypeAdapter, ValidationError
 from ..errors import InputError
 from ..files import write_text
 
-NAME = "summary.json"
-RESTORE = "delete it; calibrate --resume, criticise and pour write it again from what was simulated"
+SUMMARY_FILE = "summary.json"
+HOW_TO_RESTORE = (
+    "delete it; calibrate --resume, criticise and pour write it again from what was simulated"
+)
 
 Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
 """A number that may be NaN, for which JSON has `null`."""
@@ -26,7 +28,7 @@ class Section:
     """Of the section, which is that of the command."""
 
     @classmethod
-    def from_json(cls, values: Mapping[str, Any], where: str = NAME) -> Self:
+    def from_json(cls, values: Mapping[str, Any], where: str = SUMMARY_FILE) -> Self:
         """The section from what `json.loads` read.
 
         Raises:
@@ -37,7 +39,7 @@ class Section:
         except ValidationError as err:
             first = err.errors(include_url=False)[0]
             field = ".".join(map(str, (cls.SECTION, *first["loc"])))
-            raise InputError(f"{field}: {first['msg']}", where=where, fix=RESTORE) from err
+            raise InputError(f"{field}: {first['msg']}", where=where, fix=HOW_TO_RESTORE) from err
 
     def to_json(self) -> dict[str, Any]:
         """The section as `json.dumps` takes it."""
@@ -51,7 +53,7 @@ class Section:
             InputError: The file is damaged.
             KeyError: The run has no such section.
         """
-        return cls.from_json(read_summary(run)[cls.SECTION], str(run / NAME))
+        return cls.from_json(read_summary(run)[cls.SECTION], str(run / SUMMARY_FILE))
 
     def write(self, run: Path) -> None:
         """Replace the section of a run."""
@@ -69,22 +71,24 @@ def read_summary(run: Path) -> dict[str, Any]:
     Raises:
         InputError: The file is not JSON.
     """
-    path = run / NAME
+    path = run / SUMMARY_FILE
     if not path.exists():
         return {}
     try:
         summary = json.loads(path.read_text(encoding="utf-8"))
     except json.JSONDecodeError as err:
-        raise InputError(f"not JSON (line {err.lineno})", where=str(path), fix=RESTORE) from err
+        raise InputError(
+            f"not JSON (line {err.lineno})", where=str(path), fix=HOW_TO_RESTORE
+        ) from err
     if not isinstance(summary, dict) or not all(isinstance(s, dict) for s in summary.values()):
-        raise InputError("holds no sections", where=str(path), fix=RESTORE)
+        raise InputError("holds no sections", where=str(path), fix=HOW_TO_RESTORE)
     return summary
 
 
 def write_section(run: Path, name: str, section: dict[str, Any]) -> None:
     """Replace one section and leave the others as they are; the file is never half written."""
     summary = read_summary(run) | {name: _finite(section)}
-    write_text(run / NAME, json.dumps(summary, indent=2, allow_nan=False) + "\n")
+    write_text(run / SUMMARY_FILE, json.dumps(summary, indent=2, allow_nan=False) + "\n")
 
 
 def _finite(value):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..inputs.described_liquid import Described
 from ..inputs.recording import Recording
-from ..movie.file import RATE, write_movie
+from ..movie.file import PICTURE_RATE, write_movie
 from ..progress import progress_bar
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def film_stir(
             recording.gripper,
             setup,
             described.seed,
-            rate=RATE,
+            rate=PICTURE_RATE,
             effects=described.effects,
         )
     lines = described.lines()
@@ -61,7 +61,7 @@ def film_pour(
             described.particles,
             described.effects,
         )
-        frames = models.pour_frames(batch, rate=RATE)
+        frames = models.pour_frames(batch, rate=PICTURE_RATE)
     turn = f"{np.degrees(rate):g}°/s, lip to axis {100 * distance:g} cm"
     pictures = pour_pictures(frames, landings, cups, distance, [*described.lines(), turn])
     _write(movie, pictures, len(frames.time), progress)

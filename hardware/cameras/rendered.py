@@ -14,7 +14,7 @@ from ..rendering.faults import fault_of
 from ..rendering.world import World, WorldState
 from ..vision.frame import Frame
 
-LATEST = 0.2  # s; a camera that is further behind leaves frames out
+MAX_LATENESS = 0.2  # s; a camera that is further behind leaves frames out
 TRUTH_COLUMNS = ("index", "stamp", "time", "inclination_xz", "inclination_yz")
 
 
@@ -41,7 +41,7 @@ class RenderedCamera:
     """Shows a world at absolute times of its own clock.
 
     A frame that is asked for late still shows its own moment; frames are left out only when the
-    camera is more than `LATEST` behind, as a real one drops what nobody fetched.
+    camera is more than `MAX_LATENESS` behind, as a real one drops what nobody fetched.
     """
 
     def __init__(
@@ -100,9 +100,9 @@ class RenderedCamera:
     def _skip_missed(self) -> int:
         """Index of the oldest frame that is not too late."""
         behind = self._now() - self._exposed(self._next) - self._timing.latency
-        if behind <= LATEST:
+        if behind <= MAX_LATENESS:
             return self._next
-        return self._next + int(np.ceil((behind - LATEST) * self._rate))
+        return self._next + int(np.ceil((behind - MAX_LATENESS) * self._rate))
 
     @property
     def _rate(self) -> float:

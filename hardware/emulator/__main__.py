@@ -12,7 +12,7 @@ from collections.abc import Callable
 from ..errors import RigError
 from ..motion.kinematics import ARMS
 from ..priority import hurry
-from .controller import HOME, MODELS, Options
+from .controller import HOME_JOINTS, MODELS, Options
 from .hanging_stick import Stick, checked
 from .loop import Emulator
 
@@ -43,7 +43,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--address", default="127.0.0.5", help="one of 127.0.0.0/8")
     parser.add_argument("--controller", choices=sorted(MODELS), default="cb3")
     parser.add_argument("--arm", choices=sorted(ARMS), help="default: that of the controller")
-    parser.add_argument("--joints", type=json.loads, default=list(HOME), help="JSON, six in rad")
+    parser.add_argument(
+        "--joints", type=json.loads, default=list(HOME_JOINTS), help="JSON, six in rad"
+    )
     parser.add_argument("--tcp", type=json.loads, default=[0.0] * 6, help="JSON, six in m and rad")
     parser.add_argument("--rate", type=float, help="ticks per second")
     parser.add_argument("--stick", type=json.loads, help="JSON object: what hangs in the gripper")

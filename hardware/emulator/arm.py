@@ -7,7 +7,7 @@ import numpy as np
 from ..motion.kinematics import DhArm
 from .motion import ArmState, Motion, MotionError, Plan, Reactive, Timed, Tool, joint_speed
 
-RESTING = 1e-4  # rad/s; under 0.2 mm/s at the TCP
+RESTING_RATE = 1e-4  # rad/s; under 0.2 mm/s at the TCP
 _REST = np.zeros(6)
 
 
@@ -39,7 +39,7 @@ class Arm:
 
     @property
     def resting(self) -> bool:
-        return float(np.abs(self.state.speed).max()) < RESTING
+        return float(np.abs(self.state.speed).max()) < RESTING_RATE
 
     def begin(self, plans: Sequence[Plan], *, brake: float | None = None) -> None:
         """Go on with `plans` instead; with `brake` [rad/s2] the arm first comes to rest."""

@@ -20,12 +20,12 @@ from .motion import (
 )
 from .script import Kind, Waypoint
 
-BRAKE = 3.0  # rad/s2; of a motion whose thread was killed
+BRAKE_DECELERATION = 3.0  # rad/s2; of a motion whose thread was killed
 SERVO_RATE = 15.0  # rad/s2; the real arm's is not published
 _ZERO = np.zeros(6)
 
 # carried out again whenever the script reads them, and answered at once
-REALTIME = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, *range(66, 72)})
+REALTIME_COMMANDS = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, *range(66, 72)})
 
 
 def within_limits(arm: Arm, pose: np.ndarray) -> bool:
@@ -53,7 +53,7 @@ def _move(kind: Kind, *, is_pose: bool) -> Callable[[RunningScript], None]:
         waypoint = Waypoint(kind, is_pose, tuple(target), speed, acceleration, None)
         program.end_move()
         thread = "move" if program.integer(1) == 1 else None
-        program.begin([_plan(program.arm, waypoint)], thread, brake=BRAKE)
+        program.begin([_plan(program.arm, waypoint)], thread, brake=BRAKE_DECELERATION)
 
     return run
 
@@ -62,7 +62,9 @@ def _move_path(program: RunningScript) -> None:
     path = program.script.path
     program.end_move()
     thread = "move" if program.integer(1) == 1 else None
-    program.begin([_plan(program.arm, one) for one in path], thread, brake=BRAKE, path=path)
+    program.begin(
+        [_plan(program.arm, one) for one in path], thread, brake=BRAKE_DECELERATION, path=path
+    )
 
 
 def _fresh(program: RunningScript, count: int) -> list[float] | None:

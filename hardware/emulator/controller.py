@@ -47,7 +47,7 @@ MODELS = {
     "e-series": Model((5, 11, 6, 108000), 500.0, "ur10e", "URSoftware 5.11.6.108000 (Nov 10 2021)"),
 }
 # elbow up, tool pointing down, in front of the base
-HOME = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
+HOME_JOINTS = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
 
 
 class Watchdog(NamedTuple):
@@ -79,7 +79,7 @@ class Options(NamedTuple):
 
     controller: str = "cb3"
     arm: str | None = None
-    joints: tuple[float, ...] = HOME
+    joints: tuple[float, ...] = HOME_JOINTS
     tcp: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     rate: float | None = None
     stick: Stick | None = None

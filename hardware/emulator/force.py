@@ -2,7 +2,7 @@
 
 import random
 
-NOISE = (0.2, 0.2, 0.2, 0.02, 0.02, 0.02)  # N and Nm, standard deviation
+FORCE_NOISE = (0.2, 0.2, 0.2, 0.02, 0.02, 0.02)  # N and Nm, standard deviation
 
 
 class ForceReading:
@@ -24,5 +24,5 @@ class ForceReading:
         gauss = self._random.gauss
         return tuple(
             pressed - offset + gauss(0.0, noise)
-            for pressed, offset, noise in zip(self._pressed, self._offset, NOISE, strict=True)
+            for pressed, offset, noise in zip(self._pressed, self._offset, FORCE_NOISE, strict=True)
         )

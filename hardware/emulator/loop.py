@@ -11,7 +11,7 @@ from .servers.network import ADMIN, DASHBOARD, RTDE, SCRIPT, Network
 from .servers.rtde import RtdeSession
 from .servers.script import ScriptSession
 
-LATE = 0.05  # s; ticks that are later are left out, not made up for
+MAX_LATENESS = 0.05  # s; ticks that are later are left out, not made up for
 
 
 class Emulator:
@@ -57,7 +57,7 @@ class Emulator:
         self.network.poll(0.0)
         self._tick()
         late = self._clock.now() - deadline
-        if late <= LATE:
+        if late <= MAX_LATENESS:
             return deadline
         ticks = int(late / self.controller.dt)
         self.controller.skip(ticks)

@@ -2,7 +2,7 @@
 
 from ..motion.poses import Numbers
 from .arm import Arm
-from .commands import COMMANDS, REALTIME
+from .commands import COMMANDS, REALTIME_COMMANDS
 from .machine import Machine, ProgramError, Thread
 from .motion import Plan
 from .registers import Registers
@@ -76,7 +76,7 @@ class Program:
         if command == 0:
             self._executing = False
             self._answer(READY)
-        elif command in REALTIME:
+        elif command in REALTIME_COMMANDS:
             self._carry_out(command)
             self._answer(READY)
         elif not self._executing:

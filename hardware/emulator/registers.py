@@ -1,6 +1,6 @@
 """General purpose registers, the mailbox between client and script, and inputs of the I/O."""
 
-COUNT = 48
+REGISTER_COUNT = 48
 
 INPUT_TYPES = {
     "speed_slider_mask": "UINT32",
@@ -16,8 +16,8 @@ INPUT_TYPES = {
     "standard_analog_output_0": "DOUBLE",
     "standard_analog_output_1": "DOUBLE",
     "external_force_torque": "VECTOR6D",
-    **{f"input_int_register_{i}": "INT32" for i in range(COUNT)},
-    **{f"input_double_register_{i}": "DOUBLE" for i in range(COUNT)},
+    **{f"input_int_register_{i}": "INT32" for i in range(REGISTER_COUNT)},
+    **{f"input_double_register_{i}": "DOUBLE" for i in range(REGISTER_COUNT)},
 }
 
 # digital outputs of `actual_digital_output_bits`: standard, configurable, tool
@@ -33,8 +33,8 @@ class Registers:
             for name, kind in INPUT_TYPES.items()
             if kind != "VECTOR6D"
         }
-        self.output_ints = [0] * COUNT
-        self.output_doubles = [0.0] * COUNT
+        self.output_ints = [0] * REGISTER_COUNT
+        self.output_doubles = [0.0] * REGISTER_COUNT
         self.digital_outputs = 0
         self.analog_outputs = [0.0, 0.0]
         self.slider = 1.0

@@ -18,20 +18,25 @@ from .process import free_address
 from .servers import wire
 from .servers.network import RTDE, SCRIPT
 
-OFFSET = 24  # of the control script's registers, as in ur_rtde
+REGISTER_OFFSET = 24  # of the control script's registers, as in ur_rtde
 READY, DONE = 1, 2
 SERVO_L, SERVO_STOP, SET_PAYLOAD, SET_TCP = 24, 16, 17, 29
 SET_WATCHDOG, WITHIN_LIMITS, TCP_OFFSET, STOP_SCRIPT = 35, 36, 40, 255
 SCRIPT_TEXT = (
-    f"def rtde_control():\n# int register offset\n{OFFSET}\n# inject move path\n\tend\nend\n"
+    f"def rtde_control():\n# int register offset\n{REGISTER_OFFSET}\n"
+    "# inject move path\n\tend\nend\n"
 )
-INPUTS = [
-    f"input_int_register_{OFFSET}",
-    *(f"input_double_register_{OFFSET + i}" for i in range(18)),
+INPUT_FIELDS = [
+    f"input_int_register_{REGISTER_OFFSET}",
+    *(f"input_double_register_{REGISTER_OFFSET + i}" for i in range(18)),
 ]
-OUTPUTS = [
-    *("runtime_state", f"output_int_register_{OFFSET}", f"output_int_register_{OFFSET + 1}"),
-    *(f"output_double_register_{OFFSET + i}" for i in range(6)),
+OUTPUT_FIELDS = [
+    *(
+        "runtime_state",
+        f"output_int_register_{REGISTER_OFFSET}",
+        f"output_int_register_{REGISTER_OFFSET + 1}",
+    ),
+    *(f"output_double_register_{REGISTER_OFFSET + i}" for i in range(6)),
 ]
 
 
@@ -147,10 +152,10 @@ class _Control(_Client):
     FLAG_UPLOAD_SCRIPT, FLAG_NO_WAIT = 1, 8
 
     def __init__(self, _: str, rate: float, flag: int):
-        super().__init__(OUTPUTS, rate)
+        super().__init__(OUTPUT_FIELDS, rate)
         self._period = 1.0 / rate
         self._layout = wire.layout(["INT32"] + 18 * ["DOUBLE"])
-        answer = self.ask(wire.INPUTS, ",".join(INPUTS).encode())
+        answer = self.ask(wire.INPUTS, ",".join(INPUT_FIELDS).encode())
         if b"IN_USE" in answer:
             raise RuntimeError("registers already in use")
         self._later: list[Iterator[None]] = []
@@ -170,11 +175,11 @@ class _Control(_Client):
 
     def getTCPOffset(self) -> list[float]:
         self._wait(TCP_OFFSET, [])
-        return [self.value(f"output_double_register_{OFFSET + i}") for i in range(6)]
+        return [self.value(f"output_double_register_{REGISTER_OFFSET + i}") for i in range(6)]
 
     def isPoseWithinSafetyLimits(self, pose: list[float]) -> bool:
         self._wait(WITHIN_LIMITS, pose)
-        return self.value(f"output_int_register_{OFFSET + 1}") == 1
+        return self.value(f"output_int_register_{REGISTER_OFFSET + 1}") == 1
 
     def setWatchdog(self, frequency: float) -> bool:
         return self._wait(SET_WATCHDOG, [frequency])
@@ -205,7 +210,7 @@ class _Control(_Client):
         for sent, answer in ((command, DONE), (0, READY)):
             self._send(sent, numbers)
             yield
-            while self._runs() and self.value(f"output_int_register_{OFFSET}") != answer:
+            while self._runs() and self.value(f"output_int_register_{REGISTER_OFFSET}") != answer:
                 yield
 
     def _go_on(self) -> None:

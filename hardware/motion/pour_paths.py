@@ -17,7 +17,7 @@ from .stir_paths import (
     turn_rate,
 )
 
-RAMP = 0.1  # s, in which the turn reaches its angular velocity, and in which it ends
+RAMP_SECONDS = 0.1  # s, in which the turn reaches its angular velocity, and in which it ends
 UPRIGHT_RATE = np.radians(60.0)  # rad/s, of the turn back
 UPRIGHT_ACCELERATION = np.radians(240.0)  # rad/s2
 
@@ -65,7 +65,7 @@ def pour_path(
 ) -> PosePath:
     """Down from `ready_to_pour`, the pour about the resting lip, back upright, and up again.
 
-    The turn reaches its angular velocity within `RAMP` and gives it up within the same; in
+    The turn reaches its angular velocity within `RAMP_SECONDS` and gives it up within the same; in
     between it is constant. A turn too short for that never reaches it.
 
     Args:
@@ -84,7 +84,7 @@ def pour_path(
     low = placed(ready, z=ready[2] - rig.pouring.approach_height)
     dt = 1.0 / rig.robot.rate
     down = travel(rig, [ready, low], rig.pouring.approach_speed).pose
-    over = profile(final_angle, angular_velocity, angular_velocity / RAMP)
+    over = profile(final_angle, angular_velocity, angular_velocity / RAMP_SECONDS)
     back = profile(final_angle, turn_rate(rig, UPRIGHT_RATE), UPRIGHT_ACCELERATION)
     angle = np.concatenate(
         [

@@ -22,7 +22,7 @@ VIEWS: tuple[View, View] = ("xz", "yz")
 BYTES_PER_PIXEL = 0.3  # of a noisy picture as MJPEG
 SAMPLE_BYTES = 320  # of a row of samples.csv
 WAY_TIME = 30.0  # [s] from and to where the arm waits, at the most
-SPARE = 2.0  # times the need
+SPARE_SPACE = 2.0  # times the need
 
 
 class Provenance(NamedTuple):
@@ -105,7 +105,7 @@ def expected_bytes(rig: Rig, duration: float, *, videos: bool = True) -> float:
     cameras = rig.cameras if videos else ()
     pixels = sum(camera.width * camera.height * camera.rate for camera in cameras)
     per_second = BYTES_PER_PIXEL * pixels + SAMPLE_BYTES * rig.robot.rate
-    return SPARE * (duration + WAY_TIME) * per_second
+    return SPARE_SPACE * (duration + WAY_TIME) * per_second
 
 
 def read_provenance(directory: Path) -> Provenance:

@@ -14,7 +14,7 @@ from .events import EventLog
 from .rate import Rate, counted, no_rate
 from .sample import SAMPLES, Sample
 
-BEAT = 0.04  # [s], at the longest, from one sign of life to the next
+HEARTBEAT = 0.04  # [s], at the longest, from one sign of life to the next
 # [s]; how long the arm is followed after main has gone: a source of liquid is turned back first
 LAST_SAMPLES = 5.0
 
@@ -55,7 +55,7 @@ class _Recorder:
         ends = [samples, main]
         deadline = float("inf")
         while host_time() < deadline and ends:
-            for end in wait(ends, timeout=min(BEAT, max(deadline - host_time(), 0.0))):
+            for end in wait(ends, timeout=min(HEARTBEAT, max(deadline - host_time(), 0.0))):
                 if end is samples and self._record(samples):
                     continue
                 ends.remove(end)  # type: ignore[arg-type]

@@ -2,11 +2,11 @@
 
 from typing import NamedTuple
 
-WINDOW = 1.0  # [s]
+RATE_WINDOW = 1.0  # [s]
 
 
 class Rate(NamedTuple):
-    """A count, and its rate over the last `WINDOW` that is complete.
+    """A count, and its rate over the last `RATE_WINDOW` that is complete.
 
     Attributes:
         total: In all.
@@ -30,6 +30,6 @@ def counted(rate: Rate, more: int, now: float) -> Rate:
     """The rate after `more` have come, at time `now` [s]."""
     total = rate.total + more
     passed = now - rate.start
-    if passed < WINDOW:
+    if passed < RATE_WINDOW:
         return rate._replace(total=total)
     return Rate(total, (total - rate.counted) / passed, now, total)

@@ -16,15 +16,15 @@ from ..vision.series import FrameSeries
 from .directory import VIEWS
 from .raw import Columns, Raw, frame_series
 
-RATE = 30.0  # of the table [1/s]; the cameras' in "To Stir or Not to Stir"
-AROUND = 1.0  # [s] before and after the stir that the clocks are learned from, too
+TABLE_RATE = 30.0  # of the table [1/s]; the cameras' in "To Stir or Not to Stir"
+CLOCK_MARGIN = 1.0  # [s] before and after the stir that the clocks are learned from, too
 LONGEST_GAP = 0.1  # [s] without a sample of the robot, over which nothing is interpolated
 MOST_GAP = 0.2  # [s]; a recording ends at a longer one, since a simulator needs the way
 LEAST_TIME = 1.0  # [s] of a stir
 
 
 class Stir(NamedTuple):
-    """A stir; T samples at `RATE`.
+    """A stir; T samples at `TABLE_RATE`.
 
     Attributes:
         time: From its first sample [s], shape (T,).
@@ -71,7 +71,7 @@ def extract_stir(raw: Raw, where: str, until: float = np.inf) -> Stir:
     for view in VIEWS:
         span = _seen(span, series[view], clocks[view], view)
     _check_length(span, where)
-    time = np.arange(np.floor((span.last - span.first) * RATE + 1e-6) + 1) / RATE
+    time = np.arange(np.floor((span.last - span.first) * TABLE_RATE + 1e-6) + 1) / TABLE_RATE
     times = span.first + time
     xz, yz = (JoinedView(series[v], clocks[v], raw.provenance.cameras[v]) for v in VIEWS)
     joined = join(xz, yz, times)
@@ -118,7 +118,9 @@ def _stirred(samples: Columns, where: str, until: float) -> _Span:
 
 def _clock(raw: Raw, view: View, series: FrameSeries, span: _Span) -> Clock:
     samples, frames = raw.samples, raw.frames[view]
-    near = (samples["time"] > span.first - AROUND) & (samples["time"] < span.last + AROUND)
+    near = (samples["time"] > span.first - CLOCK_MARGIN) & (
+        samples["time"] < span.last + CLOCK_MARGIN
+    )
     path = np.column_stack([samples[axis][near] for axis in "xyz"])
     to_host = float(np.median(samples["time"] - samples["host"]))
     guess = to_host + float(np.median(frames["host"] - frames["stamp"]))

@@ -13,7 +13,7 @@ from .scene import Look, Scene, circle
 from .stick_shape import bar_sides, submerged_outline, surface_share
 from .world import WorldState
 
-SHIFT = 4  # OpenCV draws at sixteenths of a pixel
+SUBPIXEL_BITS = 4  # OpenCV draws at sixteenths of a pixel
 SUB_EXPOSURES = 3
 
 
@@ -110,7 +110,7 @@ def _liquid_mask(scene: Scene, camera: CameraModel) -> np.ndarray:
         return mask
     body = np.concatenate([circle(scene.cup_radius, 0.0), circle(scene.cup_radius, scene.fill)])
     hull = opencv().convexHull(camera.project(body).astype(np.float32))
-    opencv().fillConvexPoly(mask, _fixed(hull[:, 0]), 255, shift=SHIFT)
+    opencv().fillConvexPoly(mask, _fixed(hull[:, 0]), 255, shift=SUBPIXEL_BITS)
     return mask
 
 
@@ -136,7 +136,7 @@ def _back_lines(scene: Scene, camera: CameraModel) -> tuple[np.ndarray, ...]:
 def _draw_lines(image: np.ndarray, lines: Sequence[np.ndarray], grey: float) -> None:
     cv2 = opencv()
     fixed = [_fixed(line) for line in lines]
-    cv2.polylines(image, fixed, False, int(grey), 1, cv2.LINE_AA, SHIFT)
+    cv2.polylines(image, fixed, False, int(grey), 1, cv2.LINE_AA, SUBPIXEL_BITS)
 
 
 def _draw_submerged(image: np.ndarray, stage: Stage, state: WorldState) -> None:
@@ -148,7 +148,7 @@ def _draw_submerged(image: np.ndarray, stage: Stage, state: WorldState) -> None:
     rows, columns = slice(window.top, window.bottom), slice(window.left, window.right)
     drawn = image.copy()
     grey = 0.7 * stage.look.stick + 0.3 * stage.look.liquid
-    cv2.fillPoly(drawn, [_fixed(outline)], int(grey), cv2.LINE_AA, SHIFT)
+    cv2.fillPoly(drawn, [_fixed(outline)], int(grey), cv2.LINE_AA, SUBPIXEL_BITS)
     wet = stage.liquid[rows, columns] > 0
     image[rows, columns][wet] = drawn[rows, columns][wet]
 
@@ -179,7 +179,7 @@ def _draw_gripper(image: np.ndarray, stage: Stage, state: WorldState) -> None:
     pixels = stage.camera.project(corners)
     if np.isfinite(pixels).all():
         hull = cv2.convexHull(pixels.astype(np.float32))[:, 0]
-        cv2.fillConvexPoly(image, _fixed(hull), int(stage.look.gripper), cv2.LINE_AA, SHIFT)
+        cv2.fillConvexPoly(image, _fixed(hull), int(stage.look.gripper), cv2.LINE_AA, SUBPIXEL_BITS)
 
 
 def _draw_marker(image: np.ndarray, stage: Stage, exposures: Sequence[WorldState]) -> None:
@@ -196,4 +196,4 @@ def _draw_marker(image: np.ndarray, stage: Stage, exposures: Sequence[WorldState
 
 def _fixed(pixels: np.ndarray) -> np.ndarray:
     """Pixels as OpenCV's fixed-point numbers, shape (N, 1, 2)."""
-    return np.rint(np.clip(pixels, -4e3, 4e3) * 2**SHIFT).astype(np.int32)[:, None]
+    return np.rint(np.clip(pixels, -4e3, 4e3) * 2**SUBPIXEL_BITS).astype(np.int32)[:, None]

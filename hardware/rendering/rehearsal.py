@@ -8,9 +8,9 @@ from ..vision.camera_model import CameraModel, look_at
 from ..vision.stick_view import StickView
 from .scene import Look, Scene
 
-FACE = 0.02  # m, from the pivot to the face of the gripper that carries a marker
+PIVOT_TO_MARKER = 0.02  # m, from the pivot to the face of the gripper that carries a marker
 MARKER_ABOVE = 0.025  # m
-TARGET = (0.0, 0.0, 0.13)  # m; what both cameras look at
+LOOK_AT = (0.0, 0.0, 0.13)  # m; what both cameras look at
 
 ViewName = Literal["xz", "yz"]
 
@@ -36,7 +36,7 @@ def rehearsal_camera(
         focal=(640.0, 640.0),
         centre=(319.5, 239.5),
         size=(640, 480),
-        rotation=look_at(position, np.array(TARGET)),
+        rotation=look_at(position, np.array(LOOK_AT)),
         position=position,
         distortion=distortion,
     )
@@ -44,7 +44,7 @@ def rehearsal_camera(
 
 def rehearsal_scene(view: ViewName) -> Scene:
     """The scene with the marker that faces this camera."""
-    side = {"xz": (0.0, -FACE), "yz": (FACE, 0.0)}[view]
+    side = {"xz": (0.0, -PIVOT_TO_MARKER), "yz": (PIVOT_TO_MARKER, 0.0)}[view]
     return Scene(marker_offset=(*side, MARKER_ABOVE))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from .world import WorldState
 
-KEPT = 1.0  # s
+KEPT_SECONDS = 1.0  # s
 ADMIN_PORT = 29997
 
 
@@ -123,7 +123,7 @@ class StreamedWorld:
                 if self._states and host <= self._states[-1][0]:
                     continue
                 self._states.append((host, state))
-                while host - self._states[0][0] > KEPT:
+                while host - self._states[0][0] > KEPT_SECONDS:
                     self._states.popleft()
             self._first.set()
 

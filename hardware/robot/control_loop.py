@@ -42,17 +42,19 @@ from .outlet import Outlet
 from .preparation import Prepared, others
 from .ur import LOOKAHEAD, WATCHDOG_RATE, URArm
 
-SETTLED = 3  # periods, until the controller's program listens again after an order that it answers
-ROOM = 0.5  # of a period, that must be left of it for a slice of a path's check
-WATCHDOG = 1.0 / WATCHDOG_RATE  # s
+SETTLING_PERIODS = (
+    3  # periods, until the controller's program listens again after an order that it answers
+)
+CHECK_ROOM = 0.5  # of a period, that must be left of it for a slice of a path's check
+WATCHDOG_PERIOD = 1.0 / WATCHDOG_RATE  # s
 MOST_WAIT = 0.5  # of a period, for a package that is late
 PULL, MOST_PULL = 0.05, 2e-4  # share of the loop's phase that a tick mends, and at most [s]
-TRAIL = LOOKAHEAD + 0.1  # s, by which the arm may lag behind its set-points
+MAX_LAG = LOOKAHEAD + 0.1  # s, by which the arm may lag behind its set-points
 CAUSE_PERIODS = 3  # in which a package tells why the controller ended its program
 REST_TIME = 0.6  # s, at most, in which a stopped arm is watched; main waits for longer
-RESTING = 1e-3  # m/s
+RESTING_SPEED = 1e-3  # m/s
 RESTING_TICKS = 5
-UPRIGHT = float(np.radians(2.0))
+UPRIGHT_ANGLE = float(np.radians(2.0))
 # after these the robot is well, and a source of liquid is better turned back than held
 MAY_TURN_BACK = ("stop", "main", "order", "camera", "recorder")
 IN_DRY_RUN = ("link", "silence")
@@ -60,8 +62,8 @@ IN_DRY_RUN = ("link", "silence")
 
 def _late(since: float) -> str:
     return (
-        f"this computer sent nothing for {since:.3f} s, and after {WATCHDOG:g} s the controller's "
-        "watchdog ends a program: close what keeps this computer busy"
+        f"this computer sent nothing for {since:.3f} s, and after {WATCHDOG_PERIOD:g} s the "
+        "controller's watchdog ends a program: close what keeps this computer busy"
     )
 
 
@@ -70,7 +72,7 @@ def refused(reason: str, connected: bool, silent: float) -> Trip:
 
     This process may stand still between a look at the guards and the set-point, too.
     """
-    if connected and silent > WATCHDOG:
+    if connected and silent > WATCHDOG_PERIOD:
         return Trip("overrun", f"overrun: {_late(silent)}")
     return Trip("link", reason)
 
@@ -131,7 +133,7 @@ class ControlLoop:
         self._outlet = Outlet(links.samples)
         state = prepared.states[-1]
         self._course = Course(np.array(state.pose))
-        self._trail = Trail(self._course.hold, round(TRAIL / self._period))
+        self._trail = Trail(self._course.hold, round(MAX_LAG / self._period))
         self._joints = np.array(state.joints)
         self._vetting = Vetting(rig, assignment.tool, self._course.hold, self._joints)
         self._watch = first_watch(state, self._clock.now(), prepared.wrench)
@@ -161,7 +163,7 @@ class ControlLoop:
         quieten()
         if self._arm is not None:
             self._arm.arm_watchdog()
-            self._clock.sleep(SETTLED * self._period)
+            self._clock.sleep(SETTLING_PERIODS * self._period)
         self._log.write("ready", armed=self._to.armed, priority=hurry())
         self._inbox.start()
         self._report(Checked(self._checks, self._course.hold, self._joints))
@@ -179,7 +181,7 @@ class ControlLoop:
             # whole periods that were missed are left out: the path is delayed, never hurried
             missed = self._period * int(late / self._period)
             deadline += self._period + missed + _nearer(age, self._period)
-            if self._trip is None and deadline - self._clock.now() > ROOM * self._period:
+            if self._trip is None and deadline - self._clock.now() > CHECK_ROOM * self._period:
                 self._vet()
 
     def _await_package(self, end: float) -> None:
@@ -204,7 +206,7 @@ class ControlLoop:
         seen = self._seen(state, late, now)
         self._readings = evaluate(seen, self._rules)
         trip = tripped(self._kept(self._readings), seen) or self._ordered()
-        if trip is not None and trip.guard == "program" and now - self._sent > WATCHDOG:
+        if trip is not None and trip.guard == "program" and now - self._sent > WATCHDOG_PERIOD:
             trip = trip._replace(reason=f"{trip.reason}; {_late(now - self._sent)}")
         if trip is None and self._arm is not None:
             trip = self._go_on(self._arm)
@@ -328,8 +330,8 @@ class ControlLoop:
         if self._arm is None or self._to.tool != "pouring" or self._turning_back:
             return False
         # a path that does not begin upright is no way back to it
-        begins = turn_between(leg.base[0, 3:], self._upright) <= UPRIGHT
-        tilted = turn_between(leg.base[0, 3:], self._course.hold[3:]) > UPRIGHT
+        begins = turn_between(leg.base[0, 3:], self._upright) <= UPRIGHT_ANGLE
+        tilted = turn_between(leg.base[0, 3:], self._course.hold[3:]) > UPRIGHT_ANGLE
         return begins and tilted and trip.guard.startswith(MAY_TURN_BACK)
 
     def _come_to_rest(self) -> None:
@@ -355,7 +357,7 @@ class ControlLoop:
         now, state = self._clock.now(), self._reader.read()
         # an old state says nothing about rest
         if state.time > self._watch.time:
-            self._still = self._still + 1 if state.speed < RESTING else 0
+            self._still = self._still + 1 if state.speed < RESTING_SPEED else 0
         self._watch = watched(self._watch, state, now, self._period)
         return now, state
 

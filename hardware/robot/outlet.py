@@ -6,7 +6,7 @@ from multiprocessing.connection import Connection
 
 from ..recorder.sample import Sample
 
-BATCH = 5  # samples a message
+SAMPLES_PER_MESSAGE = 5  # samples a message
 # what a pipe takes at once where it takes anything is 4096 bytes; a sample needs about 250
 MOST = 12
 
@@ -31,7 +31,7 @@ class Outlet:
     def put(self, sample: Sample) -> None:
         """Take a sample; every few of them go on."""
         self._waiting.append(sample)
-        if len(self._waiting) >= BATCH:
+        if len(self._waiting) >= SAMPLES_PER_MESSAGE:
             self.flush()
 
     def flush(self) -> None:

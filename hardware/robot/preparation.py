@@ -25,7 +25,7 @@ from ..safety.preflight import (
 from .orders import Assignment
 from .ur import URArm, URReader
 
-LOOK = 0.3  # s, for which the arm is watched at rest
+REST_WATCH = 0.3  # s, for which the arm is watched at rest
 WAIT_FOR_OTHERS = 15.0  # s, for recorder and cameras to show signs of life
 
 
@@ -104,7 +104,7 @@ def _take_control(
 
 def _look(arm: URReader, period: float, clock: HostClock) -> list[ArmState]:
     states = []
-    end = clock.now() + LOOK
+    end = clock.now() + REST_WATCH
     while clock.now() < end:
         states.append(arm.read())
         clock.sleep(period)

@@ -27,12 +27,12 @@ from ..safety.limits import TargetCheck, Tool
 WATCHDOG_RATE = 10.0  # Hz: the controller stops its program 0.1 s after the last set-point
 # the defaults of the vendor's manual: the arm lags its set-points by about the first
 LOOKAHEAD = 0.1  # s
-GAIN = 300.0
+SERVO_GAIN = 300.0
 STOP_DECELERATION = 3.0  # m/s2: from 0.15 m/s at rest within 0.05 s
 PROGRAM_ENDS = 1.0  # s, until the controller's program has ended
 # ur_rtde checks these two of servoL's arguments and the controller ignores them
 UNUSED_SPEED, UNUSED_ACCELERATION = 0.5, 0.5
-FIELDS = [
+RTDE_FIELDS = [
     "timestamp",
     "actual_q",
     "actual_TCP_pose",
@@ -66,7 +66,7 @@ class URReader:
             RigError: There is no controller at the address, or it refuses.
         """
         receive = _interface("rtde_receive").RTDEReceiveInterface
-        self._receive = self._opened(receive, self._address, self._rate, FIELDS)
+        self._receive = self._opened(receive, self._address, self._rate, RTDE_FIELDS)
 
     def read(self) -> ArmState:
         """The latest state, all of it from one package; never waits."""
@@ -203,7 +203,7 @@ class URArm(URReader):
             raise LinkLost("the connection to the controller is lost; nothing is sent any more")
         period = 1.0 / self._rate
         sent = self._control.servoL(
-            pose.tolist(), UNUSED_SPEED, UNUSED_ACCELERATION, period, LOOKAHEAD, GAIN
+            pose.tolist(), UNUSED_SPEED, UNUSED_ACCELERATION, period, LOOKAHEAD, SERVO_GAIN
         )
         if not sent:
             raise LinkLost("the controller's program does not take set-points any more")

@@ -14,15 +14,15 @@ from ..rig import Box, Limits
 NORMAL, REDUCED = 1 << 0, 1 << 1
 RUNNING_MODE, PLAYING = 7, 2
 FULL_SPEED = 0.95  # of the speed slider; a slowed arm would fall behind its path
-FASTEST = 1.5  # times the rig's speed: beyond that the arm does something of its own
+MAX_SPEED_RATIO = 1.5  # times the rig's speed: beyond that the arm does something of its own
 RECORDER_AGE = 0.3  # s, since the recorder's last sign of life
-BACKLOG = 0.5  # s, of samples that the recorder has not taken
+MAX_BACKLOG = 0.5  # s, of samples that the recorder has not taken
 TURN_ERROR = math.radians(10.0)
 TORQUE_LEVER = 0.25  # m: the torque's limit is the force's on such a lever
-DRIFT = 2e-4  # s/s, by which two good clocks may part
-YES = 0.5  # limit of what is 0 if it is well and 1 if it is not
+MAX_CLOCK_DRIFT = 2e-4  # s/s, by which two good clocks may part
+YES_LIMIT = 0.5  # limit of what is 0 if it is well and 1 if it is not
 
-SAFETY = {
+SAFETY_MODES = {
     2: "protective stopped",
     3: "recovery",
     4: "safeguard stopped",
@@ -33,14 +33,14 @@ SAFETY = {
     9: "fault",
     10: "stopped due to safety",
 }
-TROUBLE = {
+OUTCOME_TROUBLE = {
     Trouble.NONE: "",
     Trouble.WRITE_FAILED: "cannot write",
     Trouble.SOURCE_LOST: "gives no more pictures",
     Trouble.SAME_PICTURE: "gives the same picture again and again",
     Trouble.STOPPED: "has stopped",
 }
-SAID = {
+GUARD_MESSAGES = {
     "overrun": "this computer came late by",
     "silence": "the controller has said nothing new for",
     "delay": "what the controller says comes late by",
@@ -135,7 +135,7 @@ def watched(watch: Watch, state: ArmState, now: float, period: float) -> Watch:
     """What is remembered after another state, read at host time `now` [s]."""
     if state.time <= watch.time:
         return watch
-    offset = min(watch.offset + DRIFT * period, now - state.time)
+    offset = min(watch.offset + MAX_CLOCK_DRIFT * period, now - state.time)
     return watch._replace(time=state.time, fresh=now, offset=offset)
 
 
@@ -156,7 +156,7 @@ def _loop(seen: Seen, rules: Rules) -> tuple[Reading, ...]:
     state, watch, limits = seen.state, seen.watch, rules.limits
     return (
         # first: the library stands still itself while it reconnects, which looks like an overrun
-        Reading("link", float(not state.connected), YES, ""),
+        Reading("link", float(not state.connected), YES_LIMIT, ""),
         Reading("overrun", seen.late, limits.overrun, "s"),
         Reading("silence", seen.now - watch.fresh, limits.silence, "s"),
         Reading("delay", watch.fresh - watch.time - watch.offset, limits.silence, "s"),
@@ -167,14 +167,14 @@ def _arm(seen: Seen, rules: Rules) -> tuple[Reading, ...]:
     state, limits = seen.state, rules.limits
     change = [a - b for a, b in zip(state.wrench, seen.watch.wrench, strict=True)]
     return (
-        Reading("safety", float(not safe(state.safety_bits, limits)), YES, ""),
-        Reading("mode", float(state.robot_mode != RUNNING_MODE), YES, ""),
-        Reading("program", float(state.runtime_state != PLAYING), YES, ""),
+        Reading("safety", float(not safe(state.safety_bits, limits)), YES_LIMIT, ""),
+        Reading("mode", float(state.robot_mode != RUNNING_MODE), YES_LIMIT, ""),
+        Reading("program", float(state.runtime_state != PLAYING), YES_LIMIT, ""),
         Reading("force", math.hypot(*change[:3]), limits.force, "N"),
         Reading("torque", math.hypot(*change[3:]), limits.force * TORQUE_LEVER, "Nm"),
         Reading("tracking", seen.error, limits.tracking_error, "m"),
         Reading("turning", seen.turn_error, TURN_ERROR, "rad"),
-        Reading("speed", math.hypot(*state.velocity[:3]), FASTEST * limits.speed, "m/s"),
+        Reading("speed", math.hypot(*state.velocity[:3]), MAX_SPEED_RATIO * limits.speed, "m/s"),
         Reading("box", _outside(seen.position, rules.box), 1.0, "of the box"),
         Reading("slider", 1.0 - state.speed_scaling, 1.0 - FULL_SPEED, ""),
     )
@@ -184,12 +184,14 @@ def _others(seen: Seen, rules: Rules) -> tuple[Reading, ...]:
     readings = []
     for who, row in seen.rows.items():
         if who in CAMERAS:
-            readings.append(Reading(f"{CAMERAS[who]} health", float(row.trouble > 0), YES, ""))
+            readings.append(
+                Reading(f"{CAMERAS[who]} health", float(row.trouble > 0), YES_LIMIT, "")
+            )
             readings.append(Reading(CAMERAS[who], row.age(seen.now), rules.limits.frame_age, "s"))
     row = seen.rows[Who.RECORDER]
     return (
-        Reading("recorder health", float(row.trouble > 0), YES, ""),
-        Reading("recorder pipe", seen.backlog, BACKLOG, "s"),
+        Reading("recorder health", float(row.trouble > 0), YES_LIMIT, ""),
+        Reading("recorder pipe", seen.backlog, MAX_BACKLOG, "s"),
         Reading("recorder", row.age(seen.now), RECORDER_AGE, "s"),
         *readings,
     )
@@ -205,7 +207,7 @@ def safe(safety_bits: int, limits: Limits) -> bool:
 
 def safety_text(safety_bits: int) -> str:
     """The bits as words."""
-    said = [text for bit, text in SAFETY.items() if safety_bits >> bit & 1]
+    said = [text for bit, text in SAFETY_MODES.items() if safety_bits >> bit & 1]
     if safety_bits & REDUCED:
         said.append("reduced")
     return f"safety_status_bits = {safety_bits} ({', '.join(said) or 'normal'})"
@@ -226,7 +228,7 @@ def _reason(reading: Reading, seen: Seen) -> str:
     rows = {name: seen.rows[who] for who, name in CAMERAS.items() if who in seen.rows}
     rows["recorder"] = seen.rows[Who.RECORDER]
     if reading.name.endswith(" health"):
-        return f"{words} {TROUBLE[Trouble(int(rows[words].trouble))]}"
+        return f"{words} {OUTCOME_TROUBLE[Trouble(int(rows[words].trouble))]}"
     special = {
         "link": "the connection to the controller is lost; where its arm is going is not known",
         "safety": f"the controller's {safety_text(state.safety_bits)}",
@@ -241,6 +243,6 @@ def _reason(reading: Reading, seen: Seen) -> str:
     if reading.name in special:
         return special[reading.name]
     measured = f"{reading.value:.4g} {reading.unit}"
-    if said := SAID.get(reading.name):
+    if said := GUARD_MESSAGES.get(reading.name):
         return f"{words}: {said} {measured}, the limit is {reading.limit:.4g}"
     return f"{words}: {measured} is above {reading.limit:.4g}"

@@ -23,11 +23,14 @@ from ..rig import Box, Limits, Rig
 
 Tool = Literal["stirring", "pouring"]
 ARMS = {"cb3": UR10, "e-series": UR10E}
-TILT = {"stirring": np.radians(15.0), "pouring": np.radians(150.0)}  # from the rig's orientation
-ROUNDING = 1e-6  # relative, of speeds and accelerations
-AGREEMENT = 0.1  # rad, of the arm's own joints with ours; another configuration is further
+MAX_TILT = {
+    "stirring": np.radians(15.0),
+    "pouring": np.radians(150.0),
+}  # from the rig's orientation
+SPEED_ROUNDING = 1e-6  # relative, of speeds and accelerations
+JOINT_AGREEMENT = 0.1  # rad, of the arm's own joints with ours; another configuration is further
 MOST_SAMPLES = 150_000  # 20 minutes
-SLICE = 20  # samples, whose check lasts some thousandths of a second
+SLICE_SAMPLES = 20  # samples, whose check lasts some thousandths of a second
 
 
 class Workspace(NamedTuple):
@@ -57,7 +60,7 @@ def workspace(rig: Rig, tool: Tool) -> Workspace:
         box=getattr(rig.limits, tool),
         tcp=np.array(getattr(robot, f"{tool}_tcp")),
         orientation=np.array(getattr(robot, f"{tool}_orientation")),
-        tilt=TILT[tool],
+        tilt=MAX_TILT[tool],
         arm=ARMS[robot.controller],
         start=np.array(robot.start),
     )
@@ -100,7 +103,7 @@ def path_checks(
     _check_numbers(path, rig.robot.rate)
     space = workspace(rig, tool)
     now = np.empty(6)
-    for start in range(0, len(path.time), SLICE):
+    for start in range(0, len(path.time), SLICE_SAMPLES):
         part = _part(path, start)
         _check_rates(part, rig.limits)
         _check_turns(part, space, rig.limits)
@@ -133,7 +136,7 @@ class _Part(NamedTuple):
 
 
 def _part(path: PosePath, start: int) -> _Part:
-    first, end = max(start - 2, 0), start + SLICE
+    first, end = max(start - 2, 0), start + SLICE_SAMPLES
     time, pose = path.time[first:end], path.pose[first:end]
     dt = float(path.time[1])
     velocity = np.diff(pose[:, :3], axis=0) / dt
@@ -183,10 +186,10 @@ class TargetCheck:
                 f"{'xyz'[axis]} = {position[axis]:.4f} m is outside [{low}, {high}] m", "set-point"
             )
         step = float(np.linalg.norm(target[:3] - previous[:3]))
-        if step > self._step * (1.0 + ROUNDING) + 1e-9:
+        if step > self._step * (1.0 + SPEED_ROUNDING) + 1e-9:
             raise _rejected(f"a step of {step:.5f} m is above {self._step:.5f} m", "set-point")
         turn = turn_between(previous[3:], target[3:])
-        if turn > self._turn * (1.0 + ROUNDING) + 1e-9:
+        if turn > self._turn * (1.0 + SPEED_ROUNDING) + 1e-9:
             raise _rejected(f"a turn of {turn:.5f} rad is above {self._turn:.5f} rad", "set-point")
 
 
@@ -214,11 +217,11 @@ def _check_numbers(path: PosePath, rate: float) -> None:
 
 def _check_rates(part: _Part, limits: Limits) -> None:
     speed = np.linalg.norm(part.velocity, axis=1)
-    _bound(part.between, speed, limits.speed * (1.0 + ROUNDING), "speed", "m/s")
+    _bound(part.between, speed, limits.speed * (1.0 + SPEED_ROUNDING), "speed", "m/s")
     if len(part.velocity) > 1:
         dt = float(part.between[1] - part.between[0])
         change = np.linalg.norm(np.diff(part.velocity, axis=0), axis=1) / dt
-        most = limits.acceleration * (1.0 + ROUNDING)
+        most = limits.acceleration * (1.0 + SPEED_ROUNDING)
         _bound(part.between[:-1], change, most, "acceleration", "m/s2")
 
 
@@ -228,7 +231,7 @@ def _check_turns(part: _Part, space: Workspace, limits: Limits) -> None:
     _bound(part.time, np.degrees(tilt), float(np.degrees(space.tilt)), "tilt", "deg")
     if len(part.time) > 1:
         rate = (turns[:-1].inv() * turns[1:]).magnitude() / np.diff(part.time)
-        most = limits.tilt_rate_deg_s * (1.0 + ROUNDING)
+        most = limits.tilt_rate_deg_s * (1.0 + SPEED_ROUNDING)
         _bound(part.time[1:], np.degrees(rate), most, "tilt rate", "deg/s")
 
 
@@ -276,7 +279,7 @@ def _first_joints(pose: np.ndarray, space: Workspace, joints: np.ndarray | None)
     if first.status == "unreachable":
         raise _rejected("no joints reach its first pose", _when(0.0))
     away = float(np.abs(first.joints - near).max())
-    if joints is not None and not away <= AGREEMENT:
+    if joints is not None and not away <= JOINT_AGREEMENT:
         raise _rejected(f"its first pose is {away:.2f} rad of a joint from the arm", _when(0.0))
     return first.joints
 

@@ -22,7 +22,7 @@ TCP_ERROR = 1e-4  # m and rad
 PAYLOAD_ERROR = 0.01  # kg
 CENTRE_ERROR = 1e-3  # m
 FORCE_SPREAD = 0.25  # of the force's limit, while the arm rests
-RESTING = 1e-3  # m/s
+RESTING_SPEED = 1e-3  # m/s
 LEAST_DISK = 200e6  # bytes
 NO_SIGN = "no sign of life; bolfi-liquids rig check tells why"
 
@@ -56,7 +56,7 @@ def arm_checks(states: list[ArmState], rig: Rig) -> list[Check]:
             state.speed_slider >= FULL_SPEED,
             f"{100 * state.speed_slider:.0f} %, must be {100 * FULL_SPEED:.0f} % or more",
         ),
-        Check("at rest", state.speed <= RESTING, f"{1e3 * state.speed:.2f} mm/s"),
+        Check("at rest", state.speed <= RESTING_SPEED, f"{1e3 * state.speed:.2f} mm/s"),
         _force_check(states, limits.force),
     ]
 

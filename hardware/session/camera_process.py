@@ -28,7 +28,7 @@ from ..vision.frame_measurement import FrameMeasurement, line_is_good
 from ..vision.measuring import FrameMeter
 
 SAME_PICTURES = 3  # in a row; a camera's noise makes no two alike
-PATIENCE = 0.3  # [s]; how long a camera that does not answer may hold up the end
+CLOSING_SECONDS = 0.3  # [s]; how long a camera that does not answer may hold up the end
 WHO: dict[View, Who] = {"xz": Who.CAMERA_XZ, "yz": Who.CAMERA_YZ}
 
 
@@ -79,7 +79,7 @@ def _wait_for_end(
     """A camera that blocks cannot be interrupted: its process then ends without it."""
     main.poll(None)
     leaving.set()
-    if not answered.wait(PATIENCE):
+    if not answered.wait(CLOSING_SECONDS):
         process.tell_end("the camera does not answer")
         os._exit(1)  # what was written is in the files; the video can be read without its end
 

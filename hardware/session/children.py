@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from ..board import SPAWN, host_time
 
 LET_END = 0.8  # s, for which a child may end by itself
-TERMINATED = 0.1  # s, from the request to end to the end by force
+TERMINATE_SECONDS = 0.1  # s, from the request to end to the end by force
 
 
 class Child(NamedTuple):
@@ -66,7 +66,7 @@ def end(children: list[Child], patience: float = LET_END) -> list[Child]:
     stubborn = [child for child in children if child.process.is_alive()]
     for child in stubborn:
         child.process.terminate()
-    deadline = host_time() + TERMINATED
+    deadline = host_time() + TERMINATE_SECONDS
     for child in stubborn:
         child.process.join(max(deadline - host_time(), 0.0))
         if child.process.is_alive():

@@ -12,8 +12,8 @@ from ..motion.stir_paths import PosePath
 from ..rig import Rig
 from ..safety.limits import Tool, workspace
 
-SENTENCE = "the arm may move"
-ANSWER = 2.0  # s
+CONFIRMATION = "the arm may move"
+ANSWER_SECONDS = 2.0  # s
 _KEY = object()
 
 
@@ -47,11 +47,11 @@ def confirm(plan: str, typed: str, address: str) -> Confirmation:
     Raises:
         RigError: It is not the sentence.
     """
-    if typed.strip() != SENTENCE:
+    if typed.strip() != CONFIRMATION:
         raise RigError(
             f"got {typed.strip()!r:.60}",
             where="confirmation",
-            fix=f"type exactly: {SENTENCE}",
+            fix=f"type exactly: {CONFIRMATION}",
         )
     return Confirmation(_KEY, plan, address, emulated=False)
 
@@ -83,7 +83,7 @@ def _is_loopback(address: str) -> bool:
 
 def _answers_as_emulator(address: str) -> bool:
     try:
-        Admin(address, timeout=ANSWER).state()
+        Admin(address, timeout=ANSWER_SECONDS).state()
     except (OSError, AdminError):
         return False
     return True

@@ -8,18 +8,18 @@ from rich.table import Table
 from rich.text import Text
 
 from ..board import Row, Trouble, Who
-from ..safety.guards import TROUBLE, Reading
+from ..safety.guards import OUTCOME_TROUBLE, Reading
 
 BAR_WIDTH = 30
-LITTLE = 0.2  # of a guard's limit: less margin is shown in yellow
-FRESH = 0.5  # [s]; an older sign of life is shown in red
+LITTLE_MARGIN = 0.2  # of a guard's limit: less margin is shown in yellow
+FRESH_SECONDS = 0.5  # [s]; an older sign of life is shown in red
 NAMES = {
     Who.CONTROL: "robot",
     Who.RECORDER: "recorder",
     Who.CAMERA_XZ: "camera xz",
     Who.CAMERA_YZ: "camera yz",
 }
-COUNTED = {Who.CONTROL: "ticks", Who.RECORDER: "rows"}
+COUNTED_UNITS = {Who.CONTROL: "ticks", Who.RECORDER: "rows"}
 
 
 class LiveStatus(NamedTuple):
@@ -75,17 +75,17 @@ def _degrees(angle: float) -> str:
 
 
 def _alive(who: Who, row: Row, now: float) -> Text:
-    trouble = TROUBLE[Trouble(int(row.trouble))]
+    trouble = OUTCOME_TROUBLE[Trouble(int(row.trouble))]
     if trouble:
         return Text(trouble, style="bold red")
     if not row.beat:
         return Text("no sign yet", style="yellow")
-    unit = COUNTED.get(who, "pictures")
+    unit = COUNTED_UNITS.get(who, "pictures")
     text = f"{row.rate:6.1f} /s {row.count:9.0f} {unit:<9} {1e3 * row.age(now):5.0f} ms ago"
-    return Text(text, style="red" if row.age(now) > FRESH else "green")
+    return Text(text, style="red" if row.age(now) > FRESH_SECONDS else "green")
 
 
 def _guard(guard: Reading) -> Text:
-    style = "red" if guard.margin <= 0 else "yellow" if guard.margin < LITTLE else "green"
+    style = "red" if guard.margin <= 0 else "yellow" if guard.margin < LITTLE_MARGIN else "green"
     left = f"{100 * guard.margin:.0f} % left" if guard.margin > 0 else "passed"
     return Text(f"{guard.value:8.3g} of {guard.limit:.3g} {guard.unit}, {left}", style=style)

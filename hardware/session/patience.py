@@ -2,7 +2,7 @@
 
 from ..rig import Rig
 
-STALL = 1.0  # s, in which neither the arm nor its controller moves on
+STALL_SECONDS = 1.0  # s, in which neither the arm nor its controller moves on
 
 
 def patient(rig: Rig) -> Rig:
@@ -12,11 +12,11 @@ def patient(rig: Rig) -> Rig:
     """
     limits = rig.limits.model_copy(
         update={
-            "silence": STALL,
-            "overrun": STALL,
-            "frame_age": STALL,
+            "silence": STALL_SECONDS,
+            "overrun": STALL_SECONDS,
+            "frame_age": STALL_SECONDS,
             # the emulated arm stays behind its set-points by what they move on in a stall
-            "tracking_error": rig.limits.tracking_error + STALL * rig.limits.speed,
+            "tracking_error": rig.limits.tracking_error + STALL_SECONDS * rig.limits.speed,
         }
     )
     return rig.model_copy(update={"limits": limits})

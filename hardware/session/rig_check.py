@@ -16,8 +16,8 @@ from ..safety.preflight import Check, controller_checks, place_check
 from .cameras import RigCamera
 
 RTDE_PORT = 30004
-ANSWER = 2.0  # s
-PACKAGES = (
+ANSWER_SECONDS = 2.0  # s
+OPTIONAL_PACKAGES = (
     ("ur-rtde", "robot", "moves the robot"),
     ("opencv-python-headless", "cameras", "reads the cameras"),
     ("av", "cameras", "writes the videos"),
@@ -27,7 +27,7 @@ PACKAGES = (
 def check_rig(rig: Rig) -> list[Check]:
     """Packages, plan, cameras and robot, in this order; the robot is only looked at."""
     return [
-        *(_package(*one) for one in PACKAGES),
+        *(_package(*one) for one in OPTIONAL_PACKAGES),
         _plan(rig),
         *(check for camera in rig.cameras for check in _camera(camera)),
         *_robot(rig),
@@ -74,7 +74,7 @@ def _picture(camera: Camera) -> str:
 def _robot(rig: Rig) -> Iterator[Check]:
     where = f"robot at {rig.robot.host}"
     try:
-        socket.create_connection((rig.robot.host, RTDE_PORT), ANSWER).close()
+        socket.create_connection((rig.robot.host, RTDE_PORT), ANSWER_SECONDS).close()
     except OSError as err:
         yield Check(where, False, f"does not answer on port {RTDE_PORT}: {err.strerror or err}")
         return

@@ -23,7 +23,7 @@ from .processes import Processes
 from .progress import Phase, Progress, SessionStopped, Status
 from .setup import SessionSetup
 
-ENDINGS = (signal.SIGTERM, signal.SIGHUP)  # Ctrl-C raises KeyboardInterrupt already
+END_SIGNALS = (signal.SIGTERM, signal.SIGHUP)  # Ctrl-C raises KeyboardInterrupt already
 PREFLIGHT_TIMEOUT = 30.0  # s, until the pre-flight list must be there
 # s, until the arm must be at rest and its process gone; a source is turned back upright first
 CONTROL_ENDS = {"stirring": 0.7, "pouring": 5.0}
@@ -93,7 +93,7 @@ class Session:
         self._processes = Processes(self.board, self._log, self._progress)
         atexit.register(self.close)
         if threading.current_thread() is threading.main_thread():
-            self._handlers = {one: signal.signal(one, _end_by_signal) for one in ENDINGS}
+            self._handlers = {one: signal.signal(one, _end_by_signal) for one in END_SIGNALS}
         try:
             # what a child imports is nothing that Ctrl-C should show the inside of
             with ignored_interrupts():

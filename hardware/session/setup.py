@@ -16,7 +16,7 @@ from ..safety.limits import Tool
 from .confirmation import Confirmation
 from .patience import patient
 
-PROBES = 60  # poses of the plan about which the controller's own limits are asked
+PROBED_POSES = 60  # poses of the plan about which the controller's own limits are asked
 
 
 @dataclass(frozen=True)
@@ -136,5 +136,5 @@ def _probes(plan: Sequence[PosePath], rig: Rig) -> np.ndarray:
     if not plan:
         return np.empty((0, 6))
     pose = np.concatenate([path.pose for path in plan])
-    chosen = np.unique(np.linspace(0, len(pose) - 1, PROBES).astype(int))
+    chosen = np.unique(np.linspace(0, len(pose) - 1, PROBED_POSES).astype(int))
     return cup_frame(rig.cup).to_base(pose[chosen])

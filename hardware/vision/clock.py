@@ -9,13 +9,13 @@ from ..motion.trajectory import Trajectory
 from .camera_model import CameraModel
 from .series import FrameSeries
 
-SEARCH = 0.5  # s on both sides of the first guess
+SEARCH_RANGE = 0.5  # s on both sides of the first guess
 SEARCH_STEP = 0.01  # s
-ROUNDS = 15
-HUBER = 1.5  # standard deviations
-OUTLIER = 6.0
+MAX_ROUNDS = 15
+HUBER_SDS = 1.5  # standard deviations
+OUTLIER_SDS = 6.0
 HUBER_ROUNDS = 10
-ENOUGH = 1e-6  # s; smaller steps end the search
+STEP_TOLERANCE = 1e-6  # s; smaller steps end the search
 LEAST_FRAMES = 30
 LEAST_SPEED = 5.0  # px/s, root mean square: slower, and the pictures tell nothing about time
 DRIFT_PRIOR = 1e-4  # clocks of computers and cameras differ by some 1e-5
@@ -80,7 +80,7 @@ def fit_clock(
         gripper: The robot's samples; times without finite position are skipped.
         camera: Of the view.
         marker_offset: From the pivot to the marker [m].
-        guess: Robot's time minus stamp [s], right to `SEARCH`; the median difference of what
+        guess: Robot's time minus stamp [s], right to `SEARCH_RANGE`; the median difference of what
             arrived at the same time will do.
 
     Raises:
@@ -93,13 +93,13 @@ def fit_clock(
     reference = float(stamp.mean())
     start = _search(stamp + guess, pixels, path)
     state = np.array([guess + start, 0.0])
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         fit = _linear_fit(state, stamp - reference, stamp, pixels, path)
         state = state + fit.step
-        if np.abs(fit.step[0]) < ENOUGH:
+        if np.abs(fit.step[0]) < STEP_TOLERANCE:
             return _as_clock(state, reference, fit)
     raise ClockError(
-        f"the clocks did not settle in {ROUNDS} rounds: is the marker's offset right, and does "
+        f"the clocks did not settle in {MAX_ROUNDS} rounds: is the marker's offset right, and does "
         "the robot's time advance evenly?"
     )
 
@@ -161,7 +161,7 @@ def _path(
 def _seen(series: FrameSeries, path: _Path, guess: float) -> np.ndarray:
     """Frames that show the marker while the robot was surely sampled."""
     time = series.stamp + guess
-    sampled = (time > path.first + SEARCH) & (time < path.last - SEARCH)
+    sampled = (time > path.first + SEARCH_RANGE) & (time < path.last - SEARCH_RANGE)
     seen = sampled & np.isfinite(series.marker).all(axis=1)
     if seen.sum() < LEAST_FRAMES:
         raise ClockError(
@@ -177,7 +177,7 @@ def _seen(series: FrameSeries, path: _Path, guess: float) -> np.ndarray:
 
 def _search(time: np.ndarray, pixels: np.ndarray, path: _Path) -> float:
     """Shift [s] of the guess, on a grid; constant pixel differences are left out of account."""
-    shifts = np.arange(-SEARCH, SEARCH + SEARCH_STEP / 2, SEARCH_STEP)
+    shifts = np.arange(-SEARCH_RANGE, SEARCH_RANGE + SEARCH_STEP / 2, SEARCH_STEP)
 
     def apart(shift: float) -> float:
         difference = pixels - path.pixels(time + shift)
@@ -199,8 +199,8 @@ def _linear_fit(
     weight, normal = np.ones(len(target)), np.eye(columns.shape[1])
     for _ in range(HUBER_ROUNDS):
         noise = max(1.4826 * float(np.median(np.abs(left))), LEAST_NOISE)
-        weight = np.minimum(1.0, HUBER * noise / np.maximum(np.abs(left), 1e-12))
-        weight[np.abs(left) > OUTLIER * noise] = 0.0
+        weight = np.minimum(1.0, HUBER_SDS * noise / np.maximum(np.abs(left), 1e-12))
+        weight[np.abs(left) > OUTLIER_SDS * noise] = 0.0
         weighted = columns * weight[:, None] / noise**2
         normal = weighted.T @ columns + np.diag(prior)
         right = weighted.T @ target

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 ROW_STEP = 6
-ANGLES = np.radians(np.arange(-56.0, 56.1, 0.5))
-APART = np.radians(8.0)  # nearer rays overlap the same stick
-FLANK = 0.6  # width of the strips compared with the stick, over the stick's width
+SEARCH_ANGLES = np.radians(np.arange(-56.0, 56.1, 0.5))
+MIN_ANGLE_APART = np.radians(8.0)  # nearer rays overlap the same stick
+FLANK_SHARE = 0.6  # width of the strips compared with the stick, over the stick's width
 
 
 class Ray(NamedTuple):
@@ -65,15 +65,15 @@ def search_rays(
     seen = np.arange(rows.first, rows.last, ROW_STEP)
     response = _stick_response(lines, width)
     below = seen - pivot_row
-    slopes = np.tan(ANGLES)
+    slopes = np.tan(SEARCH_ANGLES)
     places = columns[:, None, None] + below[None, None, :] * slopes[None, :, None]
     index = np.rint(places).astype(np.intp)
-    reached = below[None, :] <= length * np.cos(ANGLES)[:, None]
+    reached = below[None, :] <= length * np.cos(SEARCH_ANGLES)[:, None]
     valid = (index >= 0) & (index < lines.shape[1]) & reached[None]
     sampled = response[np.arange(len(seen)), np.clip(index, 0, lines.shape[1] - 1)]
     score = np.sum(sampled * valid, axis=2) / np.maximum(reached.sum(axis=1), 4)[None]
     start, angle = np.unravel_index(int(np.argmax(score)), score.shape)
-    apart = np.abs(ANGLES - ANGLES[angle]) > APART
+    apart = np.abs(SEARCH_ANGLES - SEARCH_ANGLES[angle]) > MIN_ANGLE_APART
     return Ray(
         column=float(columns[start]),
         row=pivot_row,
@@ -86,7 +86,7 @@ def search_rays(
 def _stick_response(lines: np.ndarray, width: float) -> np.ndarray:
     """How much a bar of `width` about each pixel exceeds the strips on both sides, >= 0."""
     inner = max(int(0.8 * width), 3) | 1
-    flank = max(int(FLANK * width), 2)
+    flank = max(int(FLANK_SHARE * width), 2)
     total = np.cumsum(np.pad(lines, ((0, 0), (1, 0))), axis=1, dtype=np.float32)
     half, gap = inner // 2, int(np.ceil(0.75 * width))
     reach = gap + flank

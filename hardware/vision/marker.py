@@ -6,11 +6,11 @@ import numpy as np
 
 from .opencv import opencv
 
-REDUCTION = 4  # the first search runs on a picture this much smaller
+SEARCH_REDUCTION = 4  # the first search runs on a picture this much smaller
 CANDIDATES = 3
 LEAST_CONTRAST = 30.0
 AREA_RATIO = (0.6, 1.6)  # found over expected
-ROUNDNESS = 0.75  # smaller over larger principal extent
+MIN_ROUNDNESS = 0.75  # smaller over larger principal extent
 
 
 class Marker(NamedTuple):
@@ -44,10 +44,12 @@ def find_marker(image: np.ndarray, radius: float) -> Marker | None:
 def _candidates(image: np.ndarray, radius: float) -> list[tuple[float, float]]:
     """Places [px] that are brighter than all their surround, best first."""
     cv2 = opencv()
-    small = cv2.resize(image, None, fx=1 / REDUCTION, fy=1 / REDUCTION, interpolation=3)
-    inner = max(int(round(1.2 * radius / REDUCTION)) | 1, 1)
+    small = cv2.resize(
+        image, None, fx=1 / SEARCH_REDUCTION, fy=1 / SEARCH_REDUCTION, interpolation=3
+    )
+    inner = max(int(round(1.2 * radius / SEARCH_REDUCTION)) | 1, 1)
     centre = cv2.blur(small, (inner, inner))
-    step = int(np.ceil(1.6 * radius / REDUCTION))
+    step = int(np.ceil(1.6 * radius / SEARCH_REDUCTION))
     # the brightest of the surround counts: an edge of the background is no marker
     around = cv2.dilate(small, _ring(step))
     response = cv2.subtract(centre, around)
@@ -56,7 +58,7 @@ def _candidates(image: np.ndarray, radius: float) -> list[tuple[float, float]]:
         _, best, _, (x, y) = cv2.minMaxLoc(response)
         if best < LEAST_CONTRAST:
             break
-        places.append(((x + 0.5) * REDUCTION - 0.5, (y + 0.5) * REDUCTION - 0.5))
+        places.append(((x + 0.5) * SEARCH_REDUCTION - 0.5, (y + 0.5) * SEARCH_REDUCTION - 0.5))
         response[max(y - step, 0) : y + step + 1, max(x - step, 0) : x + step + 1] = 0
     return places
 
@@ -108,6 +110,6 @@ def _round_disc(
     xy = float(offsets @ weight @ offsets) / mass - x * y
     spread = np.hypot(0.5 * (xx - yy), xy)
     smaller, larger = 0.5 * (xx + yy) - spread, 0.5 * (xx + yy) + spread
-    if smaller < ROUNDNESS**2 * larger:
+    if smaller < MIN_ROUNDNESS**2 * larger:
         return None
     return Marker(origin[0] + x, origin[1] + y)

@@ -19,15 +19,15 @@ LEAST_ROWS_SHARE = 0.5
 WIDTH_TOLERANCE = 0.35  # of the stick's width: it depends on the depth and the other inclination
 ROW_WIDTH_TOLERANCE = 0.7  # px across the stick: one edge of such a row is something else
 MOST_DISAGREEMENT = np.radians(0.5)
-FASTEST = 8.0  # rad/s; a pendulum of 22 cm does 2 rad/s after a swing of 17 degrees
+MAX_SWING_RATE = 8.0  # rad/s; a pendulum of 22 cm does 2 rad/s after a swing of 17 degrees
 JUMP_ALLOWANCE = np.radians(1.0)
 OFF_PIVOT = 0.0025  # m
 SATURATED_SHARE = 0.10
 # Grey levels beside the stick vary slowly, and the edges with them. This tilt over the stick's
 # length, found with a cluttered background, is nothing that the scatter of the rows shows.
-SYSTEMATIC = 0.025  # px
+SYSTEMATIC_ERROR = 0.025  # px
 HIDDEN_SEARCH = 40.0  # px on both sides of where the marker was
-COMPARED = (slice(None, None, 7), slice(None, None, 5))
+COMPARED_PIXELS = (slice(None, None, 7), slice(None, None, 5))
 
 
 class Track(NamedTuple):
@@ -74,7 +74,7 @@ def measure(frame: Frame, view: StickView, track: Track) -> tuple[FrameMeasureme
             f"frame {frame.index} is {image.dtype} of shape {image.shape}; the camera model is "
             f"for grey uint8 of shape {view.camera.size[::-1]}: calibrate at the size you record"
         )
-    sample = image[COMPARED].copy()
+    sample = image[COMPARED_PIXELS].copy()
     marker = find_marker(image, view.marker_radius * view.scale)
     pivot = _pivot(marker, view) if marker is not None else track.pivot
     stick = _find_stick(image, view, pivot, known=marker is not None)
@@ -182,8 +182,8 @@ def _line_of(edges: Edges, ray: Ray, width: float, view: StickView) -> _Stick:
 
 def _with_systematic(line: Line, middle: np.ndarray, view: StickView) -> Line:
     rows = middle[line.inlier, 1]
-    tilt = SYSTEMATIC / max(float(np.ptp(rows)), 1.0)
-    shift = SYSTEMATIC / view.camera.focal[0]
+    tilt = SYSTEMATIC_ERROR / max(float(np.ptp(rows)), 1.0)
+    shift = SYSTEMATIC_ERROR / view.camera.focal[0]
     return line._replace(
         slope_error=float(np.hypot(line.slope_error, tilt)),
         offset_error=float(np.hypot(line.offset_error, shift)),
@@ -217,7 +217,7 @@ def _misses(line: Line, pivot: tuple[float, float], view: StickView) -> bool:
 
 def _jumps(angle: float, stamp: float, track: Track) -> bool:
     turned = abs(angle - track.angle)
-    return bool(turned > FASTEST * abs(stamp - track.stamp) + JUMP_ALLOWANCE)
+    return bool(turned > MAX_SWING_RATE * abs(stamp - track.stamp) + JUMP_ALLOWANCE)
 
 
 def _as_measurement(

@@ -14,7 +14,7 @@ from .stick_line import Line, fit_line
 LEAST_RESPONSE = 8.0  # grey levels
 START_STEP = 3.0  # px
 SEARCH_WIDTH = 9  # px
-FLANK = 6  # px beside the thread that show the background
+FLANK_WIDTH = 6  # px beside the thread that show the background
 LEAST_SHARE = 0.5  # of the rows
 MOST_ERROR = np.radians(0.2)
 
@@ -109,13 +109,13 @@ def _thread(image: np.ndarray, camera: CameraModel, width: float, sign: float) -
 def _centroids(image: np.ndarray, sign: float, ray: Ray, width: float) -> np.ndarray:
     """Middle of the thread in each row [px], shape (N, 2), where it stands out."""
     row = np.arange(image.shape[0])
-    reach = int(np.ceil(0.5 * width + FLANK))
+    reach = int(np.ceil(0.5 * width + FLANK_WIDTH))
     centre = np.rint(ray.column + ray.slope * (row - ray.row)).astype(np.intp)
     inside = (centre >= reach) & (centre < image.shape[1] - reach)
     row, centre = row[inside], centre[inside]
     offsets = np.arange(-reach, reach + 1)
     strength = sign * image[row[:, None], centre[:, None] + offsets].astype(np.float64)
-    flank = np.abs(offsets) > reach - FLANK // 2
+    flank = np.abs(offsets) > reach - FLANK_WIDTH // 2
     level, scatter = strength[:, flank].mean(axis=1), strength[:, flank].std(axis=1)
     above = np.maximum(strength - level[:, None] - 2.0 * np.median(scatter), 0.0)
     mass = above.sum(axis=1)

@@ -6,9 +6,9 @@ import numpy as np
 
 from .coarse_search import Ray, Rows
 
-MARGIN = 9.0  # px on each side of the stick, across it
+STRIP_MARGIN = 9.0  # px on each side of the stick, across it
 SMOOTHED_ROWS = 9  # levels inside and beside the stick change slowly along it
-BLUR = 1.5  # px on each side of an edge, across it, that its blur reaches
+EDGE_BLUR = 1.5  # px on each side of an edge, across it, that its blur reaches
 SATURATED = 254
 
 
@@ -49,7 +49,7 @@ def find_edges(image: np.ndarray, sign: float, ray: Ray, rows: Rows, width: floa
     """
     row = np.arange(rows.first, rows.last)
     stretch = float(np.hypot(1.0, ray.slope))
-    half, reach = 0.5 * width * stretch, int(np.ceil((0.5 * width + MARGIN) * stretch))
+    half, reach = 0.5 * width * stretch, int(np.ceil((0.5 * width + STRIP_MARGIN) * stretch))
     centre = np.rint(ray.column + ray.slope * (row - ray.row)).astype(np.intp)
     offsets = np.arange(-reach, reach + 1)
     columns = centre[:, None] + offsets
@@ -62,7 +62,7 @@ def find_edges(image: np.ndarray, sign: float, ray: Ray, rows: Rows, width: floa
     )
     behind = np.where(offsets[None, :] < 0, beside[0][:, None], beside[1][:, None])
     share = (strength - behind) / np.maximum(inside[:, None] - behind, 1.0)
-    blur = int(np.ceil(BLUR * stretch))
+    blur = int(np.ceil(EDGE_BLUR * stretch))
     left = -_outward_edge(share[:, reach::-1], blur)
     right = _outward_edge(share[:, reach:], blur)
     mass, moment = _soft_mass(share, offsets)

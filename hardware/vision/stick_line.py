@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-HUBER = 1.5  # standard deviations up to which a row counts in full
-OUTLIER = 4.0
-ROUNDS = 12
+HUBER_SDS = 1.5  # standard deviations up to which a row counts in full
+OUTLIER_SDS = 4.0
+MAX_ROUNDS = 12
 LEAST_SPREAD = 1e-6  # normalised; below any camera's resolution
 LONGEST_CORRELATION = 24  # rows
 
@@ -47,18 +47,18 @@ def fit_line(points: np.ndarray) -> Line | None:
     y = y - middle
     slope, offset = _pairs_start(x, y)
     spread = 0.0
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         residual = x - offset - slope * y
         spread = max(1.4826 * float(np.median(np.abs(residual))), LEAST_SPREAD)
-        weight = np.minimum(1.0, HUBER * spread / np.maximum(np.abs(residual), 1e-12))
-        weight[np.abs(residual) > OUTLIER * spread] = 0.0
+        weight = np.minimum(1.0, HUBER_SDS * spread / np.maximum(np.abs(residual), 1e-12))
+        weight[np.abs(residual) > OUTLIER_SDS * spread] = 0.0
         update = _weighted(x, y, weight)
         moved = abs(update[0] - slope) + abs(update[1] - offset)
         slope, offset = update
         if moved < 1e-9:
             break
     residual = x - offset - slope * y
-    inlier = np.abs(residual) <= OUTLIER * spread
+    inlier = np.abs(residual) <= OUTLIER_SDS * spread
     variance = _variance(residual[inlier])
     y_in = y[inlier]
     slope_variance = variance / max(float(np.sum((y_in - y_in.mean()) ** 2)), 1e-12)

@@ -14,7 +14,7 @@ from scipy.special import gammaln, xlogy
 from scipy.stats import binom
 
 BISECTIONS = 30
-BOUNDED = 1e-9
+SMALLEST_LEVEL = 1e-9
 
 
 class Band(NamedTuple):
@@ -50,12 +50,12 @@ def band(n: int, draws: int, level: float) -> Band:
 def p_value(ranks: np.ndarray, draws: int) -> float:
     """Probability that uniform ranks stray at least as far as these do.
 
-    Exact; below `BOUNDED` per point the bound of Bonferroni, which costs nothing.
+    Exact; below `SMALLEST_LEVEL` per point the bound of Bonferroni, which costs nothing.
     """
     n = len(ranks)
     tails = _tails(n, draws)
     gamma = 2.0 * tails[np.arange(draws), counts_below(ranks, draws)].min()
-    if gamma < BOUNDED:
+    if gamma < SMALLEST_LEVEL:
         return draws * gamma
     # the region where every tail exceeds the observed one; equal tails differ by rounding
     return float(np.clip(1.0 - _inside(n, draws, gamma * (1.0 + 1e-9)), 0.0, 1.0))

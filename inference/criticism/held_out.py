@@ -9,7 +9,7 @@ from ..surrogates.output import MIN_SERIES
 from .experiment import Experiment
 from .hypothesis import samples
 from .measurement_noise import gaussian
-from .misfit import MODES, exceedance, orthonormal, slow_modes
+from .misfit import MODES_PER_CHANNEL, exceedance, orthonormal, slow_modes
 from .run_noise import errors_of, smooth_covariance
 from .simulate import Laboratory
 from .usual_residual import without_usual
@@ -101,7 +101,7 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
     runs = gaussian(rng, simulated, REPLICATES)
     null = experiment.noise.draw(rng, at, REPLICATES) + runs
     noise = measured.draw(rng, at, REPLICATES) + runs
-    modes = slow_modes(at, MODES) if series else np.eye(len(observed))
+    modes = slow_modes(at, MODES_PER_CHANNEL) if series else np.eye(len(observed))
     span = orthonormal(np.linalg.solve(factor, modes))
 
     def measures(rows: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from .measurement_noise import Noise, gaussian
 from .signatures import Signature, directions
 
 REPLICATES = 999  # of the parametric bootstrap
-MODES = 36  # of each channel: slower than these is what simulators get wrong
+MODES_PER_CHANNEL = 36  # of each channel: slower than these is what simulators get wrong
 WINDOW_MODES = 3
 
 
@@ -89,7 +89,7 @@ def check(hypothesis: Hypothesis, signatures: Mapping[str, Signature], null: np.
     """
     residual = hypothesis.project(hypothesis.whiten(hypothesis.difference))
     series = hypothesis.surrogate.output.series
-    modes = slow_modes(hypothesis.layout, MODES) if series else np.eye(len(residual))
+    modes = slow_modes(hypothesis.layout, MODES_PER_CHANNEL) if series else np.eye(len(residual))
     span = orthonormal(hypothesis.project(hypothesis.whiten(modes.T)))
     unused = directions(hypothesis, signatures)
     rows = np.stack(list(unused.values())) if unused else np.zeros((0, len(residual)))

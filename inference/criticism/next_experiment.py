@@ -9,7 +9,7 @@ import numpy as np
 from ..surrogates.output import MIN_SERIES
 from .experiment import Proposal
 from .hypothesis import samples
-from .misfit import MODES, orthonormal, slow_modes
+from .misfit import MODES_PER_CHANNEL, orthonormal, slow_modes
 from .run_noise import errors_of, smooth_covariance
 from .simulate import Laboratory
 from .verdict import Candidate
@@ -67,7 +67,7 @@ def _distance(proposal: Proposal, signals: Sequence[np.ndarray], a: int, b: int)
     runs = smooth_covariance(errors_of(signals), at, series)
     covariance = proposal.noise.covariance(at) + runs
     factor = np.linalg.cholesky(covariance)
-    modes = slow_modes(at, MODES) if series else np.eye(len(at.sample))
+    modes = slow_modes(at, MODES_PER_CHANNEL) if series else np.eye(len(at.sample))
     span = orthonormal(np.linalg.solve(factor, modes))
     difference = signals[a].mean(0) - signals[b].mean(0)
     length = np.sum((span.T @ np.linalg.solve(factor, difference)) ** 2)

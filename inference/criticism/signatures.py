@@ -9,9 +9,11 @@ from .._float64 import in_float64
 from .extension import Extension
 from .hypothesis import Hypothesis
 
-STEPS = np.array([0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7, 0.9])  # of prior quantiles
+QUANTILE_STEPS = np.array(
+    [0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7, 0.9]
+)  # of prior quantiles
 VISIBLE_SNR = 5.0  # signal-to-noise ratio at which a signature is taken
-FAINT_SHARE = 0.3  # share of its visible length below which what is left of a change means nothing
+FAINT_SHARE = 0.3  # a change shorter than this share of its visible length counts as none
 
 
 class Signature(NamedTuple):
@@ -47,7 +49,7 @@ def signature(base: Hypothesis, extended: Hypothesis, extension: Extension) -> S
     neutral = float(prior.to_unit({**at, name: np.asarray(extension.neutral)})[-1])
     units = {}
     for side in (-1, 1):
-        u = neutral + side * STEPS
+        u = neutral + side * QUANTILE_STEPS
         u = u[(u >= 0.01) & (u <= 0.99)]
         if len(u):
             changes = _changes(base, extended, neutral, u)

@@ -13,7 +13,7 @@ from .mixture import UNIFORMS, Mixture, propose
 from .mixture import log_density as log_mixture
 from .starts import look_around, resampled
 from .target import (
-    NOWHERE,
+    LOG_ZERO,
     Chains,
     Length,
     Target,
@@ -85,7 +85,7 @@ def _sampler(
         padded[: len(x)] = x
         values = _log_densities(target.log_likelihood, target.state, padded)
         values = np.asarray(values)[: len(x)]
-        return np.where(np.isfinite(values), values, NOWHERE)
+        return np.where(np.isfinite(values), values, LOG_ZERO)
 
     def jump(x: np.ndarray, random: Any) -> tuple[np.ndarray, np.ndarray]:
         uniforms = 1.0 - random.random_sample((len(x), UNIFORMS))

@@ -12,12 +12,14 @@ import jax.numpy as jnp
 import numpy as np
 
 COMPONENTS = 8
-FREEDOM = 6  # degrees of freedom, even: tails heavier than a posterior's, at little cost near it
+DEGREES_OF_FREEDOM = (
+    6  # degrees of freedom, even: tails heavier than a posterior's, at little cost near it
+)
 PRIOR_SHARE = 0.05
 EVEN_SHARE = 0.2  # share of the proposals spread evenly over the components, for small modes
 RESAMPLED_POINTS = 512
 EM_STEPS = 8  # of expectation maximisation
-UNIFORMS = FREEDOM // 2 + 2
+UNIFORMS = DEGREES_OF_FREEDOM // 2 + 2
 """Numbers, besides d normals, that make one draw."""
 
 
@@ -67,7 +69,9 @@ def propose(mixture: Mixture, z: jax.Array, uniforms: jax.Array) -> jax.Array:
     choice, half = uniforms[:, 0], uniforms[:, 1]
     # chi^2 of an even number of degrees is twice a sum of exponentials
     chi_square = -2.0 * jnp.sum(jnp.log(uniforms[:, 2:]), axis=-1)
-    scale = jnp.sqrt(FREEDOM / chi_square) * jnp.where(half < 0.5, 1.0, mixture.sharpness)
+    scale = jnp.sqrt(DEGREES_OF_FREEDOM / chi_square) * jnp.where(
+        half < 0.5, 1.0, mixture.sharpness
+    )
     within = (choice - PRIOR_SHARE) / (1.0 - PRIOR_SHARE)
     edges = jnp.cumsum(jnp.exp(mixture.log_share))[:-1]
     component = jnp.sum(within[:, None] > edges, axis=-1)
@@ -135,9 +139,9 @@ def _distances(mixture: Mixture, x: jax.Array) -> tuple[jax.Array, jax.Array]:
 
 def _log_student(square: jax.Array, d: int) -> jax.Array:
     """Log density of the standard multivariate t at squared distance `square`."""
-    constant = math.lgamma(0.5 * (FREEDOM + d)) - math.lgamma(0.5 * FREEDOM)
-    constant = constant - 0.5 * d * math.log(FREEDOM * math.pi)
-    return constant - 0.5 * (FREEDOM + d) * jnp.log1p(square / FREEDOM)
+    constant = math.lgamma(0.5 * (DEGREES_OF_FREEDOM + d)) - math.lgamma(0.5 * DEGREES_OF_FREEDOM)
+    constant = constant - 0.5 * d * math.log(DEGREES_OF_FREEDOM * math.pi)
+    return constant - 0.5 * (DEGREES_OF_FREEDOM + d) * jnp.log1p(square / DEGREES_OF_FREEDOM)
 
 
 def _cumulated(weights: jax.Array) -> jax.Array:

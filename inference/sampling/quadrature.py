@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .target import (
-    NOWHERE,
+    LOG_ZERO,
     NOWHERE_FINITE,
     Chains,
     Length,
@@ -96,7 +96,7 @@ def integrate(target: Target, budget: int = QUICK_BUDGET) -> Quadrature:
         )
     log_mass = cells.value + d * np.log(cells.width)
     top = log_mass.max()
-    if top <= 0.5 * NOWHERE:
+    if top <= 0.5 * LOG_ZERO:
         raise ValueError(NOWHERE_FINITE)
     mass = np.exp(log_mass - top)
     evidence = float(top + np.log(mass.sum()))
@@ -148,9 +148,9 @@ def _divided(target: Target, parents: _Cells) -> _Cells:
 
 
 def _finite(target: Target, u: np.ndarray) -> np.ndarray:
-    """Log likelihood [n] at u [n, d]; NOWHERE where it is not finite."""
+    """Log likelihood [n] at u [n, d]; LOG_ZERO where it is not finite."""
     values = log_likelihood(target, u)
-    return np.where(np.isfinite(values), values, NOWHERE)
+    return np.where(np.isfinite(values), values, LOG_ZERO)
 
 
 def draw(rng: np.random.Generator, cells: Quadrature, n: int) -> tuple[np.ndarray, np.ndarray]:

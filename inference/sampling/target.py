@@ -9,7 +9,7 @@ import numpy as np
 from ..types import LogLikelihood
 from .mixture import log_prior, to_unit
 
-NOWHERE = -1e300
+LOG_ZERO = -1e300
 """Log density in place of none: finite, so that differences of two are numbers."""
 NOWHERE_FINITE = (
     "the log likelihood is finite nowhere in the prior's box; nothing can be sampled. "

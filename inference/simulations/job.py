@@ -40,7 +40,7 @@ def simulation_seed(seed: int, index: int) -> int:
     return int(np.random.SeedSequence([seed, index]).generate_state(1)[0] >> 1)
 
 
-def jobs(theta: Mapping[str, np.ndarray], seeds: Sequence[int]) -> list[Job]:
+def jobs(theta: Mapping[str, np.ndarray], seeds: Sequence[int] | np.ndarray) -> list[Job]:
     """One job per seed, with the rows of theta (name -> [n or more]) in order."""
     return [
         Job({name: float(column[i]) for name, column in theta.items()}, int(seed))

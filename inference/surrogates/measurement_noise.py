@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-FACTORS = 16
+NOISE_FACTORS = 16
 CORRELATIONS = np.tanh([0.0, 0.3, 0.6, 0.9, 1.2, 1.6, 2.0, 2.5])  # of neighbouring samples
 SIZES = 2.0 ** np.arange(-3.0, 1.4, 1.0 / 3.0)  # sigma over the sd of the residual
 
@@ -21,7 +21,7 @@ MIN_SIZE = 1e-4  # of a residual, in units of the outputs' sd: data are never wi
 class Remainder(NamedTuple):
     """Covariance F F^T + white 1 of what the components leave of the simulations."""
 
-    factors: np.ndarray  # [m, FACTORS]
+    factors: np.ndarray  # [m, NOISE_FACTORS]
     white: float
 
     @property
@@ -68,7 +68,7 @@ def shrunk_covariance(residuals: np.ndarray, lost: int) -> Remainder:
         lost: Degrees of freedom that the components took from the n.
     """
     n, m = residuals.shape
-    factors = np.zeros((m, FACTORS))
+    factors = np.zeros((m, NOISE_FACTORS))
     freedom = n - lost
     values, left = np.linalg.eigh(residuals @ residuals.T)
     values = np.maximum(values, 0.0)
@@ -80,7 +80,7 @@ def shrunk_covariance(residuals: np.ndarray, lost: int) -> Remainder:
     # what the components took makes residuals smaller, and as good as fewer
     error = (np.sum(lengths**2) / n - np.sum((values / n) ** 2)) / n / m * (n / freedom) ** 3
     intensity = float(np.clip(error / spread, 0.0, 1.0)) if spread > 0 else 1.0
-    top = np.argsort(values)[::-1][:FACTORS]
+    top = np.argsort(values)[::-1][:NOISE_FACTORS]
     factors[:, : len(top)] = residuals.T @ left[:, top] * np.sqrt((1.0 - intensity) / freedom)
     return Remainder(factors, max(mean - np.sum(factors**2) / m, 0.0))
 

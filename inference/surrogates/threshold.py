@@ -35,12 +35,12 @@ class Predicted(NamedTuple):
 
 
 Threshold = str | float | Quantile | Predicted | None
-TAIL = -30.0
+TAIL_Z = -30.0
 RULES = ("min_mean", "min_observed")
-DEFAULT = Predicted(0.2)
+DEFAULT_THRESHOLD = Predicted(0.2)
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(12)
 LEGENDRE = np.polynomial.legendre.leggauss(12)
-NEAR = -4.0
+SERIES_Z = -4.0
 
 
 def log_likelihood(state: ThresholdState, u: jax.Array) -> jax.Array:
@@ -67,7 +67,7 @@ def log_second_moment(state: ThresholdState, u: jax.Array, spread: jax.Array | N
     likelihood (Jarvenpaa et al. 2019, MaxVar), or that part of it which further simulations
     will resolve (their expected integrated variance). Both are the chance that two variables
     of correlation r = spread / sigma^2 lie below z: Phi(z) - 2 T(z, sqrt((1 - r) / (1 + r))),
-    Owen's T by Gauss and Legendre; below NEAR, where that cancels,
+    Owen's T by Gauss and Legendre; below SERIES_Z, where that cancels,
     E_w[Phi((z + sqrt(r) w) / sqrt(1 - r))^2] by Gauss and Hermite about the integrand's peak.
     """
     z, noisy = _standardised(state, u)
@@ -80,15 +80,15 @@ def log_second_moment(state: ThresholdState, u: jax.Array, spread: jax.Array | N
     inside = 2.0 * log_cdf((z + jnp.sqrt(r) * w) / jnp.sqrt(1.0 - r)) + norm.logpdf(w)
     log_terms = inside - norm.logpdf(NODES) + jnp.log(width * WEIGHTS / jnp.sqrt(2.0 * jnp.pi))
     tail = logsumexp(log_terms, axis=1)
-    both = jnp.where(z[:, 0] > NEAR, _log_both(z[:, 0], r[:, 0]), tail)
+    both = jnp.where(z[:, 0] > SERIES_Z, _log_both(z[:, 0], r[:, 0]), tail)
     return logsumexp(both) - jnp.log(z.shape[0])
 
 
 def _log_both(z: jax.Array, r: jax.Array) -> jax.Array:
-    """Log chance that two standard normals of correlation r lie below z, for z > NEAR."""
+    """Log chance that two standard normals of correlation r lie below z, for z > SERIES_Z."""
     a = jnp.sqrt((1.0 - r) / (1.0 + r))[:, None]
     x = a * (LEGENDRE[0] + 1.0) / 2.0
-    near = jnp.maximum(z, NEAR)[:, None]
+    near = jnp.maximum(z, SERIES_Z)[:, None]
     integrand = jnp.exp(-0.5 * near**2 * (1.0 + x**2)) / (1.0 + x**2)
     owen = jnp.sum(LEGENDRE[1] * integrand * a / 2.0, axis=1) / (2.0 * jnp.pi)
     return jnp.log(jnp.maximum(norm.cdf(near[:, 0]) - 2.0 * owen, 1e-30))
@@ -107,14 +107,14 @@ def _log_cdf_jvp(
     """Slope phi / Phi.
 
     JAX's own exponentiates a difference of two numbers near z^2 / 2: wrong by a third at
-    z = -1e8, by any factor beyond. From TAIL on the asymptotic series is exact to 1e-10.
+    z = -1e8, by any factor beyond. From TAIL_Z on the asymptotic series is exact to 1e-10.
     """
     (z,), (tangent,) = primals, tangents
     value = log_cdf(z)
-    near, far = jnp.maximum(z, TAIL), jnp.minimum(z, TAIL)  # each finite in its unused branch
+    near, far = jnp.maximum(z, TAIL_Z), jnp.minimum(z, TAIL_Z)  # each finite in its unused branch
     inverse_square = (1.0 / far) ** 2
     series = 1.0 - inverse_square * (1.0 - inverse_square * (3.0 - 15.0 * inverse_square))
-    slope = jnp.where(z > TAIL, jnp.exp(norm.logpdf(near) - log_ndtr(near)), -far / series)
+    slope = jnp.where(z > TAIL_Z, jnp.exp(norm.logpdf(near) - log_ndtr(near)), -far / series)
     return value, slope * tangent
 
 
@@ -144,7 +144,7 @@ def choose_threshold(
     """The threshold on the transformed scale.
 
     Args:
-        rule: None is DEFAULT; Predicted(q), the q quantile of a new discrepancy at the
+        rule: None is DEFAULT_THRESHOLD; Predicted(q), the q quantile of a new discrepancy at the
             simulated point where the surrogate's mean is least; "min_mean", that mean, the same
             as Predicted(0.5) (Gutmann and Corander 2016); "min_observed", the smallest
             discrepancy so far; a Quantile of the discrepancies so far; or a number on the
@@ -158,7 +158,7 @@ def choose_threshold(
     Raises:
         ValueError: the transform is undefined at the given number.
     """
-    rule = DEFAULT if rule is None else Predicted(0.5) if rule == "min_mean" else rule
+    rule = DEFAULT_THRESHOLD if rule is None else Predicted(0.5) if rule == "min_mean" else rule
     if isinstance(rule, Predicted):
         mean, sd = at_minimum()
         return mean + sd * float(ndtri(rule.q))

@@ -2,10 +2,10 @@
 
 from ..effect import Effect
 
-PULL = 20.0  # m/s², towards the wall at adhesion 1, halfway through the kernel's support
-RUB = 3.0  # friction over pull
-CREEP = 0.015  # m/s, below which friction is viscous
-DAMPED = 0.5  # of critical damping, along the normal
+PULL_AT_ONE = 20.0  # m/s², towards the wall at adhesion 1, halfway through the kernel's support
+FRICTION_OVER_PULL = 3.0  # friction over pull
+CREEP_SPEED = 0.015  # m/s, below which friction is viscous
+DAMPING_RATIO = 0.5  # of critical damping, along the normal
 
 
 def _prior():
@@ -19,13 +19,13 @@ def _force():
 
     @ti.func
     def pull(a):
-        """Over `PULL` at the distance a h: linear up to a quarter, at most 1, and smooth at h."""
+        """Pull over `PULL_AT_ONE` at the distance a h: linear up to h/4, at most 1, smooth at h."""
         bump = a * ti.max(1.0 - a, 0.0)
         return ti.select(a < 0.25, 27.0 / 16.0 * ti.max(a, 0.0), 64.0 * bump * bump * bump)
 
     @ti.func
     def cling(scene: ti.template(), b, coefficient):  # type: ignore[valid-type]
-        damping = DAMPED * ti.sqrt(2.0 * PULL * coefficient / scene.h)
+        damping = DAMPING_RATIO * ti.sqrt(2.0 * PULL_AT_ONE * coefficient / scene.h)
         for i in range(scene.alive[b]):
             added = ti.Matrix.zero(ti.f32, 3, 3)
             for n in ti.static(range(scene.walls)):
@@ -33,12 +33,12 @@ def _force():
                 a = distance / scene.h
                 if share > 0.0 and a < 1.0:
                     t = 1.0 - a
-                    kick = share * scene.dt * PULL * coefficient * pull(a)
+                    kick = share * scene.dt * PULL_AT_ONE * coefficient * pull(a)
                     v = scene.velocity[b, i] - scene.wall_velocity[b, i]
                     slip = (v - v.dot(normal) * normal).norm()
                     across = normal.outer_product(normal)
                     along = ti.Matrix.identity(ti.f32, 3) - across
-                    added += RUB * kick / (slip + CREEP) * along
+                    added += FRICTION_OVER_PULL * kick / (slip + CREEP_SPEED) * along
                     added += share * scene.dt * damping * t * t * across
                     scene.velocity[b, i] = scene.velocity[b, i] - kick * normal
             scene.grip[b, i] = scene.grip[b, i] + added

@@ -2,7 +2,7 @@
 
 from ..effect import Effect
 
-ONSET = 1.0  # s, one over the shear rate at which thinning sets in
+ONSET_TIME = 1.0  # s, one over the shear rate at which thinning sets in
 
 
 def _prior():
@@ -17,7 +17,7 @@ def _rheology():
 
     @ti.func
     def thins(viscosity, shear_rate, time, coefficient):
-        x = ONSET * shear_rate
+        x = ONSET_TIME * shear_rate
         return viscosity * (1.0 + x * x) ** (-0.5 * coefficient)
 
     return thins

@@ -2,7 +2,9 @@
 
 from ..effect import Effect
 
-ROUNDING = 16.0  # of the attraction; with less, small drops are stiffer than their size says
+ROUNDING_OVER_ATTRACTION = (
+    16.0  # of the attraction; with less, small drops are stiffer than their size says
+)
 # tension over density, attraction and spacing²: with it drops swing at Rayleigh's frequency, see
 # tests/models/test_surface_tension.py; the square of what that test finds multiplies it
 UNIT_TENSION = 1.35
@@ -21,7 +23,7 @@ def _force():
     @ti.func
     def contract(scene: ti.template(), b, coefficient):  # type: ignore[valid-type]
         unit = UNIT_TENSION * scene.density[b] * scene.spacing * scene.spacing
-        scene.contract(b, coefficient / unit, ROUNDING * coefficient / unit)
+        scene.contract(b, coefficient / unit, ROUNDING_OVER_ATTRACTION * coefficient / unit)
 
     return contract
 

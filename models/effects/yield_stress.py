@@ -2,7 +2,7 @@
 
 from ..effect import Effect
 
-REGULARISED = 4.0  # s: below a shear rate of 1 / (4 s) the liquid creeps
+REGULARISATION_TIME = 4.0  # s: below a shear rate of 1 / (4 s) the liquid creeps
 
 
 def _prior():
@@ -18,11 +18,11 @@ def _rheology():
     @ti.func
     def yields(viscosity, shear_rate, time, coefficient):
         # 1 - exp(-x) loses its digits in float32 where the rate vanishes
-        x = REGULARISED * shear_rate
+        x = REGULARISATION_TIME * shear_rate
         share = 1.0 - 0.5 * x
         if x > 1e-3:
             share = (1.0 - ti.exp(-x)) / x
-        return viscosity + coefficient * REGULARISED * share
+        return viscosity + coefficient * REGULARISATION_TIME * share
 
     return yields
 

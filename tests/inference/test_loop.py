@@ -1,4 +1,4 @@
-"""The whole loop: budget, bank, what is told and what is refused."""
+"""The whole loop: budget, bank, progress, refused input."""
 
 import re
 import threading

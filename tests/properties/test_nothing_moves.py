@@ -16,7 +16,7 @@ import numpy as np
 import pexpect
 import pytest
 import typer.main
-from bolfi_liquids.hardware.session.confirmation import SENTENCE, Confirmation
+from bolfi_liquids.hardware.session.confirmation import CONFIRMATION, Confirmation
 from pexpect.fdpexpect import fdspawn
 
 import bolfi_liquids as bl
@@ -204,7 +204,7 @@ def test_unarmed_command_moves_nothing(words, rig_file, run_with_a_pour, boards,
     names = {"RUN": run_with_a_pour, "BOARDS": boards, "CALIBRATED": rig_file.parent / "c"}
     arguments = [names.get(one, one) for one in OF_A_RIG[words]]
     # the sentence is typed all the same
-    result = bolfi_liquids(*words.split(), *arguments, "--rig", rig_file, typed=f"{SENTENCE}\n")
+    result = bolfi_liquids(*words.split(), *arguments, "--rig", rig_file, typed=f"{CONFIRMATION}\n")
     assert "Traceback" not in result.stderr, result.stderr
     assert emulator.admin.motions() == before
     if words in ("record", "pour"):
@@ -218,14 +218,14 @@ def test_a_sentence_through_a_pipe_was_typed_by_nobody(
     before = emulator.admin.motions()
     extra = {"record": ["--out", tmp_path / "out"], "pour": [run_with_a_pour, "--execute"]}[words]
     command = [words, *extra, "--rig", rig_file, "--arm"]
-    result = bolfi_liquids(*command, typed=f"{SENTENCE}\n")
+    result = bolfi_liquids(*command, typed=f"{CONFIRMATION}\n")
     assert result.returncode == REFUSED, result.stderr
     # cameras that are files are refused even earlier
     assert ("no terminal" if words == "pour" else "name a device") in result.stderr
     assert emulator.admin.motions() == before
 
 
-@pytest.mark.parametrize("typed", ["", "yes", SENTENCE.upper()])
+@pytest.mark.parametrize("typed", ["", "yes", CONFIRMATION.upper()])
 @pytest.mark.parametrize("words", ["record", "pour"])
 def test_armed_without_the_sentence_moves_nothing(
     words, typed, rig_file, run_with_a_pour, emulator, tmp_path
@@ -259,7 +259,7 @@ def test_the_sentence_does_move_the_arm(whole, run_with_a_pour, tmp_path):
         command = ["pour", run_with_a_pour, "--execute", "--rig", path, "--arm"]
         motions = running.emulator.admin.motions
         until = None if whole else lambda: motions() > 0
-        status, said = in_a_terminal(*command, typed=SENTENCE, until=until)
+        status, said = in_a_terminal(*command, typed=CONFIRMATION, until=until)
         assert (status == 0) == whole, said
         assert motions() > 0
 
@@ -276,7 +276,7 @@ def test_python_asks_for_the_same(tmp_path):
             tmp_path / "c",
             armed=True,
             rehearsal=True,
-            confirmation=hardware.confirm("plan", SENTENCE, rig.robot.host),
+            confirmation=hardware.confirm("plan", CONFIRMATION, rig.robot.host),
         )
     with pytest.raises(TypeError, match="comes from confirm"):
         Confirmation(object(), "plan", "127.0.0.1", emulated=False)

@@ -4,7 +4,7 @@ import struct
 from collections.abc import Callable
 from typing import NamedTuple
 
-from ..registers import COUNT
+from ..registers import REGISTER_COUNT
 from ..snapshot import Snapshot
 from .wire import layout
 
@@ -69,11 +69,11 @@ FIELDS: dict[str, Field] = {
     "payload_inertia": Field("VECTOR6D", lambda _: _ZEROS, (5, 11)),
     **{
         f"output_int_register_{i}": Field("INT32", lambda s, i=i: s.output_ints[i : i + 1])
-        for i in range(COUNT)
+        for i in range(REGISTER_COUNT)
     },
     **{
         f"output_double_register_{i}": Field("DOUBLE", lambda s, i=i: s.output_doubles[i : i + 1])
-        for i in range(COUNT)
+        for i in range(REGISTER_COUNT)
     },
 }
 

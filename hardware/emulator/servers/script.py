@@ -4,7 +4,7 @@ from ..controller import Controller
 from ..script import take
 from .network import Connection
 
-LARGEST = 1 << 20  # bytes; a script without an end
+MAX_SCRIPT_SIZE = 1 << 20  # bytes; a script without an end
 
 
 class ScriptSession:
@@ -17,5 +17,5 @@ class ScriptSession:
     def received(self) -> None:
         while (text := take(self._connection.inbox)) is not None:
             self._controller.load(text)
-        if len(self._connection.inbox) > LARGEST:
+        if len(self._connection.inbox) > MAX_SCRIPT_SIZE:
             self._connection.closing = True

@@ -3,13 +3,13 @@
 import struct
 from typing import NamedTuple
 
-HEADER = struct.Struct(">HB")  # size with this header, type
-LARGEST = 0xFFFF
+PACKAGE_HEADER = struct.Struct(">HB")  # size with this header, type
+MAX_PACKAGE_SIZE = 0xFFFF
 
 VERSION, CONTROLLER, TEXT, DATA = b"VvMU"
 OUTPUTS, INPUTS, START, PAUSE = b"OISP"
 
-TYPES = {
+PACKAGE_TYPES = {
     "BOOL": "?",
     "UINT8": "B",
     "UINT32": "I",
@@ -34,7 +34,7 @@ class Package(NamedTuple):
 
 def pack(type: int, payload: bytes) -> bytes:
     """A package as it goes over the wire."""
-    return HEADER.pack(HEADER.size + len(payload), type) + payload
+    return PACKAGE_HEADER.pack(PACKAGE_HEADER.size + len(payload), type) + payload
 
 
 def take(buffer: bytearray) -> Package | None:
@@ -43,21 +43,21 @@ def take(buffer: bytearray) -> Package | None:
     Raises:
         WireError: The header gives a size that no package has.
     """
-    if len(buffer) < HEADER.size:
+    if len(buffer) < PACKAGE_HEADER.size:
         return None
-    size, kind = HEADER.unpack_from(buffer)
-    if size < HEADER.size:
+    size, kind = PACKAGE_HEADER.unpack_from(buffer)
+    if size < PACKAGE_HEADER.size:
         raise WireError(f"a package of {size} bytes is shorter than its header")
     if len(buffer) < size:
         return None
-    payload = bytes(buffer[HEADER.size : size])
+    payload = bytes(buffer[PACKAGE_HEADER.size : size])
     del buffer[:size]
     return Package(kind, payload)
 
 
 def layout(types: list[str]) -> struct.Struct:
     """Recipe number, then fields of these types."""
-    return struct.Struct(">B" + "".join(TYPES[kind] for kind in types))
+    return struct.Struct(">B" + "".join(PACKAGE_TYPES[kind] for kind in types))
 
 
 def names(payload: bytes) -> list[str]:

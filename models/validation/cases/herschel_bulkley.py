@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...effects.shear_thinning import ONSET
+from ...effects.shear_thinning import ONSET_TIME
 from ...fluid.liquid import Liquid
 from ..analysis.profiles import binned_profile
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
@@ -43,7 +43,7 @@ def truth(flow: Flow, z: np.ndarray) -> np.ndarray:
         )
 
     def carreau(rate: float) -> float:
-        return flow.viscosity * (1.0 + (ONSET * rate) ** 2) ** (-0.5 * flow.thinning)
+        return flow.viscosity * (1.0 + (ONSET_TIME * rate) ** 2) ** (-0.5 * flow.thinning)
 
     return generalised_channel(z, gap=gap, gradient=gradient, viscosity=carreau)
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from ...cups import Cups
 from ...fluid.liquid import Liquid
-from ...pouring import DRIP, PourAction, pour
+from ...pouring import DRIP_TIME, PourAction, pour
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from ..truths.surfaces import GRAVITY, jeffreys_volume
 
@@ -39,7 +39,7 @@ def film(viscosity: np.ndarray) -> np.ndarray:
     volume = jeffreys_volume(
         np.pi * source.radius,
         source.height,
-        CUPS.pour.hold + DRIP,
+        CUPS.pour.hold + DRIP_TIME,
         viscosity=viscosity,
         density=DENSITY,
         gravity=along,

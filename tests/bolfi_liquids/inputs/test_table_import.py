@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import bolfi_liquids as bl
-from bolfi_liquids.inputs.bundled import RECORDED, bundled_recording
+from bolfi_liquids.inputs.bundled import RECORDED_LIQUIDS, bundled_recording
 from bolfi_liquids.inputs.table_import import import_table, outline, write_template
 from bolfi_liquids.inputs.table_map import open_table_map
 
@@ -147,7 +147,7 @@ def test_a_map_that_cannot_be_right_is_named(tmp_path, written, old, new, says):
     assert not (tmp_path / "stir.nc").exists()
 
 
-@pytest.mark.parametrize("liquid", RECORDED)
+@pytest.mark.parametrize("liquid", RECORDED_LIQUIDS)
 def test_what_a_stick_does_is_not_warned_of(liquid):
     assert "warning" not in outline(bundled_recording(liquid))
 

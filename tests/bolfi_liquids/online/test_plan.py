@@ -5,8 +5,8 @@ import pytest
 from bolfi_liquids.hardware.motion import star
 
 from bolfi_liquids.online.plan import (
-    FARTHEST,
-    LATEST,
+    MAX_DELAY_CHANGE,
+    MAX_OFF_PLAN,
     SoFar,
     follow,
     planned,
@@ -55,7 +55,7 @@ def test_data_are_those_of_the_plan_up_to_the_last_finished_stroke(delay):
 def test_an_arm_that_gets_later_and_later_is_followed():
     """As one whose loop misses a period now and then."""
     late = 0.04
-    assert late * ENDS[8] > LATEST
+    assert late * ENDS[8] > MAX_DELAY_CHANGE
     seen = data(ENDS[8] + late * ENDS[8] + 0.2)
     time = seen.time / (1.0 + late)
     position = np.column_stack([np.interp(time, PLAN.time, x) for x in PATH.position.T])
@@ -82,7 +82,7 @@ def test_no_sample_falls_between_two_strokes():
     delay = 0.1
     seen = data(ENDS[2], delay=delay)
     away = (seen.time > ENDS[0]) & (seen.time < ENDS[0] + delay)
-    seen.position[away, 2] += 2.0 * FARTHEST
+    seen.position[away, 2] += 2.0 * MAX_OFF_PLAN
     assert "mm off its plan" in follow(PLAN, ENDS, seen).refusal
 
 
@@ -116,16 +116,16 @@ def test_what_the_cameras_missed_is_missing():
 @pytest.mark.parametrize(
     ("fault", "says"),
     [
-        ({"off": 1.2 * FARTHEST}, "mm off its plan"),
-        ({"delay": 1.2 * LATEST}, "the arm lost 240 ms on its plan"),
-        ({"delay": -1.2 * LATEST}, "the arm gained 240 ms on its plan"),
+        ({"off": 1.2 * MAX_OFF_PLAN}, "mm off its plan"),
+        ({"delay": 1.2 * MAX_DELAY_CHANGE}, "the arm lost 240 ms on its plan"),
+        ({"delay": -1.2 * MAX_DELAY_CHANGE}, "the arm gained 240 ms on its plan"),
     ],
 )
 def test_another_stir_is_refused(fault, says):
     assert says in follow(PLAN, ENDS, data(ENDS[2] + 0.1, **fault)).refusal
 
 
-@pytest.mark.parametrize("fault", [{"off": 0.7 * FARTHEST}, {"delay": 0.8 * LATEST}])
+@pytest.mark.parametrize("fault", [{"off": 0.7 * MAX_OFF_PLAN}, {"delay": 0.8 * MAX_DELAY_CHANGE}])
 def test_tracking_errors_are_not(fault):
     assert follow(PLAN, ENDS, data(ENDS[2] + 0.1, **fault)).refusal == ""
 

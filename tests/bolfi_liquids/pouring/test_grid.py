@@ -8,7 +8,7 @@ from bolfi_liquids import inference, models
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.pouring import spillage
-from bolfi_liquids.pouring.grid import FINE, GridSize, make_grid
+from bolfi_liquids.pouring.grid import FINE_GRID, GridSize, make_grid
 from bolfi_liquids.progress import silent
 from bolfi_liquids.reproduction.decisions import decide, execute
 from bolfi_liquids.reproduction.truths import draw_truths
@@ -22,7 +22,7 @@ def best_distance(viscosity):
 COARSE = GridSize(viscosities=5, cohesions=2, rates=4)
 
 
-@pytest.fixture(params=[FINE, COARSE], ids=["fine", "coarse"])
+@pytest.fixture(params=[FINE_GRID, COARSE], ids=["fine", "coarse"])
 def grid(request, monkeypatch):
     """Of made-up pours: linear in the log of the viscosity, whatever the angular velocity."""
 

@@ -7,7 +7,7 @@ from scipy.special import ndtr
 from bolfi_liquids import models
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.pouring.spillage import (
-    STEP,
+    DISTANCE_STEP,
     Outcomes,
     Profiles,
     landed,
@@ -45,7 +45,7 @@ def test_one_simulation_serves_every_distance():
 
 def test_a_step_is_blurred_as_a_normal_error_blurs_it():
     cups = bundled_cups()
-    edge = 0.03 + STEP / 2
+    edge = 0.03 + DISTANCE_STEP / 2
     blurred = surface(profiles_of(lambda rate, p: np.where(p < edge, 1.0, 0.0) + 0 * rate), cups)
     expected = ndtr((edge - blurred.distance) / landing_sd(cups))
     assert np.abs(blurred.spilled[0] - expected).max() < 0.01
@@ -58,7 +58,7 @@ def test_the_middle_of_where_nothing_is_spilled_is_taken():
     best = surface(
         profiles_of(lambda rate, p: np.where(np.abs(p - 0.04) < 0.015, 0.0, 1.0) + 0 * rate), cups
     ).least("mean")
-    assert best["distance"] == pytest.approx(0.04, abs=2 * STEP)
+    assert best["distance"] == pytest.approx(0.04, abs=2 * DISTANCE_STEP)
 
 
 def test_risks_choose_differently():
@@ -68,8 +68,8 @@ def test_risks_choose_differently():
     usual, rare = (np.repeat(made.fractions, n, axis=1) for n in (9, 1))
     rare[..., 0] = 0.2 + 20.0 * np.abs(made.distance - 0.05)
     tried = surface(made._replace(fractions=np.concatenate([usual, rare], axis=1)), cups)
-    assert tried.least("mean")["distance"] == pytest.approx(0.02, abs=3 * STEP)
-    assert tried.least("cvar")["distance"] == pytest.approx(0.05, abs=3 * STEP)
+    assert tried.least("mean")["distance"] == pytest.approx(0.02, abs=3 * DISTANCE_STEP)
+    assert tried.least("cvar")["distance"] == pytest.approx(0.05, abs=3 * DISTANCE_STEP)
 
 
 def test_a_shifted_landing_is_a_shifted_receiver():

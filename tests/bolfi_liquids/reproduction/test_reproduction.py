@@ -89,7 +89,7 @@ def test_a_sticky_truth_is_made_once(tmp_path):
     truth = sticky.draw_sticky(3, seed=0)
     assert truth == sticky.draw_sticky(3, seed=0) != sticky.draw_sticky(4, seed=0)
     recording = sticky.stirred(truth, 200, tmp_path / "stir.nc")
-    like = bundled_recording(sticky.LIKE)
+    like = bundled_recording(sticky.STICKY_LIQUID)
     np.testing.assert_array_equal(recording.gripper.position, like.gripper.position)
     # of the same path, so it leans alike, but no copy
     off = np.degrees(recording.inclination - like.inclination)

@@ -13,7 +13,7 @@ from bolfi_liquids import inference
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.pouring.spillage import Surface
 from bolfi_liquids.reproduction import figure_of_recordings, study
-from bolfi_liquids.reproduction.calibrations import DRAWS
+from bolfi_liquids.reproduction.calibrations import DRAWS_EACH
 from bolfi_liquids.reproduction.decisions import RULES
 from bolfi_liquids.reproduction.figure_of_strokes import strokes
 from bolfi_liquids.reproduction.figures_of_spillage import (
@@ -30,7 +30,9 @@ RATES, DISTANCES = np.array([1.0]), np.linspace(0.0, 0.07, 24)  # one: neighbour
 SUITED = np.linspace(-3.0, 1.5, 24)[None]  # log10 of the viscosity that an action suits
 BUDGETS = (10, 20)
 OFF = {"signal": 0.1, "discrepancy": -0.3, "pour": 0.6}  # log10, of what is concluded at N = 10
-SPREAD = np.r_[-0.8, np.full(DRAWS - 1, 0.8 / (DRAWS - 1))]  # a draw far off; their mean is right
+SPREAD = np.r_[
+    -0.8, np.full(DRAWS_EACH - 1, 0.8 / (DRAWS_EACH - 1))
+]  # a draw far off; their mean is right
 SCALE = Scale(repetitions=2, budgets=BUDGETS, strokes=(1, 3, 10))
 
 

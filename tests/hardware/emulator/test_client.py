@@ -12,7 +12,7 @@ from itertools import islice
 import numpy as np
 import pytest
 from bolfi_liquids.hardware.emulator import EmulatorProcess
-from bolfi_liquids.hardware.emulator.loop import LATE
+from bolfi_liquids.hardware.emulator.loop import MAX_LATENESS
 from bolfi_liquids.hardware.motion import kinematics, poses
 
 rtde_control = pytest.importorskip("rtde_control")
@@ -104,7 +104,9 @@ def test_both_generations_take_the_client(controller, arm, has_sensor):
         before = robot.receive.getTimestamp()
         first, *_, last = islice(robot.admin.stream(), 50)
         # both are of one tick, which is left out if it comes later than this
-        assert last.time - first.time == pytest.approx(last.host - first.host, abs=LATE + 0.01)
+        assert last.time - first.time == pytest.approx(
+            last.host - first.host, abs=MAX_LATENESS + 0.01
+        )
         assert wait_until(lambda: robot.receive.getTimestamp() >= before + 0.1)
         robot.release()
 

@@ -7,7 +7,7 @@ import pytest
 from bolfi_liquids.hardware.emulator.controller import MODELS
 from bolfi_liquids.hardware.host_clock import SteppedClock
 from bolfi_liquids.hardware.motion.kinematics import inverse
-from bolfi_liquids.hardware.robot.ur import FIELDS
+from bolfi_liquids.hardware.robot.ur import RTDE_FIELDS
 
 HOME = (0.3, -1.4, 1.6, -1.7, -1.5, 0.2)
 DT = 0.008
@@ -25,7 +25,7 @@ def emulator(step_emulator, clock):
 
 @pytest.fixture
 def receive(emulator):
-    return __import__("rtde_receive").RTDEReceiveInterface(emulator.address, 125.0, FIELDS)
+    return __import__("rtde_receive").RTDEReceiveInterface(emulator.address, 125.0, RTDE_FIELDS)
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ def move(control, clock, emulator, seconds):
 @pytest.mark.parametrize("kind", MODELS)
 def test_the_robot_s_clock_is_the_host_s(step_emulator, clock, kind):
     emulator = step_emulator(clock, controller=kind)
-    receive = __import__("rtde_receive").RTDEReceiveInterface(emulator.address, 125.0, FIELDS)
+    receive = __import__("rtde_receive").RTDEReceiveInterface(emulator.address, 125.0, RTDE_FIELDS)
     before, since = receive.getTimestamp(), clock.now()
     clock.sleep(10.0)
     assert receive.getTimestamp() - before == pytest.approx(clock.now() - since, abs=DT)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.motion import star
 from bolfi_liquids.hardware.motion.pour_paths import (
-    RAMP,
+    RAMP_SECONDS,
     UPRIGHT_RATE,
     approach_pour,
     pour_path,
@@ -154,7 +154,7 @@ def test_the_pour_turns_about_the_resting_lip_at_a_constant_rate(rig):
     rate = np.diff(tilt) * RATE
     assert tilt.max() == pytest.approx(2.3)
     steady = np.flatnonzero(rate > 1.5 * (1 - 1e-6))
-    assert len(steady) == pytest.approx((2.3 / 1.5 - RAMP) * RATE, abs=2)
+    assert len(steady) == pytest.approx((2.3 / 1.5 - RAMP_SECONDS) * RATE, abs=2)
     assert rate.max() <= 1.5 * (1 + 1e-6)
     assert -rate.min() <= UPRIGHT_RATE * (1 + 1e-6)
     assert (tilt > 2.3 - 1e-9).sum() / RATE == pytest.approx(1.0, abs=0.05)

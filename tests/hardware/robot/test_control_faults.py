@@ -1,4 +1,4 @@
-"""Each fault during a motion, on a stepped clock: the arm rests in time, for good, and why is told.
+"""Each fault during a motion, on a stepped clock: the arm comes to rest in time and says why.
 
 `test_faults` has those that kill or stop whole processes, with the real client and in real time.
 """

@@ -13,7 +13,7 @@ from bolfi_liquids.hardware.motion.stir_paths import insert, stir
 from bolfi_liquids.hardware.recorder.events import read_events
 from bolfi_liquids.hardware.recorder.sample import Sample
 from bolfi_liquids.hardware.rig_file import bundled_rig
-from bolfi_liquids.hardware.robot.control_loop import WATCHDOG, refused
+from bolfi_liquids.hardware.robot.control_loop import WATCHDOG_PERIOD, refused
 from bolfi_liquids.hardware.robot.control_process import run_control
 from bolfi_liquids.hardware.robot.course import Course, Leg, Trail, advanced, queued
 from bolfi_liquids.hardware.robot.inbox import Inbox, Vetting
@@ -91,9 +91,11 @@ def sample(index):
 
 def test_a_set_point_refused_after_a_stall_is_an_overrun():
     lost = "the connection to the controller is lost"
-    assert refused(lost, True, 0.5 * WATCHDOG) == Trip("link", lost)
-    assert refused(lost, False, 2.0 * WATCHDOG) == Trip("link", lost)
-    assert refused(lost, True, 2.0 * WATCHDOG).reason.startswith("overrun: this computer sent")
+    assert refused(lost, True, 0.5 * WATCHDOG_PERIOD) == Trip("link", lost)
+    assert refused(lost, False, 2.0 * WATCHDOG_PERIOD) == Trip("link", lost)
+    assert refused(lost, True, 2.0 * WATCHDOG_PERIOD).reason.startswith(
+        "overrun: this computer sent"
+    )
 
 
 def test_samples_are_handed_on_in_order_and_a_full_pipe_does_not_wait():

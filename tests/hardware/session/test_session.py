@@ -20,7 +20,7 @@ from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.safety.limits import workspace
 from bolfi_liquids.hardware.safety.preflight import failures
 from bolfi_liquids.hardware.session.confirmation import (
-    SENTENCE,
+    CONFIRMATION,
     Confirmation,
     confirm,
     confirm_emulated,
@@ -159,16 +159,16 @@ def test_nobody_is_armed_without_a_confirmation(tmp_path):
         SessionSetup(RIG, tmp_path, "127.0.0.9", armed=True)
     with pytest.raises(RigError, match="armed without a confirmation"):
         SessionSetup(RIG, tmp_path, "127.0.0.9", armed=True, confirmation="yes")  # type: ignore[arg-type]
-    leave = confirm("plan", SENTENCE, "127.0.0.8")
+    leave = confirm("plan", CONFIRMATION, "127.0.0.8")
     with pytest.raises(RigError, match="is for 127.0.0.8, the controller is at 127.0.0.9"):
         SessionSetup(RIG, tmp_path, "127.0.0.9", armed=True, confirmation=leave)
 
 
-@pytest.mark.parametrize("typed", ["", "y", "yes", SENTENCE.upper(), SENTENCE + "!"])
+@pytest.mark.parametrize("typed", ["", "y", "yes", CONFIRMATION.upper(), CONFIRMATION + "!"])
 def test_only_the_sentence_confirms(typed):
-    with pytest.raises(RigError, match=SENTENCE):
+    with pytest.raises(RigError, match=CONFIRMATION):
         confirm("plan", typed, "127.0.0.8")
-    assert confirm("plan", f" {SENTENCE}\n", "127.0.0.8").plan == "plan"
+    assert confirm("plan", f" {CONFIRMATION}\n", "127.0.0.8").plan == "plan"
     with pytest.raises(TypeError):
         Confirmation(object(), "plan", None)
 
