@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
+    Canvas = Axes | ArrayLike | Figure | None
+
 INK, GREY, LIGHT = "#1f2933", "#8a94a0", "#e4e7eb"
 BLUE, ORANGE = "#2463a6", "#d1591a"
 PALETTE = (BLUE, ORANGE, "#2d8659", "#8a4fa3", "#b8860b", "#5b6770")
@@ -73,25 +75,36 @@ class Panels(NamedTuple):
             self.grid.flat[0].legend(handles, labels)
 
 
+def given_or_shown(axes: "Canvas") -> "Canvas":
+    """`axes`; where they are None, an empty figure of pyplot's, which a notebook shows."""
+    import matplotlib.pyplot as plt
+
+    return plt.figure(layout="constrained") if axes is None else axes
+
+
 def panels(
-    axes: "Axes | ArrayLike | None",
+    axes: "Canvas",
     shape: tuple[int, int],
     size: tuple[float, float],
     **options: Any,
 ) -> Panels:
-    """The axes that a caller gives, or those of a new figure.
+    """The axes that a caller gives, or those of an empty figure.
 
     Args:
-        axes: One or several `matplotlib.axes.Axes`, row by row; None makes a figure.
+        axes: One or several `matplotlib.axes.Axes`, row by row, or an empty figure to make them
+            in; None makes a figure outside pyplot's global state.
         shape: Rows and columns of axes that the plot needs.
-        size: Width and height of a new figure [inch].
-        **options: Of `Figure.subplots`, for a new figure.
+        size: Width and height of the figure [inch], unless the axes are given.
+        **options: Of `Figure.subplots`, unless the axes are given.
 
     Raises:
         ValueError: The plot needs another number of axes than are given.
     """
-    if axes is None:
-        figure = new_figure(*size)
+    from matplotlib.figure import Figure
+
+    if axes is None or isinstance(axes, Figure):
+        figure = new_figure(*size) if axes is None else axes
+        figure.set_size_inches(size)
         return Panels(figure, figure.subplots(*shape, squeeze=False, **options), True)
     given = np.atleast_1d(np.asarray(axes, dtype=object))
     if given.size != shape[0] * shape[1]:

@@ -229,7 +229,7 @@ class Fit:
         if warn and made.found:
             warnings.warn(made.status, SamplingWarning, stacklevel=3)  # beyond `in_float64`
         seconds = {**self.seconds, "sampling": time.perf_counter() - started}
-        rng = np.random.default_rng([seed, 1])
+        rng = np.random.default_rng([seed, *b"prior"])
         drawn = self.prior.from_unit(rng.random((draws, len(self.prior))))
         tree = results_tree(self.prior, made.chains, drawn, self.observed, self.simulations)
         tree["posterior"].attrs.update(status=made.status, draws_made=made.steps, **made.checks)

@@ -1,6 +1,7 @@
 """Tests in which processes must keep time, on computers that may not; what JAX compiled is kept."""
 
 import os
+import sys
 import time
 from pathlib import Path
 from threading import Event, Thread
@@ -25,6 +26,13 @@ def pytest_configure(config):
     if hasattr(config, "cache"):
         os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(config.cache.mkdir("jax")))
         os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+
+
+@pytest.fixture(autouse=True)
+def _figures_are_closed():
+    yield
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")
 
 
 def pytest_runtest_protocol(item, nextitem):

@@ -19,8 +19,9 @@ from ..hover import Readout, series, to_chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from numpy.typing import ArrayLike
     from xarray import Dataset, DataTree
+
+    from ..drawing import Canvas
 
 PREDICTIVE_SHARE = 0.9
 """Share of the posterior predictions inside the band."""
@@ -35,14 +36,14 @@ def inclination_figure(tree: "DataTree") -> str:
         return to_chart(drawn.figure, "inclination", readouts)
 
 
-def draw_fit(tree: "DataTree", axes: "ArrayLike | None" = None) -> tuple[Panels, list[Readout]]:
+def draw_fit(tree: "DataTree", axes: "Canvas" = None) -> tuple[Panels, list[Readout]]:
     """Inclination against time: recorded, closest hypothesis and posterior prediction.
 
     One row of axes for each recording, one column for each plane.
 
     Args:
         tree: posterior.nc.
-        axes: Where to draw; None makes a figure.
+        axes: Where to draw, see `drawing.panels`.
     """
     recorded = tree["recorded"].to_dataset()
     members = np.unique(recorded["recording"])

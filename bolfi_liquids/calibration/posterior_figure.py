@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from xarray import Dataset, DataTree
 
+    from ..drawing import Canvas
+
 AXIS_LABELS = {"viscosity": "viscosity [Pa s]", "cohesion": "cohesion [dimensionless]"}
 LOGARITHMIC_PARAMETERS = ("viscosity",)
 
@@ -35,20 +37,22 @@ def posterior_figure(tree: "DataTree") -> str:
         return to_chart(drawn.figure, "posterior", [simulated])
 
 
-def draw_posterior(tree: "DataTree", ax: "Axes | None" = None) -> tuple[Panels, Readout]:
+def draw_posterior(tree: "DataTree", ax: "Canvas" = None) -> tuple[Panels, Readout]:
     """Contours of the joint posterior, in a figure of its own with marginals and the prior's.
 
     Args:
         tree: posterior.nc.
-        ax: Where to draw the contours alone; None makes a figure.
+        ax: Where to draw the contours alone; None or an empty figure: the marginals, too.
     """
+    from matplotlib.figure import Figure
+
     surface = tree["surface"].to_dataset()
     first, second = map(str, surface["log_posterior"].dims)
     posterior, coordinates = grid_density(surface)
     axes_of = dict(zip((first, second), coordinates, strict=True))
-    if ax is None:
+    if ax is None or isinstance(ax, Figure):
         ratios = {"width_ratios": (3, 1), "height_ratios": (1, 3)}
-        drawn = panels(None, (2, 2), (6.2, 4.8), sharex="col", sharey="row", gridspec_kw=ratios)
+        drawn = panels(ax, (2, 2), (6.2, 4.8), sharex="col", sharey="row", gridspec_kw=ratios)
         _draw_marginals(drawn, surface, posterior, axes_of)
     else:
         drawn = panels(ax, (1, 1), (4.6, 3.6))

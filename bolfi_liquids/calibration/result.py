@@ -113,11 +113,11 @@ class Calibration:
         Returns:
             The axes.
         """
-        from ..drawing import styled
+        from ..drawing import given_or_shown, styled
         from .fit_figures import draw_fit
 
         with styled():
-            return draw_fit(self.tree, axes)[0].grid
+            return draw_fit(self.tree, given_or_shown(axes))[0].grid
 
     def plot_posterior(self, ax: "Axes | None" = None) -> "NDArray[Any]":
         """Contours of the joint posterior; in a figure of its own with the marginals.
@@ -128,11 +128,11 @@ class Calibration:
         Returns:
             The axes.
         """
-        from ..drawing import styled
+        from ..drawing import given_or_shown, styled
         from .posterior_figure import draw_posterior
 
         with styled():
-            return draw_posterior(self.tree, ax)[0].grid
+            return draw_posterior(self.tree, given_or_shown(ax))[0].grid
 
     def plot_search(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Discrepancy of each simulation in turn, and the parameters that it tried.
@@ -143,11 +143,11 @@ class Calibration:
         Returns:
             The axes.
         """
-        from ..drawing import styled
+        from ..drawing import given_or_shown, styled
         from .search_figure import draw_search
 
         with styled():
-            return draw_search(self.tree, axes)[0].grid
+            return draw_search(self.tree, given_or_shown(axes))[0].grid
 
     def draws(self, count: int, seed: int = 0) -> dict[str, NDArray]:
         """A stratified sample of the posterior: parameter -> values, shape (count,)."""

@@ -19,8 +19,9 @@ from .posterior_figure import AXIS_LABELS, LOGARITHMIC_PARAMETERS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from numpy.typing import ArrayLike
     from xarray import Dataset, DataTree
+
+    from ..drawing import Canvas
 
 POSTERIOR_INTERVAL = 0.05, 0.95
 """Quantiles of the posterior between which the panels are shaded."""
@@ -33,14 +34,14 @@ def search_figure(tree: "DataTree") -> str:
         return to_chart(drawn.figure, "search", readouts)
 
 
-def draw_search(tree: "DataTree", axes: "ArrayLike | None" = None) -> tuple[Panels, list[Readout]]:
+def draw_search(tree: "DataTree", axes: "Canvas" = None) -> tuple[Panels, list[Readout]]:
     """Discrepancy of each simulation in turn with the least so far, and below it the parameters
     that it tried, before the posterior; the start design is hollow.
 
     Args:
         tree: posterior.nc.
-        axes: Where to draw, one for the discrepancy and one for each parameter; None makes a
-            figure.
+        axes: Where to draw, see `drawing.panels`; one for the discrepancy and one for each
+            parameter.
     """
     from matplotlib.ticker import MaxNLocator
 

@@ -12,6 +12,7 @@ from ..drawing import (
     INK,
     LIGHT,
     ORANGE,
+    Panels,
     panels,
     styled,
 )
@@ -20,9 +21,9 @@ from .verdict import EffectStatus
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from numpy.typing import ArrayLike
     from xarray import DataTree
+
+    from ..drawing import Canvas
 
 STATUS_GROUPS = {
     EffectStatus.NAMED: ("named", BLUE),
@@ -54,7 +55,7 @@ def any_fitted(node: "DataTree") -> bool:
     return bool(np.isfinite(node["effects/gain"]).any())
 
 
-def score_plot(node: "DataTree", axes: "ArrayLike | None" = None) -> "Figure":
+def score_plot(node: "DataTree", axes: "Canvas" = None) -> Panels:
     """What each effect alone gains when it is fitted (left), and its score before (right).
 
     Where no effect was fitted, there is no left side.
@@ -88,7 +89,7 @@ def score_plot(node: "DataTree", axes: "ArrayLike | None" = None) -> "Figure":
         right.set_xlabel("size of the score [sd]")
         left.set_yticks(range(len(names)), names)
         left.set_ylim(len(names) - 0.4, -0.6)
-    return drawn.figure
+    return drawn
 
 
 def _draw_gains(axes: "Axes", gain: NDArray, states: list[EffectStatus]) -> None:
@@ -109,7 +110,7 @@ def _draw_gains(axes: "Axes", gain: NDArray, states: list[EffectStatus]) -> None
     axes.set_xlabel("gain in log likelihood")
 
 
-def confusion_plot(node: "DataTree", axes: "ArrayLike | None" = None) -> "Figure":
+def confusion_plot(node: "DataTree", axes: "Canvas" = None) -> Panels:
     """Size of the cosine between each two effects' signatures.
 
     Args:
@@ -131,12 +132,10 @@ def confusion_plot(node: "DataTree", axes: "ArrayLike | None" = None) -> "Figure
         for (row, column), value in np.ndenumerate(cosine):
             colour, text = "white" if value > DARK_CELL else INK, f"{value:.2f}"
             panel.text(column, row, text, ha="center", va="center", color=colour, fontsize=8)
-    return drawn.figure
+    return drawn
 
 
-def coefficient_plot(
-    tree: "DataTree", names: Sequence[str], axes: "ArrayLike | None" = None
-) -> "Figure":
+def coefficient_plot(tree: "DataTree", names: Sequence[str], axes: "Canvas" = None) -> Panels:
     """Posterior of each coefficient, with its 90 % interval and what would be no effect.
 
     Args:
@@ -149,7 +148,7 @@ def coefficient_plot(
         for panel, name in zip(drawn.grid[0], names, strict=True):
             _draw_coefficient(panel, name, tree["posterior"][name].to_numpy().ravel())
         drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
-    return drawn.figure
+    return drawn
 
 
 def _draw_coefficient(axes: "Axes", name: str, draws: NDArray) -> None:

@@ -12,6 +12,7 @@ from ..drawing import (
     INK,
     LIGHT,
     ORANGE,
+    Panels,
     panels,
     styled,
 )
@@ -20,16 +21,16 @@ from ..words import spoken
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from numpy.typing import ArrayLike
     from xarray import Dataset, DataTree
+
+    from ..drawing import Canvas
 
 MODEL_STYLES = {"before": (ORANGE, "before"), "after": (BLUE, "with the missing effect")}
 BOTH_PLANES = "both planes"
 BAND_SD = 2.0  # half width of a band
 
 
-def residual_plot(node: "DataTree", axes: "ArrayLike | None" = None) -> "Figure":
+def residual_plot(node: "DataTree", axes: "Canvas" = None) -> Panels:
     """Observed less expected against time, a row for each recording, a column for each plane.
 
     Args:
@@ -53,7 +54,7 @@ def residual_plot(node: "DataTree", axes: "ArrayLike | None" = None) -> "Figure"
             if len(members) > 1:
                 row[0].set_title(f"{_recording(windows)}\n{planes[0]} plane", loc="left")
         drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
-    return drawn.figure
+    return drawn
 
 
 def _size(recordings: int) -> tuple[float, float]:
@@ -91,7 +92,7 @@ def _shade(axes: "Axes", strokes: "Dataset") -> None:
         )
 
 
-def stroke_plot(node: "DataTree", axes: "ArrayLike | None" = None) -> "Figure":
+def stroke_plot(node: "DataTree", axes: "Canvas" = None) -> Panels:
     """RMS of observed less expected, by stroke and plane and by the gripper's speed.
 
     Args:
@@ -115,7 +116,7 @@ def stroke_plot(node: "DataTree", axes: "ArrayLike | None" = None) -> "Figure":
                 title = row[0].get_title(loc="left")
                 row[0].set_title(f"{_recording(windows)}\n{title}", loc="left")
         drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
-    return drawn.figure
+    return drawn
 
 
 def _bars(residual: "Dataset", windows: "Dataset") -> Iterator[tuple[str, "Dataset", list[str]]]:
@@ -160,7 +161,7 @@ def _strokes(windows: "Dataset", plane: str) -> "Dataset":
     return windows.isel(window=np.flatnonzero(~by_speed & (windows["channel"] == plane).to_numpy()))
 
 
-def held_out_plot(node: "DataTree", axes: "ArrayLike | None" = None) -> "Figure":
+def held_out_plot(node: "DataTree", axes: "Canvas" = None) -> Panels:
     """RMS on recordings that were not fitted, against the RMS of noise.
 
     Args:
@@ -186,7 +187,7 @@ def held_out_plot(node: "DataTree", axes: "ArrayLike | None" = None) -> "Figure"
         handles, labels = panel.get_legend_handles_labels()
         once = dict(zip(labels, handles, strict=True))
         drawn.legend(list(once.values()), list(once), ncols=len(once))
-    return drawn.figure
+    return drawn
 
 
 HELD_OUT_MARKS = {
@@ -213,7 +214,7 @@ def _draw_held_out(axes: "Axes", at: int, values: Mapping[str, float]) -> None:
         )
 
 
-def pour_residual_plot(node: "DataTree", axes: "ArrayLike | None" = None) -> "Figure":
+def pour_residual_plot(node: "DataTree", axes: "Canvas" = None) -> Panels:
     """Observed against expected fractions of each pour, a panel for each outcome.
 
     Args:
@@ -230,7 +231,7 @@ def pour_residual_plot(node: "DataTree", axes: "ArrayLike | None" = None) -> "Fi
             panel.set_xlabel("expected [% of the liquid]")
         drawn.grid[0, 0].set_ylabel("observed [% of the liquid]")
         drawn.legend(*drawn.grid[0, 0].get_legend_handles_labels())
-    return drawn.figure
+    return drawn
 
 
 def _draw_pours(axes: "Axes", part: "Dataset") -> None:

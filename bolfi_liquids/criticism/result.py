@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..calibration.result import Calibration
 from ..calibration.tree import read_tree
+from ..drawing import given_or_shown
 from ..errors import InputError
 from ..run.directory import CRITICISM, CRITICISM_FORMAT, Run, run_path
 from ..run.summary import read_summary
@@ -16,8 +17,7 @@ from .summary import CriticismSummary
 from .verdict import Verdict
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
     from xarray import Dataset, DataTree
 
 
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 class Criticism:
     """A finished criticism; nothing here simulates.
 
-    The plots draw in `axes`, where they are given, or else in a figure of their own.
+    The plots draw in `axes`, or in a figure of their own. They return the axes, shape
+    (rows, columns).
 
     Attributes:
         base: The calibration that was criticised.
@@ -98,31 +99,33 @@ class Criticism:
         summary = replace(self.base.summary, best=self.summary.best)
         return replace(self.base, tree=tree, summary=summary)
 
-    def plot_residuals(self, axes: "ArrayLike | None" = None) -> "Figure":
+    def plot_residuals(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Observed less expected against time, before and after, strokes that differ marked."""
         from .figures import residual_plot
 
-        return residual_plot(self.tree.children["stirs"], axes)
+        return residual_plot(self.tree.children["stirs"], given_or_shown(axes)).grid
 
-    def plot_strokes(self, axes: "ArrayLike | None" = None) -> "Figure":
+    def plot_strokes(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Size of the difference by stroke, plane and speed, before and after."""
         from .figures import stroke_plot
 
-        return stroke_plot(self.tree.children["stirs"], axes)
+        return stroke_plot(self.tree.children["stirs"], given_or_shown(axes)).grid
 
-    def plot_scores(self, source: str = "stirs", axes: "ArrayLike | None" = None) -> "Figure":
+    def plot_scores(self, source: str = "stirs", axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """How well each effect alone would explain the difference."""
         from .effect_figures import score_plot
 
-        return score_plot(self.tree.children[source], axes)
+        return score_plot(self.tree.children[source], given_or_shown(axes)).grid
 
-    def plot_confusion(self, source: str = "stirs", axes: "ArrayLike | None" = None) -> "Figure":
+    def plot_confusion(
+        self, source: str = "stirs", axes: "ArrayLike | None" = None
+    ) -> "NDArray[Any]":
         """Which effects look alike in these data."""
         from .effect_figures import confusion_plot
 
-        return confusion_plot(self.tree.children[source], axes)
+        return confusion_plot(self.tree.children[source], given_or_shown(axes)).grid
 
-    def plot_coefficient(self, axes: "ArrayLike | None" = None) -> "Figure":
+    def plot_coefficient(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Posterior of the accepted effects' coefficients.
 
         Raises:
@@ -132,9 +135,9 @@ class Criticism:
 
         if not self.summary.accepted:
             raise ValueError("no effect was accepted, so there is no coefficient to plot")
-        return coefficient_plot(self.tree, self.summary.accepted, axes)
+        return coefficient_plot(self.tree, self.summary.accepted, given_or_shown(axes)).grid
 
-    def plot_held_out(self, axes: "ArrayLike | None" = None) -> "Figure":
+    def plot_held_out(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """RMS on recordings that were not fitted, before and after.
 
         Raises:
@@ -146,9 +149,9 @@ class Criticism:
             raise ValueError(
                 "no explanation was tested on held-out recordings; criticise the run with held_out"
             )
-        return held_out_plot(self.tree.children["stirs"], axes)
+        return held_out_plot(self.tree.children["stirs"], given_or_shown(axes)).grid
 
-    def plot_pours(self, axes: "ArrayLike | None" = None) -> "Figure":
+    def plot_pours(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Observed against expected fractions of each pour, before and after.
 
         Raises:
@@ -158,7 +161,7 @@ class Criticism:
 
         if "pours" not in self.tree.children:
             raise ValueError("no pours were criticised; criticise the run with pours")
-        return pour_residual_plot(self.tree.children["pours"], axes)
+        return pour_residual_plot(self.tree.children["pours"], given_or_shown(axes)).grid
 
 
 def is_criticised(run: Path) -> bool:

@@ -202,7 +202,7 @@ def warm_up(problem: Problem, spillage: SpillageMap) -> None:
         observed[part:] = np.nan
         followed = Followed(observed, 1, float(time_[part - 1]), 0.0, 0.0, "")
         estimate(problem, made, followed, spillage, 0.0)
-        proposals(problem, made, observed, n, problem.settings.batch)
+        proposals(problem, made, observed, n, problem.settings.in_flight)
 
 
 def _engine(problem: Problem, observed: NDArray, seed: int) -> "Bolfi":

@@ -136,7 +136,7 @@ class _Learner:
         from .estimate import proposals
 
         settings = self.request.settings
-        n = min(settings.batch, settings.budget - self.asked)
+        n = min(settings.in_flight, settings.budget - self.asked)
         if self.followed is not None and self.simulating and not self.flying and n > 0:
             observed = self.followed.observed
             self._send(proposals(self.problem, self.made, observed, self.asked, n))

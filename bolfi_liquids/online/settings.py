@@ -24,7 +24,7 @@ class OnlineSettings:
             the posterior is often wide, and sometimes wrong: nine see the cup from all sides.
         design: Simulations all over the prior, made before the robot moves.
         budget: Simulations in all.
-        batch: Simulations side by side while the robot stirs, each on a core of its own.
+        in_flight: Simulations made together while the robot stirs; each occupies a core.
         surrogate: "discrepancy", the paper's, or "signal", which emulates the inclination itself.
         particles: Number of particles of the simulated liquid.
         pours: Number of pours of the spillage map.
@@ -36,7 +36,7 @@ class OnlineSettings:
     least_strokes: Count = 9
     design: Simulations = 16
     budget: int = 48
-    batch: Count = 1
+    in_flight: Count = 1
     surrogate: Surrogate = "discrepancy"
     particles: Particles = 1000
     pours: Annotated[int, Field(ge=MIN_POURS)] = DEFAULT_POURS

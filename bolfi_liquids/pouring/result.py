@@ -106,11 +106,11 @@ class Pour:
         Returns:
             The axes.
         """
-        from ..drawing import panels, styled
+        from ..drawing import given_or_shown, panels, styled
         from .figures import draw_expected
 
         with styled():
-            drawn = panels(ax, (1, 1), (4.6, 3.6))
+            drawn = panels(given_or_shown(ax), (1, 1), (4.6, 3.6))
             axes = drawn.grid[0, 0]
             drawn.figure.colorbar(draw_expected(axes, read_pour(self.path)), ax=axes)
             drawn.legend(*axes.get_legend_handles_labels())

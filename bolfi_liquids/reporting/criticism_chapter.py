@@ -55,7 +55,7 @@ def criticism_chapter(
         calibrated: Of the calibration that was criticised.
     """
     stirs, accepted = tree.children["stirs"], summary.accepted
-    held, residual = held_out_of(stirs), residual_plot(stirs)
+    held, residual = held_out_of(stirs), residual_plot(stirs).figure
     return {
         "results": _results(summary, calibrated),
         "superseded": sentences.superseded_sentences(summary),
@@ -70,9 +70,11 @@ def criticism_chapter(
         "suggestion": sentences.suggestion_sentence(summary),
         "noise": sentences.camera_noise_sentence(summary),
         "residual": to_chart(residual, "residual", lines_of(residual)),
-        "strokes": to_svg(stroke_plot(stirs), "strokes"),
-        "coefficient": to_svg(coefficient_plot(tree, accepted), "coefficient") if accepted else "",
-        "held_out": "" if held is None else to_svg(held_out_plot(stirs), "held-out"),
+        "strokes": to_svg(stroke_plot(stirs).figure, "strokes"),
+        "coefficient": to_svg(coefficient_plot(tree, accepted).figure, "coefficient")
+        if accepted
+        else "",
+        "held_out": "" if held is None else to_svg(held_out_plot(stirs).figure, "held-out"),
         "held_rows": [] if held is None else _held_rows(held),
         "suggestions": _suggestion_rows(summary),
         "sources": [
@@ -131,9 +133,9 @@ def _effects_part(name: str, node: "DataTree") -> dict[str, Any]:
     effects, confusion = (node[group].to_dataset() for group in ("effects", "confusion"))
     return {
         "name": name,
-        "scores": to_svg(score_plot(node), f"scores-{name}"),
+        "scores": to_svg(score_plot(node).figure, f"scores-{name}"),
         "fitted": any_fitted(node),
-        "confusion": to_svg(confusion_plot(node), f"confusion-{name}"),
+        "confusion": to_svg(confusion_plot(node).figure, f"confusion-{name}"),
         "rows": [
             _effect_row(str(effect), effects.sel(effect=effect), confusion)
             for effect in effects["effect"].to_numpy()
@@ -174,7 +176,7 @@ def _pours_part(summary: CriticismSummary, tree: "DataTree") -> dict[str, Any] |
         return None
     return {
         "sentences": sentences.pours_sentences(summary.pours),
-        "figure": to_svg(pour_residual_plot(tree.children["pours"]), "pour-residual"),
+        "figure": to_svg(pour_residual_plot(tree.children["pours"]).figure, "pour-residual"),
     }
 
 

@@ -12,12 +12,6 @@ def fit(simulate, prior, observed):
     return inference.fit(simulate, prior, observed, budget=9, warn=False, progress=False, noise=0.0)
 
 
-@pytest.fixture(autouse=True)
-def _closed():
-    yield
-    plt.close("all")
-
-
 def test_the_search_is_drawn_round_by_round(fit):
     ax = plt.subplots()[1]
     assert fit.plot_search(ax) is ax

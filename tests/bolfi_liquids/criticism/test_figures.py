@@ -24,7 +24,7 @@ def panel(figure, title):
 
 def test_residuals_are_drawn_in_degrees_with_the_sure_stroke_shaded(made):
     tree = made()
-    figure = residual_plot(tree["stirs"])
+    figure = residual_plot(tree["stirs"]).figure
     assert len(figure.axes) == 4
     first = panel(figure, "xz plane")[0]
     part = tree["stirs/residual"].to_dataset().isel(frame=slice(0, 20), plane=0)
@@ -43,13 +43,13 @@ def test_residuals_are_drawn_in_degrees_with_the_sure_stroke_shaded(made):
 def test_without_an_extended_model_only_what_was_before_is_drawn(made):
     tree = made(after=False)
     for plot in (residual_plot, stroke_plot):
-        texts = drawn(plot(tree["stirs"]))
+        texts = drawn(plot(tree["stirs"]).figure)
         assert "before" in texts
         assert "with the missing effect" not in texts
 
 
 def test_strokes_are_bars_of_rms_in_degrees(made):
-    figure = stroke_plot(made()["stirs"])
+    figure = stroke_plot(made()["stirs"]).figure
     assert len(figure.axes) == 6
     for axes in figure.axes:
         heights = [patch.get_height() for patch in axes.patches]
@@ -59,7 +59,7 @@ def test_strokes_are_bars_of_rms_in_degrees(made):
 
 
 def test_effects_are_sorted_by_what_they_gain(made):
-    figure = score_plot(made()["stirs"])
+    figure = score_plot(made()["stirs"]).figure
     labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
     assert labels == ["camera delay", "stick mass", "gripper scale"]
     texts = drawn(figure)
@@ -68,7 +68,7 @@ def test_effects_are_sorted_by_what_they_gain(made):
 
 def test_effects_that_were_not_fitted_are_sorted_by_score(made):
     tree = made(status=["not needed"] * 3)
-    figure = score_plot(tree["stirs"])
+    figure = score_plot(tree["stirs"]).figure
     labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
     assert labels == ["camera delay", "gripper scale", "stick mass"]
     assert len(figure.axes) == 1  # no gains to show beside the scores
@@ -77,19 +77,19 @@ def test_effects_that_were_not_fitted_are_sorted_by_score(made):
 def test_an_effect_that_was_not_fitted_beside_others_says_so(made):
     tree = made(status=("named", "untested by a refit", "untested: its simulations failed"))
     tree["stirs/effects"]["gain"].values[1:] = np.nan
-    texts = drawn(score_plot(tree["stirs"]))
+    texts = drawn(score_plot(tree["stirs"]).figure)
     assert [text for text in texts if "not fitted" in text] == [" not fitted"] * 2
 
 
 def test_likeness_has_no_sign(made):
-    texts = drawn(confusion_plot(made()["stirs"]))
+    texts = drawn(confusion_plot(made()["stirs"]).figure)
     assert texts.count("0.90") == 2
     assert texts.count("1.00") == 3
     assert "camera delay" in texts
 
 
 def test_coefficient_is_drawn_in_its_unit_beside_no_effect(made):
-    figure = coefficient_plot(made(), ["camera_delay"])
+    figure = coefficient_plot(made(), ["camera_delay"]).figure
     texts = drawn(figure)
     assert {"camera delay [s]", "90 % interval", "no effect"} <= set(texts)
     (neutral,) = [line for line in figure.axes[0].get_lines() if line.get_label() == "no effect"]
@@ -103,18 +103,18 @@ def test_plots_of_what_there_is_not_say_how_to_get_it(criticism_summary, made):
     with pytest.raises(ValueError, match="pours"):
         missing.plot_pours()
     there = bl.Criticism(SimpleNamespace(), made(held=True, pours=True), criticism_summary)
-    assert "third.nc" in "".join(drawn(there.plot_held_out()))
-    assert "as expected" in drawn(there.plot_pours())
+    assert "third.nc" in "".join(drawn(there.plot_held_out().flat[0].figure))
+    assert "as expected" in drawn(there.plot_pours().flat[0].figure)
 
 
 @pytest.mark.parametrize("plot", ["residuals", "strokes", "scores", "confusion", "coefficient"])
 def test_plots_draw_in_the_axes_that_are_given(criticism_summary, made, plot):
     criticism = bl.Criticism(SimpleNamespace(), made(), criticism_summary)
-    alone = getattr(criticism, f"plot_{plot}")()
-    panels = [axes for axes in alone.axes if axes.get_label() != "<colorbar>"]
+    panels = getattr(criticism, f"plot_{plot}")().ravel()
     figure = new_figure(9.0, 6.0)
     given = figure.subplots(len(panels), 1, squeeze=False)
-    assert getattr(criticism, f"plot_{plot}")(axes=given) is figure
+    drawn = getattr(criticism, f"plot_{plot}")(axes=given)
+    assert [*drawn.flat] == [*given.flat]
     for axes, expected in zip(given.flat, panels, strict=True):
         assert axes.get_xlabel() == expected.get_xlabel()
         assert len(axes.get_lines()) == len(expected.get_lines())

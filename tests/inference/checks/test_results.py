@@ -139,7 +139,6 @@ def test_figures_show_every_quantity(made, tmp_path):
     with pytest.raises(ValueError, match="one for each of 3"):
         checks[0].histogram(axes[:2])
     figure.savefig(tmp_path / "f.png")
-    plt.close("all")
 
 
 def test_matplotlib_waits_until_a_figure_is_wanted():
