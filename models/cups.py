@@ -133,7 +133,7 @@ class Cups(_Section, frozen=True):
         return (self.liquid_volume / particles) ** (1.0 / 3.0)
 
     def least_viscosity(self, density: float, angular_velocity: float) -> float:
-        """Viscosity [Pa s] below which liquids of `density` [kg/m³] look alike in a pour; see
+        """Viscosity [Pa s] below which pours cannot distinguish liquids of `density` [kg/m³]; see
         `Numerics.least_viscosity`. The source's floor turns about the lip at the flow's speed."""
         speed = angular_velocity * self.source.height
         return Numerics().least_viscosity(self.spacing(), density, speed)

@@ -140,8 +140,8 @@ class StirSetup:
         return max(min(self.cup.height, MAX_FILL_RATIO * self.cup.fill), self.cup.fill)
 
     def least_viscosity(self, density: float, gripper: Trajectory) -> float:
-        """Viscosity [Pa s] below which liquids of `density` [kg/m³] look alike while the gripper
-        repeats its path; see `Numerics.least_viscosity`."""
+        """Viscosity [Pa s] below which this path of the gripper cannot distinguish liquids of
+        `density` [kg/m³]; see `Numerics.least_viscosity`."""
         return self.numerics.least_viscosity(self.spacing, density, mean_speed(gripper))
 
     def liquid_volume(self, fill: float | np.ndarray) -> Any:

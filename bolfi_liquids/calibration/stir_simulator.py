@@ -56,7 +56,7 @@ class Stirring(TimeLimited):
 
     @property
     def least_viscosity(self) -> float:
-        """Viscosity [Pa s] below which liquids look alike in all of the recordings."""
+        """Viscosity [Pa s] below which no recording distinguishes liquids."""
         return min(
             setup.least_viscosity(recording.number("liquid_density"), recording.gripper)
             for recording, setup in zip(self.recordings, self.setups, strict=True)

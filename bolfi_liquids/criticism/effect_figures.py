@@ -1,4 +1,4 @@
-"""Figures of effects: how well each explains, which look alike, how large one is."""
+"""Figures of effects: gain and score of each, cosines between signatures, coefficients."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING

@@ -120,7 +120,7 @@ class Criticism:
     def plot_confusion(
         self, source: str = "stirs", axes: "ArrayLike | None" = None
     ) -> "NDArray[Any]":
-        """Which effects look alike in these data."""
+        """Which effects these data cannot distinguish: cosines between their signatures."""
         from .effect_figures import confusion_plot
 
         return confusion_plot(self.tree.children[source], given_or_shown(axes)).grid

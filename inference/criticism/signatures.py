@@ -1,4 +1,4 @@
-"""What an effect looks like in the data, and which effects look alike."""
+"""Signatures: the change that each effect makes to the data, and the cosines between them."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
