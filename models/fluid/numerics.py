@@ -82,7 +82,7 @@ class Numerics:
         return max(radius - self.stick_thinner * spacing, 0.2 * radius)
 
     def least_viscosity(self, spacing: float, density: float, speed: float = 0.1) -> float:
-        """Viscosity [Pa s] below which particles flow alike, so that liquids cannot be distinguished.
+        """Viscosity [Pa s] below which particles flow alike, and liquids cannot be told apart.
 
         Measured without gravity in channels twelve particles wide (validation case `poiseuille`).
         It rises with speed, as particles that pass each other pick up disorder, and, beyond what

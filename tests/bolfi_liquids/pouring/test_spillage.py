@@ -84,5 +84,5 @@ def test_profiles_of_other_distances_are_others(monkeypatch):
     outcomes = Outcomes({}, 1000.0, bundled_cups(), np.zeros(1, int))
     before = outcomes.identity
     assert Outcomes({}, 1000.0, bundled_cups(), np.zeros(1, int)).identity == before
-    monkeypatch.setattr("bolfi_liquids.pouring.spillage.MISSED", 0.04)
+    monkeypatch.setattr("bolfi_liquids.pouring.spillage.LANDING_SD", 0.04)
     assert outcomes.identity != before
