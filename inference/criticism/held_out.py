@@ -17,9 +17,7 @@ from .verdict import ACCEPTANCE_LEVEL
 
 NOISE_QUANTILE = 0.99  # quantile of the noise's RMS below which a gap may be noise
 MAX_LEFT_SHARE = 0.5  # of a gap beyond noise that an explanation may leave, unless it may be noise
-MIN_LPD_GAIN = (
-    3.0  # log predictive density that an explanation must win on all held-out data together
-)
+MIN_LPD_GAIN = 3.0  # log predictive density to be won on all held-out data together
 REPLICATES = 999
 
 
@@ -56,7 +54,7 @@ class Gap(NamedTuple):
 
 
 def beyond(rms: float, noise: float) -> float:
-    """What of an RMS noise does not explain, in quadrature."""
+    """RMS in excess of noise, subtracted in quadrature."""
     return max(rms**2 - noise**2, 0.0) ** 0.5
 
 

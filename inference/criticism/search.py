@@ -21,7 +21,7 @@ from .measurement_noise import Noise
 from .misfit import Check, check, null_draws
 from .run_table import Runs, joined
 from .signatures import Signature, signature
-from .simulate import Laboratory
+from .simulate import AllRunsFailed, Laboratory
 from .verdict import Candidate, near_best
 
 REFIT_PASSES = 2  # of a refit, the second only if the first moved the best fit out of its box
@@ -61,7 +61,7 @@ class Study(NamedTuple):
 
     @property
     def seed(self) -> int:
-        return self.laboratory.keeping.seed
+        return self.laboratory.seed
 
     def hypothesis(self, names: tuple[str, ...], runs: Runs) -> Hypothesis:
         """The model in which the named effects act, fitted."""
@@ -100,7 +100,7 @@ class Base(NamedTuple):
 
 
 def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Box]:
-    """The base model, fitted to runs near where it fits best; they, and where they are."""
+    """Fit the base model near its optimum. Return the fit, its runs and their box."""
     dimension = len(study.laboratory.prior)
     everywhere = Box(np.zeros(dimension), np.ones(dimension))
     runs = study.run("start", everywhere, (), study.plan.start) if earlier is None else earlier
@@ -111,7 +111,11 @@ def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Box]
 
 
 def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
-    """Fit the base model, learn every effect's signature, test; and what could not be run."""
+    """Fit the base model, learn every effect's signature, and test the model.
+
+    Returns:
+        What was found, and the effects of which every simulation failed.
+    """
     laboratory, plan = study.laboratory, study.plan
     base, runs, box = fit_base(study, earlier)
     parts = [runs]
@@ -120,7 +124,7 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
         wide = with_coefficient(box)
         try:
             made = study.run(f"effect {name}", wide, (name,), plan.extension)
-        except RuntimeError:
+        except AllRunsFailed:
             untested.append(name)
             continue
         parts.append(made)
