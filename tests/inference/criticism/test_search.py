@@ -181,7 +181,7 @@ def test_other_held_out_data_change_no_fit(drifting, criticised):
 def test_held_out_data_that_the_explanation_fails_withdraw_it(drifting, criticised):
     """The other way round the drift makes all predictions worse."""
     again = criticised(experiment(drift=0.06), held_out=[held_out(drift=-0.06)])
-    assert again.verdict.kind == "unknown" and "held out" in again.verdict.reason
+    assert again.verdict.kind == "unknown"
     assert again.accepted == () and again.extended is None
     assert ("drift",) in again.refuted
     assert not again.singles["drift"].accepted
