@@ -35,7 +35,7 @@ def checked_array(name: str, value: object) -> np.ndarray:
         raise ValueError(f"{name} must be an array of numbers, got {value!r:.100}") from error
 
 
-def check_timeout(timeout: object) -> None:
+def check_timeout(timeout: float | None) -> None:
     """Raise ValueError unless `timeout` is a positive and finite number of seconds, or None."""
     number = isinstance(timeout, int | float) and not isinstance(timeout, bool)
     if timeout is not None and not (number and 0 < timeout < math.inf):
