@@ -59,8 +59,10 @@ def beyond(rms: float, noise: float) -> float:
 
 
 def holds(gaps: Sequence[Gap]) -> bool:
-    """Whether an explanation leaves no more than noise and what is usual anywhere, predicts better
-    on all data together, and explains most of the gap on them.
+    """Whether an explanation holds on held-out data.
+
+    It leaves no more than noise and the usual residual on each of them, predicts better on all of
+    them together, and explains most of the gap there.
 
     What is usual is no excuse for the gap, or a wrong explanation would hide behind it.
     """

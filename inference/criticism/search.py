@@ -1,4 +1,4 @@
-"""The search for what a model lacks."""
+"""The search for the effect that a model lacks."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -142,10 +142,13 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
 def explain(
     study: Study, base: Base, accept: Sequence[str] | None = None
 ) -> tuple[list[Candidate], list[Candidate]]:
-    """Every explanation by one effect, or by two where none suffices; and those that are accepted.
+    """Fit every explanation by one effect, and pairs of effects where no single one suffices.
 
     Args:
         accept: Effects that are refitted together, whatever their rank.
+
+    Returns:
+        All explanations, and the accepted ones.
     """
     plan, runs = study.plan, base.runs
     first = [study.candidate(base, single) for single in base.singles.values()]
@@ -167,8 +170,11 @@ def explain(
 def _refit(
     study: Study, base: Base, candidate: Candidate, runs: Runs, most: int | None
 ) -> tuple[Candidate, Runs]:
-    """The candidate, simulated where it fits best and fitted again, until it stays there or
-    more than `most` runs would be made."""
+    """Simulate a candidate near its optimum and fit it again.
+
+    That ends when the optimum lies in the box of the latest runs, after REFIT_PASSES passes, or
+    where more than `most` runs would be made.
+    """
     names = candidate.names
     for attempt in range(REFIT_PASSES):
         if most is not None and len(runs) - base.given + study.plan.refit > most:
@@ -185,7 +191,10 @@ def _refit(
 def _pairs(
     study: Study, base: Base, found: dict[tuple[str, ...], Candidate], runs: Runs
 ) -> tuple[list[Candidate], Runs]:
-    """The best effect with a second one; both must gain, and `found` learns how each does alone."""
+    """Fit the best effect with each other one; a pair counts if it gains more than either alone.
+
+    Single effects of an accepted pair are refitted in `found`.
+    """
     if not found:  # no effect could be simulated
         return [], runs
     best = max(found.values(), key=lambda c: c.gain)
