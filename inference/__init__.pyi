@@ -15,10 +15,12 @@ from .checks import shared_design as shared_design
 from .checks import tarp as tarp
 from .loop import fit as fit
 from .prior import Prior as Prior
+from .regression import Regression as Regression
 from .regression import regress as regress
 from .result import Fit as Fit
 from .sampling.convergence import SamplingWarning as SamplingWarning
 from .simulations.bank import SimulationBank as SimulationBank
+from .surrogates.base import Acquisition as Acquisition
 from .surrogates.families import DiscrepancyFamily as DiscrepancyFamily
 from .surrogates.families import SignalFamily as SignalFamily
 from .surrogates.squared_difference import squared_difference as squared_difference

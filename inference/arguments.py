@@ -1,5 +1,7 @@
 """Arguments as users give them: made what they should be, or refused by name."""
 
+import math
+
 import numpy as np
 
 LARGEST_INTEGER = 2**31 - 1  # that every random number generator takes as a seed
@@ -31,6 +33,21 @@ def checked_array(name: str, value: object) -> np.ndarray:
         return np.ma.filled(array.astype(np.float64), np.nan)  # what is masked is missing
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name} must be an array of numbers, got {value!r:.100}") from error
+
+
+def check_timeout(timeout: float | None) -> None:
+    """Raise ValueError unless `timeout` is a positive and finite number of seconds, or None."""
+    number = isinstance(timeout, int | float) and not isinstance(timeout, bool)
+    if timeout is not None and not (number and 0 < timeout < math.inf):
+        raise ValueError(f"timeout must be positive and finite [s], or None, got {timeout!r}")
+
+
+def check_progress(progress: object) -> None:
+    """Raise ValueError unless `progress` is True, False or a function."""
+    if not (isinstance(progress, bool) or callable(progress)):
+        raise ValueError(
+            f"progress must be True, False or a function of a count, got {progress!r:.100}"
+        )
 
 
 def check_text(name: str, value: object) -> None:

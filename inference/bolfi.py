@@ -336,13 +336,17 @@ def _resolve(given: str | Acquisition | None, family: Family) -> Acquisition:
 def _seeds(seeds: ArrayLike | None, n: int) -> np.ndarray:
     if seeds is None:
         return np.full(n, UNKNOWN)
+    refusal = f"seeds must be integers below 2^63, got {seeds!r:.100}"
     try:
-        array = np.asarray(seeds, np.int64)
+        array = np.asarray(seeds)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"seeds must be integers, got {seeds!r:.100}") from error
+        raise ValueError(refusal) from error
     if array.shape != (n,):
         raise ValueError(f"seeds must have shape ({n},), one per theta, got {array.shape}")
-    return array
+    # a float would lose its fraction, or as a large number its last digits
+    if array.dtype.kind not in "iu" or (array > np.iinfo(np.int64).max).any():
+        raise ValueError(refusal)
+    return array.astype(np.int64)
 
 
 def _errors(errors: Sequence[str] | None, n: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Text that says what a function or an option is, the same in every process that makes it anew."""
+"""Text descriptions of functions and options, identical in every process."""
 
 import hashlib
 import re

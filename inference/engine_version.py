@@ -1,4 +1,4 @@
-"""What a kept conclusion was made by."""
+"""Version of the engine, stored with results."""
 
 ENGINE_VERSION = "3"
 """Raised by a change of what the engine concludes from equal simulations."""

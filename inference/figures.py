@@ -8,7 +8,9 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-OBSERVED, CLOSEST, PREDICTED, GREY = "#1f2933", "#d1591a", "#2463a6", "#8a94a0"
+INK, GREY = "#1f2933", "#8a94a0"
+COLOURS = ("#2463a6", "#d1591a", "#2d8659", "#8a4fa3", "#b8860b", "#5b6770", "#c2185b", "#00838f")
+OBSERVED, CLOSEST, PREDICTED = INK, COLOURS[1], COLOURS[0]
 MAX_PANELS = 6  # channels of a signal that are drawn
 PREDICTIVE_QUANTILES = 0.05, 0.5, 0.95  # quantiles of the predictive distribution
 
@@ -39,7 +41,7 @@ def plot_search(rounds: np.ndarray, discrepancy: np.ndarray, ax: "Axes | None") 
     ax.set_xlabel("round")
     ax.set_ylabel("discrepancy")
     ax.legend(frameon=False, fontsize="small")
-    return _bare(ax)
+    return bare(ax)
 
 
 def plot_predictive(
@@ -75,7 +77,7 @@ def plot_predictive(
         if near is not None:
             ax.plot(index, near[j], color=CLOSEST, lw=1.2, label="closest simulation")
         ax.plot(index, values, ".", ms=3, color=OBSERVED, label="observed")
-        _bare(ax)
+        bare(ax)
     given[0].legend(frameon=False, fontsize="small")
     given[len(panels) - 1].set_xlabel("sample")
     return given[: len(panels)]
@@ -86,6 +88,9 @@ def _channels(output: np.ndarray) -> np.ndarray:
     return np.atleast_1d(output).reshape(len(np.atleast_1d(output)), -1).T
 
 
-def _bare(ax: "Axes") -> "Axes":
+def bare(ax: "Axes") -> "Axes":
+    """Axes with two spines, quiet ones."""
     ax.spines[["top", "right"]].set_visible(False)
+    ax.spines[["left", "bottom"]].set_color(GREY)
+    ax.tick_params(colors=INK, labelsize="small")
     return ax

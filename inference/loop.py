@@ -1,6 +1,5 @@
 """The usual loop: ask, simulate, store, tell."""
 
-import math
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
@@ -11,7 +10,14 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import check_function, check_text, checked_array, checked_integer
+from .arguments import (
+    check_function,
+    check_progress,
+    check_text,
+    check_timeout,
+    checked_array,
+    checked_integer,
+)
 from .bolfi import MIN_LEARN, Bolfi
 from .prior import Prior
 from .progress import progress_bar
@@ -43,7 +49,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
     timeout: float | None = None,
     earlier: tuple[Theta, ArrayLike] | tuple[Theta, ArrayLike, ArrayLike] | None = None,
     vectorised: bool = True,
-    in_rounds: bool = False,
+    in_rounds: bool = True,
     warn: bool = True,
     progress: bool | Callable[[int], object] = True,
     **options: Any,
@@ -56,11 +62,11 @@ def fit(  # noqa: PLR0913  the one call that most users make
     was finished and concludes the same, bit for bit, also after a crash; with a larger budget it
     goes on where it ended.
 
-    Without an executor, rounds of `batch` points are simulated in one call each. With one, every
-    simulation is a call of its own and `batch` of them are kept in flight: point i is asked as
-    soon as all up to i - batch have been told, while the others still run. Which points these
-    are depends on `batch`, but neither on the kind of executor nor on who finishes first.
-    `in_rounds` makes them the same as without an executor.
+    Rounds of `batch` points are asked together. Without an executor a round is simulated in one
+    call; with one, every simulation is a call of its own. With in_rounds=False `batch`
+    simulations are kept in flight instead: point i is asked as soon as all up to i - batch have
+    been told, while the others still run. Which points are simulated depends on `batch` and
+    `in_rounds`, but neither on the executor nor on what finishes first.
 
     Args:
         simulate: Callable (theta: name -> [b], seeds: [b]) -> signals [b, *signal_shape]; or,
@@ -85,15 +91,16 @@ def fit(  # noqa: PLR0913  the one call that most users make
             the signals for equal theta and seed must change it.
         timeout: Seconds that one simulation may take; a round in one call `batch` times as
             long, and if it fails its runs are tried one by one. `simulate` then runs in a
-            thread, which is abandoned, not stopped, when it is overdue: see `simulate.within`.
+            thread, which is abandoned, not stopped, when it is overdue: see `job.within`.
         earlier: Your own simulations (theta, signals) or (theta, signals, seeds), as
             `SimulationBank.simulations` returns them. They are learned from like the others,
             take the place of the start design's points, and count beside the budget, which may
             then be 0.
         vectorised: Whether `simulate` makes a batch of runs in one call; False calls it once
             for each run, such as `simulate({"a": 1.0}, seed)`.
-        in_rounds: Whether to ask whole rounds of an executor, too: it then simulates the same
-            points, and the fit has the same bits, as without an executor.
+        in_rounds: Whether points are asked a round at a time. False asks the next one as soon as
+            a simulation is told: an executor's workers then never wait for the slowest run of a
+            round, and other points are simulated than in rounds.
         warn: Whether each of the surrogate's complaints is raised as an `EmulatorWarning`;
             `Fit.warnings` holds them in any case.
         progress: Whether to show a bar on stderr; or a function that is called with 1 for each
@@ -113,7 +120,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
     """
     batch = checked_integer("batch", batch)
     budget = checked_integer("budget", budget, MIN_LEARN if earlier is None else 0)
-    _check_timeout(timeout)
+    check_timeout(timeout)
+    check_progress(progress)
     check_text("identity", identity)
     if budget:
         check_function("simulate", simulate)
@@ -140,13 +148,12 @@ def fit(  # noqa: PLR0913  the one call that most users make
     with ExitStack() as stack:
         if not isinstance(bank, SimulationBank):
             bank = stack.enter_context(SimulationBank(bank))
-        bar = stack.enter_context(progress_bar("simulations", budget, shown=progress is True))
-        advance = bar if isinstance(progress, bool) else progress
+        advance = stack.enter_context(progress_bar("simulations", budget, shown=progress))
         workers = stack.enter_context(open_executor(executor))
         simulator: Any = simulate if vectorised else OneByOne(cast(SingleSimulator, simulate))
         keep = Keep(bank, identity, batch, workers, timeout)
         runner = stack.enter_context(Runner(simulator, keep))
-        schedule = _in_rounds if workers is None or in_rounds else _in_flight
+        schedule = _in_rounds if in_rounds else _in_flight
         finished = schedule(engine, runner, budget, batch)
         seconds = 0.0
         for simulation in finished:
@@ -156,7 +163,6 @@ def fit(  # noqa: PLR0913  the one call that most users make
             raise RuntimeError(
                 f"{engine.succeeded} of {engine.told} simulations succeeded, copies counted once; "
                 f"{MIN_LEARN} are needed; the last error: {(engine.errors or ['none'])[-1]}. "
-                "Finished simulations are kept in "
                 f"{bank.where}; mend the cause, or raise budget, and repeat the call to go on "
                 "from there"
             )
@@ -219,9 +225,3 @@ def _length(earlier: Any) -> int:
             f"names to values, or None, got {earlier!r:.100}"
         )
     return len(np.atleast_1d(checked_array("earlier's signals", earlier[1])))
-
-
-def _check_timeout(timeout: float | None) -> None:
-    number = isinstance(timeout, int | float) and not isinstance(timeout, bool)
-    if timeout is not None and not (number and 0 < timeout < math.inf):
-        raise ValueError(f"timeout must be positive and finite [s], or None, got {timeout!r}")

@@ -16,9 +16,7 @@ from .types import Theta
 RESERVED = frozenset(
     {"chain", "draw", "simulation", "seed", "discrepancy", "failed", "error", "round", "signal"}
 )
-TAIL_QUANTILE = (
-    1e-12  # quantile at which an unbounded prior is cut, so that u = 0 and 1 stay finite
-)
+TAIL_QUANTILE = 1e-12  # at which an unbounded prior is cut, so that u = 0 and 1 stay finite
 
 
 class Prior:

@@ -3,20 +3,25 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-Advance = Callable[[int], None]
+Advance = Callable[[int], object]
 """Moves a bar on by so many steps."""
 
 
 @contextmanager
-def progress_bar(task: str, total: int, *, shown: bool, done: int = 0) -> Iterator[Advance]:
+def progress_bar(
+    task: str, total: int, *, shown: bool | Callable[[int], object], done: int = 0
+) -> Iterator[Advance]:
     """A bar that the yielded function moves on; one line only where there is no terminal.
 
     Args:
         task: What is being done, in a few words.
         total: Steps in all.
-        shown: False for silence.
+        shown: False for silence; a function is called with the steps instead.
         done: Steps made before.
     """
+    if not isinstance(shown, bool):
+        yield shown
+        return
     if not shown:
         yield lambda steps: None
         return

@@ -45,6 +45,9 @@ class SurrogateView:
         self.prior = prior
         self.learned = learned
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.prior}, {type(self.learned).__name__})"
+
     def predict(self, theta: Theta) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new simulation at theta, each [..., *its own axes].
 
@@ -67,7 +70,7 @@ def _shaped(rows: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     return array.reshape((*shape, *array.shape[1:]))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """Result of `fit` or `Bolfi.fit`; immutable.
 

@@ -15,7 +15,7 @@ LogLikelihood = Callable[[Any, "jax.Array"], "jax.Array"]
 """(state, u [d]) -> scalar. A module-level function, so that what it compiles to is cached."""
 
 LogSecondMoment = Callable[[Any, "jax.Array", Any], "jax.Array"]
-"""(state, u [d], spread [k] or None) -> scalar; see `acquisition`."""
+"""(state, u [d], spread [k] or None) -> scalar; see `signal_likelihood.log_second_moment`."""
 
 
 class Simulator(Protocol):

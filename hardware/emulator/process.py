@@ -14,7 +14,7 @@ from .admin_client import Admin
 from .servers.network import ADMIN, DASHBOARD, RTDE, SCRIPT
 
 START_TIMEOUT = 20.0  # s
-_TRIES = 20
+ADDRESS_TRIES = 20  # random addresses of which one must be free
 
 
 class EmulatorProcess:
@@ -129,12 +129,12 @@ def free_address() -> str:
     """An address on which none of the emulator's ports is taken just now."""
     # the system's own source: seeding `random` must not make two processes collide
     source = random.SystemRandom()
-    for _ in range(_TRIES):
+    for _ in range(ADDRESS_TRIES):
         address = ".".join(["127", *(str(source.randint(1, 254)) for _ in range(3))])
         if all(_is_free(address, port) for port in (RTDE, SCRIPT, DASHBOARD, ADMIN)):
             return address
     raise RigError(
-        f"no free address in 127.0.0.0/8 after {_TRIES} tries",
+        f"no free address in 127.0.0.0/8 after {ADDRESS_TRIES} tries",
         where="starting an emulator",
         fix="give one with address=",
     )

@@ -1,4 +1,4 @@
-"""What the controller knows at one tick; its servers tell it on."""
+"""The controller's state at one tick, as its servers publish it."""
 
 from typing import NamedTuple
 

@@ -42,9 +42,7 @@ from .outlet import Outlet
 from .preparation import Prepared, others
 from .ur import LOOKAHEAD, WATCHDOG_RATE, URArm
 
-SETTLING_PERIODS = (
-    3  # periods, until the controller's program listens again after an order that it answers
-)
+SETTLING_PERIODS = 3  # until the controller's program listens again after an order it answers
 CHECK_ROOM = 0.5  # of a period, that must be left of it for a slice of a path's check
 WATCHDOG_PERIOD = 1.0 / WATCHDOG_RATE  # s
 MOST_WAIT = 0.5  # of a period, for a package that is late

@@ -1,4 +1,4 @@
-"""Where the set-points have come to: paths that wait, the one that runs, and the latest ones."""
+"""Waiting paths, the running path and recent set-points."""
 
 from typing import NamedTuple
 

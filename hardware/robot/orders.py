@@ -1,4 +1,4 @@
-"""What main tells the control process, and what that answers."""
+"""Messages between the main process and the control process."""
 
 import hashlib
 from multiprocessing.connection import Connection

@@ -8,7 +8,7 @@ from ..recorder.sample import Sample
 
 SAMPLES_PER_MESSAGE = 5  # samples a message
 # what a pipe takes at once where it takes anything is 4096 bytes; a sample needs about 250
-MOST = 12
+MAX_SAMPLES_AT_ONCE = 12
 
 
 class Outlet:
@@ -39,7 +39,8 @@ class Outlet:
         while self._waiting and not self.gone:
             if not select.select([], [self._samples], [], 0.0)[1]:
                 return
-            batch = [self._waiting.popleft() for _ in range(min(MOST, len(self._waiting)))]
+            count = min(MAX_SAMPLES_AT_ONCE, len(self._waiting))
+            batch = [self._waiting.popleft() for _ in range(count)]
             try:
                 self._samples.send(batch)
             except OSError:

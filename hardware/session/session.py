@@ -87,8 +87,11 @@ class Session:
         """Make the directory and start the processes; the pre-flight list is then on its way.
 
         Raises:
+            SessionStopped: The session was started or closed before.
             RigError: The directory cannot be used, or the confirmation was used before.
         """
+        if self._log is not None or self.phase is not Phase.NEW:
+            raise SessionStopped("a session starts once; make a new one for another recording")
         self._log = self._begin_recording()
         self._processes = Processes(self.board, self._log, self._progress)
         atexit.register(self.close)

@@ -48,7 +48,7 @@ class SessionSetup:
     tool: Tool = "stirring"
     armed: bool = False
     confirmation: Confirmation | None = None
-    plan: Sequence[PosePath] = ()
+    plan: Sequence[PosePath] = field(default=(), repr=False)
     rehearsal: bool = False
     source: str = "robot"
 

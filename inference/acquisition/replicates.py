@@ -1,4 +1,4 @@
-"""When to simulate the same parameters again: the only direct word on run-to-run noise."""
+"""Replicates measure run-to-run noise directly."""
 
 import numpy as np
 

@@ -6,9 +6,7 @@ from typing import Any
 import numpy as np
 from arviz_stats.base.array import array_stats
 
-DRAW_SPACING = (
-    2  # autocorrelation times between kept draws; an AR(1) chain then keeps exp(-4) = 0.02
-)
+DRAW_SPACING = 2  # autocorrelation times between kept draws: an AR(1) chain keeps exp(-4) = 0.02
 MIN_DRAWS = 4  # draws per chain that an effective sample size can be estimated from
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 CONFIDENCE = 0.95  # of the intervals shown for each rate
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Coverage:
     """How many of R central intervals held the truth.
 
@@ -66,7 +66,7 @@ class Coverage:
 
     @property
     def warnings(self) -> list[str]:
-        """All that speaks against the pipeline, in sentences."""
+        """Warnings about the pipeline."""
         limit = self.alpha / self.p_values.size
         return self.replicates.warnings + [
             f"{name}: {level:.0%} intervals hold the truth in {self.rate[i, j]:.1%} (p = {p:.1g})"
@@ -116,9 +116,10 @@ class Coverage:
 
 def coverage(
     of: Replicates | Pipeline,
-    *data: Simulator | Prior | None,
+    simulate: Simulator | None = None,
+    prior: Prior | None = None,
+    *,
     levels: Sequence[float] = (0.5, 0.8, 0.9, 0.95),
-    conservative: bool = False,
     quantities: Mapping[str, Quantity] | None = None,
     alpha: float = 0.01,
     **run: Any,
@@ -132,13 +133,12 @@ def coverage(
 
     Args:
         of: Replicates, or a pipeline for which `replicates` makes them.
-        data: `simulate` and `prior` of `replicates`; only with a pipeline.
-        run: Further arguments of `replicates`, or these two by name.
+        simulate, prior, run: Arguments of `replicates`; only with a pipeline.
         levels: Nominal levels.
-        conservative: Only too little coverage is a fault, as for a posterior that is wide by
-            construction.
         quantities: Further functions (theta: name -> [n], observed) -> [n].
         alpha: False alarms of `ok`.
+        conservative: Given as True among `run`, only too little coverage is a fault, as for a
+            posterior that is wide by construction.
 
     Raises:
         ValueError: as `replicates`; none finished; a level outside (0, 1).
@@ -146,8 +146,8 @@ def coverage(
     nominal = np.array(levels, np.float64)
     if nominal.ndim != 1 or nominal.size == 0 or not ((nominal > 0) & (nominal < 1)).all():
         raise ValueError(f"levels must lie between 0 and 1, got {levels}")
-    run |= zip(("simulate", "prior"), data, strict=False)
-    made = made_or_given(of, run.pop("simulate", None), run.pop("prior", None), run)
+    conservative = bool(run.pop("conservative", False))
+    made = made_or_given(of, simulate, prior, run)
     values = made.values(quantities)
     quantiles = made.quantiles(values)
     covered = np.sum(2 * np.abs(quantiles - 0.5) <= nominal[:, None, None], axis=1)

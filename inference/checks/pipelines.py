@@ -1,28 +1,59 @@
 """The engine as a pipeline, with simulations of its own or with a design that is shared."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from inspect import signature
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import xarray as xr
 
-from ..arguments import check_function, checked_integer
+from ..arguments import check_function, check_progress, checked_integer
 from ..bolfi import MIN_LEARN, Bolfi
 from ..loop import fit
 from ..prior import Prior
+from ..progress import progress_bar
+from ..result import Fit
 from ..simulations.bank import SimulationBank
 from ..simulations.executors import Workers, open_executor
-from ..simulations.job import jobs, simulation_seed, stacked
-from ..simulations.runner import Keep, run_missing
+from ..simulations.job import BATCH, OneByOne, jobs, simulation_seed, stacked
+from ..simulations.runner import Keep, check_keep, run_missing
 from ..sobol import sobol
 from ..surrogates.families import resolve
-from ..types import Simulator
+from ..types import Simulator, SingleSimulator
 from .replicate import LogDensity
 
 Options = Mapping[str, Any]
+
+OF_PIPELINE = {"simulate", "prior", "observed", "budget", "seed"}  # what a pipeline gives itself
+
+
+def _check_options(function: Callable[..., object], options: Options, sampling: Options) -> None:
+    """Raise ValueError for options that `function`, `fit` or `Bolfi`, or `Fit.sample` refuses."""
+    known = signature(function).parameters
+    of_family = {name: value for name, value in options.items() if name not in known}
+    resolve(options.get("surrogate"), of_family)
+    _check_names("options", options, set(known) | set(of_family))
+    _check_names("sampling", sampling, set(signature(Fit.sample).parameters))
+
+
+def _check_names(which: str, given: Options, known: set[str]) -> None:
+    allowed = known - OF_PIPELINE - {"self", "options"}
+    wrong = [name for name in given if name not in allowed]
+    if wrong:
+        raise ValueError(f"{which} must be among {sorted(allowed)}, got {wrong}")
+
+
+def _batched(
+    simulate: Simulator | SingleSimulator, options: Options
+) -> tuple[Simulator, dict[str, Any]]:
+    """A simulator of batches, and the options without `vectorised`, which says what was given."""
+    others = dict(options)
+    if others.pop("vectorised", True):
+        return cast(Simulator, simulate), others
+    return OneByOne(cast(SingleSimulator, simulate)), others
 
 
 @dataclass(frozen=True)
@@ -30,27 +61,31 @@ class FitPipeline:
     """`fit` and `Fit.sample` on each set of data, with new simulations each time.
 
     Attributes:
-        simulate, prior: See `fit`.
+        simulate, prior: See `fit`. With "vectorised": False among the options, `simulate` becomes
+            the simulator of batches that calls the given one for each run.
         budget: Simulations per set of data.
-        options: Other options of `fit`, such as {"surrogate": "signal"}.
+        options: Other options of `fit`, such as {"surrogate": "signal", "timeout": 60}.
         sampling: Options of `Fit.sample`, such as {"chains": 2, "draws": 250}.
         warn: Whether a replicate's complaints are raised as warnings.
+
+    Raises:
+        ValueError: something given with which every replicate would fail.
     """
 
-    simulate: Simulator
+    simulate: Simulator | SingleSimulator
     prior: Prior
     budget: int = 40
     options: Options = field(default_factory=dict)
     sampling: Options = field(default_factory=dict)
-    warn: bool = True
+    warn: bool = field(default=True, compare=False)
 
     def __post_init__(self) -> None:
-        """Raise ValueError where every replicate would."""
         check_function("simulate", self.simulate)
         checked_integer("budget", self.budget, MIN_LEARN)
-        loop = signature(fit).parameters
-        of_family = {name: value for name, value in self.options.items() if name not in loop}
-        resolve(self.options.get("surrogate"), of_family)
+        _check_options(fit, self.options, self.sampling)
+        simulate, options = _batched(self.simulate, self.options)
+        object.__setattr__(self, "simulate", simulate)
+        object.__setattr__(self, "options", options)
 
     def __call__(self, observed: np.ndarray, seed: int) -> tuple[xr.DataTree, LogDensity]:
         options = {"progress": False, "warn": self.warn, **self.options}
@@ -59,7 +94,7 @@ class FitPipeline:
         return made.sample(seed=seed, **sampling), made.log_prob
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class SharedDesign:
     """One set of simulations that serves every set of data; see `shared_design`.
 
@@ -81,7 +116,7 @@ class SharedDesign:
     seeds: np.ndarray
     options: Options = field(default_factory=dict)
     sampling: Options = field(default_factory=dict)
-    warn: bool = True
+    warn: bool = field(default=True, compare=False)
 
     def __repr__(self) -> str:
         n, *shape = self.signals.shape
@@ -96,17 +131,20 @@ class SharedDesign:
 
 
 def shared_design(  # noqa: PLR0913  one flat place for what defines a design
-    simulate: Simulator,
+    simulate: Simulator | SingleSimulator,
     prior: Prior,
     n: int = 40,
     *,
+    batch: int = BATCH,
     seed: int = 0,
     options: Options | None = None,
     sampling: Options | None = None,
     executor: Workers | None = None,
-    bank: str | Path = ":memory:",
+    bank: str | Path | SimulationBank = ":memory:",
     identity: str = "",
+    timeout: float | None = None,
     warn: bool = True,
+    progress: bool | Callable[[int], object] = True,
 ) -> SharedDesign:
     """A pipeline whose n simulations are made here, once, for all replicates.
 
@@ -115,35 +153,39 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
     replicates cost n simulations and one for each set of data.
 
     Args:
-        simulate, prior, executor, bank, identity: See `fit`.
+        simulate, prior, executor, bank, identity, timeout, progress: See `fit`.
         n: Simulations, at least three.
+        batch: Simulations in one call, and stored together, where there is no executor.
         seed: Fixes the points and the simulations' seeds.
-        options: Of `Bolfi`, such as {"surrogate": "signal"}.
+        options: Of `Bolfi`, such as {"surrogate": "signal"}; and "vectorised", see `fit`.
         sampling: Of `Fit.sample`, such as {"chains": 2, "draws": 250}.
         warn: Whether a replicate's complaints are raised as warnings.
 
     Raises:
-        RuntimeError: fewer than three simulations succeeded.
+        ValueError: bad argument.
+        RuntimeError: fewer than three simulations succeeded, or the executor lost its workers.
+        ImportError, ConnectionError: Dask is not installed, or does not answer.
     """
+    check_function("simulate", simulate)
     n, seed = checked_integer("n", n, MIN_LEARN), checked_integer("seed", seed, 0)
+    check_keep(checked_integer("batch", batch), timeout)
+    check_progress(progress)
+    batched, options = _batched(simulate, options or {})
+    _check_options(Bolfi, options, sampling or {})
     theta = prior.from_unit(sobol(seed, 0, n, len(prior)))
     seeds = [simulation_seed(seed, i) for i in range(n)]
-    with SimulationBank(bank) as kept, open_executor(executor) as workers:
-        keep = Keep(kept, identity, executor=workers)
-        made = run_missing(simulate, jobs(theta, seeds), keep)
+    with ExitStack() as stack:
+        if not isinstance(bank, SimulationBank):
+            bank = stack.enter_context(SimulationBank(bank))
+        workers = stack.enter_context(open_executor(executor))
+        advance = stack.enter_context(progress_bar("simulations", n, shown=progress))
+        keep = Keep(bank, identity, batch, workers, timeout)
+        made = run_missing(batched, jobs(theta, seeds), keep, advance=advance)
     good = sum(result.signal is not None for result in made)
     if good < MIN_LEARN:
         first = next((result.error for result in made if result.error), "none")
         raise RuntimeError(
             f"{good} of {n} simulations succeeded, {MIN_LEARN} are needed; the first error: {first}"
         )
-    return SharedDesign(
-        simulate,
-        prior,
-        prior.to_array(theta),
-        stacked(made),
-        np.array(seeds),
-        options or {},
-        sampling or {},
-        warn,
-    )
+    design = prior.to_array(theta), stacked(made), np.array(seeds)
+    return SharedDesign(batched, prior, *design, options, sampling or {}, warn)

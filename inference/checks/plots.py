@@ -8,14 +8,14 @@ import numpy as np
 from matplotlib.ticker import PercentFormatter
 from scipy.stats import binom
 
+from ..figures import COLOURS, GREY, INK, bare
 from . import bands
 from .ranks import bin_count
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-INK, GREY, BAND = "#1f2933", "#8a94a0", "#e4e7eb"
-COLOURS = ("#2463a6", "#d1591a", "#2d8659", "#8a4fa3", "#b8860b", "#5b6770", "#c2185b", "#00838f")
+BAND = "#e4e7eb"
 SIZE = (5.2, 3.9)  # inch
 LEGEND_BELOW: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16), "ncols": 3}
 COVERAGE_LEVELS = 100  # at which a coverage curve is drawn
@@ -86,7 +86,7 @@ def plot_histograms(
         ax.set_ylim(0.0, 1.15 * max(counts.max(), high))
         ax.set_title(name, color=INK)
         ax.set_xlabel("rank, as a fraction")
-        _bare(ax)
+        bare(ax)
     panels[0].set_ylabel(f"replicates of {n}")
     return panels[:q]
 
@@ -169,11 +169,4 @@ def _closed(values: np.ndarray, last: float) -> np.ndarray:
 
 def _finish(ax: "Axes", **place: Any) -> "Axes":
     ax.legend(**place, frameon=False, fontsize="small", labelcolor=INK)
-    return _bare(ax)
-
-
-def _bare(ax: "Axes") -> "Axes":
-    ax.spines[["top", "right"]].set_visible(False)
-    ax.spines[["left", "bottom"]].set_color(GREY)
-    ax.tick_params(colors=INK, labelsize="small")
-    return ax
+    return bare(ax)

@@ -23,7 +23,7 @@ BOOTSTRAPS = 1000
 CONFIDENCE = 0.95  # of the bootstrap band
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tarp:
     """Expected coverage probability against credibility.
 
@@ -57,7 +57,7 @@ class Tarp:
 
     @property
     def warnings(self) -> list[str]:
-        """All that speaks against the pipeline, in sentences."""
+        """Warnings about the pipeline."""
         said = self.replicates.warnings
         p = min(self.ecdf, self.kolmogorov_smirnov)
         if p < self.alpha / 2:

@@ -1,6 +1,6 @@
 """Running a pipeline many times on data whose truth is known."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, as_completed
 from contextlib import ExitStack
 from pathlib import Path
@@ -8,7 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import check_callable, check_function, checked_integer
+from ..arguments import (
+    check_callable,
+    check_function,
+    check_progress,
+    check_timeout,
+    checked_integer,
+)
 from ..describe import describe
 from ..prior import Prior
 from ..progress import progress_bar
@@ -34,8 +40,9 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
     executor: Workers | None = None,
     store: str | Path = ":memory:",
     identity: str = "",
+    timeout: float | None = None,
     retry: bool = False,
-    progress: bool = True,
+    progress: bool | Callable[[int], object] = True,
 ) -> Replicates:
     """Draw parameters from the prior, simulate data, run the pipeline on them; n times.
 
@@ -59,8 +66,12 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
             on where the last one ended, also after a crash.
         identity: Names what the store cannot see: anything in the code that would change the
             draws must change it.
+        timeout: Seconds that simulating the data of one replicate may take; one that takes longer
+            has failed. What a pipeline simulates itself has a limit of its own, such as
+            `FitPipeline(..., options={"timeout": 60})`.
         retry: Run again what failed before and is in the store with its error.
-        progress: Whether to show a bar on stderr.
+        progress: Whether to show a bar on stderr; or a function that is called with 1 for each
+            replicate.
 
     Raises:
         ValueError: bad argument; a store made with other settings; a simulator or pipeline
@@ -71,13 +82,14 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
     prior = _own(pipeline, "prior", prior)
     check_function("simulate", simulator)
     check_callable("observe", observe)
+    check_timeout(timeout)
+    check_progress(progress)
     if not isinstance(prior, Prior):
         raise ValueError(f"prior must be a Prior, got {type(prior).__name__}")
     n, seed = checked_integer("n", n), checked_integer("seed", seed, 0)
     draws = checked_integer("draws", draws)
-    plan = Plan(pipeline, simulator, observe, prior.names, seed, draws, independent)
-    settings = {field: describe(value) for field, value in plan._asdict().items()}
-    settings |= {"prior": describe(prior), "identity": identity}
+    plan = Plan(pipeline, simulator, observe, prior.names, seed, draws, independent, timeout)
+    settings = _settings(plan, prior) | {"identity": identity}
     truths = _truths(prior, n, seed)
     with ExitStack() as stack:
         workers = stack.enter_context(open_executor(executor))
@@ -117,6 +129,13 @@ def made_or_given(
             f"got {[*run] or 'simulate or prior'}"
         )
     return of
+
+
+def _settings(plan: Plan, prior: Prior) -> dict[str, str]:
+    """All that a replicate's draws depend on, as text."""
+    given = plan._asdict()
+    del given["timeout"]
+    return {name: describe(value) for name, value in {**given, "prior": prior}.items()}
 
 
 def _truths(prior: Prior, n: int, seed: int) -> np.ndarray:

@@ -6,6 +6,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ..simulations.failures import timed_out
+from ..simulations.job import Overdue, limit_of, within
 from ..types import Simulator
 from .draws import effective_size, posterior_array, thin
 
@@ -41,6 +43,7 @@ class Plan(NamedTuple):
     seed: int
     draws: int
     independent: bool
+    timeout: float | None = None  # s, that simulating the data of one replicate may take
 
 
 class Replicate(NamedTuple):
@@ -84,6 +87,8 @@ def run_replicate(plan: Plan, number: int, truth: np.ndarray) -> Replicate:
 
     try:
         signals = _simulated(plan, number, truth)
+    except Overdue:
+        return failed("simulator", timed_out(plan.timeout or 0.0))
     except FAILURES as error:  # whatever the user's code raises costs this replicate only
         return failed("simulator", f"{type(error).__name__}: {error}")
     if signals.shape[:1] != (1,):
@@ -117,7 +122,11 @@ def run_replicate(plan: Plan, number: int, truth: np.ndarray) -> Replicate:
 def _simulated(plan: Plan, number: int, truth: np.ndarray) -> np.ndarray:
     theta = {name: truth[j : j + 1] for j, name in enumerate(plan.names)}
     seeds = np.array([_seed(plan.seed, number, SIMULATOR)], np.int64)
-    return np.asarray(plan.simulate(theta, seeds), np.float64)
+    return within(
+        plan.timeout,
+        lambda: np.asarray(plan.simulate(theta, seeds), np.float64),
+        limit_of(plan.simulate),
+    )
 
 
 def _observed(plan: Plan, number: int, signal: np.ndarray) -> np.ndarray:

@@ -21,7 +21,7 @@ Values = dict[str, tuple[np.ndarray, np.ndarray]]
 """Quantity -> (its value at the truths [R], at the draws [R, L] with NaN after the last)."""
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Replicates:
     """What a pipeline concluded from data whose truth is known; R finished replicates.
 

@@ -21,6 +21,7 @@ CREATE TABLE IF NOT EXISTS replicate (
     error     TEXT
 );
 """
+FORMAT = {"format": "2"}  # of the settings' texts; stores of version 0.1 have none
 ARRAYS = ("truth", "observed", "draws", "log_density")
 
 
@@ -44,7 +45,7 @@ class ReplicateStore:
         self.path = str(path)
         self._connection = opened_database(path, MARK, SCHEMA, "replicate store")
         try:
-            self._agree_on(dict(settings))
+            self._agree_on({**settings, **FORMAT})
         except BaseException:
             self._connection.close()
             raise
@@ -100,12 +101,15 @@ def _from_row(
 
 
 def _difference(path: str, stored: Mapping[str, str], settings: Mapping[str, str]) -> str:
+    """Why a store is refused."""
+    if stored.get("format") != settings["format"]:
+        return f"{path} was made by version 0.1, whose replicates differ; choose another file"
     unlike = [
         f"{name}: stored {json.dumps(stored.get(name))}, now {json.dumps(settings.get(name))}"
         for name in sorted(set(stored) | set(settings))
         if stored.get(name) != settings.get(name)
     ]
     return (
-        f"{path} holds replicates made with other settings or by another version "
+        f"{path} holds replicates made with other settings "
         f"({'; '.join(unlike)}); restore these, or choose another file"
     )

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 NAMED_SHAPE_Z = 3.0  # standard errors from which a shape of the ranks is named
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SBC:
     """Ranks of R truths among their draws, and how well they agree with uniform ones.
 
@@ -50,7 +50,7 @@ class SBC:
 
     @property
     def warnings(self) -> list[str]:
-        """All that speaks against the pipeline, in sentences."""
+        """Warnings about the pipeline."""
         limit = self.alpha / (2 * len(self.names))
         least = np.minimum(self.chi_square, self.ecdf)
         return self.replicates.warnings + [

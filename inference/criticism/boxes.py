@@ -8,11 +8,9 @@ from ..prior import Prior
 from ..sobol import sobol
 
 MIN_POSTERIOR_SDS = 10.0  # posterior sds: narrower boxes make slopes of noise (errors in variables)
-FIRST_HALF_WIDTH, LATER_HALF_WIDTH, MAX_HALF_WIDTH = (
-    0.25,
-    0.08,
-    0.5,
-)  # half a box's width: to begin with, later, and at most
+FIRST_HALF_WIDTH = 0.25  # half a box's width to begin with
+LATER_HALF_WIDTH = 0.08  # later
+MAX_HALF_WIDTH = 0.5  # at most
 PRIOR_END = 0.02  # quantile of a coefficient's prior beyond which nothing is simulated
 
 

@@ -1,4 +1,4 @@
-"""What a simulator leaves of data that are believed to lack nothing."""
+"""Residual of the base model on clean data."""
 
 import numpy as np
 
@@ -17,11 +17,14 @@ def own_residual(
     """Observed less the calibrated base model's expectation [*signal_shape], NaN where missing.
 
     Raises:
-        RuntimeError: every simulation failed.
+        RuntimeError: every simulation failed, or the executor lost its workers.
     """
-    laboratory = Laboratory(experiment.simulate, prior, extensions, experiment.identity, keeping)
-    study = Study(laboratory, experiment.observed, experiment.noise, plan)
-    best = fit_base(study, None)[0].best
-    at_best = {name: np.full(CLEAN_RUNS, value) for name, value in best.items()}
-    mean = laboratory.run("repeat", at_best).signals.mean(0)
+    with keeping.opened(experiment.identity) as keep:
+        laboratory = Laboratory(
+            experiment.simulate, prior, extensions, keep, keeping.seed, keeping.report
+        )
+        study = Study(laboratory, experiment.observed, experiment.noise, plan)
+        best = fit_base(study, None)[0].best
+        at_best = {name: np.full(CLEAN_RUNS, value) for name, value in best.items()}
+        mean = laboratory.run("repeat", at_best).signals.mean(0)
     return experiment.observed - mean

@@ -16,8 +16,8 @@ def scored_on_clean(
 ) -> dict[str, Signature]:
     """Signatures with the size of their scores on clean data of the same experiment, at least 1.
 
-    Each clean residual is scored by what the others teach, or it would excuse itself; alone, it
-    says nothing. Scores of either sign count: what errs one way on one liquid may err the other
+    Each clean residual is scored with the other residuals only; a single residual is not scored.
+    Scores of either sign count: what errs one way on one liquid may err the other
     way on another. With K of them the mean square is that of K + 1 scores, one of which is 1.
     """
     usual = usual_in(noise)

@@ -1,8 +1,9 @@
-"""Find where a calibrated simulator and data disagree, name what it lacks, and prove it."""
+"""Find where a calibrated simulator and data disagree, and which effect explains it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from .usual_residual import without_usual
 from .verdict import REJECTION_LEVEL, Candidate, Verdict, VerdictKind, conclude, tied
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Criticism:
     """What was found.
 
@@ -78,7 +79,7 @@ class Criticism:
         ]
         suggested = [str(one.label) for one in self.suggestions[:1]]
         return [
-            ("verdict", f"{self.verdict.kind.value}. {self.verdict.reason}"),
+            ("verdict", self.verdict.reason),
             ("next", self.verdict.kind.advice),
             ("accepted", ", ".join(self.accepted) or "none"),
             *sizes,
@@ -103,8 +104,12 @@ class Criticism:
         return tuple(one.names for one in self.candidates if one.passes and not one.held)
 
     def holds(self, names: tuple[str, ...]) -> bool:
-        """Whether an explanation holds on the held-out data, see `gaps`."""
-        return holds(self.gaps[names])
+        """Whether an explanation holds on the held-out data, see `gaps`; True without such data.
+
+        Raises:
+            KeyError: there are held-out data, and it was not compared with them.
+        """
+        return holds(self.gaps[names]) if self.gaps else True
 
     @property
     def leading(self) -> Candidate | None:
@@ -158,13 +163,15 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         accept: Effects to accept, whatever the verdict; None accepts what the verdict names.
         level: p-value below which the base model is rejected.
         plan: How many runs each step may make.
-        keeping: Where runs are kept and how they are made; it also holds the seed of everything
-            random. None forgets them.
+        keeping: Where runs are kept and how they are made: bank, executor, timeout and the seed
+            of everything random. None is `Keeping()`, which forgets the runs.
 
     Raises:
         ValueError: an argument makes no sense, a held-out experiment is the fitted one, or the
             bank would confuse two experiments.
-        RuntimeError: every simulation of a phase failed.
+        RuntimeError: every simulation of a phase failed, or the executor lost its workers. An
+            effect that could not be simulated at all is in `Criticism.untested` instead.
+        ImportError, ConnectionError: Dask is not installed, or does not answer.
     """
     check_extensions(prior, extensions)
     _check_held_out(experiment, held_out)
@@ -178,54 +185,72 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         count += finished
         kept.report(phase, finished)
 
-    seed, counting = kept.seed, replace(kept, report=counted)
-    laboratory = Laboratory(experiment.simulate, prior, extensions, experiment.identity, counting)
-    study = Study(laboratory, experiment.observed, experiment.noise, plan or Plan())
-    before = None if earlier is None else laboratory.table(*earlier)
-    base, untested = examine(study, before)
-    candidates, members, gaps = [], [], {}
-    if accept is not None or base.check.p_value < level:
-        candidates, members = explain(study, base, accept)
-        chosen = {c.names: c for c in [*members, _among(candidates, accept)] if c}
-        gaps = _gaps(study, base, list(chosen.values()), held_out)
-        candidates = [replace(c, held=holds(gaps.get(c.names, ()))) for c in candidates]
-        members = [_judged(member, gaps) for member in members]
-    verdict = conclude(base.check, members, level)
+    with kept.opened(experiment.identity) as keep:
+        laboratory = Laboratory(experiment.simulate, prior, extensions, keep, kept.seed, counted)
+        study = Study(laboratory, experiment.observed, experiment.noise, plan or Plan())
+        base, untested = examine(study, None if earlier is None else laboratory.table(*earlier))
+        tried = Tried([], [], {})
+        if accept is not None or base.check.p_value < level:
+            tried = _try(study, base, accept, held_out)
+        verdict = conclude(base.check, tried.members, level)
+        suggestions = suggest(laboratory, proposals, _rivals(verdict, tried))
     accepted = tuple(accept) if accept is not None else _named(verdict)
-    leading = _among(candidates, accepted)
+    leading = _among(tried.candidates, accepted)
     extended = leading.hypothesis if leading else None
-    found = locate(base.hypothesis, experiment.windows, base.null)
     left = []
     if extended is not None:
-        null = null_draws(extended, study.noise, np.random.default_rng(seed))
+        null = null_draws(extended, study.noise, np.random.default_rng(kept.seed))
         left = locate(extended, experiment.windows, null)
     return Criticism(
         verdict=verdict,
         accepted=accepted,
         base=base,
-        candidates=tuple(candidates),
+        candidates=tuple(tried.candidates),
         extended=extended,
-        posterior=weighted_posterior(extended or base.hypothesis, seed),
-        before=tuple(found),
+        posterior=weighted_posterior(extended or base.hypothesis, kept.seed),
+        before=tuple(locate(base.hypothesis, experiment.windows, base.null)),
         after=tuple(left),
-        gaps=gaps,
-        suggestions=tuple(suggest(laboratory, proposals, _rivals(verdict, candidates, members))),
-        untested=(*untested, *_left_out(candidates)),
+        gaps=tried.gaps,
+        suggestions=tuple(suggestions),
+        untested=(*untested, *_left_out(tried.candidates)),
         noise=experiment.noise,
         units={name: one.unit for name, one in extensions.items()},
-        tied=tuple(one.names for one in tied(members)),
+        tied=tuple(one.names for one in tied(tried.members)),
         simulations=count,
     )
 
 
-def _rivals(
-    verdict: Verdict, candidates: Sequence[Candidate], members: Sequence[Candidate]
-) -> list[Candidate]:
+class Tried(NamedTuple):
+    """Explanations that were tried.
+
+    Attributes:
+        candidates: All of them.
+        members: Those that passed, their gains with those on the held-out data.
+        gaps: On held-out data, names -> gaps.
+    """
+
+    candidates: list[Candidate]
+    members: list[Candidate]
+    gaps: dict[tuple[str, ...], tuple[Gap, ...]]
+
+
+def _try(
+    study: Study, base: Base, accept: Sequence[str] | None, held_out: Sequence[Experiment]
+) -> Tried:
+    """Fit explanations, and test those that passed on the held-out data."""
+    candidates, members = explain(study, base, accept)
+    chosen = {c.names: c for c in [*members, _among(candidates, accept)] if c}
+    gaps = _gaps(study, base, list(chosen.values()), held_out)
+    judged = [replace(c, held=holds(gaps.get(c.names, ()))) for c in candidates]
+    return Tried(judged, [_judged(member, gaps) for member in members], gaps)
+
+
+def _rivals(verdict: Verdict, tried: Tried) -> list[Candidate]:
     """Explanations that a further experiment should tell apart."""
     if verdict.kind is VerdictKind.TIE:
-        return tied(members)
+        return tied(tried.members)
     if verdict.kind is VerdictKind.UNKNOWN:
-        return sorted(candidates, key=lambda c: -c.gain)[:2]
+        return sorted(tried.candidates, key=lambda c: -c.gain)[:2]
     return []
 
 

@@ -10,7 +10,7 @@ from .measurement_noise import Noise
 from .misfit import Window
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Experiment:
     """One experiment; others may share the simulator's parameters, not its settings.
 

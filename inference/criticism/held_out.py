@@ -17,9 +17,7 @@ from .verdict import ACCEPTANCE_LEVEL
 
 NOISE_QUANTILE = 0.99  # quantile of the noise's RMS below which a gap may be noise
 MAX_LEFT_SHARE = 0.5  # of a gap beyond noise that an explanation may leave, unless it may be noise
-MIN_LPD_GAIN = (
-    3.0  # log predictive density that an explanation must win on all held-out data together
-)
+MIN_LPD_GAIN = 3.0  # log predictive density to be won on all held-out data together
 REPLICATES = 999
 
 
@@ -56,13 +54,15 @@ class Gap(NamedTuple):
 
 
 def beyond(rms: float, noise: float) -> float:
-    """What of an RMS noise does not explain, in quadrature."""
+    """RMS in excess of noise, subtracted in quadrature."""
     return max(rms**2 - noise**2, 0.0) ** 0.5
 
 
 def holds(gaps: Sequence[Gap]) -> bool:
-    """Whether an explanation leaves no more than noise and what is usual anywhere, predicts better
-    on all data together, and explains most of the gap on them.
+    """Whether an explanation holds on held-out data.
+
+    It leaves no more than noise and the usual residual on each of them, predicts better on all of
+    them together, and explains most of the gap there.
 
     What is usual is no excuse for the gap, or a wrong explanation would hide behind it.
     """

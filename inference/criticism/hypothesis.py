@@ -28,7 +28,7 @@ PRIOR_END = 1e-4  # quantile of a prior from which a parameter is at its end
 INDEPENDENT_SLOPE = 1e-8  # relative size below which a slope adds nothing to those before
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Hypothesis:
     """A fitted model; arrays over the m values of what was observed.
 
@@ -169,7 +169,7 @@ def _with_own_noise(
 
 
 def _reduced(surrogate: SignalSurrogate, covariance: np.ndarray) -> Reduced:
-    """What was observed says of the scores, all noise having this covariance [m, m]."""
+    """Generalised least-squares estimate of the scores under this noise covariance [m, m]."""
     basis = surrogate.emulator.basis
     used, k = basis.used, basis.vectors.shape[1]
     estimate, error = np.zeros((1, k)), np.eye(k)[None]

@@ -12,18 +12,18 @@ DRAWS = 400
 
 
 class Noise(Protocol):
-    """Gaussian noise on samples, known as well as it is known."""
+    """Gaussian noise whose size may be uncertain."""
 
     def covariance(self, at: Layout) -> np.ndarray:
         """[n, n] of n samples."""
         ...
 
     def draw(self, rng: np.random.Generator, at: Layout, count: int) -> np.ndarray:
-        """[count, n], each row with sizes that the noise may as well have."""
+        """[count, n]; each row draws the uncertain noise size anew."""
         ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class KnownNoise:
     """Independent noise of known size.
 
@@ -40,7 +40,7 @@ class KnownNoise:
         return self.sd * rng.normal(size=(count, len(at.channel)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AutoregressiveNoise:
     """AR(1) noise, independent between channels, of uncertain size and correlation.
 

@@ -46,7 +46,7 @@ class Weighted(NamedTuple):
 
 @in_float64
 def weighted_posterior(hypothesis: Hypothesis, seed: int = 0) -> Weighted:
-    """Adaptive importance sampling of a hypothesis's posterior, see `population`."""
+    """Adaptive importance sampling of a hypothesis's posterior, see `importance.explore`."""
     surrogate, prior = hypothesis.surrogate, hypothesis.fit.prior
     found = explore(jax.random.key(seed), surrogate.log_likelihood, surrogate.state, len(prior))
     log_weights = np.asarray(found.log_weights)

@@ -45,9 +45,8 @@ def resized(errors: np.ndarray, u: np.ndarray, centre: np.ndarray) -> np.ndarray
     def smoothed(point: np.ndarray) -> float:
         x = np.column_stack([np.ones(len(u)), (u - point) / ALIKE_DISTANCE])
         weighted = x * np.exp(-0.5 * np.sum(x[:, 1:] ** 2, axis=1))[:, None]
-        known = np.diag(
-            [PRIOR_RUNS] + [1.0] * u.shape[1]
-        )  # as if a run or less spoke for no change
+        # as if a run or less spoke for no change
+        known = np.diag([PRIOR_RUNS] + [1.0] * u.shape[1])
         return float(np.linalg.solve(weighted.T @ x + known, weighted.T @ (logs - usual))[0])
 
     there = np.array([smoothed(point) for point in u])

@@ -1,4 +1,4 @@
-"""The search for what a model lacks."""
+"""The search for the effect that a model lacks."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ from .measurement_noise import Noise
 from .misfit import Check, check, null_draws
 from .run_table import Runs, joined
 from .signatures import Signature, signature
-from .simulate import Laboratory
+from .simulate import AllRunsFailed, Laboratory
 from .verdict import Candidate, near_best
 
 REFIT_PASSES = 2  # of a refit, the second only if the first moved the best fit out of its box
@@ -61,7 +61,7 @@ class Study(NamedTuple):
 
     @property
     def seed(self) -> int:
-        return self.laboratory.keeping.seed
+        return self.laboratory.seed
 
     def hypothesis(self, names: tuple[str, ...], runs: Runs) -> Hypothesis:
         """The model in which the named effects act, fitted."""
@@ -100,7 +100,7 @@ class Base(NamedTuple):
 
 
 def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Box]:
-    """The base model, fitted to runs near where it fits best; they, and where they are."""
+    """Fit the base model near its optimum. Return the fit, its runs and their box."""
     dimension = len(study.laboratory.prior)
     everywhere = Box(np.zeros(dimension), np.ones(dimension))
     runs = study.run("start", everywhere, (), study.plan.start) if earlier is None else earlier
@@ -111,7 +111,11 @@ def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Box]
 
 
 def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
-    """Fit the base model, learn every effect's signature, test; and what could not be run."""
+    """Fit the base model, learn every effect's signature, and test the model.
+
+    Returns:
+        What was found, and the effects of which every simulation failed.
+    """
     laboratory, plan = study.laboratory, study.plan
     base, runs, box = fit_base(study, earlier)
     parts = [runs]
@@ -120,7 +124,7 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
         wide = with_coefficient(box)
         try:
             made = study.run(f"effect {name}", wide, (name,), plan.extension)
-        except RuntimeError:
+        except AllRunsFailed:
             untested.append(name)
             continue
         parts.append(made)
@@ -138,10 +142,13 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
 def explain(
     study: Study, base: Base, accept: Sequence[str] | None = None
 ) -> tuple[list[Candidate], list[Candidate]]:
-    """Every explanation by one effect, or by two where none suffices; and those that are accepted.
+    """Fit every explanation by one effect, and pairs of effects where no single one suffices.
 
     Args:
         accept: Effects that are refitted together, whatever their rank.
+
+    Returns:
+        All explanations, and the accepted ones.
     """
     plan, runs = study.plan, base.runs
     first = [study.candidate(base, single) for single in base.singles.values()]
@@ -163,8 +170,11 @@ def explain(
 def _refit(
     study: Study, base: Base, candidate: Candidate, runs: Runs, most: int | None
 ) -> tuple[Candidate, Runs]:
-    """The candidate, simulated where it fits best and fitted again, until it stays there or
-    more than `most` runs would be made."""
+    """Simulate a candidate near its optimum and fit it again.
+
+    That ends when the optimum lies in the box of the latest runs, after REFIT_PASSES passes, or
+    where more than `most` runs would be made.
+    """
     names = candidate.names
     for attempt in range(REFIT_PASSES):
         if most is not None and len(runs) - base.given + study.plan.refit > most:
@@ -181,7 +191,10 @@ def _refit(
 def _pairs(
     study: Study, base: Base, found: dict[tuple[str, ...], Candidate], runs: Runs
 ) -> tuple[list[Candidate], Runs]:
-    """The best effect with a second one; both must gain, and `found` learns how each does alone."""
+    """Fit the best effect with each other one; a pair counts if it gains more than either alone.
+
+    Single effects of an accepted pair are refitted in `found`.
+    """
     if not found:  # no effect could be simulated
         return [], runs
     best = max(found.values(), key=lambda c: c.gain)

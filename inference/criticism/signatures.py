@@ -69,7 +69,7 @@ def signature(base: Hypothesis, extended: Hypothesis, extension: Extension) -> S
 
 
 def _changes(base: Hypothesis, extended: Hypothesis, neutral: float, u: np.ndarray) -> np.ndarray:
-    """What coefficients at prior quantiles u [n] change of the expected values [n, m]."""
+    """Changes of the expected values [n, m] due to coefficients at prior quantiles u [n]."""
     points = np.column_stack([np.tile(base.u, (len(u) + 1, 1)), np.append(neutral, u)])
     expected = extended.expected(points)
     return expected[1:] - expected[0]

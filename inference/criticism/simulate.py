@@ -1,16 +1,18 @@
 """Runs of a simulator and of its extensions, kept in a bank."""
 
-from collections.abc import Callable, Mapping
-from concurrent.futures import Executor
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
+from ..arguments import check_function, checked_integer
 from ..prior import Prior
 from ..simulations.bank import SimulationBank
+from ..simulations.executors import Workers, open_executor
 from ..simulations.job import BATCH, jobs, succeeded
-from ..simulations.runner import Keep, run_missing
+from ..simulations.runner import Keep, check_keep, run_missing
 from ..types import Simulator
 from .experiment import Experiment, Proposal
 from .extension import Extensions
@@ -18,6 +20,10 @@ from .run_table import Runs
 
 Report = Callable[[str, int], None]
 """(phase, simulations finished in it since the last call)"""
+
+
+class AllRunsFailed(RuntimeError):
+    """Every simulation of a phase failed; the message has the first one's error."""
 
 
 def silent(phase: str, finished: int) -> None:
@@ -29,24 +35,42 @@ class Keeping:
     """Where simulations are kept, and how they are made.
 
     Attributes:
-        bank: Takes every finished one; what it holds is not simulated again.
-        batch: Simulated in one call.
+        bank: Takes every finished simulation; what it holds is not simulated again. None keeps
+            them until the call ends.
+        batch: Simulations in one call of the simulator, where there is no executor.
         seed: All of their seeds derive from it.
-        report: Told of every simulation.
-        executor: Simulates each run in a call of its own; None simulates in this process.
-        timeout: Seconds that one run may take; None sets no limit.
+        report: Called with the phase and the number of simulations finished in it.
+        executor: Makes each simulation in a call of its own, see `fit`; what is given open stays
+            open. None simulates in this process.
+        timeout: Seconds that one simulation may take; None sets no limit.
+
+    Raises:
+        ValueError: a batch, seed, report or timeout that cannot be used.
     """
 
-    bank: SimulationBank = field(default_factory=SimulationBank)
+    bank: SimulationBank | None = None
     batch: int = BATCH
     seed: int = 0
     report: Report = silent
-    executor: Executor | None = None
+    executor: Workers | None = None
     timeout: float | None = None
 
-    def of(self, identity: str) -> Keep:
-        """The same for one simulator, by its name in the bank."""
-        return Keep(self.bank, identity, self.batch, self.executor, self.timeout)
+    def __post_init__(self) -> None:
+        check_keep(checked_integer("batch", self.batch), self.timeout)
+        checked_integer("seed", self.seed, 0)
+        check_function("report", self.report)
+
+    @contextmanager
+    def opened(self, identity: str) -> Iterator[Keep]:
+        """Bank and executor for the simulator of this name; what is opened here is closed.
+
+        Raises:
+            ValueError, ImportError, ConnectionError: the executor cannot be used.
+        """
+        with ExitStack() as stack:
+            workers = stack.enter_context(open_executor(self.executor))
+            bank = stack.enter_context(SimulationBank()) if self.bank is None else self.bank
+            yield Keep(bank, identity, self.batch, workers, self.timeout)
 
 
 @dataclass(frozen=True)
@@ -58,19 +82,22 @@ class Laboratory:
             coefficients those that act.
         prior: Of the base parameters.
         extensions: All that may act.
-        identity: The simulator's name in the bank.
-        keeping: Where runs are kept.
+        keep: Where runs are made and kept.
+        seed: All seeds derive from it.
+        report: Called with the phase and the number of simulations finished in it.
     """
 
     simulate: Simulator
     prior: Prior
     extensions: Extensions
-    identity: str
-    keeping: Keeping
+    keep: Keep
+    seed: int = 0
+    report: Report = silent
 
     def of(self, experiment: Experiment | Proposal) -> "Laboratory":
         """The same for the simulator of another experiment."""
-        return replace(self, simulate=experiment.simulate, identity=experiment.identity)
+        keep = self.keep._replace(identity=experiment.identity)
+        return replace(self, simulate=experiment.simulate, keep=keep)
 
     def run(self, phase: str, theta: Mapping[str, np.ndarray]) -> Runs:
         """Simulate at theta, name -> [n]; runs that fail are left out.
@@ -79,16 +106,15 @@ class Laboratory:
             phase: A word for what they are for; with the run's number it fixes the seeds.
 
         Raises:
-            RuntimeError: all of them failed.
+            AllRunsFailed: all of them did.
+            RuntimeError: the executor lost its workers.
         """
-        seeds = phase_seeds(self.keeping.seed, phase, len(next(iter(theta.values()))))
+        seeds = phase_seeds(self.seed, phase, len(next(iter(theta.values()))))
         asked = jobs(theta, seeds)
-        keeping = self.keeping
-        report = partial(keeping.report, phase)
-        results = run_missing(self.simulate, asked, keeping.of(self.identity), advance=report)
+        results = run_missing(self.simulate, asked, self.keep, advance=partial(self.report, phase))
         good = succeeded(results)
         if not good:
-            raise RuntimeError(
+            raise AllRunsFailed(
                 f"all {len(asked)} simulations of the phase {phase!r} failed, the first at "
                 f"{asked[0].theta}: {results[0].error or 'its output is not finite'}"
             )

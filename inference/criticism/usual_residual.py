@@ -11,7 +11,7 @@ from .measurement_noise import Noise, SumOfNoises, gaussian
 MIN_FREEDOM = 3  # with fewer, draws have no variance and no effect would be found
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class UsualResidual:
     """A simulator's own residual, as a Gaussian process of uncertain size.
 

@@ -34,7 +34,7 @@ _ADVICE = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Candidate:
     """An explanation, tested like the base model.
 
@@ -117,7 +117,7 @@ def conclude(
     names = tuple(dict.fromkeys(name for member in members for name in member.names))
     reason = (
         f"Model and data differ (p = {p:.2g}); one of {', '.join(names)} explains it, and these "
-        "data cannot say which."
+        "data do not distinguish them."
     )
     return Verdict(VerdictKind.TIE, names, p, reason)
 
@@ -127,6 +127,6 @@ def _unexplained(p: float, explanations: Sequence[Candidate]) -> str:
     if not refuted:
         return f"Model and data differ (p = {p:.2g}), and no known effect explains it."
     return (
-        f"Model and data differ (p = {p:.2g}); {' or '.join(refuted)} explains these data, but "
-        "those held out do not bear it out, so what is missing is not known."
+        f"Model and data differ (p = {p:.2g}); {' or '.join(refuted)} explains the fitted data "
+        "but fails on held-out data. The missing effect is unknown."
     )

@@ -8,15 +8,14 @@ from .._lazy import stats
 from .optimise import minimise_many
 from .process import Data, Hyper, log_marginal_likelihood
 
-# Normal priors of the logs: inputs are coordinates of the prior's sd (see `gp.coordinates`) and
-# targets of about unit variance, so one choice fits every parameter, unit and simulator.
+# Normal priors of the logs: inputs are coordinates of the prior's sd (see
+# `gp.process.coordinates`) and targets of about unit variance, so one choice fits every parameter,
+# unit and simulator.
 LENGTH = (np.log(1.0), 1.5)  # 95 %: a twentieth of the box to 20 times the box: no effect at all
 AMPLITUDE = (np.log(1.0), 0.7)
 NOISE = (np.log(0.2), 1.0)  # 95 %: 3 % of the targets' sd to more than all of it
-SCORED_STARTS, REFINED_STARTS = (
-    8,
-    2,
-)  # starts that are evaluated, and of these the best to be optimised
+SCORED_STARTS = 8  # starts that are evaluated
+REFINED_STARTS = 2  # best of these, which are optimised
 
 
 def log_prior(hyper: Hyper) -> jax.Array:

@@ -169,7 +169,7 @@ def _screened(now: _Progress, z: jax.Array, uniforms: jax.Array) -> _Fresh:
 
 def _proposed(now: _Progress, z: jax.Array, uniforms: jax.Array) -> _Fresh:
     """Points of a mixture fitted to those so far."""
-    mixture = fit_mixture(now.x, *_bearable(now))
+    mixture = fit_mixture(now.x, *_tempered_weights(now))
     density = log_density(mixture, now.x)
     row = now.round - SCREEN_ROUNDS
     return _Fresh(
@@ -206,9 +206,11 @@ def _weighed(now: _Progress, fresh: _Fresh, values: jax.Array) -> _Progress:
     return after._replace(effective=_effective(_log_weights(after, 1.0)))
 
 
-def _bearable(now: _Progress) -> tuple[jax.Array, jax.Array]:
-    """Log weights for the largest power of the likelihood that leaves enough effective points
-    (bisection), and how much narrower than these the next proposals may be."""
+def _tempered_weights(now: _Progress) -> tuple[jax.Array, jax.Array]:
+    """Tempered log weights, and the width factor of the next proposals.
+
+    The power of the likelihood is the largest that leaves enough effective points (bisection).
+    """
     enough = 32.0 + 16.0 * now.x.shape[1]
 
     def halve(_: int, bounds: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:

@@ -12,9 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 COMPONENTS = 8
-DEGREES_OF_FREEDOM = (
-    6  # degrees of freedom, even: tails heavier than a posterior's, at little cost near it
-)
+DEGREES_OF_FREEDOM = 6  # even: tails heavier than a posterior's, at little cost near it
 PRIOR_SHARE = 0.05
 EVEN_SHARE = 0.2  # share of the proposals spread evenly over the components, for small modes
 RESAMPLED_POINTS = 512

@@ -49,7 +49,7 @@ STATISTICS = {
 
 
 class Guide(NamedTuple):
-    """What the population tells the sampler."""
+    """Metric and jump proposal, estimated from the population."""
 
     factor: jax.Array  # [d, d], x = factor y: the posterior is about as wide in every y
     mixture: Mixture  # over x, proposes jumps

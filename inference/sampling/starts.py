@@ -6,9 +6,7 @@ import numpy as np
 from .importance import Population, explore
 from .target import NOWHERE_FINITE, Target
 
-SEPARATE_MODES_GAIN = (
-    0.5  # gain in mean log density over one Gaussian from which on modes count as separate
-)
+SEPARATE_MODES_GAIN = 0.5  # in mean log density over one Gaussian: modes then count as separate
 
 
 def look_around(rng: np.random.Generator, target: Target) -> Population:

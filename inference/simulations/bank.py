@@ -80,8 +80,10 @@ class SimulationBank:
 
     @property
     def where(self) -> str:
-        """Where finished simulations are kept, for messages."""
-        return "nothing, for bank is in memory" if self.in_memory else self.path
+        """A sentence for messages: where finished simulations are kept."""
+        if self.in_memory:
+            return "Finished simulations are not kept, because the bank is in memory"
+        return f"Finished simulations are kept in {self.path}"
 
     def __repr__(self) -> str:
         return as_text("SimulationBank", self._shown())

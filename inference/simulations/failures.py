@@ -1,4 +1,4 @@
-"""Why a simulation failed: a sentence per simulation, of which the kind can be told."""
+"""Failure messages of simulations, and their classification."""
 
 import os
 import traceback
@@ -16,7 +16,7 @@ class Failure(StrEnum):
     TIMEOUT = "timeout"
 
 
-_ENGINE = str(Path(__file__).parent)
+_ENGINE = f"{Path(__file__).parents[1]}{os.sep}"
 _INSTALLED = f"{os.sep}lib{os.sep}python"  # of Python's own modules and of packages
 
 

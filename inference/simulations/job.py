@@ -64,6 +64,11 @@ class OneByOne:
 
     simulate: SingleSimulator
 
+    @property
+    def time_limit(self) -> Limit | None:
+        """How the simulator of single runs stops itself; see `limit_of`."""
+        return limit_of(self.simulate)
+
     def __call__(self, theta: Mapping[str, np.ndarray], seeds: np.ndarray) -> np.ndarray:
         """theta: name -> [n]; seeds: int64 [n]  ->  signals [n, *signal_shape]."""
         runs = [np.asarray(self.simulate(*job), np.float64) for job in jobs(theta, seeds.tolist())]
@@ -134,14 +139,20 @@ def run_batch(
     seconds = (time.perf_counter() - started) / len(batch)
     expected = (len(batch), *(signals.shape[1:] if shape is None else shape))
     if signals.shape != expected:
-        raise ValueError(
-            f"simulate must return signals of shape {expected}, one row per theta, "
-            f"got {signals.shape}"
-        )
+        raise ValueError(_misshapen(simulate, expected, signals.shape))
     return [Simulation(signal, None, seconds) for signal in signals]
 
 
-def limit_of(simulate: Simulator) -> Limit | None:
+def _misshapen(simulate: Simulator, expected: tuple[int, ...], got: tuple[int, ...]) -> str:
+    if isinstance(simulate, OneByOne):
+        return (
+            f"with vectorised=False simulate must return the signal of one run, of shape "
+            f"{expected[1:]}, got {got[1:]}"
+        )
+    return f"simulate must return signals of shape {expected}, one row per theta, got {got}"
+
+
+def limit_of(simulate: Simulator | SingleSimulator) -> Limit | None:
     """How a simulator stops itself: the method `time_limit` of it, or of the object whose method
     it is; None if there is no such method."""
     return getattr(getattr(simulate, "__self__", simulate), "time_limit", None)

@@ -1,11 +1,12 @@
 """Simulating what the bank lacks: a batch in one call, or one by one on an executor."""
 
+import pickle
 from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, wait
 from functools import partial
-from pickle import PicklingError
 from typing import NamedTuple
 
+from ..arguments import check_timeout, checked_integer
 from ..types import Simulator
 from .bank import Simulation, SimulationBank
 from .executors import killed_its_worker
@@ -55,9 +56,13 @@ class Runner:
     Args:
         simulate: The user's simulator.
         keep: Where simulations are made and kept; the caller decides on batches.
+
+    Raises:
+        ValueError: a batch or timeout that is not positive.
     """
 
     def __init__(self, simulate: Simulator, keep: Keep):
+        check_keep(keep.batch, keep.timeout)
         self.simulate = simulate
         self.bank, self.identity, _, self.executor, self.timeout = keep
         self._elsewhere: list[Order] = []  # claimed by somebody else
@@ -195,7 +200,7 @@ class Runner:
 
     def _explained(self, error: BaseException) -> BaseException:
         """What to tell the user of an executor's own error."""
-        if isinstance(error, PicklingError | AttributeError | TypeError):
+        if _is_of_pickling(error, self.simulate):
             told = TypeError(
                 "simulate must be picklable to reach the executor's workers "
                 f"({error}); define it at the top level of a module"
@@ -205,13 +210,37 @@ class Runner:
             told = RuntimeError(
                 f"the executor lost its workers ({raised(error)}): one was killed, ran out of "
                 "memory, crashed in the simulator or could not import it. "
-                f"In flight: {jobs}. Finished simulations are kept in {self.bank.where}; "
+                f"In flight: {jobs}. {self.bank.where}; "
                 "mend the cause and repeat the call with a new executor to go on from there"
             )
         else:
             return error
         told.__cause__ = error
         return told
+
+
+def _is_of_pickling(error: BaseException, simulate: Simulator) -> bool:
+    """Whether an executor's error says that the simulator cannot be pickled.
+
+    Python raises an AttributeError for a local function and a TypeError for what holds a lock,
+    and other mistakes raise these, too.
+    """
+    if isinstance(error, pickle.PicklingError):
+        return True
+    if not isinstance(error, AttributeError | TypeError):
+        return False
+    try:
+        pickle.dumps(simulate)
+    except Exception:
+        return True
+    return False
+
+
+def check_keep(batch: int | None, timeout: float | None) -> None:
+    """Raise ValueError unless simulations can be made in such batches and times; see `Keep`."""
+    if batch is not None:
+        checked_integer("batch", batch)
+    check_timeout(timeout)
 
 
 def is_final(found: Simulation, timeout: float | None) -> bool:

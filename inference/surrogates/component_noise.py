@@ -31,7 +31,7 @@ def absorbed_noise(basis: Basis, noise: np.ndarray, remainder: Remainder, n: int
 def left_over(
     basis: Basis, noise: np.ndarray, remainder: Remainder, excess: np.ndarray
 ) -> Remainder:
-    """`remainder`, and the noise that only seemed to be the components'.
+    """`remainder`, plus the noise wrongly attributed to the components.
 
     Args:
         noise: Run-to-run variances of the scores, without the excess [k].

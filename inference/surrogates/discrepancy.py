@@ -51,7 +51,7 @@ class Scale(NamedTuple):
         return (self.transform(discrepancy) - self.location) / self.spread
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DiscrepancySurrogate:
     """GP of g(Delta); see `learn`.
 
@@ -172,7 +172,7 @@ def learn(
         transform: A name, or None to choose.
         previous: Learned from the first of these data; its hyperparameters are kept until the
             data have grown by GROWTH, its transform until they have by TRANSFORM_GROWTH.
-        normal: Which parameters the kernel sees as normal scores [d], see `gp.coordinates`.
+        normal: Which parameters the kernel sees as normal scores [d], see `gp.process.coordinates`.
 
     Raises:
         ValueError: bad transform.

@@ -94,7 +94,7 @@ def emulate(
         limits: Of components and data.
         previous: Learned from the first of these data; its components and hyperparameters are
             kept until the data have grown by GROWTH.
-        normal: Which parameters the kernels see as normal scores [d], see `gp.coordinates`.
+        normal: Which parameters the kernels see as normal scores [d], see `gp.process.coordinates`.
     """
     n, rows = len(u), limits.rows
     if previous is not None and _goes_on(previous, outputs):
@@ -189,8 +189,10 @@ def loo_errors(emulator: Emulator) -> np.ndarray:
 
 
 def innovations(emulator: Emulator, u: np.ndarray, outputs: np.ndarray) -> np.ndarray:
-    """Studentised errors [n, used] in the scores of new outputs [n, m] at u [n, d], each foretold
-    from all outputs before it; components and hyperparameters stay. n fits into the reserved rows.
+    """Studentised errors [n, used] in the scores of new outputs [n, m] at u [n, d].
+
+    Each output is predicted from all earlier outputs, with components and hyperparameters fixed.
+    n must not exceed the reserved rows.
     """
     basis, used, n = emulator.basis, emulator.basis.used, len(u)
     squared = np.sum(basis.vectors[:, :used] ** 2, 0)

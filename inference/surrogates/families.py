@@ -42,7 +42,7 @@ class DiscrepancyFamily:
             leave-one-out log predictive density.
         threshold: Rule for eps, or a number on the discrepancy's own scale, which may be
             negative where a user's discrepancy is, as a logarithm; see
-            `likelihood.choose_threshold`.
+            `threshold.choose_threshold`.
         hyper_draws: Posterior draws of the hyperparameters over which the likelihood of a fit
             is averaged; 0 takes the best hyperparameters alone.
     """
@@ -69,7 +69,7 @@ class DiscrepancyFamily:
         return DiscrepancyLearner(self, _distance(self.discrepancy, observed), observed)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DiscrepancyLearner:
     """`DiscrepancyFamily` in view of what was observed."""
 
@@ -107,7 +107,7 @@ class DiscrepancyLearner:
         return marginalised(learned, self.family.threshold, draws, seed)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SignalFamily:
     """Principal components of the output, a Gaussian process for each score.
 
@@ -152,7 +152,7 @@ class SignalFamily:
         return SignalLearner(self, output, distance, observed, values, noise)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SignalLearner:
     """`SignalFamily` in view of what was observed."""
 

@@ -1,4 +1,4 @@
-"""Where runs fail."""
+"""Probability that a simulation succeeds, by kernel regression."""
 
 from typing import NamedTuple
 

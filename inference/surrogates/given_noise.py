@@ -77,7 +77,7 @@ def _independent(variances: np.ndarray) -> GivenNoise:
 
 
 def _covariance(given: np.ndarray, rank: np.ndarray, output: Output) -> GivenNoise:
-    """Much of it as white noise, lest rounding rule where factors alone are noisy."""
+    """White noise and factors of the covariance; the white part keeps it well conditioned."""
     refusal = "noise must be a finite, symmetric, positive semidefinite covariance"
     if not (np.isfinite(given).all() and np.allclose(given, given.T)):
         raise ValueError(refusal)

@@ -14,7 +14,7 @@ MAX_VALUES = 2000  # values; neighbouring samples of longer series are averaged
 Summary = Callable[[np.ndarray], np.ndarray]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Output:
     """How an output [*signal_shape] becomes values [m], channel after channel, time inside.
 

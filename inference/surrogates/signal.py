@@ -50,7 +50,7 @@ KEPT_NODES = 12  # nodes of unknown measurement noise that enter the likelihood
 SCREENED_POINTS = 128
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SignalSurrogate:
     """An emulator, and what the observed output says of its scores.
 

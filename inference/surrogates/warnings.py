@@ -6,9 +6,7 @@ from .._lazy import stats
 from .held_back import HeldBack
 
 FALSE_ALARMS = 1e-3  # of each leave-one-out check, were its errors independent and normal
-HELD_BACK_FALSE_ALARMS = (
-    1e-2  # nominal share of good fits that are warned, see `held_back_warnings`
-)
+HELD_BACK_FALSE_ALARMS = 1e-2  # nominal share of good fits warned, see `held_back_warnings`
 FAR_ERROR = 3.0  # studentised errors beyond are rare
 OVERCONFIDENT_SQUARE = 1.5  # mean square of the studentised errors that matters
 OUTSIDE = (
@@ -91,6 +89,6 @@ def noise_warnings(share: float) -> list[str]:
 
 
 def _too_large(errors: np.ndarray, matters: float) -> bool:
-    """Whether studentised errors are, in the mean square, by more than chance."""
+    """Whether the mean square of studentised errors exceeds both `matters` and chance."""
     count = errors.size
     return bool(np.mean(errors**2) > max(matters, stats.chi2.isf(FALSE_ALARMS, count) / count))

@@ -2,9 +2,7 @@
 
 from ..effect import Effect
 
-ROUNDING_OVER_ATTRACTION = (
-    16.0  # of the attraction; with less, small drops are stiffer than their size says
-)
+ROUNDING_OVER_ATTRACTION = 16.0  # with less, small drops are stiffer than their size says
 # tension over density, attraction and spacing²: with it drops swing at Rayleigh's frequency, see
 # tests/models/test_surface_tension.py; the square of what that test finds multiplies it
 UNIT_TENSION = 1.35

@@ -229,6 +229,9 @@ def test_bad_calls_are_refused(prior, observed):
         engine.tell({"slope": [5.0], "offset": [0.5]}, np.zeros((1, 30)))
     with pytest.raises(ValueError, match="seeds must have shape"):
         engine.tell(theta, np.zeros((2, 30)), seeds=[1])
+    for seeds in ([0.5, 1.5], [1.0, 2.0], ["1", "2"], [True, False], [2**63, 0], [[1], [2, 3]]):
+        with pytest.raises(ValueError, match="seeds must be integers"):
+            engine.tell(theta, np.zeros((2, 30)), seeds=seeds)
     with pytest.raises(ValueError, match="n must be an integer"):
         engine.ask(0)
     with pytest.raises(ValueError, match="3 successful simulations, got 0 of 0"):

@@ -66,25 +66,36 @@ def test_too_few_successes_are_an_error_that_loses_nothing(
         return simulate(theta, seeds)
 
     path = tmp_path / "b.sqlite"
-    message = (
-        f"{successes} of 7 simulations succeeded, copies counted once; 3 are needed; the last "
-        r"error: OSError: no licence \(test_failures\.py, line \d+\). "
-        "Finished simulations are kept in "
-        f"{re.escape(str(path))}; mend the cause"
-    )
-    with pytest.raises(RuntimeError, match=message):
+    with pytest.raises(RuntimeError, match=f"^{successes} of 7 .*no licence") as caught:
         inference.fit(fragile, prior, observed, budget=7, batch=1, bank=path)
+    assert str(path) in str(caught.value)
     with inference.SimulationBank(path) as bank:
         assert len(bank.simulations("").seeds) == successes
     calls.clear()
-    with pytest.raises(RuntimeError, match="kept in nothing, for bank is in memory"):
+    with pytest.raises(RuntimeError, match=f"^{successes} of 7 ") as caught:
         inference.fit(fragile, prior, observed, budget=7, batch=1)
+    assert str(path) not in str(caught.value) and ":memory:" not in str(caught.value)
+
+
+def test_the_user_s_own_line_is_named_where_the_engine_refuses_his_call(prior, observed):
+    def wrong(theta, seeds):
+        return prior.to_array({"slope": theta["slope"]})
+
+    line = wrong.__code__.co_firstlineno + 1
+    with pytest.raises(RuntimeError, match=rf"\(test_failures\.py, line {line}\)"):
+        inference.fit(wrong, prior, observed)
 
 
 def test_copies_among_earlier_simulations_are_too_few(prior, observed):
     earlier = {"slope": [0.5] * 3, "offset": [0.5] * 3}, np.zeros((3, 30)), [0, 0, 0]
-    with pytest.raises(RuntimeError, match=r"1 of 3 .*copies counted once.*last error: none"):
+    with pytest.raises(RuntimeError, match=r"^1 of 3 "):
         inference.fit(None, prior, observed, budget=0, initial=3, earlier=earlier)
+
+
+@pytest.mark.parametrize("shape", [(29,), (1, 30), ()])
+def test_a_single_run_s_signal_of_wrong_shape_is_told_as_the_user_made_it(prior, observed, shape):
+    with pytest.raises(ValueError, match=re.escape(f"(30,), got {shape}")):
+        inference.fit(lambda theta, seed: np.zeros(shape), prior, observed, vectorised=False)
 
 
 @pytest.mark.parametrize("shape", [(4, 29), (3, 30), (30,), ()])

@@ -4,7 +4,6 @@ import struct
 from typing import NamedTuple
 
 PACKAGE_HEADER = struct.Struct(">HB")  # size with this header, type
-MAX_PACKAGE_SIZE = 0xFFFF
 
 VERSION, CONTROLLER, TEXT, DATA = b"VvMU"
 OUTPUTS, INPUTS, START, PAUSE = b"OISP"

@@ -1,7 +1,7 @@
 """The real client against the emulator, each test with an emulator of its own.
 
 None of them measures this computer's time: they wait for what must come, and take durations from
-the robot's clock. `test_emulator_stepped` has the emulator's own times.
+the robot's clock. `test_stepped` has the emulator's own times.
 """
 
 import time

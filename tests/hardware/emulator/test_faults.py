@@ -1,6 +1,6 @@
 """Faults of the link, of the client and of the operator, and what the emulated arm does then.
 
-Those that are punctual need the real library to keep time. `test_emulator_stepped` has how soon
+Those that are punctual need the real library to keep time. `test_stepped` has how soon
 the arm rests, and after what time a watchdog or a protective stop ends.
 """
 

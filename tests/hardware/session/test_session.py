@@ -334,3 +334,17 @@ def test_ctrl_c_twice_leaves_no_process_behind_and_shows_no_child_s_inside(
     while time.monotonic() < end and group_lives(main.pid):
         time.sleep(0.02)
     assert not group_lives(main.pid)
+
+
+def test_a_session_starts_once(tmp_path):
+    """What was closed would start processes again that nothing ends."""
+    session = Session(SessionSetup(RIG, tmp_path))
+    session.close()
+    assert session.phase is Phase.CLOSED
+    with pytest.raises(SessionStopped):
+        session.start()
+    assert session._processes is None and not list(tmp_path.iterdir())
+
+
+def test_a_setup_is_shown_without_the_arrays_of_its_plan(tmp_path):
+    assert "array" not in repr(SessionSetup(RIG, tmp_path, plan=PLAN))

@@ -2,11 +2,14 @@
 
 import multiprocessing
 import pickle
+import time
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from bolfi_liquids.inference.describe import describe
 
 from bolfi_liquids import inference
 
@@ -90,12 +93,110 @@ def test_pipelines_travel_to_spawned_processes(monkeypatch):
         ({"budget": -2}, "budget must be an integer from 3"),
         ({"simulate": 3}, "simulate must be a function, got 3"),
         ({"options": {"nosie": 1}}, "surrogate 'signal' has the options"),
+        ({"options": {"budget": 9}}, r"options must be among .*, got \['budget'\]"),
+        ({"options": {"seed": 9}}, r"options must be among .*, got \['seed'\]"),
+        ({"sampling": {"chain": 2}}, r"sampling must be among .*, got \['chain'\]"),
+        ({"sampling": {"seed": 2}}, r"sampling must be among .*, got \['seed'\]"),
     ],
 )
 def test_a_pipeline_that_can_only_fail_is_refused(simulate, prior, change, message):
     given = {"simulate": simulate, "prior": prior, **change}
     with pytest.raises(ValueError, match=message):
         inference.FitPipeline(**given)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"options": {"nosie": 1}},
+        {"options": {"batch": 4}},
+        {"options": {"observed": 4}},
+        {"sampling": {"chain": 2}},
+        {"batch": 0},
+        {"timeout": 0},
+        {"progress": None},
+        {"executor": 3},
+    ],
+)
+def test_a_design_that_can_only_fail_is_refused_before_it_is_simulated(prior, wrong):
+    calls = []
+    with pytest.raises(ValueError):
+        inference.shared_design(lambda *given: calls.append(given), prior, 5, **wrong)
+    assert calls == []
+
+
+def test_a_design_s_simulations_are_kept_batch_by_batch(simulate, prior):
+    """What was finished before a crash is not simulated again, and the bank stays open."""
+    made, told = [], []
+
+    def mortal(theta, seeds):
+        if len(made) == 2:
+            raise KeyboardInterrupt
+        made.append(list(seeds))
+        return simulate(theta, seeds)
+
+    with inference.SimulationBank() as bank:
+        given = {"bank": bank, "identity": "line", "batch": 3}
+        with pytest.raises(KeyboardInterrupt):
+            inference.shared_design(mortal, prior, 8, **given)
+        assert [len(batch) for batch in made] == [3, 3] and len(bank) == 6
+        design = inference.shared_design(simulate, prior, 8, progress=told.append, **given)
+        assert len(bank) == 8
+    assert told == [1] * 8
+    np.testing.assert_array_equal(
+        design.signals, inference.shared_design(simulate, prior, 8).signals
+    )
+
+
+def test_a_design_s_simulations_may_take_so_long_and_no_longer(simulate, prior):
+    def slow(theta, seeds):
+        time.sleep(0.5 * (theta["slope"] > 0.5).any())
+        return simulate(theta, seeds)
+
+    design = inference.shared_design(slow, prior, 12, timeout=0.1)
+    failed = np.isnan(design.signals).all(-1)
+    np.testing.assert_array_equal(failed, design.theta[:, 0] > 0.5)
+
+
+def single(theta, seed):
+    """The line of a single run."""
+    assert isinstance(theta["slope"], float) and isinstance(seed, int)
+    return closed_line({name: np.array([value]) for name, value in theta.items()}, [seed])[0]
+
+
+def closed_line(theta, seeds):
+    time_ = np.linspace(0.0, 1.0, 30)
+    return theta["slope"][:, None] * time_ + theta["offset"][:, None]
+
+
+def test_a_pipeline_of_single_runs_makes_data_for_its_replicates(prior):
+    options = {"vectorised": False, "surrogate": "discrepancy"}
+    short = {"sampler": "quadrature", "chains": 2, "draws": 32}
+    pipeline = inference.FitPipeline(single, prior, 8, options, short)
+    design = inference.shared_design(single, prior, 8, options=options, sampling=short)
+    np.testing.assert_array_equal(
+        design.signals, closed_line(prior.to_dict(design.theta), design.seeds)
+    )
+    given = {"n": 2, "draws": 7, "progress": False}
+    for one, batched in (
+        (
+            pipeline,
+            inference.FitPipeline(closed_line, prior, 8, {"surrogate": "discrepancy"}, short),
+        ),
+        (design, design),
+    ):
+        made = inference.replicates(one, **given)
+        assert made.errors == {}
+        expected = inference.replicates(batched, **given)
+        np.testing.assert_array_equal(made.draws, expected.draws)
+
+
+def test_a_display_switch_is_no_setting(simulate, prior):
+    loud, silent = (inference.FitPipeline(simulate, prior, warn=warn) for warn in (True, False))
+    assert loud == silent and describe(loud) == describe(silent)
+    design = inference.shared_design(simulate, prior, 4)
+    assert describe(design) == describe(replace(design, warn=False))
+    assert design != replace(design)
 
 
 def test_what_cannot_be_run_is_refused(simulate, prior):

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpyro.distributions as dist
 import pytest
+from bolfi_liquids.inference.simulations.failures import Failure, kind
 
 from bolfi_liquids import inference
 
@@ -210,6 +211,43 @@ def test_a_simulator_that_fails_is_not_the_pipelines_fault():
             check(made)
 
 
+def test_a_simulator_that_takes_too_long_costs_its_replicate():
+    def slow(theta, seeds):
+        time.sleep(0.5 * (theta["a"][0] > 0))
+        return simulate(theta, seeds)
+
+    options = {"draws": 15, "independent": True}
+    made = inference.replicates(Guess(), slow, PRIOR, 12, timeout=0.1, **options)
+    plain = inference.replicates(Guess(), simulate, PRIOR, 12, **options)
+    late = plain.truth[:, 0] > 0
+    assert set(made.errors) == set(np.flatnonzero(late)) and len(made) == (~late).sum()
+    assert {kind(error.partition(": ")[2]) for error in made.errors.values()} == {Failure.TIMEOUT}
+    np.testing.assert_array_equal(made.draws, plain.draws[~late])
+
+
+def test_more_time_is_no_other_setting(tmp_path):
+    store = tmp_path / "r.sqlite"
+    first = run(n=4, store=store, timeout=60.0)
+    np.testing.assert_array_equal(run(n=4, store=store).draws, first.draws)
+
+
+def test_a_store_of_version_0_1_is_refused_by_its_version(tmp_path):
+    store = tmp_path / "r.sqlite"
+    run(n=2, store=store)
+    with closing(sqlite3.connect(store)) as connection:
+        connection.execute("DELETE FROM settings WHERE name = 'format'")
+        connection.commit()
+    with pytest.raises(ValueError, match=r"version 0\.1") as caught:
+        run(n=2, store=store)
+    assert len(str(caught.value).splitlines()) == 1 and len(str(caught.value)) < 200
+
+
+def test_progress_is_told_of_every_replicate(capsys):
+    told = []
+    run(n=3, progress=told.append)
+    assert told == [1] * 3 and capsys.readouterr() == ("", "")
+
+
 def test_draws_that_are_not_finite_are_a_failure():
     made = run(lambda observed, seed: {"a": np.full(9, np.nan), "b": np.ones(9)}, n=2)
     assert set(made.errors.values()) == {"pipeline: draws are not finite"}
@@ -229,7 +267,12 @@ def test_a_pipeline_of_the_wrong_form_stops_the_run(pipeline, said):
 
 @pytest.mark.parametrize(
     ("options", "said"),
-    [({"n": 0}, "n must be"), ({"draws": 0}, "draws must be"), ({"seed": -1}, "seed must be")],
+    [
+        ({"n": 0}, "n must be"),
+        ({"draws": 0}, "draws must be"),
+        ({"seed": -1}, "seed must be"),
+        ({"timeout": 0}, "timeout must be"),
+    ],
 )
 def test_arguments_are_checked(options, said):
     with pytest.raises(ValueError, match=said):

@@ -28,9 +28,9 @@ def oscillate(theta, seeds):
 
 
 def fitted(simulate, observed, noise, bank, count=RUNS):
-    keeping = criticism.Keeping(seed=bank, batch=64)
-    laboratory = Laboratory(simulate, PRIOR, EXTENSIONS, "", keeping)
-    runs = laboratory.run("start", fill(Box(np.zeros(1), np.ones(1)), PRIOR, bank, count))
+    with criticism.Keeping(batch=64).opened("") as keep:
+        laboratory = Laboratory(simulate, PRIOR, EXTENSIONS, keep, bank)
+        runs = laboratory.run("start", fill(Box(np.zeros(1), np.ones(1)), PRIOR, bank, count))
     return hypothesise((), PRIOR, runs, observed, noise)
 
 

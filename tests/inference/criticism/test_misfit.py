@@ -59,9 +59,9 @@ def observe(simulate, number, bump=0.0):
 
 
 def examined(simulate, observed, bank):
-    keeping = criticism.Keeping(seed=bank, batch=64)
-    laboratory = Laboratory(simulate, PRIOR, EXTENSIONS, "", keeping)
-    return examine(Study(laboratory, observed, NOISE, criticism.Plan()), None)[0]
+    with criticism.Keeping(batch=64).opened("") as keep:
+        laboratory = Laboratory(simulate, PRIOR, EXTENSIONS, keep, bank)
+        return examine(Study(laboratory, observed, NOISE, criticism.Plan()), None)[0]
 
 
 def on(hypothesis, observed):
@@ -244,9 +244,10 @@ def test_what_clean_data_show_as_well_is_no_discovery(banks):
 @pytest.mark.parametrize(("low", "high", "side"), [(-2.0, 2.0, 0), (0.0, 2.0, 1), (-2.0, 0.0, -1)])
 def test_a_prior_says_on_which_side_an_effect_can_act(low, high, side):
     extensions = {"bump": criticism.Extension(dist.Uniform(low, high))}
-    laboratory = Laboratory(exact, PRIOR, extensions, "", criticism.Keeping(batch=64))
     observed = observe(exact, 3)
-    found = examine(Study(laboratory, observed, NOISE, criticism.Plan()), None)[0].signatures
+    with criticism.Keeping(batch=64).opened("") as keep:
+        laboratory = Laboratory(exact, PRIOR, extensions, keep)
+        found = examine(Study(laboratory, observed, NOISE, criticism.Plan()), None)[0].signatures
     assert found["bump"].side == side
     assert found["bump"].change @ BUMP > 0.0  # towards a greater coefficient, on either side
 

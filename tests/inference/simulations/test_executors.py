@@ -6,7 +6,7 @@ import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 
 import dask
 import numpy as np
@@ -121,32 +121,29 @@ def clients(cluster):
 
 
 def options(executor):
-    return {"budget": BUDGET, "initial": INITIAL, "batch": 3, "executor": executor}
+    """Three in flight."""
+    flying = {"batch": 3, "in_rounds": False}
+    return {"budget": BUDGET, "initial": INITIAL, "executor": executor, **flying}
 
 
 def test_one_in_flight_is_one_per_round(prior, observed, simulate):
-    plain = inference.fit(simulate, prior, observed, budget=7, initial=5, batch=1)
+    given = {"budget": 7, "initial": 5, "batch": 1}
+    plain = inference.fit(simulate, prior, observed, **given)
     with ThreadPoolExecutor(2) as pool:
-        spread = inference.fit(
-            simulate, prior, observed, budget=7, initial=5, batch=1, executor=pool
-        )
+        spread = inference.fit(simulate, prior, observed, executor=pool, in_rounds=False, **given)
     assert_same(plain, spread)
 
 
-def test_in_rounds_an_executor_has_the_bits_of_none(prior, observed, simulate):
-    plain = inference.fit(simulate, prior, observed, budget=8, initial=5, batch=3)
+def test_an_executor_has_the_bits_of_none(prior, observed, simulate):
+    given = {"budget": 8, "initial": 5, "batch": 3}
+    plain = inference.fit(simulate, prior, observed, **given)
     with ThreadPoolExecutor(3) as pool:
-        spread = inference.fit(
-            dithering(simulate),
-            prior,
-            observed,
-            budget=8,
-            initial=5,
-            batch=3,
-            executor=pool,
-            in_rounds=True,
-        )
+        spread = inference.fit(dithering(simulate), prior, observed, executor=pool, **given)
     assert_same(plain, spread)
+
+
+def test_in_flight_no_executor_has_the_bits_of_one(prior, observed, simulate, by_hand):
+    assert_same(inference.fit(simulate, prior, observed, **options(None)), by_hand)
 
 
 def test_progress_is_told_of_every_simulation(prior, observed, simulate):
@@ -211,6 +208,20 @@ def test_a_worker_of_dask_that_dies_costs_one_run(tmp_path, prior, observed, wor
 def test_a_simulator_that_cannot_travel_is_explained(prior, observed, simulate):
     with spawned(1) as pool, pytest.raises(TypeError, match="simulate must be picklable"):
         inference.fit(lambda theta, seeds: None, prior, observed, **options(pool))
+
+
+class Strict(Executor):
+    """Takes no work, for a reason of its own."""
+
+    def submit(self, work, /):
+        raise TypeError("work must be a str")
+
+
+def test_another_error_of_an_executor_is_told_as_it_is(worker_side, prior, observed, simulate):
+    """A simulator that travels is not blamed."""
+    with pytest.raises(TypeError) as caught:
+        inference.fit(worker_side.simulate, prior, observed, **options(Strict()))
+    assert caught.value.args == ("work must be a str",) and caught.value.__cause__ is None
 
 
 def test_after_an_error_the_bank_is_free_for_the_next_call(prior, observed, simulate):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from bolfi_liquids.inference import SimulationBank
-from bolfi_liquids.inference.simulations import Job, Keep, Simulation, run_missing
+from bolfi_liquids.inference.simulations import Job, Keep, OneByOne, Simulation, run_missing
 from bolfi_liquids.inference.simulations.failures import timed_out
 from bolfi_liquids.inference.simulations.job import run_batch, simulation_seed
 
@@ -127,6 +127,23 @@ def test_a_simulator_that_stops_itself_stays_in_its_thread(seconds, error):
     assert patient.threads == {threading.current_thread()}
 
 
+class PatientOnce(Patient):
+    """The same of single runs."""
+
+    def simulate(self, theta, seed):
+        return super().simulate({"a": np.array([theta["a"]])}, seed)[0]
+
+
+@pytest.mark.parametrize(("seconds", "error"), [(0.0, None), (9.0, timed_out(0.1))])
+def test_a_simulator_of_single_runs_stops_itself_as_well(seconds, error):
+    patient = PatientOnce(seconds)
+    with SimulationBank() as bank:
+        keep = Keep(bank, timeout=0.1)
+        (found,) = run_missing(OneByOne(patient.simulate), JOBS[:1], keep)
+    assert found.error == error
+    assert patient.threads == {threading.current_thread()}
+
+
 def test_every_kind_is_counted_and_written(tmp_path, prior, observed, simulate, forever):
     """Runs 1, 3 and 4 fail, each in its way; the others are as they would have been."""
     raises, diverges, hangs = (simulation_seed(0, index) for index in (1, 3, 4))
@@ -189,3 +206,15 @@ def test_the_clock_runs_in_the_worker(tmp_path, monkeypatch):
 def test_bad_timeouts_are_refused(prior, observed, simulate, timeout):
     with pytest.raises(ValueError, match="timeout must be positive and finite"):
         inference.fit(simulate, prior, observed, timeout=timeout)
+    with SimulationBank() as bank:
+        with pytest.raises(ValueError, match="timeout must be positive and finite"):
+            run_missing(simulate, JOBS, Keep(bank, timeout=timeout))
+
+
+@pytest.mark.parametrize("batch", [0, -1, 2.0])
+def test_bad_batches_are_refused(batch):
+    """Also where there is nothing to simulate, which a batch of none would have made of it."""
+    with SimulationBank() as bank:
+        for jobs in (JOBS, []):
+            with pytest.raises(ValueError, match="batch must be an integer"):
+                run_missing(stuck_at(-1, None), jobs, Keep(bank, batch=batch))

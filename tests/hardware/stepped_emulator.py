@@ -7,19 +7,23 @@ this computer does.
 
 import socket
 import struct
+import time
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import Any
 
-from ..host_clock import SteppedClock
-from .controller import Options
-from .loop import Emulator
-from .process import free_address
-from .servers import wire
-from .servers.network import RTDE, SCRIPT
+from bolfi_liquids.hardware.emulator.controller import Options
+from bolfi_liquids.hardware.emulator.loop import Emulator
+from bolfi_liquids.hardware.emulator.process import free_address
+from bolfi_liquids.hardware.emulator.servers import wire
+from bolfi_liquids.hardware.emulator.servers.network import RTDE, SCRIPT
+from bolfi_liquids.hardware.host_clock import SteppedClock
+
+ANSWER_TIMEOUT = 10.0  # s of this computer's clock; the emulator answers in this thread
 
 REGISTER_OFFSET = 24  # of the control script's registers, as in ur_rtde
 READY, DONE = 1, 2
+OVER = object()  # of a command of which no step is left
 SERVO_L, SERVO_STOP, SET_PAYLOAD, SET_TCP = 24, 16, 17, 29
 SET_WATCHDOG, WITHIN_LIMITS, TCP_OFFSET, STOP_SCRIPT = 35, 36, 40, 255
 SCRIPT_TEXT = (
@@ -74,11 +78,13 @@ class _Client:
 
     def ask(self, kind: int, payload: bytes) -> bytes:
         self._socket.sendall(wire.pack(kind, payload))
-        while True:
+        end = time.monotonic() + ANSWER_TIMEOUT
+        while time.monotonic() < end:
             self.emulator.network.poll(0.0)
             for package in self._packages():
                 if package.type == kind:
                     return package.payload
+        raise TimeoutError(f"no answer to a package of type {kind} in {ANSWER_TIMEOUT:g} s")
 
     def value(self, name: str) -> Any:
         """Of the latest package; it stays what it was once the link is lost."""
@@ -158,7 +164,8 @@ class _Control(_Client):
         answer = self.ask(wire.INPUTS, ",".join(INPUT_FIELDS).encode())
         if b"IN_USE" in answer:
             raise RuntimeError("registers already in use")
-        self._later: list[Iterator[None]] = []
+        self._later: list[Iterator[None]] = []  # commands that nobody waits for, one after another
+        self._goes_on = False
         if flag == self.FLAG_UPLOAD_SCRIPT:
             with socket.create_connection((self.emulator.address, SCRIPT)) as upload:
                 upload.sendall(SCRIPT_TEXT.encode())
@@ -192,10 +199,12 @@ class _Control(_Client):
     def servoStop(self, deceleration: float) -> None:
         """The real one waits, in the driver's own thread; here the clock goes on with it."""
         self._later.append(self._carried_out(SERVO_STOP, [deceleration]))
-        self.emulator.clock.every(self._period, self._go_on)
+        if not self._goes_on:
+            self._goes_on = True
+            self.emulator.clock.every(self._period, self._go_on)
 
     def stopScript(self) -> None:
-        self._later.append(iter(lambda: self._send(STOP_SCRIPT, []), None))
+        self._later.append(self._ended())
 
     def _runs(self) -> bool:
         return self.isConnected() and self.value("runtime_state") == 2
@@ -213,8 +222,14 @@ class _Control(_Client):
             while self._runs() and self.value(f"output_int_register_{REGISTER_OFFSET}") != answer:
                 yield
 
+    def _ended(self) -> Iterator[None]:
+        """The script ends, and answers nothing."""
+        self._send(STOP_SCRIPT, [])
+        yield from ()
+
     def _go_on(self) -> None:
-        if self._later and next(self._later[0], self) is self:
+        """One more step of the first command that is not carried out yet."""
+        if self._later and next(self._later[0], OVER) is OVER:
             self._later.pop(0)
 
     def _send(self, command: int, numbers: list[float]) -> None:
