@@ -15,6 +15,11 @@ if TYPE_CHECKING:
     from ..models import Liquid
 
 
+VISCOSITY, COHESION, DENSITY = 1.0, 0.2, 1260.0  # Pa s, 1, kg/m3: the bundled glycerin
+STIR_PARTICLES, POUR_PARTICLES = 1000, 664
+"""Numbers of particles that a stir and a pour are simulated with, unless others are given."""
+
+
 @checked()
 class Described:
     """A liquid and how it is simulated.
@@ -35,7 +40,7 @@ class Described:
     cohesion: Annotated[float, Field(ge=0.0, le=1.0)]
     density: Annotated[float, Field(gt=0.0)]
     effects: Mapping[str, float] = Field(default_factory=dict)
-    particles: Particles = 1000
+    particles: Particles = STIR_PARTICLES
     seed: Seed = 0
 
     def liquid(self) -> "Liquid":
@@ -67,6 +72,18 @@ class Described:
             "particles": self.particles,
             "seed": self.seed,
         }
+
+
+def number_of(value: object, where: str) -> float:
+    """A value that must be one number.
+
+    Raises:
+        InputError: It is something else; `where` is named.
+    """
+    numbers = int | float | np.integer | np.floating
+    if isinstance(value, bool) or not isinstance(value, numbers) or not np.isfinite(value):
+        raise InputError(f"{value!r:.80}", where=where, fix="give one finite number")
+    return float(value)
 
 
 def read_effects(given: Iterable[str], scene: str) -> dict[str, float]:
