@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterable, Mapping
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -74,7 +74,7 @@ class Described:
         }
 
 
-def number_of(value: object, where: str) -> float:
+def number_of(value: Any, where: str) -> float:
     """A value that must be one number.
 
     Raises:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -124,7 +124,7 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
     return found
 
 
-def _density(value: object) -> float:
+def _density(value: Any) -> float:
     return number_of(value, "--density")
 
 
