@@ -183,7 +183,7 @@ def is_criticised(run: Path) -> bool:
     section = read_summary(run).get(CriticismSummary.SECTION)
     if section is None:
         return False
-    if section.get("made_from", {}).get("format") != CRITICISM_FORMAT:
+    if (section.get("made_from") or {}).get("format") != CRITICISM_FORMAT:
         raise InputError(
             f"its criticism has the form of {made_by(section)}",
             where=str(run),

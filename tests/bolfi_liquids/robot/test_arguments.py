@@ -33,7 +33,7 @@ def test_what_went_wrong_is_logged_once_whether_a_view_is_shown_or_not(caplog, c
     (record,) = caplog.records
     assert record.getMessage() == "calibration failed: no memory"
     assert record.levelname == "WARNING"
-    assert capsys.readouterr().err == ""  # the handlers' business alone
+    assert capsys.readouterr().err.count("no memory") <= 1  # by the command line's handler
 
 
 @pytest.mark.parametrize("emulate", [False, True])
