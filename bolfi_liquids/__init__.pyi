@@ -2,7 +2,9 @@ from .calibration.calibrate import calibrate as calibrate
 from .calibration.result import Calibration as Calibration
 from .criticism.criticise import criticise as criticise
 from .criticism.result import Criticism as Criticism
+from .errors import InputError as InputError
 from .inputs.open import open_recording as open_recording
+from .inputs.pour_table import open_pours as open_pours
 from .inputs.recording import Recording as Recording
 from .inputs.table_import import import_table as import_table
 from .models import Cups as Cups

@@ -14,23 +14,28 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..inputs.open import Source, open_recordings
 from ..inputs.prior import check_prior, default_prior, describe_prior
-from ..inputs.recording import Recording
+from ..inputs.recording import Recording, aborted_recordings
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
 from ..progress import after_first, progress_bar
 from ..run.directory import (
     POSTERIOR,
     enter_run,
+    note_timeout,
     open_bank,
     read_run,
 )
 from ..run.provenance import LIBRARIES, versions
 from ..run.recordings import keep_recordings
+from ..run.simulations import warn_of_timeouts
+from ..run.workers import open_workers
 from .draws import pick_draws
 from .result import Calibration, is_calibrated
 from .stir_simulator import Stirring, stirring_of
 from .summary import CalibrationSummary
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from ..inference import Fit, Prior, SimulationBank
     from ..inference.simulations import Keep, Workers
 
@@ -79,12 +84,15 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         resume: Whether `out` may hold a run of the same settings, but for a smaller budget, to go
             on with.
         executor: Where simulations run: a pool of processes, a Dask client or the address of a
-            Dask scheduler; None is this process. The result has the same bits.
-        timeout: Seconds that one simulation may take; None sets no limit.
+            Dask scheduler, whose workers have one thread each; None is this process. The result
+            has the same bits.
+        timeout: Seconds that one simulation may take; one that takes longer counts as failed.
+            None sets no limit.
         progress: Whether to show bars on stderr.
 
     Raises:
-        InputError: A recording, the prior, a setting or `out` cannot be used.
+        InputError: A recording, the prior, a setting, `timeout` or `out` cannot be used.
+        ValueError, ImportError, ConnectionError: `executor` cannot be used.
         RuntimeError: Simulations failed; the message says how.
     """
     settings = CalibrationSettings(
@@ -100,23 +108,30 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     opened = _open_all(recordings)
     prior = default_prior() if prior is None else prior
     check_prior(prior)
-    stirring = stirring_of(opened, particles)
-    run = Path(mkdtemp(prefix="bolfi_liquids_") if out is None else out)
-    record = run_record(settings, prior, stirring)
+    stirring = stirring_of(opened, settings.particles)
+    with open_workers(executor, timeout) as workers:
+        run = Path(mkdtemp(prefix="bolfi_liquids_") if out is None else out)
+        _enter(run, run_record(settings, prior, stirring), resume)
+        keep_recordings(run, stirring.recordings)
+        for notice in aborted_recordings(opened):
+            logger.warning(notice)
+        if not is_calibrated(run):
+            _calibrate(run, stirring, prior, settings, _Means(workers, timeout, progress))
+    return Calibration.open(run)
+
+
+def _enter(run: Path, record: dict[str, Any], resume: bool) -> None:
     removed = enter_run(run, record, resume=resume, growing="settings.budget")
     if removed:
         what = f"removed {', '.join(removed)}, concluded from fewer simulations"
         logger.warning("%s: %s; every simulation is kept", run, what)
-    keep_recordings(run, stirring.recordings)
-    if not is_calibrated(run):
-        _calibrate(run, stirring, prior, settings, _Means(executor, timeout, progress))
-    return Calibration.open(run)
 
 
 class _Means(NamedTuple):
-    """How simulations are made; nothing here changes a bit of the result."""
+    """How simulations are made. Only `timeout` can change the result: a simulation that takes
+    longer is a failed one."""
 
-    executor: "Workers | None"
+    workers: "Executor | None"
     timeout: float | None
     progress: bool
 
@@ -139,17 +154,19 @@ def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring
 def _calibrate(
     run: Path, stirring: Stirring, prior: "Prior", settings: CalibrationSettings, means: _Means
 ) -> None:
-    from ..inference.simulations import Keep, open_executor
+    from ..inference.simulations import Keep
     from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES, check_by_simulation
     from .tree import results_tree, write_tree
 
+    note_timeout(run, means.timeout)
     needed = settings.budget + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
-    with open_bank(run) as bank, open_executor(means.executor) as workers, ExitStack() as stack:
-        kept = max(needed - _left(run, settings, bank), 0)
+    with open_bank(run) as bank, ExitStack() as stack:
+        kept = min(max(needed - _left(run, settings, bank), 0), needed)
         bar = progress_bar("simulating stirs", needed, shown=means.progress, done=kept)
         advance = after_first(kept, stack.enter_context(bar))
-        keep = Keep(bank, stirring.identity, settings.batch, workers, means.timeout)
+        keep = Keep(bank, stirring.identity, settings.batch, means.workers, means.timeout)
         fit = fit_recordings(stirring, stirring.observed, prior, keep, settings, progress=advance)
+        warn_of_timeouts(fit.history.errors.tolist(), means.timeout)
         sampled = fit.sample(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
         )
@@ -169,7 +186,10 @@ def _calibrate(
 
 
 def _left(run: Path, settings: CalibrationSettings, bank: "SimulationBank") -> int:
-    """Simulations that a run still needs; some of those before it grew were judging, or pours."""
+    """Simulations that a run still needs; some of those before it grew were judging, or pours.
+
+    Negative where the bank holds pours that followed a calibration whose results were deleted.
+    """
     from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES
 
     before = read_run(run).get("grown", [{"learned_from": 0, "simulations": 0}])[-1]

@@ -23,9 +23,6 @@ if TYPE_CHECKING:
 
     from ..drawing import Canvas
 
-PREDICTIVE_SHARE = 0.9
-"""Share of the posterior predictions inside the band."""
-
 PLANE_COLOURS = (BLUE, ORANGE)
 
 

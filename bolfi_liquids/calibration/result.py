@@ -84,6 +84,10 @@ class Calibration:
         )
         return cls(run, loaded, MappingProxyType(record), CalibrationSummary.read(run))
 
+    def __reduce__(self):
+        """A mapping proxy cannot be pickled."""
+        return _unpickled, ({**vars(self), "record": dict(self.record)},)
+
     @property
     def posterior(self) -> "Dataset":
         """Draws of each parameter, shape (chain, draw)."""
@@ -100,6 +104,12 @@ class Calibration:
         return read_prior(self.record["settings"]["prior"])
 
     @property
+    def added(self) -> tuple[str, ...]:
+        """Effects that a criticism has added to the liquid's parameters."""
+        searched = self.tree["simulations"].to_dataset()
+        return tuple(str(name) for name in self.posterior.data_vars if name not in searched)
+
+    @property
     def liquid_density(self) -> float:
         """Density of the stirred liquid, as weighed [kg/m3]."""
         return float(self.tree.attrs["liquid_density"])
@@ -112,7 +122,11 @@ class Calibration:
 
         Returns:
             The axes.
+
+        Raises:
+            ValueError: A criticism has added effects; there is no such plot with them.
         """
+        self._check_plot("plot_residuals")
         from ..drawing import given_or_shown, styled
         from .fit_figures import draw_fit
 
@@ -127,7 +141,11 @@ class Calibration:
 
         Returns:
             The axes.
+
+        Raises:
+            ValueError: A criticism has added effects; there is no such plot with them.
         """
+        self._check_plot("plot_coefficient")
         from ..drawing import given_or_shown, styled
         from .posterior_figure import draw_posterior
 
@@ -149,9 +167,20 @@ class Calibration:
         with styled():
             return draw_search(self.tree, given_or_shown(axes))[0].grid
 
+    def _check_plot(self, instead: str) -> None:
+        if self.added:
+            raise ValueError(
+                f"the plot would be of the model without {', '.join(self.added)}; use "
+                f"`criticism.{instead}()`, or plot `criticism.base`"
+            )
+
     def draws(self, count: int, seed: int = 0) -> dict[str, NDArray]:
         """A stratified sample of the posterior: parameter -> values, shape (count,)."""
         return pick_draws(self.posterior, count, seed)
+
+
+def _unpickled(values: dict[str, Any]) -> Calibration:
+    return Calibration(**{**values, "record": MappingProxyType(values["record"])})
 
 
 def _given_options(record: Mapping[str, Any]) -> str:

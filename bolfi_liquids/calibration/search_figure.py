@@ -45,8 +45,9 @@ def draw_search(tree: "DataTree", axes: "Canvas" = None) -> tuple[Panels, list[R
     """
     from matplotlib.ticker import MaxNLocator
 
-    names = list(map(str, tree["posterior"].data_vars))
     simulations = tree["simulations"].to_dataset()
+    # effects that were added to the posterior later were not searched for
+    names = [str(name) for name in tree["posterior"].data_vars if name in simulations]
     discrepancy = np.degrees(np.degrees(simulations["discrepancy"].to_numpy()))
     iteration = np.arange(1, len(discrepancy) + 1)
     start = iteration <= int(tree.attrs["initial"])

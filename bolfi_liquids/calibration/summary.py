@@ -1,10 +1,10 @@
 """The section "calibrate" of summary.json."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from importlib.metadata import version
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from .noise import irreducible_rms, rms
 from .stir_simulator import Stirring
 
 if TYPE_CHECKING:
-    from xarray import DataArray, DataTree
+    from xarray import DataArray, Dataset, DataTree
 
     from ..inference import Fit
 
@@ -112,29 +112,40 @@ class CalibrationSummary(Section):
     def from_fit(cls, tree: "DataTree", fit: "Fit", stirring: Stirring, check: Check) -> Self:
         """From posterior.nc, the engine's fit, what was stirred and the simulations that check."""
         posterior, closest = tree["posterior"], fit.closest
-        attrs, seen = posterior.attrs, [one.inclination for one in stirring.recordings]
-        thin = posterior["viscosity"].to_numpy() < stirring.least_viscosity
+        seen = [one.inclination for one in stirring.recordings]
         spent = {name: tree.attrs[f"seconds_{name}"] for name in Seconds.__dataclass_fields__}
         return cls(
             parameters={
                 str(name): ParameterSummary.of(draws) for name, draws in posterior.data_vars.items()
             },
             least_viscosity=float(stirring.least_viscosity),
-            below_least_viscosity=float(thin.mean()),
+            below_least_viscosity=_below(posterior.to_dataset(), stirring.least_viscosity),
             best=fit.best,
             closest=closest.theta,
             n_simulations=int(fit.simulations.sizes["simulation"]),
             n_check_simulations=len(check.predictive) + len(check.replicates),
             fit_rms_deg=float(np.degrees(rms(stirring.observed - closest.signal))),
             noise_deg=float(np.degrees(irreducible_rms(seen, check.replicates))),
-            rhat_max=float(attrs["rhat_max"]),
-            ess_min=float(min(attrs["ess_bulk_min"], attrs["ess_tail_min"])),
-            n_draws=int(posterior.sizes["chain"] * posterior.sizes["draw"]),
-            divergences=int(attrs["divergences"]),
+            **_sampling(posterior.to_dataset()),
             emulator_warnings=tuple(fit.warnings),
             seconds=Seconds(**{name: float(value) for name, value in spent.items()}),
             seed=int(tree.attrs["seed"]),
             version=version("bolfi-liquids"),
+        )
+
+    def of_posterior(
+        self,
+        posterior: "Dataset",
+        parameters: Mapping[str, ParameterSummary],
+        best: Mapping[str, float],
+    ) -> Self:
+        """These numbers with those of another posterior, in which effects were added."""
+        return replace(
+            self,
+            parameters=parameters,
+            best=best,
+            below_least_viscosity=_below(posterior, self.least_viscosity),
+            **_sampling(posterior),
         )
 
     @property
@@ -148,3 +159,19 @@ class CalibrationSummary(Section):
         mixed = self.rhat_max <= RHAT_MAX and self.ess_min >= ESS_MIN  # neither holds for NaN
         good = mixed and self.divergent_share <= DIVERGENT_SHARE_MAX
         return SamplerStatus.CONVERGED if good else SamplerStatus.NOT_CONVERGED
+
+
+def _below(posterior: "Dataset", viscosity: float) -> float:
+    """Share of the draws below a viscosity [Pa s]."""
+    return float((posterior["viscosity"].to_numpy() < viscosity).mean())
+
+
+def _sampling(posterior: "Dataset") -> dict[str, Any]:
+    """What the sampler tells of its draws, as fields of `CalibrationSummary`."""
+    attrs = posterior.attrs
+    return {
+        "rhat_max": float(attrs["rhat_max"]),
+        "ess_min": float(min(attrs["ess_bulk_min"], attrs["ess_tail_min"])),
+        "n_draws": int(posterior.sizes["chain"] * posterior.sizes["draw"]),
+        "divergences": int(attrs["divergences"]),
+    }

@@ -94,7 +94,6 @@ def calibrate(
     """Learn a liquid's parameters from recordings of it being stirred."""
     from ..calibration.calibrate import calibrate as run_calibrate
     from ..inputs.open import open_recordings
-    from ..inputs.recording import aborted_recordings
 
     opened = open_recordings(recordings)
     if resume and not (out / RUN_TOML).exists():
@@ -109,8 +108,6 @@ def calibrate(
             **asdict(options),
         )
     print_section(out, "calibrate")
-    for line in aborted_recordings(opened):
-        typer.echo(line, err=True)
     print_next(out, "criticise", "pour")
 
 
@@ -130,17 +127,12 @@ def criticise(
 ) -> None:
     """Find where simulation and recording disagree, and which effect is missing."""
     from ..criticism.criticise import criticise as run_criticise
-    from ..inputs.cups import open_cups
     from ..inputs.pour_table import open_pours
 
     tables = [
         None if path is None else open_pours(path, poured.liquid)
         for path in (poured.pours, poured.held_out_pours)
     ]
-    for table in filter(None, tables):
-        if table.unused:
-            typer.echo(f"{table.path}: columns not used: {', '.join(table.unused)}", err=True)
-    cups = None if poured.cups is None else open_cups(poured.cups)
     with compute.executor() as executor:
         criticism = run_criticise(
             run,
@@ -148,7 +140,7 @@ def criticise(
             baseline=data.baseline or (),
             pours=tables[0],
             held_out_pours=tables[1],
-            cups=cups,
+            cups=poured.cups,
             effects=options.effects or None,
             accept=options.accept or None,
             seed=options.seed,

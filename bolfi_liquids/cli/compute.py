@@ -75,6 +75,7 @@ def open_executor_of(workers: int | None, dask: str | None) -> "Iterator[Executo
 
     Raises:
         BadParameter: Both are given.
+        ValueError: A Dask worker has several threads, of which the fluid can use only one.
         ImportError: Dask is not installed.
         ConnectionError: No scheduler answers there.
     """
@@ -86,7 +87,7 @@ def open_executor_of(workers: int | None, dask: str | None) -> "Iterator[Executo
         return
     if workers not in (None, 1):
         raise typer.BadParameter("--workers and --dask name two places to simulate: give one")
-    from ..inference.simulations import open_executor
+    from ..run.workers import open_workers
 
-    with open_executor(dask) as executor:
+    with open_workers(dask) as executor:
         yield executor

@@ -6,25 +6,30 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..inputs.described_liquid import (
+    COHESION,
+    DENSITY,
+    POUR_PARTICLES,
+    STIR_PARTICLES,
+    VISCOSITY,
+)
 from .compute import Workers
 from .examples import examples
 from .grouped import grouped
-from .options import CupsOption
+from .options import CupsOption, ParticlesOption
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
 app = typer.Typer(help="Simulate one stir or one pour, and look at it.", no_args_is_help=True)
 
-GLYCERIN_DENSITY = 1260.0  # kg/m3
-
 
 @dataclass(frozen=True)
 class LiquidOptions:
     """A liquid by numbers."""
 
-    viscosity: Annotated[float, typer.Option(help="Of the liquid, in Pa s.")] = 1.0
-    cohesion: Annotated[float, typer.Option(help="Of the liquid, 0 to 1.")] = 0.2
+    viscosity: Annotated[float, typer.Option(help="Of the liquid, in Pa s.")] = VISCOSITY
+    cohesion: Annotated[float, typer.Option(help="Of the liquid, 0 to 1.")] = COHESION
     effect: Annotated[
         list[str] | None,
         typer.Option("--effect", metavar="NAME=VALUE", help="An effect; may be repeated."),
@@ -94,7 +99,7 @@ def stir(
     density: Annotated[
         float | None, typer.Option(help="Of the liquid, in kg/m³; else the recording's.")
     ] = None,
-    particles: Annotated[int, typer.Option(help="Of which the simulated liquid is made.")] = 1000,
+    particles: ParticlesOption = STIR_PARTICLES,
     recording: Annotated[
         Path | None,
         typer.Option(metavar="NC", help="Whose path and rig are used; else a bundled one."),
@@ -139,8 +144,8 @@ def pour(
     action: ActionOptions,
     files: FileOptions,
     compute: Workers,
-    density: Annotated[float, typer.Option(help="Of the liquid, in kg/m³.")] = GLYCERIN_DENSITY,
-    particles: Annotated[int, typer.Option(help="Of which the simulated liquid is made.")] = 664,
+    density: Annotated[float, typer.Option(help="Of the liquid, in kg/m³.")] = DENSITY,
+    particles: ParticlesOption = POUR_PARTICLES,
 ) -> None:
     """Pour a liquid from one cup into another.
 

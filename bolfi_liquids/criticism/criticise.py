@@ -3,6 +3,7 @@
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..calibration.result import Calibration
@@ -15,6 +16,7 @@ from ..inputs.recording import Recording
 from ..inputs.settings import CriticismSettings
 from ..progress import phases
 from ..run.directory import CRITICISM, Run, open_bank, run_path
+from ..run.workers import open_workers
 from .baseline import (
     Clean,
     clean_residuals,
@@ -48,7 +50,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     baseline: Source | Sequence[Source] = (),
     pours: Pours | None = None,
     held_out_pours: Pours | None = None,
-    cups: "Cups | None" = None,
+    cups: "Cups | str | Path | None" = None,
     effects: str | Sequence[str] | None = None,
     accept: str | Sequence[str] | None = None,
     seed: int = 0,
@@ -69,7 +71,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
             to be missing: their residuals count as simulator error.
         pours: A table of pours of the liquid, or its path; a second source.
         held_out_pours: Another, to which nothing is fitted.
-        cups: With which they were poured; None takes the bundled ones.
+        cups: With which they were poured, or a TOML file of them; None takes the bundled ones.
         effects: Names in `models.EFFECTS` to consider; None is all of them.
         accept: Effects that join the model whatever the verdict.
         seed: Seed of all random draws.
@@ -78,11 +80,11 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         progress: Whether to show phases on stderr.
 
     Raises:
-        InputError: Something given cannot be used.
+        InputError, ValueError: Something given cannot be used.
+        ImportError, ConnectionError: `executor` cannot be used.
         RuntimeError: Simulations failed; the message says how.
     """
     from ..inference.criticism import Keeping
-    from ..inference.simulations import open_executor
 
     if not isinstance(calibration, Calibration):
         calibration = Calibration.open(run_path(calibration))
@@ -98,11 +100,11 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     if finished := finished_criticism(run, inputs.made_from):
         return finished
     with (
+        open_workers(executor, timeout) as workers,
         open_bank(run) as bank,
-        open_executor(executor) as workers,
         phases(shown=progress) as report,
     ):
-        keeping = Keeping(bank, settings.batch, seed, report, workers, timeout)
+        keeping = Keeping(bank, settings.batch, settings.seed, report, workers, timeout)
         findings = _find(calibration, inputs, keeping)
         tree = criticism_tree(findings)
     write_tree(tree, run / CRITICISM)
@@ -214,7 +216,5 @@ def _learned_from(calibration: Calibration):
     """The simulations that the calibration learned from: theta, signals, seeds."""
     made = calibration.tree["simulations"].to_dataset()
     good = ~made["failed"].to_numpy()
-    theta = {
-        str(name): made[name].to_numpy()[good] for name in calibration.tree["posterior"].data_vars
-    }
+    theta = {name: made[name].to_numpy()[good] for name in calibration.prior.names}
     return theta, made["signal"].to_numpy()[good], made["seed"].to_numpy()[good]

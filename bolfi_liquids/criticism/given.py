@@ -1,6 +1,7 @@
 """What a criticism is given, read and checked."""
 
 import json
+import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, same_liquid, stirring_of
 from ..errors import InputError
-from ..inputs.cups import bundled_cups
+from ..inputs.cups import cups_of
 from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import PourTable, open_pours
 from ..inputs.recording import Recording
@@ -22,6 +23,8 @@ from .stirs import effects_of, frame_interval, same_rate
 
 if TYPE_CHECKING:
     from ..models import Cups
+
+logger = logging.getLogger(__name__)
 
 Pours = PourTable | str | Path
 RIG_SIZES = ("cup_radius", "stick_radius", "stick_length")
@@ -91,7 +94,7 @@ class Given(NamedTuple):
     baseline: Source | Sequence[Source] = ()
     pours: Pours | None = None
     held_out_pours: Pours | None = None
-    cups: "Cups | None" = None
+    cups: "Cups | str | Path | None" = None
 
 
 def open_inputs(calibration: Calibration, settings: CriticismSettings, given: Given) -> Inputs:
@@ -113,6 +116,11 @@ def open_inputs(calibration: Calibration, settings: CriticismSettings, given: Gi
     table = _opened(given.pours, "--pours")
     held_out_table = _opened(given.held_out_pours, "--held-out-pours")
     _check_pours(table, held_out_table, settings)
+    if given.cups is not None and table is None:
+        raise InputError("there are no pours from them", where="--cups", fix="give --pours, too")
+    for one in filter(None, (table, held_out_table)):
+        if one.unused:
+            logger.warning("%s: columns not used: %s", one.path, ", ".join(one.unused))
     return Inputs(
         stirring=stirring,
         held_out=tuple(kept_back),
@@ -120,7 +128,7 @@ def open_inputs(calibration: Calibration, settings: CriticismSettings, given: Gi
         left_out=_names_of(r for r in believed if r.hash not in {one.hash for one in others}),
         table=table,
         held_out_table=held_out_table,
-        cups=bundled_cups() if given.cups is None else given.cups,
+        cups=cups_of(given.cups),
         settings=settings,
     )
 

@@ -11,7 +11,7 @@ from ..calibration.tree import read_tree
 from ..drawing import given_or_shown
 from ..errors import InputError
 from ..run.directory import CRITICISM, CRITICISM_FORMAT, Run, run_path
-from ..run.summary import read_summary
+from ..run.summary import SUMMARY_FILE, made_by, read_summary
 from ..words import html_table, sentence, spoken
 from .summary import CriticismSummary
 from .verdict import Verdict
@@ -62,7 +62,7 @@ class Criticism:
         """Read a finished criticism.
 
         Raises:
-            InputError: There is none in the directory.
+            InputError: There is none in the directory, or not one whole of this version's form.
         """
         run = Path(run)
         if not is_criticised(run):
@@ -71,8 +71,15 @@ class Criticism:
                 where=str(run),
                 fix=f"run: bolfi-liquids criticise {run}",
             )
-        tree = read_tree(run / CRITICISM, fix=f"write it again: bolfi-liquids criticise {run}")
-        return cls(Calibration.open(run), tree, CriticismSummary.read(run))
+        tree = read_tree(run / CRITICISM, fix=_again(run))
+        summary = CriticismSummary.read(run)
+        if json.loads(tree.attrs.get("made_from", "null")) != summary.made_from:
+            raise InputError(
+                f"is of another criticism than the section in {SUMMARY_FILE}: a call was killed",
+                where=str(run / CRITICISM),
+                fix=_again(run),
+            )
+        return cls(Calibration.open(run), tree, summary)
 
     @property
     def verdict(self) -> Verdict:
@@ -96,7 +103,10 @@ class Criticism:
             return self.base
         tree = self.base.tree.copy()
         tree["posterior"] = self.tree["posterior"]
-        summary = replace(self.base.summary, best=self.summary.best)
+        posterior = tree["posterior"].to_dataset()
+        summary = self.base.summary.of_posterior(
+            posterior, self.summary.parameters, self.summary.best
+        )
         return replace(self.base, tree=tree, summary=summary)
 
     def plot_residuals(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
@@ -165,22 +175,35 @@ class Criticism:
 
 
 def is_criticised(run: Path) -> bool:
-    """Whether a run holds a finished criticism in today's form."""
-    section = read_summary(run).get(CriticismSummary.SECTION, {})
-    current = section.get("made_from", {}).get("format") == CRITICISM_FORMAT
-    return current and (run / CRITICISM).is_file()
+    """Whether a run holds a finished criticism.
+
+    Raises:
+        InputError: It does, but in the form of another version.
+    """
+    section = read_summary(run).get(CriticismSummary.SECTION)
+    if section is None:
+        return False
+    if (section.get("made_from") or {}).get("format") != CRITICISM_FORMAT:
+        raise InputError(
+            f"its criticism has the form of {made_by(section)}",
+            where=str(run),
+            fix=f"{_again(run)}, or use that version",
+        )
+    return (run / CRITICISM).is_file()
 
 
 def finished_criticism(run: Path, made_from: Mapping[str, Any]) -> Criticism | None:
     """The criticism in a run if it was finished and made from just this; else None."""
-    if not is_criticised(run):
-        return None
+    read_summary(run)  # a damaged one is refused now, not after the simulations
     try:
         found = Criticism.open(run)
-    except InputError:  # damaged: it is made again
+    except InputError:  # of another version, damaged or unfinished: it is made again
         return None
-    written = found.summary.made_from, json.loads(found.tree.attrs.get("made_from", "null"))
-    return found if written == (made_from, made_from) else None
+    return found if found.summary.made_from == made_from else None
+
+
+def _again(run: Path) -> str:
+    return f"write it again: bolfi-liquids criticise {run}"
 
 
 def latest_calibration(given: "Run") -> Calibration:

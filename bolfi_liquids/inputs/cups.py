@@ -5,6 +5,7 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..errors import InputError
 from .toml_file import read_toml
 
 if TYPE_CHECKING:
@@ -17,6 +18,27 @@ def bundled_cups() -> "Cups":
     """The cups that come with the package."""
     with as_file(files("bolfi_liquids.data") / BUNDLED) as path:
         return open_cups(path)
+
+
+def cups_of(given: "Cups | str | Path | None") -> "Cups":
+    """Cups as they are, those of a file, or the bundled ones for None.
+
+    Raises:
+        InputError: The file cannot be used, or something else was given.
+    """
+    from ..models import Cups
+
+    if given is None:
+        return bundled_cups()
+    if isinstance(given, str | Path):
+        return open_cups(given)
+    if not isinstance(given, Cups):
+        raise InputError(
+            f"{given!r:.80} is no pair of cups",
+            where="--cups",
+            fix="give the path of a TOML file, or models.Cups",
+        )
+    return given
 
 
 def kept_cups(settings: Mapping[str, Any]) -> "Cups":

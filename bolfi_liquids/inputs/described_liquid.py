@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterable, Mapping
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -13,6 +13,11 @@ from .settings import Particles, Seed, checked
 
 if TYPE_CHECKING:
     from ..models import Liquid
+
+
+VISCOSITY, COHESION, DENSITY = 1.0, 0.2, 1260.0  # Pa s, 1, kg/m3: the bundled glycerin
+STIR_PARTICLES, POUR_PARTICLES = 1000, 664
+"""Numbers of particles that a stir and a pour are simulated with, unless others are given."""
 
 
 @checked()
@@ -35,7 +40,7 @@ class Described:
     cohesion: Annotated[float, Field(ge=0.0, le=1.0)]
     density: Annotated[float, Field(gt=0.0)]
     effects: Mapping[str, float] = Field(default_factory=dict)
-    particles: Particles = 1000
+    particles: Particles = STIR_PARTICLES
     seed: Seed = 0
 
     def liquid(self) -> "Liquid":
@@ -67,6 +72,18 @@ class Described:
             "particles": self.particles,
             "seed": self.seed,
         }
+
+
+def number_of(value: Any, where: str) -> float:
+    """A value that must be one number.
+
+    Raises:
+        InputError: It is something else; `where` is named.
+    """
+    numbers = int | float | np.integer | np.floating
+    if isinstance(value, bool) or not isinstance(value, numbers) or not np.isfinite(value):
+        raise InputError(f"{value!r:.80}", where=where, fix="give one finite number")
+    return float(value)
 
 
 def read_effects(given: Iterable[str], scene: str) -> dict[str, float]:

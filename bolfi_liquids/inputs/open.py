@@ -20,7 +20,8 @@ def open_recording(path: str | Path) -> Recording:
     """Read a recording and check that it can be simulated.
 
     Args:
-        path: A NetCDF file with the fields, units and attributes of the README.
+        path: A NetCDF file with the fields, units and attributes that
+            `bolfi-liquids guide recordings` lists.
 
     Raises:
         InputError: The file is missing, is no NetCDF file, or holds something a simulator

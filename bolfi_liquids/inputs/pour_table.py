@@ -47,7 +47,7 @@ class PourTable:
 
 
 def open_pours(path: str | Path, liquid: str | None = None) -> PourTable:
-    """Read a table of pours, in the form of the README.
+    """Read a table of pours, in the form that `bolfi-liquids guide criticism` shows.
 
     Args:
         path: The file: columns `angular_velocity_deg_s`, `distance_cm`, and `spilled`,

@@ -110,7 +110,7 @@ def _unpickled(values: dict[str, Any]) -> Recording:
 def aborted_recordings(recordings: Iterable[Recording]) -> list[str]:
     """A warning for each recording that something stopped."""
     return [
-        f"warning: {one.path}: aborted after {one.time[-1] - one.time[0]:.1f} s of stirring "
+        f"{one.path}: aborted after {one.time[-1] - one.time[0]:.1f} s of stirring "
         f"({one.attrs.get('reason') or 'no reason is told'}); a short stir says little"
         for one in recordings
         if one.attrs.get("status") == "aborted"
@@ -140,7 +140,7 @@ def as_recording(dataset: "Dataset", path: Path) -> Recording:
     """What the variables and attributes of a recording's file mean; nothing is checked.
 
     Args:
-        dataset: With the fields and units of the README.
+        dataset: With the fields and units that `bolfi-liquids guide recordings` lists.
         path: The file that it was read from.
     """
 

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 from functools import wraps
+from operator import index
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, dataclass_transform
 
-from pydantic import AfterValidator, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic.dataclasses import dataclass as validated_dataclass
 
 from ..errors import InputError
@@ -39,10 +40,19 @@ def one_of(choices: tuple[str, ...]) -> AfterValidator:
     return AfterValidator(check)
 
 
-Seed = Annotated[int, Field(ge=0)]
-Count = Annotated[int, Field(ge=1)]
-Simulations = Annotated[int, Field(ge=MIN_SIMULATIONS)]
-Particles = Annotated[int, Field(ge=MIN_PARTICLES)]
+def _plain_integer(value: Any) -> Any:
+    """Integers of other libraries as Python's own; anything else as it is."""
+    try:
+        return value if isinstance(value, bool) else index(value)
+    except TypeError:
+        return value
+
+
+Integer = Annotated[int, BeforeValidator(_plain_integer)]
+Seed = Annotated[Integer, Field(ge=0)]
+Count = Annotated[Integer, Field(ge=1)]
+Simulations = Annotated[Integer, Field(ge=MIN_SIMULATIONS)]
+Particles = Annotated[Integer, Field(ge=MIN_PARTICLES)]
 Surrogate = Annotated[str, one_of(SURROGATES)]
 
 T = TypeVar("T")
@@ -102,8 +112,8 @@ class CalibrationSettings:
     surrogate: Surrogate = "discrepancy"
     particles: Particles = 1000
     sampler: Annotated[str, one_of(SAMPLERS)] = "nuts"
-    chains: Annotated[int, Field(ge=2)] = 4
-    draws: Annotated[int, Field(ge=4)] = 1000
+    chains: Annotated[Integer, Field(ge=2)] = 4
+    draws: Annotated[Integer, Field(ge=4)] = 1000
 
 
 @checked(noise_deg="--noise")
@@ -120,8 +130,8 @@ class SbcSettings:
         seed: Seed of all random draws.
     """
 
-    runs: Annotated[int, Field(ge=0)] = 200
-    sequential: Annotated[int, Field(ge=0)] = 40
+    runs: Annotated[Integer, Field(ge=0)] = 200
+    sequential: Annotated[Integer, Field(ge=0)] = 40
     design: Simulations = 512
     budget: Simulations = 20
     noise_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = 0.1

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 DELIMITERS = ",;\t|"
 NOT_TEXT = "\0"  # in no table, but in most other files
 MISSING = ("", "nan", "na", "n/a", "null", "none", "-")
-COMMA_IN_NUMBER = re.compile(r"\s*[+-]?\d*,\d+\s*")
-POINT_IN_NUMBER = re.compile(r"\s*[+-]?\d*\.\d+.*")
+NUMBER = r"\s*[+-]?\d*{}\d+([eE][+-]?\d+)?\s*"
+COMMA_IN_NUMBER = re.compile(NUMBER.format(","))
+POINT_IN_NUMBER = re.compile(NUMBER.format(r"\."))
 
 
 @dataclass(frozen=True, eq=False)

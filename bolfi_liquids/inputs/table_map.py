@@ -26,19 +26,19 @@ ATTRIBUTE_UNITS = (
 
 
 class Given(BaseModel):
-    """Base of what stands in the file: no name that is not known, no value of another kind."""
+    """Base of the file's tables. Unknown names and wrong types are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class Column(Given):
-    """A column of the table: (its number + offset) x unit, with the sign turned or not.
+    """A column of the table: (its number + offset) x unit, with an optional change of sign.
 
     Attributes:
         column: Its name in the header.
         unit: Of its numbers.
         offset: Added to them, in `unit`.
-        flip: Whether what it counts as positive is negative in a recording.
+        flip: Whether to change the sign.
     """
 
     column: str

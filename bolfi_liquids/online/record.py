@@ -144,7 +144,7 @@ class _Stirring:
     def _take(self, estimate: "OnlineEstimate | None") -> None:
         status = self._calibration.status
         if status.phase in (FAILED, REFUSED):
-            self._view.say(f"calibration {status.phase}: {status.detail}")
+            self._view.warn(f"calibration {status.phase}: {status.detail}")
         if estimate is not None:
             self._enough = self._calibration.enough(estimate)
             self._view.say(sentence(estimate))

@@ -13,10 +13,11 @@ from ..calibration.result import Calibration
 from ..calibration.tree import write_tree
 from ..criticism.result import latest_calibration
 from ..errors import InputError
-from ..inputs.cups import bundled_cups, open_cups
+from ..inputs.cups import cups_of
 from ..inputs.settings import PourSettings
 from ..progress import Advance, progress_bar
 from ..run.directory import POUR, Run, open_bank
+from ..run.workers import open_workers
 from ..seeds import Phase, simulation_seeds
 from .result import Judged, Pour, PourSummary
 from .spillage import (
@@ -68,8 +69,8 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
 
     Every angular velocity of a grid is poured with a fixed set of posterior draws and simulator
     seeds, each pour for all distances at once. The most promising ones, and the one that would be
-    best at theta*, are poured with as many draws again: few draws tell good actions apart by
-    chance. Of these the action is taken whose risk is least, averaged over where the liquid may
+    best at theta*, are poured with as many draws again: with few draws, good actions differ mainly
+    by chance. Of these the action is taken whose risk is least, averaged over where the liquid may
     land, and judged on draws and seeds it was not chosen by, so that the figure is not flattered
     by the choice. Finished simulations are kept in the run.
 
@@ -87,20 +88,20 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         progress: Whether to show a bar on stderr.
 
     Raises:
-        InputError: A setting or the file of the cups cannot be used.
+        InputError: A setting, `timeout` or the file of the cups cannot be used.
+        ValueError, ImportError, ConnectionError: `executor` cannot be used.
         RuntimeError: Pours failed at every angular velocity, or at all of the promising ones.
     """
-    from ..inference.simulations import Keep, open_executor
+    from ..inference.simulations import Keep
 
     calibration = latest_calibration(calibration)
     settings = PourSettings(iterations=iterations, draws=draws, risk=risk, seed=seed)
-    if cups is None or isinstance(cups, str | Path):
-        cups = bundled_cups() if cups is None else open_cups(cups)
-    drawn = strata(calibration, draws, seed)
+    cups, actions = cups_of(cups), 2 * settings.iterations + N_FINALISTS + 3
+    drawn = strata(calibration, settings.draws, settings.seed)
     with (
+        open_workers(executor, timeout) as workers,
         open_bank(calibration.path) as bank,
-        open_executor(executor) as workers,
-        progress_bar("trying actions", 2 * iterations + N_FINALISTS + 3, shown=progress) as advance,
+        progress_bar("trying actions", actions, shown=progress) as advance,
     ):
         keep = Keep(bank, executor=workers, timeout=timeout)
         pours = _Pours(cups, calibration.liquid_density, settings, keep, advance)

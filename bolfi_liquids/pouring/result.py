@@ -54,6 +54,11 @@ class Judged:
         """Spilled fraction that one outcome in twenty exceeds."""
         return float(np.quantile(self.fractions[:, 0], SPILLAGE_QUANTILE))
 
+    def equals(self, other: "Judged") -> bool:
+        """Whether another one has the same action and the same outcomes."""
+        same = self.action == other.action
+        return same and np.array_equal(self.fractions, other.fractions)
+
     def __str__(self) -> str:
         return (
             f"{np.degrees(self.angular_velocity):.1f} deg/s, {100 * self.distance:.2f} cm, "
@@ -105,16 +110,30 @@ class Pour:
 
         Returns:
             The axes.
+
+        Raises:
+            ValueError: Another pour was chosen in the run since.
         """
         from ..drawing import given_or_shown, panels, styled
         from .figures import draw_expected
 
+        tree = read_pour(self.path)
+        if not self._is_in(tree):
+            raise ValueError(
+                f"another pour was chosen in {self.path} since; open it by Pour.open, or choose "
+                "this one again"
+            )
         with styled():
             drawn = panels(given_or_shown(ax), (1, 1), (4.6, 3.6))
             axes = drawn.grid[0, 0]
-            drawn.figure.colorbar(draw_expected(axes, read_pour(self.path)), ax=axes)
+            drawn.figure.colorbar(draw_expected(axes, tree), ax=axes)
             drawn.legend(*axes.get_legend_handles_labels())
         return axes
+
+    def _is_in(self, tree: "DataTree") -> bool:
+        """Whether a pour.nc holds this pour."""
+        pairs = ((self.chosen, "chosen"), (self.plug_in, "plug_in"))
+        return all(one.equals(_judged(tree, name)) for one, name in pairs)
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """The live view of a session, in a terminal."""
 
+import logging
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -8,6 +9,8 @@ from rich.live import Live
 
 if TYPE_CHECKING:
     from ..hardware import Session
+
+logger = logging.getLogger(__name__)
 
 REFRESH_RATE = 5.0  # per second
 
@@ -24,6 +27,7 @@ class SessionView:
         self.title = title
         self.motions: int | None = None  # of the plan, where it is known
         self._note = ""
+        self._warned: set[str] = set()
         self._console = Console(stderr=True, quiet=not shown)
         shown = shown and self._console.is_terminal
         self._live = Live(console=self._console, auto_refresh=False) if shown else None
@@ -57,6 +61,12 @@ class SessionView:
         if self._live is None and note != self._note:
             self._console.print(note, highlight=False, soft_wrap=True)
         self._note = note
+
+    def warn(self, notice: str) -> None:
+        """Log a line, once, whether anything is shown or not."""
+        if notice not in self._warned:
+            self._warned.add(notice)
+            logger.warning(notice)
 
     def _progress(self, done: int) -> str:
         if self.motions is None:

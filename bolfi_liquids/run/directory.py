@@ -49,6 +49,8 @@ def run_path(run: Run) -> Path:
 MUST_AGREE = ("settings", "inputs", "simulator", "engine")
 """Sections of run.toml that decide the results; versions and dates may differ."""
 
+TIMEOUTS = "timeouts"  # key of run.toml
+
 CONCLUSIONS = (POSTERIOR, CRITICISM, POUR, FRAMES, REPORT, SUMMARY)
 """What follows from the simulations, in the order in which it goes when these become more."""
 
@@ -102,6 +104,17 @@ def enter_run(
     run.mkdir(parents=True, exist_ok=True)
     write_text(path, tomli_w.dumps(record))
     return []
+
+
+def note_timeout(run: Path, timeout: float | None) -> None:
+    """Add a time limit [s] to those that run.toml lists; None adds nothing.
+
+    Runs may go on with another limit, but it decides which simulations were given up.
+    """
+    record = read_run(run)
+    listed = record.get(TIMEOUTS, [])
+    if timeout is not None and timeout not in listed:
+        write_text(run / RUN_TOML, tomli_w.dumps({**record, TIMEOUTS: [*listed, float(timeout)]}))
 
 
 @contextmanager
@@ -199,7 +212,7 @@ def _grow(run: Path, held: Mapping[str, Any], record: Mapping[str, Any], size: i
     removed = [name for name in CONCLUSIONS if (run / name).exists()]
     for name in removed:
         (run / name).unlink(missing_ok=True)
-    first = {key: held[key] for key in made if key in held}
+    first = {key: held[key] for key in (*made, TIMEOUTS) if key in held}
     write_text(run / RUN_TOML, tomli_w.dumps({**record, **first, "grown": [*grown, now | made]}))
     return removed
 

@@ -1,4 +1,4 @@
-"""What JAX compiles for the commands is kept: without it, each compiles for 10 to 25 seconds."""
+"""JAX's compilations are cached between commands, each of which would compile for 10 to 25 s."""
 
 import os
 import platform
@@ -8,10 +8,10 @@ from platformdirs import user_cache_path
 
 
 def keep_compilations() -> None:
-    """Have JAX keep what it compiles in the user's cache, for this process and those it starts.
+    """Have JAX cache compilations in the user's cache, for this process and those it starts.
 
-    Call it before anything imports JAX. Where the environment names another place
-    (`JAX_COMPILATION_CACHE_DIR`), that is taken; a cache that cannot be written is done without.
+    Call it before anything imports JAX. If the environment names a directory
+    (`JAX_COMPILATION_CACHE_DIR`), it is used. If the directory is not writable, nothing is cached.
     """
     ignore_torn_entries()
     if "JAX_COMPILATION_CACHE_DIR" in os.environ:
@@ -29,6 +29,6 @@ def keep_compilations() -> None:
 
 
 def ignore_torn_entries() -> None:
-    """JAX compiles again what it finds cut short, by a kill or by another process that still
-    writes; that it warns of it helps nobody. For this process only."""
+    """JAX recompiles truncated cache entries. Its warning about them is suppressed in this
+    process."""
     warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache")

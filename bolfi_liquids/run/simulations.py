@@ -1,5 +1,6 @@
 """Simulations outside the engine's loop, kept in the same bank."""
 
+import logging
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -7,7 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..inference.simulations import Keep, jobs, run_missing, stacked, succeeded
+from ..inference.simulations.failures import Failure, kind
 from ..progress import Advance, Simulate, silent
+
+logger = logging.getLogger(__name__)
+
+CURES = {
+    Failure.RAISED: "remove the cause and repeat the call: nothing that has finished is lost",
+    Failure.NOT_FINITE: "simulate with more particles, or leave such liquids out of the prior",
+    Failure.TIMEOUT: "allow more time, and repeat the call",
+}
+"""What to do where every simulation failed, by the kind of the first one's failure."""
 
 
 class Kept(NamedTuple):
@@ -44,13 +55,29 @@ def simulate_kept(
     asked = jobs(theta, seeds)
     results = run_missing(simulate, asked, keep, advance=advance)
     good = succeeded(results)
+    errors = [result.error or "" for result in results]
     if not good:
+        failure = kind(errors[0]) if errors[0] else Failure.NOT_FINITE
         raise RuntimeError(
             f"all {len(seeds)} simulations failed, the first at {asked[0].theta}"
-            f" ({results[0].error or 'it diverged'}); use more particles"
+            f" ({errors[0] or 'it diverged'}); {CURES[failure]}"
         )
+    warn_of_timeouts(errors, keep.timeout)
     seconds = sum(result.seconds for result in results)
     return Kept(np.stack(list(good.values())), np.array(list(good)), seconds)
+
+
+def warn_of_timeouts(errors: Sequence[str], timeout: float | None) -> None:
+    """Log how many simulations were given up; they count as failed.
+
+    Args:
+        errors: Why each failed; "" where it did not.
+        timeout: The limit [s] that they exceeded.
+    """
+    overdue = sum(kind(error) is Failure.TIMEOUT for error in errors if error)
+    if overdue:
+        what = "%d of %d simulations took longer than %s s and count as failed"
+        logger.warning(what, overdue, len(errors), timeout)
 
 
 def keeping(simulate: Simulate, shape: tuple[int, ...], keep: Keep) -> Simulate:

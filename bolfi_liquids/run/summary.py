@@ -39,7 +39,8 @@ class Section:
         except ValidationError as err:
             first = err.errors(include_url=False)[0]
             field = ".".join(map(str, (cls.SECTION, *first["loc"])))
-            raise InputError(f"{field}: {first['msg']}", where=where, fix=HOW_TO_RESTORE) from err
+            what = f"{field}: {first['msg']} (in a section that {made_by(values)} wrote)"
+            raise InputError(what, where=where, fix=HOW_TO_RESTORE) from err
 
     def to_json(self) -> dict[str, Any]:
         """The section as `json.dumps` takes it."""
@@ -58,6 +59,14 @@ class Section:
     def write(self, run: Path) -> None:
         """Replace the section of a run."""
         write_section(run, self.SECTION, self.to_json())
+
+
+def made_by(section: Mapping[str, Any]) -> str:
+    """The version that wrote a section, for messages."""
+    made_from = section.get("made_from")
+    inner = made_from.get("version") if isinstance(made_from, Mapping) else None
+    version = section.get("version", inner)
+    return "an unknown version" if version is None else f"version {version}"
 
 
 @cache

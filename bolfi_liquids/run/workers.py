@@ -1,8 +1,9 @@
-"""Processes that share long work.
+"""Processes that share long work, and what may be given in their place.
 
 Not by loky: with 3.7.0, workers go on for at least 20 s after their parent is killed.
 """
 
+import math
 import os
 import signal
 from collections.abc import Iterator
@@ -11,8 +12,13 @@ from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
 from multiprocessing.process import BaseProcess
 from threading import Thread
+from typing import TYPE_CHECKING
 
+from ..errors import InputError
 from .jax_cache import ignore_torn_entries
+
+if TYPE_CHECKING:
+    from ..inference.simulations import Workers
 
 
 @contextmanager
@@ -42,14 +48,45 @@ def processes(count: int | None = None) -> Iterator[Executor | None]:
     pool.shutdown()
 
 
+@contextmanager
+def open_workers(
+    executor: "Workers | None", timeout: float | None = None
+) -> Iterator[Executor | None]:
+    """Where the fluid is simulated; None is this process. To be opened before anything is written.
+
+    Args:
+        executor: Of processes with one thread each: a pool, a Dask client or the address of a Dask
+            scheduler; None is this process.
+        timeout: Seconds that one simulation may take; None sets no limit.
+
+    Raises:
+        InputError: `timeout` is no positive number.
+        ValueError: `executor` is something else, or has several threads in a process.
+        ImportError, ConnectionError: Dask is not installed, or no scheduler answers.
+    """
+    from ..inference.simulations import open_executor
+
+    _check_timeout(timeout)
+    with open_executor(executor, one_thread=True) as workers:
+        yield workers
+
+
+def _check_timeout(timeout: float | None) -> None:
+    number = isinstance(timeout, int | float) and not isinstance(timeout, bool)
+    if timeout is not None and not (number and 0.0 < timeout < math.inf):
+        raise InputError(
+            f"{timeout!r:.80}", where="--timeout", fix="give a positive number of seconds, or none"
+        )
+
+
 def _begin() -> None:
     ignore_torn_entries()
     _follow_parent()
 
 
 def _follow_parent() -> None:
-    """End this process, without a word, on Ctrl-C, unless that is ignored as in the background of a
-    script, and when the one that started it is gone, be it by `kill -9`."""
+    """Exit silently on Ctrl-C, unless SIGINT is ignored, and when the parent process ends, even by
+    `kill -9`."""
 
     def follow(parent: BaseProcess) -> None:
         parent.join()

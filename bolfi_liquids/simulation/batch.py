@@ -1,6 +1,7 @@
 """Liquids that are simulated in one call, by numbers or by arrays of them."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -9,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from ..inputs.described_liquid import Described
 from ..progress import Simulate
+from ..run.time_limit import TimeLimited
+from ..run.workers import open_workers
 from .film import failures_raised
 
 if TYPE_CHECKING:
@@ -93,27 +96,54 @@ def batch_of(
     return Batch(liquids, columns["seed"].ndim == 0)
 
 
-def simulated(simulate: Simulate, batch: Batch, where: Where) -> NDArray[np.float64]:
+@dataclass(frozen=True)
+class Raising(TimeLimited):
+    """A simulator that raises, in whatever process, where a simulation goes wrong.
+
+    Attributes:
+        simulator: Warns and returns NaN there.
+    """
+
+    simulator: Simulate
+
+    def simulate(self, theta: dict[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
+        """What the simulator returns.
+
+        Raises:
+            RuntimeError: A simulation went wrong.
+        """
+        with failures_raised():
+            return self.simulator(theta, seeds)
+
+
+def simulated(
+    simulate: Simulate, batch: Batch, where: Where, needed: slice = slice(None)
+) -> NDArray[np.float64]:
     """Signals of all liquids, shape (simulations, ...).
 
     Args:
         simulate: As given to `inference.fit`.
         batch: The liquids; their density is the simulator's.
         where: Where simulations run.
+        needed: Part of a signal that is finite in all simulations that succeed.
 
     Raises:
+        InputError, ValueError: `where` cannot be used.
         RuntimeError: A simulation failed.
     """
     from ..inference import SimulationBank
-    from ..inference.simulations import Job, Keep, open_executor, run_missing
+    from ..inference.simulations import Job, Keep, run_missing
 
     jobs = [
         Job({"viscosity": one.viscosity, "cohesion": one.cohesion, **one.effects}, one.seed)
         for one in batch.liquids
     ]
-    with failures_raised(), SimulationBank() as bank, open_executor(where.executor) as workers:
-        made = run_missing(simulate, jobs, Keep(bank, "", None, workers, where.timeout))
+    with open_workers(where.executor, where.timeout) as workers, SimulationBank() as bank:
+        keep = Keep(bank, "", None, workers, where.timeout)
+        made = run_missing(Raising(simulate).simulate, jobs, keep)
     for job, one in zip(jobs, made, strict=True):
-        if one.error is not None:
+        if one.signal is None:
             raise RuntimeError(f"the simulation of {job.theta} failed: {one.error}")
+        if not np.isfinite(one.signal[needed]).all():
+            raise RuntimeError(f"the simulation of {job.theta} failed: its result is not finite")
     return np.stack([one.signal for one in made if one.signal is not None])

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,8 +13,17 @@ from ..calibration.stir_simulator import Stirring
 from ..errors import InputError
 from ..files import write_netcdf
 from ..inputs.bundled import bundled_recording
-from ..inputs.cups import bundled_cups, open_cups
-from ..inputs.described_liquid import check_effects
+from ..inputs.cups import cups_of
+from ..inputs.described_liquid import (
+    COHESION,
+    DENSITY,
+    POUR_PARTICLES,
+    STIR_PARTICLES,
+    VISCOSITY,
+    check_effects,
+    number_of,
+)
+from ..inputs.fields import LENGTHS, STICK_WEIGHT
 from ..inputs.open import Source, open_recordings
 from ..inputs.prior import split_parameters
 from ..inputs.recording import Recording, Trajectory
@@ -29,7 +38,7 @@ if TYPE_CHECKING:
     from ..inference.simulations import Workers
     from ..models import Cups
 
-VISCOSITY, COHESION, DENSITY = 1.0, 0.2, 1260.0  # Pa s, 1, kg/m3: the bundled glycerin
+RIG_SIZES = (*LENGTHS, *STICK_WEIGHT)  # attributes of a recording that may be replaced
 DISTANCE_LIMITS = -0.5, 0.5  # m, between lip and receiver; more is a slip of the unit
 PATTERN_SPEED = 0.1  # m/s, of a star or circle that is given by its name
 
@@ -52,7 +61,7 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
     path: str | TimedPath | None = None,
     rig: Mapping[str, float] | None = None,
     recording: Source | None = None,
-    particles: int = 1000,
+    particles: int = STIR_PARTICLES,
     seed: ArrayLike = 0,
     executor: "Workers | None" = None,
     timeout: float | None = None,
@@ -71,7 +80,8 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
         effects: Coefficients of `models.EFFECTS` by name.
         path: "star" or "circle", at 10 cm/s, or a path such as `hardware.motion.star(speed=0.05,
             height=0.235)` returns; None is the recording's.
-        rig: Attributes of a recording, such as `cup_radius` [m], in place of the recording's.
+        rig: Sizes of cup and stick [m], and `stick_mass` [kg] or `stick_density` [kg/m3], by the
+            names of a recording's attributes, in place of the recording's.
         recording: Whose path and rig are used, or its file; None is a bundled stir of glycerin.
         particles: Number of particles of the simulated liquid.
         seed: Seed of the packing; an integer or shape (B,).
@@ -98,12 +108,13 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
         raise InputError(
             "is the recording itself", where=str(targets.out), fix="choose another name"
         )
-    density = opened.number("liquid_density") if density is None else density
+    density = opened.number("liquid_density") if density is None else _density(density)
     liquid = {"viscosity": viscosity, "cohesion": cohesion, "density": density}
     batch = batch_of(liquid, check_effects(effects or {}, "stir"), particles, seed)
     targets.check_single(batch.single)
-    plan = _planned(opened, path, {**(rig or {}), "liquid_density": float(density)})
-    setup = StirSetup.from_recording(plan, particles=particles)
+    of_another = _with_rig(opened.attrs, rig or {}) | {"liquid_density": density}
+    plan = _planned(replace(opened, attrs=MappingProxyType(of_another)), path)
+    setup = StirSetup.from_recording(plan, particles=batch.one.particles)
     angles = simulated(Stirring((plan,), (setup,)).simulate, batch, Where(executor, timeout))
     found = stir_dataset(batch, plan, angles)
     if targets.out is not None:
@@ -113,15 +124,36 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
     return found
 
 
-def _planned(
-    recording: Recording, path: str | TimedPath | None, attrs: Mapping[str, float]
-) -> Recording:
-    """The recording with another path and other attributes."""
+def _density(value: Any) -> float:
+    return number_of(value, "--density")
+
+
+def _with_rig(attrs: Mapping[str, float | str], rig: Mapping[str, float]) -> dict[str, float | str]:
+    """A recording's attributes with those of a rig in their place.
+
+    Raises:
+        InputError: A name is none of `RIG_SIZES`, a value is no positive number, or the stick's
+            mass and density are both given.
+    """
+    for name, value in rig.items():
+        if name not in RIG_SIZES:
+            fix = f"give some of {', '.join(RIG_SIZES)}"
+            raise InputError(f"{name!r} is no size of a rig", where="rig", fix=fix)
+        if number_of(value, f"rig: {name}") <= 0.0:
+            raise InputError(f"{value!r}", where=f"rig: {name}", fix="give a positive number")
+    weighed = [name for name in STICK_WEIGHT if name in rig]
+    if len(weighed) > 1:
+        raise InputError(f"{' and '.join(weighed)} are given", where="rig", fix="give one of them")
+    replaced = STICK_WEIGHT if weighed else ()
+    return {name: value for name, value in attrs.items() if name not in replaced} | dict(rig)
+
+
+def _planned(recording: Recording, path: str | TimedPath | None) -> Recording:
+    """The recording with another path."""
     from ..hardware.motion import circle, star
 
-    changed = replace(recording, attrs=MappingProxyType({**recording.attrs, **attrs}))
     if path is None:
-        return changed
+        return recording
     patterns = {"star": star, "circle": circle}
     if not isinstance(path, str):
         name, timed = "path", path
@@ -134,9 +166,9 @@ def _planned(
         )
     gripper = Trajectory(np.asarray(timed.time, np.float64), np.asarray(timed.position, np.float64))
     unseen = np.full((len(gripper.time), 2), np.nan)
-    named = {key: value for key, value in changed.attrs.items() if key != "speed"}
+    named = {key: value for key, value in recording.attrs.items() if key != "speed"}
     return replace(
-        changed,
+        recording,
         time=gripper.time,
         gripper=gripper,
         inclination=unseen,
@@ -186,7 +218,7 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     density: float = DENSITY,
     effects: Mapping[str, float] | None = None,
     cups: "Cups | str | Path | None" = None,
-    particles: int = 664,
+    particles: int = POUR_PARTICLES,
     seed: ArrayLike = 0,
     executor: "Workers | None" = None,
     timeout: float | None = None,
@@ -218,14 +250,14 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
 
     targets = check_targets(movie, out)
     _check_action(angular_velocity, distance)
-    if cups is None or isinstance(cups, str | Path):
-        cups = bundled_cups() if cups is None else open_cups(cups)
+    cups, density = cups_of(cups), _density(density)
     liquid = {"viscosity": viscosity, "cohesion": cohesion, "density": density}
     batch = batch_of(liquid, check_effects(effects or {}, "pour"), particles, seed)
     targets.check_single(batch.single)
-    simulator = PourSimulator(angular_velocity, cups, float(density), particles)
-    signals = simulated(simulator.simulate, batch, Where(executor, timeout))
-    position = signals[:, 1:].reshape(len(signals), particles, 2).astype(np.float32)
+    simulator = PourSimulator(angular_velocity, cups, density, batch.one.particles)
+    where, retained = Where(executor, timeout), slice(0, 1)  # what has not landed is NaN
+    signals = simulated(simulator.simulate, batch, where, retained)
+    position = signals[:, 1:].reshape(len(signals), -1, 2).astype(np.float32)
     landings = Landings(position, signals[:, 0])
     action = PourAction(angular_velocity, distance)
     found = pour_dataset(batch, landings, action, cups)
@@ -239,6 +271,8 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
 def _check_action(angular_velocity: float, distance: float) -> None:
     from ..models.pouring import FASTEST, SLOWEST
 
+    angular_velocity = number_of(angular_velocity, "--angular-velocity")
+    distance = number_of(distance, "--distance")
     low, high = DISTANCE_LIMITS
     if not low <= distance <= high:
         raise InputError(

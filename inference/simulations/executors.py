@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any, Protocol, runtime_checkable
 
@@ -15,21 +15,39 @@ class DaskClient(Protocol):
         """An executor that submits to the client's cluster."""
         ...
 
+    def nthreads(self) -> dict[str, int]:
+        """Threads of each worker, by its address."""
+        ...
+
 
 Workers = Executor | DaskClient | str
 """An executor, a Dask client, or the address of a Dask scheduler."""
 
 
 @contextmanager
-def open_executor(executor: Workers | None) -> Iterator[Executor | None]:
+def open_executor(
+    executor: Workers | None, *, one_thread: bool = False
+) -> Iterator[Executor | None]:
     """The executor itself, or a Dask client's, left open; or one at a Dask scheduler's address,
     closed afterwards.
 
+    Args:
+        executor: As a user gives it; None is this process.
+        one_thread: Whether the simulator serves only one thread of a process.
+
     Raises:
-        ValueError: none of them, or a process pool that forks.
+        ValueError: none of them, a process pool that forks, or one that `one_thread` forbids.
         ImportError: an address, but Dask is not installed.
         ConnectionError: no scheduler answers there.
     """
+    with _opened(executor) as opened:
+        if one_thread:
+            _check_one_thread(opened)
+        yield opened
+
+
+@contextmanager
+def _opened(executor: Workers | None) -> Iterator[Executor | None]:
     if isinstance(executor, str):
         with _dask(executor) as found:
             yield found
@@ -48,6 +66,27 @@ def open_executor(executor: Workers | None) -> Iterator[Executor | None]:
             "ProcessPoolExecutor(n, mp_context=multiprocessing.get_context('spawn'))"
         )
     yield executor
+
+
+def _check_one_thread(executor: Executor | None) -> None:
+    if isinstance(executor, ThreadPoolExecutor):
+        raise ValueError(
+            "executor is a pool of threads, but the simulator serves only one thread of a process; "
+            "give ProcessPoolExecutor(n, mp_context=multiprocessing.get_context('spawn'))"
+        )
+    for worker, threads in _dask_threads(executor).items():
+        if threads > 1:
+            raise ValueError(
+                f"the Dask worker {worker} has {threads} threads, but the simulator serves only "
+                "one thread of a process; start workers by `dask worker ADDRESS --nthreads 1`, or "
+                "LocalCluster(threads_per_worker=1)"
+            )
+
+
+def _dask_threads(executor: Executor | None) -> dict[str, int]:
+    """Threads of each worker that has joined a Dask executor's cluster; none of other executors."""
+    client = getattr(executor, "_client", None)  # there is no public way
+    return client.nthreads() if isinstance(client, DaskClient) else {}
 
 
 def _forks(pool: ProcessPoolExecutor) -> bool:

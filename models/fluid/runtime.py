@@ -17,8 +17,39 @@ import numpy as np
 SLOTS = max(8, os.cpu_count() or 1)  # simulations of a scene side by side
 CHUNK = 240  # substeps a kernel call, so that Ctrl-C is prompt
 
-LOCK = threading.Lock()
-"""Held while a scene runs: Taichi's runtime and a scene's fields serve one thread at a time."""
+
+class WrongThread(RuntimeError):
+    """A thread wants to simulate that did not start Taichi."""
+
+
+class OneThread:
+    """A lock that, once it has an owner, only this thread may take."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._owner: threading.Thread | None = None
+
+    def own(self) -> None:
+        """Make the calling thread the owner."""
+        self._owner = threading.current_thread()
+
+    def __enter__(self) -> None:
+        self._lock.acquire()
+        if self._owner is not None and self._owner.ident != threading.get_ident():
+            self._lock.release()
+            raise WrongThread(
+                f"Taichi was started in the thread {self._owner.name!r} and works in no other; "
+                "simulate in processes of one thread each, such as ProcessPoolExecutor's or those "
+                "of `dask worker ADDRESS --nthreads 1`"
+            )
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+
+
+LOCK = OneThread()
+"""Held while a scene runs: Taichi compiles only in the thread that started it, and fails for good
+where another one tries."""
 
 
 _ends: ContextVar[float] = ContextVar("ends", default=math.inf)  # of `time.monotonic`
@@ -90,3 +121,4 @@ def start() -> None:
     # the banner is a bare print that no log level silences
     with contextlib.redirect_stdout(io.StringIO()):
         ti.init(arch=ti.cpu, default_fp=ti.f32, log_level=ti.ERROR)
+    LOCK.own()

@@ -206,8 +206,13 @@ def _made(*, after=True, held=None, pours=False, status=("named", "rejected", "r
     angles = {name: (frames, rng.uniform(0.0, 0.05, (2 * each, 2))) for name in names}
     found, confusion = _effects(list(status))
     draws = rng.normal(0.05, 0.005, (2, 100))
+    parameters = {"viscosity": 2.0 * draws, "cohesion": 10.0 * draws, "camera_delay": draws}
+    sampled = {"rhat_max": 1.002, "ess_bulk_min": 900.0, "ess_tail_min": 800.0, "divergences": 1}
     groups = {
-        "/posterior": xr.Dataset({"camera_delay": (("chain", "draw"), draws)}),
+        "/posterior": xr.Dataset(
+            {name: (("chain", "draw"), values) for name, values in parameters.items()},
+            attrs=sampled,
+        ),
         "/stirs/residual": xr.Dataset(angles, coords=coords),
         "/stirs/where": _windows(after),
         "/stirs/effects": found,
@@ -229,6 +234,7 @@ def _made(*, after=True, held=None, pours=False, status=("named", "rejected", "r
         made_from=json.dumps(
             {
                 "version": bl.__version__,
+                "format": CRITICISM_FORMAT,
                 "settings": {"effects": ["camera_delay", "camera_tilt"], "seed": 3},
                 "held_out": {},
                 "baseline": {"clean.nc": "abc123"},

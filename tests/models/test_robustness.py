@@ -1,6 +1,7 @@
 """Nothing goes wrong anywhere in the prior box; what is made to go wrong is NaN, with a reason."""
 
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 from typing import NamedTuple
 
@@ -296,3 +297,15 @@ def test_what_goes_wrong_is_nan_with_a_reason(name, glycerin, violent, cups, reg
     alone = simulate(slice(0, 1))
     np.testing.assert_array_equal(angles[:1], alone[0])
     np.testing.assert_array_equal(fractions[:1], alone[1])
+
+
+def test_a_thread_that_did_not_start_taichi_is_refused_and_does_no_harm(cups):
+    def poured():
+        liquid = models.Liquid(1.0, 0.2, 1260.0)
+        return models.landings(liquid, [2.0], cups, [0], PARTICLES["pour"]).retained
+
+    before = poured()
+    with ThreadPoolExecutor(1) as pool:
+        with pytest.raises(runtime.WrongThread, match="--nthreads 1"):
+            pool.submit(poured).result()
+    np.testing.assert_array_equal(poured(), before)

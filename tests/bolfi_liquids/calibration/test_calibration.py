@@ -1,6 +1,7 @@
 """What a calibration writes, and that it is what it says."""
 
 import json
+import re
 import shutil
 import tempfile
 import tomllib
@@ -10,11 +11,12 @@ import numpyro.distributions as dist
 import pytest
 import xarray as xr
 from arviz_stats.base.array import array_stats
+from bolfi_liquids.inference.simulations import job
 
 import bolfi_liquids as bl
 from bolfi_liquids import inference, models
 from bolfi_liquids.calibration import calibrate as calibrating
-from bolfi_liquids.calibration.stir_simulator import stirring_of
+from bolfi_liquids.calibration.stir_simulator import Stirring, stirring_of
 from bolfi_liquids.drawing import new_figure
 from bolfi_liquids.inputs.prior import default_prior
 
@@ -145,6 +147,69 @@ def test_plots_draw_in_axes_that_are_given_or_in_their_own(calibration, plot, sh
     drawn = getattr(calibration, plot)(given if given.size > 1 else given[0, 0])
     assert [*drawn.flat] == [*given.flat]
     assert all(axes.has_data() for axes in given.flat)
+
+
+def test_what_the_bank_holds_beside_stirs_is_not_counted(
+    short_recording, calibration, settings, pour, tmp_path, capsys
+):
+    """A calibration whose results were deleted after a pour was chosen."""
+    run = tmp_path / "run"
+    shutil.copytree(pour.path, run)
+    (run / "summary.json").unlink()
+    again = bl.calibrate(short_recording, out=run, resume=True, **settings)
+    (count,) = re.findall(r"simulating stirs: (\S+) to run", capsys.readouterr().err)
+    assert int(count) == 0
+    assert again.summary.parameters == calibration.summary.parameters
+
+
+def test_an_aborted_recording_is_logged(short_recording, tmp_path, monkeypatch, caplog):
+    aborted = tmp_path / "aborted.nc"
+    with xr.open_dataset(short_recording, decode_times=False) as whole:
+        whole.assign_attrs(status="aborted", reason="protective stop").to_netcdf(aborted)
+    monkeypatch.setattr(calibrating, "_calibrate", lambda *_: None)
+    with pytest.raises(ValueError, match="not finished"):
+        bl.calibrate([short_recording, aborted], out=tmp_path / "run", progress=False)
+    (notice,) = caplog.records
+    assert str(aborted) in notice.getMessage() and "protective stop" in notice.getMessage()
+
+
+def test_settings_may_be_integers_of_numpy(short_recording, calibration, settings):
+    """They are those of the run, which is only opened."""
+    given = {name: np.int64(value) for name, value in settings.items()}
+    again = bl.calibrate(
+        short_recording, out=calibration.path, resume=True, progress=False, **given
+    )
+    assert again.summary == calibration.summary
+
+
+@pytest.mark.slow
+def test_stirs_that_take_too_long_are_counted_and_their_limit_is_kept(
+    short_recording, settings, tmp_path, monkeypatch, caplog
+):
+    simulate, calls = Stirring.simulate, []
+
+    def slow(self, theta, seeds):
+        calls.append(seeds)
+        if len(calls) in (1, 2):  # the first batch together, then its first alone
+            raise models.TimeLimitExceeded
+        return simulate(self, theta, seeds)
+
+    monkeypatch.setattr(Stirring, "simulate", slow)
+    monkeypatch.setattr(job, "within", given_up)
+    made = bl.calibrate(
+        short_recording, out=tmp_path / "run", timeout=600.0, progress=False, **settings
+    )
+    assert made.record["timeouts"] == [600.0]
+    notices = [one.args for one in caplog.records if one.name.endswith("run.simulations")]
+    assert notices == [(1, settings["budget"], 600.0)]
+
+
+def given_up(timeout, call, limit=None):
+    """As if the time were over where the simulator says so."""
+    try:
+        return call()
+    except TimeoutError as error:
+        raise job.Overdue from error
 
 
 def test_without_a_directory_a_run_is_among_the_temporary_files(short_recording, monkeypatch):

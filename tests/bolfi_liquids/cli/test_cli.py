@@ -192,6 +192,7 @@ def test_import_is_cheap():
 def test_public_names_are_what_they_say():
     for name in bl.__all__:
         assert getattr(bl, name) is not None
+    assert {"open_pours", "InputError"} <= set(bl.__all__)  # guide and messages name them
     assert callable(bl.calibrate)  # also after a module of the package was imported
     with pytest.raises(AttributeError, match="stirr"):
         getattr(bl, "stirr")  # noqa: B009  pyright would know that it is not there

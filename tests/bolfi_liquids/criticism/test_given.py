@@ -1,6 +1,7 @@
 """What a criticism is given: read, checked and written down."""
 
 from dataclasses import replace
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from bolfi_liquids.criticism.given import Given, open_inputs
 from bolfi_liquids.criticism.result import finished_criticism
 from bolfi_liquids.criticism.stirs import camera_noise, held_out_noise, stir_experiment
 from bolfi_liquids.errors import InputError
+from bolfi_liquids.inputs.cups import open_cups
 from bolfi_liquids.inputs.settings import CriticismSettings
 
 HEADER = "angular_velocity_deg_s,distance_cm,spilled,received,retained"
@@ -97,6 +99,27 @@ def test_what_is_no_file_is_refused_by_its_option(calibration, other, table):
     refused("--baseline", calibration, baseline=3)
     refused("3 is no table of pours", calibration, pours=3)
     refused("--held-out-pours", calibration, pours=table("p.csv"), held_out_pours=[1])
+
+
+def test_cups_are_given_by_their_file_and_with_pours(calibration, table, tmp_path):
+    path = tmp_path / "cups.toml"
+    bundled = (files("bolfi_liquids.data") / "cups.toml").read_text(encoding="utf-8")
+    path.write_text(bundled.replace("lip_height = 0.20", "lip_height = 0.21"), encoding="utf-8")
+    for given_as in (path, str(path)):
+        inputs = given(calibration, pours=table("p.csv"), cups=given_as)
+        assert inputs.cups == open_cups(path)
+    refused("is no pair of cups", calibration, pours=table("p.csv"), cups=3)
+    with pytest.raises(InputError) as error:
+        given(calibration, cups=path)
+    assert error.value.where == "--cups"
+
+
+def test_columns_that_nobody_reads_are_logged(calibration, tmp_path, caplog):
+    path = tmp_path / "p.csv"
+    path.write_text("\n".join([f"{HEADER},who", *(f"{row},me" for row in ROWS)]) + "\n")
+    given(calibration, pours=path)
+    (notice,) = caplog.records
+    assert notice.name.endswith("criticism.given") and "who" in notice.getMessage()
 
 
 def test_a_recording_is_held_out_once_and_under_its_own_name(calibration, other, tmp_path):

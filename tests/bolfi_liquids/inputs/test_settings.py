@@ -3,6 +3,7 @@
 import pickle
 from dataclasses import asdict, replace
 
+import numpy as np
 import pytest
 
 from bolfi_liquids.errors import InputError
@@ -37,6 +38,29 @@ def test_a_value_that_breaks_a_rule_is_named(kind, where, name, value):
         kind(**{name: value})
     assert (refused.value.where, refused.value.what) == (where, repr(value))
     assert refused.value.fix
+
+
+@pytest.mark.parametrize("kind", [np.int64, np.uint8, np.int32])
+def test_integers_of_numpy_become_pythons_own(kind):
+    settings = CalibrationSettings(
+        budget=kind(9),
+        batch=kind(2),
+        seed=kind(3),
+        particles=kind(200),
+        chains=kind(2),
+        draws=kind(50),
+    )
+    assert settings == CalibrationSettings(
+        budget=9, batch=2, seed=3, particles=200, chains=2, draws=50
+    )
+    assert {type(value) for value in asdict(settings).values()} == {int, str}
+    assert type(PourSettings(draws=kind(4)).draws) is int
+
+
+@pytest.mark.parametrize("value", [np.bool_(True), np.float64(3.0), np.array([1, 2])])
+def test_what_is_no_integer_is_refused(value):
+    with pytest.raises(InputError):
+        CalibrationSettings(seed=value)
 
 
 def test_the_limit_itself_is_allowed():

@@ -25,6 +25,13 @@ def test_delimiter_and_decimal_sign_are_found(tmp_path, text, newline):
     np.testing.assert_array_equal(table.numbers("x"), [1.5, -2e-3])
 
 
+@pytest.mark.parametrize("other", ["24.11.2026", "v1.2", "10.0.0.1", "3.5 g"])
+def test_only_whole_numbers_tell_the_decimal_sign(tmp_path, other):
+    path = tmp_path / "table.csv"
+    path.write_text(f"note;x\n{other};30,5\n{other};1,5e-3\n")
+    np.testing.assert_array_equal(read_table(path).numbers("x"), [30.5, 1.5e-3])
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
 def test_the_encoding_is_found(tmp_path, encoding):
     path = tmp_path / "table.csv"

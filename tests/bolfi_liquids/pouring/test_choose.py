@@ -3,6 +3,7 @@
 import json
 import shutil
 import sqlite3
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -181,6 +182,17 @@ def test_the_map_marks_both_actions_among_the_risks(pour, given):
     for label, judged in (("chosen pour", pour.chosen), ("best at θ* alone", pour.plug_in)):
         at = np.degrees(judged.angular_velocity), 100.0 * judged.distance
         np.testing.assert_allclose(marked[label], at)
+
+
+def test_the_map_of_another_pour_is_not_drawn(pour):
+    chosen = pour.chosen
+    others = (
+        replace(chosen, distance=chosen.distance + 1e-3),
+        replace(chosen, fractions=chosen.fractions[:, ::-1]),
+    )
+    for other in others:
+        with pytest.raises(ValueError, match="another pour"):
+            replace(pour, chosen=other).plot_map()
 
 
 def test_a_run_without_a_pour_says_how_to_choose_one(tmp_path):

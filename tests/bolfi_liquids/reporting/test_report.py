@@ -1,5 +1,6 @@
 """The report is one file that shows what the run holds."""
 
+import json
 import re
 import shutil
 from dataclasses import replace
@@ -142,10 +143,13 @@ def criticised(calibration, criticism_summary, tmp_path, made):
     shutil.copytree(calibration.path, run)
     of_a_delay = criticism_summary.coefficient["camera_delay"]
     parameters = dict.fromkeys(calibration.summary.parameters, of_a_delay)
-    replace(criticism_summary, parameters=parameters | dict(criticism_summary.coefficient)).write(
-        run
-    )
-    write_tree(made(held=True), run / CRITICISM)
+    tree = made(held=True)
+    replace(
+        criticism_summary,
+        parameters=parameters | dict(criticism_summary.coefficient),
+        made_from=json.loads(tree.attrs["made_from"]),
+    ).write(run)
+    write_tree(tree, run / CRITICISM)
     return run
 
 

@@ -6,6 +6,7 @@ import bolfi_liquids as bl
 from bolfi_liquids import hardware
 from bolfi_liquids.inputs.rigs import rig_of
 from bolfi_liquids.robot.armed_session import EMULATED_VISCOSITY, hidden_liquid
+from bolfi_liquids.robot.live_view import SessionView
 
 
 def test_an_emulated_liquid_may_be_given_or_left_to_the_emulator():
@@ -22,6 +23,17 @@ def test_a_rig_may_be_itself_or_its_file_or_none(tmp_path):
     assert rig_of(None) == bundled
     with pytest.raises(ValueError, match=r"none\.toml"):
         rig_of(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize("shown", [False, True])
+def test_what_went_wrong_is_logged_once_whether_a_view_is_shown_or_not(caplog, capsys, shown):
+    with SessionView("stirring", shown=shown) as view:
+        for _ in range(3):
+            view.warn("calibration failed: no memory")
+    (record,) = caplog.records
+    assert record.getMessage() == "calibration failed: no memory"
+    assert record.levelname == "WARNING"
+    assert capsys.readouterr().err.count("no memory") <= 1  # by the command line's handler
 
 
 @pytest.mark.parametrize("emulate", [False, True])

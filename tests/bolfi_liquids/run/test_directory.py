@@ -15,6 +15,7 @@ from bolfi_liquids.run.directory import (
     RUN_TOML,
     SIMULATIONS,
     enter_run,
+    note_timeout,
     open_bank,
     read_run,
 )
@@ -119,6 +120,18 @@ def test_a_run_that_grows_twice_counts_what_it_had_learned_from(tmp_path):
         enter_run(tmp_path, larger, resume=True, growing="settings.budget")
     grown = read_run(tmp_path)["grown"]
     assert [(one["size"], one["learned_from"]) for one in grown] == [(20, 20), (40, 25)]
+
+
+def test_time_limits_are_listed_and_need_not_agree(tmp_path):
+    enter_run(tmp_path, RECORD, resume=False)
+    for timeout in (None, 60.0, 5, 60.0):
+        note_timeout(tmp_path, timeout)
+    assert read_run(tmp_path) == RECORD | {"timeouts": [60.0, 5.0]}
+    assert not enter_run(tmp_path, RECORD, resume=True)
+    larger = copy.deepcopy(RECORD)
+    larger["settings"]["budget"] = 30
+    enter_run(tmp_path, larger, resume=True, growing="settings.budget")
+    assert read_run(tmp_path)["timeouts"] == [60.0, 5.0]
 
 
 def test_resuming_ignores_dates_and_versions(tmp_path):

@@ -1,11 +1,15 @@
 """What was simulated once is taken from the bank."""
 
+import time
+
 import numpy as np
 import pytest
 from bolfi_liquids.inference import SimulationBank
 from bolfi_liquids.inference.simulations import Keep
+from bolfi_liquids.inference.simulations.failures import Failure
 
 from bolfi_liquids.run.simulations import (
+    CURES,
     keeping,
     simulate_kept,
 )
@@ -39,6 +43,37 @@ def test_diverged_ones_are_left_out():
         np.testing.assert_array_equal(kept.signals, [[0.0], [1.0]])
         with pytest.raises(RuntimeError, match="all 1 simulations failed"):
             simulate_kept(simulate, {"a": np.array([2.0])}, [2], keep)
+
+
+def failing(theta, seeds):
+    if theta["a"][0] > 1.0:
+        raise OSError("the disk is full")
+    if theta["a"][0] < 0.0:
+        time.sleep(30.0)
+    return np.full((1, 1), np.nan)
+
+
+@pytest.mark.parametrize(
+    ("a", "failure"),
+    [(2.0, Failure.RAISED), (0.5, Failure.NOT_FINITE), (-1.0, Failure.TIMEOUT)],
+)
+def test_where_all_fail_the_advice_is_of_their_kind(a, failure):
+    with SimulationBank() as bank, pytest.raises(RuntimeError) as failed:
+        simulate_kept(failing, {"a": np.array([a])}, [1], Keep(bank, "", 1, None, 0.05))
+    assert [kind for kind, cure in CURES.items() if cure in str(failed.value)] == [failure]
+
+
+def test_simulations_that_took_too_long_are_counted(caplog):
+    def slow(theta, seeds):
+        time.sleep(30.0 if theta["a"][0] > 1.0 else 0.0)
+        return theta["a"][:, None]
+
+    with SimulationBank() as bank:
+        keep = Keep(bank, "", 1, None, 0.2)
+        simulate_kept(slow, {"a": np.array([0.0, 2.0, 3.0])}, [1, 2, 3], keep)
+        simulate_kept(slow, {"a": np.array([0.0])}, [1], keep)
+    (notice,) = caplog.records
+    assert notice.args == (2, 3, 0.2)
 
 
 def test_a_simulator_that_keeps_repeats_nothing_that_was_finished():

@@ -1,15 +1,20 @@
-"""Processes that share long work."""
+"""Processes that share long work, and what may be given in their place."""
 
 import os
 import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
 import pytest
+from distributed import LocalCluster
 
-from bolfi_liquids.run.workers import processes
+import bolfi_liquids as bl
+from bolfi_liquids.cli.compute import open_executor_of
+from bolfi_liquids.errors import InputError
+from bolfi_liquids.run.workers import open_workers, processes
 
 WORKING = """
 import os, signal, time
@@ -85,3 +90,64 @@ def test_work_is_given_up_where_there_was_an_error():
         raise KeyError
     assert time.perf_counter() - began < 60.0
     assert all(future.done() for future in busy)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_workers_of_dask_have_one_thread_each(threads):
+    cluster = LocalCluster(
+        processes=False,
+        n_workers=1,
+        threads_per_worker=threads,
+        protocol="tcp://",
+        dashboard_address=None,
+    )
+    with cluster, cluster.get_client() as client:
+        for given in (client, client.get_executor(), cluster.scheduler_address):
+            if threads == 1:
+                with open_workers(given) as workers:
+                    assert workers.submit(pow, 2, 3).result(60.0) == 8
+                continue
+            with pytest.raises(ValueError, match="--nthreads 1"), open_workers(given):
+                pass
+        if threads > 1:
+            with pytest.raises(ValueError, match="--nthreads 1"):
+                with open_executor_of(1, cluster.scheduler_address):
+                    pass
+
+
+UNUSABLE = [
+    {"executor": ThreadPoolExecutor(2)},
+    {"executor": 4},
+    {"timeout": -1},
+    {"timeout": float("nan")},
+    {"timeout": "60"},
+    {"timeout": True},
+]
+
+
+@pytest.mark.parametrize("given", UNUSABLE, ids=str)
+def test_what_cannot_simulate_is_refused_before_anything_is_written(
+    short_recording, tmp_path, given
+):
+    run = tmp_path / "run"
+    with pytest.raises(ValueError):
+        bl.calibrate(short_recording, out=run, progress=False, **given)
+    assert not run.exists()
+
+
+@pytest.mark.parametrize("given", UNUSABLE, ids=str)
+def test_every_call_that_simulates_refuses_it(calibration, given):
+    before = sorted(calibration.path.iterdir())
+    calls = [
+        lambda: bl.choose_pour(calibration, progress=False, **given),
+        lambda: bl.criticise(calibration, progress=False, **given),
+        lambda: bl.simulate_stir(progress=False, **given),
+        lambda: bl.simulate_pour(progress=False, **given),
+    ]
+    for call in calls:
+        with pytest.raises(ValueError) as refused:
+            call()
+        if "timeout" in given:
+            assert isinstance(refused.value, InputError)
+            assert refused.value.where == "--timeout"
+    assert sorted(calibration.path.iterdir()) == before

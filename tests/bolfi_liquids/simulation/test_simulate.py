@@ -1,6 +1,8 @@
 """Stirs and pours by numbers, from Python."""
 
-from concurrent.futures import ThreadPoolExecutor
+import pickle
+import warnings
+from concurrent.futures import Executor, Future
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +12,7 @@ import bolfi_liquids as bl
 from bolfi_liquids import hardware, models
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.cups import bundled_cups
+from bolfi_liquids.inputs.described_liquid import DENSITY, POUR_PARTICLES, STIR_PARTICLES
 from bolfi_liquids.inputs.recording import Trajectory
 
 SHORT = hardware.motion.star(speed=0.2, height=0.235, radius=0.02, points=5, rest=0.2)
@@ -38,11 +41,20 @@ def test_a_stir_is_what_the_simulator_returns(pair):
     assert pair.attrs["liquid_density"] == 1100.0 and "viscosity" not in pair.attrs
 
 
+class Elsewhere(Executor):
+    """As if in a process of its own: what is submitted travels, and warnings stay there."""
+
+    def submit(self, fn, /, *args, **kwargs):
+        done = Future()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            done.set_result(pickle.loads(pickle.dumps(fn))(*args, **kwargs))
+        return done
+
+
 def test_one_of_a_pair_is_the_same_alone_and_elsewhere(pair):
-    with ThreadPoolExecutor(1) as pool:
-        alone = bl.simulate_stir(
-            2.0, 0.3, density=1100.0, path=SHORT, seed=5, executor=pool, timeout=60.0, **FEW
-        )
+    where = {"executor": Elsewhere(), "timeout": 60.0}
+    alone = bl.simulate_stir(2.0, 0.3, density=1100.0, path=SHORT, seed=5, **where, **FEW)
     assert alone.attrs["viscosity"] == 2.0
     for name in PLANES:
         assert alone[name].dims == ("time",)
@@ -92,10 +104,46 @@ def test_a_pour_is_what_the_simulator_returns():
     assert alone["spilled"].item() == made["spilled"][1].item()
 
 
+@pytest.mark.parametrize("executor", [None, Elsewhere()])
+def test_what_goes_wrong_is_an_error_wherever_it_is_simulated(tmp_path, executor):
+    out = tmp_path / "stir.nc"
+    with pytest.raises(RuntimeError, match="failed"):
+        bl.simulate_stir(1e30, 0.2, path=SHORT, out=out, executor=executor, **FEW)
+    with pytest.raises(RuntimeError, match="failed"):
+        bl.simulate_pour(1e30, 0.2, out=out, executor=executor, **FEW)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("simulate", [bl.simulate_stir, bl.simulate_pour])
+def test_what_is_not_finite_is_an_error_though_nobody_warned(monkeypatch, simulate):
+    lost = np.full((1, 99, 2), np.nan)
+    monkeypatch.setattr(models, "stir", lambda *_: lost)
+    monkeypatch.setattr(models, "landings", lambda *_: models.Landings(lost, lost[:, 0, 0]))
+    with pytest.raises(RuntimeError, match="not finite"):
+        simulate(**FEW)
+
+
+def test_a_stick_that_is_weighed_anew_replaces_what_the_recording_says(dataset, tmp_path):
+    density = dataset.attrs.pop("stick_density")
+    radius, length = (dataset.attrs[f"stick_{size}"] for size in ("radius", "length"))
+    weighed = tmp_path / "weighed.nc"
+    dataset.assign_attrs(stick_mass=density * np.pi * radius**2 * length).to_netcdf(weighed)
+    options = {"path": SHORT, "recording": weighed, **FEW}
+    made = bl.simulate_stir(rig={"stick_density": 2.0 * density}, **options)
+    assert "stick_mass" not in made.attrs and made.attrs["stick_density"] == 2.0 * density
+    same = bl.simulate_stir(rig={"stick_density": density}, **options)
+    assert not np.array_equal(made["inclination_xz"], same["inclination_xz"])
+
+
 @pytest.mark.parametrize(
     ("given", "message"),
     [
         ({"viscosity": -1.0}, "--viscosity: -1"),
+        ({"density": [1000.0, 1200.0]}, "--density: "),
+        ({"density": "1000"}, "--density: "),
+        ({"rig": {"cup_raduis": 0.02}}, "rig: 'cup_raduis'.*cup_radius"),
+        ({"rig": {"cup_radius": -0.02}}, "rig: cup_radius"),
+        ({"rig": {"stick_mass": 0.01, "stick_density": 4000.0}}, "rig: .*give one"),
         ({"viscosity": [0.1, 0.2], "seed": [1, 2, 3]}, "arrays of one length"),
         ({"path": "square"}, "path: 'square'.*star, circle"),
         ({"effects": {"stickiness": 1.0}}, "--effect stickiness=1: unknown"),
@@ -115,3 +163,21 @@ def test_actions_in_the_wrong_unit_are_refused():
         bl.simulate_pour(distance=3.0)
     with pytest.raises(ValueError, match="--angular-velocity"):
         bl.simulate_pour(angular_velocity=60.0)
+    with pytest.raises(ValueError, match="--distance: "):
+        bl.simulate_pour(distance=[0.01, 0.02])
+    with pytest.raises(ValueError, match="--density: "):
+        bl.simulate_pour(density=[1000.0, 1200.0])
+
+
+def test_settings_may_be_integers_of_numpy():
+    made = bl.simulate_stir(
+        path=SHORT, particles=np.int64(FEW["particles"]), seed=np.int64(4), progress=False
+    )
+    assert type(made.attrs["particles"]) is int and type(made.attrs["seed"]) is int
+
+
+def test_defaults_are_those_of_the_simulator():
+    assert POUR_PARTICLES == models.fluid.numerics.POUR_PARTICLES
+    recording = bundled_recording("glycerin")
+    assert models.StirSetup.from_recording(recording).particles == STIR_PARTICLES
+    assert recording.number("liquid_density") == DENSITY
