@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .compute import Workers
+from .compute import Compute
 from .examples import examples
 from .grouped import grouped
 from .options import CupsOption
@@ -90,7 +90,7 @@ class ActionOptions:
 def stir(
     liquid: LiquidOptions,
     files: FileOptions,
-    compute: Workers,
+    compute: Compute,
     density: Annotated[
         float | None, typer.Option(help="Of the liquid, in kg/m³; else the recording's.")
     ] = None,
@@ -116,6 +116,7 @@ def stir(
             particles=particles,
             recording=recording,
             executor=executor,
+            timeout=compute.timeout,
             movie=files.movie,
             out=files.out,
         )
@@ -138,7 +139,7 @@ def pour(
     liquid: LiquidOptions,
     action: ActionOptions,
     files: FileOptions,
-    compute: Workers,
+    compute: Compute,
     density: Annotated[float, typer.Option(help="Of the liquid, in kg/m³.")] = GLYCERIN_DENSITY,
     particles: Annotated[int, typer.Option(help="Of which the simulated liquid is made.")] = 664,
 ) -> None:
@@ -161,6 +162,7 @@ def pour(
             cups=action.cups,
             particles=particles,
             executor=executor,
+            timeout=compute.timeout,
             movie=files.movie,
             out=files.out,
         )

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..inference.simulations import Keep
 from ..pouring.spillage import (
     DISTANCE_STEP,
     Outcomes,
@@ -19,7 +18,8 @@ from .calibrations import PARAMETER_NAMES
 from .truths import DENSITY, Truths
 
 if TYPE_CHECKING:
-    from ..inference import Prior, SimulationBank
+    from ..inference import Prior
+    from ..inference.simulations import Keep
     from ..models import Cups
     from ..pouring.grid import PourGrid
     from ..progress import Advance
@@ -58,7 +58,7 @@ def execute(
     truths: Truths,
     actions: Iterable[Iterable[Action]],
     grid: "PourGrid",
-    bank: "SimulationBank",
+    keep: "Keep",
     advance: "Advance",
 ) -> list[NDArray[np.float64]]:
     """Spilled fraction of each action, the mean over seeds that nothing else uses.
@@ -67,14 +67,14 @@ def execute(
         truths: n liquids.
         actions: Those of each, with angular velocities of the grid.
         grid: Its cups are poured.
-        bank: Where pours are kept.
+        keep: Where pours are made and kept.
         advance: Called after each truth.
     """
     spilled = []
     for at, chosen in enumerate(actions):
         theta = {name: float(values[at]) for name, values in truths.theta.items()}
         outcomes = executions(theta, DENSITY, grid.cups, int(truths.seed[at]))
-        spilled.append(spilled_by(outcomes, list(chosen), bank))
+        spilled.append(spilled_by(outcomes, list(chosen), keep))
         advance(1)
     return spilled
 
@@ -100,12 +100,10 @@ def executions(
     return Outcomes(tiled, density, cups, seeds)
 
 
-def spilled_by(
-    outcomes: Outcomes, actions: Sequence[Action], bank: "SimulationBank"
-) -> NDArray[np.float64]:
+def spilled_by(outcomes: Outcomes, actions: Sequence[Action], keep: "Keep") -> NDArray[np.float64]:
     """Spilled fraction of each action, the mean over the outcomes' seeds."""
     rates = np.unique([action["angular_velocity"] for action in actions])
-    made = pour_all(outcomes, rates, Keep(bank), silent)
+    made = pour_all(outcomes, rates, keep, silent)
     return np.array([_spilled(made, action) for action in actions])
 
 
