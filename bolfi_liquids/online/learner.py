@@ -33,7 +33,7 @@ def learn_online(parent: Connection, simulator: Connection, request: Request) ->
         if learner.prepare():
             learner.serve()
     except PARTNER_GONE:
-        return  # nobody is left to be told
+        return  # no process is left to report to
     except Exception as error:
         parent.send(Status(OnlinePhase.FAILED, f"{type(error).__name__}: {error}"))
         raise
@@ -89,7 +89,7 @@ class _Learner:
         return True
 
     def serve(self) -> None:
-        """Answer data first; simulate what they make worth while in between."""
+        """Answer data first; in between, simulate the points that they suggest."""
         while True:
             ready = wait([self.parent, *([self.simulator] if self.simulating else [])])
             if self.parent in ready:
@@ -107,7 +107,7 @@ class _Learner:
             else:
                 later = float(so_far.time[-1]) - followed.covered - followed.delay
                 self._estimate(followed, so_far.ended - later)
-        except ValueError as error:  # from these data nothing follows; from others it may
+        except ValueError as error:  # these data cannot be used; later ones may
             self._tell(OnlinePhase.REFUSED, str(error))
 
     def _estimate(self, followed: "Followed", ended: float) -> None:
@@ -153,7 +153,7 @@ class _Learner:
             self.made = with_results(self.made, self.flying.pop(0), results)
 
     def _go_alone(self) -> None:
-        """Without the simulator, what it has made must do."""
+        """Go on with the simulations that there are: the simulator has died."""
         self.simulating = False
         self.flying.clear()
 

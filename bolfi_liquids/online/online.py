@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from .estimate import OnlineEstimate
 
 BANK, LOG = "online.sqlite", "online.jsonl"
-POLL_SECONDS = 0.02  # s between looks while somebody waits
+POLL_SECONDS = 0.02  # s between looks while a caller waits
 JOIN_SECONDS = 2.0  # s that the processes have to end by themselves
 
 

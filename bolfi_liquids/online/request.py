@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..models import Cups
 
 PARTNER_GONE = EOFError, BrokenPipeError, ConnectionResetError
-"""What a pipe raises when nobody is at its other end."""
+"""What a pipe raises when its other end is closed."""
 
 
 class OnlinePhase(StrEnum):

@@ -1,7 +1,7 @@
 """Calibrating a liquid whose parameters are known: by stirring it, and by pouring it.
 
-Both are simulators to `run_missing` of the engine, which keeps what is finished: a truth goes in,
-what was concluded with each budget comes out.
+Both are simulators for `run_missing` of the engine, which keeps what is finished. They map a truth
+to theta* and posterior draws with each budget.
 """
 
 import json
@@ -163,10 +163,9 @@ def _made_by(prior: "Prior") -> list[Any]:
 
 
 def after_each(engine: "Bolfi", simulate: Simulate, budgets: Sequence[int]) -> "Iterator[Fit]":
-    """What one search concludes after each number of simulations, ascending.
+    """The fits of one search after each number of simulations, ascending.
 
-    Points are asked in batches that end at each budget, so where a search goes depends a little
-    on when it is looked at.
+    Points are asked in batches that end at each budget, so the budgets affect the points slightly.
 
     Args:
         engine: Told of nothing yet.

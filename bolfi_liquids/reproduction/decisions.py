@@ -1,4 +1,4 @@
-"""Pours chosen from conclusions, and what they spill when they are carried out."""
+"""Pours chosen from posteriors, and what they spill when they are carried out."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from ..progress import Advance
 
 RULES = ("plug_in", "mean", "cvar")
-"""The best pour if theta* were the truth, as in the paper; least expected spillage over the
-posterior; and its mean over the worst tenth."""
+"""The best pour at theta*, as in the paper; least expected spillage over the posterior; least mean
+spillage over the worst tenth of its draws."""
 
 PRIOR_DRAWS = 64  # draws of the prior over which a pour is chosen without any calibration
 EXECUTION_SEEDS = 4  # seeds with which a chosen pour is carried out

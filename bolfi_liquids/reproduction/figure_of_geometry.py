@@ -1,4 +1,4 @@
-"""Where calibration matters: what the best single pour for all liquids spills too much."""
+"""Where calibration matters: excess spillage of the best single pour for all liquids."""
 
 import json
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Who learns the liquids of a study, and from what."""
+"""The learners of a study: stirring with either surrogate, and pouring."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING

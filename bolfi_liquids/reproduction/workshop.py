@@ -1,4 +1,4 @@
-"""What the figures are made from: simulations that are kept, made once for all figures."""
+"""Simulations and calibrations that figures share; each is made once and kept."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Workshop:
-    """Where figures find their material.
+    """Simulations and calibrations that figures share.
 
     Attributes:
         out: Directory of the results.
@@ -78,7 +78,7 @@ class Workshop:
         return spillage_study(learners, self.bank, self.grid, self.scale, self.means)
 
     def begin_sticky(self) -> None:
-        """Let a pool begin on the liquids that stick, which take longest and wait for nothing."""
+        """Start the sticky liquids in the pool: they take longest and depend on nothing else."""
         _ = self._sticking
 
     @cached_property
