@@ -33,4 +33,4 @@ def run_demo(out: Path, *, executor: "Workers | None" = None, timeout: float | N
         calibration = calibrate(recording, out=out, resume=True, **where)
         criticism = criticise(calibration, baseline=clean, **where)
     choose_pour(criticism, **where)
-    return report(out)
+    return report(out, **where)

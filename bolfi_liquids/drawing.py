@@ -1,4 +1,4 @@
-"""Figures of one look: inline SVG, with no file outside the page, or files of their own."""
+"""Figures of one style: SVG within a page, which needs no other file, or files of their own."""
 
 import io
 import re
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 INK, GREY, LIGHT = "#1f2933", "#8a94a0", "#e4e7eb"
 BLUE, ORANGE = "#2463a6", "#d1591a"
 PALETTE = (BLUE, ORANGE, "#2d8659", "#8a4fa3", "#b8860b", "#5b6770")
-"""Told apart also by those who do not see red and green."""
+"""Distinguishable with red-green colour blindness."""
 _STYLE: dict[Any, Any] = {
     "font.family": "sans-serif",
     "font.size": 9.0,
@@ -41,7 +41,7 @@ _OUTSIDE = re.compile(r"<metadata>.*?</metadata>|\sxmlns(?::\w+)?=\"[^\"]*\"", r
 
 
 def styled(name: str = "") -> AbstractContextManager[None]:
-    """The report's look, inside `with`; `name` sets the ids of an SVG written there."""
+    """The report's style, inside `with`; `name` sets the ids of an SVG written there."""
     import matplotlib
 
     return matplotlib.rc_context({**_STYLE, "svg.hashsalt": name})
@@ -68,7 +68,7 @@ class Panels(NamedTuple):
     own: bool
 
     def legend(self, handles: list, labels: list[str], ncols: int = 3) -> None:
-        """Above the plot, or within the first axes of somebody else's figure."""
+        """Above the plot, or within the first axes of a caller's figure."""
         if self.own:
             self.figure.legend(handles, labels, loc="outside upper center", ncols=ncols)
         else:

@@ -1,4 +1,4 @@
-"""What a page's script needs to say the values under the pointer, beside a figure's SVG."""
+"""Data for the page's hover labels, beside a figure's SVG."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -33,7 +33,7 @@ class Readout(NamedTuple):
 
 
 def series(axes: "Axes", x: ArrayLike, lines: dict[str, ArrayLike], **more: Any) -> Readout:
-    """Lines over a common x: all values at the nearest x are said.
+    """Lines over a common x; hovering shows all values at the nearest x.
 
     Args:
         axes: Where they are drawn.
@@ -46,7 +46,7 @@ def series(axes: "Axes", x: ArrayLike, lines: dict[str, ArrayLike], **more: Any)
 
 
 def marks(axes: "Axes", x: ArrayLike, y: ArrayLike, texts: Sequence[str], **more: Any) -> Readout:
-    """Points: the text of the nearest is said. All of shape (n,)."""
+    """Points; hovering shows the text of the nearest one. All of shape (n,)."""
     rows = zip(short(x), short(y), texts, strict=True)
     return Readout(axes, {"kind": "marks", "marks": [list(row) for row in rows], **more})
 
@@ -54,7 +54,7 @@ def marks(axes: "Axes", x: ArrayLike, y: ArrayLike, texts: Sequence[str], **more
 def field(
     axes: "Axes", x: ArrayLike, y: ArrayLike, values: Mapping[str, NDArray], unit: str
 ) -> Readout:
-    """Values over a grid: those of the nearest node are said.
+    """Values over a grid; hovering shows those at the nearest node.
 
     Args:
         axes: Where they are drawn.
@@ -68,7 +68,7 @@ def field(
 
 
 def lines_of(figure: "Figure") -> list[Readout]:
-    """Of every axes the labelled lines that share their x."""
+    """The labelled lines of each axes that share one x array."""
     found = []
     for axes in figure.axes:
         labelled = [line for line in axes.lines if not str(line.get_label()).startswith("_")]
@@ -80,7 +80,7 @@ def lines_of(figure: "Figure") -> list[Readout]:
 
 
 def to_chart(figure: "Figure", name: str, readouts: Sequence[Readout]) -> str:
-    """A figure as SVG, followed by what its script says.
+    """A figure as SVG, followed by the data of its hover labels.
 
     Args:
         figure: Drawn under `styled`.
@@ -93,7 +93,7 @@ def to_chart(figure: "Figure", name: str, readouts: Sequence[Readout]) -> str:
 
 
 def script_json(value: Any) -> str:
-    """JSON that may stand in an HTML script element, whatever texts it holds."""
+    """JSON that is safe in an HTML script element, whatever texts it holds."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c")
 

@@ -17,7 +17,7 @@ def silent(steps: int) -> None:
 
 
 def after_first(kept: int, advance: Advance) -> Advance:
-    """`advance` without its first `kept` steps, of which a bar knows that they were made before."""
+    """`advance`, ignoring the first `kept` steps, which the bar already counts."""
     passed = 0
 
     def later(steps: int) -> None:
@@ -31,8 +31,9 @@ def after_first(kept: int, advance: Advance) -> Advance:
 
 @contextmanager
 def phases(*, shown: bool) -> Iterator[Callable[[str, int], None]]:
-    """The phase of long work with a running count of simulations; one line for each phase where
-    there is no terminal.
+    """The phase of long work with a running count of simulations.
+
+    Without a terminal, one line for each phase.
 
     Yields:
         Called with the phase and the simulations finished in it since the last call.
@@ -62,7 +63,7 @@ def phases(*, shown: bool) -> Iterator[Callable[[str, int], None]]:
 
 @contextmanager
 def fraction_bar(task: str, *, shown: bool) -> Iterator[Callable[[float], None]]:
-    """A bar that the yielded function sets to a fraction; one line where there is no terminal.
+    """A bar that the yielded function sets to a fraction; without a terminal, one line.
 
     Args:
         task: What is being done, in a few words.

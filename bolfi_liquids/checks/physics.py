@@ -3,10 +3,11 @@
 import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import Executor, Future, as_completed
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import InputError
 from ..files import write_text
@@ -67,21 +68,22 @@ def check_physics(
     names: Iterable[str] = (),
     *,
     seed: int = 0,
-    cases: "Mapping[str, Case] | None" = None,
     executor: "Workers | None" = None,
+    timeout: float | None = None,
     progress: bool = True,
 ) -> PhysicsCheck:
     """Run validation cases, those that have not finished in `out` before.
 
     A case that raises costs itself alone: it is recorded with its error and tried again by the
-    next check. Every record is kept at once, so a check that was killed goes on where it was.
+    next check. So is what a pool had not finished when one of its processes died. Every record is
+    kept at once, so a check that was killed goes on where it was.
 
     Args:
         out: Directory of results; made if missing.
         names: Cases to run; none for all.
         seed: Seed of the cases' initial packings.
-        cases: The registry; None for all there are.
         executor: Runs each case in a call of its own, see `calibrate`; None is this process.
+        timeout: Seconds that one case may take; None sets no limit.
         progress: Whether to show progress on stderr.
 
     Raises:
@@ -89,7 +91,7 @@ def check_physics(
     """
     from ..inference.simulations import open_executor
 
-    registry = all_cases() if cases is None else cases
+    registry = all_cases()
     chosen = _chosen(names, registry)
     if seed < 0:
         raise InputError(f"is {seed}", where="--seed", fix="give an integer of at least 0")
@@ -102,7 +104,7 @@ def check_physics(
     records = {name: record for name, record in held.items() if record is not None}
     missing = [case for case in chosen if not _is_held(held[case.name], case, seed)]
     with open_executor(executor) as workers:
-        for record in _run_all(missing, seed, workers, progress):
+        for record in _run_all(missing, _Setting(seed, timeout), workers, progress):
             name = record["name"]
             write_record(out, record)
             _plot_path(out, name).unlink(missing_ok=True)
@@ -120,21 +122,45 @@ def _is_held(record: "Mapping[str, Any] | None", case: "Case", seed: int) -> boo
     return record is not None and is_finished(record, case_identity(case, seed))
 
 
+class _Setting(NamedTuple):
+    """What all cases of a check share: see `check_physics`."""
+
+    seed: int
+    timeout: float | None
+
+
 def _run_all(
-    missing: "Sequence[Case]", seed: int, workers: "Executor | None", progress: bool
+    missing: "Sequence[Case]", setting: _Setting, workers: "Executor | None", progress: bool
 ) -> Iterator[dict[str, Any]]:
     """Records of cases as they finish."""
     if workers is None:
         for number, case in enumerate(missing, 1):
             label = f"{case.name} ({number} of {len(missing)})"
             with fraction_bar(label, shown=progress) as tell:
-                yield run_case(case, seed, tell)
+                yield run_case(case, setting.seed, setting.timeout, tell)
         return
-    futures = [workers.submit(run_case, case, seed) for case in missing]
+    futures = {_submitted(workers, case, setting): case for case in missing}
     with progress_bar("validation cases", len(missing), shown=progress) as advance:
         for future in as_completed(futures):
-            yield future.result()
+            yield _received(future, futures[future], setting.seed)
             advance(1)
+
+
+def _submitted(workers: Executor, case: "Case", setting: _Setting) -> "Future[dict[str, Any]]":
+    try:
+        return workers.submit(run_case, case, *setting)
+    except Exception as err:  # of a pool that another case has broken
+        failed: Future[dict[str, Any]] = Future()
+        failed.set_exception(err)
+        return failed
+
+
+def _received(future: "Future[dict[str, Any]]", case: "Case", seed: int) -> dict[str, Any]:
+    """The record of a case; of one that its worker lost, a failed record."""
+    try:
+        return future.result()
+    except Exception as err:  # the records of the other cases are still worth keeping
+        return _failed(case, err, seed, 0.0)
 
 
 def _chosen(names: Iterable[str], registry: "Mapping[str, Case]") -> "list[Case]":
@@ -148,24 +174,34 @@ def _chosen(names: Iterable[str], registry: "Mapping[str, Case]") -> "list[Case]
 
 
 def run_case(
-    case: "Case", seed: int, tell: Callable[[float], None] = lambda fraction: None
+    case: "Case",
+    seed: int,
+    timeout: float | None = None,
+    tell: Callable[[float], None] = lambda fraction: None,
 ) -> dict[str, Any]:
     """The record of one case, which ran or failed.
 
     Args:
         case: What to run.
         seed: Seed of its initial packings.
+        timeout: Seconds that it may take; None sets no limit.
         tell: Called with the fraction that is done.
     """
+    from ..models import time_limit
+
     began = time.perf_counter()
     try:
-        result = case.run(tell, seed)
+        with nullcontext() if timeout is None else time_limit(timeout):
+            result = case.run(tell, seed)
         return finished_record(case, result, seed, time.perf_counter() - began)
     except Exception as err:  # whatever it is, the other cases are still worth running
-        seconds = time.perf_counter() - began
-        said = " ".join(str(err).split())
-        record = failed_record(case, f"{type(err).__name__}: {said}", seed, seconds)
+        record = _failed(case, err, seed, time.perf_counter() - began)
         return record | {"traceback": traceback.format_exc()}
+
+
+def _failed(case: "Case", err: Exception, seed: int, seconds: float) -> dict[str, Any]:
+    said = " ".join(str(err).split())
+    return failed_record(case, f"{type(err).__name__}: {said}", seed, seconds)
 
 
 def _all_records(out: Path, registry: "Mapping[str, Case]", seed: int) -> Iterator[dict[str, Any]]:

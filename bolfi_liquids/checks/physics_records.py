@@ -2,14 +2,17 @@
 
 OUT/cases/NAME.json is written whole when its case has finished, so that a killed check repeats
 no finished case, and two checks may run different cases side by side. OUT/physics.json is made
-from these. A record is used again for the same seed, settings of the case, version of the
-simulator and version of the package.
+from these. A record is used again for the same seed, tolerance, settings and code of the case,
+version of the simulator and version of the package.
 """
 
 import json
 import math
+import sys
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
+from functools import cache
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +26,6 @@ if TYPE_CHECKING:
 CASES = "cases"
 RESULTS = "physics.json"
 LIBRARIES = ("bolfi-liquids", "numpy", "scipy", "taichi")
-IDENTITY = ("seed", "model", "version", "settings")
 
 
 def case_identity(case: "Case", seed: int) -> dict[str, Any]:
@@ -34,13 +36,39 @@ def case_identity(case: "Case", seed: int) -> dict[str, Any]:
         "seed": seed,
         "model": MODEL_VERSION,
         "version": versions(("bolfi-liquids",))["bolfi-liquids"],
+        "tolerance": case.tolerance,
         "settings": plain(case.settings),
+        "code": _code(case),
     }
 
 
+def _code(case: "Case") -> str:
+    """SHA-256 of the case's module and of all that cases share.
+
+    Rows may have tolerances of their own, which nothing but the code tells.
+    """
+    module = sys.modules.get(case.run.__module__)
+    own = getattr(module, "__file__", None)  # a notebook has none
+    return sha256(_shared_code() + (Path(own).read_bytes() if own else b"")).hexdigest()
+
+
+@cache
+def _shared_code() -> bytes:
+    """Sources of the models' validation, without the modules of single cases."""
+    from ..models import validation
+
+    folder = Path(validation.__path__[0])
+    shared = [
+        path
+        for path in sorted(folder.rglob("*.py"))
+        if path.parent.name != "cases" or path.name.startswith("_")
+    ]
+    return b"".join(path.read_bytes() for path in shared)
+
+
 def has_identity(record: Mapping[str, Any], identity: Mapping[str, Any]) -> bool:
-    """Whether the record is of the same seed, versions and settings."""
-    return all(record.get(field) == identity[field] for field in IDENTITY)
+    """Whether the record has all of an identity, see `case_identity`."""
+    return all(record.get(field) == value for field, value in identity.items())
 
 
 def finished_record(
@@ -132,7 +160,6 @@ def _about(case: "Case", seed: int) -> dict[str, Any]:
         "truth": case.truth,
         "source": case.source,
         "unit": case.unit,
-        "tolerance": case.tolerance,
         **case_identity(case, seed),
         "created": _now(),
     }

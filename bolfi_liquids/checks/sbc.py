@@ -1,10 +1,10 @@
-"""`check sbc`: is what a calibration concludes true as often as it says?
+"""`check sbc`: are posteriors of the whole calibration calibrated?
 
 Truths are drawn from the prior, their stirs simulated with seeds of their own, camera noise is
 added, and each is calibrated as a recording would be. The emulator of the inclination learns from
 one set of simulations for all of them; the paper's surrogate makes its own for each. Bands and
-intervals take replicates as independent, which those that share a set are not quite: another seed
-draws another set.
+intervals assume independent replicates; those that share simulations are weakly dependent. Another
+seed draws another set.
 """
 
 from collections.abc import Mapping

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from ..inference import Prior
 
 SAMPLING: dict[str, Any] = {"sampler": "quadrature", "chains": 2, "draws": 250}
-"""Of the posterior: independent draws, which are sooner made; `calibrate` checks its own against
-the same quadrature."""
+"""Of the posterior: independent draws, which take less time; `calibrate` checks its own against the
+same quadrature."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class FromBank:
         told: list[tuple[int, int]] = []  # point and run
 
         def engine(seed: int) -> Bolfi:
-            """One that was told all so far, and waits for nothing that it asked before."""
+            """An engine that was told all so far, with no point outstanding."""
             made = Bolfi(self.prior, observed, seed=seed, **options)
             if told:
                 point, run = np.array(told).T

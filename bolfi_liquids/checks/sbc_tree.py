@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from ..inference.checks import SBC, Coverage, Replicates
 
 RESULTS = "sbc.nc"
-INTERVAL_LEVEL = 0.9  # of the intervals that are looked at by region
+INTERVAL_LEVEL = 0.9  # of the intervals whose coverage is given by region
 PRIOR_REGIONS = 4  # of equal prior probability
 
 
 @dataclass(frozen=True, eq=False)
 class SurrogateCheck:
-    """What one surrogate's replicates say.
+    """Ranks and coverage of one surrogate's replicates.
 
     Attributes:
         replicates: Truths, data and draws.
@@ -44,7 +44,7 @@ class SurrogateCheck:
 
     @property
     def ok(self) -> bool:
-        """Neither ranks nor coverage speak against the pipeline."""
+        """Neither the test of ranks nor that of coverage fails."""
         return self.sbc.ok and self.coverage.ok
 
     def __str__(self) -> str:

@@ -182,8 +182,10 @@ def pour(
 
 
 @app.command(epilog=examples("report runs/mine", "report runs/mine --still"))
+@grouped
 def report(
     run: RunArgument,
+    compute: Compute,
     moving: Annotated[
         bool,
         typer.Option(
@@ -195,7 +197,9 @@ def report(
     """Write RUN/report.html, one file that shows it all."""
     from ..reporting.report import report as write_report
 
-    typer.echo(write_report(run, moving=moving))
+    with compute.executor() as executor:
+        path = write_report(run, moving=moving, executor=executor, timeout=compute.timeout)
+    typer.echo(path)
 
 
 @app.command(epilog=examples("demo --out runs/demo"))

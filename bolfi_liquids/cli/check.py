@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from ..inputs.settings import SbcSettings
-from .compute import StudyCompute, Workers
+from .compute import Compute, StudyCompute
 from .errors import FAILED
 from .examples import examples
 from .grouped import grouped
@@ -19,7 +19,7 @@ app = typer.Typer(help="Long validation runs; a killed one goes on.", no_args_is
 @app.command(epilog=examples("check physics --case couette", "check physics --out runs/physics"))
 @grouped
 def physics(
-    compute: Workers,
+    compute: Compute,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Directory of the results.")] = Path(
         "runs/physics"
     ),
@@ -32,7 +32,7 @@ def physics(
     """Compare the fluid with analytic solutions and measurements.
 
     The exit status is 1 when a case is out of its tolerance or failed. What has finished in DIR
-    before, with the same seed, simulator and case, is not run again.
+    before, with the same seed, simulator and case, is not run again. --timeout limits each case.
     """
     from rich.console import Console
 
@@ -40,7 +40,9 @@ def physics(
     from .physics_table import print_physics
 
     with compute.executor() as executor:
-        check = check_physics(out, case or (), seed=seed, executor=executor)
+        check = check_physics(
+            out, case or (), seed=seed, executor=executor, timeout=compute.timeout
+        )
     print_physics(check.records, Console())
     typer.echo(f"results: {check.results}")
     if not check.passed:
@@ -64,8 +66,8 @@ def sbc(
 ) -> None:
     """Simulation-based calibration of the whole pipeline, with the particle fluid.
 
-    Stirs of liquids drawn from the prior are calibrated, and the truths looked up in what was
-    concluded. The exit status is 1 when ranks or coverage speak against it. What has finished in
+    Stirs of liquids drawn from the prior are calibrated, and the truths compared with the
+    posteriors. The exit status is 1 when ranks or coverage fail their test. What has finished in
     DIR before is kept; more replicates can be added to it.
     """
     from ..checks.sbc import check_sbc

@@ -26,40 +26,24 @@ TimeoutOption = Annotated[
 
 
 @dataclass(frozen=True)
-class Workers:
-    """Where something long runs.
+class Compute:
+    """Where simulations run, and for how long at the most.
 
     Attributes:
         workers: Number of processes; 1 is this process, None one for each processor.
         dask: Address of a Dask scheduler, in place of processes.
+        timeout: Seconds that one simulation may take; None sets no limit.
     """
 
     workers: WorkersOption = 1
     dask: DaskOption = None
+    timeout: TimeoutOption = None
 
     @contextmanager
     def executor(self) -> "Iterator[Executor | None]":
         """The executor that `workers` and `dask` name; it is closed afterwards."""
         with open_executor_of(self.workers, self.dask) as executor:
             yield executor
-
-
-@dataclass(frozen=True)
-class Compute(Workers):
-    """Where simulations run, and for how long at the most.
-
-    Attributes:
-        timeout: Seconds that one simulation may take; None sets no limit.
-    """
-
-    timeout: TimeoutOption = None
-
-
-@dataclass(frozen=True)
-class AllProcessors(Workers):
-    """`Workers` of a long study, which takes all processors unless told otherwise."""
-
-    workers: WorkersOption = None
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .compute import AllProcessors
+from .compute import StudyCompute
 from .examples import examples
 from .grouped import grouped
 
@@ -14,7 +14,7 @@ EPILOG = examples("reproduce --quick", "reproduce inclination posterior --out ru
 
 @grouped
 def reproduce(
-    compute: AllProcessors,
+    compute: StudyCompute,
     figures: Annotated[
         list[str] | None, typer.Argument(metavar="FIGURE", help="Names; all without any.")
     ] = None,
@@ -44,16 +44,13 @@ def reproduce(
 
     What has finished in DIR is kept: a killed run goes on with the same command.
     """
-    from ..reproduction.reproduce import reproduce as draw
+    from ..reproduction.means import Means
+    from ..reproduction.reproduce import draw_figures
     from ..reproduction.scale import FULL, QUICK
 
     # of one scale each, so that no figure of the one stands beside some of the other
     out = out or Path("runs/reproduce_quick" if quick else "runs/reproduce")
     with compute.executor() as executor:
-        draw(
-            figures or (),
-            out,
-            scale=QUICK if quick else FULL,
-            executor=executor,
-            done=lambda name, drawn: typer.echo(f"{out / name}.png\n{drawn.says}\n"),
-        )
+        means = Means(executor, compute.timeout)
+        for name, drawn in draw_figures(figures or (), out, QUICK if quick else FULL, means):
+            typer.echo(f"{out / name}.png\n{drawn.says}\n")

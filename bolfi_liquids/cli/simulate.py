@@ -13,7 +13,7 @@ from ..inputs.described_liquid import (
     STIR_PARTICLES,
     VISCOSITY,
 )
-from .compute import Workers
+from .compute import Compute
 from .examples import examples
 from .grouped import grouped
 from .options import CupsOption, ParticlesOption
@@ -95,7 +95,7 @@ class ActionOptions:
 def stir(
     liquid: LiquidOptions,
     files: FileOptions,
-    compute: Workers,
+    compute: Compute,
     density: Annotated[
         float | None, typer.Option(help="Of the liquid, in kg/m³; else the recording's.")
     ] = None,
@@ -121,6 +121,7 @@ def stir(
             particles=particles,
             recording=recording,
             executor=executor,
+            timeout=compute.timeout,
             movie=files.movie,
             out=files.out,
         )
@@ -143,7 +144,7 @@ def pour(
     liquid: LiquidOptions,
     action: ActionOptions,
     files: FileOptions,
-    compute: Workers,
+    compute: Compute,
     density: Annotated[float, typer.Option(help="Of the liquid, in kg/m³.")] = DENSITY,
     particles: ParticlesOption = POUR_PARTICLES,
 ) -> None:
@@ -166,6 +167,7 @@ def pour(
             cups=action.cups,
             particles=particles,
             executor=executor,
+            timeout=compute.timeout,
             movie=files.movie,
             out=files.out,
         )

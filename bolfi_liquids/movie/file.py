@@ -1,4 +1,4 @@
-"""Pictures into a file that plays, by PyAV and Pillow, which cameras and figures need anyway.
+"""Write movies with PyAV and Pillow, which are already dependencies.
 
 imageio-ffmpeg would add 68 MB.
 """

@@ -1,4 +1,4 @@
-"""What has passed the receiver's rim: it falls on, and fills the receiver or lies beside it."""
+"""Liquid below the receiver's rim: it falls on, and fills the receiver or lies beside it."""
 
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -62,6 +62,6 @@ def landed(
 
 
 def level(caught: float, cups: "Cups") -> float:
-    """Depth of the liquid in the receiver [m], which holds no more than it can."""
+    """Depth of the liquid in the receiver [m], at most the receiver's height."""
     depth = caught * cups.liquid_volume / (np.pi * cups.receiver.radius**2)
     return min(depth, cups.receiver.height)

@@ -1,4 +1,4 @@
-"""Light on and through the liquid: what it takes away, bends, and throws back."""
+"""Light on and through the liquid: absorption, refraction and reflection."""
 
 from typing import NamedTuple
 
@@ -15,11 +15,11 @@ ABSORPTION = np.array([62.0, 21.0, 7.0], np.float32)  # 1/m: a blue dye, so that
 SCATTERED_COLOUR = np.array([0.36, 0.62, 0.86], np.float32)
 SCATTERING = 8.0  # 1/m
 REFRACTION_SHIFT = 0.35  # displacement of what is behind, by the thickness
-MAX_BENDING_DEPTH = 0.02  # m of liquid that bend
+MAX_BENDING_DEPTH = 0.02  # m of liquid; more refracts no further
 SKY, GROUND = np.array([1.0, 1.0, 1.0], np.float32), np.array([0.62, 0.68, 0.74], np.float32)
 LAMP_DIRECTION = np.array([-0.45, 0.72, 0.53], np.float32)
 SHININESS = 60.0
-LEAST_REFLECTED = 0.03  # of what meets the surface head on
+LEAST_REFLECTED = 0.03  # share at normal incidence
 
 
 class Layer(NamedTuple):
@@ -55,7 +55,7 @@ def through_liquid(
     base = behind if stick is None else over(behind, stick.colour, stick.cover)
     if liquid is None or not liquid.cover.any():
         return base
-    part = _window(liquid.cover)  # light takes time to work out
+    part = _window(liquid.cover)  # light takes time to compute
     seen = Surface(*(field[part] for field in liquid))
     bent = _bent(view, seen, part)
     depth = seen.thickness[..., None]
@@ -94,7 +94,7 @@ def _bent(view: View, seen: Surface, part: tuple[slice, slice]) -> tuple[NDArray
 
 
 def _lit(passed: Picture, normal: NDArray) -> Picture:
-    """Light that has passed the liquid, with what its surface throws back (Schlick 1994)."""
+    """Light that has passed the liquid, with the reflection of its surface (Schlick 1994)."""
     up, facing = normal[..., 1:2], np.clip(normal[..., 2:3], 0.0, 1.0)
     reflected = LEAST_REFLECTED + (1.0 - LEAST_REFLECTED) * (1.0 - facing) ** 5
     mirrored = GROUND + (0.5 + 0.5 * up) * (SKY - GROUND)

@@ -33,10 +33,10 @@ if TYPE_CHECKING:
 
 PICTURE_SIZE = 480, 640
 AZIMUTH, ELEVATION = np.radians(12.0), np.radians(14.0)
-PUDDLE_SPREAD = 0.012  # m by which what is spilled runs
+PUDDLE_SPREAD = 0.012  # m that spilled liquid spreads
 TABLE_CELL = 0.002  # m
 DARKEST_DEPTH = 0.012  # m of liquid
-CAPTION_HEIGHT = 0.09  # of the height is left free for it
+CAPTION_HEIGHT = 0.09  # share of the picture's height that is left free for the caption
 DYED, SHINING = (38, 92, 190, 215), (92, 160, 226, 235)
 UP = np.array([0.0, 0.0, 1.0])
 

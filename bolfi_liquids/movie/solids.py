@@ -12,7 +12,7 @@ from .light import Layer, Picture, over
 from .surface import Glass
 from .view import View
 
-LINE_SUPERSAMPLING = 2  # times finer are lines drawn than shown
+LINE_SUPERSAMPLING = 2  # lines are drawn this many times finer than shown
 EDGE, FAINT = (92, 112, 130, 210), (92, 112, 130, 110)
 GLASS_COLOUR = (150, 180, 205, 26)
 GLINT_COLOUR = (255, 255, 255, 120)
@@ -60,7 +60,7 @@ def ring(glass: Glass, height: float, view: View, part: str = "all") -> NDArray:
 
 
 def glass_behind(glass: Glass, view: View) -> list[Shape]:
-    """What of a cup is farther than its contents."""
+    """The part of a cup behind its contents."""
     floor, rim = ring(glass, 0.0, view, "far"), ring(glass, glass.height, view, "far")
     return [
         Shape(np.concatenate([floor, rim[::-1]]), GLASS_COLOUR),
@@ -71,7 +71,7 @@ def glass_behind(glass: Glass, view: View) -> list[Shape]:
 
 
 def glass_before(glass: Glass, view: View) -> list[Shape]:
-    """What of a cup is nearer than its contents."""
+    """The part of a cup in front of its contents."""
     rim, floor = ring(glass, glass.height, view, "near"), ring(glass, 0.0, view, "near")
     glint = [at + share * (to - at) for at, to in [(floor[58], rim[58])] for share in (0.12, 0.9)]
     return [

@@ -1,4 +1,4 @@
-"""Words on a movie's pictures."""
+"""Captions of a movie's pictures."""
 
 from collections.abc import Sequence
 from functools import cache

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from ..models import Cups
     from .estimate import OnlineEstimate
 
-MAX_CYCLES = 5  # of the pattern, unless somebody asks for more
+MAX_CYCLES = 5  # of the pattern, by default
 
 
 class OnlineChoice(NamedTuple):

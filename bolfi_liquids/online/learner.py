@@ -10,15 +10,7 @@ import numpy as np
 from ..calibration.stir_simulator import stirring_of
 from .outbox import newest
 from .plan import SoFar, follow, stroke_ends
-from .request import (
-    FAILED,
-    PARTNER_GONE,
-    PREPARING,
-    READY,
-    REFUSED,
-    Request,
-    Status,
-)
+from .request import PARTNER_GONE, OnlinePhase, Request, Status
 from .simulator import step_back
 
 if TYPE_CHECKING:
@@ -41,9 +33,9 @@ def learn_online(parent: Connection, simulator: Connection, request: Request) ->
         if learner.prepare():
             learner.serve()
     except PARTNER_GONE:
-        return  # nobody is left to be told
+        return  # no process is left to report to
     except Exception as error:
-        parent.send(Status(FAILED, f"{type(error).__name__}: {error}"))
+        parent.send(Status(OnlinePhase.FAILED, f"{type(error).__name__}: {error}"))
         raise
 
 
@@ -75,7 +67,7 @@ class _Learner:
         side_by_side = os.cpu_count() or 1  # nothing is urgent before the robot moves
         for start in range(0, len(jobs), side_by_side):
             self._send(jobs[start : start + side_by_side])
-        self._tell(PREPARING, "learning the map of spillage")
+        self._tell(OnlinePhase.PREPARING, "learning the map of spillage")
         with SimulationBank(self.request.bank) as bank:
             self.spillage = make_map(
                 self.request.cups,
@@ -85,38 +77,38 @@ class _Learner:
                 pours=settings.pours,
                 progress=False,
             )
-        self._tell(PREPARING, "compiling")
+        self._tell(OnlinePhase.PREPARING, "compiling")
         warm_up(self.problem, self.spillage)
         while self.flying:
-            self._tell(PREPARING, "simulating the plan")
+            self._tell(OnlinePhase.PREPARING, "simulating the plan")
             self._land()
         if self.made.size < settings.design:
-            self._tell(FAILED, SIMULATOR_DIED)
+            self._tell(OnlinePhase.FAILED, SIMULATOR_DIED)
             return False
-        self._tell(READY, "")
+        self._tell(OnlinePhase.READY, "")
         return True
 
     def serve(self) -> None:
-        """Answer data first; simulate what they make worth while in between."""
+        """Answer data first; in between, simulate the points that they suggest."""
         while True:
             ready = wait([self.parent, *([self.simulator] if self.simulating else [])])
             if self.parent in ready:
                 self._answer(newest(self.parent))
             if self.simulator in ready:
                 self._land()
-                self._tell(READY, "")
+                self._tell(OnlinePhase.READY, "")
             self._go_on()
 
     def _answer(self, so_far: SoFar) -> None:
         try:
             followed = follow(self.plan, self.ends, so_far)
             if followed.refusal:
-                self._tell(REFUSED, followed.refusal)
+                self._tell(OnlinePhase.REFUSED, followed.refusal)
             else:
                 later = float(so_far.time[-1]) - followed.covered - followed.delay
                 self._estimate(followed, so_far.ended - later)
-        except ValueError as error:  # from these data nothing follows; from others it may
-            self._tell(REFUSED, str(error))
+        except ValueError as error:  # these data cannot be used; later ones may
+            self._tell(OnlinePhase.REFUSED, str(error))
 
     def _estimate(self, followed: "Followed", ended: float) -> None:
         from .estimate import estimate
@@ -127,7 +119,7 @@ class _Learner:
         self.followed = followed
         found = estimate(self.problem, self.made, followed, self.spillage, ended)
         self.parent.send(found)
-        self._tell(READY, "")
+        self._tell(OnlinePhase.READY, "")
         with self.request.log.open("a", encoding="utf-8") as log:
             log.write(json.dumps(as_record(found)) + "\n")
 
@@ -161,12 +153,12 @@ class _Learner:
             self.made = with_results(self.made, self.flying.pop(0), results)
 
     def _go_alone(self) -> None:
-        """Without the simulator, what it has made must do."""
+        """Go on with the simulations that there are: the simulator has died."""
         self.simulating = False
         self.flying.clear()
 
-    def _tell(self, phase: str, detail: str) -> None:
-        if phase == READY and not self.simulating:
+    def _tell(self, phase: OnlinePhase, detail: str) -> None:
+        if phase == OnlinePhase.READY and not self.simulating:
             detail = SIMULATOR_DIED
         in_flight = sum(len(jobs) for jobs in self.flying)
         self.parent.send(Status(phase, detail, self.made.size, in_flight))

@@ -2,8 +2,8 @@
 
 The path of the gripper is known before the robot moves. So the plan is simulated before and while
 it is carried out, every simulation once and to its end, and after each stroke all of them are
-compared with the data so far. Two processes do the work; nothing here blocks or disturbs who
-watches the robot: `update` and `poll` return at once, and what goes wrong is a status.
+compared with the data so far. Two processes do the work; no call here blocks the process that
+supervises the robot: `update` and `poll` return at once, and what goes wrong is a status.
 """
 
 import multiprocessing
@@ -34,36 +34,15 @@ from .choice import OnlineChoice
 from .learner import learn_online
 from .outbox import Outbox
 from .plan import SoFar, planned, stroke_ends
-from .request import (
-    FAILED,
-    PARTNER_GONE,
-    PREPARING,
-    READY,
-    REFUSED,
-    Request,
-    Status,
-)
-from .settings import OnlineSettings
+from .request import PARTNER_GONE, OnlinePhase, Request, Status
 from .simulator import simulate_plan
 
 if TYPE_CHECKING:
     from ..models.trajectory import Trajectory
     from .estimate import OnlineEstimate
 
-__all__ = [
-    "FAILED",
-    "PREPARING",
-    "READY",
-    "REFUSED",
-    "OnlineCalibration",
-    "OnlineSettings",
-    "SoFar",
-    "Status",
-    "replay",
-]
-
 BANK, LOG = "online.sqlite", "online.jsonl"
-POLL_SECONDS = 0.02  # s between looks while somebody waits
+POLL_SECONDS = 0.02  # s between looks while a caller waits
 JOIN_SECONDS = 2.0  # s that the processes have to end by themselves
 
 
@@ -82,7 +61,7 @@ class OnlineCalibration:
     def __init__(self, request: Request, out: Path):
         self.settings, self.plan, self.out = request.settings, request.plan(), out
         self.ends = stroke_ends(self.plan)
-        self.status = Status(PREPARING, "starting")
+        self.status = Status(OnlinePhase.PREPARING, "starting")
         self.estimates: list[OnlineEstimate] = []
         self._prior = read_prior(request.prior)
         self._link, self._workers = _launch(request)
@@ -145,17 +124,17 @@ class OnlineCalibration:
             Whether it is ready; if not, `status` says why.
         """
         until = np.inf if timeout is None else time.monotonic() + timeout
-        while self.status.phase == PREPARING and time.monotonic() < until:
+        while self.status.phase == OnlinePhase.PREPARING and time.monotonic() < until:
             time.sleep(POLL_SECONDS)
             self.poll()
-        return self.status.phase == READY
+        return self.status.phase == OnlinePhase.READY
 
     def update(self, so_far: SoFar) -> "OnlineEstimate | None":
         """Hand over the recording so far, at best after each stroke; returns at once.
 
         What was not looked at yet is replaced. Data of an arm that is off its plan by more than
-        `online_plan.FARTHEST`, or that lost or gained more than `LATEST` in a stroke, are not
-        learned from: `status` says so.
+        `plan.MAX_OFF_PLAN`, or whose delay changed by more than `plan.MAX_DELAY_CHANGE` in a
+        stroke, are not learned from: `status` says so.
 
         Returns:
             As `poll`.
@@ -171,7 +150,7 @@ class OnlineCalibration:
         """
         before = len(self.estimates)
         try:
-            while self.status.phase != FAILED and self._link.poll():
+            while self.status.phase != OnlinePhase.FAILED and self._link.poll():
                 message = self._link.recv()
                 if isinstance(message, Status):
                     self.status = message
@@ -181,7 +160,7 @@ class OnlineCalibration:
             self._workers["learner"].join(POLL_SECONDS)
             code = self._workers["learner"].exitcode
             detail = f"the process that learns has died (exit code {code}); the recording goes on"
-            self.status = self.status._replace(phase=FAILED, detail=detail)
+            self.status = self.status._replace(phase=OnlinePhase.FAILED, detail=detail)
         return self.estimates[-1] if len(self.estimates) > before else None
 
     def enough(self, estimate: "OnlineEstimate") -> bool:
@@ -253,12 +232,14 @@ def replay(
         if realtime:
             yield from _arriving(online, began + end)
         estimate = online.update(_until(recording, end))
-        while not realtime and estimate is None and online.status.phase == READY:
+        while not realtime and estimate is None and online.status.phase == OnlinePhase.READY:
             time.sleep(POLL_SECONDS)
             estimate = online.poll()
         if estimate is not None:
             yield estimate
-        if online.status.phase != READY or any(map(online.enough, online.estimates[-1:])):
+        if online.status.phase != OnlinePhase.READY:
+            return
+        if any(map(online.enough, online.estimates[-1:])):
             return
     if realtime:
         yield from _arriving(online, time.monotonic() + JOIN_SECONDS)

@@ -12,7 +12,7 @@ class Outbox:
     """The newest message goes out as soon as the other end takes it; older ones are dropped.
 
     Args:
-        link: Of a duplex pipe; nobody else may send through it, or close it.
+        link: Of a duplex pipe; nothing else may send through it, or close it.
     """
 
     def __init__(self, link: Connection):
@@ -32,7 +32,7 @@ class Outbox:
         """Close the link, whether or not the other end reads; closing twice does no harm."""
         if self._link.closed:
             return
-        # ends a send that nobody takes, which closing would not; a closed number may be reused
+        # ends a pending send, which closing would not; a closed number may be reused
         with socket.socket(fileno=os.dup(self._link.fileno())) as both, suppress(OSError):
             both.shutdown(socket.SHUT_RDWR)
         self.put(None)
@@ -44,7 +44,7 @@ class Outbox:
             self._waiting.clear()
             try:
                 self._link.send(self._newest)
-            except OSError:  # closed at either end: whoever reads it finds out
+            except OSError:  # closed at either end: the reader gets an error of its own
                 return
 
 

@@ -20,7 +20,9 @@ from ..robot.stir import (
     stir_session,
 )
 from .choice import OnlineChoice
-from .online import FAILED, REFUSED, OnlineCalibration, SoFar
+from .online import OnlineCalibration
+from .plan import SoFar
+from .request import OnlinePhase
 
 if TYPE_CHECKING:
     from ..hardware import HiddenLiquid, Rig, Session
@@ -143,7 +145,7 @@ class _Stirring:
 
     def _take(self, estimate: "OnlineEstimate | None") -> None:
         status = self._calibration.status
-        if status.phase in (FAILED, REFUSED):
+        if status.phase in (OnlinePhase.FAILED, OnlinePhase.REFUSED):
             self._view.warn(f"calibration {status.phase}: {status.detail}")
         if estimate is not None:
             self._enough = self._calibration.enough(estimate)

@@ -1,7 +1,8 @@
-"""What the processes of an online calibration are given, and how they say how it goes."""
+"""What the processes of an online calibration are given, and the status that they report."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,22 +17,46 @@ from .settings import OnlineSettings
 if TYPE_CHECKING:
     from ..models import Cups
 
-PREPARING, READY, REFUSED, FAILED = "preparing", "ready", "refused", "failed"
 PARTNER_GONE = EOFError, BrokenPipeError, ConnectionResetError
-"""What a pipe raises when nobody is at its other end."""
+"""What a pipe raises when its other end is closed."""
+
+
+class OnlinePhase(StrEnum):
+    """Phase of an online calibration."""
+
+    PREPARING = "preparing"
+    READY = "ready"
+    REFUSED = "refused"
+    FAILED = "failed"
+
+    @property
+    def advice(self) -> str:
+        """What it means and what to do next."""
+        return _ADVICE[self]
+
+
+_ADVICE = {
+    OnlinePhase.PREPARING: "The design is simulated and everything is compiled. Let the robot move "
+    "after `wait_until_ready`.",
+    OnlinePhase.READY: "Hand over the recording so far by `update` after each stroke.",
+    OnlinePhase.REFUSED: "The last data cannot be used; `status.detail` says why. Earlier "
+    "estimates hold, and later data may be used again.",
+    OnlinePhase.FAILED: "No estimate will follow; `status.detail` says why. The recording goes on: "
+    "calibrate on it by `finish` afterwards.",
+}
 
 
 class Status(NamedTuple):
     """How an online calibration is doing.
 
     Attributes:
-        phase: "preparing"; "ready" for data; "refused", where data are off the plan; "failed".
+        phase: What it is doing; `phase.advice` says what to do.
         detail: What is being prepared, or what is wrong; "" if nothing is.
         simulations: Finished, failed ones included.
         in_flight: Being simulated.
     """
 
-    phase: str
+    phase: OnlinePhase
     detail: str
     simulations: int = 0
     in_flight: int = 0

@@ -30,7 +30,7 @@ def simulate_plan(link: Connection, request: Request) -> None:
 
 
 def step_back(niceness: int) -> None:
-    """Run at a lower priority, and leave Ctrl-C to who watches the robot."""
+    """Run at a lower priority, and ignore Ctrl-C; the supervising process handles it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(os, "nice"):
         os.nice(niceness)

@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
 PERCENT_LEVELS = (0, 1, 2, 5, 10, 20, 40, 70, 100)
-"""Spilled, of the contours: dense where little is spilled, which is what matters."""
+"""Contour levels of the spilled percentage, denser where little is spilled."""
 
 BAD_CASE = 0.9  # quantile over the draws of the second map
 SURE, BOOTSTRAP_SAMPLES = 0.95, 200
-"""Confidence that an action is worse, and the samples that it is computed from."""
+"""Confidence that an action is worse, and number of bootstrap samples for it."""
 
 MIN_COMPARED_DRAWS = 8
-"""Draws, of which fewer cannot show that an action is worse."""
+"""Fewer draws cannot show that an action is worse."""
 
 CHOICES = {"chosen": (BLUE, "o", "chosen pour"), "plug_in": (ORANGE, "s", "best at θ* alone")}
 """Colour, marker and label of the two actions, by their group in pour.nc."""

@@ -1,12 +1,13 @@
 """Expected spillage of any pour of any liquid, within milliseconds.
 
-Choosing a pour by simulation takes a minute. While a robot stirs there is none, so the pours are
-made before: a space-filling design of liquids and actions, each poured once. A Gaussian process
-learns the spilled fraction from them, and a table of its predictions answers for a posterior.
+Choosing a pour by simulation takes a minute. There is no time for that while a robot stirs, so the
+pours are simulated beforehand: a space-filling design of liquids and actions, each poured once. A
+Gaussian process learns the spilled fraction from them, and a table of its predictions gives the
+expected spillage over a posterior.
 
-With 512 pours the map of the bundled cups misses a pour that it has not seen by 0.025 RMS, by
-0.015 where little is spilled. Making them takes some three minutes on one core, the first time:
-they are kept in a simulation bank, under a name that holds cups, density and the model's version.
+With 512 pours the map of the bundled cups predicts left-out pours with an error of 0.025 RMS, of
+0.015 where little is spilled. The pours take some three minutes on one core, the first time: they
+are kept in a simulation bank, under an identity of cups, density and the model's version.
 """
 
 import json
@@ -30,9 +31,9 @@ if TYPE_CHECKING:
     from ..models import Cups
 
 DEFAULT_POURS = 512
-MIN_POURS = 64  # of fewer the process learns next to nothing about four inputs
-MAP_PACKINGS = 64  # that the pours start from; a new one takes as long as a quick pour
-AT_ONCE = 16  # pours of like duration in one call
+MIN_POURS = 64  # fewer tell a Gaussian process of four inputs next to nothing
+MAP_PACKINGS = 64  # initial packings of the pours; a new one takes as long as a quick pour
+AT_ONCE = 16  # pours of similar duration in one call
 LEFT_OUT = 8  # one pour in so many is left out to check the map by
 LIQUID_GRID = 33, 5  # viscosity and cohesion, which acts slowly
 ACTION_GRID = 16  # along each axis
@@ -41,12 +42,13 @@ OUTCOMES_EACH = 16  # equally probable ones of each predicted pour
 
 
 class MapError(NamedTuple):
-    """What the map missed of pours that it had not seen.
+    """Errors of the map on pours that it was not made from.
 
     Attributes:
         rms: Of the spilled fraction.
         rms_little: The same where less than a tenth was expected to be spilled.
-        spread: RMS error in predicted standard deviations; 1 if the map knows how wrong it is.
+        spread: RMS error in units of the predicted standard deviation; 1 if predicted standard
+            deviations are calibrated.
         pours: Left out for this check.
     """
 
@@ -109,8 +111,8 @@ class SpillageMap:
     def best(self, liquids: Mapping[str, NDArray]) -> Expected:
         """The action of the grid that is expected to spill least.
 
-        Being chosen flatters it: where the map errs downwards, there the least is found. So the
-        bound is that of the outcomes and `error.rms_little` above it.
+        The minimum is biased low, because it tends to lie where the map underestimates. So
+        `error.rms_little` is added to the bound of the outcomes.
         """
         outcomes = self.outcomes(liquids)
         at = int(np.argmin(outcomes.mean(axis=0)))
@@ -178,8 +180,8 @@ def make_map(
 ) -> SpillageMap:
     """Learn the spilled fraction from pours; arguments as in `make_pours`.
 
-    One pour in eight is left out first: if the rest, of which a map is made like the final one,
-    predicts those worse than it believes, the final map's standard deviations grow by as much.
+    One pour in eight is left out first. If a map of the rest has larger errors on them than its
+    standard deviations, those of the final map are enlarged by that factor.
     """
     theta, spilled = make_pours(cups, density, bank, prior=prior, pours=pours, progress=progress)
     prior, joint = _liquid(prior), _joint(prior, cups)
@@ -216,7 +218,7 @@ def _joint(prior: "Prior", cups: "Cups") -> "Prior":
 
 
 def _jobs(joint: "Prior", pours: int) -> "list[Job]":
-    """A Sobol design; neighbours in the list turn at like rates, so that none waits for another."""
+    """A Sobol design in order of angular velocity, so that pours of one call end together."""
     from scipy.stats import qmc
 
     from ..inference.simulations import jobs

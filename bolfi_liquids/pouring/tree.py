@@ -1,9 +1,9 @@
 """pour.nc: everything that a report shows of a pour.
 
-Its groups are `actions` and `actions_plug_in`, over a grid of actions, the spillage that each
-posterior draw, or theta*, lets expect, and the risk that was minimised; `finalists`, the same of
+Its groups are `actions` and `actions_plug_in`, over a grid of actions, the spillage expected for
+each draw of the posterior, or at theta*, and the risk that was minimised; `finalists`, the same of
 the most promising ones over more draws; `chosen` and `plug_in`, over outcomes, fractions with
-fresh seeds; `liquids` and `liquids_again`, the posterior draws that chose.
+fresh seeds; `liquids` and `liquids_again`, the posterior draws that the choice was made with.
 """
 
 from collections.abc import Mapping

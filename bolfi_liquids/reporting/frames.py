@@ -8,9 +8,10 @@ they are past the receiver's rim, with the source's `angle` [rad] and the share 
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,17 +27,16 @@ from ..run.directory import FRAMES, POUR
 from ..run.recordings import kept_recordings
 from ..seeds import Phase, simulation_seeds
 from ..words import unit_of
+from .scenes import FRAME_RATE, Draw, PourScene, PourShown, StirScene, StirShown
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
     from ..calibration.result import Calibration
+    from ..inference.simulations import Workers
 
 N_DRAWS_SHOWN = 3
 """Posterior draws that are shown."""
-
-FRAME_RATE = 15.0
-"""Of the pictures [1/s]."""
 
 MAX_STIR_SECONDS = 10.0
 """Of a stir that is shown [s]."""
@@ -45,15 +45,27 @@ FRAMES_FORMAT = 1
 """Of the file; another is made again."""
 
 
-def frames_of(run: str | Path, *, progress: bool = True) -> "Dataset":
+T = TypeVar("T")
+
+
+def frames_of(
+    run: str | Path,
+    *,
+    executor: "Workers | None" = None,
+    timeout: float | None = None,
+    progress: bool = True,
+) -> "Dataset":
     """The run's frames; simulated if there are none of this calibration and pour.
 
     Args:
         run: A RUN directory with a finished calibration.
+        executor: Where draws are simulated, see `calibrate`; the result has the same bits.
+        timeout: Seconds that one simulation may take; None sets no limit.
         progress: Whether to show a bar on stderr.
 
     Raises:
         InputError: The directory holds no finished calibration, or its recording is missing.
+        RuntimeError: A simulation took longer than `timeout`; nothing was written.
     """
     calibration = latest_calibration(run)
     whole = kept_recordings(calibration.path, dict(calibration.record))[0]
@@ -68,12 +80,70 @@ def frames_of(run: str | Path, *, progress: bool = True) -> "Dataset":
         kept = read_tree(path, fix="delete it: it is made again").to_dataset()
         if kept.attrs.get("made_from") == made_from:
             return kept
-    steps = N_DRAWS_SHOWN * (1 if pour is None else 2)
-    with progress_bar("moving pictures", steps, shown=progress) as advance:
-        frames = _stirred(calibration, recording, theta, seeds, advance)
-        if pour is not None:
-            frames.update(_poured(calibration, pour, theta, seeds, advance))
+    scenes = _scenes(calibration, recording, pour, timeout)
+    try:
+        frames = _simulated(scenes, _draws(theta, seeds), executor, progress)
+    except TimeoutError as err:
+        if timeout is None:
+            raise
+        raise RuntimeError(
+            f"a moving picture took longer than {timeout:g} s to simulate; allow more time, or "
+            "leave the pictures out by --still, in Python by moving=False"
+        ) from err
     return _write(frames, theta, made_from, path)
+
+
+class _Scenes(NamedTuple):
+    stir: StirScene
+    pour: PourScene | None
+
+
+def _scenes(
+    calibration: "Calibration",
+    recording: Recording,
+    pour: Mapping[str, Any] | None,
+    timeout: float | None,
+) -> _Scenes:
+    from ..calibration.stir_simulator import stirring_of
+
+    particles = int(calibration.record["settings"]["particles"])
+    stir = StirScene(stirring_of([recording], particles), timeout)
+    if pour is None:
+        return _Scenes(stir, None)
+    action = float(pour["angular_velocity"]), float(pour["distance"])
+    cups, density = kept_cups(pour["cups"]), calibration.liquid_density
+    return _Scenes(stir, PourScene(cups, *action, density, timeout))
+
+
+def _simulated(
+    scenes: _Scenes, draws: list[Draw], executor: "Workers | None", progress: bool
+) -> dict[str, Any]:
+    """All of the file's variables but theta."""
+    from ..inference.simulations import open_executor
+
+    steps = len(draws) * sum(scene is not None for scene in scenes)
+    with (
+        open_executor(executor) as workers,
+        progress_bar("moving pictures", steps, shown=progress) as advance,
+    ):
+        stirs = _each(scenes.stir, draws, workers, advance)
+        pours = None if scenes.pour is None else _each(scenes.pour, draws, workers, advance)
+        frames = _stirred(list(stirs), scenes.stir.stirring.time)
+        return frames if pours is None else frames | _poured(list(pours))
+
+
+def _each(
+    scene: Callable[[Draw], T], draws: list[Draw], workers: Executor | None, advance: Advance
+) -> Iterator[T]:
+    """What is seen of each draw, in order; an executor begins with all of them at once."""
+    shown = map(scene, draws) if workers is None else workers.map(scene, draws)
+
+    def counted() -> Iterator[T]:
+        for one in shown:
+            yield one
+            advance(1)
+
+    return counted()
 
 
 def _write(
@@ -119,91 +189,45 @@ def _digest(
     return hashlib.sha256(json.dumps(told, sort_keys=True, default=float).encode()).hexdigest()
 
 
-def _each(theta: Mapping[str, NDArray]) -> list[tuple[dict[str, float], dict[str, float]]]:
-    """Parameters of the liquid and coefficients of effects, of each draw."""
+def _draws(theta: Mapping[str, NDArray], seeds: list[int]) -> list[Draw]:
     liquid, effects = split_parameters(theta)
     return [
-        (
+        Draw(
             {name: float(values[at]) for name, values in liquid.items()},
             {name: float(values[at]) for name, values in effects.items()},
+            seed,
         )
-        for at in range(N_DRAWS_SHOWN)
+        for at, seed in enumerate(seeds)
     ]
 
 
-def _stirred(
-    calibration: "Calibration",
-    recording: Recording,
-    theta: Mapping[str, NDArray],
-    seeds: list[int],
-    advance: Advance,
-) -> dict[str, Any]:
-    from .. import models
-    from ..calibration.stir_simulator import stirring_of
-
-    particles = int(calibration.record["settings"]["particles"])
-    stirring = stirring_of([recording], particles)
-    density = recording.number("liquid_density")
-    made = []
-    for (liquid, effects), seed in zip(_each(theta), seeds, strict=True):
-        one = models.Liquid(**liquid, density=density)
-        made.append(
-            models.stir_frames(
-                one, recording.gripper, stirring.setups[0], seed, rate=FRAME_RATE, effects=effects
-            )
-        )
-        advance(1)
-    seen = stirring.simulate(dict(theta), np.array(seeds))
+def _stirred(shown: list[StirShown], time: NDArray) -> dict[str, Any]:
+    made = [one.frames for one in shown]
     metres, frame = {"units": "m"}, ("draw", "stir_frame")
     return {
         "stir_time": ("stir_frame", made[0].time, {"units": "s"}),
         "stirred": ((*frame, "stir_particle", "axis"), _stack(made, "position"), metres),
         "pivot": ((*frame, "axis"), _stack(made, "pivot"), metres),
         "tip": ((*frame, "axis"), _stack(made, "tip"), metres),
-        "time": ("frame", recording.time, {"units": "s"}),
-        "inclination": (("draw", "frame", "plane"), seen, {"units": "rad"}),
+        "time": ("frame", time, {"units": "s"}),
+        "inclination": (
+            ("draw", "frame", "plane"),
+            np.stack([one.inclination for one in shown]),
+            {"units": "rad"},
+        ),
     }
 
 
-def _poured(
-    calibration: "Calibration",
-    pour: Mapping[str, Any],
-    theta: Mapping[str, NDArray],
-    seeds: list[int],
-    advance: Advance,
-) -> dict[str, Any]:
-    from .. import models
-
-    cups = kept_cups(pour["cups"])
-    rate, distance = float(pour["angular_velocity"]), float(pour["distance"])
-    density = calibration.liquid_density
-    made, caught, outcomes = [], [], []
-    for (liquid, effects), seed in zip(_each(theta), seeds, strict=True):
-        one = models.Liquid(**liquid, density=density)
-        batch = models.PourBatch(one, rate, cups, [seed], effects=effects)
-        frames = models.pour_frames(batch, rate=FRAME_RATE)
-        landed = models.landings(one, rate, cups, [seed], effects=effects)
-        made.append(frames)
-        inside = landed.inside(distance, cups.receiver.radius)[0]
-        caught.append(_caught(frames.position, inside))
-        result = landed.into(distance, cups.receiver.radius)
-        outcomes.append([float(part[0]) for part in (result.spilled, result.retained)])
-        advance(1)
-    frame, parts = ("draw", "pour_frame"), np.array(outcomes)
+def _poured(shown: list[PourShown]) -> dict[str, Any]:
+    made, frame = [one.frames for one in shown], ("draw", "pour_frame")
     return {
         "pour_time": ("pour_frame", made[0].time, {"units": "s"}),
         "poured": ((*frame, "pour_particle", "axis"), _stack(made, "position"), {"units": "m"}),
         "angle": ("pour_frame", made[0].angle, {"units": "rad"}),
-        "caught": (frame, np.stack(caught)),
-        "spilled": ("draw", parts[:, 0]),
-        "retained": ("draw", parts[:, 1]),
+        "caught": (frame, np.stack([one.caught for one in shown])),
+        "spilled": ("draw", np.array([one.spilled for one in shown])),
+        "retained": ("draw", np.array([one.retained for one in shown])),
     }
-
-
-def _caught(position: NDArray, inside: NDArray) -> NDArray:
-    """Share of all particles in the receiver, by frame; they land in the order of `inside`."""
-    gone = np.isnan(position[..., 0]).sum(axis=1)
-    return np.append(0, np.cumsum(inside))[gone] / len(inside)
 
 
 def _stack(made: list, name: str) -> NDArray[np.float32]:

@@ -14,6 +14,7 @@ from ..calibration.summary import CalibrationSummary
 from ..criticism.result import latest_calibration
 from ..files import write_text
 from ..hover import script_json
+from ..inputs.prior import Described
 from ..pouring.result import PourSummary, read_pour
 from ..run.directory import POUR, REPORT, Run, run_path
 from ..run.summary import read_summary
@@ -25,26 +26,39 @@ from .warnings import Results, warnings_of
 if TYPE_CHECKING:
     from xarray import DataTree
 
+    from ..inference.simulations import Workers
+
 PAGE_TEMPLATE = "report.html.jinja"
 
 
-def report(run: Run, *, moving: bool = True, progress: bool = True) -> Path:
+def report(
+    run: Run,
+    *,
+    moving: bool = True,
+    executor: "Workers | None" = None,
+    timeout: float | None = None,
+    progress: bool = True,
+) -> Path:
     """Write RUN/report.html from what the run holds.
 
     Args:
         run: A RUN directory with a finished calibration; or a calibration, criticism or pour.
         moving: Whether it has moving pictures, of a few stirs and pours that are simulated for
             them once and kept in RUN/frames.nc; nothing else is simulated.
+        executor: Where they are simulated, see `calibrate`; the result has the same bits.
+        timeout: Seconds that one simulation may take; None sets no limit.
         progress: Whether to show a bar on stderr while they are.
 
     Raises:
         InputError: The directory holds no finished calibration.
+        RuntimeError: A simulation took longer than `timeout`.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     calibration = Calibration.open(run_path(run))
     poured, criticism = _poured(calibration.path), criticism_context(calibration)
-    pictures = _moving(calibration, progress) if moving else None
+    how = {"executor": executor, "timeout": timeout, "progress": progress}
+    pictures = _moving(calibration, how) if moving else None
     environment = Environment(
         loader=PackageLoader("bolfi_liquids", "data"),
         autoescape=True,
@@ -82,8 +96,29 @@ def _calibration_context(calibration: Calibration) -> dict[str, Any]:
         "posterior": posterior_figure(tree),
         "search": search_figure(tree),
         "start": min(int(tree.attrs["initial"]), summary.n_simulations),
+        "priors": {
+            name: prior_text(one) for name, one in calibration.record["settings"]["prior"].items()
+        },
         "rows": [_row(name, summary) for name in summary.parameters],
     }
+
+
+def prior_text(described: Described | str) -> str:
+    """A distribution of run.toml as Python writes it, such as `LogUniform(0.003, 20)`.
+
+    A text, as version 0.1 wrote it, stays.
+    """
+    if isinstance(described, str):
+        return described
+    values = {
+        name: prior_text(value) if isinstance(value, Mapping) else f"{value:g}"
+        for name, value in described.items()
+        if name != "family"
+    }
+    if set(values) == {"low", "high"}:
+        return f"{described['family']}({values['low']}, {values['high']})"
+    named = ", ".join(f"{name}={value}" for name, value in values.items())
+    return f"{described['family']}({named})"
 
 
 def _row(name: str, summary: CalibrationSummary) -> dict[str, Any]:
@@ -133,7 +168,8 @@ def _pour_context(summary: PourSummary, tree: "DataTree") -> dict[str, Any]:
     }
 
 
-def _moving(calibration: Calibration, progress: bool) -> dict[str, Any] | None:
+def _moving(calibration: Calibration, how: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Moving pictures, simulated by the arguments `how` of `frames_of`."""
     from ..run.recordings import RECORDINGS_FOLDER
     from .frames import frames_of
     from .moving_pictures import moving_context
@@ -142,7 +178,7 @@ def _moving(calibration: Calibration, progress: bool) -> dict[str, Any] | None:
         calibration.path / RECORDINGS_FOLDER
     ).is_dir():  # of a run that was made before they were kept
         return None
-    return moving_context(calibration, frames_of(calibration.path, progress=progress))
+    return moving_context(calibration, frames_of(calibration.path, **how))
 
 
 def _text(name: str) -> str:

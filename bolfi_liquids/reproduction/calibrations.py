@@ -1,7 +1,7 @@
 """Calibrating a liquid whose parameters are known: by stirring it, and by pouring it.
 
-Both are simulators to `run_missing` of the engine, which keeps what is finished: a truth goes in,
-what was concluded with each budget comes out.
+Both are simulators for `run_missing` of the engine, which keeps what is finished. They map a truth
+to theta* and posterior draws with each budget.
 """
 
 import json
@@ -20,6 +20,7 @@ from ..checks.sbc_pipelines import SAMPLING, CameraNoise
 from ..inputs.prior import describe_prior
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from ..progress import Simulate
+from ..run.time_limit import TimeLimited
 from ..seeds import Phase, generator
 from .truths import DENSITY
 
@@ -43,6 +44,7 @@ class ByStirring:
         surrogate: "signal", or "discrepancy": the paper's.
         budgets: Ascending; a larger one goes on from a smaller one's simulations.
         bank: Where finished simulations are kept.
+        timeout: Seconds that one simulation may take; None sets no limit.
     """
 
     stirring: Stirring
@@ -50,6 +52,7 @@ class ByStirring:
     surrogate: str
     budgets: tuple[int, ...]
     bank: str | Path = ":memory:"
+    timeout: float | None = None
 
     def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         """theta*, then draws, of viscosity and cohesion: (B, budgets, 1 + DRAWS_EACH, 2)."""
@@ -62,7 +65,7 @@ class ByStirring:
 
         stirring = self.stirring
         with SimulationBank(self.bank) as bank:
-            keep = Keep(bank, stirring.identity, BATCH)
+            keep = Keep(bank, stirring.identity, BATCH, timeout=self.timeout)
             simulate = keeping(stirring.simulate, stirring.observed.shape, keep)
             clean = simulate(truth, np.array([seed]))[0]
             engine = Bolfi(
@@ -83,7 +86,7 @@ class ByStirring:
 
 
 @dataclass(frozen=True)
-class ByPouring:
+class ByPouring(TimeLimited):
     """The paper's reference (Lopez-Guevara et al. 2017): a training pour is observed once, and
     Bayesian optimisation seeks the liquid that spills as much.
 
@@ -91,7 +94,7 @@ class ByPouring:
         cups: Of training pour and task alike.
         prior: Of the parameters.
         angular_velocity, distance: The training pour [rad/s], [m].
-        budgets, bank: See `ByStirring`.
+        budgets, bank, timeout: See `ByStirring`.
     """
 
     cups: "Cups"
@@ -100,6 +103,7 @@ class ByPouring:
     distance: float
     budgets: tuple[int, ...]
     bank: str | Path = ":memory:"
+    timeout: float | None = None
 
     def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         """As `ByStirring.simulate`."""
@@ -112,7 +116,8 @@ class ByPouring:
 
         rules: dict[str, Any] = {**PAPER_RULES}
         with SimulationBank(self.bank) as bank:
-            keep = Keep(bank, json.dumps(["training pour", *self._pour], sort_keys=True), BATCH)
+            identity = json.dumps(["training pour", *self._pour], sort_keys=True)
+            keep = Keep(bank, identity, BATCH, timeout=self.timeout)
             simulate = keeping(self._spilled, (1,), keep)
             engine = Bolfi(
                 self.prior,
@@ -158,10 +163,9 @@ def _made_by(prior: "Prior") -> list[Any]:
 
 
 def after_each(engine: "Bolfi", simulate: Simulate, budgets: Sequence[int]) -> "Iterator[Fit]":
-    """What one search concludes after each number of simulations, ascending.
+    """The fits of one search after each number of simulations, ascending.
 
-    Points are asked in batches that end at each budget, so where a search goes depends a little
-    on when it is looked at.
+    Points are asked in batches that end at each budget, so the budgets affect the points slightly.
 
     Args:
         engine: Told of nothing yet.

@@ -1,4 +1,4 @@
-"""Pours chosen from conclusions, and what they spill when they are carried out."""
+"""Pours chosen from posteriors, and what they spill when they are carried out."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..inference.simulations import Keep
 from ..pouring.spillage import (
     DISTANCE_STEP,
     Outcomes,
@@ -19,14 +18,15 @@ from .calibrations import PARAMETER_NAMES
 from .truths import DENSITY, Truths
 
 if TYPE_CHECKING:
-    from ..inference import Prior, SimulationBank
+    from ..inference import Prior
+    from ..inference.simulations import Keep
     from ..models import Cups
     from ..pouring.grid import PourGrid
     from ..progress import Advance
 
 RULES = ("plug_in", "mean", "cvar")
-"""The best pour if theta* were the truth, as in the paper; least expected spillage over the
-posterior; and its mean over the worst tenth."""
+"""The best pour at theta*, as in the paper; least expected spillage over the posterior; least mean
+spillage over the worst tenth of its draws."""
 
 PRIOR_DRAWS = 64  # draws of the prior over which a pour is chosen without any calibration
 EXECUTION_SEEDS = 4  # seeds with which a chosen pour is carried out
@@ -58,7 +58,7 @@ def execute(
     truths: Truths,
     actions: Iterable[Iterable[Action]],
     grid: "PourGrid",
-    bank: "SimulationBank",
+    keep: "Keep",
     advance: "Advance",
 ) -> list[NDArray[np.float64]]:
     """Spilled fraction of each action, the mean over seeds that nothing else uses.
@@ -67,14 +67,14 @@ def execute(
         truths: n liquids.
         actions: Those of each, with angular velocities of the grid.
         grid: Its cups are poured.
-        bank: Where pours are kept.
+        keep: Where pours are made and kept.
         advance: Called after each truth.
     """
     spilled = []
     for at, chosen in enumerate(actions):
         theta = {name: float(values[at]) for name, values in truths.theta.items()}
         outcomes = executions(theta, DENSITY, grid.cups, int(truths.seed[at]))
-        spilled.append(spilled_by(outcomes, list(chosen), bank))
+        spilled.append(spilled_by(outcomes, list(chosen), keep))
         advance(1)
     return spilled
 
@@ -100,12 +100,10 @@ def executions(
     return Outcomes(tiled, density, cups, seeds)
 
 
-def spilled_by(
-    outcomes: Outcomes, actions: Sequence[Action], bank: "SimulationBank"
-) -> NDArray[np.float64]:
+def spilled_by(outcomes: Outcomes, actions: Sequence[Action], keep: "Keep") -> NDArray[np.float64]:
     """Spilled fraction of each action, the mean over the outcomes' seeds."""
     rates = np.unique([action["angular_velocity"] for action in actions])
-    made = pour_all(outcomes, rates, Keep(bank), silent)
+    made = pour_all(outcomes, rates, keep, silent)
     return np.array([_spilled(made, action) for action in actions])
 
 

@@ -1,4 +1,4 @@
-"""Where calibration matters: what the best single pour for all liquids spills too much."""
+"""Where calibration matters: excess spillage of the best single pour for all liquids."""
 
 import json
 from collections.abc import Mapping
@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from ..drawing import INK, new_figure, styled
-from ..inference.simulations import Keep
 from ..inputs.cups import bundled_cups
 from ..pouring.spillage import DISTANCE_STEP, landing_sd
 from ..progress import progress_bar
 from ..run.simulations import simulate_kept
+from ..run.time_limit import TimeLimited
 from ..seeds import Phase, simulation_seeds
 from .figure import Drawn
 from .truths import DENSITY
@@ -31,7 +31,7 @@ DISTANCES = np.arange(-0.02, 0.0901, DISTANCE_STEP)  # m
 
 
 @dataclass(frozen=True)
-class Poured:
+class Poured(TimeLimited):
     """Pours of all liquids into receivers of all radii at all distances.
 
     Attributes:
@@ -66,20 +66,7 @@ def geometry(workshop: Workshop) -> Drawn:
     from xarray import Dataset
 
     lips = np.array(workshop.scale.lips)
-    regret = np.empty((len(lips), len(RECEIVER_RADII)))
-    total = len(lips) * TURN_RATES
-    with progress_bar("pouring from several heights", total, shown=workshop.progress) as advance:
-        for row, lip in enumerate(lips):
-            cups = bundled_cups()
-            cups = cups.model_copy(
-                update={"pour": cups.pour.model_copy(update={"lip_height": float(lip)})}
-            )
-            poured = Poured(cups)
-            rates = np.geomspace(*cups.angular_velocity_range, TURN_RATES)
-            keep = Keep(workshop.bank, poured.identity, 1)
-            theta = {"angular_velocity": rates}
-            made = simulate_kept(poured.simulate, theta, [0] * TURN_RATES, keep, advance=advance)
-            regret[row] = _regret(made.signals, cups)
+    regret = _regrets(workshop, lips)
     with styled():
         figure = new_figure(5.6, 3.9)
         axes = figure.subplots()
@@ -103,6 +90,27 @@ def geometry(workshop: Workshop) -> Drawn:
     )
     coords = {"lip_height": lips, "radius": RECEIVER_RADII}
     return Drawn(Dataset({"regret": (("lip_height", "radius"), regret)}, coords), figure, says)
+
+
+def _regrets(workshop: Workshop, lips: NDArray) -> NDArray[np.float64]:
+    """By height of the lip and radius of the receiver."""
+    means, rows = workshop.means, []
+    total, one_call = len(lips) * TURN_RATES, means
+    if means.timeout is not None:  # a call pours all liquids
+        one_call = means._replace(timeout=means.timeout * len(VISCOSITIES))
+    with progress_bar("pouring from several heights", total, shown=means.progress) as advance:
+        for lip in lips:
+            cups = bundled_cups()
+            cups = cups.model_copy(
+                update={"pour": cups.pour.model_copy(update={"lip_height": float(lip)})}
+            )
+            poured = Poured(cups)
+            rates = np.geomspace(*cups.angular_velocity_range, TURN_RATES)
+            keep = one_call.keep(workshop.bank, poured.identity, 1)
+            theta = {"angular_velocity": rates}
+            made = simulate_kept(poured.simulate, theta, [0] * TURN_RATES, keep, advance=advance)
+            rows.append(_regret(made.signals, cups))
+    return np.stack(rows)
 
 
 def _regret(spilled: NDArray, cups: "Cups") -> NDArray[np.float64]:

@@ -80,7 +80,7 @@ def _chosen(workshop: Workshop, liquid: str, budget: int, surrogate: str) -> dic
         workshop.calibration(liquid, budget, surrogate),
         iterations=scale.rates,
         seed=scale.seed,
-        progress=workshop.progress,
+        **workshop.means._asdict(),
     )
     return {
         "plug_in": pour.plug_in.action,

@@ -2,7 +2,7 @@
 
 import json
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from .figure_of_recordings import recordings
 from .figure_of_strokes import strokes
 from .figures_of_fits import inclination, posterior
 from .figures_of_spillage import decision, liquids, spillage, surrogates
+from .means import Means
 from .scale import FULL, Scale
 from .workshop import Workshop
 
@@ -41,9 +42,9 @@ def reproduce(
     *,
     scale: Scale = FULL,
     executor: Workers | None = None,
+    timeout: float | None = None,
     progress: bool = True,
-    done: Callable[[str, Drawn], object] = lambda name, drawn: None,
-) -> None:
+) -> dict[str, Drawn]:
     """Make figures: NAME.png, NAME.svg and the numbers in NAME.nc.
 
     Every finished simulation, and every finished calibration, is kept in `out`: the same call
@@ -54,12 +55,38 @@ def reproduce(
         out: Directory of the results; made if missing.
         scale: How much is simulated: `FULL`, `QUICK`, or one of your own.
         executor: Shares the work, see `calibrate`; None is this process.
+        timeout: Seconds that one simulation may take; None sets no limit.
         progress: Whether to show bars on stderr.
-        done: Called with each figure.
+
+    Returns:
+        The figures by name, in the order in which they were asked for.
 
     Raises:
         InputError: There is no figure of that name.
     """
+    with open_executor(executor) as pool:
+        return dict(draw_figures(names, Path(out), scale, Means(pool, timeout, progress)))
+
+
+def draw_figures(
+    names: Iterable[str], out: Path, scale: Scale, means: Means
+) -> Iterator[tuple[str, Drawn]]:
+    """As `reproduce`, each figure with its name as soon as it is written."""
+    chosen = _chosen(names)
+    out.mkdir(parents=True, exist_ok=True)
+    made_with = {"scale": asdict(scale), **generations(), "versions": versions(LIBRARIES)}
+    with open_bank(out) as bank:
+        workshop = Workshop(out, scale, bank, means)
+        if "adhesion" in chosen:
+            workshop.begin_sticky()
+        for name in chosen:
+            began = time.perf_counter()
+            drawn = FIGURES[name](workshop)
+            drawn.write(out, name, json.dumps(made_with | {"seconds": time.perf_counter() - began}))
+            yield name, drawn
+
+
+def _chosen(names: Iterable[str]) -> list[str]:
     wanted = list(dict.fromkeys(names)) or ["all"]
     chosen = list(FIGURES) if "all" in wanted else wanted
     for name in chosen:
@@ -67,15 +94,4 @@ def reproduce(
             raise InputError(
                 f"no figure {name!r}", where="reproduce", fix=f"choose all, {', '.join(FIGURES)}"
             )
-    out = Path(out)
-    out.mkdir(parents=True, exist_ok=True)
-    made_with = {"scale": asdict(scale), **generations(), "versions": versions(LIBRARIES)}
-    with open_bank(out) as bank, open_executor(executor) as pool:
-        workshop = Workshop(out, scale, bank, pool, progress)
-        if "adhesion" in chosen:
-            workshop.begin_sticky()
-        for name in chosen:
-            began = time.perf_counter()
-            drawn = FIGURES[name](workshop)
-            drawn.write(out, name, json.dumps(made_with | {"seconds": time.perf_counter() - began}))
-            done(name, drawn)
+    return chosen

@@ -13,13 +13,13 @@ class Scale:
         repetitions: Truths of each liquid.
         budgets: Simulations to learn from, ascending.
         recorded: Simulations for each recording of the other solver.
-        strokes: Of the star, after which is calibrated.
-        few: Simulations with which is calibrated after some strokes.
+        strokes: Numbers of strokes to calibrate after.
+        few: Budget of each calibration after some strokes.
         sticky: Repetitions of the liquid that sticks to its cup.
-        considered: Effects that may be missing where it is poured.
+        considered: Effects that criticism of its pours considers.
         rates: Angular velocities among which pours after a recording are chosen.
-        surrogates: That learn from these.
-        lips: Heights of the lip that are compared.
+        surrogates: Surrogates that recordings are calibrated with.
+        lips: Heights of the lip that are compared [m].
         particles: Of the stirs by which bundled recordings are calibrated.
         drawn_particles: Of the stirs of drawn truths, and of those by which they are calibrated.
         grid: Of the pours by which actions are chosen.

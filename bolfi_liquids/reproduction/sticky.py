@@ -1,4 +1,4 @@
-"""A liquid that sticks to its cup, of which stirring shows nothing: the paper's failure."""
+"""A liquid that sticks to its cup, which stirring does not show: the paper's failure."""
 
 import csv
 import json
@@ -44,7 +44,7 @@ class Sticky(NamedTuple):
 
     @property
     def liquid(self) -> dict[str, float]:
-        """Without what sticks."""
+        """Its parameters without adhesion."""
         return {name: value for name, value in self.theta.items() if name != "adhesion"}
 
 
@@ -61,8 +61,10 @@ def draw_sticky(repetition: int, seed: int) -> Sticky:
 
 
 def recipe(cups: "Cups", particles: int, seed: int) -> str:
-    """Short name of what decides the drawn liquid and its pours; runs of another model are kept
-    elsewhere."""
+    """Short hash of what determines the drawn liquid and its pours.
+
+    Runs of another model are kept elsewhere.
+    """
     made_by = [
         Phase.STICKY_TRUTHS.value,
         STICKY_LIQUID,

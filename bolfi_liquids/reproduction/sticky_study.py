@@ -7,7 +7,6 @@ import numpy as np
 
 from ..calibration.calibrate import calibrate
 from ..criticism.criticise import criticise
-from ..inference.simulations import Keep
 from ..inputs.cups import bundled_cups
 from ..pouring.choose import choose_pour
 from ..pouring.spillage import pour_all, surface
@@ -15,6 +14,7 @@ from ..progress import silent
 from ..run.directory import open_bank
 from ..seeds import Phase
 from .decisions import executions, spilled_by
+from .means import HERE, Means
 from .scale import Scale
 from .sticky import Sticky, draw_sticky, poured, recipe, stirred
 
@@ -35,7 +35,7 @@ class Stuck(NamedTuple):
 
 
 def spilled_where_it_sticks(
-    out: Path, runs: Path, scale: Scale, number: int, *, progress: bool = False
+    out: Path, runs: Path, scale: Scale, number: int, means: Means = HERE
 ) -> Stuck:
     """Stir a liquid, choose its pour, criticise, choose again, and carry all of it out.
 
@@ -44,7 +44,7 @@ def spilled_where_it_sticks(
         runs: Where the run is kept.
         scale: How much is simulated.
         number: Of the liquid.
-        progress: Show bars on stderr.
+        means: How simulations are made.
     """
     cups, seed, particles = bundled_cups(), scale.seed, scale.drawn_particles
     truth = draw_sticky(number, seed)
@@ -59,19 +59,20 @@ def spilled_where_it_sticks(
         particles=particles,
         seed=seed,
         resume=True,
-        progress=progress,
+        **means._asdict(),
     )
-    tried = {"iterations": scale.rates, "seed": seed, "progress": progress}
+    tried = {"iterations": scale.rates, "seed": seed, **means._asdict()}
     before = choose_pour(calibration, cups, **tried)
     effects = scale.considered
-    criticism = criticise(calibration, pours=table, effects=effects, seed=seed, progress=progress)
+    criticism = criticise(calibration, pours=table, effects=effects, seed=seed, **means._asdict())
     after = choose_pour(criticism.calibration, cups, **tried)
     sticks = executions(truth.theta, density, cups, truth.seed)
     flows = executions(truth.liquid, density, cups, truth.seed)
     rehearsed = executions(truth.theta, density, cups, truth.seed, Phase.REHEARSAL)
     rates = np.geomspace(*cups.angular_velocity_range, scale.grid.rates)
     with open_bank(out) as bank:
-        known = surface(pour_all(rehearsed, rates, Keep(bank), silent), cups).least("mean")
+        keep = means.keep(bank)
+        known = surface(pour_all(rehearsed, rates, keep, silent), cups).least("mean")
         actions = [before.chosen.action, after.chosen.action, known]
-        spilled = [*spilled_by(flows, actions[:1], bank), *spilled_by(sticks, actions, bank)]
+        spilled = [*spilled_by(flows, actions[:1], keep), *spilled_by(sticks, actions, keep)]
     return Stuck(truth, spilled, ", ".join(criticism.effects))

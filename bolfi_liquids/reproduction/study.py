@@ -1,7 +1,6 @@
 """Spillage after calibrating in several ways, on truths that are known."""
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,6 +11,7 @@ from ..inputs.prior import default_prior
 from ..progress import progress_bar
 from .calibrations import Learner
 from .decisions import RULES, Action, decide, decide_unknowing, execute
+from .means import HERE, Means
 from .truths import Truths, draw_truths
 
 if TYPE_CHECKING:
@@ -42,9 +42,7 @@ def spillage_study(
     bank: "SimulationBank",
     grid: "PourGrid",
     scale: "Scale",
-    pool: Executor | None = None,
-    *,
-    progress: bool = True,
+    means: Means = HERE,
 ) -> "Dataset":
     """Spilled fractions over (learned_by, rule, truth, budget).
 
@@ -55,34 +53,28 @@ def spillage_study(
         bank: Where all simulations and calibrations are kept.
         grid: Of pours, by which actions are chosen, and with whose cups they are carried out.
         scale: How many of what.
-        pool: Of processes that share the calibrations.
-        progress: Show bars on stderr.
+        means: How simulations and calibrations are made.
     """
     tasks = Tasks(draw_truths(scale.repetitions, scale.seed), grid, bank)
     unknowing = decide_unknowing(grid, default_prior(), scale.seed)
     concluded = {
-        name: conclusions(learner, name, tasks, pool, progress=progress)
-        for name, learner in learners.items()
+        name: conclusions(learner, name, tasks, means) for name, learner in learners.items()
     }
     (budgets,) = {learner.budgets for learner in learners.values()}
-    return _judged(tasks, unknowing, concluded, budgets, progress)
+    return _judged(tasks, unknowing, concluded, budgets, means)
 
 
-def conclusions(
-    learner: Learner,
-    name: str,
-    tasks: Tasks,
-    pool: Executor | None,
-    *,
-    progress: bool,
-) -> list[NDArray | None]:
-    """Of each truth; None where its calibration failed."""
+def conclusions(learner: Learner, name: str, tasks: Tasks, means: Means) -> list[NDArray | None]:
+    """Of each truth; None where its calibration failed.
+
+    The learner itself knows for how long its simulations may take.
+    """
     from ..inference.simulations import Keep, jobs, run_missing
 
     truths = tasks.truths
     asked = jobs(truths.theta, truths.seed)
-    with progress_bar(f"calibrating ({name})", len(asked), shown=progress) as advance:
-        keep = Keep(tasks.bank, learner.identity, 1, pool)
+    with progress_bar(f"calibrating ({name})", len(asked), shown=means.progress) as advance:
+        keep = Keep(tasks.bank, learner.identity, 1, means.executor)
         found = run_missing(learner.simulate, asked, keep, advance=advance)
     return [result.signal for result in found]
 
@@ -92,7 +84,7 @@ def _judged(
     unknowing: Action,
     concluded: Mapping[str, list[NDArray | None]],
     budgets: tuple[int, ...],
-    progress: bool,
+    means: Means,
 ) -> "Dataset":
     from xarray import Dataset
 
@@ -111,8 +103,8 @@ def _judged(
         own = {name: values[at : at + 1] for name, values in truths.theta.items()}
         mine = [action for _, _, truth, _, action in chosen if truth == at]
         actions.append([grid.surface(own).least("mean"), unknowing, *mine])
-    with progress_bar("pouring what was chosen", len(truths.seed), shown=progress) as advance:
-        spilled = execute(truths, actions, grid, tasks.bank, advance)
+    with progress_bar("pouring what was chosen", len(truths.seed), shown=means.progress) as advance:
+        spilled = execute(truths, actions, grid, means.keep(tasks.bank), advance)
     values, rates, distances = (np.full(shape, np.nan) for _ in range(3))
     for at, outcome in enumerate(spilled):
         mine = [row for row in chosen if row[2] == at]

@@ -1,4 +1,4 @@
-"""What a table of pours says between its actions."""
+"""Spilled fractions between the actions of a table of pours."""
 
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -38,13 +38,14 @@ class Row(NamedTuple):
 
 
 def between(table: "PourTable", rate: float, distance: float) -> tuple[float, float]:
-    """What was spilled between a table's actions, and how far that may be off.
+    """The spilled fraction between a table's actions, and its error.
 
-    Along the distance by monotone cubics, since the best distance lies in a valley that chords
-    cut off. Chords miss bundled pours that are left out by .110 (water), .089 (oil) and .041
-    (glycerin), RMS, mostly upwards, and cubics by .087, .071 and .034; finely simulated rows,
-    told at the table's distances, by .018 and .011 where less than 5 % is spilled. Between
-    angular velocities linear in their logarithm.
+    Along the distance by monotone cubics: the best distance lies in a valley, where linear
+    interpolation overestimates the minimum. On bundled pours that are left out, linear
+    interpolation has RMS errors of .110 (water), .089 (oil) and .041 (glycerin), mostly upwards,
+    and cubics of .087, .071 and .034. On finely simulated rows, evaluated at the table's
+    distances, the errors are .018 and .011 where less than 5 % is spilled. Between angular
+    velocities linear in their logarithm.
 
     Args:
         table: Of at least two pours for each angular velocity.
@@ -52,11 +53,11 @@ def between(table: "PourTable", rate: float, distance: float) -> tuple[float, fl
         distance: From the lip to the receiver's axis [m].
 
     Returns:
-        Spilled fraction; beyond the table its edge's. And its error: RMS over pours that are left
-        out of their row in turn, to which is added, where `rate` lies between two rows, what
-        their neighbours miss of rows that are left out, in quadrature. To leave out doubles the
-        gaps, so it errs on the large side. NaN beyond the table, and where nothing can be left
-        out.
+        Spilled fraction; beyond the table that of its edge. And its error: the RMS error on pours
+        that are left out of their row in turn. Where `rate` lies between two rows, the RMS error
+        on rows that are left out in turn is added in quadrature. Leaving points out doubles the
+        gaps, so the error is an upper estimate. NaN beyond the table, and where nothing can be
+        left out.
     """
     rows = _rows(table)
     near = _neighbours(rows, rate)

@@ -1,7 +1,6 @@
-"""What the figures are made from: simulations that are kept, made once for all figures."""
+"""Simulations and calibrations that figures share; each is made once and kept."""
 
 from collections.abc import Iterator, Mapping
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -9,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from ..calibration.calibrate import calibrate
 from ..calibration.result import Calibration
-from ..inference.simulations import Keep
 from ..inputs.bundled import bundled_recording
 from ..inputs.cups import bundled_cups
 from ..inputs.prior import default_prior
@@ -18,12 +16,15 @@ from ..progress import progress_bar
 from ..run.directory import SIMULATIONS
 from ..run.provenance import generations
 from .learners import after_strokes, by_stirring_and_pouring
+from .means import HERE, Means
 from .scale import Scale
 from .sticky_study import Stuck, spilled_where_it_sticks
 from .study import spillage_study
 from .truths import DENSITY
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from xarray import Dataset
 
     from ..inference import SimulationBank
@@ -32,55 +33,58 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Workshop:
-    """Where figures find their material.
+    """Simulations and calibrations that figures share.
 
     Attributes:
         out: Directory of the results.
         scale: How much is simulated.
         bank: Every finished simulation and calibration.
-        pool: Of processes that share the work; None for this one alone.
-        progress: Show bars on stderr.
+        means: How simulations are made.
     """
 
     out: Path
     scale: Scale
     bank: "SimulationBank"
-    pool: Executor | None = None
-    progress: bool = True
+    means: Means = HERE
 
     @cached_property
     def grid(self) -> PourGrid:
         """Of pours with the bundled cups, by which actions are chosen."""
-        size = self.scale.grid
-        with progress_bar("pouring a grid of liquids", size.rates, shown=self.progress) as advance:
-            cups, prior = bundled_cups(), default_prior()
-            return make_grid(cups, DENSITY, prior, Keep(self.bank), advance, size=size)
+        size, shown = self.scale.grid, self.means.progress
+        with progress_bar("pouring a grid of liquids", size.rates, shown=shown) as advance:
+            cups, prior, keep = bundled_cups(), default_prior(), self.means.keep(self.bank)
+            return make_grid(cups, DENSITY, prior, keep, advance, size=size)
 
     @cached_property
     def study(self) -> "Dataset":
         """Spillage after stirring and after pouring; see `spillage_study`."""
-        return self._studied(
-            by_stirring_and_pouring(self.grid.cups, self.scale, self.out / SIMULATIONS)
-        )
+        made = self._learners_bank, self.means.timeout
+        return self._studied(by_stirring_and_pouring(self.grid.cups, self.scale, *made))
 
     @cached_property
     def strokes(self) -> "Dataset":
         """The same after stirring for some strokes only."""
-        return self._studied(after_strokes(self.scale, self.out / SIMULATIONS))
+        return self._studied(after_strokes(self.scale, self._learners_bank, self.means.timeout))
+
+    @property
+    def _learners_bank(self) -> str | Path:
+        """Of the simulations within a calibration; workers of another computer do not reach `out`.
+
+        What was concluded is kept in `out` in any case.
+        """
+        return self.out / SIMULATIONS if self.means.local else ":memory:"
 
     def _studied(self, learners: "Mapping[str, Learner]") -> "Dataset":
-        return spillage_study(
-            learners, self.bank, self.grid, self.scale, self.pool, progress=self.progress
-        )
+        return spillage_study(learners, self.bank, self.grid, self.scale, self.means)
 
     def begin_sticky(self) -> None:
-        """Let a pool begin on the liquids that stick, which take longest and wait for nothing."""
+        """Start the sticky liquids in the pool: they take longest and depend on nothing else."""
         _ = self._sticking
 
     @cached_property
     def sticky(self) -> list[Stuck]:
         """Adhesive liquids and their spillage."""
-        found, shown = [], self.progress and self.pool is not None
+        found, shown = [], self.means.progress and self._pool is not None
         with progress_bar("liquids that stick", self.scale.sticky, shown=shown) as advance:
             for one in self._sticking:
                 found.append(one)
@@ -89,9 +93,19 @@ class Workshop:
 
     @cached_property
     def _sticking(self) -> Iterator[Stuck]:
-        progress = self.progress and not self.pool
-        one = partial(spilled_where_it_sticks, self.out, self.runs, self.scale, progress=progress)
-        return (self.pool.map if self.pool else map)(one, range(self.scale.sticky))
+        """Results as they come.
+
+        A local pool takes whole liquids. Other workers do not reach the directory of a run, so
+        they only simulate.
+        """
+        means = self.means if self._pool is None else self.means.of_a_worker()
+        one = partial(spilled_where_it_sticks, self.out, self.runs, self.scale, means=means)
+        return (map if self._pool is None else self._pool.map)(one, range(self.scale.sticky))
+
+    @property
+    def _pool(self) -> "Executor | None":
+        """Of processes on this computer."""
+        return self.means.executor if self.means.local else None
 
     @property
     def runs(self) -> Path:
@@ -109,5 +123,5 @@ class Workshop:
             particles=self.scale.particles,
             seed=self.scale.seed,
             resume=True,
-            progress=self.progress,
+            **self.means._asdict(),
         )

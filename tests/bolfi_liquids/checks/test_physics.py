@@ -1,13 +1,17 @@
 """The runner of validation cases, on cases that take no time."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
 import textwrap
 import time
 import xml.etree.ElementTree as ET
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
+from multiprocessing import get_context
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -51,7 +55,9 @@ def registry(calls):
 
 
 def run(out, registry, names=(), **more):
-    return check_physics(out, names, cases=registry, progress=False, **more)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(physics, "all_cases", lambda: registry)
+        return check_physics(out, names, progress=False, **more)
 
 
 def test_a_check_leaves_table_rows_plots_and_one_results_file(tmp_path, registry):
@@ -97,6 +103,40 @@ def test_other_settings_run_again(tmp_path, registry, calls, change, monkeypatch
     assert check.ran == ("good",) and len(calls) == 2
 
 
+def test_a_tighter_tolerance_is_not_met_by_a_record_of_a_wider_one(tmp_path, registry):
+    def off(progress, seed):
+        return replace(outcome(), rows=(Row.absolute("q", 1.0, 1.5, case.tolerance),))
+
+    case = replace(registry["good"], tolerance=0.9, run=off)
+    assert run(tmp_path, {"good": case}).passed
+    case = replace(case, tolerance=0.1)
+    check = run(tmp_path, {"good": case})
+    assert check.ran == ("good",) and not check.passed
+
+
+def test_changed_code_of_a_case_runs_again(tmp_path, registry, monkeypatch):
+    source = tmp_path / "own_case.py"
+    source.write_text("TOLERANCE = 0.9\n")
+    module = ModuleType("own_case")
+    module.__file__ = str(source)
+    monkeypatch.setitem(sys.modules, "own_case", module)
+
+    def good(progress, seed):
+        return outcome()
+
+    good.__module__ = "own_case"
+    cases = {"good": fake("good", good)}
+    out = tmp_path / "out"
+    assert [run(out, cases).ran for _ in range(2)] == [("good",), ()]
+    source.write_text("TOLERANCE = 0.1\n")
+    assert run(out, cases).ran == ("good",)
+
+
+def test_the_modules_that_cases_share_belong_to_their_code():
+    text = physics_records._shared_code().decode()
+    assert "class Case:" in text and "CASE = Case(" not in text
+
+
 def test_cases_that_an_executor_runs_are_recorded_alike(tmp_path, registry):
     here = run(tmp_path / "here", registry)
     with ThreadPoolExecutor(2) as pool:
@@ -135,6 +175,48 @@ def test_a_case_that_raises_costs_itself_alone_and_is_tried_again(tmp_path, regi
     assert (tmp_path / "breaks.svg").exists()
 
 
+def fine(progress, seed):
+    return outcome()
+
+
+def dies(progress, seed):
+    os._exit(1)
+
+
+def test_a_case_that_kills_its_worker_costs_no_other_its_record(tmp_path):
+    """Of two cases that one process runs, the first has finished when the second kills it."""
+    registry = {name: fake(name, job) for name, job in
+                (("first", fine), ("dies", dies), ("waits", fine))}  # fmt: skip
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        first, killed, lost = run(tmp_path, registry, executor=pool).records
+    assert first["passed"] and first["error"] is None
+    for record in (killed, lost):
+        assert record["error"].startswith("BrokenProcessPool") and not record["passed"]
+    registry["dies"] = fake("dies", fine)
+    assert run(tmp_path, registry).ran == ("dies", "waits")
+
+
+def test_a_pool_that_is_broken_already_is_recorded(tmp_path, registry):
+    pool = ThreadPoolExecutor(1)
+    pool.shutdown()
+    records = run(tmp_path, registry, executor=pool).records
+    assert all(record["error"].startswith("RuntimeError") for record in records)
+
+
+def test_a_case_may_take_so_long(tmp_path, registry):
+    from bolfi_liquids.models.fluid.runtime import run_chunks
+
+    def long(progress, seed):
+        run_chunks(None, 1000, lambda begin, end: time.sleep(0.02), None)
+        return outcome()
+
+    registry |= {"long": fake("long", long)}
+    records = {one["name"]: one for one in run(tmp_path, registry, timeout=0.01).records}
+    assert records["long"]["error"].startswith("TimeLimitExceeded")
+    assert records["good"]["passed"]
+    assert run(tmp_path, registry).ran == ("long",)
+
+
 def test_what_is_no_number_is_kept_as_null_and_fails(tmp_path):
     def diverged(progress, seed):
         panel = Panel("x", "y", (Curve("", [0.0, 1.0], [np.nan, 1.0]),))
@@ -162,7 +244,7 @@ def test_a_killed_check_goes_on(tmp_path):
         import sys, time
         from pathlib import Path
         from bolfi_liquids.models.validation import Case, CaseResult, Curve, Panel, Row
-        from bolfi_liquids.checks.physics import check_physics
+        from bolfi_liquids.checks import physics
 
         here = Path(sys.argv[1])
 
@@ -176,7 +258,8 @@ def test_a_killed_check_goes_on(tmp_path):
             return Case(name, name, "t", "s", "relative", 0.0, {}, simulate)
 
         cases = [run("first", 0), run("second", float(sys.argv[2]))]
-        check_physics(here / "out", cases={case.name: case for case in cases}, progress=False)
+        physics.all_cases = lambda: {case.name: case for case in cases}
+        physics.check_physics(here / "out", progress=False)
         """)
     )
     command = [sys.executable, str(script), str(tmp_path)]

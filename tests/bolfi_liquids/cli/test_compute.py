@@ -5,21 +5,38 @@ from typing import Annotated
 
 import pytest
 import typer
+from typer.main import get_command
 from typer.testing import CliRunner
 
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.cli.compute import Compute, open_executor_of
 from bolfi_liquids.cli.grouped import grouped
 
-SIMULATING = ("calibrate", "criticise", "pour", "demo", "reproduce", "check sbc", "check physics",
-              "simulate stir", "simulate pour")  # fmt: skip
+ELSEWHERE = {"import", "guide", "record"}
+"""Commands that simulate nothing, or in real time beside an arm."""
 
 
-@pytest.mark.parametrize("command", SIMULATING)
-def test_every_command_that_simulates_says_where(command):
-    result = CliRunner().invoke(app, [*command.split(), "--help"], env={"COLUMNS": "120"})
-    assert result.exit_code == 0
-    assert "--workers" in result.stdout and "--dask" in result.stdout
+def simulating(command=None, words=()):
+    """Words of every command but those of `ELSEWHERE` and of the group `rig`."""
+    command = get_command(app) if command is None else command
+    for name, child in command.commands.items():
+        if getattr(child, "commands", None) and name != "rig":
+            yield from simulating(child, (*words, name))
+        elif name not in {*ELSEWHERE, "rig"}:
+            yield (*words, name), child
+
+
+@pytest.mark.parametrize(
+    "command", [pytest.param(child, id=" ".join(words)) for words, child in simulating()]
+)
+def test_every_command_that_simulates_says_where_and_for_how_long(command):
+    options = {name for parameter in command.params for name in parameter.opts}
+    assert options >= {"--workers", "--dask", "--timeout"}
+
+
+def test_commands_are_found_in_their_groups():
+    found = {" ".join(words) for words, _ in simulating()}
+    assert found >= {"calibrate", "report", "reproduce", "check physics", "simulate stir"}
 
 
 def test_one_worker_is_this_process():

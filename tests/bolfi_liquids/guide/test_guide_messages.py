@@ -206,6 +206,23 @@ def test_warnings_of_the_engine(calibration):
     assert any(str(thin).startswith(message) for message in QUOTED)
 
 
+def test_sentences_that_the_page_on_priors_quotes(calibration):
+    from bolfi_liquids.inference.surrogates.warnings import OUTSIDE
+
+    from bolfi_liquids.words import sentence
+
+    values = next(iter(calibration.summary.parameters.values()))
+    said = [
+        str(sentence("calibration.parameter_at_the_end", name="x", values=values, share=0.5)),
+        OUTSIDE,
+    ]
+    page = " ".join(read_page("priors").split())
+    quoted = [one for one in re.findall(r'"([^"]*)"', page) if len(one.split()) > 6]
+    assert len(quoted) == len(said)
+    for text, quote in zip(said, quoted, strict=True):
+        assert quote in text
+
+
 def test_there_are_causes_and_cures():
     page = read_page("troubleshooting")
     assert len(QUOTED) >= 20

@@ -17,15 +17,11 @@ import bolfi_liquids as bl
 from bolfi_liquids import models
 from bolfi_liquids.online import online
 from bolfi_liquids.online.choice import OnlineChoice
-from bolfi_liquids.online.online import (
-    FAILED,
-    READY,
-    REFUSED,
-    OnlineCalibration,
-    OnlineSettings,
-    SoFar,
-)
+from bolfi_liquids.online.online import OnlineCalibration
 from bolfi_liquids.online.outbox import Outbox, newest
+from bolfi_liquids.online.plan import SoFar
+from bolfi_liquids.online.request import OnlinePhase
+from bolfi_liquids.online.settings import OnlineSettings
 
 # the process that simulates gives way to others: beside another test it gets little
 PATIENCE_S = 600
@@ -83,23 +79,35 @@ def story(short_recording, tmp_path_factory):
         until(lambda: of.status.simulations > SMALL.design, of)
         told.later = of.status
         of.update(so_far(recording, of.ends[2], off=0.01))
-        until(lambda: of.status.phase == REFUSED, of)
+        until(lambda: of.status.phase == OnlinePhase.REFUSED, of)
         told.refused = of.status
         os.kill(of._workers["simulator"].pid, signal.SIGKILL)
         of.update(so_far(recording, of.ends[2]))
         until(lambda: len(of.estimates) > 2 and "died" in of.status.detail, of)
         told.alone, told.last = of.status, of.estimates[-1]
         os.kill(of._workers["learner"].pid, signal.SIGKILL)
-        until(lambda: of.status.phase == FAILED, of)
+        until(lambda: of.status.phase == OnlinePhase.FAILED, of)
         told.dead = of.status
         told.after = of.update(so_far(recording, of.ends[2]))
         told.workers = of._workers
     return told
 
 
+def test_a_phase_is_its_spelling_and_says_what_to_do():
+    for phase in OnlinePhase:
+        assert phase == phase.value and phase.advice
+    assert len({phase.advice for phase in OnlinePhase}) == len(OnlinePhase)
+
+
+@pytest.mark.slow
+def test_a_phase_keeps_its_type_on_the_way_from_another_process(story):
+    for status in (story.early, story.status, story.refused, story.dead):
+        assert isinstance(status.phase, OnlinePhase)
+
+
 @pytest.mark.slow
 def test_it_prepares_before_the_robot_moves(story):
-    assert story.early.phase == "preparing"
+    assert story.early.phase is OnlinePhase.PREPARING
     assert story.ready and story.status.simulations == SMALL.design
 
 
@@ -147,7 +155,7 @@ def test_data_off_the_plan_are_refused_with_a_reason(story):
 @pytest.mark.slow
 def test_without_its_simulator_it_goes_on(story):
     assert story.last.strokes == 3
-    assert (story.alone.phase, story.alone.in_flight) == (READY, 0)
+    assert (story.alone.phase, story.alone.in_flight) == (OnlinePhase.READY, 0)
     assert "simulates has died" in story.alone.detail
 
 

@@ -59,7 +59,7 @@ def test_rules_decide_and_what_they_decide_is_carried_out(grid):
     truths = draw_truths(1, 0)
     chosen = [list(actions.values())] * len(truths.seed)
     with inference.SimulationBank(":memory:") as bank:
-        spilled = execute(truths, chosen, grid, bank, lambda steps: None)
+        spilled = execute(truths, chosen, grid, Keep(bank), lambda steps: None)
     off = np.abs(actions["mean"]["distance"] - best_distance(truths.viscosity))
     assert np.array(spilled)[:, 1] == pytest.approx(np.clip(10.0 * off, 0.0, 1.0), abs=1e-9)
 

@@ -1,10 +1,13 @@
 """The report is one file that shows what the run holds."""
 
+import html
 import json
 import re
 import shutil
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from html.parser import HTMLParser
+from multiprocessing import get_context
 
 import pytest
 
@@ -12,7 +15,8 @@ import bolfi_liquids as bl
 from bolfi_liquids.calibration.summary import ParameterSummary
 from bolfi_liquids.calibration.tree import write_tree
 from bolfi_liquids.pouring.result import ActionSummary, PourSummary
-from bolfi_liquids.reporting import criticism_sentences, sentences
+from bolfi_liquids.reporting import criticism_sentences, frames, sentences
+from bolfi_liquids.reporting.report import prior_text
 from bolfi_liquids.run.directory import CRITICISM
 
 FIGURES = {
@@ -66,6 +70,68 @@ def test_report_shows_the_runs_numbers(pour, calibration):
     assert f"{summary.parameters['viscosity'].q50:.3g} Pa s" in text
     assert f"{pour.chosen.angular_velocity * 57.29578:.0f}°/s" in text
     assert calibration.record["inputs"]["sha256"][0] in text
+
+
+@pytest.mark.parametrize(
+    ("described", "text"),
+    [
+        ({"family": "LogUniform", "high": 20.0, "low": 0.003}, "LogUniform(0.003, 20)"),
+        ({"family": "Normal", "loc": 0.5, "scale": 0.1}, "Normal(loc=0.5, scale=0.1)"),
+        (
+            {
+                "family": "TruncatedDistribution",
+                "base_dist": {"family": "Normal", "loc": 0.0, "scale": 1.0},
+                "high": 2.0,
+                "low": 0.0,
+            },
+            "TruncatedDistribution(base_dist=Normal(loc=0, scale=1), high=2, low=0)",
+        ),
+        ("a text of version 0.1", "a text of version 0.1"),
+    ],
+)
+def test_a_prior_is_written_as_in_python(described, text):
+    assert prior_text(described) == text
+
+
+def test_report_shows_the_priors(calibration):
+    text, _ = read(bl.report(calibration.path, moving=False))
+    for described in calibration.record["settings"]["prior"].values():
+        assert html.escape(prior_text(described)) in text
+    assert html.escape("{'family'") not in text
+
+
+@pytest.fixture
+def unseen(pour, tmp_path):
+    """A copy of the run whose moving pictures were never made."""
+    run = shutil.copytree(pour.path, tmp_path / "unseen")
+    (run / "frames.nc").unlink(missing_ok=True)
+    return run
+
+
+def test_a_report_says_where_its_pictures_are_simulated(unseen, monkeypatch):
+    seen = []
+
+    def simulated(scenes, draws, executor, progress):
+        seen.append((executor, scenes.stir.timeout, scenes.pour.timeout, progress))
+        raise TimeoutError
+
+    monkeypatch.setattr(frames, "_simulated", simulated)
+    with ThreadPoolExecutor(1) as pool, pytest.raises(RuntimeError, match="60 s"):
+        bl.report(unseen, executor=pool, timeout=60.0, progress=False)
+    assert seen == [(pool, 60.0, 60.0, False)]
+
+
+def test_pictures_that_take_too_long_leave_nothing(unseen):
+    with pytest.raises(RuntimeError, match="moving=False"):
+        bl.report(unseen, timeout=1e-9, progress=False)
+    assert not (unseen / "frames.nc").exists()
+
+
+@pytest.mark.slow
+def test_pictures_by_processes_have_the_same_bits(unseen, pour):
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        there = frames.frames_of(unseen, executor=pool, progress=False)
+    assert there.identical(frames.frames_of(pour.path, progress=False))
 
 
 def test_report_says_below_which_viscosity_liquids_look_alike(calibration, tmp_path):

@@ -1,7 +1,7 @@
 """What the figures' numbers are made of."""
 
 import pickle
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -11,10 +11,17 @@ from bolfi_liquids import inference, models
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.pour_table import open_pours
-from bolfi_liquids.reproduction import sticky, workshop
+from bolfi_liquids.reproduction import (
+    figure_of_geometry,
+    figure_of_recordings,
+    sticky,
+    sticky_study,
+    workshop,
+)
 from bolfi_liquids.reproduction.figure_of_adhesion import adhesion
 from bolfi_liquids.reproduction.figures_of_spillage import interval
 from bolfi_liquids.reproduction.learners import by_stirring_and_pouring
+from bolfi_liquids.reproduction.means import Means
 from bolfi_liquids.reproduction.reproduce import reproduce
 from bolfi_liquids.reproduction.scale import FULL
 from bolfi_liquids.reproduction.sticky_study import Stuck
@@ -72,7 +79,8 @@ def test_conclusions_are_those_of_the_truths_and_a_failed_one_is_none(pooled):
     truths = draw_truths(1, seed=0)
     with inference.SimulationBank() as bank, ThreadPoolExecutor(2) as pool:
         tasks, learner = Tasks(truths, None, bank), Failing(truths.seed[2])
-        found = conclusions(learner, "stub", tasks, pool if pooled else None, progress=False)
+        means = Means(pool if pooled else None, progress=False)
+        found = conclusions(learner, "stub", tasks, means)
     assert found[2] is None
     for at in (0, 1, 3, 4):
         assert found[at] == truths.viscosity[at]
@@ -116,8 +124,9 @@ class Pickling(ThreadPoolExecutor):
         return super().submit(*pickle.loads(pickle.dumps((fn, *args))), **kwargs)
 
 
-def stuck(out, runs, scale, number, *, progress):
+def stuck(out, runs, scale, number, means):
     """In place of half an hour's simulations."""
+    assert means.executor is None and not means.progress
     spilled = [0.01 * number, 0.2, 0.1, 0.05]
     return Stuck(sticky.draw_sticky(number, scale.seed), spilled, "adhesion" if number else "")
 
@@ -126,7 +135,7 @@ def test_what_sticks_is_told_by_liquid_with_a_pool_and_without(tmp_path, monkeyp
     monkeypatch.setattr(workshop, "spilled_where_it_sticks", stuck)
     with Pickling(2) as pool:
         for shared in (pool, None):
-            shop = Workshop(tmp_path, FULL, None, shared, progress=False)
+            shop = Workshop(tmp_path, FULL, None, Means(shared, progress=False))
             shop.begin_sticky()
             adhesion(shop)
             drawn = adhesion(shop)  # as often as it is wanted
@@ -139,3 +148,94 @@ def test_what_sticks_is_told_by_liquid_with_a_pool_and_without(tmp_path, monkeyp
                 "10.0 points won back (paired, 90 %: 10.0 to 10.0) of 15.0; adhesion" in drawn.says
             )
             assert "named alone in 4 of 5" in drawn.says
+
+
+class Elsewhere(Executor):
+    """Workers of other computers, as those of a Dask cluster may be; here they do nothing."""
+
+
+def called(into):
+    """A function that keeps what it is given, and goes no further."""
+
+    def call(*given, **named):
+        into.append((given, named))
+        raise Called
+
+    return call
+
+
+class Called(Exception):
+    pass
+
+
+MEANS = Means(Elsewhere(), 60.0, progress=False)
+
+
+def test_runs_of_recordings_are_simulated_by_the_executor(tmp_path, monkeypatch):
+    shop, calls = Workshop(tmp_path, FULL, None, MEANS), []
+    monkeypatch.setattr(workshop, "calibrate", called(calls))
+    with pytest.raises(Called):
+        shop.calibration("water", 10, "discrepancy")
+    monkeypatch.setattr(Workshop, "calibration", lambda *given: None)
+    monkeypatch.setattr(figure_of_recordings, "choose_pour", called(calls))
+    with pytest.raises(Called):
+        figure_of_recordings._chosen(shop, "water", 10, "discrepancy")
+    monkeypatch.setattr(sticky_study, "stirred", lambda *given: bundled_recording("water"))
+    monkeypatch.setattr(sticky_study, "poured", lambda *given: None)
+    monkeypatch.setattr(sticky_study, "calibrate", called(calls))
+    with pytest.raises(Called):
+        sticky_study.spilled_where_it_sticks(tmp_path, tmp_path, FULL, 0, MEANS)
+    assert len(calls) == 3
+    for _, named in calls:
+        assert named.items() >= MEANS._asdict().items()
+
+
+def test_grids_of_pours_are_simulated_by_the_executor(tmp_path, monkeypatch):
+    shop, calls = Workshop(tmp_path, FULL, None, MEANS), []
+    monkeypatch.setattr(workshop, "make_grid", called(calls))
+    monkeypatch.setattr(figure_of_geometry, "simulate_kept", called(calls))
+    for make in (lambda: shop.grid, lambda: figure_of_geometry.geometry(shop)):
+        with pytest.raises(Called):
+            make()
+    grid, geometry = (given[3] for given, _ in calls)
+    assert (grid.executor, grid.timeout) == (MEANS.executor, 60.0)
+    liquids = len(figure_of_geometry.VISCOSITIES)  # of one call
+    assert (geometry.executor, geometry.timeout) == (MEANS.executor, 60.0 * liquids)
+
+
+@pytest.mark.parametrize(
+    ("executor", "near"), [(None, True), (ThreadPoolExecutor(1), True), (Elsewhere(), False)]
+)
+def test_workers_of_other_computers_are_given_no_path(tmp_path, monkeypatch, executor, near):
+    learned = []
+    monkeypatch.setattr(Workshop, "_studied", lambda shop, learners: learned.append(learners))
+    monkeypatch.setattr(Workshop, "grid", Grid)
+    shop = Workshop(tmp_path, FULL, None, Means(executor, 60.0, progress=False))
+    _ = shop.study, shop.strokes
+    for learner in (one for learners in learned for one in learners.values()):
+        assert (learner.bank == ":memory:") == (not near)
+        assert learner.timeout == 60.0
+
+
+class Grid:
+    cups = bundled_cups()
+
+
+def test_liquids_that_stick_are_simulated_elsewhere_but_kept_here(tmp_path, monkeypatch):
+    found = []
+
+    def here(out, runs, scale, number, means):
+        found.append((runs, means))
+        return Stuck(sticky.draw_sticky(number, scale.seed), [0.0] * 4, "")
+
+    monkeypatch.setattr(workshop, "spilled_where_it_sticks", here)
+    shop = Workshop(tmp_path, FULL, None, MEANS)
+    shop.begin_sticky()
+    assert len(shop.sticky) == FULL.sticky
+    assert found == [(shop.runs, MEANS)] * FULL.sticky
+
+
+def test_a_learner_gives_up_a_simulation_that_takes_too_long():
+    learner = by_stirring_and_pouring(bundled_cups(), FULL, timeout=60.0)["pour"]
+    with pytest.raises(TimeoutError), learner.time_limit(1e-9):
+        learner._spilled({"viscosity": np.ones(1), "cohesion": np.ones(1)}, np.arange(1))

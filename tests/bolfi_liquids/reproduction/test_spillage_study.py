@@ -4,6 +4,7 @@ Every action has one liquid that it suits, and spills the square of the distance
 miss the truth by known factors. So each number of the study and of its figures is known.
 """
 
+from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 
 import numpy as np
@@ -23,6 +24,7 @@ from bolfi_liquids.reproduction.figures_of_spillage import (
     spillage,
     surrogates,
 )
+from bolfi_liquids.reproduction.means import Means
 from bolfi_liquids.reproduction.scale import Scale
 from bolfi_liquids.reproduction.truths import draw_truths
 
@@ -33,6 +35,7 @@ OFF = {"signal": 0.1, "discrepancy": -0.3, "pour": 0.6}  # log10, of what is con
 SPREAD = np.r_[
     -0.8, np.full(DRAWS_EACH - 1, 0.8 / (DRAWS_EACH - 1))
 ]  # a draw far off; their mean is right
+SILENT = Means(progress=False)
 SCALE = Scale(repetitions=2, budgets=BUDGETS, strokes=(1, 3, 10))
 
 
@@ -50,7 +53,7 @@ class Grid:
         return Surface(RATES, DISTANCES, spilled(np.atleast_1d(liquids["viscosity"])))
 
 
-def execute(truths, actions, grid, bank, advance):
+def execute(truths, actions, grid, keep, advance):
     """In place of pours with the true liquid."""
     for viscosity, chosen in zip(truths.viscosity, actions, strict=True):
         by_action = spilled(np.array([viscosity]))[0]
@@ -85,7 +88,21 @@ def made(monkeypatch):
     monkeypatch.setattr(study, "execute", lambda *given: list(execute(*given)))
     learners = {name: Learner(name, 3 if name == "pour" else None) for name in OFF}
     with inference.SimulationBank() as bank:
-        return study.spillage_study(learners, bank, Grid(), SCALE, progress=False)
+        return study.spillage_study(learners, bank, Grid(), SCALE, SILENT)
+
+
+def test_chosen_pours_are_simulated_where_calibrations_are(monkeypatch):
+    kept = []
+
+    def recorded(truths, actions, grid, keep, advance):
+        kept.append(keep)
+        return list(execute(truths, actions, grid, keep, advance))
+
+    monkeypatch.setattr(study, "execute", recorded)
+    with inference.SimulationBank() as bank, ThreadPoolExecutor(2) as pool:
+        means = Means(pool, timeout=60.0, progress=False)
+        study.spillage_study({"signal": Learner("signal")}, bank, Grid(), SCALE, means)
+    assert [(one.executor, one.timeout) for one in kept] == [(pool, 60.0)]
 
 
 def expected(name, rule, viscosity, budget):
@@ -173,7 +190,7 @@ def test_what_was_concluded_before_a_kill_is_not_concluded_again(tmp_path, monke
 
     def run(path, learner):
         with inference.SimulationBank(path) as bank:
-            return study.spillage_study({"signal": learner}, bank, Grid(), SCALE, progress=False)
+            return study.spillage_study({"signal": learner}, bank, Grid(), SCALE, SILENT)
 
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path / "bank.sqlite", Killed("signal"))

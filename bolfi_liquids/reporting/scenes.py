@@ -1,0 +1,108 @@
+"""Stirs and pours that are shown: one call simulates one liquid, in this process or a worker."""
+
+from contextlib import AbstractContextManager, nullcontext
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from ..calibration.stir_simulator import Stirring
+    from ..models import Cups, PourFrames, StirFrames
+
+FRAME_RATE = 15.0
+"""Of the pictures [1/s]."""
+
+
+class Draw(NamedTuple):
+    """A liquid of the posterior, and the seed with which it is shown."""
+
+    liquid: dict[str, float]
+    effects: dict[str, float]
+    seed: int
+
+
+class StirScene(NamedTuple):
+    """A stir that can be shown, of any liquid.
+
+    Attributes:
+        stirring: Of one recording.
+        timeout: Seconds that one simulation may take; None sets no limit.
+    """
+
+    stirring: "Stirring"
+    timeout: float | None
+
+    def __call__(self, draw: Draw) -> "StirShown":
+        from .. import models
+
+        (recording,), (setup,) = self.stirring.recordings, self.stirring.setups
+        liquid = models.Liquid(**draw.liquid, density=recording.number("liquid_density"))
+        with _limited(self.timeout):
+            frames = models.stir_frames(
+                liquid, recording.gripper, setup, draw.seed, rate=FRAME_RATE, effects=draw.effects
+            )
+        theta = {name: np.array([x]) for name, x in {**draw.liquid, **draw.effects}.items()}
+        with _limited(self.timeout):
+            seen = self.stirring.simulate(theta, np.array([draw.seed]))
+        return StirShown(frames, seen[0])
+
+
+class StirShown(NamedTuple):
+    """What a stir looks like, and its inclination (frame, plane) as the cameras would see it."""
+
+    frames: "StirFrames"
+    inclination: NDArray[np.float64]
+
+
+class PourScene(NamedTuple):
+    """A pour that can be shown, of any liquid.
+
+    Attributes:
+        cups: Source and receiver.
+        angular_velocity, distance: The chosen action [rad/s], [m].
+        density: Of the liquid [kg/m3].
+        timeout: Seconds that one simulation may take; None sets no limit.
+    """
+
+    cups: "Cups"
+    angular_velocity: float
+    distance: float
+    density: float
+    timeout: float | None
+
+    def __call__(self, draw: Draw) -> "PourShown":
+        from .. import models
+
+        liquid, effects = models.Liquid(**draw.liquid, density=self.density), draw.effects
+        action = liquid, self.angular_velocity, self.cups, [draw.seed]
+        with _limited(self.timeout):
+            frames = models.pour_frames(models.PourBatch(*action, effects=effects), rate=FRAME_RATE)
+        with _limited(self.timeout):
+            landed = models.landings(*action, effects=effects)
+        radius = self.cups.receiver.radius
+        caught = _caught(frames.position, landed.inside(self.distance, radius)[0])
+        result = landed.into(self.distance, radius)
+        return PourShown(frames, caught, float(result.spilled[0]), float(result.retained[0]))
+
+
+class PourShown(NamedTuple):
+    """What a pour looks like, the share caught in each frame, and what became of the liquid."""
+
+    frames: "PourFrames"
+    caught: NDArray[np.float64]
+    spilled: float
+    retained: float
+
+
+def _caught(position: NDArray, inside: NDArray) -> NDArray:
+    """Share of all particles in the receiver, by frame; they land in the order of `inside`."""
+    gone = np.isnan(position[..., 0]).sum(axis=1)
+    return np.append(0, np.cumsum(inside))[gone] / len(inside)
+
+
+def _limited(timeout: float | None) -> AbstractContextManager[None]:
+    """Inside, a simulation that takes longer raises TimeoutError."""
+    from ..models import time_limit
+
+    return nullcontext() if timeout is None else time_limit(timeout)
