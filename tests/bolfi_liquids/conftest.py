@@ -191,6 +191,23 @@ def _held_out(holds):
     )
 
 
+MADE_FROM = {
+    "version": bl.__version__,
+    "format": CRITICISM_FORMAT,
+    "settings": {"effects": ["camera_delay", "camera_tilt"], "seed": 3},
+    "held_out": {},
+    "baseline": {"clean.nc": "abc123"},
+    "pours": {},
+    "held_out_pours": {},
+}
+
+
+@pytest.fixture
+def made_from():
+    """What a tree of `made` says that it was made from."""
+    return MADE_FROM
+
+
 def _made(*, after=True, held=None, pours=False, status=("named", "rejected", "rejected")):
     """A tree as `criticise` writes it: two recordings of 2 s, and maybe four pours."""
     rng = np.random.default_rng(0)
@@ -231,17 +248,7 @@ def _made(*, after=True, held=None, pours=False, status=("named", "rejected", "r
         groups["/pours/effects"], groups["/pours/confusion"] = found, confusion
     tree = xr.DataTree.from_dict(groups)
     tree.attrs.update(
-        made_from=json.dumps(
-            {
-                "version": bl.__version__,
-                "format": CRITICISM_FORMAT,
-                "settings": {"effects": ["camera_delay", "camera_tilt"], "seed": 3},
-                "held_out": {},
-                "baseline": {"clean.nc": "abc123"},
-                "pours": {},
-                "held_out_pours": {},
-            }
-        ),
+        made_from=json.dumps(MADE_FROM),
         accepted=["camera_delay"],
         requested=[],
     )

@@ -1,6 +1,5 @@
 """A criticism as it is opened, and the calibration that it extends."""
 
-import json
 import pickle
 import shutil
 from dataclasses import replace
@@ -25,11 +24,10 @@ def run(calibration, tmp_path):
 
 
 @pytest.fixture
-def criticised(run, made, criticism_summary):
+def criticised(run, made, made_from, criticism_summary):
     """A copy of a run, with a criticism that accepted an effect."""
-    tree = made(held=True)
-    write_tree(tree, run / CRITICISM)
-    replace(criticism_summary, made_from=json.loads(tree.attrs["made_from"])).write(run)
+    write_tree(made(held=True), run / CRITICISM)
+    replace(criticism_summary, made_from=made_from).write(run)
     return run
 
 

@@ -1,7 +1,6 @@
 """The report is one file that shows what the run holds."""
 
 import html
-import json
 import re
 import shutil
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
@@ -203,19 +202,18 @@ def test_sentence_repeats_no_action():
 
 
 @pytest.fixture
-def criticised(calibration, criticism_summary, tmp_path, made):
+def criticised(calibration, criticism_summary, tmp_path, made, made_from):
     """A copy of a calibrated run with a criticism in it."""
     run = tmp_path / "run"
     shutil.copytree(calibration.path, run)
     of_a_delay = criticism_summary.coefficient["camera_delay"]
     parameters = dict.fromkeys(calibration.summary.parameters, of_a_delay)
-    tree = made(held=True)
     replace(
         criticism_summary,
         parameters=parameters | dict(criticism_summary.coefficient),
-        made_from=json.loads(tree.attrs["made_from"]),
+        made_from=made_from,
     ).write(run)
-    write_tree(tree, run / CRITICISM)
+    write_tree(made(held=True), run / CRITICISM)
     return run
 
 
