@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ..errors import InputError
 from ..files import write_text
 from ..progress import fraction_bar, progress_bar
+from ..run.workers import open_workers
 from .physics_records import (
     CASES,
     RESULTS,
@@ -89,8 +90,6 @@ def check_physics(
     Raises:
         InputError: an unknown name, a negative seed, or a directory that holds something else.
     """
-    from ..inference.simulations import open_executor
-
     registry = all_cases()
     chosen = _chosen(names, registry)
     if seed < 0:
@@ -103,7 +102,7 @@ def check_physics(
     held = {case.name: read_record(out, case.name) for case in chosen}
     records = {name: record for name, record in held.items() if record is not None}
     missing = [case for case in chosen if not _is_held(held[case.name], case, seed)]
-    with open_executor(executor) as workers:
+    with open_workers(executor, timeout) as workers:
         for record in _run_all(missing, _Setting(seed, timeout), workers, progress):
             name = record["name"]
             write_record(out, record)

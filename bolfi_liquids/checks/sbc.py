@@ -31,6 +31,7 @@ from ..inputs.settings import (
 from ..progress import progress_bar
 from ..run.directory import SIMULATIONS, enter_run
 from ..run.provenance import LIBRARIES, versions
+from ..run.workers import open_workers
 from ..seeds import Phase, generator, simulation_seeds
 from .sbc_pipelines import (
     SAMPLING,
@@ -76,16 +77,14 @@ def check_sbc(
         InputError: A recording or setting cannot be used, or `out` holds other results.
         ValueError: Of a surrogate, no replicate finished.
     """
-    from ..inference.simulations import open_executor
-
     settings = settings or SbcSettings()
     given = bundled_recording("water") if recording is None else recording
     stirring = stirring_of(open_recordings(given), settings.particles)
     prior, out = default_prior(), Path(out)
     record = _record(settings, prior, stirring)
-    enter_run(out, record, resume=True)
     found = {}
-    with open_executor(executor) as workers:
+    with open_workers(executor, timeout) as workers:
+        enter_run(out, record, resume=True)
         study = SbcStudy(out, stirring, prior, settings, workers, timeout, progress)
         for name in SURROGATES:
             if settings.replicates[name]:

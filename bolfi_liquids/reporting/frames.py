@@ -119,11 +119,11 @@ def _simulated(
     scenes: _Scenes, draws: list[Draw], executor: "Workers | None", progress: bool
 ) -> dict[str, Any]:
     """All of the file's variables but theta."""
-    from ..inference.simulations import open_executor
+    from ..run.workers import open_workers
 
     steps = len(draws) * sum(scene is not None for scene in scenes)
     with (
-        open_executor(executor) as workers,
+        open_workers(executor) as workers,
         progress_bar("moving pictures", steps, shown=progress) as advance,
     ):
         stirs = _each(scenes.stir, draws, workers, advance)

@@ -7,9 +7,10 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ..errors import InputError
-from ..inference.simulations import Workers, open_executor
+from ..inference.simulations import Workers
 from ..run.directory import open_bank
 from ..run.provenance import LIBRARIES, generations, versions
+from ..run.workers import open_workers
 from .figure import Drawn
 from .figure_of_adhesion import adhesion
 from .figure_of_geometry import geometry
@@ -64,7 +65,7 @@ def reproduce(
     Raises:
         InputError: There is no figure of that name.
     """
-    with open_executor(executor) as pool:
+    with open_workers(executor, timeout) as pool:
         return dict(draw_figures(names, Path(out), scale, Means(pool, timeout, progress)))
 
 

@@ -8,7 +8,7 @@ import sys
 import textwrap
 import time
 import xml.etree.ElementTree as ET
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
 from types import ModuleType
@@ -137,9 +137,22 @@ def test_the_modules_that_cases_share_belong_to_their_code():
     assert "class Case:" in text and "CASE = Case(" not in text
 
 
-def test_cases_that_an_executor_runs_are_recorded_alike(tmp_path, registry):
+def fine(progress, seed):
+    return outcome()
+
+
+def off(progress, seed):
+    return outcome(error=0.2)
+
+
+def dies(progress, seed):
+    os._exit(1)
+
+
+def test_cases_that_an_executor_runs_are_recorded_alike(tmp_path):
+    registry = {"good": fake("good", fine), "bad": fake("bad", off)}
     here = run(tmp_path / "here", registry)
-    with ThreadPoolExecutor(2) as pool:
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         there = run(tmp_path / "there", registry, executor=pool)
     same = ("name", "rows", "notes", "panels", "passed")
     assert there.ran == here.ran
@@ -175,14 +188,6 @@ def test_a_case_that_raises_costs_itself_alone_and_is_tried_again(tmp_path, regi
     assert (tmp_path / "breaks.svg").exists()
 
 
-def fine(progress, seed):
-    return outcome()
-
-
-def dies(progress, seed):
-    os._exit(1)
-
-
 def test_a_case_that_kills_its_worker_costs_no_other_its_record(tmp_path):
     """Of two cases that one process runs, the first has finished when the second kills it."""
     registry = {name: fake(name, job) for name, job in
@@ -197,7 +202,7 @@ def test_a_case_that_kills_its_worker_costs_no_other_its_record(tmp_path):
 
 
 def test_a_pool_that_is_broken_already_is_recorded(tmp_path, registry):
-    pool = ThreadPoolExecutor(1)
+    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"))
     pool.shutdown()
     records = run(tmp_path, registry, executor=pool).records
     assert all(record["error"].startswith("RuntimeError") for record in records)
