@@ -115,17 +115,17 @@ def test_workers_of_dask_have_one_thread_each(threads):
                     pass
 
 
-UNUSABLE = [
-    {"executor": ThreadPoolExecutor(2)},
-    {"executor": 4},
-    {"timeout": -1},
-    {"timeout": float("nan")},
-    {"timeout": "60"},
-    {"timeout": True},
-]
+UNUSABLE = {
+    "threads": {"executor": ThreadPoolExecutor(2)},
+    "no executor": {"executor": 4},
+    "negative": {"timeout": -1},
+    "nan": {"timeout": float("nan")},
+    "text": {"timeout": "60"},
+    "bool": {"timeout": True},
+}
 
 
-@pytest.mark.parametrize("given", UNUSABLE, ids=str)
+@pytest.mark.parametrize("given", UNUSABLE.values(), ids=UNUSABLE)
 def test_what_cannot_simulate_is_refused_before_anything_is_written(
     short_recording, tmp_path, given
 ):
@@ -135,7 +135,7 @@ def test_what_cannot_simulate_is_refused_before_anything_is_written(
     assert not run.exists()
 
 
-@pytest.mark.parametrize("given", UNUSABLE, ids=str)
+@pytest.mark.parametrize("given", UNUSABLE.values(), ids=UNUSABLE)
 def test_every_call_that_simulates_refuses_it(calibration, given):
     before = sorted(calibration.path.iterdir())
     calls = [
