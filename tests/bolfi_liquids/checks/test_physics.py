@@ -11,6 +11,7 @@ import xml.etree.ElementTree as ET
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -149,6 +150,13 @@ def dies(progress, seed):
     os._exit(1)
 
 
+@pytest.fixture
+def importable(monkeypatch):
+    """Started processes find this module, however pytest was started."""
+    monkeypatch.syspath_prepend(Path(__file__).parents[3])
+
+
+@pytest.mark.usefixtures("importable")
 def test_cases_that_an_executor_runs_are_recorded_alike(tmp_path):
     registry = {"good": fake("good", fine), "bad": fake("bad", off)}
     here = run(tmp_path / "here", registry)
@@ -188,6 +196,7 @@ def test_a_case_that_raises_costs_itself_alone_and_is_tried_again(tmp_path, regi
     assert (tmp_path / "breaks.svg").exists()
 
 
+@pytest.mark.usefixtures("importable")
 def test_a_case_that_kills_its_worker_costs_no_other_its_record(tmp_path):
     """Of two cases that one process runs, the first has finished when the second kills it."""
     registry = {name: fake(name, job) for name, job in
