@@ -13,7 +13,9 @@ if TYPE_CHECKING:
 WorkersOption = Annotated[
     int | None,
     typer.Option(
-        "--workers", min=1, help="Processes that simulate; 1 is this one. Else one per processor."
+        "--workers",
+        min=1,
+        help="Processes that simulate; 1 is this process. Studies use all processors.",
     ),
 ]
 DaskOption = Annotated[

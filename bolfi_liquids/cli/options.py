@@ -26,7 +26,7 @@ CupsOption = Annotated[
 ]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random numbers.")]
 ParticlesOption = Annotated[
-    int, typer.Option("--particles", help="Of which the simulated liquid is made.")
+    int, typer.Option("--particles", help="Number of particles of the simulated liquid.")
 ]
 
 
@@ -41,7 +41,7 @@ class CalibrationOptions:
         str, typer.Option(metavar="|".join(SURROGATES), help="What the engine emulates.")
     ] = CalibrationSettings.surrogate
     sampler: Annotated[
-        str, typer.Option(metavar="|".join(SAMPLERS), help="Of the posterior's draws.")
+        str, typer.Option(metavar="|".join(SAMPLERS), help="Sampler of the posterior.")
     ] = CalibrationSettings.sampler
     seed: SeedOption = CalibrationSettings.seed
     particles: ParticlesOption = CalibrationSettings.particles
@@ -60,7 +60,9 @@ class CriticismData:
     ] = None
     baseline: Annotated[
         list[Path] | None,
-        typer.Option(metavar="RECORDING", help="Believed to lack nothing, of any liquid."),
+        typer.Option(
+            metavar="RECORDING", help="A recording, of any liquid, in which no effect is expected."
+        ),
     ] = None
 
 
@@ -75,7 +77,8 @@ class PourData:
         Path | None, typer.Option(metavar="CSV", help="Other pours of the liquid: the proof.")
     ] = None
     liquid: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Whose pours, if CSV has several.")
+        str | None,
+        typer.Option(metavar="NAME", help="Liquid of the table's pours, if it has several."),
     ] = None
     cups: CupsOption = None
 
@@ -96,7 +99,8 @@ class EffectOptions:
         list[str] | None, typer.Option(metavar="EFFECT", help="To consider; all if not given.")
     ] = None
     accept: Annotated[
-        list[str] | None, typer.Option(metavar="EFFECT", help="Joins the model in any case.")
+        list[str] | None,
+        typer.Option(metavar="EFFECT", help="Effect that joins the model whatever the verdict."),
     ] = None
     seed: SeedOption = CriticismSettings.seed
 

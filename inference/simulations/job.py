@@ -149,7 +149,8 @@ def _misshapen(simulate: Simulator, expected: tuple[int, ...], got: tuple[int, .
             f"with vectorised=False simulate must return the signal of one run, of shape "
             f"{expected[1:]}, got {got[1:]}"
         )
-    return f"simulate must return signals of shape {expected}, one row per theta, got {got}"
+    cure = "; if it makes one run at a time, pass vectorised=False" if got == expected[1:] else ""
+    return f"simulate must return signals of shape {expected}, one row per theta, got {got}{cure}"
 
 
 def limit_of(simulate: Simulator | SingleSimulator) -> Limit | None:

@@ -315,6 +315,14 @@ def test_a_simulator_of_single_runs_is_looped_over(prior, observed, tmp_path):
     xr.testing.assert_equal(fit.simulations.drop_vars("error"), twin.simulations.drop_vars("error"))
 
 
+def test_a_simulator_of_single_runs_is_recognised_by_its_shape(prior, observed):
+    def one(theta, seeds):
+        return np.zeros(observed.shape)
+
+    with pytest.raises(ValueError, match="vectorised=False"):
+        inference.fit(one, prior, observed, budget=9, progress=False)
+
+
 def test_complaints_are_kept_without_a_warning(prior, observed):
     """Warnings are errors here, so that one would fail the test."""
     fit = inference.fit(
