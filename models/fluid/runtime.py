@@ -14,6 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+# read when Taichi is imported, which prints otherwise: its version, and, under a progress bar, that
+# it takes the wrapped stdout for a notebook's
+os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "False")
+os.environ.setdefault("TI_ENABLE_PYBUF", "0")
+
 SLOTS = max(8, os.cpu_count() or 1)  # simulations of a scene side by side
 CHUNK = 240  # substeps a kernel call, so that Ctrl-C is prompt
 
@@ -115,7 +120,6 @@ def start() -> None:
 
     Taichi keeps its settings for the life of a process, so other settings need another process.
     """
-    os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "False")
     import taichi as ti
 
     # the banner is a bare print that no log level silences

@@ -1,5 +1,7 @@
 """Nothing goes wrong anywhere in the prior box; what is made to go wrong is NaN, with a reason."""
 
+import subprocess
+import sys
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
@@ -309,3 +311,16 @@ def test_a_thread_that_did_not_start_taichi_is_refused_and_does_no_harm(cups):
         with pytest.raises(runtime.WrongThread, match="--nthreads 1"):
             pool.submit(poured).result()
     np.testing.assert_array_equal(poured(), before)
+
+
+def test_taichi_starts_without_a_word_also_under_a_progress_bar():
+    """A progress bar wraps stdout, which Taichi takes for a notebook's."""
+    code = """
+import io, sys
+sys.stdout = io.StringIO()
+from bolfi_liquids.models.fluid import fluid, runtime
+runtime.start()
+assert not sys.stdout.getvalue()
+"""
+    made = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert (made.returncode, made.stdout, made.stderr) == (0, "", "")
