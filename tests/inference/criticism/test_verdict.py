@@ -191,6 +191,9 @@ class Client:
         self.asked.append(options)
         return self.pool
 
+    def nthreads(self):
+        return {}
+
 
 def own_residual(keeping):
     plan = criticism.Plan()
