@@ -60,6 +60,7 @@ def test_what_a_sensor_does_is_not_in_the_frames(oil, setup, path):
     np.testing.assert_array_equal(frames.tip, plain.tip)
 
 
+@pytest.mark.slow
 def test_looking_changes_no_bit(oil, cups):
     """Whatever the rate of the frames, and of what lands."""
     some, many = (

@@ -24,6 +24,7 @@ def pour(liquid, rows, cups, seeds=None):
     return models.pour(models.Liquid(viscosity, 0.0, density), action, cups, seeds)
 
 
+@pytest.mark.slow
 def test_spillage_ranks_pours_as_an_independent_solver_does(cups):
     ours, theirs = [], []
     for viscosity, density, rows in POURS.values():

@@ -301,6 +301,7 @@ def test_what_goes_wrong_is_nan_with_a_reason(name, glycerin, violent, cups, reg
     np.testing.assert_array_equal(fractions[:1], alone[1])
 
 
+@pytest.mark.slow
 def test_a_thread_that_did_not_start_taichi_is_refused_and_does_no_harm(cups):
     def poured():
         liquid = models.Liquid(1.0, 0.2, 1260.0)

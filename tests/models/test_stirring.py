@@ -140,6 +140,7 @@ def test_no_particle_is_ever_outside_the_cup(water, speed, monkeypatch):
     assert seen[..., 2].max() < setup.cup.height
 
 
+@pytest.mark.slow
 def test_a_wide_stick_leaves_room_for_all_particles(glycerin):
     attrs = {**glycerin.attrs, "stick_radius": 0.025}
     short = first_seconds(glycerin, 0.2)

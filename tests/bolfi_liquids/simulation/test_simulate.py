@@ -123,6 +123,7 @@ def test_what_is_not_finite_is_an_error_though_nobody_warned(monkeypatch, simula
         simulate(**FEW)
 
 
+@pytest.mark.slow
 def test_a_stick_that_is_weighed_anew_replaces_what_the_recording_says(dataset, tmp_path):
     density = dataset.attrs.pop("stick_density")
     radius, length = (dataset.attrs[f"stick_{size}"] for size in ("radius", "length"))

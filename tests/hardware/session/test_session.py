@@ -85,6 +85,7 @@ def kinds(directory, source):
     return [event["kind"] for event in read_events(directory) if event["source"] == source]
 
 
+@pytest.mark.slow
 @keeps_time
 def test_a_session_follows_paths_records_them_and_leaves_nothing_behind(emulator, tmp_path):
     session = armed(emulator, tmp_path)
@@ -203,6 +204,7 @@ def test_a_path_that_breaks_a_limit_is_not_ordered(emulator, tmp_path):
         assert session.follow(PLAN[0]) == 0
 
 
+@pytest.mark.slow
 @keeps_time
 def test_an_exception_stops_the_arm_and_is_the_reason(emulator, tmp_path):
     with pytest.raises(ZeroDivisionError):
