@@ -7,7 +7,7 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
@@ -24,6 +24,7 @@ from ..run.directory import (
     open_bank,
     read_run,
 )
+from ..run.means import Means
 from ..run.provenance import LIBRARIES, versions
 from ..run.recordings import keep_recordings
 from ..run.simulations import warn_of_timeouts
@@ -34,8 +35,6 @@ from .stir_simulator import Stirring, stirring_of
 from .summary import CalibrationSummary
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
-
     from ..inference import Fit, Prior, SimulationBank
     from ..inference.simulations import Keep, Workers
 
@@ -116,7 +115,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         for notice in aborted_recordings(opened):
             logger.warning(notice)
         if not is_calibrated(run):
-            _calibrate(run, stirring, prior, settings, _Means(workers, timeout, progress))
+            _calibrate(run, stirring, prior, settings, Means(workers, timeout, progress))
     return Calibration.open(run)
 
 
@@ -125,15 +124,6 @@ def _enter(run: Path, record: dict[str, Any], resume: bool) -> None:
     if removed:
         what = f"removed {', '.join(removed)}, concluded from fewer simulations"
         logger.warning("%s: %s; every simulation is kept", run, what)
-
-
-class _Means(NamedTuple):
-    """How simulations are made. Only `timeout` can change the result: a simulation that takes
-    longer is a failed one."""
-
-    workers: "Executor | None"
-    timeout: float | None
-    progress: bool
 
 
 def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring) -> dict[str, Any]:
@@ -152,9 +142,8 @@ def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring
 
 
 def _calibrate(
-    run: Path, stirring: Stirring, prior: "Prior", settings: CalibrationSettings, means: _Means
+    run: Path, stirring: Stirring, prior: "Prior", settings: CalibrationSettings, means: Means
 ) -> None:
-    from ..inference.simulations import Keep
     from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES, check_by_simulation
     from .tree import results_tree, write_tree
 
@@ -164,7 +153,7 @@ def _calibrate(
         kept = min(max(needed - _left(run, settings, bank), 0), needed)
         bar = progress_bar("simulating stirs", needed, shown=means.progress, done=kept)
         advance = after_first(kept, stack.enter_context(bar))
-        keep = Keep(bank, stirring.identity, settings.batch, means.workers, means.timeout)
+        keep = means.keep(bank, stirring.identity, settings.batch)
         fit = fit_recordings(stirring, stirring.observed, prior, keep, settings, progress=advance)
         warn_of_timeouts(fit.history.errors.tolist(), means.timeout)
         sampled = fit.sample(

@@ -44,9 +44,9 @@ def reproduce(
 
     What has finished in DIR is kept: a killed run goes on with the same command.
     """
-    from ..reproduction.means import Means
     from ..reproduction.reproduce import draw_figures
     from ..reproduction.scale import FULL, QUICK
+    from ..run.means import Means
 
     # of one scale each, so that no figure of the one stands beside some of the other
     out = out or Path("runs/reproduce_quick" if quick else "runs/reproduce")

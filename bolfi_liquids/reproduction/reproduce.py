@@ -9,6 +9,7 @@ from pathlib import Path
 from ..errors import InputError
 from ..inference.simulations import Workers
 from ..run.directory import open_bank
+from ..run.means import Means
 from ..run.provenance import LIBRARIES, generations, versions
 from ..run.workers import open_workers
 from .figure import Drawn
@@ -18,7 +19,6 @@ from .figure_of_recordings import recordings
 from .figure_of_strokes import strokes
 from .figures_of_fits import inclination, posterior
 from .figures_of_spillage import decision, liquids, spillage, surrogates
-from .means import Means
 from .scale import FULL, Scale
 from .workshop import Workshop
 

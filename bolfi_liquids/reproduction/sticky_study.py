@@ -12,9 +12,9 @@ from ..pouring.choose import choose_pour
 from ..pouring.spillage import pour_all, surface
 from ..progress import silent
 from ..run.directory import open_bank
+from ..run.means import HERE, Means
 from ..seeds import Phase
 from .decisions import executions, spilled_by
-from .means import HERE, Means
 from .scale import Scale
 from .sticky import Sticky, draw_sticky, poured, recipe, stirred
 

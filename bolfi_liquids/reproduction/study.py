@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from ..inputs.prior import default_prior
 from ..progress import progress_bar
+from ..run.means import HERE, Means
 from .calibrations import Learner
 from .decisions import RULES, Action, decide, decide_unknowing, execute
-from .means import HERE, Means
 from .truths import Truths, draw_truths
 
 if TYPE_CHECKING:

@@ -14,9 +14,9 @@ from ..inputs.prior import default_prior
 from ..pouring.grid import PourGrid, make_grid
 from ..progress import progress_bar
 from ..run.directory import SIMULATIONS
+from ..run.means import HERE, Means
 from ..run.provenance import generations
 from .learners import after_strokes, by_stirring_and_pouring
-from .means import HERE, Means
 from .scale import Scale
 from .sticky_study import Stuck, spilled_where_it_sticks
 from .study import spillage_study

@@ -3,7 +3,6 @@
 Not by loky: with 3.7.0, workers go on for at least 20 s after their parent is killed.
 """
 
-import math
 import os
 import signal
 from collections.abc import Iterator
@@ -72,11 +71,14 @@ def open_workers(
 
 
 def _check_timeout(timeout: float | None) -> None:
-    number = isinstance(timeout, int | float) and not isinstance(timeout, bool)
-    if timeout is not None and not (number and 0.0 < timeout < math.inf):
+    from ..inference.arguments import check_timeout
+
+    try:
+        check_timeout(timeout)
+    except ValueError as refused:
         raise InputError(
             f"{timeout!r:.80}", where="--timeout", fix="give a positive number of seconds, or none"
-        )
+        ) from refused
 
 
 def _begin() -> None:

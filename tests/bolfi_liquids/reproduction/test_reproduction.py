@@ -21,13 +21,13 @@ from bolfi_liquids.reproduction import (
 from bolfi_liquids.reproduction.figure_of_adhesion import adhesion
 from bolfi_liquids.reproduction.figures_of_spillage import interval
 from bolfi_liquids.reproduction.learners import by_stirring_and_pouring
-from bolfi_liquids.reproduction.means import Means
 from bolfi_liquids.reproduction.reproduce import reproduce
 from bolfi_liquids.reproduction.scale import FULL
 from bolfi_liquids.reproduction.sticky_study import Stuck
 from bolfi_liquids.reproduction.study import Tasks, conclusions
 from bolfi_liquids.reproduction.truths import draw_truths
 from bolfi_liquids.reproduction.workshop import Workshop
+from bolfi_liquids.run.means import Means
 
 
 def test_the_interval_covers_the_mean_as_often_as_it_says():

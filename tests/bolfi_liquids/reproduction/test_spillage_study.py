@@ -24,9 +24,9 @@ from bolfi_liquids.reproduction.figures_of_spillage import (
     spillage,
     surrogates,
 )
-from bolfi_liquids.reproduction.means import Means
 from bolfi_liquids.reproduction.scale import Scale
 from bolfi_liquids.reproduction.truths import draw_truths
+from bolfi_liquids.run.means import Means
 
 RATES, DISTANCES = np.array([1.0]), np.linspace(0.0, 0.07, 24)  # one: neighbours are averaged
 SUITED = np.linspace(-3.0, 1.5, 24)[None]  # log10 of the viscosity that an action suits

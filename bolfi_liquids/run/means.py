@@ -1,4 +1,4 @@
-"""How a study's simulations are made."""
+"""How simulations are made."""
 
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from typing import TYPE_CHECKING, NamedTuple
@@ -9,7 +9,8 @@ if TYPE_CHECKING:
 
 
 class Means(NamedTuple):
-    """How simulations are made; no executor changes a bit of a result.
+    """How simulations are made. Only `timeout` can change a result: a simulation that takes longer
+    is a failed one.
 
     Attributes:
         executor: Shares the work; None is this process.
