@@ -76,7 +76,11 @@ class Panels(NamedTuple):
 
 
 def given_or_shown(axes: "Canvas") -> "Canvas":
-    """`axes`; where they are None, an empty figure of pyplot's, which a notebook shows."""
+    """`axes`; where they are None, an empty figure of pyplot's, which a notebook shows.
+
+    Call it before `styled`: pyplot's first import sets what a notebook needs, and the end of that
+    style would unset it.
+    """
     import matplotlib.pyplot as plt
 
     return plt.figure(layout="constrained") if axes is None else axes

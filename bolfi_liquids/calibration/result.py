@@ -130,8 +130,9 @@ class Calibration:
         from ..drawing import given_or_shown, styled
         from .fit_figures import draw_fit
 
+        canvas = given_or_shown(axes)
         with styled():
-            return draw_fit(self.tree, given_or_shown(axes))[0].grid
+            return draw_fit(self.tree, canvas)[0].grid
 
     def plot_posterior(self, ax: "Axes | None" = None) -> "NDArray[Any]":
         """Contours of the joint posterior; in a figure of its own with the marginals.
@@ -149,8 +150,9 @@ class Calibration:
         from ..drawing import given_or_shown, styled
         from .posterior_figure import draw_posterior
 
+        canvas = given_or_shown(ax)
         with styled():
-            return draw_posterior(self.tree, given_or_shown(ax))[0].grid
+            return draw_posterior(self.tree, canvas)[0].grid
 
     def plot_search(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Discrepancy of each simulation in turn, and the parameters that it tried.
@@ -164,8 +166,9 @@ class Calibration:
         from ..drawing import given_or_shown, styled
         from .search_figure import draw_search
 
+        canvas = given_or_shown(axes)
         with styled():
-            return draw_search(self.tree, given_or_shown(axes))[0].grid
+            return draw_search(self.tree, canvas)[0].grid
 
     def _check_plot(self, instead: str) -> None:
         if self.added:

@@ -123,8 +123,9 @@ class Pour:
                 f"another pour was chosen in {self.path} since; open it by Pour.open, or choose "
                 "this one again"
             )
+        canvas = given_or_shown(ax)
         with styled():
-            drawn = panels(given_or_shown(ax), (1, 1), (4.6, 3.6))
+            drawn = panels(canvas, (1, 1), (4.6, 3.6))
             axes = drawn.grid[0, 0]
             drawn.figure.colorbar(draw_expected(axes, tree), ax=axes)
             drawn.legend(*axes.get_legend_handles_labels())
