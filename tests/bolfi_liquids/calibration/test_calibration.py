@@ -6,6 +6,8 @@ import shutil
 import tempfile
 import tomllib
 
+import nbclient
+import nbformat
 import numpy as np
 import numpyro.distributions as dist
 import pytest
@@ -221,3 +223,14 @@ def test_without_a_directory_a_run_is_among_the_temporary_files(short_recording,
     assert (run / "run.toml").is_file()
     assert str(run).startswith(tempfile.gettempdir())
     shutil.rmtree(run)
+
+
+@pytest.mark.slow
+def test_a_notebook_shows_every_plot(calibration):
+    """The plots return axes, and each figure is shown all the same."""
+    opened = f"import bolfi_liquids as bl\nrun = bl.Calibration.open({str(calibration.path)!r})"
+    cells = [opened, "run.plot_posterior();", "run.plot_fit();", "run.plot_search();"]
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(c) for c in cells])
+    nbclient.NotebookClient(notebook, timeout=120, kernel_name="python3").execute()
+    for cell in notebook.cells[1:]:
+        assert any("image/png" in output.get("data", {}) for output in cell.outputs)
