@@ -14,7 +14,6 @@ from .acquisition import rules as acquisitions
 from .acquisition.replicates import next_replicate
 from .arguments import checked_array, checked_integer
 from .describe import describe
-from .display import as_html, as_text
 from .gp.process import padded_rows
 from .history import (
     UNKNOWN,
@@ -24,6 +23,7 @@ from .history import (
     remember_asked,
     remember_told,
 )
+from .notebook_display import as_html, as_text
 from .prior import Prior
 from .result import Fit
 from .sobol import sobol, start_size

@@ -11,8 +11,8 @@ import jax
 import numpy as np
 
 from ._float64 import in_float64
-from .display import as_html, as_text
 from .history import History
+from .notebook_display import as_html, as_text
 from .prior import Prior
 from .sampling.convergence import SamplingWarning
 from .sampling.draw import SAMPLERS, draw_posterior

@@ -24,7 +24,7 @@ from ..run.directory import (
     open_bank,
     read_run,
 )
-from ..run.means import Means
+from ..run.execution import Execution
 from ..run.provenance import LIBRARIES, versions
 from ..run.recordings import keep_recordings
 from ..run.simulations import warn_of_timeouts
@@ -115,7 +115,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         for notice in aborted_recordings(opened):
             logger.warning(notice)
         if not is_calibrated(run):
-            _calibrate(run, stirring, prior, settings, Means(workers, timeout, progress))
+            _calibrate(run, stirring, prior, settings, Execution(workers, timeout, progress))
     return Calibration.open(run)
 
 
@@ -142,20 +142,24 @@ def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring
 
 
 def _calibrate(
-    run: Path, stirring: Stirring, prior: "Prior", settings: CalibrationSettings, means: Means
+    run: Path,
+    stirring: Stirring,
+    prior: "Prior",
+    settings: CalibrationSettings,
+    execution: Execution,
 ) -> None:
     from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES, check_by_simulation
     from .tree import results_tree, write_tree
 
-    note_timeout(run, means.timeout)
+    note_timeout(run, execution.timeout)
     needed = settings.budget + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
     with open_bank(run) as bank, ExitStack() as stack:
         kept = min(max(needed - _left(run, settings, bank), 0), needed)
-        bar = progress_bar("simulating stirs", needed, shown=means.progress, done=kept)
+        bar = progress_bar("simulating stirs", needed, shown=execution.progress, done=kept)
         advance = after_first(kept, stack.enter_context(bar))
-        keep = means.keep(bank, stirring.identity, settings.batch)
+        keep = execution.keep(bank, stirring.identity, settings.batch)
         fit = fit_recordings(stirring, stirring.observed, prior, keep, settings, progress=advance)
-        warn_of_timeouts(fit.history.errors.tolist(), means.timeout)
+        warn_of_timeouts(fit.history.errors.tolist(), execution.timeout)
         sampled = fit.sample(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
         )

@@ -15,7 +15,7 @@ from ..drawing import (
     panels,
     styled,
 )
-from ..hover import Readout, series, to_chart
+from ..hover_labels import Readout, series, to_chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

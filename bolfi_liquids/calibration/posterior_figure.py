@@ -15,7 +15,7 @@ from ..drawing import (
     plain_log_ticks,
     styled,
 )
-from ..hover import Readout, marks, to_chart
+from ..hover_labels import Readout, marks, to_chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

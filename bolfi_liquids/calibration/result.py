@@ -13,7 +13,7 @@ from ..inputs.prior import read_prior
 from ..inputs.settings import CalibrationSettings
 from ..run.directory import POSTERIOR, read_run
 from ..run.summary import read_summary
-from ..words import html_table, with_unit
+from ..wording import html_table, with_unit
 from .draws import pick_draws
 from .summary import CalibrationSummary
 

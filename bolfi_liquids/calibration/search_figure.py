@@ -13,8 +13,8 @@ from ..drawing import (
     plain_log_ticks,
     styled,
 )
-from ..hover import Readout, marks, to_chart
-from ..words import with_unit
+from ..hover_labels import Readout, marks, to_chart
+from ..wording import with_unit
 from .posterior_figure import AXIS_LABELS, LOGARITHMIC_PARAMETERS
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from .options import RigOption
 
 if TYPE_CHECKING:
     from ..hardware import Check, HiddenLiquid, Rig
-    from ..online.choice import OnlineChoice
+    from ..online.online_choice import OnlineChoice
 
 OUT = Path("runs/recording")
 EPILOG = examples(
@@ -79,7 +79,7 @@ class OnlineOptions:
     def choice(self, cycles: int | None) -> "OnlineChoice | None":
         """What to calibrate, with so many cycles at the most; None for nothing."""
         from ..inputs.cups import open_cups
-        from ..online.choice import MAX_CYCLES, OnlineChoice
+        from ..online.online_choice import MAX_CYCLES, OnlineChoice
 
         if self.calibrate is None:
             return None

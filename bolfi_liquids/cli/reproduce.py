@@ -45,12 +45,12 @@ def reproduce(
     What has finished in DIR is kept: a killed run goes on with the same command.
     """
     from ..reproduction.reproduce import draw_figures
-    from ..reproduction.scale import FULL, QUICK
-    from ..run.means import Means
+    from ..reproduction.study_size import FULL, QUICK
+    from ..run.execution import Execution
 
     # of one scale each, so that no figure of the one stands beside some of the other
     out = out or Path("runs/reproduce_quick" if quick else "runs/reproduce")
     with compute.executor() as executor:
-        means = Means(executor, compute.timeout)
-        for name, drawn in draw_figures(figures or (), out, QUICK if quick else FULL, means):
+        execution = Execution(executor, compute.timeout)
+        for name, drawn in draw_figures(figures or (), out, QUICK if quick else FULL, execution):
             typer.echo(f"{out / name}.png\n{drawn.says}\n")

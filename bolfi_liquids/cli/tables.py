@@ -16,7 +16,7 @@ from ..reporting.sentences import (
     sampler_sentences,
     surrogate_sentences,
 )
-from ..words import LIQUID_UNITS, Sentence
+from ..wording import LIQUID_UNITS, Sentence
 
 if TYPE_CHECKING:
     from xarray import Dataset

@@ -24,7 +24,7 @@ from .baseline import (
     usual_for,
 )
 from .findings import Findings
-from .given import Given, Inputs, Pours, open_inputs
+from .inputs import Given, Inputs, Pours, open_inputs
 from .pours import as_prior, pour_experiment
 from .proposals import pour_proposals, stir_proposals
 from .result import Criticism, finished_criticism

@@ -16,7 +16,7 @@ from ..drawing import (
     panels,
     styled,
 )
-from ..words import spoken, unit_of
+from ..wording import spoken, unit_of
 from .verdict import EffectStatus
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from ..drawing import (
     styled,
 )
 from ..inputs.settings import FALSE_ALARM_RATE
-from ..words import spoken
+from ..wording import spoken
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,7 +7,7 @@ if TYPE_CHECKING:
     from .. import inference
     from ..calibration.result import Calibration
     from .baseline import Clean
-    from .given import Inputs
+    from .inputs import Inputs
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from ..drawing import given_or_shown
 from ..errors import InputError
 from ..run.directory import CRITICISM, CRITICISM_FORMAT, Run, run_path
 from ..run.summary import SUMMARY_FILE, made_by, read_summary
-from ..words import html_table, sentence, spoken
+from ..wording import html_table, sentence, spoken
 from .summary import CriticismSummary
 from .verdict import Verdict
 

@@ -9,7 +9,7 @@ from ..calibration.stir_simulator import Stirring
 from ..errors import InputError
 from ..inputs.recording import Recording
 from ..inputs.strokes import resting
-from .windows import windows
+from .stir_windows import windows
 
 if TYPE_CHECKING:
     from ..inference.criticism import (

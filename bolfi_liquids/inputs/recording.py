@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..words import html_table
+from ..wording import html_table
 from .fields import AXES, LENGTHS, PLANES, UNITS
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from .landed import Landed, landed, level
+from .landed_liquid import Landed, landed, level
 from .light import (
     ABSORPTION,
     SCATTERED_COLOUR,

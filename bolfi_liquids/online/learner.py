@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..calibration.stir_simulator import stirring_of
-from .outbox import newest
+from .newest_message import newest
 from .plan import SoFar, follow, stroke_ends
 from .request import PARTNER_GONE, OnlinePhase, Request, Status
 from .simulator import step_back

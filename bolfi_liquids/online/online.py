@@ -30,9 +30,9 @@ from ..inputs.prior import (
 from ..inputs.recording import Recording
 from ..pouring.map import make_pours
 from ..run.directory import RUN_TOML
-from .choice import OnlineChoice
 from .learner import learn_online
-from .outbox import Outbox
+from .newest_message import Outbox
+from .online_choice import OnlineChoice
 from .plan import SoFar, planned, stroke_ends
 from .request import PARTNER_GONE, OnlinePhase, Request, Status
 from .simulator import simulate_plan

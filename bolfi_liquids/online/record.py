@@ -19,8 +19,8 @@ from ..robot.stir import (
     plan_stir,
     stir_session,
 )
-from .choice import OnlineChoice
 from .online import OnlineCalibration
+from .online_choice import OnlineChoice
 from .plan import SoFar
 from .request import OnlinePhase
 

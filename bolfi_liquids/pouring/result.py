@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..inputs.settings import PourSettings
 from ..run.directory import POUR
 from ..run.summary import Number, Section
-from ..words import html_table, percent
+from ..wording import html_table, percent
 from .spillage import ACTION, FRACTIONS
 
 if TYPE_CHECKING:

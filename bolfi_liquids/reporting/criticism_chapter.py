@@ -23,9 +23,9 @@ from ..criticism.figures import (
 from ..criticism.result import is_criticised
 from ..criticism.summary import CriticismSummary
 from ..drawing import to_svg
-from ..hover import lines_of, to_chart
+from ..hover_labels import lines_of, to_chart
 from ..run.directory import CRITICISM
-from ..words import Sentence, spoken, unit_of
+from ..wording import Sentence, spoken, unit_of
 from . import criticism_sentences as sentences
 
 if TYPE_CHECKING:

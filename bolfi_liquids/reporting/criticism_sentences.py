@@ -11,7 +11,7 @@ import numpy as np
 from ..criticism.source_summary import Gap, PourVerdict, SourceVerdict, Window
 from ..criticism.summary import CriticismSummary
 from ..criticism.verdict import Verdict
-from ..words import Sentence, sentence
+from ..wording import Sentence, sentence
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -26,7 +26,7 @@ from ..progress import Advance, progress_bar
 from ..run.directory import FRAMES, POUR
 from ..run.recordings import kept_recordings
 from ..seeds import Phase, simulation_seeds
-from ..words import unit_of
+from ..wording import unit_of
 from .scenes import FRAME_RATE, Draw, PourScene, PourShown, StirScene, StirShown
 
 if TYPE_CHECKING:

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.result import Calibration
-from ..hover import short
+from ..hover_labels import short
 from ..inputs.cups import kept_cups
 from ..pouring.result import read_pour
 from ..run.recordings import kept_recordings
-from ..words import sentence, with_unit
+from ..wording import sentence, with_unit
 
 if TYPE_CHECKING:
     from xarray import Dataset

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..drawing import new_figure, styled
-from ..hover import Readout, field, to_chart
+from ..hover_labels import Readout, field, to_chart
 from ..pouring.figures import (
     BAD_CASE,
     action_axes,

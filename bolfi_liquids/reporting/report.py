@@ -13,12 +13,12 @@ from ..calibration.search_figure import search_figure
 from ..calibration.summary import CalibrationSummary
 from ..criticism.result import latest_calibration
 from ..files import write_text
-from ..hover import script_json
+from ..hover_labels import script_json
 from ..inputs.prior import Described
 from ..pouring.result import PourSummary, read_pour
 from ..run.directory import POUR, REPORT, Run, run_path
 from ..run.summary import read_summary
-from ..words import LIQUID_UNITS, sentence
+from ..wording import LIQUID_UNITS, sentence
 from . import sentences
 from .criticism_chapter import criticism_context
 from .warnings import Results, warnings_of

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..calibration.summary import CalibrationSummary, ParameterSummary, SamplerStatus
 from ..pouring.result import PourSummary
-from ..words import Sentence, sentence
+from ..wording import Sentence, sentence
 
 UNLEARNED_SHARE = 0.6
 """Share of the prior's 90 % interval above which little was learned."""

@@ -13,7 +13,7 @@ from ..criticism.summary import CriticismSummary
 from ..criticism.verdict import Verdict
 from ..pouring.result import PourSummary
 from ..pouring.spillage import ACTION
-from ..words import Sentence, sentence
+from ..wording import Sentence, sentence
 from .criticism_sentences import verdict_sentence
 from .sentences import (
     FIT_NEAR_NOISE,

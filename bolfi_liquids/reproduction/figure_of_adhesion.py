@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from ..drawing import BLUE, GREY, ORANGE, PALETTE, new_figure, styled
 from .figure import Drawn
 from .figures_of_spillage import interval
+from .shared_simulations import SharedSimulations
 from .sticky import TRAINING
-from .workshop import Workshop
 
 ADHESION_CASES = {
     "believed": ("the same pour if it did not stick", GREY),
@@ -17,11 +17,11 @@ ADHESION_CASES = {
 }
 
 
-def adhesion(workshop: Workshop) -> Drawn:
+def adhesion(shared: SharedSimulations) -> Drawn:
     """Spilled by liquids like glycerin that stick to their cup."""
     from xarray import Dataset
 
-    found = workshop.sticky
+    found = shared.sticky
     truths = [one.truth for one in found]
     spilled = np.array([one.spilled for one in found])
     named = [one.named for one in found]

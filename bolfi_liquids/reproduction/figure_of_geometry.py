@@ -17,8 +17,8 @@ from ..run.simulations import simulate_kept
 from ..run.time_limit import TimeLimited
 from ..seeds import Phase, simulation_seeds
 from .figure import Drawn
+from .shared_simulations import SharedSimulations
 from .truths import DENSITY
-from .workshop import Workshop
 
 if TYPE_CHECKING:
     from ..models import Cups
@@ -61,12 +61,12 @@ class Poured(TimeLimited):
         return json.dumps([*made_by, self.cups.settings()], sort_keys=True)
 
 
-def geometry(workshop: Workshop) -> Drawn:
+def geometry(shared: SharedSimulations) -> Drawn:
     """The regret of the best single action, over heights of the lip and radii of the receiver."""
     from xarray import Dataset
 
-    lips = np.array(workshop.scale.lips)
-    regret = _regrets(workshop, lips)
+    lips = np.array(shared.scale.lips)
+    regret = _regrets(shared, lips)
     with styled():
         figure = new_figure(5.6, 3.9)
         axes = figure.subplots()
@@ -92,13 +92,13 @@ def geometry(workshop: Workshop) -> Drawn:
     return Drawn(Dataset({"regret": (("lip_height", "radius"), regret)}, coords), figure, says)
 
 
-def _regrets(workshop: Workshop, lips: NDArray) -> NDArray[np.float64]:
+def _regrets(shared: SharedSimulations, lips: NDArray) -> NDArray[np.float64]:
     """By height of the lip and radius of the receiver."""
-    means, rows = workshop.means, []
-    total, one_call = len(lips) * TURN_RATES, means
-    if means.timeout is not None:  # a call pours all liquids
-        one_call = means._replace(timeout=means.timeout * len(VISCOSITIES))
-    with progress_bar("pouring from several heights", total, shown=means.progress) as advance:
+    execution, rows = shared.execution, []
+    total, one_call = len(lips) * TURN_RATES, execution
+    if execution.timeout is not None:  # a call pours all liquids
+        one_call = execution._replace(timeout=execution.timeout * len(VISCOSITIES))
+    with progress_bar("pouring from several heights", total, shown=execution.progress) as advance:
         for lip in lips:
             cups = bundled_cups()
             cups = cups.model_copy(
@@ -106,7 +106,7 @@ def _regrets(workshop: Workshop, lips: NDArray) -> NDArray[np.float64]:
             )
             poured = Poured(cups)
             rates = np.geomspace(*cups.angular_velocity_range, TURN_RATES)
-            keep = one_call.keep(workshop.bank, poured.identity, 1)
+            keep = one_call.keep(shared.bank, poured.identity, 1)
             theta = {"angular_velocity": rates}
             made = simulate_kept(poured.simulate, theta, [0] * TURN_RATES, keep, advance=advance)
             rows.append(_regret(made.signals, cups))

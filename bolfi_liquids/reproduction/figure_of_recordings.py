@@ -13,8 +13,8 @@ from ..pouring.result import read_pour
 from ..pouring.spillage import ACTION, Surface
 from .decisions import RULES, Action, decide_unknowing
 from .figure import Drawn
-from .table_between import between
-from .workshop import Workshop
+from .shared_simulations import SharedSimulations
+from .table_interpolation import between
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,27 +28,27 @@ OTHER_CHOICES = {
 """Rules beside the least expected spillage -> marker and label."""
 
 
-def recordings(workshop: Workshop) -> Drawn:
+def recordings(shared: SharedSimulations) -> Drawn:
     """Chosen from a recording of stirring alone, spilled by the other solver."""
-    data = _judged(workshop)
+    data = _judged(shared)
     return Drawn(data, _figure(data), _says(data))
 
 
-def _judged(workshop: Workshop) -> "Dataset":
+def _judged(shared: SharedSimulations) -> "Dataset":
     from xarray import Dataset
 
-    scale = workshop.scale
+    scale = shared.scale
     runs = [(surrogate, n) for surrogate in scale.surrogates for n in scale.recorded]
     shape = len(POURED_LIQUIDS), len(runs), len(RULES)
     spilled, error, rates, distances = (np.empty(shape) for _ in range(4))
-    unknowing = decide_unknowing(workshop.grid, default_prior(), scale.seed)
+    unknowing = decide_unknowing(shared.grid, default_prior(), scale.seed)
     best, unknown = np.empty(len(POURED_LIQUIDS)), np.empty((len(POURED_LIQUIDS), 2))
     for row, liquid in enumerate(POURED_LIQUIDS):
         table = bundled_pours(liquid)
         best[row] = table.fractions[:, 0].min()
         unknown[row] = between(table, *(unknowing[name] for name in ACTION))
         for column, (surrogate, budget) in enumerate(runs):
-            actions = _chosen(workshop, liquid, budget, surrogate)
+            actions = _chosen(shared, liquid, budget, surrogate)
             for at, rule in enumerate(RULES):
                 rate, distance = (actions[rule][name] for name in ACTION)
                 place = row, column, at
@@ -73,14 +73,16 @@ def _judged(workshop: Workshop) -> "Dataset":
     )
 
 
-def _chosen(workshop: Workshop, liquid: str, budget: int, surrogate: str) -> dict[str, Action]:
+def _chosen(
+    shared: SharedSimulations, liquid: str, budget: int, surrogate: str
+) -> dict[str, Action]:
     """By the rules of `RULES`."""
-    scale = workshop.scale
+    scale = shared.scale
     pour = choose_pour(
-        workshop.calibration(liquid, budget, surrogate),
+        shared.calibration(liquid, budget, surrogate),
         iterations=scale.rates,
         seed=scale.seed,
-        **workshop.means._asdict(),
+        **shared.execution._asdict(),
     )
     return {
         "plug_in": pour.plug_in.action,

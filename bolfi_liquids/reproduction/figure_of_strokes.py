@@ -7,8 +7,8 @@ import numpy as np
 from ..drawing import GREY, INK, PALETTE, new_figure, styled
 from .figure import Drawn
 from .figures_of_spillage import FEW_PERCENT, complete, interval
+from .shared_simulations import SharedSimulations
 from .truths import LIQUIDS
-from .workshop import Workshop
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 ENOUGH_SPILLED = (0.05, 0.01)  # spilled, on average over the liquids
 
 
-def strokes(workshop: Workshop) -> Drawn:
+def strokes(shared: SharedSimulations) -> Drawn:
     """Spilled percentage, and what is known of the viscosity, by the number of strokes."""
-    study = complete(workshop.strokes).squeeze("budget")
-    study = study.rename(learned_by="strokes").assign_coords(strokes=list(workshop.scale.strokes))
+    study = complete(shared.strokes).squeeze("budget")
+    study = study.rename(learned_by="strokes").assign_coords(strokes=list(shared.scale.strokes))
     spilled = study["spilled"].sel(rule="mean").transpose("truth", "strokes")
     drawn = study["concluded"].sel(parameter="viscosity").isel(draw=slice(1, None))
     width = np.log(drawn.transpose("truth", "strokes", "draw").to_numpy()).std(axis=-1)
@@ -36,7 +36,7 @@ def strokes(workshop: Workshop) -> Drawn:
         _by_liquid(right, np.exp(width), study)
         right.set(ylim=(1, None), ylabel="posterior sd of the viscosity, a factor")
         figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4)
-    return Drawn(study, figure, _says(study, spilled.to_numpy(), workshop.scale.few))
+    return Drawn(study, figure, _says(study, spilled.to_numpy(), shared.scale.few))
 
 
 def _by_liquid(axes: "Axes", values: np.ndarray, study: "Dataset") -> None:

@@ -8,18 +8,18 @@ from ..calibration.posterior_figure import AXIS_LABELS, contour_levels, grid_den
 from ..drawing import GREY, INK, LIGHT, ORANGE, PALETTE, new_figure, plain_log_ticks, styled
 from ..inputs.bundled import RECORDED_LIQUIDS
 from .figure import Drawn
-from .workshop import Workshop
+from .shared_simulations import SharedSimulations
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
 
-def inclination(workshop: Workshop) -> Drawn:
+def inclination(shared: SharedSimulations) -> Drawn:
     """Inclination against time with the closest hypothesis; the discrepancy is what is shaded."""
     from xarray import Dataset
 
-    budget = workshop.scale.recorded[-1]
-    tree = workshop.calibration("water", budget, "discrepancy").tree
+    budget = shared.scale.recorded[-1]
+    tree = shared.calibration("water", budget, "discrepancy").tree
     recorded, closest = (tree[name]["inclination"] for name in ("recorded", "closest"))
     time = tree["recorded"]["time"].to_numpy()
     with styled():
@@ -45,11 +45,11 @@ def inclination(workshop: Workshop) -> Drawn:
     return Drawn(data, figure, f"water, N = {budget}: closest hypothesis {rms:.2f} deg RMS away")
 
 
-def posterior(workshop: Workshop) -> Drawn:
+def posterior(shared: SharedSimulations) -> Drawn:
     """Contours of the posteriors of the recorded liquids, one panel for each surrogate."""
     from xarray import concat
 
-    budget, surrogates = workshop.scale.recorded[-1], workshop.scale.surrogates
+    budget, surrogates = shared.scale.recorded[-1], shared.scale.surrogates
     kept = []
     with styled():
         figure = new_figure(4.6 * len(surrogates), 3.9)
@@ -57,7 +57,7 @@ def posterior(workshop: Workshop) -> Drawn:
         for axes, surrogate in zip(panels, surrogates, strict=True):
             found = []
             for liquid, colour in zip(RECORDED_LIQUIDS, PALETTE, strict=False):
-                tree = workshop.calibration(liquid, budget, surrogate).tree
+                tree = shared.calibration(liquid, budget, surrogate).tree
                 _contours(axes, tree["surface"].to_dataset(), liquid, colour)
                 found.append(tree["surface"].to_dataset().assign_coords(liquid=liquid))
             axes.set(xlabel=AXIS_LABELS["viscosity"], title=f"{surrogate}, N = {budget}")

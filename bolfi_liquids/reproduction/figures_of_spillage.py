@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from ..drawing import GREY, PALETTE, new_figure, plain_log_ticks, styled
 from ..seeds import Phase, generator
 from .figure import Drawn
+from .shared_simulations import SharedSimulations
 from .truths import LIQUIDS
-from .workshop import Workshop
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,9 +46,9 @@ def interval(values: NDArray, seed: int = 0) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def spillage(workshop: Workshop) -> Drawn:
+def spillage(shared: SharedSimulations) -> Drawn:
     """Spilled percentage against N for calibration by stirring and by pouring."""
-    study = complete(workshop.study)
+    study = complete(shared.study)
     budgets = study["budget"].to_numpy()
     with styled():
         figure = new_figure(7.4, 4.6)
@@ -67,7 +67,7 @@ def spillage(workshop: Workshop) -> Drawn:
 
 
 def _against_budget(axes: "Axes", spilled: "DataArray", way: tuple[str, str], at: int) -> None:
-    """Means, with 90 % intervals, side by side for those that are compared."""
+    """Execution, with 90 % intervals, side by side for those that are compared."""
     percent = 100.0 * spilled.transpose("budget", "truth").to_numpy()
     means, ends = percent.mean(axis=1), np.array([interval(row) for row in percent])
     x = np.arange(len(means)) + 0.06 * (at - (len(SHOWN_LEARNERS) - 1) / 2)
@@ -105,9 +105,9 @@ def complete(study: "Dataset") -> "Dataset":
     return study.isel(truth=whole).assign_attrs(left_out=int((~whole).sum()))
 
 
-def liquids(workshop: Workshop) -> Drawn:
+def liquids(shared: SharedSimulations) -> Drawn:
     """Spilled percentage by liquid at N = 10 and 20, or else at the largest N."""
-    study = complete(workshop.study)
+    study = complete(shared.study)
     made = study["budget"].to_numpy().tolist()
     budgets = [n for n in (10, 20) if n in made] or made[-1:]
     rules = [
@@ -146,11 +146,11 @@ def liquids(workshop: Workshop) -> Drawn:
     return Drawn(study, figure, f"least expected after N = {budgets[-1]} stirs: {says}")
 
 
-def decision(workshop: Workshop) -> Drawn:
+def decision(shared: SharedSimulations) -> Drawn:
     """What deciding over the posterior saves against the plug-in at theta*, paired by truth."""
     from xarray import Dataset
 
-    study = complete(workshop.study)
+    study = complete(shared.study)
     spilled = 100.0 * study["spilled"]
     apart = spilled.sel(rule=["mean", "cvar"]) - spilled.sel(rule="plug_in", drop=True)
     dims = ("learned_by", "rule", "budget")
@@ -191,11 +191,11 @@ def decision(workshop: Workshop) -> Drawn:
     return Drawn(data, figure, "\n".join(lines))
 
 
-def surrogates(workshop: Workshop) -> Drawn:
+def surrogates(shared: SharedSimulations) -> Drawn:
     """Error of the viscosity at equal N: the signal surrogate against the paper's."""
     from xarray import DataArray, Dataset
 
-    study = complete(workshop.study)
+    study = complete(shared.study)
     drawn = study["concluded"].sel(parameter="viscosity").isel(draw=slice(1, None))
     dims = ("learned_by", "truth", "budget")
     factors = drawn.transpose(*dims, "draw") / study["viscosity"]

@@ -11,7 +11,7 @@ from ..inputs.prior import default_prior
 from ..inputs.recording import Recording
 from ..inputs.strokes import until_stroke
 from .calibrations import ByPouring, ByStirring, Learner
-from .scale import Scale
+from .study_size import Scale
 
 if TYPE_CHECKING:
     from ..models import Cups

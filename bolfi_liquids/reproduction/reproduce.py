@@ -9,7 +9,7 @@ from pathlib import Path
 from ..errors import InputError
 from ..inference.simulations import Workers
 from ..run.directory import open_bank
-from ..run.means import Means
+from ..run.execution import Execution
 from ..run.provenance import LIBRARIES, generations, versions
 from ..run.workers import open_workers
 from .figure import Drawn
@@ -19,10 +19,10 @@ from .figure_of_recordings import recordings
 from .figure_of_strokes import strokes
 from .figures_of_fits import inclination, posterior
 from .figures_of_spillage import decision, liquids, spillage, surrogates
-from .scale import FULL, Scale
-from .workshop import Workshop
+from .shared_simulations import SharedSimulations
+from .study_size import FULL, Scale
 
-FIGURES: dict[str, Callable[[Workshop], Drawn]] = {
+FIGURES: dict[str, Callable[[SharedSimulations], Drawn]] = {
     "inclination": inclination,
     "posterior": posterior,
     "recordings": recordings,
@@ -66,23 +66,23 @@ def reproduce(
         InputError: There is no figure of that name.
     """
     with open_workers(executor, timeout) as pool:
-        return dict(draw_figures(names, Path(out), scale, Means(pool, timeout, progress)))
+        return dict(draw_figures(names, Path(out), scale, Execution(pool, timeout, progress)))
 
 
 def draw_figures(
-    names: Iterable[str], out: Path, scale: Scale, means: Means
+    names: Iterable[str], out: Path, scale: Scale, execution: Execution
 ) -> Iterator[tuple[str, Drawn]]:
     """As `reproduce`, each figure with its name as soon as it is written."""
     chosen = _chosen(names)
     out.mkdir(parents=True, exist_ok=True)
     made_with = {"scale": asdict(scale), **generations(), "versions": versions(LIBRARIES)}
     with open_bank(out) as bank:
-        workshop = Workshop(out, scale, bank, means)
+        shared = SharedSimulations(out, scale, bank, execution)
         if "adhesion" in chosen:
-            workshop.begin_sticky()
+            shared.begin_sticky()
         for name in chosen:
             began = time.perf_counter()
-            drawn = FIGURES[name](workshop)
+            drawn = FIGURES[name](shared)
             drawn.write(out, name, json.dumps(made_with | {"seconds": time.perf_counter() - began}))
             yield name, drawn
 

@@ -12,11 +12,11 @@ from ..pouring.choose import choose_pour
 from ..pouring.spillage import pour_all, surface
 from ..progress import silent
 from ..run.directory import open_bank
-from ..run.means import HERE, Means
+from ..run.execution import HERE, Execution
 from ..seeds import Phase
 from .decisions import executions, spilled_by
-from .scale import Scale
 from .sticky import Sticky, draw_sticky, poured, recipe, stirred
+from .study_size import Scale
 
 
 class Stuck(NamedTuple):
@@ -35,7 +35,7 @@ class Stuck(NamedTuple):
 
 
 def spilled_where_it_sticks(
-    out: Path, runs: Path, scale: Scale, number: int, means: Means = HERE
+    out: Path, runs: Path, scale: Scale, number: int, execution: Execution = HERE
 ) -> Stuck:
     """Stir a liquid, choose its pour, criticise, choose again, and carry all of it out.
 
@@ -44,7 +44,7 @@ def spilled_where_it_sticks(
         runs: Where the run is kept.
         scale: How much is simulated.
         number: Of the liquid.
-        means: How simulations are made.
+        execution: How simulations are made.
     """
     cups, seed, particles = bundled_cups(), scale.seed, scale.drawn_particles
     truth = draw_sticky(number, seed)
@@ -59,19 +59,21 @@ def spilled_where_it_sticks(
         particles=particles,
         seed=seed,
         resume=True,
-        **means._asdict(),
+        **execution._asdict(),
     )
-    tried = {"iterations": scale.rates, "seed": seed, **means._asdict()}
+    tried = {"iterations": scale.rates, "seed": seed, **execution._asdict()}
     before = choose_pour(calibration, cups, **tried)
     effects = scale.considered
-    criticism = criticise(calibration, pours=table, effects=effects, seed=seed, **means._asdict())
+    criticism = criticise(
+        calibration, pours=table, effects=effects, seed=seed, **execution._asdict()
+    )
     after = choose_pour(criticism.calibration, cups, **tried)
     sticks = executions(truth.theta, density, cups, truth.seed)
     flows = executions(truth.liquid, density, cups, truth.seed)
     rehearsed = executions(truth.theta, density, cups, truth.seed, Phase.REHEARSAL)
     rates = np.geomspace(*cups.angular_velocity_range, scale.grid.rates)
     with open_bank(out) as bank:
-        keep = means.keep(bank)
+        keep = execution.keep(bank)
         known = surface(pour_all(rehearsed, rates, keep, silent), cups).least("mean")
         actions = [before.chosen.action, after.chosen.action, known]
         spilled = [*spilled_by(flows, actions[:1], keep), *spilled_by(sticks, actions, keep)]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..inputs.prior import default_prior
 from ..progress import progress_bar
-from ..run.means import HERE, Means
+from ..run.execution import HERE, Execution
 from .calibrations import Learner
 from .decisions import RULES, Action, decide, decide_unknowing, execute
 from .truths import Truths, draw_truths
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from ..inference import SimulationBank
     from ..pouring.grid import PourGrid
-    from .scale import Scale
+    from .study_size import Scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ def spillage_study(
     bank: "SimulationBank",
     grid: "PourGrid",
     scale: "Scale",
-    means: Means = HERE,
+    execution: Execution = HERE,
 ) -> "Dataset":
     """Spilled fractions over (learned_by, rule, truth, budget).
 
@@ -53,18 +53,20 @@ def spillage_study(
         bank: Where all simulations and calibrations are kept.
         grid: Of pours, by which actions are chosen, and with whose cups they are carried out.
         scale: How many of what.
-        means: How simulations and calibrations are made.
+        execution: How simulations and calibrations are made.
     """
     tasks = Tasks(draw_truths(scale.repetitions, scale.seed), grid, bank)
     unknowing = decide_unknowing(grid, default_prior(), scale.seed)
     concluded = {
-        name: conclusions(learner, name, tasks, means) for name, learner in learners.items()
+        name: conclusions(learner, name, tasks, execution) for name, learner in learners.items()
     }
     (budgets,) = {learner.budgets for learner in learners.values()}
-    return _judged(tasks, unknowing, concluded, budgets, means)
+    return _judged(tasks, unknowing, concluded, budgets, execution)
 
 
-def conclusions(learner: Learner, name: str, tasks: Tasks, means: Means) -> list[NDArray | None]:
+def conclusions(
+    learner: Learner, name: str, tasks: Tasks, execution: Execution
+) -> list[NDArray | None]:
     """Of each truth; None where its calibration failed.
 
     The learner itself knows for how long its simulations may take.
@@ -73,8 +75,8 @@ def conclusions(learner: Learner, name: str, tasks: Tasks, means: Means) -> list
 
     truths = tasks.truths
     asked = jobs(truths.theta, truths.seed)
-    with progress_bar(f"calibrating ({name})", len(asked), shown=means.progress) as advance:
-        keep = Keep(tasks.bank, learner.identity, 1, means.executor)
+    with progress_bar(f"calibrating ({name})", len(asked), shown=execution.progress) as advance:
+        keep = Keep(tasks.bank, learner.identity, 1, execution.executor)
         found = run_missing(learner.simulate, asked, keep, advance=advance)
     return [result.signal for result in found]
 
@@ -84,7 +86,7 @@ def _judged(
     unknowing: Action,
     concluded: Mapping[str, list[NDArray | None]],
     budgets: tuple[int, ...],
-    means: Means,
+    execution: Execution,
 ) -> "Dataset":
     from xarray import Dataset
 
@@ -103,8 +105,10 @@ def _judged(
         own = {name: values[at : at + 1] for name, values in truths.theta.items()}
         mine = [action for _, _, truth, _, action in chosen if truth == at]
         actions.append([grid.surface(own).least("mean"), unknowing, *mine])
-    with progress_bar("pouring what was chosen", len(truths.seed), shown=means.progress) as advance:
-        spilled = execute(truths, actions, grid, means.keep(tasks.bank), advance)
+    with progress_bar(
+        "pouring what was chosen", len(truths.seed), shown=execution.progress
+    ) as advance:
+        spilled = execute(truths, actions, grid, execution.keep(tasks.bank), advance)
     values, rates, distances = (np.full(shape, np.nan) for _ in range(3))
     for at, outcome in enumerate(spilled):
         mine = [row for row in chosen if row[2] == at]

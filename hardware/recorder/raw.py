@@ -10,7 +10,7 @@ from ..errors import RigError
 from ..rig import View
 from ..vision.frame_measurement import FrameMeasurement
 from ..vision.inclination import ViewLines
-from ..vision.series import FrameSeries
+from ..vision.measurement_series import FrameSeries
 from .csv_file import read_csv
 from .directory import VIEWS, Provenance, read_provenance
 from .names import frames_file

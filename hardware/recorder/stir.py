@@ -10,9 +10,9 @@ from ..motion.trajectory import Trajectory
 from ..rig import View
 from ..vision.clock import Clock, ClockError, fit_clock
 from ..vision.frame_measurement import BAD_LINE
-from ..vision.joining import View as JoinedView
-from ..vision.joining import join
-from ..vision.series import FrameSeries
+from ..vision.joined_views import View as JoinedView
+from ..vision.joined_views import join
+from ..vision.measurement_series import FrameSeries
 from .directory import VIEWS
 from .raw import Columns, Raw, frame_series
 

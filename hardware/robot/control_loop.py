@@ -22,8 +22,7 @@ from ..recorder.rate import Rate, counted, no_rate
 from ..recorder.sample import Sample
 from ..safety.guards import Reading, Rules, Seen, Trip, evaluate, first_watch, tripped, watched
 from ..safety.limits import turn_between, workspace
-from .course import Course, Leg, Trail, advanced, queued
-from .inbox import Inbox, Vetting
+from .order_queue import Inbox, Vetting
 from .orders import (
     Ask,
     Assignment,
@@ -38,8 +37,9 @@ from .orders import (
     fingerprint,
     report_to,
 )
-from .outlet import Outlet
+from .path_queue import Course, Leg, Trail, advanced, queued
 from .preparation import Prepared, others
+from .sample_queue import Outlet
 from .ur import LOOKAHEAD, WATCHDOG_RATE, URArm
 
 SETTLING_PERIODS = 3  # until the controller's program listens again after an order it answers

@@ -14,7 +14,7 @@ from ..rig import Rig, View
 from ..robot.orders import Assignment
 from ..safety.limits import Tool
 from .confirmation import Confirmation
-from .patience import patient
+from .emulated_limits import patient
 
 PROBED_POSES = 60  # poses of the plan about which the controller's own limits are asked
 

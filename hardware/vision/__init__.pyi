@@ -19,9 +19,12 @@ from .inclination import Inclination as Inclination
 from .inclination import ViewLines as ViewLines
 from .inclination import direction as direction
 from .inclination import inclination as inclination
-from .joining import JoinedInclination as JoinedInclination
-from .joining import View as View
-from .joining import join as join
+from .joined_views import JoinedInclination as JoinedInclination
+from .joined_views import View as View
+from .joined_views import join as join
+from .measurement_series import FrameSeries as FrameSeries
+from .measurement_series import as_series as as_series
+from .measurement_series import interpolate_lines as interpolate_lines
 from .measuring import FrameMeter as FrameMeter
 from .measuring import Track as Track
 from .measuring import measure as measure
@@ -31,8 +34,5 @@ from .plumb_line import level_camera as level_camera
 from .pose_refinement import PoseError as PoseError
 from .pose_refinement import RefinedPose as RefinedPose
 from .pose_refinement import refine_orientation as refine_orientation
-from .series import FrameSeries as FrameSeries
-from .series import as_series as as_series
-from .series import interpolate_lines as interpolate_lines
 from .stick_view import StickView as StickView
 from .stick_view import ViewError as ViewError

@@ -3,7 +3,6 @@ from .criticise import Criticism as Criticism
 from .criticise import criticise as criticise
 from .experiment import Experiment as Experiment
 from .experiment import Proposal as Proposal
-from .extension import Extension as Extension
 from .held_out import Gap as Gap
 from .held_out import beyond as beyond
 from .hypothesis import Hypothesis as Hypothesis
@@ -15,6 +14,7 @@ from .measurement_noise import rest_noise as rest_noise
 from .misfit import Check as Check
 from .misfit import Found as Found
 from .misfit import Window as Window
+from .model_extension import Extension as Extension
 from .next_experiment import Suggestion as Suggestion
 from .posterior import weighted_posterior as weighted_posterior
 from .search import Plan as Plan

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..prior import Prior
 from .experiment import Experiment
-from .extension import Extensions
+from .model_extension import Extensions
 from .search import Plan, Study, fit_base
 from .simulate import Keeping, Laboratory
 

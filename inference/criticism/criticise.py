@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..display import as_html, as_text
+from ..notebook_display import as_html, as_text
 from ..prior import Prior
 from .experiment import Experiment, Proposal
-from .extension import Extensions, check_extensions
 from .held_out import Gap, gap, holds, predict
 from .hypothesis import Hypothesis, samples
 from .measurement_noise import Noise
 from .misfit import Found, locate, null_draws
+from .model_extension import Extensions, check_extensions
 from .next_experiment import Suggestion, suggest
 from .posterior import Interval, Weighted, weighted_posterior
 from .search import Base, Plan, Study, examine, explain

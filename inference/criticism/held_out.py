@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..surrogates.output import MIN_SERIES
+from ..surrogates.output_vectors import MIN_SERIES
 from .experiment import Experiment
 from .hypothesis import samples
 from .measurement_noise import gaussian

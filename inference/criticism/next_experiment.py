@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..surrogates.output import MIN_SERIES
+from ..surrogates.output_vectors import MIN_SERIES
 from .experiment import Proposal
 from .hypothesis import samples
 from .misfit import MODES_PER_CHANNEL, orthonormal, slow_modes

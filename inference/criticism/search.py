@@ -6,7 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .boxes import (
+from .clean_scores import scored_on_clean
+from .hypothesis import Hypothesis, hypothesise
+from .measurement_noise import Noise
+from .misfit import Check, check, null_draws
+from .model_extension import extended
+from .prior_boxes import (
     FIRST_HALF_WIDTH,
     LATER_HALF_WIDTH,
     Box,
@@ -14,11 +19,6 @@ from .boxes import (
     fill,
     with_coefficient,
 )
-from .clean_scores import scored_on_clean
-from .extension import extended
-from .hypothesis import Hypothesis, hypothesise
-from .measurement_noise import Noise
-from .misfit import Check, check, null_draws
 from .run_table import Runs, joined
 from .signatures import Signature, signature
 from .simulate import AllRunsFailed, Laboratory

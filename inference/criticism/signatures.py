@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .._float64 import in_float64
-from .extension import Extension
 from .hypothesis import Hypothesis
+from .model_extension import Extension
 
 QUANTILE_STEPS = np.array(
     [0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7, 0.9]

@@ -15,7 +15,7 @@ from ..simulations.job import BATCH, jobs, succeeded
 from ..simulations.runner import Keep, check_keep, run_missing
 from ..types import Simulator
 from .experiment import Experiment, Proposal
-from .extension import Extensions
+from .model_extension import Extensions
 from .run_table import Runs
 
 Report = Callable[[str, int], None]

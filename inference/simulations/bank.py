@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..display import as_html, as_text
+from ..notebook_display import as_html, as_text
 from .database import opened_database
 from .simulation_locks import Claims
 

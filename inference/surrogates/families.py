@@ -14,7 +14,7 @@ from .emulator import PREDICTED_SHARE, Limits, emulate
 from .given_noise import GivenNoise, given_noise
 from .held_back import held_back
 from .outliers import sane
-from .output import Output, Summary, describe
+from .output_vectors import Output, Summary, describe
 from .signal import SignalSurrogate, observe
 from .squared_difference import evaluate, squared_difference
 from .threshold import Threshold, check_rule

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import checked_array
-from .output import Output
+from .output_vectors import Output
 
 
 class GivenNoise(NamedTuple):

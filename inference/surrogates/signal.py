@@ -30,7 +30,7 @@ from .measurement_noise import (
     reduce,
     residual_size,
 )
-from .output import Output
+from .output_vectors import Output
 from .signal_likelihood import (
     SignalState,
     log_likelihood,

@@ -46,19 +46,26 @@ def settings():
 
 @pytest.fixture(scope="session")
 def calibration(short_recording, tmp_path_factory):
-    """A real calibration, as small as the engine allows it to be useful.
+    """A real calibration, as small as the engine allows it to be useful."""
 
-    Of the workers of a session the first makes it and each takes a copy, for tests change theirs.
-    """
-    own = tmp_path_factory.mktemp("runs") / "calibrated"
-    base = tmp_path_factory.getbasetemp()
-    shared = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "calibrated"
+    def calibrate(run):
+        bl.calibrate(short_recording, out=run, progress=False, **SETTINGS)
+
+    return bl.Calibration.open(made_once(tmp_path_factory, "calibrated", calibrate))
+
+
+def made_once(tmp_path_factory, name, make):
+    """A copy of a run that the first worker of a session makes, for tests change theirs."""
+    own, base = tmp_path_factory.mktemp("runs") / name, tmp_path_factory.getbasetemp()
+    shared = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / name
+    whole = shared.with_suffix(".whole")
     with alone_with(shared.with_suffix(".lock")):
-        if not (shared / "summary.json").exists():
+        if not whole.exists():
             shutil.rmtree(shared, ignore_errors=True)  # of a worker that was killed in the middle
-            bl.calibrate(short_recording, out=shared, progress=False, **SETTINGS)
+            make(shared)
+            whole.touch()
         shutil.copytree(shared, own)
-    return bl.Calibration.open(own)
+    return own
 
 
 @contextmanager
@@ -70,9 +77,14 @@ def alone_with(path):
 
 
 @pytest.fixture(scope="session")
-def pour(calibration):
-    """A real pour, chosen over the calibration."""
-    return bl.choose_pour(calibration, iterations=7, draws=4, progress=False)
+def pour(calibration, tmp_path_factory):
+    """A real pour, chosen over the calibration, in a run of its own."""
+
+    def choose(run):
+        shutil.copytree(calibration.path, run)
+        bl.choose_pour(run, iterations=7, draws=4, progress=False)
+
+    return bl.Pour.open(made_once(tmp_path_factory, "poured", choose))
 
 
 @pytest.fixture(scope="session")

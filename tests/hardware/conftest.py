@@ -14,7 +14,7 @@ from bolfi_liquids.hardware.motion.cup_frame import cup_frame
 from bolfi_liquids.hardware.motion.kinematics import inverse
 from bolfi_liquids.hardware.recorder.events import EventLog, read_events
 from bolfi_liquids.hardware.rig import Rig
-from bolfi_liquids.hardware.robot import control_loop, inbox, ur
+from bolfi_liquids.hardware.robot import control_loop, order_queue, ur
 from bolfi_liquids.hardware.robot.control_loop import ControlLoop, Links
 from bolfi_liquids.hardware.robot.control_process import checked
 from bolfi_liquids.hardware.robot.orders import (
@@ -189,7 +189,7 @@ def stepped(tmp_path, monkeypatch, step_emulator):
     # the process of the tests keeps its priority
     monkeypatch.setattr(control_loop, "quieten", lambda: None)
     monkeypatch.setattr(control_loop, "hurry", lambda: "normal")
-    monkeypatch.setattr(inbox, "hurry", lambda: "normal")
+    monkeypatch.setattr(order_queue, "hurry", lambda: "normal")
     running: list[SteppedControl] = []
 
     def make(rig: Rig, tool: Tool, start, *, armed: bool = True, cameras: bool = False):

@@ -61,6 +61,7 @@ def drops(points, spacing=SPACING):
     return np.bincount(connected_components(near)[1])
 
 
+@pytest.mark.slow
 def test_linear_and_angular_momentum_are_kept(run):
     """In 50 steps at speeds of 5 cm/s, up to the rounding of float32."""
     points = block(5, 6, 7)

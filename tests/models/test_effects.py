@@ -76,6 +76,7 @@ def when(effect):
 ALONE = [pytest.param(name, marks=when(effect)) for name, effect in models.EFFECTS.items()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ALONE)
 def test_a_neutral_coefficient_leaves_every_bit(stir, name):
     base, neutral = stir(), models.EFFECTS[name].neutral

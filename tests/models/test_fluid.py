@@ -121,6 +121,7 @@ def _state(scene):
     return position, velocity, direction, swing
 
 
+@pytest.mark.slow
 def test_drops_that_all_but_rest_are_solved(weightless):
     """A residual near nothing is a solution, not a failure."""
     scene = weightless(4, 2, 0.006, [(-0.05,) * 3, (0.05,) * 3])

@@ -76,6 +76,7 @@ def test_looking_changes_no_bit(oil, cups):
     np.testing.assert_array_equal(watched.position, landed.position)
 
 
+@pytest.mark.slow
 def test_what_is_in_the_source_in_the_end_is_what_landings_retain(cups):
     thick = models.Liquid(5.0, 0.0, 1260.0)
     frames = models.pour_frames(PourBatch(thick, RATE, cups, [0], PARTICLES))

@@ -35,6 +35,7 @@ def test_spillage_ranks_pours_as_an_independent_solver_does(cups):
     assert np.sqrt(np.mean((ours - theirs) ** 2)) < 0.15
 
 
+@pytest.mark.slow
 def test_every_particle_is_somewhere(cups):
     rows = [(30, 0.0), (60, 7.0), (180, 3.0), (120, 2.0)]
     result = pour(([1e-3, 0.1, 1.0, 50.0], 1000.0), rows, cups)

@@ -273,6 +273,7 @@ def test_every_fault_is_provoked():
     assert {ABSURD[n][3] for n in ABSURD if n not in LONG} == set(faults.REASONS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_what_goes_wrong_is_nan_with_a_reason(name, glycerin, violent, cups, register):
     """And the other in its batch keeps its bits."""

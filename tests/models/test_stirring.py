@@ -23,6 +23,7 @@ def first_seconds(recording, seconds):
     )
 
 
+@pytest.mark.slow
 def test_same_bits_again_alone_and_anywhere_in_a_batch(glycerin):
     short = first_seconds(glycerin, 1.5)
     setup = models.StirSetup.from_recording(short, particles=300)
@@ -44,6 +45,7 @@ def test_same_bits_again_alone_and_anywhere_in_a_batch(glycerin):
     np.testing.assert_array_equal(run(many), whole[many])
 
 
+@pytest.mark.slow
 def test_without_liquid_the_stick_is_the_driven_spherical_pendulum(glycerin):
     """Lagrange's equation of a rod on a moving pivot, integrated by SciPy, is the truth."""
     setup = models.StirSetup.from_recording(glycerin, particles=100)
@@ -150,6 +152,7 @@ def test_a_wide_stick_leaves_room_for_all_particles(glycerin):
     assert np.isfinite(signal).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cohesion", [0.0, 0.5, 1.0])
 def test_liquid_at_rest_stays_at_rest(water, cohesion):
     setup = models.StirSetup.from_recording(water)

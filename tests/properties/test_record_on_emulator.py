@@ -94,7 +94,7 @@ def test_the_recording_is_complete_and_says_how_it_was_made(recorded):
 # `test_online` has the same with a recording that is there, this module the recording
 @pytest.mark.minutes
 def test_stirring_ends_when_the_pour_is_known_well_enough(tmp_path):
-    from bolfi_liquids.online.choice import OnlineChoice
+    from bolfi_liquids.online.online_choice import OnlineChoice
     from bolfi_liquids.online.record import record_online
     from bolfi_liquids.online.settings import OnlineSettings
 

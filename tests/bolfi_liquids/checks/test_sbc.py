@@ -56,6 +56,7 @@ class Watching(rules.PosteriorDraws):
         return super().__call__(key, *given)
 
 
+@pytest.mark.slow
 def test_every_batch_is_asked_with_random_numbers_of_its_own(monkeypatch):
     """As by `calibrate`; the same ones again would choose by the same rule again and again."""
     monkeypatch.setitem(rules.RULES, "draws", Watching)

@@ -19,7 +19,7 @@ from bolfi_liquids.reporting.sentences import (
     parameter_sentence,
     sampler_sentences,
 )
-from bolfi_liquids.words import percent
+from bolfi_liquids.wording import percent
 
 
 def test_sensor_noise_is_found_under_a_smooth_signal(rng):

@@ -162,7 +162,7 @@ def test_a_run_without_a_pour_executes_none(told, run):
 
 def test_criticism_without_proof_or_with_none(told, run, criticism_summary):
     from bolfi_liquids.reporting.criticism_sentences import verdict_sentence
-    from bolfi_liquids.words import sentence
+    from bolfi_liquids.wording import sentence
 
     copy = next((run / "recordings").iterdir())
     shutil.copy(copy, "stir.nc")
@@ -209,7 +209,7 @@ def test_warnings_of_the_engine(calibration):
 def test_sentences_that_the_page_on_priors_quotes(calibration):
     from bolfi_liquids.inference.surrogates.warnings import OUTSIDE
 
-    from bolfi_liquids.words import sentence
+    from bolfi_liquids.wording import sentence
 
     values = next(iter(calibration.summary.parameters.values()))
     said = [

@@ -12,7 +12,7 @@ from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.described_liquid import Described, read_effects
 from bolfi_liquids.inputs.open import open_recording
 from bolfi_liquids.movie.file import WRITERS, write_movie
-from bolfi_liquids.movie.landed import GRAVITY, landed, level
+from bolfi_liquids.movie.landed_liquid import GRAVITY, landed, level
 from bolfi_liquids.movie.pour import (
     pour_pictures,
     pour_view,

@@ -16,9 +16,9 @@ import pytest
 import bolfi_liquids as bl
 from bolfi_liquids import models
 from bolfi_liquids.online import online
-from bolfi_liquids.online.choice import OnlineChoice
+from bolfi_liquids.online.newest_message import Outbox, newest
 from bolfi_liquids.online.online import OnlineCalibration
-from bolfi_liquids.online.outbox import Outbox, newest
+from bolfi_liquids.online.online_choice import OnlineChoice
 from bolfi_liquids.online.plan import SoFar
 from bolfi_liquids.online.request import OnlinePhase
 from bolfi_liquids.online.settings import OnlineSettings

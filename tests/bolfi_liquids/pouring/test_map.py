@@ -57,6 +57,7 @@ def liquids(viscosity, count=400):
     return {"viscosity": spread, "cohesion": rng.uniform(size=count)}
 
 
+@pytest.mark.slow
 def test_no_pour_is_made_twice(made):
     assert made[1] == POURS
 

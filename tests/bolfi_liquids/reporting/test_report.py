@@ -133,6 +133,7 @@ def test_pictures_by_processes_have_the_same_bits(unseen, pour):
     assert there.identical(frames.frames_of(pour.path, progress=False))
 
 
+@pytest.mark.slow
 def test_report_says_below_which_viscosity_liquids_look_alike(calibration, tmp_path):
     run = tmp_path / "run"
     shutil.copytree(calibration.path, run)

@@ -9,7 +9,7 @@ import pytest
 from jinja2 import Environment, UndefinedError, nodes
 
 import bolfi_liquids
-from bolfi_liquids.words import listed, percent, sentence, with_unit, wordings
+from bolfi_liquids.wording import listed, percent, sentence, with_unit, wordings
 
 HOME = Path(bolfi_liquids.__file__).parent
 TEMPLATES = {

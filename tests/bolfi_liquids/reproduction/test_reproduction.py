@@ -14,20 +14,20 @@ from bolfi_liquids.inputs.pour_table import open_pours
 from bolfi_liquids.reproduction import (
     figure_of_geometry,
     figure_of_recordings,
+    shared,
     sticky,
     sticky_study,
-    workshop,
 )
 from bolfi_liquids.reproduction.figure_of_adhesion import adhesion
 from bolfi_liquids.reproduction.figures_of_spillage import interval
 from bolfi_liquids.reproduction.learners import by_stirring_and_pouring
 from bolfi_liquids.reproduction.reproduce import reproduce
-from bolfi_liquids.reproduction.scale import FULL
+from bolfi_liquids.reproduction.shared_simulations import SharedSimulations
 from bolfi_liquids.reproduction.sticky_study import Stuck
 from bolfi_liquids.reproduction.study import Tasks, conclusions
+from bolfi_liquids.reproduction.study_size import FULL
 from bolfi_liquids.reproduction.truths import draw_truths
-from bolfi_liquids.reproduction.workshop import Workshop
-from bolfi_liquids.run.means import Means
+from bolfi_liquids.run.execution import Execution
 
 
 def test_the_interval_covers_the_mean_as_often_as_it_says():
@@ -52,11 +52,11 @@ def test_an_interval_of_nothing_is_nan():
 )
 def test_what_another_version_made_is_left_alone(tmp_path, monkeypatch, part, name):
     """Kept calibrations go by name; those of another engine or model are others."""
-    workshop = Workshop(tmp_path, FULL, None)
+    shared = SharedSimulations(tmp_path, FULL, None)
     learner = by_stirring_and_pouring(bundled_cups(), FULL)["pour"]
-    now = workshop.runs, learner.identity
+    now = shared.runs, learner.identity
     monkeypatch.setattr(part, name, "another", raising=False)
-    assert workshop.runs != now[0]
+    assert shared.runs != now[0]
     assert part is models or learner.identity != now[1]
 
 
@@ -79,7 +79,7 @@ def test_conclusions_are_those_of_the_truths_and_a_failed_one_is_none(pooled):
     truths = draw_truths(1, seed=0)
     with inference.SimulationBank() as bank, ThreadPoolExecutor(2) as pool:
         tasks, learner = Tasks(truths, None, bank), Failing(truths.seed[2])
-        means = Means(pool if pooled else None, progress=False)
+        means = Execution(pool if pooled else None, progress=False)
         found = conclusions(learner, "stub", tasks, means)
     assert found[2] is None
     for at in (0, 1, 3, 4):
@@ -132,10 +132,10 @@ def stuck(out, runs, scale, number, means):
 
 
 def test_what_sticks_is_told_by_liquid_with_a_pool_and_without(tmp_path, monkeypatch):
-    monkeypatch.setattr(workshop, "spilled_where_it_sticks", stuck)
+    monkeypatch.setattr(shared, "spilled_where_it_sticks", stuck)
     with Pickling(2) as pool:
         for shared in (pool, None):
-            shop = Workshop(tmp_path, FULL, None, Means(shared, progress=False))
+            shop = SharedSimulations(tmp_path, FULL, None, Execution(shared, progress=False))
             shop.begin_sticky()
             adhesion(shop)
             drawn = adhesion(shop)  # as often as it is wanted
@@ -168,15 +168,15 @@ class Called(Exception):
     pass
 
 
-MEANS = Means(Elsewhere(), 60.0, progress=False)
+MEANS = Execution(Elsewhere(), 60.0, progress=False)
 
 
 def test_runs_of_recordings_are_simulated_by_the_executor(tmp_path, monkeypatch):
-    shop, calls = Workshop(tmp_path, FULL, None, MEANS), []
-    monkeypatch.setattr(workshop, "calibrate", called(calls))
+    shop, calls = SharedSimulations(tmp_path, FULL, None, MEANS), []
+    monkeypatch.setattr(shared, "calibrate", called(calls))
     with pytest.raises(Called):
         shop.calibration("water", 10, "discrepancy")
-    monkeypatch.setattr(Workshop, "calibration", lambda *given: None)
+    monkeypatch.setattr(SharedSimulations, "calibration", lambda *given: None)
     monkeypatch.setattr(figure_of_recordings, "choose_pour", called(calls))
     with pytest.raises(Called):
         figure_of_recordings._chosen(shop, "water", 10, "discrepancy")
@@ -191,8 +191,8 @@ def test_runs_of_recordings_are_simulated_by_the_executor(tmp_path, monkeypatch)
 
 
 def test_grids_of_pours_are_simulated_by_the_executor(tmp_path, monkeypatch):
-    shop, calls = Workshop(tmp_path, FULL, None, MEANS), []
-    monkeypatch.setattr(workshop, "make_grid", called(calls))
+    shop, calls = SharedSimulations(tmp_path, FULL, None, MEANS), []
+    monkeypatch.setattr(shared, "make_grid", called(calls))
     monkeypatch.setattr(figure_of_geometry, "simulate_kept", called(calls))
     for make in (lambda: shop.grid, lambda: figure_of_geometry.geometry(shop)):
         with pytest.raises(Called):
@@ -208,9 +208,11 @@ def test_grids_of_pours_are_simulated_by_the_executor(tmp_path, monkeypatch):
 )
 def test_workers_of_other_computers_are_given_no_path(tmp_path, monkeypatch, executor, near):
     learned = []
-    monkeypatch.setattr(Workshop, "_studied", lambda shop, learners: learned.append(learners))
-    monkeypatch.setattr(Workshop, "grid", Grid)
-    shop = Workshop(tmp_path, FULL, None, Means(executor, 60.0, progress=False))
+    monkeypatch.setattr(
+        SharedSimulations, "_studied", lambda shop, learners: learned.append(learners)
+    )
+    monkeypatch.setattr(SharedSimulations, "grid", Grid)
+    shop = SharedSimulations(tmp_path, FULL, None, Execution(executor, 60.0, progress=False))
     _ = shop.study, shop.strokes
     for learner in (one for learners in learned for one in learners.values()):
         assert (learner.bank == ":memory:") == (not near)
@@ -228,8 +230,8 @@ def test_liquids_that_stick_are_simulated_elsewhere_but_kept_here(tmp_path, monk
         found.append((runs, means))
         return Stuck(sticky.draw_sticky(number, scale.seed), [0.0] * 4, "")
 
-    monkeypatch.setattr(workshop, "spilled_where_it_sticks", here)
-    shop = Workshop(tmp_path, FULL, None, MEANS)
+    monkeypatch.setattr(shared, "spilled_where_it_sticks", here)
+    shop = SharedSimulations(tmp_path, FULL, None, MEANS)
     shop.begin_sticky()
     assert len(shop.sticky) == FULL.sticky
     assert found == [(shop.runs, MEANS)] * FULL.sticky

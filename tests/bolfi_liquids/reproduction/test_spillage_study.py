@@ -24,9 +24,9 @@ from bolfi_liquids.reproduction.figures_of_spillage import (
     spillage,
     surrogates,
 )
-from bolfi_liquids.reproduction.scale import Scale
+from bolfi_liquids.reproduction.study_size import Scale
 from bolfi_liquids.reproduction.truths import draw_truths
-from bolfi_liquids.run.means import Means
+from bolfi_liquids.run.execution import Execution
 
 RATES, DISTANCES = np.array([1.0]), np.linspace(0.0, 0.07, 24)  # one: neighbours are averaged
 SUITED = np.linspace(-3.0, 1.5, 24)[None]  # log10 of the viscosity that an action suits
@@ -35,7 +35,7 @@ OFF = {"signal": 0.1, "discrepancy": -0.3, "pour": 0.6}  # log10, of what is con
 SPREAD = np.r_[
     -0.8, np.full(DRAWS_EACH - 1, 0.8 / (DRAWS_EACH - 1))
 ]  # a draw far off; their mean is right
-SILENT = Means(progress=False)
+SILENT = Execution(progress=False)
 SCALE = Scale(repetitions=2, budgets=BUDGETS, strokes=(1, 3, 10))
 
 
@@ -100,7 +100,7 @@ def test_chosen_pours_are_simulated_where_calibrations_are(monkeypatch):
 
     monkeypatch.setattr(study, "execute", recorded)
     with inference.SimulationBank() as bank, ThreadPoolExecutor(2) as pool:
-        means = Means(pool, timeout=60.0, progress=False)
+        means = Execution(pool, timeout=60.0, progress=False)
         study.spillage_study({"signal": Learner("signal")}, bank, Grid(), SCALE, means)
     assert [(one.executor, one.timeout) for one in kept] == [(pool, 60.0)]
 
@@ -201,7 +201,7 @@ def test_what_was_concluded_before_a_kill_is_not_concluded_again(tmp_path, monke
 
 
 def test_recordings_say_what_the_table_says_of_what_was_chosen(monkeypatch):
-    def chosen(workshop, liquid, budget, surrogate):
+    def chosen(shared, liquid, budget, surrogate):
         distance = {"discrepancy": 0.02, "signal": 0.09}[surrogate]
         action = {"angular_velocity": np.radians(45.0), "distance": distance}
         return {rule: action for rule in RULES} | {

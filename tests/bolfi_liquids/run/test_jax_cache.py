@@ -59,6 +59,7 @@ def test_the_environment_has_the_last_word(tmp_path):
     assert not (tmp_path / "home").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("home", ["a file", "cut short"])
 def test_a_cache_that_cannot_be_used_is_done_without(tmp_path, home):
     usual, _ = compiled(tmp_path / "usual")

@@ -66,6 +66,7 @@ def test_its_criticism_and_its_pour_open(run):
     assert np.degrees(chosen.angular_velocity) == pytest.approx(speed)
 
 
+@pytest.mark.slow
 def test_its_report_is_written(run):
     page = bl.report(run, moving=False, progress=False).read_text(encoding="utf-8")
     assert "short.nc" in page

@@ -87,6 +87,7 @@ def test_patterns_have_names_and_a_rig_may_be_another():
     assert np.abs(heavy["inclination_xz"]).max() < np.abs(star["inclination_xz"]).max()
 
 
+@pytest.mark.slow
 def test_a_pour_is_what_the_simulator_returns():
     action = {"angular_velocity": 2.0, "distance": 0.03}
     made = bl.simulate_pour([0.01, 1.0], 0.2, density=1100.0, seed=3, **action, **FEW)

@@ -15,8 +15,7 @@ from bolfi_liquids.hardware.recorder.sample import Sample
 from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.robot.control_loop import WATCHDOG_PERIOD, refused
 from bolfi_liquids.hardware.robot.control_process import run_control
-from bolfi_liquids.hardware.robot.course import Course, Leg, Trail, advanced, queued
-from bolfi_liquids.hardware.robot.inbox import Inbox, Vetting
+from bolfi_liquids.hardware.robot.order_queue import Inbox, Vetting
 from bolfi_liquids.hardware.robot.orders import (
     Ask,
     Assignment,
@@ -31,11 +30,12 @@ from bolfi_liquids.hardware.robot.orders import (
     Told,
     fingerprint,
 )
-from bolfi_liquids.hardware.robot.outlet import Outlet
+from bolfi_liquids.hardware.robot.path_queue import Course, Leg, Trail, advanced, queued
+from bolfi_liquids.hardware.robot.sample_queue import Outlet
 from bolfi_liquids.hardware.safety.guards import Trip
 from bolfi_liquids.hardware.safety.limits import workspace
 from bolfi_liquids.hardware.safety.preflight import failures
-from bolfi_liquids.hardware.session.patience import patient
+from bolfi_liquids.hardware.session.emulated_limits import patient
 from scipy.spatial.transform import Rotation
 
 RIG = patient(bundled_rig())

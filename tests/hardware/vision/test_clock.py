@@ -231,6 +231,7 @@ def check_joined(joined, times, late) -> None:
     assert np.abs(late).max() < 3e-4
 
 
+@pytest.mark.slow
 def test_a_stir_is_recovered_from_its_pictures():
     check_joined(*joined_from_pictures(200))
 

@@ -116,6 +116,7 @@ def test_moments_are_finite_however_far_the_threshold():
         assert np.isfinite(variance).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RULES)
 def test_batches_differ_stay_in_the_box_and_repeat_with_the_key(name):
     surrogate = fitted(noise=0.05)

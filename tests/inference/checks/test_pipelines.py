@@ -169,6 +169,7 @@ def closed_line(theta, seeds):
     return theta["slope"][:, None] * time_ + theta["offset"][:, None]
 
 
+@pytest.mark.slow
 def test_a_pipeline_of_single_runs_makes_data_for_its_replicates(prior):
     options = {"vectorised": False, "surrogate": "discrepancy"}
     short = {"sampler": "quadrature", "chains": 2, "draws": 32}

@@ -4,11 +4,11 @@ import numpy as np
 import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference import criticism
-from bolfi_liquids.inference.criticism.boxes import Box, fill
 from bolfi_liquids.inference.criticism.hypothesis import hypothesise, samples, values_of
 from bolfi_liquids.inference.criticism.misfit import locate, null_draws
+from bolfi_liquids.inference.criticism.prior_boxes import Box, fill
 from bolfi_liquids.inference.criticism.simulate import Laboratory
-from bolfi_liquids.inference.surrogates import output
+from bolfi_liquids.inference.surrogates import output_vectors
 from scipy.stats import binom, chi2, norm
 
 from bolfi_liquids import inference
@@ -58,6 +58,7 @@ def alarms(hypotheses, spread):
     return count
 
 
+@pytest.mark.slow
 def test_a_coarse_emulators_error_is_reckoned_with(coarse):
     """Without it a right model would be refused in half of all cases."""
     limit = binom.isf(ALPHA, EMULATORS, LEVEL)
@@ -94,7 +95,7 @@ def averaged():
     here = np.isfinite(observed).ravel()
     noise = criticism.KnownNoise(np.tile(SD, SHAPE[0])[here])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(output, "MAX_VALUES", 40)
+        patch.setattr(output_vectors, "MAX_VALUES", 40)
         return fitted(tilted, observed, noise, 0, count=16), noise
 
 

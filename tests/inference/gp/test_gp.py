@@ -212,6 +212,7 @@ def test_inverse_cholesky_of_an_ill_conditioned_matrix():
     np.testing.assert_allclose(small @ matrix[:5, :5] @ small.T, np.eye(5), atol=1e-7)
 
 
+@pytest.mark.slow
 def test_hyperparameters_are_a_stationary_point_that_tells_inputs_apart():
     rng = np.random.default_rng(4)
     u = rng.uniform(size=(40, 2))
@@ -234,6 +235,7 @@ def test_hyperparameters_are_a_stationary_point_that_tells_inputs_apart():
     )
 
 
+@pytest.mark.slow
 def test_processes_that_are_not_wanted_stay_out():
     rng = np.random.default_rng(6)
     u, y = rng.uniform(size=(20, 2)), rng.normal(size=(2, 20))

@@ -79,7 +79,7 @@ def assert_means(values, truth):
 @pytest.mark.parametrize("sampler", ["nuts", "emcee"])
 @pytest.mark.parametrize("d", [1, *(pytest.param(d, marks=pytest.mark.slow) for d in (2, 4))])
 def test_moments_of_a_correlated_gaussian(sampler, d):
-    """Means and variances; a twin shifted by 0.3 sd must fail: with 2000 effective draws it is
+    """Execution and variances; a twin shifted by 0.3 sd must fail: with 2000 effective draws it is
     13 standard errors off, where the bound is 4.5."""
     made = sample(sampler, gaussian(d))
     u = made.chains.u
@@ -103,6 +103,7 @@ def test_shares_of_modes_that_no_path_connects(sampler, d):
     np.testing.assert_allclose(within.std(0), 0.03, rtol=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sampler", ["nuts", "emcee", "quadrature"])
 def test_agrees_with_quadrature_on_a_banana(sampler):
     """Sixteen equally probable bins: 4000 independent draws differ by 0.025, 1000 by 0.05."""

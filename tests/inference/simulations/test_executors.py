@@ -94,6 +94,7 @@ def test_threads_that_finish_out_of_order(prior, observed, simulate, by_hand):
         assert_same(fit, by_hand)
 
 
+@pytest.mark.slow
 def test_spawned_processes_that_load_no_jax(prior, observed, by_hand, worker_side):
     with spawned(2) as pool:
         fit = inference.fit(worker_side.simulate, prior, observed, **options(pool))

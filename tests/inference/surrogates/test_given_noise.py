@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference.surrogates.families import SignalFamily
 from bolfi_liquids.inference.surrogates.given_noise import given_noise
-from bolfi_liquids.inference.surrogates.output import MAX_VALUES, describe
+from bolfi_liquids.inference.surrogates.output_vectors import MAX_VALUES, describe
 
 from bolfi_liquids import inference
 

@@ -50,6 +50,7 @@ def test_a_smooth_simulator_hardly_ever_surprises():
     assert binom.cdf(alarms, 100, 0.05) < 0.05
 
 
+@pytest.mark.slow
 def test_innovations_are_errors_of_one_run_after_another():
     """Conditioning on each new run in turn, by the plain formulae."""
     u, _ = gathered(0)

@@ -68,6 +68,7 @@ def noise():
     return np.random.default_rng(9).normal(0.0, SD, TIME.size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("given", [SD, np.full(40, SD), SD**2 * np.eye(40)])
 def test_known_measurement_noise_gives_the_exact_posterior(design, noise, given):
     observed = outputs(np.array([[0.4, 0.6]]))[0] + noise
@@ -75,6 +76,7 @@ def test_known_measurement_noise_gives_the_exact_posterior(design, noise, given)
     assert total_variation(posterior(found), exact(observed, SD**2 * np.eye(40))) < 0.05
 
 
+@pytest.mark.slow
 def test_estimated_measurement_noise_comes_near_it(design, noise):
     observed = outputs(np.array([[0.4, 0.6]]))[0] + noise
     found = learned(design, outputs(design), observed)
@@ -202,6 +204,7 @@ def marginals(seed):
     return np.stack([table.sum(0), table.sum(1)]), truth
 
 
+@pytest.mark.slow
 def test_a_parameter_that_does_nothing_keeps_its_prior():
     """Exactly, were the simulator known; were each noisy component emulated, total variation
     from the prior would be 0.65 on average."""
@@ -325,6 +328,7 @@ def test_components_that_lean_towards_their_own_noise_do_not_steepen_the_emulato
     assert abs(np.mean(noise) - 1.0) < 0.1 + second_order
 
 
+@pytest.mark.slow
 def test_components_are_found_anew_where_what_they_came_from_changed():
     rng = np.random.default_rng(0)
     u = rng.uniform(size=(21, 1))

@@ -9,7 +9,7 @@ import xarray as xr
 
 from bolfi_liquids.calibration.stir_simulator import stirring_of
 from bolfi_liquids.criticism.baseline import Clean, usual_elsewhere, usual_for
-from bolfi_liquids.criticism.given import Given, open_inputs
+from bolfi_liquids.criticism.inputs import Given, open_inputs
 from bolfi_liquids.criticism.result import finished_criticism
 from bolfi_liquids.criticism.stirs import camera_noise, held_out_noise, stir_experiment
 from bolfi_liquids.errors import InputError
@@ -119,7 +119,7 @@ def test_columns_that_nobody_reads_are_logged(calibration, tmp_path, caplog):
     path.write_text("\n".join([f"{HEADER},who", *(f"{row},me" for row in ROWS)]) + "\n")
     given(calibration, pours=path)
     (notice,) = caplog.records
-    assert notice.name.endswith("criticism.given") and "who" in notice.getMessage()
+    assert notice.name.endswith("criticism.inputs") and "who" in notice.getMessage()
 
 
 def test_a_recording_is_held_out_once_and_under_its_own_name(calibration, other, tmp_path):

@@ -7,7 +7,7 @@ import numpy as np
 from .camera_model import CameraModel
 from .clock import Clock
 from .inclination import inclination
-from .series import FrameSeries, interpolate_lines
+from .measurement_series import FrameSeries, interpolate_lines
 
 
 class JoinedInclination(NamedTuple):

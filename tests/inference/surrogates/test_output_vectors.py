@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from bolfi_liquids.inference.surrogates.components import principal_components
-from bolfi_liquids.inference.surrogates.output import MAX_VALUES, describe
+from bolfi_liquids.inference.surrogates.output_vectors import MAX_VALUES, describe
 
 
 def test_channels_follow_each_other_and_missing_samples_are_left_out():

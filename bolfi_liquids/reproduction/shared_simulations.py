@@ -14,12 +14,12 @@ from ..inputs.prior import default_prior
 from ..pouring.grid import PourGrid, make_grid
 from ..progress import progress_bar
 from ..run.directory import SIMULATIONS
-from ..run.means import HERE, Means
+from ..run.execution import HERE, Execution
 from ..run.provenance import generations
 from .learners import after_strokes, by_stirring_and_pouring
-from .scale import Scale
 from .sticky_study import Stuck, spilled_where_it_sticks
 from .study import spillage_study
+from .study_size import Scale
 from .truths import DENSITY
 
 if TYPE_CHECKING:
@@ -32,39 +32,39 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Workshop:
+class SharedSimulations:
     """Simulations and calibrations that figures share.
 
     Attributes:
         out: Directory of the results.
         scale: How much is simulated.
         bank: Every finished simulation and calibration.
-        means: How simulations are made.
+        execution: How simulations are made.
     """
 
     out: Path
     scale: Scale
     bank: "SimulationBank"
-    means: Means = HERE
+    execution: Execution = HERE
 
     @cached_property
     def grid(self) -> PourGrid:
         """Of pours with the bundled cups, by which actions are chosen."""
-        size, shown = self.scale.grid, self.means.progress
+        size, shown = self.scale.grid, self.execution.progress
         with progress_bar("pouring a grid of liquids", size.rates, shown=shown) as advance:
-            cups, prior, keep = bundled_cups(), default_prior(), self.means.keep(self.bank)
+            cups, prior, keep = bundled_cups(), default_prior(), self.execution.keep(self.bank)
             return make_grid(cups, DENSITY, prior, keep, advance, size=size)
 
     @cached_property
     def study(self) -> "Dataset":
         """Spillage after stirring and after pouring; see `spillage_study`."""
-        made = self._learners_bank, self.means.timeout
+        made = self._learners_bank, self.execution.timeout
         return self._studied(by_stirring_and_pouring(self.grid.cups, self.scale, *made))
 
     @cached_property
     def strokes(self) -> "Dataset":
         """The same after stirring for some strokes only."""
-        return self._studied(after_strokes(self.scale, self._learners_bank, self.means.timeout))
+        return self._studied(after_strokes(self.scale, self._learners_bank, self.execution.timeout))
 
     @property
     def _learners_bank(self) -> str | Path:
@@ -72,10 +72,10 @@ class Workshop:
 
         What was concluded is kept in `out` in any case.
         """
-        return self.out / SIMULATIONS if self.means.local else ":memory:"
+        return self.out / SIMULATIONS if self.execution.local else ":memory:"
 
     def _studied(self, learners: "Mapping[str, Learner]") -> "Dataset":
-        return spillage_study(learners, self.bank, self.grid, self.scale, self.means)
+        return spillage_study(learners, self.bank, self.grid, self.scale, self.execution)
 
     def begin_sticky(self) -> None:
         """Start the sticky liquids in the pool: they take longest and depend on nothing else."""
@@ -84,7 +84,7 @@ class Workshop:
     @cached_property
     def sticky(self) -> list[Stuck]:
         """Adhesive liquids and their spillage."""
-        found, shown = [], self.means.progress and self._pool is not None
+        found, shown = [], self.execution.progress and self._pool is not None
         with progress_bar("liquids that stick", self.scale.sticky, shown=shown) as advance:
             for one in self._sticking:
                 found.append(one)
@@ -98,14 +98,14 @@ class Workshop:
         A local pool takes whole liquids. Other workers do not reach the directory of a run, so
         they only simulate.
         """
-        means = self.means if self._pool is None else self.means.of_a_worker()
-        one = partial(spilled_where_it_sticks, self.out, self.runs, self.scale, means=means)
+        execution = self.execution if self._pool is None else self.execution.of_a_worker()
+        one = partial(spilled_where_it_sticks, self.out, self.runs, self.scale, execution=execution)
         return (map if self._pool is None else self._pool.map)(one, range(self.scale.sticky))
 
     @property
     def _pool(self) -> "Executor | None":
         """Of processes on this computer."""
-        return self.means.executor if self.means.local else None
+        return self.execution.executor if self.execution.local else None
 
     @property
     def runs(self) -> Path:
@@ -123,5 +123,5 @@ class Workshop:
             particles=self.scale.particles,
             seed=self.scale.seed,
             resume=True,
-            **self.means._asdict(),
+            **self.execution._asdict(),
         )

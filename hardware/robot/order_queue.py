@@ -14,8 +14,8 @@ from ..priority import hurry
 from ..rig import Rig
 from ..safety.guards import Trip
 from ..safety.limits import Tool, path_checks, turn_between
-from .course import Leg
 from .orders import Ask, Follow, Leave, Stop
+from .path_queue import Leg
 
 # of a path's first pose from the last set-point: paths join, but for rounding
 START_ERROR = 1e-6  # m

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bolfi_liquids.drawing import new_figure, plain_log_ticks, styled
-from bolfi_liquids.hover import (
+from bolfi_liquids.hover_labels import (
     field,
     lines_of,
     marks,

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from ..inference.simulations import Keep
 
 
-class Means(NamedTuple):
+class Execution(NamedTuple):
     """How simulations are made. Only `timeout` can change a result: a simulation that takes longer
     is a failed one.
 
@@ -41,10 +41,10 @@ class Means(NamedTuple):
 
         return Keep(bank, identity, batch, self.executor, self.timeout)
 
-    def of_a_worker(self) -> "Means":
+    def of_a_worker(self) -> "Execution":
         """For a job of the executor: it simulates in its own process and shows no bars."""
-        return Means(None, self.timeout, progress=False)
+        return Execution(None, self.timeout, progress=False)
 
 
-HERE = Means()
+HERE = Execution()
 """In this process, without a limit, with bars."""
