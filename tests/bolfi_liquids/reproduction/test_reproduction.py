@@ -14,7 +14,7 @@ from bolfi_liquids.inputs.pour_table import open_pours
 from bolfi_liquids.reproduction import (
     figure_of_geometry,
     figure_of_recordings,
-    shared,
+    shared_simulations,
     sticky,
     sticky_study,
 )
@@ -80,7 +80,7 @@ def test_conclusions_are_those_of_the_truths_and_a_failed_one_is_none(pooled):
     with inference.SimulationBank() as bank, ThreadPoolExecutor(2) as pool:
         tasks, learner = Tasks(truths, None, bank), Failing(truths.seed[2])
         means = Execution(pool if pooled else None, progress=False)
-        found = conclusions(learner, "stub", tasks, means)
+        found = conclusions(learner, "stub", tasks, execution)
     assert found[2] is None
     for at in (0, 1, 3, 4):
         assert found[at] == truths.viscosity[at]
@@ -124,21 +124,21 @@ class Pickling(ThreadPoolExecutor):
         return super().submit(*pickle.loads(pickle.dumps((fn, *args))), **kwargs)
 
 
-def stuck(out, runs, scale, number, means):
+def stuck(out, runs, scale, number, execution):
     """In place of half an hour's simulations."""
-    assert means.executor is None and not means.progress
+    assert execution.executor is None and not execution.progress
     spilled = [0.01 * number, 0.2, 0.1, 0.05]
     return Stuck(sticky.draw_sticky(number, scale.seed), spilled, "adhesion" if number else "")
 
 
 def test_what_sticks_is_told_by_liquid_with_a_pool_and_without(tmp_path, monkeypatch):
-    monkeypatch.setattr(shared, "spilled_where_it_sticks", stuck)
+    monkeypatch.setattr(shared_simulations, "spilled_where_it_sticks", stuck)
     with Pickling(2) as pool:
-        for shared in (pool, None):
-            shop = SharedSimulations(tmp_path, FULL, None, Execution(shared, progress=False))
-            shop.begin_sticky()
-            adhesion(shop)
-            drawn = adhesion(shop)  # as often as it is wanted
+        for executor in (pool, None):
+            shared = SharedSimulations(tmp_path, FULL, None, Execution(executor, progress=False))
+            shared.begin_sticky()
+            adhesion(shared)
+            drawn = adhesion(shared)  # as often as it is wanted
             believed = drawn.data.spilled.sel(case="believed").values
             np.testing.assert_array_equal(believed, 0.01 * np.arange(FULL.sticky))
             truths = [sticky.draw_sticky(at, FULL.seed) for at in range(FULL.sticky)]
@@ -168,39 +168,39 @@ class Called(Exception):
     pass
 
 
-MEANS = Execution(Elsewhere(), 60.0, progress=False)
+EXECUTION = Execution(Elsewhere(), 60.0, progress=False)
 
 
 def test_runs_of_recordings_are_simulated_by_the_executor(tmp_path, monkeypatch):
-    shop, calls = SharedSimulations(tmp_path, FULL, None, MEANS), []
-    monkeypatch.setattr(shared, "calibrate", called(calls))
+    shared, calls = SharedSimulations(tmp_path, FULL, None, EXECUTION), []
+    monkeypatch.setattr(shared_simulations, "calibrate", called(calls))
     with pytest.raises(Called):
-        shop.calibration("water", 10, "discrepancy")
+        shared.calibration("water", 10, "discrepancy")
     monkeypatch.setattr(SharedSimulations, "calibration", lambda *given: None)
     monkeypatch.setattr(figure_of_recordings, "choose_pour", called(calls))
     with pytest.raises(Called):
-        figure_of_recordings._chosen(shop, "water", 10, "discrepancy")
+        figure_of_recordings._chosen(shared, "water", 10, "discrepancy")
     monkeypatch.setattr(sticky_study, "stirred", lambda *given: bundled_recording("water"))
     monkeypatch.setattr(sticky_study, "poured", lambda *given: None)
     monkeypatch.setattr(sticky_study, "calibrate", called(calls))
     with pytest.raises(Called):
-        sticky_study.spilled_where_it_sticks(tmp_path, tmp_path, FULL, 0, MEANS)
+        sticky_study.spilled_where_it_sticks(tmp_path, tmp_path, FULL, 0, EXECUTION)
     assert len(calls) == 3
     for _, named in calls:
-        assert named.items() >= MEANS._asdict().items()
+        assert named.items() >= EXECUTION._asdict().items()
 
 
 def test_grids_of_pours_are_simulated_by_the_executor(tmp_path, monkeypatch):
-    shop, calls = SharedSimulations(tmp_path, FULL, None, MEANS), []
-    monkeypatch.setattr(shared, "make_grid", called(calls))
+    shared, calls = SharedSimulations(tmp_path, FULL, None, EXECUTION), []
+    monkeypatch.setattr(shared_simulations, "make_grid", called(calls))
     monkeypatch.setattr(figure_of_geometry, "simulate_kept", called(calls))
-    for make in (lambda: shop.grid, lambda: figure_of_geometry.geometry(shop)):
+    for make in (lambda: shared.grid, lambda: figure_of_geometry.geometry(shared)):
         with pytest.raises(Called):
             make()
     grid, geometry = (given[3] for given, _ in calls)
-    assert (grid.executor, grid.timeout) == (MEANS.executor, 60.0)
+    assert (grid.executor, grid.timeout) == (EXECUTION.executor, 60.0)
     liquids = len(figure_of_geometry.VISCOSITIES)  # of one call
-    assert (geometry.executor, geometry.timeout) == (MEANS.executor, 60.0 * liquids)
+    assert (geometry.executor, geometry.timeout) == (EXECUTION.executor, 60.0 * liquids)
 
 
 @pytest.mark.parametrize(
@@ -209,11 +209,11 @@ def test_grids_of_pours_are_simulated_by_the_executor(tmp_path, monkeypatch):
 def test_workers_of_other_computers_are_given_no_path(tmp_path, monkeypatch, executor, near):
     learned = []
     monkeypatch.setattr(
-        SharedSimulations, "_studied", lambda shop, learners: learned.append(learners)
+        SharedSimulations, "_studied", lambda shared, learners: learned.append(learners)
     )
     monkeypatch.setattr(SharedSimulations, "grid", Grid)
-    shop = SharedSimulations(tmp_path, FULL, None, Execution(executor, 60.0, progress=False))
-    _ = shop.study, shop.strokes
+    shared = SharedSimulations(tmp_path, FULL, None, Execution(executor, 60.0, progress=False))
+    _ = shared.study, shared.strokes
     for learner in (one for learners in learned for one in learners.values()):
         assert (learner.bank == ":memory:") == (not near)
         assert learner.timeout == 60.0
@@ -226,15 +226,15 @@ class Grid:
 def test_liquids_that_stick_are_simulated_elsewhere_but_kept_here(tmp_path, monkeypatch):
     found = []
 
-    def here(out, runs, scale, number, means):
-        found.append((runs, means))
+    def here(out, runs, scale, number, execution):
+        found.append((runs, execution))
         return Stuck(sticky.draw_sticky(number, scale.seed), [0.0] * 4, "")
 
-    monkeypatch.setattr(shared, "spilled_where_it_sticks", here)
-    shop = SharedSimulations(tmp_path, FULL, None, MEANS)
-    shop.begin_sticky()
-    assert len(shop.sticky) == FULL.sticky
-    assert found == [(shop.runs, MEANS)] * FULL.sticky
+    monkeypatch.setattr(shared_simulations, "spilled_where_it_sticks", here)
+    shared = SharedSimulations(tmp_path, FULL, None, EXECUTION)
+    shared.begin_sticky()
+    assert len(shared.sticky) == FULL.sticky
+    assert found == [(shared.runs, EXECUTION)] * FULL.sticky
 
 
 def test_a_learner_gives_up_a_simulation_that_takes_too_long():
