@@ -79,7 +79,7 @@ def test_conclusions_are_those_of_the_truths_and_a_failed_one_is_none(pooled):
     truths = draw_truths(1, seed=0)
     with inference.SimulationBank() as bank, ThreadPoolExecutor(2) as pool:
         tasks, learner = Tasks(truths, None, bank), Failing(truths.seed[2])
-        means = Execution(pool if pooled else None, progress=False)
+        execution = Execution(pool if pooled else None, progress=False)
         found = conclusions(learner, "stub", tasks, execution)
     assert found[2] is None
     for at in (0, 1, 3, 4):

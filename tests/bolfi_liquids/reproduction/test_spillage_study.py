@@ -100,8 +100,8 @@ def test_chosen_pours_are_simulated_where_calibrations_are(monkeypatch):
 
     monkeypatch.setattr(study, "execute", recorded)
     with inference.SimulationBank() as bank, ThreadPoolExecutor(2) as pool:
-        means = Execution(pool, timeout=60.0, progress=False)
-        study.spillage_study({"signal": Learner("signal")}, bank, Grid(), SCALE, means)
+        execution = Execution(pool, timeout=60.0, progress=False)
+        study.spillage_study({"signal": Learner("signal")}, bank, Grid(), SCALE, execution)
     assert [(one.executor, one.timeout) for one in kept] == [(pool, 60.0)]
 
 
