@@ -139,7 +139,7 @@ class Fit:
     def simulations(self) -> "xr.Dataset":
         """Every simulation in the order told: theta, seed, round, discrepancy, failed, error,
         signal."""
-        from .tree import simulations_dataset
+        from .arviz_tree import simulations_dataset
 
         return simulations_dataset(self.prior, self.history)
 
@@ -207,7 +207,7 @@ class Fit:
 
         Returns:
             DataTree in ArviZ's schema, draws in the parameters' own units, with R-hat, effective
-            sample sizes and Monte Carlo errors; `inference.tree` describes its groups and
+            sample sizes and Monte Carlo errors; `inference.arviz_tree` describes its groups and
             attributes. Opens in ArviZ 0.23 and 1.x, also from `to_netcdf`.
 
         Raises:
@@ -224,7 +224,7 @@ class Fit:
                 "sampling needs chains >= 2, draws >= 4, warmup >= 1 and extend >= 1, "
                 f"got chains={chains}, draws={draws}, warmup={warmup}, extend={extend}"
             )
-        from .tree import add_surrogate, finished, results_tree
+        from .arviz_tree import add_surrogate, finished, results_tree
 
         started = time.perf_counter()
         length = Length(chains, warmup, draws)

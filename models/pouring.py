@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .coefficients import acting_in, liquid_sets, with_adhesion
 from .cups import Cups
 from .effect import Effect
+from .effect_coefficients import acting_in, liquid_sets, with_adhesion
 from .fluid import runtime
 from .fluid.checks import check_numbers
 from .fluid.faults import faulty

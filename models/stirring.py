@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .coefficients import acting_in, changed_rig, changed_signal, liquid_sets, with_adhesion
 from .effect import Effect
+from .effect_coefficients import acting_in, changed_rig, changed_signal, liquid_sets, with_adhesion
 from .fluid import runtime
 from .fluid.faults import faulty
 from .fluid.liquid import Liquid

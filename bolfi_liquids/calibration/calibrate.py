@@ -149,7 +149,7 @@ def _calibrate(
     execution: Execution,
 ) -> None:
     from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES, check_by_simulation
-    from .tree import results_tree, write_tree
+    from .posterior_file import results_tree, write_tree
 
     note_timeout(run, execution.timeout)
     needed = settings.budget + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES

@@ -35,7 +35,7 @@ class Calibration:
 
     Attributes:
         path: The RUN directory.
-        tree: posterior.nc, in ArviZ's schema; the groups are listed in `calibration.tree`.
+        tree: posterior.nc, in ArviZ's schema; the groups are listed in `calibration.posterior_file`.
         record: run.toml: settings, versions, seed and hashes.
         summary: The section "calibrate" of summary.json.
     """
@@ -68,7 +68,7 @@ class Calibration:
         Raises:
             InputError: There is none in the directory, or it was not finished.
         """
-        from .tree import read_tree
+        from .posterior_file import read_tree
 
         run = Path(run)
         record = read_run(run)

@@ -33,13 +33,13 @@ from ..run.directory import SIMULATIONS, enter_run
 from ..run.provenance import LIBRARIES, versions
 from ..run.workers import open_workers
 from ..seeds import Phase, generator, simulation_seeds
+from .sbc_file import SurrogateCheck, checked, write_results
 from .sbc_pipelines import (
     SAMPLING,
     Calibrate,
     CameraNoise,
     FromBank,
 )
-from .sbc_tree import SurrogateCheck, checked, write_results
 
 if TYPE_CHECKING:
     from ..inference import Prior

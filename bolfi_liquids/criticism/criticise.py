@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..calibration.posterior_file import write_tree
 from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, stirring_of
-from ..calibration.tree import write_tree
 from ..errors import InputError
 from ..inputs.open import Source
 from ..inputs.pour_table import PourTable
@@ -23,6 +23,7 @@ from .baseline import (
     usual_elsewhere,
     usual_for,
 )
+from .criticism_file import criticism_tree
 from .findings import Findings
 from .inputs import Given, Inputs, Pours, open_inputs
 from .pours import as_prior, pour_experiment
@@ -35,7 +36,6 @@ from .stirs import (
     stir_experiment,
 )
 from .summary import CriticismSummary
-from .tree import criticism_tree
 
 if TYPE_CHECKING:
     from .. import inference

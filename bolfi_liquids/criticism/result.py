@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..calibration.posterior_file import read_tree
 from ..calibration.result import Calibration
-from ..calibration.tree import read_tree
 from ..drawing import given_or_shown
 from ..errors import InputError
 from ..run.directory import CRITICISM, CRITICISM_FORMAT, Run, run_path
@@ -30,7 +30,7 @@ class Criticism:
 
     Attributes:
         base: The calibration that was criticised.
-        tree: criticism.nc; its groups are listed in `criticism.tree`.
+        tree: criticism.nc; its groups are listed in `criticism.criticism_file`.
         summary: The section "criticise" of summary.json.
     """
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibration.posterior_file import write_tree
 from ..calibration.result import Calibration
-from ..calibration.tree import write_tree
 from ..criticism.result import latest_calibration
 from ..errors import InputError
 from ..inputs.cups import cups_of
@@ -19,6 +19,7 @@ from ..progress import Advance, progress_bar
 from ..run.directory import POUR, Run, open_bank
 from ..run.workers import open_workers
 from ..seeds import Phase, simulation_seeds
+from .pour_file import pour_tree
 from .result import Judged, Pour, PourSummary
 from .spillage import (
     MAX_LANDING_SDS,
@@ -31,7 +32,6 @@ from .spillage import (
     pour_all,
     surface,
 )
-from .tree import pour_tree
 
 if TYPE_CHECKING:
     from ..inference.simulations import Keep, Workers

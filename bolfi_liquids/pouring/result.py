@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration.tree import read_tree
+from ..calibration.posterior_file import read_tree
 from ..errors import InputError
 from ..inputs.settings import PourSettings
 from ..run.directory import POUR

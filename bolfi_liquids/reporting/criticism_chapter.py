@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..calibration.posterior_file import read_tree
 from ..calibration.result import Calibration
 from ..calibration.summary import CalibrationSummary
-from ..calibration.tree import read_tree
 from ..criticism.effect_figures import (
     any_fitted,
     coefficient_plot,

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration.tree import read_tree, write_tree
+from ..calibration.posterior_file import read_tree, write_tree
 from ..criticism.result import latest_calibration
 from ..inputs.cups import kept_cups
 from ..inputs.prior import split_parameters

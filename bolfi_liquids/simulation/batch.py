@@ -12,7 +12,7 @@ from ..inputs.described_liquid import Described
 from ..progress import Simulate
 from ..run.time_limit import TimeLimited
 from ..run.workers import open_workers
-from .film import failures_raised
+from .movies import failures_raised
 
 if TYPE_CHECKING:
     from ..inference.simulations import Workers

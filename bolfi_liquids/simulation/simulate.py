@@ -30,7 +30,7 @@ from ..inputs.recording import Recording, Trajectory
 from ..run.time_limit import TimeLimited
 from .batch import Where, batch_of, simulated
 from .files import check_targets, pour_dataset, stir_dataset
-from .film import film_pour, film_stir
+from .movies import film_pour, film_stir
 
 if TYPE_CHECKING:
     from xarray import Dataset

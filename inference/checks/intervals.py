@@ -10,9 +10,9 @@ from scipy.stats import beta, binom
 
 from ..prior import Prior
 from ..types import Simulator
-from .repeat import made_or_given
-from .replicate import Pipeline
-from .replicated import Quantity, Replicates
+from .finished_replicates import Quantity, Replicates
+from .many_replicates import made_or_given
+from .one_replicate import Pipeline
 from .table import table
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from ..simulations.runner import Keep, check_keep, run_missing
 from ..sobol import sobol
 from ..surrogates.families import resolve
 from ..types import Simulator, SingleSimulator
-from .replicate import LogDensity
+from .one_replicate import LogDensity
 
 Options = Mapping[str, Any]
 

@@ -10,10 +10,10 @@ from scipy.stats import kstest
 from ..prior import Prior
 from ..types import Simulator
 from . import bands
+from .finished_replicates import Replicates
+from .many_replicates import made_or_given
+from .one_replicate import Pipeline
 from .ranks import quantiles, to_ranks
-from .repeat import made_or_given
-from .replicate import Pipeline
-from .replicated import Replicates
 from .table import table
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..simulations.database import opened_database
-from .replicate import Replicate
+from .one_replicate import Replicate
 
 MARK = 0x424C4652  # "BLFR"
 SCHEMA = """

@@ -11,10 +11,10 @@ from scipy.stats import chisquare
 from ..prior import Prior
 from ..types import Simulator
 from . import bands
+from .finished_replicates import LOG_DENSITY, Quantity, Replicates
+from .many_replicates import made_or_given
+from .one_replicate import Pipeline
 from .ranks import bin_count, to_ranks
-from .repeat import made_or_given
-from .replicate import Pipeline
-from .replicated import LOG_DENSITY, Quantity, Replicates
 from .table import table
 
 if TYPE_CHECKING:

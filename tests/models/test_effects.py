@@ -7,7 +7,7 @@ import numpy as np
 import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference.distributions import Univariate
-from bolfi_liquids.models.coefficients import acting_in, changed_signal
+from bolfi_liquids.models.effect_coefficients import acting_in, changed_signal
 from jax import random
 
 from bolfi_liquids import models

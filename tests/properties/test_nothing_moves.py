@@ -102,7 +102,7 @@ def run_with_a_pour(tmp_path):
 
     from xarray import DataTree
 
-    from bolfi_liquids.calibration.tree import write_tree
+    from bolfi_liquids.calibration.posterior_file import write_tree
     from bolfi_liquids.inputs.cups import bundled_cups
     from bolfi_liquids.pouring.result import ActionSummary, PourSummary
 

@@ -7,9 +7,9 @@ import pytest
 import xarray as xr
 from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 
+from bolfi_liquids.criticism.criticism_file import _effects, _posterior
 from bolfi_liquids.criticism.findings import Findings
 from bolfi_liquids.criticism.pour_noise import REPEATABILITY_SD, SIMULATOR_ERROR_SD, PourNoise
-from bolfi_liquids.criticism.tree import _effects, _posterior
 from bolfi_liquids.inputs.settings import CriticismSettings
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bolfi_liquids as bl
-from bolfi_liquids.calibration.tree import write_tree
+from bolfi_liquids.calibration.posterior_file import write_tree
 from bolfi_liquids.criticism.criticise import _learned_from
 from bolfi_liquids.criticism.result import finished_criticism, is_criticised, latest_calibration
 from bolfi_liquids.drawing import new_figure

@@ -11,8 +11,8 @@ from multiprocessing import get_context
 import pytest
 
 import bolfi_liquids as bl
+from bolfi_liquids.calibration.posterior_file import write_tree
 from bolfi_liquids.calibration.summary import ParameterSummary
-from bolfi_liquids.calibration.tree import write_tree
 from bolfi_liquids.pouring.result import ActionSummary, PourSummary
 from bolfi_liquids.reporting import criticism_sentences, frames, sentences
 from bolfi_liquids.reporting.report import prior_text

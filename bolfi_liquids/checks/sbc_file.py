@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..calibration.tree import write_tree
+from ..calibration.posterior_file import write_tree
 from ..drawing import new_figure, styled, write_figure
 
 if TYPE_CHECKING:

@@ -20,8 +20,8 @@ from ..prior import Prior
 from ..progress import progress_bar
 from ..simulations.executors import Workers, open_executor
 from ..types import Simulator
-from .replicate import Observe, Pipeline, Plan, Replicate, run_replicate
-from .replicated import Replicates
+from .finished_replicates import Replicates
+from .one_replicate import Observe, Pipeline, Plan, Replicate, run_replicate
 from .store import ReplicateStore
 
 BLOCK = 256  # truths are made in blocks of one shape, so that JAX seldom compiles

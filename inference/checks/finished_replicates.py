@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 
 from ..prior import Prior
+from .one_replicate import Replicate, as_theta
 from .ranks import quantiles
-from .replicate import Replicate, as_theta
 
 LOG_DENSITY = "log_density"
 
