@@ -35,7 +35,7 @@ class Calibration:
 
     Attributes:
         path: The RUN directory.
-        tree: posterior.nc, in ArviZ's schema; the groups are listed in `calibration.posterior_file`.
+        tree: posterior.nc, in ArviZ's schema; groups as in `calibration.posterior_file`.
         record: run.toml: settings, versions, seed and hashes.
         summary: The section "calibrate" of summary.json.
     """
