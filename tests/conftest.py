@@ -28,6 +28,15 @@ def pytest_configure(config):
         os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
 
 
+RUNS = {"calibration", "pour", "frames"}  # fixtures that simulate
+
+
+def pytest_collection_modifyitems(items):
+    """What simulates comes first: of two workers one then compiles the kernels, not both."""
+    models = Path(__file__).parent / "models"
+    items.sort(key=lambda item: not (RUNS & set(item.fixturenames) or models in item.path.parents))
+
+
 @pytest.fixture(autouse=True)
 def _figures_are_closed():
     yield

@@ -38,6 +38,7 @@ def test_pending_points_are_not_asked_again(prior, observed, simulate):
     assert distances.min() > 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:run-to-run noise")  # six runs show but one of two components
 def test_told_in_any_order_and_from_elsewhere(prior, observed, simulate):
     engine = inference.Bolfi(prior, observed)
@@ -93,6 +94,7 @@ def test_failed_runs_count_and_teach_nothing(prior, observed, simulate):
     assert fit.best == other.fit().best
 
 
+@pytest.mark.slow
 def test_rescaling_a_parameter_changes_nothing(observed, simulate):
     def run(scale):
         prior = inference.Prior(

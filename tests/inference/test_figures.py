@@ -8,6 +8,8 @@ import pytest
 
 from bolfi_liquids import inference
 
+pytestmark = pytest.mark.slow  # one fit compiles for ten seconds
+
 
 @pytest.fixture
 def fit(simulate, prior, observed):
@@ -23,7 +25,6 @@ def test_the_search_is_drawn_round_by_round(fit):
     assert least[-1, 1] == fit.closest.discrepancy and (np.diff(least[:, 1]) <= 0).all()
 
 
-@pytest.mark.slow
 def test_what_was_observed_is_drawn_with_its_prediction(fit, observed):
     """A 90 % band holds the 30 samples; less than 20 of them with a chance of 5e-4."""
     (ax,) = fit.plot_predictive()

@@ -76,6 +76,7 @@ def test_linear_and_angular_momentum_are_kept(run):
             assert np.linalg.norm(turning - before[1]) < 1e-4 * np.linalg.norm(before[1])
 
 
+@pytest.mark.slow
 def test_a_cube_becomes_a_quiet_ball(run):
     start = block(8, 8, 8)
     positions, velocities = run(start, 0.05, [0.0, *COHESIONS], 3.0)

@@ -154,6 +154,7 @@ def test_a_pour_takes_what_a_stir_taught(pour):
         pour({"wind": 1.0})
 
 
+@pytest.mark.slow
 def test_an_effect_from_outside_acts_like_a_built_in_one(stir, register):
     """One in the rig (the gripper is raised at the end) and one in the sensor (a gain)."""
 

@@ -158,6 +158,7 @@ def test_dry_friction_takes_the_same_angle_from_every_swing(setup):
         np.testing.assert_allclose(-np.diff(peaks), 2 * tau / stiffness, rtol=0.01, atol=own)
 
 
+@pytest.mark.slow
 def test_dry_friction_holds_a_stick_that_leans_little(setup):
     """It stops at an angle below τ/k, and stays there but for rounding."""
     stiffness = setup.stick.mass * GRAVITY * setup.stick.length / 2

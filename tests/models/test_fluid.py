@@ -14,6 +14,7 @@ from bolfi_liquids import models
 DENSITY = 1000.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("viscosity", [pytest.param(0.1, marks=pytest.mark.slow), 1.0])
 def test_viscosity_damps_a_shear_wave_as_its_number_says(viscosity):
     """u_x = cos(k y) decays at the rate ν k², in a block that repeats along x and y.
@@ -47,6 +48,7 @@ def test_viscosity_damps_a_shear_wave_as_its_number_says(viscosity):
     assert measured / expected == pytest.approx(1.0, abs=1 / 6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "numerics",
     [models.Numerics(), pytest.param(models.PUBLISHED_DRAG, marks=pytest.mark.slow)],

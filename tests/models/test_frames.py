@@ -92,6 +92,7 @@ def test_what_is_in_the_source_in_the_end_is_what_landings_retain(cups):
     assert inside.mean() == pytest.approx(landed.retained[0])
 
 
+@pytest.mark.slow
 def test_nothing_comes_back_from_below_the_rim(oil, cups):
     frames = models.pour_frames(PourBatch(oil, RATE, cups, [2], PARTICLES))
     present = np.isfinite(frames.position).all(axis=-1).sum(axis=1)

@@ -45,6 +45,7 @@ def test_every_particle_is_somewhere(cups):
     assert result.retained[2] > result.retained[0]
 
 
+@pytest.mark.slow
 def test_same_bits_again_and_anywhere_in_a_batch(cups):
     rows = [(180, 1.0), (120, 2.0), (150, 3.0)]
     seeds = np.array([1, 2, 3])

@@ -114,6 +114,7 @@ def test_a_submerged_stick_is_buoyed_as_archimedes_says(glycerin, numerics, tole
     assert abs(np.mean(across) - expected) < tolerance * expected + 3.0 * error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [pytest.param(0.1, marks=pytest.mark.slow), 0.8])
 def test_no_particle_is_ever_outside_the_cup(water, speed, monkeypatch):
     """Looked at after every other substep of the first strokes, also of a violent stir."""

@@ -75,6 +75,7 @@ def test_cubes_become_balls(swinging_drops):
     assert roundness.min() > 0.95
 
 
+@pytest.mark.slow
 def test_drops_swing_at_rayleighs_frequency(swinging_drops):
     """Of any size and tension, though the radius is only four to five particles."""
     _, measured, rayleigh = swinging_drops

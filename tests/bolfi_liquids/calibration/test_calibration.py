@@ -151,6 +151,7 @@ def test_plots_draw_in_axes_that_are_given_or_in_their_own(calibration, plot, sh
     assert all(axes.has_data() for axes in given.flat)
 
 
+@pytest.mark.slow
 def test_what_the_bank_holds_beside_stirs_is_not_counted(
     short_recording, calibration, settings, pour, tmp_path, capsys
 ):

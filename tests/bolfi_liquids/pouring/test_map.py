@@ -62,6 +62,7 @@ def test_no_pour_is_made_twice(made):
     assert made[1] == POURS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("viscosity", [0.01, 0.1, 1.0, 10.0])
 def test_expected_spillage_is_that_of_the_pours(made, viscosity):
     spillage = made[0]

@@ -92,6 +92,7 @@ def test_a_prior_is_written_as_in_python(described, text):
     assert prior_text(described) == text
 
 
+@pytest.mark.slow
 def test_report_shows_the_priors(calibration):
     text, _ = read(bl.report(calibration.path, moving=False))
     for described in calibration.record["settings"]["prior"].values():
@@ -218,6 +219,7 @@ def criticised(calibration, criticism_summary, tmp_path, made, made_from):
     return run
 
 
+@pytest.mark.slow
 def test_page_shows_the_criticism_before_the_pour(criticised, criticism_summary):
     page = bl.report(criticised, moving=False).read_text(encoding="utf-8")
     assert page.count(f"<strong>{criticism_sentences.verdict_sentence(criticism_summary)}") == 2

@@ -2,6 +2,7 @@
 
 import numpy as np
 import numpyro.distributions as dist
+import pytest
 
 from bolfi_liquids import inference
 from bolfi_liquids.inputs.settings import MIN_SIMULATIONS, PAPER_RULES
@@ -21,6 +22,7 @@ def engine():
                            surrogate="discrepancy", **PAPER_RULES)  # fmt: skip
 
 
+@pytest.mark.slow
 def test_each_budget_concludes_from_as_many_simulations():
     fits = list(after_each(engine(), line, (5, 9, 12)))
     assert [fit.simulations.sizes["simulation"] for fit in fits] == [5, 9, 12]

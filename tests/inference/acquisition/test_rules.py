@@ -129,6 +129,7 @@ def test_batches_differ_stay_in_the_box_and_repeat_with_the_key(name):
     assert not np.allclose(batch, RULES[name]()(jax.random.key(1), surrogate, 4, runs))
 
 
+@pytest.mark.slow
 def test_draws_follow_the_posterior():
     """All-draws rule against the likelihood on a grid: means within 5 standard errors."""
     surrogate = fitted(40, noise=0.1)

@@ -35,6 +35,7 @@ def explained():
     return [judged(number, acts=1.0) for number in range(SETS)]
 
 
+@pytest.mark.slow
 def test_the_right_explanation_passes(explained):
     """But for the share that the floor sacrifices, and for what few runs get wrong."""
     assert np.mean([holds([one]) for one in explained]) > 2.0 * NOISE_QUANTILE - 1.0 - 0.02

@@ -13,6 +13,8 @@ from scipy.stats import binom, chi2, norm
 
 from bolfi_liquids import inference
 
+pytestmark = pytest.mark.slow  # one fit compiles for ten seconds
+
 ALPHA = 1e-4  # false alarms per test
 EMULATORS, RUNS = 20, 8
 LEVEL = 0.05
@@ -58,7 +60,6 @@ def alarms(hypotheses, spread):
     return count
 
 
-@pytest.mark.slow
 def test_a_coarse_emulators_error_is_reckoned_with(coarse):
     """Without it a right model would be refused in half of all cases."""
     limit = binom.isf(ALPHA, EMULATORS, LEVEL)

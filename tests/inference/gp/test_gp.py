@@ -72,6 +72,7 @@ def test_marginal_likelihood_agrees_with_scipy(rows, hyper):
     np.testing.assert_allclose(value, expected, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_padding_changes_nothing(rows, hyper):
     u, y = rows
     answers = []

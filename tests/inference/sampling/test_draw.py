@@ -76,6 +76,7 @@ def assert_means(values, truth):
     assert (z < norm.ppf(1 - ALPHA / (2 * z.size))).all(), z
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sampler", ["nuts", "emcee"])
 @pytest.mark.parametrize("d", [1, *(pytest.param(d, marks=pytest.mark.slow) for d in (2, 4))])
 def test_moments_of_a_correlated_gaussian(sampler, d):
@@ -115,6 +116,7 @@ def test_agrees_with_quadrature_on_a_banana(sampler):
     assert_means(made.chains.u, cells.mean())
 
 
+@pytest.mark.slow
 def test_a_posterior_at_the_border_and_an_open_direction():
     """Half a Gaussian of sd 0.02 at u = 0, and nothing known of the other parameter."""
     made = sample("nuts", one(np.array([0.0, 0.5]), np.diag([1 / 0.02, 1e-3])))

@@ -46,6 +46,7 @@ def populations(state, d):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("d", "sd"),
     [
@@ -81,6 +82,7 @@ def test_weights_of_distant_modes(d, sd):
         assert abs(log_evidence) < 0.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [1, 6])
 def test_without_any_information_it_is_the_prior(d):
     """A Gaussian a hundred boxes wide."""

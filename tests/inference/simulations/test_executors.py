@@ -102,6 +102,7 @@ def test_spawned_processes_that_load_no_jax(prior, observed, by_hand, worker_sid
     assert_same(fit, by_hand)
 
 
+@pytest.mark.slow
 def test_dask_by_its_client_and_by_its_address(prior, observed, simulate, by_hand):
     local = {"processes": False, "n_workers": 1, "threads_per_worker": 2, "protocol": "tcp://"}
     with LocalCluster(**local, dashboard_address=None) as cluster:

@@ -107,6 +107,7 @@ def test_correlated_noise_widens_the_posterior(design):
     assert np.mean(correlations) > 0.5
 
 
+@pytest.mark.slow
 def test_the_simulators_own_noise_is_learned_and_not_counted_twice(design, noise):
     """Observed is one output of a noisy simulator: exact with SD once, not sqrt(2) SD."""
     u = np.concatenate([design, design[:4]])
@@ -237,6 +238,7 @@ def test_what_does_nothing_has_no_trend(monkeypatch, fades):
     assert (change < np.exp(NOISE[0])) == fades
 
 
+@pytest.mark.slow
 def test_runs_that_no_parameter_predicts_leave_the_prior(design):
     rng = np.random.default_rng(0)
     found = learned(design, noisy_outputs(design, rng, 0.0), noisy_outputs(design, rng, 0.0)[0])

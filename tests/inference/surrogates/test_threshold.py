@@ -17,6 +17,7 @@ U = sobol(0, 0, 12, 2)
 DELTA = 1.0 + ((U - 0.4) ** 2).sum(-1)
 
 
+@pytest.mark.slow
 def test_agrees_with_scipy_with_the_noise_in_sigma():
     fitted = learn(U, DELTA, ROWS, "identity")
     u = np.array([0.8, 0.3])
