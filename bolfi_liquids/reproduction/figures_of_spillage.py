@@ -67,7 +67,7 @@ def spillage(shared: SharedSimulations) -> Drawn:
 
 
 def _against_budget(axes: "Axes", spilled: "DataArray", way: tuple[str, str], at: int) -> None:
-    """Execution, with 90 % intervals, side by side for those that are compared."""
+    """Means, with 90 % intervals, side by side for those that are compared."""
     percent = 100.0 * spilled.transpose("budget", "truth").to_numpy()
     means, ends = percent.mean(axis=1), np.array([interval(row) for row in percent])
     x = np.arange(len(means)) + 0.06 * (at - (len(SHOWN_LEARNERS) - 1) / 2)

@@ -32,7 +32,7 @@ def extend(gp: GP, data: Data) -> GP:
 
 
 def predict(gp: GP, u: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    """Execution and variances [k, n] of the latent functions at u [n, d].
+    """Means and variances [k, n] of the latent functions at u [n, d].
 
     In batches as long as the data's arrays, so that one shape is compiled.
 

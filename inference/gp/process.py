@@ -147,7 +147,7 @@ def _cross(gp: GP, u: jax.Array) -> tuple[jax.Array, jax.Array]:
 
 
 def predict(gp: GP, u: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Execution and variances [k] of the latent functions (without noise) at u [d]."""
+    """Means and variances [k] of the latent functions (without noise) at u [d]."""
     mean, variance = predict_many(gp, u[None])
     return mean[:, 0], variance[:, 0]
 

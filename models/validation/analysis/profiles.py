@@ -12,7 +12,7 @@ from scipy.optimize import minimize_scalar
 
 
 class Profile(NamedTuple):
-    """Execution of particles in bins, all [n]; bins without particles are left out.
+    """Means of particles in bins, all [n]; bins without particles are left out.
 
     Attributes:
         at: Mean coordinate of the particles in the bin.
