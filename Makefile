@@ -12,6 +12,7 @@ SUPPORTED := import sys, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2]
 SELECTED := $(if $(filter slow,$(ALSO)),,not slow and )not minutes and not gpu and not hardware and not benchmark
 # tests that must keep time have the computer for themselves, the others share its processors
 ALONE := (punctual or alone)
+ALONE_IN := tests/hardware tests/properties
 SHARED := -n logical --maxprocesses 4 --dist worksteal
 
 PEERS := .venv-peers
@@ -48,7 +49,7 @@ browser: setup
 
 test: setup
 	$(BIN)/pytest $(SHARED) --durations 20 -m "$(SELECTED) and not $(ALONE)"
-	$(BIN)/pytest --durations 20 -m "$(SELECTED) and $(ALONE)"
+	$(BIN)/pytest --durations 20 -m "$(SELECTED) and $(ALONE)" $(ALONE_IN)
 
 test-long: setup
 	$(BIN)/pytest -m minutes

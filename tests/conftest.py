@@ -28,13 +28,19 @@ def pytest_configure(config):
         os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
 
 
-RUNS = {"calibration", "pour", "frames"}  # fixtures that simulate
+SIMULATED = {"calibration", "pour", "frames"}  # fixtures of the application
+SIMULATING = ("models", "simulation")  # folders of tests
 
 
 def pytest_collection_modifyitems(items):
     """What simulates comes first: of two workers one then compiles the kernels, not both."""
-    models = Path(__file__).parent / "models"
-    items.sort(key=lambda item: not (RUNS & set(item.fixturenames) or models in item.path.parents))
+    items.sort(key=lambda item: not _simulates(item))
+
+
+def _simulates(item):
+    folders = item.path.relative_to(Path(__file__).parent).parts
+    application = folders[0] == "bolfi_liquids" and bool(SIMULATED & set(item.fixturenames))
+    return application or any(one in SIMULATING for one in folders)
 
 
 @pytest.fixture(autouse=True)

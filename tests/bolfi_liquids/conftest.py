@@ -21,6 +21,7 @@ from bolfi_liquids.run.directory import CRITICISM_FORMAT
 BUNDLED = Path(str(files("bolfi_liquids.data"))) / "glycerin_v10.nc"
 SHORT = 60  # samples, 2 s: the pause and the first strokes
 SETTINGS = {"budget": 8, "batch": 2, "particles": 200, "seed": 3}
+POUR_SETTINGS = {"iterations": 5, "draws": 2}
 
 
 @pytest.fixture
@@ -82,9 +83,15 @@ def pour(calibration, tmp_path_factory):
 
     def choose(run):
         shutil.copytree(calibration.path, run)
-        bl.choose_pour(run, iterations=7, draws=4, progress=False)
+        bl.choose_pour(run, progress=False, **POUR_SETTINGS)
 
     return bl.Pour.open(made_once(tmp_path_factory, "poured", choose))
+
+
+@pytest.fixture(scope="session")
+def pour_settings():
+    """Of `pour`."""
+    return POUR_SETTINGS
 
 
 @pytest.fixture(scope="session")

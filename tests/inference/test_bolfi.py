@@ -53,6 +53,7 @@ def test_told_in_any_order_and_from_elsewhere(prior, observed, simulate):
     np.testing.assert_array_equal(runs["round"], [0, 0, 0, 0, -1, -1])
 
 
+@pytest.mark.slow
 def test_foreign_simulations_replace_the_start_design(prior, observed, simulate):
     engine = inference.Bolfi(prior, observed, initial=8)
     own = prior.sample(jax.random.key(0), 12)
@@ -156,6 +157,7 @@ def test_an_acquisition_is_called_in_float64(prior, observed, simulate):
     assert seen == [np.float64]
 
 
+@pytest.mark.slow
 def test_a_discrepancy_may_compare_unlike_shapes(prior):
     engine = inference.Bolfi(
         prior, [0.5], discrepancy=lambda seen, runs: float(abs(runs.mean() - seen[0]))

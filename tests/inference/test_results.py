@@ -9,6 +9,8 @@ from arviz_stats.base import array_stats
 
 from bolfi_liquids import inference
 
+pytestmark = pytest.mark.slow  # one fit with NUTS compiles for ten seconds
+
 GROUPS = {
     "posterior",
     "prior",

@@ -93,6 +93,7 @@ def test_a_cube_becomes_a_quiet_ball(run):
         assert np.sqrt((velocity**2).sum(axis=1).mean()) < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("viscosity", [0.003, 0.05])
 def test_small_drops_neither_evaporate_nor_collapse(run, viscosity):
     positions, _ = run(block(3, 3, 3), viscosity, COHESIONS, 3.0)

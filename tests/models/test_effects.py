@@ -177,6 +177,7 @@ def test_an_effect_from_outside_acts_like_a_built_in_one(stir, register):
     np.testing.assert_array_equal(stir({"gain": 2.0, "lift": [0.0, 0.03, 0.0]}), 2.0 * lifted)
 
 
+@pytest.mark.slow
 def test_a_stir_that_diverged_stays_nan_behind_every_sensor(stir):
     liquid = models.Liquid([0.1, 3e38, 0.1], 0.0, 1000.0)
     sensors = {n: coefficient(n) for n, e in models.EFFECTS.items() if e.acts_in == "sensor"}

@@ -179,6 +179,7 @@ def test_friction_damps_in_liquid_too(setup, short):
     assert np.abs(held).max() == 0.0
 
 
+@pytest.mark.slow
 def test_room_for_more_is_no_part_of_the_physics(setup, short, monkeypatch):
     liquid, seeds = models.Liquid(0.1, 0.3, 1000.0), np.arange(4)
     levels = np.array([0.004, -0.003, 0.0, 0.012])

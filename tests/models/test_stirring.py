@@ -166,6 +166,7 @@ def test_liquid_at_rest_stays_at_rest(water, cohesion):
     assert np.abs(np.degrees(signal)).max() < 1.0
 
 
+@pytest.mark.slow
 def test_the_inclination_tells_liquids_apart_as_another_solver_does(glycerin, water):
     viscosity = np.array([1e-3, 0.1, 1.0])  # of water, oil and glycerin
     for recording, truth in ((glycerin, 2), (water, 0)):

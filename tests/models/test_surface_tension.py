@@ -82,6 +82,7 @@ def test_drops_swing_at_rayleighs_frequency(swinging_drops):
     np.testing.assert_allclose(measured / rayleigh, 1.0, atol=0.1)
 
 
+@pytest.mark.slow
 def test_frequency_rises_as_the_root_of_the_tension(swinging_drops):
     _, measured, _ = swinging_drops
     np.testing.assert_allclose(measured[2:] / measured[:2], 2.0, rtol=0.1)

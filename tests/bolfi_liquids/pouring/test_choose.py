@@ -136,9 +136,9 @@ def test_section_is_of_the_pour(pour, calibration):
     assert bl.Calibration.open(pour.path).summary == calibration.summary  # left as it was
 
 
-def test_choosing_again_simulates_nothing(pour, calibration):
+def test_choosing_again_simulates_nothing(pour, pour_settings):
     before = rows(pour.path)
-    again = bl.choose_pour(calibration, iterations=7, draws=4, progress=False)
+    again = bl.choose_pour(pour.path, **pour_settings, progress=False)
     assert rows(pour.path) == before
     np.testing.assert_array_equal(again.chosen.fractions, pour.chosen.fractions)
 

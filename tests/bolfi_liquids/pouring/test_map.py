@@ -78,6 +78,7 @@ def test_expected_spillage_is_that_of_the_pours(made, viscosity):
     assert there.mean() - truth.min() < spillage.error.rms
 
 
+@pytest.mark.slow
 def test_one_outcome_in_twenty_exceeds_the_bound(made):
     spillage, rng = made[0], np.random.default_rng(2)
     above, count = 0, 0

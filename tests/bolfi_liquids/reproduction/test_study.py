@@ -29,6 +29,7 @@ def test_each_budget_concludes_from_as_many_simulations():
     assert abs(fits[-1].best["x"] - 0.3) < 0.05
 
 
+@pytest.mark.slow
 def test_to_look_changes_nothing_where_batches_end_alike():
     rarely, often = (
         list(after_each(engine(), line, budgets))[-1] for budgets in ((12,), (4, 8, 12))

@@ -105,6 +105,7 @@ def test_a_pour_is_what_the_simulator_returns():
     assert alone["spilled"].item() == made["spilled"][1].item()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("executor", [None, Elsewhere()])
 def test_what_goes_wrong_is_an_error_wherever_it_is_simulated(tmp_path, executor):
     out = tmp_path / "stir.nc"

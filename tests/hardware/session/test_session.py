@@ -194,6 +194,7 @@ def begin(session):
     time.sleep(0.8)
 
 
+@pytest.mark.slow
 @keeps_time
 def test_a_path_that_breaks_a_limit_is_not_ordered(emulator, tmp_path):
     with armed(emulator, tmp_path) as session:

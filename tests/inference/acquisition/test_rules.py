@@ -70,6 +70,7 @@ def test_jitter_is_a_truncated_normal():
     assert kstest(points, truncnorm(-0.2, 9.8, loc=0.02, scale=0.1).cdf).pvalue < 1e-4
 
 
+@pytest.mark.slow
 def test_jitter_keeps_points_off_the_bounds():
     """The least discrepancy lies in a corner, where every minimiser ends."""
     u = sobol(0, 0, 9, 2)
@@ -142,6 +143,7 @@ def test_draws_follow_the_posterior():
     assert (np.abs(drawn.mean(0) - mean) < 5.0 * sd / np.sqrt(60.0)).all()
 
 
+@pytest.mark.slow
 def test_expected_variance_prefers_where_a_run_teaches():
     """Beside many runs at one point, another there resolves next to nothing."""
     centre = np.array([0.4, 0.4])
@@ -153,6 +155,7 @@ def test_expected_variance_prefers_where_a_run_teaches():
     assert np.linalg.norm(chosen - centre) > 0.05
 
 
+@pytest.mark.slow
 def test_regions_where_runs_fail_are_avoided():
     surrogate = fitted(24, noise=0.05)
     good = np.asarray(surrogate.gp.data.u)[:24]

@@ -42,6 +42,7 @@ def test_the_right_explanation_passes(explained):
     assert all(one.lpd_gain > 0.0 for one in explained)
 
 
+@pytest.mark.slow
 def test_what_noise_leaves_is_foretold(explained):
     """In root mean square: of AR(1) noise, one more run, and the mean of few runs."""
     left = np.array([one.after for one in explained])
@@ -76,6 +77,7 @@ def test_a_smaller_gap_alone_proves_nothing():
     assert not any(holds([one]) for one in found)
 
 
+@pytest.mark.slow
 def test_an_explanation_that_predicts_the_same_gains_nothing():
     """However well both fit."""
     found = [judged(number, acts=0.0, after=0.0) for number in range(SETS)]

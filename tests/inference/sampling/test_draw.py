@@ -89,6 +89,7 @@ def test_moments_of_a_correlated_gaussian(sampler, d):
     assert (z_scores(u + 0.3 * 0.03, np.full(d, 0.45)) > 5.0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sampler", ["nuts", "emcee"])
 @pytest.mark.parametrize("d", [1, *(pytest.param(d, marks=pytest.mark.slow) for d in (2, 4))])
 def test_shares_of_modes_that_no_path_connects(sampler, d):

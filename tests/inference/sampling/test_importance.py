@@ -47,9 +47,7 @@ def populations(state, d):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("d", "sd"), [(1, 0.003), (2, 0.1), (2, 0.003), (3, 0.003), (6, 0.1)]
-)
+@pytest.mark.parametrize(("d", "sd"), [(1, 0.003), (2, 0.1), (2, 0.003), (3, 0.003), (6, 0.1)])
 def test_moments_and_evidence_of_a_correlated_gaussian(d, sd):
     """At least 200 effective points: means to 0.3 sd and sds to 25 %, over 4 errors of 0.07
     and 0.05; a population that stopped a temperature too early is twice as wide. The
@@ -63,6 +61,7 @@ def test_moments_and_evidence_of_a_correlated_gaussian(d, sd):
         assert abs(log_evidence) < 0.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("d", "sd"), [(1, 0.02), (2, 0.02), pytest.param(6, 0.05, marks=pytest.mark.slow)]
 )

@@ -37,6 +37,7 @@ def test_jacobian_and_inverse_are_that_of_the_transform():
         np.testing.assert_allclose(g.inverse(g(x)), x)
 
 
+@pytest.mark.slow
 def test_a_discrepancy_of_zero_stays_finite():
     values = np.array([0.0, 0.2, 0.4, 1.0, 3.0, 2.0])
     for g in candidates(None, values):

@@ -152,6 +152,7 @@ def test_likelihood_and_gradient_are_finite_everywhere(design, noise):
         assert all(np.isfinite(part).all() for part in parts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1e-6, 1e6])
 def test_the_outputs_unit_changes_nothing(design, noise, factor):
     observed = outputs(np.array([[0.4, 0.6]]))[0] + noise
@@ -250,6 +251,7 @@ def test_runs_that_no_parameter_predicts_leave_the_prior(design):
     np.testing.assert_allclose(drawn.std(0)[5:-5], expected[5:-5], rtol=0.6)
 
 
+@pytest.mark.slow
 def test_predictions_cover_new_runs(design):
     """90 % intervals over 40 new points and all samples; binomial over points, 1e-4."""
     u = sobol(1, 0, 40, 2)
