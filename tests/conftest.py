@@ -30,15 +30,24 @@ def pytest_configure(config):
 
 SIMULATED = {"calibration", "pour", "frames"}  # fixtures of the application
 SIMULATING = ("models", "simulation")  # folders of tests
+ALONE_IN = ("hardware", "properties")  # where Makefile looks for tests that have the computer alone
 
 
 def pytest_collection_modifyitems(items):
     """What simulates comes first: of two workers one then compiles the kernels, not both."""
     items.sort(key=lambda item: not _simulates(item))
+    for item in items:
+        alone = item.get_closest_marker("alone") or item.get_closest_marker("punctual")
+        if alone and _folders(item)[0] not in ALONE_IN:
+            raise pytest.UsageError(f"{item.nodeid}: `make test` would miss it, see ALONE_IN")
+
+
+def _folders(item):
+    return item.path.relative_to(Path(__file__).parent).parts
 
 
 def _simulates(item):
-    folders = item.path.relative_to(Path(__file__).parent).parts
+    folders = _folders(item)
     application = folders[0] == "bolfi_liquids" and bool(SIMULATED & set(item.fixturenames))
     return application or any(one in SIMULATING for one in folders)
 

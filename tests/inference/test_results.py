@@ -122,7 +122,6 @@ def test_how_it_was_made_is_at_the_root(tree):
     assert {"seconds_simulator", "seconds_engine", "seconds_sampling"} < set(tree.attrs)
 
 
-@pytest.mark.slow
 def test_each_simulation_has_a_row_of_checks(simulate, prior, observed):
     """The third run fails and the fifth blows up: nothing is learned from these."""
     engine = inference.Bolfi(prior, observed, surrogate="signal")
