@@ -50,7 +50,8 @@ def test_a_failure_is_repeated_once_and_seldom(tmp_path, disturbed, tests, failu
     (tmp_path / "conftest.py").write_text((Path(__file__).parent / "conftest.py").read_text())
     (tmp_path / "pytest.ini").write_text("[pytest]\n")
     text = TESTS.format(disturbed=disturbed, tests=tests, failures=failures)
-    (tmp_path / "test_punctual.py").write_text(text)
+    (tmp_path / "hardware").mkdir()
+    (tmp_path / "hardware" / "test_punctual.py").write_text(text)
     command = [sys.executable, "-m", "pytest", "-p", "no:randomly", str(tmp_path)]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60.0)
     assert done.returncode == code, done.stdout + done.stderr
