@@ -118,7 +118,7 @@ def test_what_was_lucky_with_the_first_draws_alone_is_not_chosen(
     assert pour.chosen.expected_spillage == pytest.approx(0.2)
 
 
-def test_section_is_of_the_pour(pour, calibration):
+def test_section_is_of_the_pour(pour, calibration, pour_settings):
     section = json.loads((pour.path / "summary.json").read_text())["pour"]
     assert section["expected_spillage"] == pytest.approx(pour.chosen.fractions[:, 0].mean())
     assert section["spillage_q95"] == pytest.approx(np.quantile(pour.chosen.fractions[:, 0], 0.95))
@@ -133,7 +133,9 @@ def test_section_is_of_the_pour(pour, calibration):
     finalists = xr.load_datatree(pour.path / "pour.nc")["finalists"]
     rates = finalists["angular_velocity"].to_numpy()
     assert np.isclose(rates, pour.plug_in.angular_velocity).any()
-    assert section["n_simulations"] == 7 * (4 + 4) + 4 * len(finalists["angular_velocity"]) + 2 * 8
+    iterations, draws = pour_settings["iterations"], pour_settings["draws"]
+    tried, again = iterations * (draws + 4), draws * len(finalists["angular_velocity"])
+    assert section["n_simulations"] == tried + again + 2 * (2 * draws)
     assert bl.Calibration.open(pour.path).summary == calibration.summary  # left as it was
 
 
