@@ -47,6 +47,7 @@ def test_discrepancies_and_views_fit_the_data(task):
     assert task.noise is None or task.noise.shape == (view.shape[1],) * 2
 
 
+@pytest.mark.slow
 def test_scores_of_the_likelihood_average_to_zero_and_vary_by_the_information(task):
     """At the truth, over data sets: E s = 0 and E s s' = -E H (first and second Bartlett identity).
 

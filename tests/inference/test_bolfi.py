@@ -80,6 +80,7 @@ def test_a_copy_teaches_nothing(prior, observed, simulate):
     assert engine.succeeded == 18
 
 
+@pytest.mark.slow
 def test_failed_runs_count_and_teach_nothing(prior, observed, simulate):
     engine = inference.Bolfi(prior, observed)
     theta = engine.ask(6)

@@ -230,6 +230,7 @@ def check_predictive(of):
 MEMBERS = [name for name in vars(base.Surrogate) if not name.startswith("_")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("member", MEMBERS)
 def test_a_surrogate_keeps_its_protocol(learned, member):
     """A member without a check fails here."""

@@ -250,6 +250,7 @@ def test_interruption_keeps_what_has_finished(tmp_path, registry, calls):
     assert run(tmp_path, registry).ran == ()
 
 
+@pytest.mark.slow
 def test_a_killed_check_goes_on(tmp_path):
     """SIGKILL in the second case; the first is not run again, the second is."""
     script = tmp_path / "check.py"

@@ -12,6 +12,7 @@ DISTANCE = np.array([0.01, 0.03, 0.04, 0.02, -0.01])
 DENSITY = 1000.0
 
 
+@pytest.mark.slow
 def test_each_pour_spills_what_it_spills_alone():
     cups, seeds = bundled_cups(), np.array([3, 5])
     theta = {"viscosity": np.array([0.01, 1.0]), "cohesion": np.array([0.2, 0.7])}

@@ -85,6 +85,7 @@ def test_chapter_of_an_effect_that_was_named(criticism_summary, made, calibrated
     assert chapter["pours"] is None
 
 
+@pytest.mark.slow
 def test_chapter_of_a_tie_says_what_to_record_next(criticism_summary, made, calibrated):
     gap = replace(criticism_summary.gap, held_out_before=None, held_out_after=None)
     tied = replace(criticism_summary, **TIED, gap=gap)
@@ -105,6 +106,7 @@ def test_next_experiment_that_would_not_help_is_not_recommended(criticism_summar
     assert CIRCLES.snr < sentences.DETECTABLE_SNR < STAR.snr
 
 
+@pytest.mark.slow
 def test_chapter_of_an_explanation_that_held_out_data_refute(criticism_summary, made, calibrated):
     status = [EffectStatus.REFUTED, EffectStatus.REJECTED, EffectStatus.REJECTED]
     tree = made(after=False, held=False, status=status)

@@ -62,6 +62,7 @@ def test_report_is_one_file_with_every_figure(pour):
         assert label in text, figure
 
 
+@pytest.mark.slow
 def test_report_shows_the_runs_numbers(pour, calibration):
     text, _ = read(bl.report(pour.path, moving=False))
     summary = calibration.summary
@@ -121,6 +122,7 @@ def test_a_report_says_where_its_pictures_are_simulated(unseen, monkeypatch):
     assert seen == [(pool, 60.0, 60.0, False)]
 
 
+@pytest.mark.slow
 def test_pictures_that_take_too_long_leave_nothing(unseen):
     with pytest.raises(RuntimeError, match="moving=False"):
         bl.report(unseen, timeout=1e-9, progress=False)
@@ -159,6 +161,7 @@ def test_report_without_a_pour_says_how_to_get_one(calibration, tmp_path):
     assert page.figures == len(FIGURES) - 1
 
 
+@pytest.mark.slow
 def test_file_names_are_escaped(calibration, tmp_path):
     run = tmp_path / "run"
     shutil.copytree(calibration.path, run)

@@ -110,6 +110,7 @@ def test_second_moment_agrees_with_the_bivariate_normal():
     np.testing.assert_allclose(np.exp(log_variance)[near], expected[near], rtol=0.03, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_moments_are_finite_however_far_the_threshold():
     for threshold in (-1e3, -1e8, -1e30, 1e30):
         first, variance = log_moments(fitted(noise=0.1, rule=threshold), GRID[::40])

@@ -136,6 +136,7 @@ def test_thinning_repairs_autocorrelated_draws(run):
         assert np.min(p_values) > ALPHA / len(p_values)
 
 
+@pytest.mark.slow
 def test_draws_too_few_to_tell_are_not_passed_in_silence(run):
     """Chains of correlation 0.999 hardly move: whoever believes them is told, twice over."""
     stuck = {"correlation": 0.999, "shape": (2, 250)}

@@ -169,6 +169,7 @@ def test_coordinates_of_a_prior_that_fades_out_are_its_normal_scores(rows, hyper
         assert np.isfinite(part).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("used", [12, *(pytest.param(n, marks=pytest.mark.slow) for n in (40, 64))])
 def test_density_and_its_gradient_agree_with_jax(used):
     """Over one block, part of a second, and two whole ones."""

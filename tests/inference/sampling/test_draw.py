@@ -226,6 +226,7 @@ def test_divergences_are_not_silent(monkeypatch):
     assert [*made.found] == [Status.DIVERGENT] and "5." in made.status
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sampler", ["nuts", "emcee", "quadrature"])
 def test_a_likelihood_that_is_nowhere_finite_is_an_error(sampler):
     with pytest.raises(ValueError, match="finite nowhere"):
@@ -263,6 +264,7 @@ def test_independent_draws_pass_the_limits(chains, draws):
         assert all(short(apart + rng.normal(size=(chains, draws))) for _ in range(20))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sampler", ["nuts", "emcee", "quadrature"])
 def test_a_fit_agrees_with_its_quadrature(line_fit, sampler):
     tree = line_fit.sample(sampler, seed=2)

@@ -128,6 +128,7 @@ def options(executor):
     return {"budget": BUDGET, "initial": INITIAL, "executor": executor, **flying}
 
 
+@pytest.mark.slow
 def test_one_in_flight_is_one_per_round(prior, observed, simulate):
     given = {"budget": 7, "initial": 5, "batch": 1}
     plain = inference.fit(simulate, prior, observed, **given)
@@ -136,6 +137,7 @@ def test_one_in_flight_is_one_per_round(prior, observed, simulate):
     assert_same(plain, spread)
 
 
+@pytest.mark.slow
 def test_an_executor_has_the_bits_of_none(prior, observed, simulate):
     given = {"budget": 8, "initial": 5, "batch": 3}
     plain = inference.fit(simulate, prior, observed, **given)

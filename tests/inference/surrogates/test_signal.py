@@ -264,6 +264,7 @@ def test_predictions_cover_new_runs(design):
     np.testing.assert_allclose(drawn.mean(0), mean[0], atol=5.0 * sd[0].max() / 20.0)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:run-to-run noise")
 def test_the_engine_repeats_points_until_it_knows_the_noise():
     prior = inference.Prior({"a": dist.Uniform(0.0, 1.0), "b": dist.Uniform(0.0, 1.0)})
