@@ -1,6 +1,7 @@
 """Pours as a simulator that can be criticised."""
 
 import numpy as np
+import pytest
 
 from bolfi_liquids import models
 from bolfi_liquids.criticism.pours import Pouring
