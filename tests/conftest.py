@@ -9,6 +9,11 @@ from threading import Event, Thread
 import pytest
 from _pytest.runner import runtestprotocol
 
+APPLICATION = "bolfi_liquids"
+POURED = {"pour", "frames"}  # its fixtures that take a minute where nothing is compiled yet
+SIMULATED = {"calibration", *POURED}
+SIMULATING = ("models", "simulation")  # folders of tests
+ALONE_IN = ("hardware", "properties")  # where Makefile looks for tests that have the computer alone
 MOST_REPEATS = 3  # of a session; with more of them, tests hide what fails
 CALM, MOST_CALM = 1.0, 30.0  # s, without a stall before a repetition; and waited for at most
 REPEATED = pytest.StashKey[list[str]]()
@@ -28,15 +33,13 @@ def pytest_configure(config):
         os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
 
 
-SIMULATED = {"calibration", "pour", "frames"}  # fixtures of the application
-SIMULATING = ("models", "simulation")  # folders of tests
-ALONE_IN = ("hardware", "properties")  # where Makefile looks for tests that have the computer alone
-
-
+@pytest.hookimpl(tryfirst=True)  # before tests are selected by their markers
 def pytest_collection_modifyitems(items):
     """What simulates comes first: of two workers one then compiles the kernels, not both."""
     items.sort(key=lambda item: not _simulates(item))
     for item in items:
+        if POURED & set(item.fixturenames) and _folders(item)[0] == APPLICATION:
+            item.add_marker("slow")
         alone = item.get_closest_marker("alone") or item.get_closest_marker("punctual")
         if alone and _folders(item)[0] not in ALONE_IN:
             raise pytest.UsageError(f"{item.nodeid}: `make test` would miss it, see ALONE_IN")
@@ -48,7 +51,7 @@ def _folders(item):
 
 def _simulates(item):
     folders = _folders(item)
-    application = folders[0] == "bolfi_liquids" and bool(SIMULATED & set(item.fixturenames))
+    application = folders[0] == APPLICATION and bool(SIMULATED & set(item.fixturenames))
     return application or any(one in SIMULATING for one in folders)
 
 

@@ -188,6 +188,7 @@ def test_data_far_from_every_simulation_are_told(prior, observed, simulate, shif
     assert not any("outside" in said for said in fit.warnings)
 
 
+@pytest.mark.slow
 def test_a_fit_on_a_few_of_many_says_so(prior, observed, simulate):
     def fragile(theta, seeds):
         return np.where(theta["slope"][:, None] > 0.3, np.nan, simulate(theta, seeds))

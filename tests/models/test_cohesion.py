@@ -9,6 +9,8 @@ from scipy.spatial import cKDTree
 
 from bolfi_liquids import models
 
+pytestmark = pytest.mark.slow  # kernels compile for ten seconds and more
+
 SPACING = 0.006
 DENSITY = 1000.0
 COHESIONS = (0.1, 0.5, 1.0)
@@ -61,7 +63,6 @@ def drops(points, spacing=SPACING):
     return np.bincount(connected_components(near)[1])
 
 
-@pytest.mark.slow
 def test_linear_and_angular_momentum_are_kept(run):
     """In 50 steps at speeds of 5 cm/s, up to the rounding of float32."""
     points = block(5, 6, 7)
@@ -76,7 +77,6 @@ def test_linear_and_angular_momentum_are_kept(run):
             assert np.linalg.norm(turning - before[1]) < 1e-4 * np.linalg.norm(before[1])
 
 
-@pytest.mark.slow
 def test_a_cube_becomes_a_quiet_ball(run):
     start = block(8, 8, 8)
     positions, velocities = run(start, 0.05, [0.0, *COHESIONS], 3.0)
@@ -93,7 +93,6 @@ def test_a_cube_becomes_a_quiet_ball(run):
         assert np.sqrt((velocity**2).sum(axis=1).mean()) < 0.01
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("viscosity", [0.003, 0.05])
 def test_small_drops_neither_evaporate_nor_collapse(run, viscosity):
     positions, _ = run(block(3, 3, 3), viscosity, COHESIONS, 3.0)
@@ -113,7 +112,6 @@ def test_stronger_cohesion_breaks_a_column_into_larger_drops(run):
     assert 1.5 * sizes[0] < sizes[2] < 0.5 * len(start)
 
 
-@pytest.mark.slow
 def test_cohesion_draws_a_poured_stream_together(cups):
     """What falls from a fast pour is in larger pieces, and in a narrower stream."""
     cohesion, seeds = np.array([0.0, 0.0, 1.0, 1.0]), np.array([0, 1, 0, 1])
@@ -144,7 +142,6 @@ def test_cohesion_draws_a_poured_stream_together(cups):
     assert width[2:].max() < 0.9 * width[:2].min()
 
 
-@pytest.mark.slow
 def test_a_bar_contracts_towards_a_ball(run):
     start = block(5, 5, 20)
     positions, _ = run(start, 0.05, COHESIONS, 6.0)

@@ -246,6 +246,7 @@ def test_the_registry_takes_only_new_effects(register):
         wind.neutral = 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

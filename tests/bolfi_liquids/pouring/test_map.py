@@ -92,6 +92,7 @@ def test_one_outcome_in_twenty_exceeds_the_bound(made):
     assert above / count < 0.05
 
 
+@pytest.mark.slow
 def test_errors_are_those_of_pours_that_were_left_out(made):
     error = made[0].error
     assert error.pours == POURS // 8

@@ -15,6 +15,8 @@ from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.described_liquid import DENSITY, POUR_PARTICLES, STIR_PARTICLES
 from bolfi_liquids.inputs.recording import Trajectory
 
+pytestmark = pytest.mark.slow  # kernels compile for ten seconds and more
+
 SHORT = hardware.motion.star(speed=0.2, height=0.235, radius=0.02, points=5, rest=0.2)
 FEW = {"particles": 120, "progress": False}
 PLANES = ("inclination_xz", "inclination_yz")
@@ -76,7 +78,6 @@ def test_a_simulated_stir_is_a_recording(tmp_path):
     assert read.number("liquid_density") == bundled_recording("glycerin").number("liquid_density")
 
 
-@pytest.mark.slow
 def test_patterns_have_names_and_a_rig_may_be_another():
     star = bl.simulate_stir(path="star", particles=100, progress=False)
     expected = hardware.motion.star(
@@ -87,7 +88,6 @@ def test_patterns_have_names_and_a_rig_may_be_another():
     assert np.abs(heavy["inclination_xz"]).max() < np.abs(star["inclination_xz"]).max()
 
 
-@pytest.mark.slow
 def test_a_pour_is_what_the_simulator_returns():
     action = {"angular_velocity": 2.0, "distance": 0.03}
     made = bl.simulate_pour([0.01, 1.0], 0.2, density=1100.0, seed=3, **action, **FEW)
@@ -105,7 +105,6 @@ def test_a_pour_is_what_the_simulator_returns():
     assert alone["spilled"].item() == made["spilled"][1].item()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("executor", [None, Elsewhere()])
 def test_what_goes_wrong_is_an_error_wherever_it_is_simulated(tmp_path, executor):
     out = tmp_path / "stir.nc"
@@ -125,7 +124,6 @@ def test_what_is_not_finite_is_an_error_though_nobody_warned(monkeypatch, simula
         simulate(**FEW)
 
 
-@pytest.mark.slow
 def test_a_stick_that_is_weighed_anew_replaces_what_the_recording_says(dataset, tmp_path):
     density = dataset.attrs.pop("stick_density")
     radius, length = (dataset.attrs[f"stick_{size}"] for size in ("radius", "length"))

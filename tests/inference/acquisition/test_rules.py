@@ -173,6 +173,7 @@ def test_regions_where_runs_fail_are_avoided():
         assert away > towards, name
 
 
+@pytest.mark.slow
 def test_scores_of_the_user_choose_among_candidates():
     surrogate = fitted()
     best = best_candidates(

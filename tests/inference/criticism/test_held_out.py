@@ -7,6 +7,8 @@ from bolfi_liquids.inference.criticism.held_out import NOISE_QUANTILE, gap, hold
 from bolfi_liquids.inference.criticism.hypothesis import samples
 from scipy.stats import binom, norm
 
+pytestmark = pytest.mark.slow  # the engine compiles for seconds for each shape
+
 ALPHA = 1e-4  # false alarms per test
 SETS, RUNS, N = 100, 8, 60
 NOISE = criticism.AutoregressiveNoise(np.array([0.2]), np.array([0.6]))
@@ -35,14 +37,12 @@ def explained():
     return [judged(number, acts=1.0) for number in range(SETS)]
 
 
-@pytest.mark.slow
 def test_the_right_explanation_passes(explained):
     """But for the share that the floor sacrifices, and for what few runs get wrong."""
     assert np.mean([holds([one]) for one in explained]) > 2.0 * NOISE_QUANTILE - 1.0 - 0.02
     assert all(one.lpd_gain > 0.0 for one in explained)
 
 
-@pytest.mark.slow
 def test_what_noise_leaves_is_foretold(explained):
     """In root mean square: of AR(1) noise, one more run, and the mean of few runs."""
     left = np.array([one.after for one in explained])
@@ -77,7 +77,6 @@ def test_a_smaller_gap_alone_proves_nothing():
     assert not any(holds([one]) for one in found)
 
 
-@pytest.mark.slow
 def test_an_explanation_that_predicts_the_same_gains_nothing():
     """However well both fit."""
     found = [judged(number, acts=0.0, after=0.0) for number in range(SETS)]

@@ -9,6 +9,8 @@ from bolfi_liquids.inference.sampling.importance import explore
 from bolfi_liquids.inference.sampling.mixture import fit_mixture, log_density, to_unit
 from scipy.special import logsumexp
 
+pytestmark = pytest.mark.slow  # the engine compiles for seconds for each shape
+
 SEEDS = 5
 
 
@@ -46,7 +48,6 @@ def populations(state, d):
     return found
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("d", "sd"), [(1, 0.003), (2, 0.1), (2, 0.003), (3, 0.003), (6, 0.1)])
 def test_moments_and_evidence_of_a_correlated_gaussian(d, sd):
     """At least 200 effective points: means to 0.3 sd and sds to 25 %, over 4 errors of 0.07
@@ -61,10 +62,7 @@ def test_moments_and_evidence_of_a_correlated_gaussian(d, sd):
         assert abs(log_evidence) < 0.3
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("d", "sd"), [(1, 0.02), (2, 0.02), pytest.param(6, 0.05, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("d", "sd"), [(1, 0.02), (2, 0.02), (6, 0.05)])
 def test_weights_of_distant_modes(d, sd):
     """Half a box or more apart: no path leads from one to the other. At least 400 effective
     points: shares to 0.02, tested to 4 times that."""
@@ -73,7 +71,6 @@ def test_weights_of_distant_modes(d, sd):
         assert abs(log_evidence) < 0.3
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("d", [1, 6])
 def test_without_any_information_it_is_the_prior(d):
     """A Gaussian a hundred boxes wide."""

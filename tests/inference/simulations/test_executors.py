@@ -146,6 +146,7 @@ def test_an_executor_has_the_bits_of_none(prior, observed, simulate):
     assert_same(plain, spread)
 
 
+@pytest.mark.slow
 def test_in_flight_no_executor_has_the_bits_of_one(prior, observed, simulate, by_hand):
     assert_same(inference.fit(simulate, prior, observed, **options(None)), by_hand)
 

@@ -6,6 +6,8 @@ from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.discrepancy import learn, marginalised, with_threshold
 from bolfi_liquids.inference.surrogates.transform import Transform, candidates
 
+pytestmark = pytest.mark.slow  # the engine compiles for seconds for each shape
+
 ROWS = 64
 
 
@@ -37,7 +39,6 @@ def test_jacobian_and_inverse_are_that_of_the_transform():
         np.testing.assert_allclose(g.inverse(g(x)), x)
 
 
-@pytest.mark.slow
 def test_a_discrepancy_of_zero_stays_finite():
     values = np.array([0.0, 0.2, 0.4, 1.0, 3.0, 2.0])
     for g in candidates(None, values):
@@ -130,7 +131,6 @@ def test_a_run_that_blew_up_does_not_drown_the_others():
     assert np.abs(fitted.minimum() - 0.4).max() < 0.15
 
 
-@pytest.mark.slow
 def test_marginalised_hyperparameters_widen_what_few_points_leave_open():
     u = sobol(0, 0, 7, 1)
     values = 1.0 + 3.0 * (u[:, 0] - 0.4) ** 2 + 0.2 * np.random.default_rng(1).normal(size=7)

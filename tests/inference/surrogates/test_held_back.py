@@ -12,6 +12,8 @@ from bolfi_liquids.inference.surrogates.held_back import MIN_FIRST_RUNS, held_ba
 from bolfi_liquids.inference.surrogates.warnings import held_back_warnings
 from scipy.stats import binom
 
+pytestmark = pytest.mark.slow  # the engine compiles for seconds for each shape
+
 TIME = np.linspace(0.0, 2.0, 40)
 NOISE = 0.03
 COMPONENTS = 8
@@ -39,7 +41,6 @@ def errors(u, outputs, predicted=0.3):
     return held_back(emulate(u, outputs, scale, Limits(COMPONENTS, 64)), scale, predicted)
 
 
-@pytest.mark.slow
 def test_a_smooth_simulator_hardly_ever_surprises():
     """A rate of 5 % is refuted at 5 %: no more than one alarm of 100 fits. At the nominal 1 % there
     would be more one time in four."""
@@ -50,7 +51,6 @@ def test_a_smooth_simulator_hardly_ever_surprises():
     assert binom.cdf(alarms, 100, 0.05) < 0.05
 
 
-@pytest.mark.slow
 def test_innovations_are_errors_of_one_run_after_another():
     """Conditioning on each new run in turn, by the plain formulae."""
     u, _ = gathered(0)

@@ -18,6 +18,8 @@ from scipy.stats import binom, multivariate_normal
 
 from bolfi_liquids import inference
 
+pytestmark = pytest.mark.slow  # the engine compiles for seconds for each shape
+
 TIME = np.linspace(0.0, 1.0, 40)
 DESIGN = np.stack([TIME, np.ones_like(TIME), np.sin(9.0 * TIME)], axis=1)
 SD = 0.1
@@ -68,7 +70,6 @@ def noise():
     return np.random.default_rng(9).normal(0.0, SD, TIME.size)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("given", [SD, np.full(40, SD), SD**2 * np.eye(40)])
 def test_known_measurement_noise_gives_the_exact_posterior(design, noise, given):
     observed = outputs(np.array([[0.4, 0.6]]))[0] + noise
@@ -76,7 +77,6 @@ def test_known_measurement_noise_gives_the_exact_posterior(design, noise, given)
     assert total_variation(posterior(found), exact(observed, SD**2 * np.eye(40))) < 0.05
 
 
-@pytest.mark.slow
 def test_estimated_measurement_noise_comes_near_it(design, noise):
     observed = outputs(np.array([[0.4, 0.6]]))[0] + noise
     found = learned(design, outputs(design), observed)
@@ -87,7 +87,6 @@ def test_estimated_measurement_noise_comes_near_it(design, noise):
     assert total_variation(posterior(bold), exact(observed, SD**2 * np.eye(40))) > 0.5
 
 
-@pytest.mark.slow
 def test_correlated_noise_widens_the_posterior(design):
     """AR(1) noise of correlation 0.9: on eight data sets far wider than if taken as white."""
     widths, correlations = [], []
@@ -107,7 +106,6 @@ def test_correlated_noise_widens_the_posterior(design):
     assert np.mean(correlations) > 0.5
 
 
-@pytest.mark.slow
 def test_the_simulators_own_noise_is_learned_and_not_counted_twice(design, noise):
     """Observed is one output of a noisy simulator: exact with SD once, not sqrt(2) SD."""
     u = np.concatenate([design, design[:4]])
@@ -120,7 +118,6 @@ def test_the_simulators_own_noise_is_learned_and_not_counted_twice(design, noise
     assert (np.abs(np.log(sd / expected)) < 0.25).all()
 
 
-@pytest.mark.slow
 def test_second_moment_agrees_with_sampling():
     u = sobol(0, 0, 6, 2)
     found = learned(u, outputs(u), outputs(np.array([[0.5, 0.5]]))[0], noise=0.5)
@@ -140,7 +137,6 @@ def test_second_moment_agrees_with_sampling():
     assert abs(second - sample.mean()) < 5.0 * sample.std() / np.sqrt(len(sample))
 
 
-@pytest.mark.slow
 def test_likelihood_and_gradient_are_finite_everywhere(design, noise):
     observed = outputs(np.array([[0.4, 0.6]]))[0] + noise
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0], [1.0, 1.0], [1e-12, 0.3]])
@@ -152,7 +148,6 @@ def test_likelihood_and_gradient_are_finite_everywhere(design, noise):
         assert all(np.isfinite(part).all() for part in parts)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1e-6, 1e6])
 def test_the_outputs_unit_changes_nothing(design, noise, factor):
     observed = outputs(np.array([[0.4, 0.6]]))[0] + noise
@@ -206,7 +201,6 @@ def marginals(seed):
     return np.stack([table.sum(0), table.sum(1)]), truth
 
 
-@pytest.mark.slow
 def test_a_parameter_that_does_nothing_keeps_its_prior():
     """Exactly, were the simulator known; were each noisy component emulated, total variation
     from the prior would be 0.65 on average."""
@@ -214,9 +208,7 @@ def test_a_parameter_that_does_nothing_keeps_its_prior():
     assert np.mean(apart) < 0.3
 
 
-@pytest.mark.parametrize(
-    "sets", [pytest.param(24, marks=pytest.mark.slow), pytest.param(60, marks=pytest.mark.minutes)]
-)
+@pytest.mark.parametrize("sets", [24, pytest.param(60, marks=pytest.mark.minutes)])
 def test_intervals_cover_beside_a_parameter_that_does_nothing(sets):
     """Of data sets, each with runs of its own; with each noisy component emulated 55 % of either
     parameter's 90 % intervals hold the truth, which 24 sets find in 83 % and 60 always."""
@@ -239,7 +231,6 @@ def test_what_does_nothing_has_no_trend(monkeypatch, fades):
     assert (change < np.exp(NOISE[0])) == fades
 
 
-@pytest.mark.slow
 def test_runs_that_no_parameter_predicts_leave_the_prior(design):
     rng = np.random.default_rng(0)
     found = learned(design, noisy_outputs(design, rng, 0.0), noisy_outputs(design, rng, 0.0)[0])
@@ -251,7 +242,6 @@ def test_runs_that_no_parameter_predicts_leave_the_prior(design):
     np.testing.assert_allclose(drawn.std(0)[5:-5], expected[5:-5], rtol=0.6)
 
 
-@pytest.mark.slow
 def test_predictions_cover_new_runs(design):
     """90 % intervals over 40 new points and all samples; binomial over points, 1e-4."""
     u = sobol(1, 0, 40, 2)
@@ -264,7 +254,6 @@ def test_predictions_cover_new_runs(design):
     np.testing.assert_allclose(drawn.mean(0), mean[0], atol=5.0 * sd[0].max() / 20.0)
 
 
-@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:run-to-run noise")
 def test_the_engine_repeats_points_until_it_knows_the_noise():
     prior = inference.Prior({"a": dist.Uniform(0.0, 1.0), "b": dist.Uniform(0.0, 1.0)})
@@ -333,7 +322,6 @@ def test_components_that_lean_towards_their_own_noise_do_not_steepen_the_emulato
     assert abs(np.mean(noise) - 1.0) < 0.1 + second_order
 
 
-@pytest.mark.slow
 def test_components_are_found_anew_where_what_they_came_from_changed():
     rng = np.random.default_rng(0)
     u = rng.uniform(size=(21, 1))
