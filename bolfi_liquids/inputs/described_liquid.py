@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from ..errors import InputError
+from ..numerals import parse_number
 from .settings import Particles, Seed, checked
 
 if TYPE_CHECKING:
@@ -103,7 +104,7 @@ def read_effects(given: Iterable[str], scene: str) -> dict[str, float]:
         name, _, value = (part.strip() for part in text.partition("="))
         where = f"--effect {text}"
         try:
-            number = float(value)
+            number = parse_number(value)
         except ValueError:
             number = np.nan
         if name not in EFFECTS:
