@@ -70,14 +70,14 @@ def kept(directory: Path) -> Iterator[None]:
     Raises:
         SessionStopped: It was stopped, or interrupted; the message says what is left.
     """
-    from ..hardware import SessionStopped
+    from ..hardware import SessionInterrupted, SessionStopped
 
     try:
         yield
     except SessionStopped as err:
         raise SessionStopped(f"{err}; {_left(directory)}") from None
     except KeyboardInterrupt:
-        raise SessionStopped(f"interrupted, the arm was stopped; {_left(directory)}") from None
+        raise SessionInterrupted(f"interrupted, the arm was stopped; {_left(directory)}") from None
 
 
 def _left(directory: Path) -> str:
