@@ -53,9 +53,11 @@ def pivot(robot_time, duration):
 
 
 def inclination(robot_time):
-    """Of the stick [rad], shape (T, 2)."""
+    """Of the stick [rad], shape (T, 2): it hangs until the gripper has begun to stir."""
     t = np.asarray(robot_time, dtype=float)
-    return np.stack([0.15 * np.sin(4.0 * t + 0.3), 0.12 * np.cos(2.7 * t)], axis=-1)
+    share = np.sin(0.5 * np.pi * np.clip((t - WAY) / 2.0, 0.0, 1.0))[..., None] ** 4
+    swing = np.stack([0.15 * np.sin(4.0 * t + 0.3), 0.12 * np.cos(2.7 * t)], axis=-1)
+    return share * swing
 
 
 def frames_of(view, until, duration, rng, rate=30.0):
