@@ -18,7 +18,7 @@ MIN_SPEED_SHARE = 0.2
 """Of the gripper's usual speed, above which it moves."""
 MAX_NOISE = np.radians(3.0)
 """Of an inclination [rad], where it is most of what there is."""
-MAX_NOISE_SHARE = 0.6
+MAX_NOISE_SHARE = 0.8
 """Of an inclination's standard deviation."""
 MAX_BEYOND_SHARE = 0.02
 """Of samples in which the stick may lean further than the cup lets it: mistakes of a camera."""

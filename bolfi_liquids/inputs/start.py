@@ -136,9 +136,10 @@ def _rests(recording: Recording, first: int) -> bool:
 def _within(
     recording: Recording, first: int, duration: float, values: NDArray
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Times since a sample [s], and whole rows of values, for so long after it."""
+    """Times since a sample [s], and whole rows of values, for so long after it, or for three."""
     time = recording.time[first:] - recording.time[first]
-    part = (time <= duration) & np.isfinite(values[first:]).all(axis=1)
+    part = time <= max(duration, *time[:3])
+    part &= np.isfinite(values[first:]).all(axis=1)
     return time[part], values[first:][part]
 
 

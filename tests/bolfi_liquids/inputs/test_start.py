@@ -121,3 +121,26 @@ def test_opening_refuses_it_and_reading_does_not(dataset, tmp_path):
 def test_bundled_recordings_open(liquid):
     with as_file(files("bolfi_liquids.data") / f"{liquid}_v10.nc") as path:
         bl.open_recording(path)
+
+
+@pytest.mark.parametrize("rate", [10.0, 60.0, 125.0])
+@pytest.mark.parametrize("liquid", RECORDED_LIQUIDS)
+def test_the_frame_rate_does_not_matter(liquid, rate):
+    recording = bundled_recording(liquid)
+    time = np.arange(recording.time[0], recording.time[-1], 1.0 / rate)
+
+    def at(values):
+        return np.stack([np.interp(time, recording.time, one) for one in values.T], axis=-1)
+
+    gripper = Trajectory(time, at(recording.gripper.position))
+    other = replace(recording, time=time, gripper=gripper, inclination=at(recording.inclination))
+    check_start(other)
+    with pytest.raises(bl.InputError, match="starts in motion"):
+        check_start(part(other, int(1.3 * rate)))
+
+
+def test_a_recording_that_was_cut_in_python_is_refused_before_anything_is_written(tmp_path):
+    late = part(bundled_recording("oil"), 40)
+    with pytest.raises(bl.InputError, match="starts in motion"):
+        bl.calibrate(late, out=tmp_path / "run")
+    assert not (tmp_path / "run").exists()
