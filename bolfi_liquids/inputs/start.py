@@ -18,6 +18,8 @@ FIRST_TIME = 0.15
 """Time from which the speed at the start is extrapolated [s]."""
 REST_TIME = 0.3
 """Time for which gripper and stick must stay where they are to be seen to rest [s]."""
+SETTLING_TIME = 0.3
+"""Time in which a gripper that has just come down may come to rest [s]: an arm lags its plan."""
 MAX_SPEED_SHARE = 0.1
 """Of the gripper's usual speed, up to which it starts from rest."""
 MAX_SWING = np.radians(1.5)
@@ -86,7 +88,8 @@ def _fault(
         return "z", f"starts with the stick in the air, {100.0 * above:.1f} cm above the liquid"
     speed, error = _first_speed(recording, first, still)
     if speed > max(MAX_SPEED_SHARE * fast, NOISE_FACTOR * error):
-        return "x, y, z", f"starts in motion: the gripper moves at {100 * speed:.1f} cm/s"
+        if _settled(recording, first) is None:
+            return "x, y, z", f"starts in motion: the gripper moves at {100 * speed:.1f} cm/s"
     lean, change = _lean(recording, first)
     rests, slack = _rests(recording, first), NOISE_FACTOR * noise
     steady = rests and (change < 0.5 * MAX_SWING + slack).all()
@@ -131,6 +134,13 @@ def _rests(recording: Recording, first: int) -> bool:
     still = max(map(noise_of, recording.gripper.position.T))
     moved = np.linalg.norm(position - position[:3].mean(axis=0), axis=1)
     return bool(moved.max() < max(2e-4, 2.0 * NOISE_FACTOR * still))
+
+
+def _settled(recording: Recording, first: int) -> int | None:
+    """First sample from which the gripper rests, soon after another one; None if it does not."""
+    later = recording.time[first:] - recording.time[first]
+    near = first + np.flatnonzero(later <= SETTLING_TIME)
+    return next((int(at) for at in near if _rests(recording, int(at))), None)
 
 
 def _within(

@@ -5,8 +5,9 @@ from bolfi_liquids.hardware import SessionStopped
 from typer.testing import CliRunner
 
 import bolfi_liquids as bl
+from bolfi_liquids import hardware
 from bolfi_liquids.cli.app import app
-from bolfi_liquids.robot.record import kept
+from bolfi_liquids.robot.record import finished, kept
 
 REASON = "protective stop at 2.6 s"
 
@@ -44,6 +45,19 @@ def test_a_complete_recording_has_none(recorded, tmp_path):
     recorded(status="complete", reason="the plan was carried out")
     result = run(tmp_path)
     assert (result.exit_code, result.stderr) == (0, "")
+
+
+def test_a_recording_that_was_aborted_too_early_to_be_used_is_aborted(
+    dataset, tmp_path, monkeypatch
+):
+    path = tmp_path / "recording.nc"
+    dataset.isel(time=slice(0, 9)).assign_attrs(status="aborted", reason=REASON).to_netcdf(path)
+    monkeypatch.setattr(hardware, "finalise", lambda _: path)
+    monkeypatch.setattr("bolfi_liquids.robot.record.record", lambda *_, out, **__: finished(out))
+    result = run(tmp_path)
+    assert result.exit_code == 3
+    (line,) = result.stderr.strip().splitlines()
+    assert REASON in line and "9 samples" in line
 
 
 @pytest.mark.parametrize(

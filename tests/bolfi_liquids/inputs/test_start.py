@@ -144,3 +144,13 @@ def test_a_recording_that_was_cut_in_python_is_refused_before_anything_is_writte
     with pytest.raises(bl.InputError, match="starts in motion"):
         bl.calibrate(late, out=tmp_path / "run")
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("liquid", RECORDED_LIQUIDS)
+def test_an_arm_that_has_just_come_down_is_no_motion(liquid):
+    """Recorders begin with the plan's rest, which an arm enters a tenth of a second late."""
+    late = lowered(bundled_recording(liquid), from_=-0.005)
+    at = int(2.0 * RATE)
+    check_start(part(late, at - 3))
+    with pytest.raises(bl.InputError, match="the gripper moves at"):
+        check_start(part(late, at - 15))
