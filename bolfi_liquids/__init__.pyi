@@ -2,6 +2,7 @@ from .calibration.calibrate import calibrate as calibrate
 from .calibration.result import Calibration as Calibration
 from .criticism.criticise import criticise as criticise
 from .criticism.result import Criticism as Criticism
+from .cut import trim as trim
 from .errors import InputError as InputError
 from .inputs.open import open_recording as open_recording
 from .inputs.pour_table import open_pours as open_pours

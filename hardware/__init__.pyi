@@ -18,6 +18,7 @@ from .session.emulated import EmulatedRig as EmulatedRig
 from .session.emulated import HiddenLiquid as HiddenLiquid
 from .session.emulated import emulated as emulated
 from .session.progress import Phase as Phase
+from .session.progress import SessionInterrupted as SessionInterrupted
 from .session.progress import SessionStopped as SessionStopped
 from .session.progress import Status as Status
 from .session.rig_check import check_rig as check_rig

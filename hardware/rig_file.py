@@ -22,7 +22,7 @@ def open_rig(path: str | Path) -> Rig:
     """
     path = Path(path)
     try:
-        written = tomllib.loads(path.read_text(encoding="utf-8"))
+        written = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, UnicodeDecodeError) as err:
         what = getattr(err, "strerror", None) or "not a text file"
         raise RigError(what, where=str(path), fix="give the path of a rig.toml") from err

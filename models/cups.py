@@ -16,19 +16,29 @@ from pydantic import (
 
 from .fluid.numerics import MODEL_VERSION, POUR_PARTICLES, Numerics
 
-
-def _in_metres(length: float) -> float:
-    if length > MAX_LENGTH:
-        raise ValueError(f"{length:g} m looks like millimetres; convert it to m")
-    return length
+MIN_LENGTH, MAX_RADIUS, MAX_HEIGHT = 1e-3, 0.25, 2.0  # [m] of cups that are poured by hand or arm
+MAX_DISTANCE = 0.5  # [m] from the lip to the receiver's axis
 
 
-MAX_LENGTH = 2.0  # [m]
-Metres = Annotated[float, Field(gt=0, allow_inf_nan=False), AfterValidator(_in_metres)]
-Offset = Annotated[float, Field(allow_inf_nan=False), AfterValidator(_in_metres)]
-Degrees = Annotated[float, Field(gt=0, le=180)]
-DegreesPerSecond = Annotated[float, Field(gt=0, le=3600)]
-Seconds = Annotated[float, Field(ge=0, le=60)]
+def _up_to(most: float) -> AfterValidator:
+    """A rule for lengths [m], which guesses at the unit of those that break it."""
+
+    def check(length: float) -> float:
+        if abs(length) > most:
+            unit = "millimetres" if abs(length) > 10.0 * most else "centimetres"
+            raise ValueError(f"{length:g} m looks like {unit}; convert it to m")
+        return length
+
+    return AfterValidator(check)
+
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Radius = Annotated[Number, Field(ge=MIN_LENGTH), _up_to(MAX_RADIUS)]
+Height = Annotated[Number, Field(ge=MIN_LENGTH), _up_to(MAX_HEIGHT)]
+Distance = Annotated[Number, _up_to(MAX_DISTANCE)]
+Degrees = Annotated[Number, Field(gt=0, le=180)]
+DegreesPerSecond = Annotated[Number, Field(gt=0, le=3600)]
+Seconds = Annotated[Number, Field(ge=0, le=60)]
 
 
 class _Section(BaseModel, frozen=True, extra="forbid"):
@@ -38,9 +48,9 @@ class _Section(BaseModel, frozen=True, extra="forbid"):
 class Source(_Section, frozen=True):
     """The cup that turns [m]; `fill` is the liquid's depth before the pour."""
 
-    radius: Metres
-    height: Metres
-    fill: Metres
+    radius: Radius
+    height: Height
+    fill: Height
 
     @model_validator(mode="after")
     def _holds_its_fill(self) -> "Source":
@@ -52,18 +62,18 @@ class Source(_Section, frozen=True):
 class Receiver(_Section, frozen=True):
     """The cup below [m]."""
 
-    radius: Metres
-    height: Metres
+    radius: Radius
+    height: Height
 
 
 class PourPlan(_Section, frozen=True):
     """How the source turns, and the range of the decision, in the units that people type."""
 
-    lip_height: Metres
+    lip_height: Height
     final_angle_deg: Degrees
     hold: Seconds
     angular_velocity_deg_s: tuple[DegreesPerSecond, DegreesPerSecond]
-    distance: tuple[Offset, Offset]
+    distance: tuple[Distance, Distance]
 
     @property
     def final_angle(self) -> float:
@@ -104,7 +114,7 @@ class Cups(_Section, frozen=True):
             FileNotFoundError: there is no such file.
         """
         try:
-            return cls.model_validate(tomllib.loads(Path(path).read_text(encoding="utf-8")))
+            return cls.model_validate(tomllib.loads(Path(path).read_text(encoding="utf-8-sig")))
         except tomllib.TOMLDecodeError as err:
             raise ValueError(f"{path}: not a TOML file: {err}") from err
         except UnicodeDecodeError as err:

@@ -16,6 +16,7 @@ from ..inputs.open import Source, open_recordings
 from ..inputs.prior import check_prior, default_prior, describe_prior
 from ..inputs.recording import Recording, aborted_recordings
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
+from ..inputs.start import check_start
 from ..progress import after_first, progress_bar
 from ..run.directory import (
     POSTERIOR,
@@ -244,6 +245,8 @@ def _open_all(recordings: Source | Sequence[Source]) -> list[Recording]:
     opened = open_recordings(recordings)
     if not opened:
         raise InputError("no recording given", where="recordings", fix="give at least one")
+    for recording in opened:
+        check_start(recording)  # of one that was made or cut in Python, too
     if len({recording.hash for recording in opened}) < len(opened):
         names = ", ".join(str(recording.path) for recording in opened)
         raise InputError("the same recording twice", where=names, fix="give each of them once")

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..files import write_text
+from ..numerals import load_json
 from ..run.provenance import versions
 
 if TYPE_CHECKING:
@@ -118,8 +119,8 @@ def read_record(out: Path, name: str) -> dict[str, Any] | None:
     if not path.exists():
         return None
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as err:
+        record = load_json(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as err:
         raise InputError(
             f"not JSON ({err})", where=str(path), fix="delete it to run it again"
         ) from err

@@ -14,6 +14,7 @@ from . import guide, import_table, reproduce
 from . import record as cli_record
 from . import rig as cli_rig
 from . import simulate as cli_simulate
+from . import trim as cli_trim
 from .compute import Compute
 from .errors import OneLineErrors
 from .examples import examples, session
@@ -225,6 +226,7 @@ def demo(
 # after the commands above, for the help lists them in this order
 app.command("import", epilog=import_table.EPILOG)(import_table.import_table)
 app.command(epilog=cli_record.EPILOG)(cli_record.record)
+app.command(epilog=cli_trim.EPILOG)(cli_trim.trim)
 app.command(epilog=reproduce.EPILOG)(reproduce.reproduce)
 app.command(epilog=guide.EPILOG)(guide.guide)
 app.add_typer(cli_simulate.app, name="simulate")

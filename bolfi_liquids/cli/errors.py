@@ -12,13 +12,28 @@ from typer.exceptions import TyperException
 
 FAILED = 1
 USAGE_ERROR = 2
+ABORTED = 3  # something ended a recording early; what there is was kept
 INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+
+
+class Aborted(RuntimeError):
+    """A recording was ended early, and what there is was kept.
+
+    Args:
+        reason: What ended it.
+        status: Of the command.
+    """
+
+    def __init__(self, reason: str, status: int = ABORTED):
+        super().__init__(reason)
+        self.status = status
 
 
 class OneLineErrors(TyperGroup):
     """A command group that turns expected errors into one line on stderr.
 
     The exit code is 2 for what a person gave and can mend, and 1 for simulations that failed.
+    One that records has 3 for a recording that was aborted.
     """
 
     def invoke(self, ctx: Any) -> Any:
@@ -39,7 +54,13 @@ class OneLineErrors(TyperGroup):
             if ctx.params.get("debug"):
                 traceback.print_exc()
             _say(f"error: {_explained(err)}")
-            raise typer.Exit(FAILED if isinstance(err, RuntimeError) else USAGE_ERROR) from None
+            raise typer.Exit(_status(err)) from None
+
+
+def _status(err: Exception) -> int:
+    if isinstance(err, Aborted):
+        return err.status
+    return FAILED if isinstance(err, RuntimeError) else USAGE_ERROR
 
 
 def _explained(err: Exception) -> str:

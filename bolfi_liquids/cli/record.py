@@ -2,6 +2,8 @@
 
 import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,7 +12,7 @@ import typer
 
 from ..errors import InputError
 from ..online.settings import OnlineSettings
-from .errors import FAILED
+from .errors import FAILED, INTERRUPTED, Aborted
 from .examples import examples
 from .grouped import grouped
 from .options import RigOption
@@ -104,7 +106,10 @@ def record(
         int | None, typer.Option(help="How often the star is stirred; else as in rig.toml.")
     ] = None,
 ) -> None:
-    """Stir, and record it. A dry run unless armed: it plans, checks everything, moves nothing."""
+    """Stir, and record it. A dry run unless armed: it plans, checks everything, moves nothing.
+
+    The exit status is 3 where something ended the recording early; what there is was kept.
+    """
     from rich.console import Console
 
     from ..inputs.rigs import rig_of
@@ -118,11 +123,29 @@ def record(
         return
     ask = typed_sentence if moved.arm else None
     given: dict[str, Any] = {"out": out, "ask": ask, "emulate": moved.emulate}
-    if (choice := online.choice(cycles)) is None:
-        recording = run_record(opened, cycles=cycles, **given)
-    else:
-        recording = record_online(opened, online=choice, **given)
+    choice = online.choice(cycles)
+    with aborted_is_told():
+        if choice is None:
+            recording = run_record(opened, cycles=cycles, **given)
+        else:
+            recording = record_online(opened, online=choice, **given)
     print_recording(recording, Console())
+    if recording.attrs["status"] == "aborted":
+        reason = recording.attrs.get("reason") or "no reason is told"
+        raise Aborted(f"{recording.path}: the recording was aborted: {reason}")
+
+
+@contextmanager
+def aborted_is_told() -> Iterator[None]:
+    """A session that was stopped ends the command with a status of its own."""
+    from ..hardware import SessionInterrupted, SessionStopped
+
+    try:
+        yield
+    except SessionInterrupted as err:
+        raise Aborted(str(err), INTERRUPTED) from err
+    except SessionStopped as err:
+        raise Aborted(str(err)) from err
 
 
 def execute(run: Path, rig: Path | None, *, arm: bool, emulator: bool) -> None:

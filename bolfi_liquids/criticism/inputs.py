@@ -1,7 +1,6 @@
 """What a criticism is given, read and checked."""
 
 import json
-import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
@@ -13,7 +12,7 @@ from ..calibration.stir_simulator import Stirring, same_liquid, stirring_of
 from ..errors import InputError
 from ..inputs.cups import cups_of
 from ..inputs.open import Source, open_recordings
-from ..inputs.pour_table import PourTable, open_pours
+from ..inputs.pour_table import PourTable, check_scene, open_pours
 from ..inputs.recording import Recording
 from ..inputs.settings import FALSE_ALARM_RATE, CriticismSettings
 from ..run.directory import CRITICISM_FORMAT
@@ -23,8 +22,6 @@ from .stirs import effects_of, frame_interval, same_rate
 
 if TYPE_CHECKING:
     from ..models import Cups
-
-logger = logging.getLogger(__name__)
 
 Pours = PourTable | str | Path
 RIG_SIZES = ("cup_radius", "stick_radius", "stick_length")
@@ -118,9 +115,9 @@ def open_inputs(calibration: Calibration, settings: CriticismSettings, given: Gi
     _check_pours(table, held_out_table, settings)
     if given.cups is not None and table is None:
         raise InputError("there are no pours from them", where="--cups", fix="give --pours, too")
+    cups = cups_of(given.cups)
     for one in filter(None, (table, held_out_table)):
-        if one.unused:
-            logger.warning("%s: columns not used: %s", one.path, ", ".join(one.unused))
+        check_scene(one, cups)
     return Inputs(
         stirring=stirring,
         held_out=tuple(kept_back),
@@ -128,7 +125,7 @@ def open_inputs(calibration: Calibration, settings: CriticismSettings, given: Gi
         left_out=_names_of(r for r in believed if r.hash not in {one.hash for one in others}),
         table=table,
         held_out_table=held_out_table,
-        cups=cups_of(given.cups),
+        cups=cups,
         settings=settings,
     )
 

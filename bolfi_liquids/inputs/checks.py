@@ -5,7 +5,9 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .fields import AXES, DENSITIES, LENGTHS, PLANES, STICK_WEIGHT
+from .inclination_checks import check_inclination_values
 from .recording import Recording
+from .start import above_liquid
 
 MIN_SAMPLES = 10
 MAX_GRIPPER_GAP = 0.2
@@ -16,8 +18,16 @@ MIN_SEEN = 0.5
 """Smallest share of a plane's samples in which the stick must have been seen."""
 MAX_INTERVAL = 1.0  # between samples [s]; more looks like milliseconds
 MAX_POSITION = 2.0  # of the gripper [m]; more looks like cm or mm
-MAX_LENGTH = 1.0  # of cup and stick [m]; more looks like cm or mm
+SIZE_LIMITS = {
+    "cup_radius": (5e-3, 0.25),
+    "cup_height": (5e-3, 0.5),
+    "fill": (1e-3, 0.5),
+    "stick_radius": (2e-4, 0.05),
+    "stick_length": (0.02, 1.0),
+}
+"""Of cups and sticks that are stirred by hand or arm [m]; more looks like cm or mm."""
 MAX_MASS = 2.0  # of the stick [kg]; more looks like grams
+MAX_STICK_DENSITY = 25_000.0  # [kg/m3]; no stick is denser
 MAX_SPEED = 5.0  # of the gripper [m/s]; more looks like a time in other units
 MIN_TRAVEL = 1e-3  # of the gripper [m]; a liquid that is not stirred shows nothing
 MIN_DENSITY, MAX_DENSITY = 50.0, 20_000.0  # [kg/m3]; less looks like g/cm3
@@ -31,7 +41,6 @@ def check_values(recording: Recording) -> None:
     _check_gripper(recording)
     _check_inclination(recording)
     _check_scene(recording)
-    _check_hangs(recording)
 
 
 def _check_time(recording: Recording) -> None:
@@ -63,9 +72,10 @@ def _check_numbers(recording: Recording) -> None:
     names = LENGTHS + DENSITIES + tuple(n for n in STICK_WEIGHT if n in recording.attrs)
     for name in names:
         value = recording.attrs[name]
-        if not isinstance(value, int | float) or not np.isfinite(value) or value <= 0:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not np.isfinite(value) or value <= 0:
             raise InputError(
-                f"{value!r}",
+                f"{' '.join(repr(value).split()):.80}",
                 where=f"{recording.path}: attribute {name}",
                 fix="it must be a positive number, in SI units",
             )
@@ -74,11 +84,18 @@ def _check_numbers(recording: Recording) -> None:
 def _check_sizes(recording: Recording) -> None:
     attrs = recording.attrs
     for name in LENGTHS:
-        if recording.number(name) > MAX_LENGTH:
+        least, most = SIZE_LIMITS[name]
+        if recording.number(name) > most:
             raise InputError(
-                f"{attrs[name]} m looks like cm or mm",
+                f"{attrs[name]} m looks like cm or mm: it may be {most:g} m at the most",
                 where=f"{recording.path}: attribute {name}",
                 fix="convert it to m",
+            )
+        if recording.number(name) < least:
+            raise InputError(
+                f"{attrs[name]} m is too small: it must be {least:g} m at least",
+                where=f"{recording.path}: attribute {name}",
+                fix="measure it again, in m",
             )
     if "stick_mass" in attrs and recording.number("stick_mass") > MAX_MASS:
         raise InputError(
@@ -86,6 +103,14 @@ def _check_sizes(recording: Recording) -> None:
             where=f"{recording.path}: attribute stick_mass",
             fix="convert it to kg",
         )
+    if "stick_mass" in attrs:
+        volume = np.pi * recording.number("stick_radius") ** 2 * recording.number("stick_length")
+        if (density := recording.number("stick_mass") / volume) > MAX_STICK_DENSITY:
+            raise InputError(
+                f"{attrs['stick_mass']} kg looks like grams: it makes {density:.3g} kg/m3",
+                where=f"{recording.path}: attribute stick_mass",
+                fix="convert it to kg, or measure the stick again",
+            )
     for name in (*DENSITIES, "stick_density"):
         if name in attrs and not MIN_DENSITY <= recording.number(name) <= MAX_DENSITY:
             raise InputError(
@@ -163,21 +188,19 @@ def _check_inclination(recording: Recording) -> None:
                 where=where,
                 fix=f"gaps up to {MAX_UNSEEN_TIME} s can be skipped: cut the recording before it",
             )
-        largest = np.abs(values[seen]).max()
-        if np.isinf(largest):
-            raise InputError("infinite", where=where, fix="mark missing samples by NaN")
-        if largest > np.pi / 2:
-            raise InputError(
-                f"reaches {largest:g} rad, which looks like degrees",
-                where=where,
-                fix="convert the inclination to rad",
-            )
+    check_inclination_values(recording)
 
 
-def _check_hangs(recording: Recording) -> None:
-    """Buoyancy's moment about the pivot must stay below the weight's, or the stick floats up."""
+def check_hangs(recording: Recording) -> None:
+    """Buoyancy's moment about the pivot must stay below the weight's, or the stick floats up.
+
+    Raises:
+        InputError: It floats.
+    """
     from ..models import StirSetup
 
+    if above_liquid(recording) >= 0.0:
+        return  # nothing lifts it there, and `check_start` refuses it
     setup = StirSetup.from_recording(recording)
     stick, wet, mass = setup.stick, setup.submerged, setup.stick.mass
     displaced = recording.number("liquid_density") * np.pi * stick.radius**2 * wet

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from ..errors import InputError
+from ..numerals import parse_number
 from .settings import Particles, Seed, checked
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 
 VISCOSITY, COHESION, DENSITY = 1.0, 0.2, 1260.0  # Pa s, 1, kg/m3: the bundled glycerin
+MAX_VISCOSITY, MAX_DENSITY = 1e6, 20_000.0  # Pa s, kg/m3: pitch by far, and mercury
 STIR_PARTICLES, POUR_PARTICLES = 1000, 664
 """Numbers of particles that a stir and a pour are simulated with, unless others are given."""
 
@@ -36,9 +38,9 @@ class Described:
         InputError: A value cannot be used.
     """
 
-    viscosity: Annotated[float, Field(ge=0.0)]
+    viscosity: Annotated[float, Field(ge=0.0, le=MAX_VISCOSITY)]
     cohesion: Annotated[float, Field(ge=0.0, le=1.0)]
-    density: Annotated[float, Field(gt=0.0)]
+    density: Annotated[float, Field(gt=0.0, le=MAX_DENSITY)]
     effects: Mapping[str, float] = Field(default_factory=dict)
     particles: Particles = STIR_PARTICLES
     seed: Seed = 0
@@ -103,7 +105,7 @@ def read_effects(given: Iterable[str], scene: str) -> dict[str, float]:
         name, _, value = (part.strip() for part in text.partition("="))
         where = f"--effect {text}"
         try:
-            number = float(value)
+            number = parse_number(value)
         except ValueError:
             number = np.nan
         if name not in EFFECTS:

@@ -6,18 +6,32 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from ..files import existing_file
-from .checks import check_values
+from .checks import check_hangs, check_values
 from .fields import check_fields
 from .recording import Recording, as_recording
+from .start import check_start
 
 if TYPE_CHECKING:
     from xarray import Dataset
+
+HDF5, CLASSIC_NETCDF = b"\x89HDF\r\n\x1a\n", b"CDF"  # how such files begin
+DAMAGE = (
+    OSError,
+    ValueError,
+    RuntimeError,
+    LookupError,
+    AttributeError,
+    TypeError,
+    ArithmeticError,
+    MemoryError,
+)
+"""What the libraries that read NetCDF raise where bytes of a file are wrong."""
 
 Source = Recording | str | Path
 
 
 def open_recording(path: str | Path) -> Recording:
-    """Read a recording and check that it can be simulated.
+    """Read a recording and check that it can be simulated: from rest, as a simulation starts.
 
     Args:
         path: A NetCDF file with the fields, units and attributes that
@@ -27,10 +41,26 @@ def open_recording(path: str | Path) -> Recording:
         InputError: The file is missing, is no NetCDF file, or holds something a simulator
             cannot use; the message names file, field, value and what to do.
     """
-    path = existing_file(path)
-    recording = as_recording(_read(path), path)
-    check_values(recording)
+    recording = read_recording(path)
+    check_recording(recording)
     return recording
+
+
+def check_recording(recording: Recording) -> None:
+    """Raise `InputError` unless a recording can be simulated; see `open_recording`."""
+    check_values(recording)
+    check_start(recording)
+    check_hangs(recording)
+
+
+def read_recording(path: str | Path) -> Recording:
+    """Read a recording whose values nobody needs to check.
+
+    Raises:
+        InputError: The file is missing or damaged, or lacks a field.
+    """
+    path = existing_file(path)
+    return as_recording(read_fields(path), path)
 
 
 def open_recordings(
@@ -62,17 +92,47 @@ def _opened(source: object, option: str) -> Recording:
     )
 
 
-def _read(path: Path) -> "Dataset":
+def read_fields(path: Path) -> "Dataset":
+    """All variables and attributes of a recording's file.
+
+    Raises:
+        InputError: The file is damaged, or lacks a field.
+    """
     import xarray
 
     try:
+        _check_root(path)
         # times stay numbers: a unit such as "ms" is then seen, not silently converted
         dataset = xarray.load_dataset(path, decode_times=False)
-    except (OSError, ValueError) as err:
-        raise InputError(
-            "not a NetCDF file that can be read",
-            where=str(path),
-            fix="if it is a table, bolfi-liquids import makes a recording of it",
-        ) from err
+    except DAMAGE as err:
+        raise _unreadable(path) from err
     check_fields(dataset, path)
     return dataset
+
+
+def _check_root(path: Path) -> None:
+    """Raise what `DAMAGE` lists where the root of an HDF5 file is damaged.
+
+    h5netcdf leaves a half-made file behind there, which complains once more when it is collected.
+    """
+    if _begins(path) == HDF5:
+        import h5py
+
+        with h5py.File(path, "r") as file:
+            list(file.attrs.items())
+
+
+def _begins(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(len(HDF5))
+
+
+def _unreadable(path: Path) -> InputError:
+    """What is no recording, or was one before it was damaged."""
+    if (begins := _begins(path)) == HDF5 or begins.startswith(CLASSIC_NETCDF):
+        return InputError("damaged, cannot be read", where=str(path), fix="copy it again")
+    return InputError(
+        "not a NetCDF file that can be read",
+        where=str(path),
+        fix="if it is a table, bolfi-liquids import makes a recording of it",
+    )

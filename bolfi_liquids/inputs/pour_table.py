@@ -1,14 +1,22 @@
 """Tables of pours that were made: what each spilled, caught and kept."""
 
 import hashlib
+import logging
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .table import Table, read_table
+from .table import Table, is_number, read_table
+
+if TYPE_CHECKING:
+    from ..models import Cups
+
+logger = logging.getLogger(__name__)
 
 ACTIONS = ("angular_velocity_deg_s", "distance_cm")
 AMOUNTS = ("spilled", "received", "retained")
@@ -16,6 +24,8 @@ ACTION_RANGES = (1.0, 1000.0), (-20.0, 50.0)  # of the actions, in their units
 LIQUID = "liquid"
 MIN_POURS = 3  # from which anything can be learned
 FIX_LINE = "mend or remove the line"
+MAX_TIMES_BEYOND = 4.0  # that a pour may be faster or slower than the cups' range
+MIN_DISTANCE_SHARE = 0.02  # of the cups' longest; a table whose distances all are shorter is in m
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,13 +56,14 @@ class PourTable:
         return self.fractions[:, [0, 2]].T
 
 
-def open_pours(path: str | Path, liquid: str | None = None) -> PourTable:
+def open_pours(path: str | Path, liquid: str | None = None, *, told: bool = True) -> PourTable:
     """Read a table of pours, in the form that `bolfi-liquids guide criticism` shows.
 
     Args:
         path: The file: columns `angular_velocity_deg_s`, `distance_cm`, and `spilled`,
             `received`, `retained` in any one unit; `liquid` if there are several.
         liquid: Whose pours to take; needed where the file holds more than one liquid's.
+        told: Whether to say which columns are not used.
 
     Raises:
         InputError: The file is missing or cannot be used; the message names file, line, column
@@ -63,6 +74,7 @@ def open_pours(path: str | Path, liquid: str | None = None) -> PourTable:
     if not table.header:
         fix = "write a header and a line for each pour"
         raise InputError("is empty", where=str(table.path), fix=fix)
+    _check_liquid_named(table)
     if missing := [name for name in needed if not table.has(name)]:
         raise InputError(
             f"has no column {', '.join(missing)}",
@@ -86,6 +98,9 @@ def open_pours(path: str | Path, liquid: str | None = None) -> PourTable:
             where=f"{table.path}: line {table.lines[int(np.argmin(total))]}",
             fix="weigh what was poured",
         )
+    unused = table.others((*needed, LIQUID))
+    if unused and told:
+        logger.warning("%s: columns not used: %s", table.path, ", ".join(unused))
     return PourTable(
         path=table.path,
         liquid=liquid,
@@ -93,8 +108,75 @@ def open_pours(path: str | Path, liquid: str | None = None) -> PourTable:
         distance=actions[:, 1] / 100.0,
         fractions=amounts / total,
         hash=hashlib.sha256(table.path.read_bytes()).hexdigest(),
-        unused=table.others((*needed, LIQUID)),
+        unused=unused,
     )
+
+
+def check_scene(table: PourTable, cups: "Cups") -> None:
+    """Refuse pours that cannot have been made with these cups, and guess at their unit.
+
+    Raises:
+        InputError: The first of them; or all distances are so short that they must be in m.
+    """
+    for rate, distance in zip(table.angular_velocity, table.distance, strict=True):
+        check_rate(float(rate), cups, f"{table.path}: {ACTIONS[0]}")
+        check_distance(float(distance), cups, f"{table.path}: {ACTIONS[1]}")
+    longest = float(np.abs(table.distance).max())
+    if 0.0 < longest < MIN_DISTANCE_SHARE * max(map(abs, cups.distance_range)):
+        raise InputError(
+            f"none is longer than {100.0 * longest:g} cm, which looks like m",
+            where=f"{table.path}: {ACTIONS[1]}",
+            fix="convert the distances to cm",
+        )
+
+
+def check_distance(distance: float, cups: "Cups", where: str) -> None:
+    """Raise `InputError` for a distance [m] at which the receiver of these cups cannot stand."""
+    low, high = cups.distance_range
+    beyond = max(high - low, 2.0 * cups.receiver.radius)
+    if low - beyond <= distance <= high + beyond:
+        return
+    looks = ", which looks like mm" if low <= distance / 10.0 <= high else ""
+    raise InputError(
+        f"{100.0 * distance:g} cm{looks}; the cups stand {100.0 * low:g} to {100.0 * high:g} cm "
+        "apart",
+        where=where,
+        fix="give the distance from the lip to the receiver's axis in cm, or the cups that were "
+        "poured with",
+    )
+
+
+def check_rate(rate: float, cups: "Cups", where: str) -> None:
+    """Raise `InputError` for an angular velocity [rad/s] far from those of these cups."""
+    low, high = cups.angular_velocity_range
+    if low / MAX_TIMES_BEYOND <= rate <= high * MAX_TIMES_BEYOND:
+        return
+    given, slow, fast = np.degrees([rate, low, high])
+    looks = ", which looks like rad/s" if low <= given <= high else ""
+    raise InputError(
+        f"{given:g} deg/s{looks}; the cups are turned at {slow:g} to {fast:g} deg/s",
+        where=where,
+        fix="give the angular velocity in deg/s, or the cups that were poured with",
+    )
+
+
+def _check_liquid_named(table: Table) -> None:
+    """Refuse a table whose column of liquids would be taken for a remark."""
+    if table.has(LIQUID):
+        return
+    strange = {
+        name.casefold(): name
+        for name in table.others((*ACTIONS, *AMOUNTS))
+        if not all(map(is_number, filter(None, table.column(name))))
+    }
+    near = [name for name in strange if LIQUID in name]
+    near += get_close_matches(LIQUID, strange, n=1, cutoff=0.7)
+    if near:
+        raise InputError(
+            f"column {strange[near[0]]!r} is not known; is it {LIQUID!r}?",
+            where=f"{table.path}: header",
+            fix=f"name it {LIQUID!r} where it says of which liquid a pour is, else otherwise",
+        )
 
 
 def _of_liquid(table: Table, liquid: str | None) -> tuple[Table, str]:

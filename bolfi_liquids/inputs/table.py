@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import existing_file
+from ..numerals import has_decimals, may_have_thousands, parse_number
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 DELIMITERS = ",;\t|"
 NOT_TEXT = "\0"  # in no table, but in most other files
+TOLD_DELIMITER = re.compile("sep=(.)")  # how Excel is told, in the first line
 MISSING = ("", "nan", "na", "n/a", "null", "none", "-")
-NUMBER = r"\s*[+-]?\d*{}\d+([eE][+-]?\d+)?\s*"
-COMMA_IN_NUMBER = re.compile(NUMBER.format(","))
-POINT_IN_NUMBER = re.compile(NUMBER.format(r"\."))
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,13 +104,14 @@ class Table:
         if cell.lower() in MISSING:
             return float("nan")
         try:
-            return float(cell.replace(self.decimal, "."))
-        except ValueError:
+            return parse_number(cell, self.decimal)
+        except ValueError as err:
             raise InputError(
-                f"{cell!r:.40} is no number",
+                str(err),
                 where=self.where(line, name),
-                fix=f"correct the cell, or leave it empty where a value is missing; the decimal "
-                f"sign is taken to be {self.decimal!r}",
+                fix="correct the cell, leave it empty where a value is missing, or remove the line "
+                f"if it is no measurement; the decimal sign is taken to be {self.decimal!r}, and "
+                "thousands are not set apart",
             ) from None
 
 
@@ -131,10 +131,13 @@ def read_table(
     """
     path = existing_file(path)
     lines = _decoded(path).splitlines()[skip:]
+    if lines and (told := TOLD_DELIMITER.fullmatch(lines[0].strip())):
+        lines, skip, delimiter = lines[1:], skip + 1, delimiter or told[1]
     delimiter = delimiter or _delimiter(lines[0] if lines else "")
     frame = _frame(path, lines, delimiter)
     first, *rows = frame.to_numpy().tolist() or [[]]
     header = _header(first)
+    _check_header(path, header, skip + 1)
     kept = [(k, row) for k, row in enumerate(rows, start=skip + 2) if any(map(_text, row))]
     for line, row in kept:
         if any(map(_text, row[len(header) :])):
@@ -146,7 +149,7 @@ def read_table(
         path=path,
         header=header,
         delimiter=delimiter,
-        decimal=decimal or _decimal(delimiter, [cell for cell in cells.ravel() if cell]),
+        decimal=decimal or _decimal(path, delimiter, [cell for cell in cells.ravel() if cell]),
         lines=np.array([line for line, _ in kept], np.int64),
         cells=cells,
     )
@@ -185,10 +188,18 @@ def _delimiter(header: str) -> str:
         return ","
 
 
-def _decimal(delimiter: str, cells: Sequence[str]) -> str:
-    if delimiter == "," or any(map(POINT_IN_NUMBER.fullmatch, cells)):
+def _decimal(path: Path, delimiter: str, cells: Sequence[str]) -> str:
+    """Found in the cells; a comma that may set thousands apart as well is refused."""
+    if delimiter == "," or any(has_decimals(cell, ".") for cell in cells):
         return "."
-    return "," if any(map(COMMA_IN_NUMBER.fullmatch, cells)) else "."
+    commas = [cell for cell in cells if has_decimals(cell, ",")]
+    if commas and all(map(may_have_thousands, commas)):
+        raise InputError(
+            f"{commas[0]!r} may be one and a bit, or some thousands",
+            where=str(path),
+            fix="write the numbers with a decimal point and without marks for thousands",
+        )
+    return "," if commas else "."
 
 
 def _frame(path: Path, lines: list[str], delimiter: str) -> "DataFrame":
@@ -234,3 +245,22 @@ def _misfit(path: Path, line: int, row: list[Any], columns: int) -> InputError:
         where=f"{path}: line {line}",
         fix=extra if count > columns else short,
     )
+
+
+def _check_header(path: Path, header: tuple[str, ...], line: int) -> None:
+    """Refuse a table that begins with its numbers."""
+    if header and all(is_number(name) for name in header):
+        raise InputError(
+            "holds numbers, not the names of columns",
+            where=f"{path}: line {line}",
+            fix="write a line of names above the numbers",
+        )
+
+
+def is_number(text: str) -> bool:
+    """Whether a cell holds a number, with either decimal sign."""
+    try:
+        parse_number(text.replace(",", "."))
+    except ValueError:
+        return False
+    return True

@@ -1,6 +1,7 @@
 """Recordings made elsewhere: a table of numbers becomes a NetCDF file that can be simulated."""
 
 import hashlib
+import logging
 from collections.abc import Iterator
 from importlib.metadata import version
 from importlib.resources import files
@@ -11,27 +12,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..files import (
-    existing_file,
-    new_netcdf,
-    write_netcdf,
-    write_text,
-)
-from .checks import check_values
+from ..files import new_netcdf, write_netcdf, write_text
+from .checks import check_hangs, check_values
 from .fields import (
     AXES,
     DENSITIES,
     LENGTHS,
     PLANES,
 )
-from .open import open_recording
+from .open import read_recording
 from .recording import Recording, as_recording, recording_dataset
+from .start import check_start
 from .strokes import speed
-from .table import read_table
+from .table import Table, read_table
 from .table_map import ATTRIBUTE_UNITS, TableMap, open_table_map
 
 if TYPE_CHECKING:
     from xarray import Dataset
+
+logger = logging.getLogger(__name__)
 
 TEMPLATE = "columns.toml"
 OTHER_NAME = "choose another name"
@@ -66,11 +65,16 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
         InputError: The table or the map cannot be used; the message names line, column and value.
             Or `out` is something else that is there already. Nothing was written.
     """
-    table, out = existing_file(table), Path(out)
+    out = Path(out)
     meaning = columns if isinstance(columns, TableMap) else open_table_map(columns)
-    dataset = _dataset(table, meaning)
+    read = read_table(
+        table, delimiter=meaning.delimiter, decimal=meaning.decimal, skip=meaning.skip
+    )
+    dataset = _dataset(read, meaning)
+    made = as_recording(dataset, read.path)
     try:
-        check_values(as_recording(dataset, table))
+        check_values(made)
+        check_hangs(made)
     except InputError as err:
         if "looks like" not in err.what:
             raise
@@ -79,7 +83,9 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
         ) from err
     _check_target(out)
     write_netcdf(dataset, out)
-    return open_recording(out)
+    if unused := read.others(column.column for column in meaning.columns.values()):
+        logger.info("%s: columns not used: %s", read.path, ", ".join(unused))
+    return read_recording(out)
 
 
 def _check_target(out: Path) -> None:
@@ -100,10 +106,10 @@ def _attributes(path: Path) -> dict[str, Any]:
         return {}
 
 
-def _dataset(table: Path, meaning: TableMap) -> "Dataset":
-    cells = _cells(table, meaning)
+def _dataset(table: Table, meaning: TableMap) -> "Dataset":
     values = {
-        name: column.in_si(name, cells[column.column]) for name, column in meaning.columns.items()
+        name: column.in_si(name, table.numbers(column.column, fix=HEADER_FIX))
+        for name, column in meaning.columns.items()
     }
     attributes = {
         name: given.value * ATTRIBUTE_UNITS[name][given.unit]
@@ -112,20 +118,11 @@ def _dataset(table: Path, meaning: TableMap) -> "Dataset":
     made = {
         "Conventions": "CF-1.11",
         "source": meaning.source,
-        "imported_from": table.name,
-        "imported_sha256": hashlib.sha256(table.read_bytes()).hexdigest(),
+        "imported_from": table.path.name,
+        "imported_sha256": hashlib.sha256(table.path.read_bytes()).hexdigest(),
         "imported_with": f"bolfi-liquids {version('bolfi-liquids')}: {meaning.model_dump_json()}",
     }
     return recording_dataset(values, attributes | made)
-
-
-def _cells(path: Path, meaning: TableMap) -> dict[str, NDArray[np.float64]]:
-    """The columns that the map names, as numbers; missing samples are NaN."""
-    table = read_table(
-        path, delimiter=meaning.delimiter, decimal=meaning.decimal, skip=meaning.skip
-    )
-    wanted = dict.fromkeys(column.column for column in meaning.columns.values())
-    return {name: table.numbers(name, fix=HEADER_FIX) for name in wanted}
 
 
 def outline(recording: Recording) -> str:
@@ -149,7 +146,7 @@ def outline(recording: Recording) -> str:
         for name, angle in zip(PLANES, np.degrees(recording.inclination.T), strict=True)
     ]
     lines.append(", ".join(_sizes(recording)))
-    return "\n".join([*lines, *_trailing(recording)])
+    return "\n".join([*lines, *_trailing(recording), *_start(recording)])
 
 
 def _sizes(recording: Recording) -> Iterator[str]:
@@ -176,6 +173,14 @@ def _trailing(recording: Recording) -> Iterator[str]:
                 f"warning: {name}: the stick follows {AXES[1 - at]} ({across:+.2f}) more than "
                 f"{AXES[at]}; are the planes exchanged?"
             )
+
+
+def _start(recording: Recording) -> Iterator[str]:
+    """A warning where `calibrate` would refuse how it starts."""
+    try:
+        check_start(recording)
+    except InputError as err:
+        yield f"warning: {err}"
 
 
 def _correlation(angle: NDArray, position: NDArray) -> float:

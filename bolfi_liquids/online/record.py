@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..inputs.open import open_recording
 from ..inputs.recording import Recording
 from ..inputs.rigs import rig_of
 from ..robot.armed_session import Ask, check_one, hidden_liquid
 from ..robot.live_view import SessionView
-from ..robot.record import kept
+from ..robot.record import finished, kept
 from ..robot.stir import (
     PATHS_AHEAD,
     StirPlan,
@@ -68,7 +67,6 @@ def record_online(
         RuntimeError: The calibration could not be prepared; nothing has moved.
         SessionStopped: The arm was stopped.
     """
-    from ..hardware import finalise
     from ..hardware.recorder.finalise import rig_attributes
 
     check_one(ask, emulate, "record")
@@ -88,7 +86,7 @@ def record_online(
             SessionView("stirring and calibrating", shown=progress) as view,
         ):
             _Stirring(session, plan, calibration, view, online.told).carry_out()
-        recording = open_recording(finalise(out))
+        recording = finished(out)
         calibration.finish(recording, progress=progress)
     return recording
 

@@ -5,7 +5,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..inputs.open import open_recording
+from ..errors import InputError
+from ..inputs.open import check_recording, read_recording
 from ..inputs.recording import Recording
 from ..inputs.rigs import rig_of
 from .armed_session import Ask, check_one, hidden_liquid
@@ -48,8 +49,6 @@ def record(
         MotionRejected: The plan breaks one of the rig's limits.
         SessionStopped: The arm was stopped; the message says why.
     """
-    from ..hardware import finalise
-
     check_one(ask, emulate, "record")
     opened, hidden = rig_of(rig), hidden_liquid(emulate)
     plan, out = plan_stir(opened, cycles), Path(out)
@@ -60,7 +59,27 @@ def record(
         SessionView(title, shown=progress) as view,
     ):
         follow_plan(session, plan, view)
-    return open_recording(finalise(out))
+    return finished(out)
+
+
+def finished(directory: Path) -> Recording:
+    """The recording of a session that has ended.
+
+    Raises:
+        SessionStopped: It was aborted so early that its recording cannot be used.
+        InputError: It was not, and cannot be used nevertheless.
+    """
+    from ..hardware import SessionStopped, finalise
+
+    recording = read_recording(finalise(directory))
+    try:
+        check_recording(recording)
+    except InputError as err:
+        if recording.attrs.get("status") != "aborted":
+            raise
+        reason = recording.attrs.get("reason") or "no reason is told"
+        raise SessionStopped(f"{recording.path}: aborted: {reason}; {err}") from err
+    return recording
 
 
 @contextmanager
@@ -70,14 +89,14 @@ def kept(directory: Path) -> Iterator[None]:
     Raises:
         SessionStopped: It was stopped, or interrupted; the message says what is left.
     """
-    from ..hardware import SessionStopped
+    from ..hardware import SessionInterrupted, SessionStopped
 
     try:
         yield
     except SessionStopped as err:
         raise SessionStopped(f"{err}; {_left(directory)}") from None
     except KeyboardInterrupt:
-        raise SessionStopped(f"interrupted, the arm was stopped; {_left(directory)}") from None
+        raise SessionInterrupted(f"interrupted, the arm was stopped; {_left(directory)}") from None
 
 
 def _left(directory: Path) -> str:

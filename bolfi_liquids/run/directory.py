@@ -161,7 +161,7 @@ def read_run(run: Path) -> dict[str, Any]:
         )
     try:
         return upgraded(tomllib.loads(path.read_text(encoding="utf-8")))
-    except tomllib.TOMLDecodeError as err:
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as err:
         raise InputError(f"not TOML ({err})", where=str(path), fix="restore the file") from err
 
 

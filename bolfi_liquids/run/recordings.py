@@ -1,11 +1,12 @@
 """A run's own copies of its recordings, so that it can be criticised wherever it was moved."""
 
+import hashlib
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..files import write_whole
-from ..inputs.open import open_recording
+from ..files import existing_file, write_whole
+from ..inputs.open import read_recording
 from ..inputs.recording import Recording
 
 RECORDINGS_FOLDER = "recordings"
@@ -36,14 +37,13 @@ def kept_recordings(run: Path, record: dict[str, Any]) -> list[Recording]:
     names, hashes = record["files"]["recordings"], record["inputs"]["sha256"]
     for number, (name, digest) in enumerate(zip(names, hashes, strict=True), start=1):
         path = run / RECORDINGS_FOLDER / _name(number, name)
-        recording = open_recording(path)
-        if recording.hash != digest:
+        if hashlib.sha256(existing_file(path).read_bytes()).hexdigest() != digest:
             raise InputError(
                 "is not the recording that this run was calibrated on",
                 where=str(path),
                 fix="put the original back, or calibrate again",
             )
-        opened.append(recording)
+        opened.append(read_recording(path))  # with these bytes it has been checked
     return opened
 
 

@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, TypeAdapter, ValidationError
 
 from ..errors import InputError
 from ..files import write_text
+from ..numerals import load_json
 
 SUMMARY_FILE = "summary.json"
 HOW_TO_RESTORE = (
@@ -78,17 +79,17 @@ def read_summary(run: Path) -> dict[str, Any]:
     """All sections written so far; empty where there is no file yet.
 
     Raises:
-        InputError: The file is not JSON.
+        InputError: The file is not JSON, or holds a number that is not finite.
     """
     path = run / SUMMARY_FILE
     if not path.exists():
         return {}
     try:
-        summary = json.loads(path.read_text(encoding="utf-8"))
-    except json.JSONDecodeError as err:
-        raise InputError(
-            f"not JSON (line {err.lineno})", where=str(path), fix=HOW_TO_RESTORE
-        ) from err
+        summary = load_json(path.read_text(encoding="utf-8"))
+    except UnicodeDecodeError as err:
+        raise InputError("not UTF-8 text", where=str(path), fix=HOW_TO_RESTORE) from err
+    except (ValueError, RecursionError) as err:
+        raise InputError(f"not JSON ({err})", where=str(path), fix=HOW_TO_RESTORE) from err
     if not isinstance(summary, dict) or not all(isinstance(s, dict) for s in summary.values()):
         raise InputError("holds no sections", where=str(path), fix=HOW_TO_RESTORE)
     return summary

@@ -25,6 +25,7 @@ from ..inputs.described_liquid import (
 )
 from ..inputs.fields import LENGTHS, STICK_WEIGHT
 from ..inputs.open import Source, open_recordings
+from ..inputs.pour_table import check_distance, check_rate
 from ..inputs.prior import split_parameters
 from ..inputs.recording import Recording, Trajectory
 from ..run.time_limit import TimeLimited
@@ -252,6 +253,8 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     _check_action(angular_velocity, distance)
     cups, density = cups_of(cups), _density(density)
     liquid = {"viscosity": viscosity, "cohesion": cohesion, "density": density}
+    check_distance(distance, cups, "--distance")
+    check_rate(angular_velocity, cups, "--angular-velocity")
     batch = batch_of(liquid, check_effects(effects or {}, "pour"), particles, seed)
     targets.check_single(batch.single)
     simulator = PourSimulator(angular_velocity, cups, density, batch.one.particles)

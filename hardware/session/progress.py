@@ -17,6 +17,10 @@ class SessionStopped(RuntimeError):
     """The arm was stopped for good; what was recorded is kept, and marked as aborted."""
 
 
+class SessionInterrupted(SessionStopped):
+    """A person stopped it by Ctrl-C."""
+
+
 class Phase(Enum):
     """Where a session is between its start and its end."""
 

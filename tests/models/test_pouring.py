@@ -97,6 +97,15 @@ def test_bad_actions_are_named(cups):
         ("[0.0, 0.07]", "[0.07, 0.0]", "distance must ascend"),
         ("hold = 0.9 ", "hold = inf ", r"pour\.hold.*inf"),
         ("radius = 0.028", "radius = inf", r"source\.radius.*inf"),
+        ("radius = 0.028", "radius = 0.56", r"source\.radius.*0.56 m looks like centimetres"),
+        ("radius = 0.028", "radius = 28.0", r"source\.radius.*28 m looks like millimetres"),
+        ("radius = 0.028", "radius = nan", r"source\.radius.*nan"),
+        ("radius = 0.028", "radius = true", r"source\.radius.*True"),
+        ("radius = 0.028", "radius = '0.028'", r"source\.radius.*'0.028'"),
+        ("[0.0, 0.07]", "[-5.0, 0.07]", r"pour\.distance.*-5 m looks like centimetres"),
+        ("[0.0, 0.07]", "[0.0, 70.0]", r"pour\.distance.*70 m looks like millimetres"),
+        ("135.0", "nan", r"pour\.final_angle_deg.*nan"),
+        ("hold = 0.9 ", "hold = nan ", r"pour\.hold.*nan"),
         ("135.0", "720.0", r"pour\.final_angle_deg.*720"),
         ("[source]", "[source", "not a TOML file"),
     ],
@@ -110,6 +119,14 @@ def test_bad_cups_files_are_named(tmp_path, old, new, message):
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(ValueError, match=f"cups.toml.*{message}"):
         models.Cups.from_toml(path)
+
+
+def test_a_cups_file_may_begin_with_a_byte_order_mark(tmp_path, cups):
+    from importlib.resources import files
+
+    text = (files("bolfi_liquids.data") / "cups.toml").read_text()
+    (tmp_path / "cups.toml").write_text(text, encoding="utf-8-sig")
+    assert models.Cups.from_toml(tmp_path / "cups.toml") == cups
 
 
 def test_landings_serve_every_receiver(cups):

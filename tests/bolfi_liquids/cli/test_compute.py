@@ -12,7 +12,7 @@ from bolfi_liquids.cli.app import app
 from bolfi_liquids.cli.compute import Compute, open_executor_of
 from bolfi_liquids.cli.grouped import grouped
 
-ELSEWHERE = {"import", "guide", "record"}
+ELSEWHERE = {"import", "guide", "record", "trim"}
 """Commands that simulate nothing, or in real time beside an arm."""
 
 

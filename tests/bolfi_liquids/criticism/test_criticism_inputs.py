@@ -119,7 +119,7 @@ def test_columns_that_nobody_reads_are_logged(calibration, tmp_path, caplog):
     path.write_text("\n".join([f"{HEADER},who", *(f"{row},me" for row in ROWS)]) + "\n")
     given(calibration, pours=path)
     (notice,) = caplog.records
-    assert notice.name.endswith("criticism.inputs") and "who" in notice.getMessage()
+    assert str(path) in notice.getMessage() and "who" in notice.getMessage()
 
 
 def test_a_recording_is_held_out_once_and_under_its_own_name(calibration, other, tmp_path):
@@ -211,3 +211,13 @@ def test_clean_recordings_of_the_same_path_say_where_it_errs(calibration):
     assert [type(part).__name__ for part in noise.parts] == ["AutoregressiveNoise", "UsualResidual"]
     assert usual_for(stirring, []) is None
     assert stir_experiment(stirring, cameras, None, "stir").noise is cameras
+
+
+@pytest.mark.parametrize("option", ["pours", "held_out_pours"])
+def test_pours_that_the_cups_could_not_make_are_refused(calibration, table, option):
+    tables = {
+        "pours": table("p.csv"),
+        option: table("q.csv", ["45,10,5,90,5", *ROWS, "60,50,1,1,1"]),
+    }
+    with pytest.raises(InputError, match=r"q\.csv: distance_cm: 50 cm, which looks like mm"):
+        given(calibration, **tables)

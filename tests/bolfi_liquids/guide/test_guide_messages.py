@@ -45,6 +45,11 @@ def in_milliseconds(stir):
     return stir.assign_coords(time=(1000.0 * stir["time"]).assign_attrs(attributes))
 
 
+def without_inclination(stir):
+    stir["inclination_xz"][:] = 0.0
+    return stir
+
+
 def without_density(stir):
     del stir.attrs["liquid_density"]
     return stir
@@ -60,6 +65,8 @@ SPOILED = {
     "NaN for 1.03 s": unseen("inclination_yz", 40, 70),
     "NaN in 181 of 201": unseen("inclination_yz", 20, None),
     "no gripper position": unseen("x", 40, 60),
+    "the camera stood still": without_inclination,
+    "starts in motion": lambda stir: stir.isel(time=slice(40, None)),
     "leaves the cup": shifted("x", 0.05),
     "through the floor": shifted("z", -0.05),
     "floats up": lambda stir: stir.assign_attrs(stick_density=300.0),
@@ -124,6 +131,8 @@ def test_refused_commands(told, tmp_path, command):
 def test_missing_and_damaged_files(told, tmp_path):
     (tmp_path / "stir.nc").write_text("time,x\n", encoding="utf-8")
     assert told("calibrate stir.nc --out runs/mine") in QUOTED
+    (tmp_path / "stir.nc").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(99))
+    assert told("calibrate stir.nc --out runs/mine") in QUOTED
     (tmp_path / "stir.nc").unlink()
     assert told("calibrate stir.nc --out runs/mine") in QUOTED
 
@@ -140,6 +149,22 @@ def test_wrong_maps_of_a_table(told, tmp_path):
     ):
         path.write_text(template.replace(right, wrong), encoding="utf-8")
         assert told("import stir.csv --columns columns.toml") in QUOTED
+
+
+def test_odd_numerals_of_a_table(told, tmp_path):
+    header = "t;tcp_x;tcp_y;tcp_z;angle_xz;angle_yz\n"
+    (tmp_path / "stir.csv").write_text(f"{header}0;1;1;1;0;0\n1;1,234.5;1;1;0;0\n")
+    told("import --template columns.toml")
+    template = (tmp_path / "columns.toml").read_text(encoding="utf-8")
+    (tmp_path / "columns.toml").write_text(template.replace('","', '";"', 1), encoding="utf-8")
+    assert told("import stir.csv --columns columns.toml") in QUOTED
+
+
+def test_pours_far_from_their_cups(told, run, tmp_path):
+    rows = ["60,1,1,9,0", "60,2,1,9,0", "60,50,1,9,0"]
+    header = "angular_velocity_deg_s,distance_cm,spilled,received,retained"
+    (tmp_path / "pours.csv").write_text("\n".join([header, *rows, ""]))
+    assert told("criticise runs/mine --pours pours.csv") in QUOTED
 
 
 def test_runs_that_cannot_go_on(told, run, calibration):

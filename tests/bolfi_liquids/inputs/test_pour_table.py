@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from bolfi_liquids.errors import InputError
-from bolfi_liquids.inputs.pour_table import open_pours
+from bolfi_liquids.inputs.bundled import POURED_LIQUIDS, bundled_pours
+from bolfi_liquids.inputs.cups import bundled_cups
+from bolfi_liquids.inputs.pour_table import check_scene, open_pours
 
 HEADER = "liquid,angular_velocity_deg_s,distance_cm,received,retained,spilled\n"
 ROWS = ["water,45,1.5,90,5,5", "water,90,1.5,80,0,20", "water,90,3,10,10,0", "oil,45,1.5,1,1,2"]
@@ -75,3 +77,60 @@ def test_names_in_upper_case_and_decimal_commas_are_read(tmp_path):
     np.testing.assert_array_equal(
         open_pours(path).fractions, open_pours(written(tmp_path, ROWS[:3])).fractions
     )
+
+
+@pytest.mark.parametrize(
+    "header", [HEADER, HEADER.replace("liquid", "Liquid"), HEADER.replace("liquid", " LIQUID ")]
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_a_liquid_is_found_however_a_spreadsheet_saves_the_table(tmp_path, header, encoding):
+    path = written(tmp_path, ROWS, header)
+    path.write_bytes(path.read_text().encode(encoding))
+    assert len(open_pours(path, "water").distance) == 3
+    with pytest.raises(InputError, match="oil, water"):
+        open_pours(path)
+
+
+@pytest.mark.parametrize("name", ["liquids", "Liquid name", "liqiud", "fluid"])
+def test_a_column_that_may_name_the_liquids_is_not_passed_over(tmp_path, name):
+    with pytest.raises(InputError, match="'liquid'"):
+        open_pours(written(tmp_path, ROWS, HEADER.replace("liquid", name)), "water")
+
+
+def test_a_measurement_of_the_liquid_does_not_name_it(tmp_path):
+    rows = [row.replace("water", "21.5") for row in ROWS[:3]]
+    path = written(tmp_path, rows, HEADER.replace("liquid", "liquid_temperature"))
+    assert open_pours(path).unused == ("liquid_temperature",)
+
+
+def test_columns_that_nobody_reads_are_told(tmp_path, caplog):
+    path = written(tmp_path, [f"{row},mine" for row in ROWS[:3]], HEADER.strip() + ",remark\n")
+    open_pours(path)
+    (record,) = caplog.records
+    assert str(path) in record.getMessage() and "remark" in record.getMessage()
+
+
+def test_a_surplus_cell_is_refused_with_its_line(tmp_path):
+    with pytest.raises(InputError, match="line 3: 7 cells, where the header has 6"):
+        open_pours(written(tmp_path, [ROWS[0], "water,90,1,5,80,0,20", ROWS[2]]))
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        (["w,45,15,1,1,1", "w,90,30,1,1,1", "w,90,50,1,1,1"], "distance_cm: 15 cm.*looks like mm"),
+        (["w,45,.01,1,1,1", "w,90,.03,1,1,1", "w,90,.05,1,1,1"], "distance_cm: .*looks like m;"),
+        (["w,1.5,1,1,1,1", "w,2,1,1,1,1", "w,3,1,1,1,1"], "1.5 deg/s, which looks like rad/s"),
+        (["w,45,-8,1,1,1", "w,90,1,1,1,1", "w,90,2,1,1,1"], "distance_cm: -8 cm"),
+        (["w,45,1,1,1,1", "w,900,1,1,1,1", "w,90,2,1,1,1"], "angular_velocity_deg_s: 900 deg/s"),
+    ],
+)
+def test_pours_that_no_such_cups_could_make_are_refused(tmp_path, rows, said):
+    table = open_pours(written(tmp_path, rows))
+    with pytest.raises(InputError, match=said):
+        check_scene(table, bundled_cups())
+
+
+@pytest.mark.parametrize("liquid", POURED_LIQUIDS)
+def test_bundled_pours_fit_the_bundled_cups(liquid):
+    check_scene(bundled_pours(liquid), bundled_cups())

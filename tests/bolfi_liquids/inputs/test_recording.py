@@ -110,6 +110,53 @@ BAD = {
     "thick stick": (with_attribute("stick_radius", 0.05), "stick_radius", "0.05"),
     "short stick": (with_attribute("stick_length", 0.1), "stick_length", "does not reach"),
     "long stick": (with_attribute("stick_length", 0.3), "stick_length", "through the floor"),
+    "complex": (with_values("inclination_yz", lambda v: v + 0j), "inclination_yz", "complex128"),
+    "whole numbers": (
+        with_values("x", lambda v: np.rint(1000 * v).astype(int)),
+        "x",
+        "int64, not decimal",
+    ),
+    "cup of 1 m": (with_attribute("cup_radius", 1.0), "cup_radius", "1.0 m looks like"),
+    "tiny cup": (with_attribute("cup_radius", 0.0004), "cup_radius", "0.0004 m is too small"),
+    "heavy stick": (with_attribute("stick_mass", 1.7), "stick_mass", "looks like g"),
+    "several sizes": (with_attribute("cup_radius", [0.04, 0.05]), "cup_radius", "array"),
+    "no inclination at all": (
+        with_values("inclination_xz", np.zeros_like),
+        "inclination_xz",
+        "the camera stood still",
+    ),
+    "one inclination": (
+        with_values("inclination_yz", lambda v: np.full_like(v, 0.02)),
+        "inclination_yz",
+        "0.02 rad",
+    ),
+    "frozen from 2.5 s on": (
+        with_values("inclination_xz", lambda v: np.where(np.arange(len(v)) > 75, v[75], v)),
+        "inclination_xz",
+        "from 2.50 s on",
+    ),
+    "frozen again and again": (
+        with_values("inclination_xz", lambda v: v[np.arange(len(v)) // 12 * 12]),
+        "inclination_xz",
+        "the camera stood still",
+    ),
+    "random": (
+        with_values(
+            "inclination_xz", lambda v: 1.5 * np.random.default_rng(0).uniform(-1, 1, len(v))
+        ),
+        "inclination_xz",
+        "jumps by",
+    ),
+    "small degrees": (
+        with_values("inclination_xz", lambda v: np.degrees(v) / 5),
+        "inclination_xz",
+        "looks like degrees",
+    ),
+    "from above": (
+        with_values("inclination_yz", lambda v: np.pi - np.abs(v)),
+        "inclination_yz",
+        "from the upward vertical",
+    ),
     "outside": (with_values("x", lambda v: v + 0.05), "x", "leaves the cup"),
 }
 
@@ -134,6 +181,23 @@ def test_what_is_no_recording_is_refused(tmp_path, content):
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(ValueError, match="no such file" if content is None else "not a NetCDF"):
+        bl.open_recording(path)
+
+
+def test_a_damaged_recording_is_one_line(dataset, tmp_path):
+    whole = Path(str(files("bolfi_liquids.data"))) / "glycerin_v10.nc"
+    content, path = whole.read_bytes(), tmp_path / "stir.nc"
+    outcomes = []
+    for at in range(0, len(content), len(content) // 29):
+        path.write_bytes(content[:at] + bytes([content[at] ^ 0xFF]) + content[at + 1 :])
+        try:
+            bl.open_recording(path)
+        except bl.InputError as err:
+            outcomes.append(err)
+            assert str(path) in err.where and "\n" not in str(err)
+    assert any("damaged" in err.what and "copy it again" in err.fix for err in outcomes)
+    path.write_bytes(content[: len(content) // 2])
+    with pytest.raises(bl.InputError, match="damaged"):
         bl.open_recording(path)
 
 

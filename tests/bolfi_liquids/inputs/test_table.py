@@ -110,3 +110,41 @@ def test_an_empty_file_has_no_columns(tmp_path):
 def test_pandas_is_imported_when_a_table_is_read():
     code = "import sys, bolfi_liquids.inputs.pour_table; sys.exit('pandas' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("odd", ["3_0", "٣", "1e999", "inf", "-nan", "1,234.5", "1 000"])
+@pytest.mark.parametrize("delimiter", [";", "\t"])
+def test_odd_numerals_are_refused_with_their_place(tmp_path, odd, delimiter):
+    path = tmp_path / "table.csv"
+    path.write_text(f"a;b\n1.5;2\n2;{odd}\n".replace(";", delimiter), encoding="utf-8")
+    assert read_table(path).numbers("a").tolist() == [1.5, 2.0]
+    with pytest.raises(InputError) as refused:
+        read_table(path).numbers("b")
+    assert refused.value.where == f"{path}: line 3, column b"
+    assert odd in refused.value.what
+
+
+def test_a_comma_that_may_set_thousands_apart_is_refused(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("a;b\n1,234;2\n5,678;3\n")
+    with pytest.raises(InputError, match="1,234"):
+        read_table(path)
+    assert read_table(path, decimal=",").numbers("a").tolist() == [1.234, 5.678]
+    path.write_text("a;b\n1,234;2\n0,678;3\n")  # nobody writes a thousand so
+    assert read_table(path).numbers("a").tolist() == [1.234, 0.678]
+
+
+def test_the_line_that_tells_excel_the_delimiter_is_no_header(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("sep=;\na;b\n1,5;2\n1,5;x\n")
+    table = read_table(path)
+    assert table.header == ("a", "b") and table.numbers("a").tolist() == [1.5, 1.5]
+    with pytest.raises(InputError, match="line 4, column b"):
+        table.numbers("b")
+
+
+def test_a_table_without_names_is_refused(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("0,1.5\n1,2.5\n")
+    with pytest.raises(InputError, match="line 1: holds numbers"):
+        read_table(path)

@@ -187,6 +187,20 @@ def test_nothing_but_an_import_is_written_over(tmp_path, written, name):
     assert (tmp_path / name).read_bytes() == before
 
 
+def test_columns_that_the_map_leaves_out_are_told(tmp_path, written, caplog):
+    caplog.set_level("INFO")
+    import_table(*written, tmp_path / "stir.nc")
+    (told,) = caplog.records
+    assert "stir.csv: columns not used: note" in told.getMessage()
+
+
+def test_a_stir_from_the_middle_is_imported_and_warned_of(tmp_path, written, truth):
+    table = table_of(tmp_path / "late.csv", truth, lambda rows: rows.__delitem__(slice(1, 60)))
+    found = import_table(table, written[1], tmp_path / "late.nc")
+    (warned,) = [line for line in outline(found).splitlines() if line.startswith("warning")]
+    assert "late.nc" in warned and "starts in motion" in warned
+
+
 def test_an_import_may_be_made_again(tmp_path, written):
     again = [import_table(*written, tmp_path / "stir.nc").hash for _ in range(2)]
     assert len(set(again)) == 1

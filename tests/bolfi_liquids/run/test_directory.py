@@ -185,3 +185,22 @@ def test_broken_summary_is_named(tmp_path):
     (tmp_path / "summary.json").write_text("{")
     with pytest.raises(InputError, match="not JSON"):
         write_section(tmp_path, "pour", {})
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b'{"pour": {"a": NaN}}', b'{"pour": {"a": 1e999}}', b'{"pour": {"a": "\xe9"}}', b"[" * 9999],
+)
+def test_numbers_and_bytes_that_json_does_not_know_are_refused_by_file(tmp_path, content):
+    path = tmp_path / "summary.json"
+    path.write_bytes(content)
+    with pytest.raises(InputError) as refused:
+        write_section(tmp_path, "calibrate", {})
+    assert refused.value.where == str(path)
+    assert path.read_bytes() == content
+
+
+def test_a_record_that_is_no_text_is_named(tmp_path):
+    (tmp_path / "run.toml").write_bytes(b'created = "\xe9"')
+    with pytest.raises(InputError, match="run.toml: not TOML"):
+        read_run(tmp_path)

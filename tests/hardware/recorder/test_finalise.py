@@ -19,8 +19,10 @@ from bolfi_liquids.hardware.recorder.sample import Sample
 from bolfi_liquids.hardware.recorder.views import camera_model
 from bolfi_liquids.hardware.rig_file import bundled_rig
 from bolfi_liquids.hardware.vision.frame_measurement import Flag, FrameMeasurement
+from typer.testing import CliRunner
 
 import bolfi_liquids as bl
+from bolfi_liquids.cli.app import app
 
 RIG = bundled_rig()
 WAY = 2.0  # s, down into the cup, and out of it
@@ -53,9 +55,11 @@ def pivot(robot_time, duration):
 
 
 def inclination(robot_time):
-    """Of the stick [rad], shape (T, 2)."""
+    """Of the stick [rad], shape (T, 2): it hangs until the gripper has begun to stir."""
     t = np.asarray(robot_time, dtype=float)
-    return np.stack([0.15 * np.sin(4.0 * t + 0.3), 0.12 * np.cos(2.7 * t)], axis=-1)
+    share = np.sin(0.5 * np.pi * np.clip((t - WAY) / 2.0, 0.0, 1.0))[..., None] ** 4
+    swing = np.stack([0.15 * np.sin(4.0 * t + 0.3), 0.12 * np.cos(2.7 * t)], axis=-1)
+    return share * swing
 
 
 def frames_of(view, until, duration, rng, rate=30.0):
@@ -236,6 +240,19 @@ def test_what_a_killed_session_left_can_be_used(session):
     assert recording.time[-1] == pytest.approx(10.0 - WAY, abs=0.2)
     apart = recording.inclination - inclination(WAY + recording.time)
     assert np.degrees(np.nanmax(np.abs(apart))) < 0.15
+
+
+def test_a_killed_session_is_made_a_recording_and_cut_by_one_command(session, tmp_path):
+    def cut(samples, frames):
+        del samples[1250:], frames["xz"][298:], frames["yz"][280:]
+
+    directory, out = session(change=cut, events=()), tmp_path / "cut.nc"
+    done = CliRunner().invoke(app, ["trim", str(directory), "--out", str(out)])
+    assert done.exit_code == 0, done.stderr
+    recording = bl.open_recording(out)
+    assert np.isfinite(recording.inclination[-1]).all()
+    assert recording.attrs["status"] == "aborted" and "killed" in recording.attrs["reason"]
+    assert len(recording.attrs["history"].splitlines()) == 2
 
 
 def test_repeated_samples_and_frames_do_no_harm(session):

@@ -1,0 +1,125 @@
+"""Cutting a recording to the part that can be simulated: from rest, without gaps at its ends."""
+
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from .errors import InputError
+from .files import existing_file, new_netcdf, write_netcdf
+from .inputs.described_liquid import number_of
+from .inputs.fields import check_fields
+from .inputs.open import check_recording, open_recording, read_fields, read_recording
+from .inputs.recording import Recording, as_recording
+from .inputs.start import first_rest
+
+CHOOSE_TIMES = "give --start and --stop within it"
+
+
+class Cut(NamedTuple):
+    """First and last time that stay [s], on the recording's clock."""
+
+    start: float
+    stop: float
+
+
+def trim(
+    recording: str | Path,
+    *,
+    start: float | None = None,
+    stop: float | None = None,
+    out: str | Path,
+) -> Recording:
+    """Cut a recording, and write what stays to a new file.
+
+    Args:
+        recording: Its file.
+        start: First time that stays [s], on the recording's clock; None is the first at which
+            gripper and stick rest in the liquid before they stir it.
+        stop: Last time that stays [s]; None is the last at which both planes and the gripper are
+            seen.
+        out: The file to write, .nc; there may be none of that name.
+
+    Returns:
+        The part, as `open_recording` opens it.
+
+    Raises:
+        InputError: The recording cannot be read, it holds no such times, what stays cannot be
+            simulated, or `out` cannot be written. Nothing was written.
+    """
+    path, out = existing_file(recording), Path(out)
+    if out.exists():
+        raise InputError("exists already", where=str(out), fix="choose another name")
+    new_netcdf(out)
+    whole = read_recording(path)
+    cut = proposed_cut(whole, start, stop)
+    dataset = read_fields(path)
+    kept = (whole.time >= cut.start) & (whole.time <= cut.stop)
+    part = dataset.isel(time=np.flatnonzero(kept))
+    for name in part.variables:
+        part[name].encoding.clear()  # chunks of the whole may be longer than the part
+    check_fields(part, path)
+    check_recording(as_recording(part, path))
+    history = [str(dataset.attrs.get("history") or ""), _told(path, whole, cut)]
+    write_netcdf(part.assign_attrs(history="\n".join(filter(None, history))), out)
+    return open_recording(out)
+
+
+def proposed_cut(
+    recording: Recording, start: float | None = None, stop: float | None = None
+) -> Cut:
+    """What `trim` keeps; times that are given stay as they are.
+
+    Raises:
+        InputError: The recording has no such times.
+    """
+    where = str(recording.path)
+    time = recording.time
+    if not len(time) or not np.isfinite(time).all() or (np.diff(time) <= 0.0).any():
+        fix = "sort the samples, drop repeated ones, and give each a time"
+        raise InputError("times do not increase", where=f"{where}: time", fix=fix)
+    if stop is None:
+        stop = _last_seen(recording)
+    else:
+        stop = number_of(stop, "--stop")
+    if start is None:
+        start = first_rest(recording)
+        if start is None:
+            raise InputError(
+                "there is no time at which gripper and stick rest in the liquid before a stir",
+                where=where,
+                fix="record from rest, or give --start",
+            )
+    else:
+        start = number_of(start, "--start")
+    if not time[0] <= stop or not start <= time[-1] or not start < stop:
+        raise InputError(
+            f"nothing lies from {start:g} to {stop:g} s; it lasts from {time[0]:.10g} to "
+            f"{time[-1]:.10g} s",
+            where=where,
+            fix=CHOOSE_TIMES,
+        )
+    return Cut(float(start), float(stop))
+
+
+def _last_seen(recording: Recording) -> float:
+    seen = np.isfinite(recording.inclination).all(axis=1)
+    seen &= np.isfinite(recording.gripper.position).all(axis=1)
+    if not seen.any():
+        raise InputError(
+            "the stick is never seen in both planes", where=str(recording.path), fix="record again"
+        )
+    last = recording.time[np.flatnonzero(seen)[-1]]
+    return float(np.ceil(1000.0 * last) / 1000.0)  # as it is printed
+
+
+def _told(path: Path, whole: Recording, cut: Cut) -> str:
+    """A line of the file's history."""
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    return (
+        f"{now}: {cut.start:.10g} to {cut.stop:.10g} s of {path.name} ({whole.time[0]:.10g} to "
+        f"{whole.time[-1]:.10g} s, SHA-256 {whole.hash}), cut by bolfi-liquids "
+        f"{version('bolfi-liquids')}"
+    )

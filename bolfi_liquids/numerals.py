@@ -1,0 +1,63 @@
+"""Numbers as people write them, read without guessing."""
+
+import json
+import math
+import re
+from typing import Any
+
+_NUMERAL = r"[+-]?(\d+{sign}?\d*|{sign}\d+)([eE][+-]?\d+)?"
+_NUMERALS = {
+    sign: re.compile(_NUMERAL.format(sign=re.escape(sign)), re.ASCII) for sign in (".", ",")
+}
+_WITH_DECIMALS = {
+    sign: re.compile(rf"[+-]?\d*{re.escape(sign)}\d+([eE][+-]?\d+)?", re.ASCII)
+    for sign in (".", ",")
+}
+_MAYBE_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
+
+
+def parse_number(text: str, decimal: str = ".") -> float:
+    """The number that a text is, blanks around it aside.
+
+    Python reads more than that: digits of other scripts, `3_0`, `infinity`, and 1e999 as infinite.
+
+    Args:
+        text: Digits 0 to 9, with a sign, a decimal sign and an exponent where there are such.
+        decimal: "." or ",".
+
+    Raises:
+        ValueError: The text is something else, or larger than a number may be.
+    """
+    text = text.strip()
+    if not _NUMERALS[decimal].fullmatch(text):
+        raise ValueError(f"{text!r:.40} is no number")
+    number = float(text.replace(decimal, "."))
+    if not math.isfinite(number):
+        raise ValueError(f"{text!r:.40} is too large for a number")
+    return number
+
+
+def has_decimals(text: str, decimal: str) -> bool:
+    """Whether a text is a number with digits behind this decimal sign."""
+    return bool(_WITH_DECIMALS[decimal].fullmatch(text.strip()))
+
+
+def may_have_thousands(text: str) -> bool:
+    """Whether the comma in a number may stand for thousands as well: 1,234."""
+    return bool(_MAYBE_THOUSANDS.fullmatch(text.strip()))
+
+
+def load_json(text: str) -> Any:
+    """What a JSON text holds; all its numbers are finite.
+
+    Raises:
+        ValueError: It is not JSON, which knows no NaN, or a number is too large.
+    """
+    return json.loads(text, parse_float=_finite, parse_constant=_finite)
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text:.40} is no number in JSON")
+    return number
