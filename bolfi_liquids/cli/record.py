@@ -10,6 +10,7 @@ import typer
 
 from ..errors import InputError
 from ..online.settings import OnlineSettings
+from ..wording import command
 from .errors import FAILED
 from .examples import examples
 from .grouped import grouped
@@ -123,6 +124,15 @@ def record(
     else:
         recording = record_online(opened, online=choice, **given)
     print_recording(recording, Console())
+    calibrated = None if choice is None else choice.run
+    typer.echo("next: " + " or: ".join(next_commands(recording.path, calibrated)))
+
+
+def next_commands(recording: Path, calibrated: Path | None) -> list[str]:
+    """What may follow a recording, which was perhaps calibrated into a RUN directory already."""
+    if calibrated is None:
+        return [command("calibrate", recording, "--out", "RUN")]
+    return [command("criticise", calibrated), command("pour", calibrated)]
 
 
 def execute(run: Path, rig: Path | None, *, arm: bool, emulator: bool) -> None:
