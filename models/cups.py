@@ -18,7 +18,7 @@ from .fluid.numerics import MODEL_VERSION, POUR_PARTICLES, Numerics
 
 
 def _in_metres(length: float) -> float:
-    if length > MAX_LENGTH:
+    if abs(length) > MAX_LENGTH:
         raise ValueError(f"{length:g} m looks like millimetres; convert it to m")
     return length
 

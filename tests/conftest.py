@@ -1,7 +1,9 @@
 """Tests in which processes must keep time, on computers that may not; what JAX compiled is kept."""
 
+import json
 import os
 import sys
+import tarfile
 import time
 from pathlib import Path
 from threading import Event, Thread
@@ -26,6 +28,18 @@ def pytest_configure(config):
     if hasattr(config, "cache"):
         os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(config.cache.mkdir("jax")))
         os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+
+
+@pytest.fixture
+def poured_run(tmp_path):
+    """A run that has chosen a pour: a small one of version 0.1, without its criticism."""
+    with tarfile.open(Path(__file__).parent / "data" / "run_0_1.tar.xz") as archive:
+        archive.extractall(tmp_path, filter="data")
+    run = tmp_path / "run_0_1"
+    summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
+    del summary["criticise"]
+    (run / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
+    return run
 
 
 @pytest.fixture(autouse=True)
