@@ -4,6 +4,7 @@ A sentence is a key and values. Its wording is a Jinja macro of that name in
 `data/SUBJECT_sentences.jinja`, so that code and tests speak of conditions and never of wording.
 """
 
+import shlex
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -47,6 +48,11 @@ def with_unit(name: str, value: float) -> str:
 def percent(fraction: float) -> str:
     """A fraction as a percentage of two digits, without decimals above ten."""
     return f"{100 * fraction:{'.0f' if fraction >= WHOLE_PERCENTS_FROM else '.2g'}} %"
+
+
+def command(*words: object) -> str:
+    """A command of this program, to be copied into a shell whatever blanks its paths have."""
+    return shlex.join(["bolfi-liquids", *map(str, words)])
 
 
 def html_table(title: str, rows: Mapping[str, Any]) -> str:

@@ -3,24 +3,30 @@
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-MAX_LENGTH = 3.0  # [m]; more looks like millimetres
+from .rig_limits import Box as Box
+from .rig_limits import Limits
+from .rig_numbers import (
+    Angle,
+    Balance,
+    Degrees,
+    Length,
+    Mass,
+    Point,
+    Positive,
+    Section,
+    Speed,
+    Tcp,
+    Turn,
+    within,
+)
+
 CONTROLLER_RATE = {"cb3": 125.0, "e-series": 500.0}  # Hz; others are rounded by the controller
+MIN_STICK_DENSITY = 300.0  # [kg/m3]; balsa and cork are lighter, and swim
 MAX_STICK_DENSITY = 25_000.0  # [kg/m3]; no stick is denser
-MAX_MASS = 30.0  # [kg]; more looks like grams
-
-
-def _in_metres(length: float) -> float:
-    if abs(length) > MAX_LENGTH:
-        raise ValueError(f"{length:g} m looks like millimetres; convert it to m")
-    return length
-
-
-def _in_kilograms(mass: float) -> float:
-    if mass > MAX_MASS:
-        raise ValueError(f"{mass:g} kg looks like grams; convert it to kg")
-    return mass
+MAX_CYCLES = 100  # stars in a recording
+MIN_LOOK = 0.05  # [m], from a camera to what it looks at
 
 
 def _odd(points: int) -> int:
@@ -29,20 +35,7 @@ def _odd(points: int) -> int:
     return points
 
 
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Coordinate = Annotated[Number, AfterValidator(_in_metres)]
-Length = Annotated[Positive, AfterValidator(_in_metres)]
-Mass = Annotated[Positive, AfterValidator(_in_kilograms)]
-Point = tuple[Coordinate, Coordinate, Coordinate]
-Angle = Annotated[float, Field(ge=-2 * np.pi, le=2 * np.pi)]
-Pose = tuple[Coordinate, Coordinate, Coordinate, Angle, Angle, Angle]
-Degrees = Annotated[float, Field(ge=-360, le=360)]
 View = Literal["xz", "yz"]
-
-
-class Section(BaseModel, frozen=True, extra="forbid"):
-    """Part of a file that a person writes: no unknown fields, no change after reading."""
 
 
 class Robot(Section, frozen=True):
@@ -59,19 +52,20 @@ class Robot(Section, frozen=True):
         pouring_tcp: The source cup's lip in the flange's frame [m, rad].
         stirring_orientation: Rotation vector of the tool while it stirs, in the base frame [rad].
         pouring_orientation: The same before it pours, the source cup upright.
-        start: Joint angles near which the arm works [rad]: which of the arm's configurations.
+        start: Joint angles with the stick's pivot above the cup [rad]: which of the arm's
+            configurations works; with them `rig_geometry` checks where the cup stands.
     """
 
     driver: Literal["ur"] = "ur"
     host: str
     controller: Literal["cb3", "e-series"] = "cb3"
     rate: Annotated[float, Field(ge=50, le=500)] = 125.0
-    payload: Mass
-    payload_centre: Point = (0.0, 0.0, 0.0)
-    stirring_tcp: Pose
-    pouring_tcp: Pose
-    stirring_orientation: tuple[Angle, Angle, Angle]
-    pouring_orientation: tuple[Angle, Angle, Angle]
+    payload: Annotated[Mass, within(0.1, 5.0, "kg", "so much weigh a gripper and what it holds")]
+    payload_centre: Balance = (0.0, 0.0, 0.0)
+    stirring_tcp: Tcp
+    pouring_tcp: Tcp
+    stirring_orientation: Turn
+    pouring_orientation: Turn
     start: tuple[Angle, Angle, Angle, Angle, Angle, Angle]
 
     @model_validator(mode="after")
@@ -89,8 +83,8 @@ class Cup(Section, frozen=True):
 
     position: Point
     yaw_deg: Degrees = 0.0
-    radius: Length
-    height: Length
+    radius: Annotated[Length, within(0.01, 0.2, "m", "a cup is as large as a hand can hold")]
+    height: Annotated[Length, within(0.01, 0.4, "m", "a cup is as high as a hand can hold")]
     fill: Length
 
     @model_validator(mode="after")
@@ -103,8 +97,8 @@ class Cup(Section, frozen=True):
 class Stick(Section, frozen=True):
     """The stick that hangs in the gripper; `colour` tells it from the background."""
 
-    radius: Length
-    length: Length
+    radius: Annotated[Length, within(0.001, 0.03, "m", "a stick is no wire and no post")]
+    length: Annotated[Length, within(0.05, 0.6, "m", "a stick reaches into a cup")]
     mass: Mass
     colour: Literal["dark", "bright"] = "dark"
 
@@ -112,6 +106,11 @@ class Stick(Section, frozen=True):
     def _weighs_as_a_stick(self) -> "Stick":
         if self.density > MAX_STICK_DENSITY:
             raise ValueError(f"mass {self.mass:g} kg looks like grams; convert it to kg")
+        if self.density < MIN_STICK_DENSITY:
+            raise ValueError(
+                f"mass {self.mass:g} kg is a density of {self.density:.3g} kg/m3, which no stick "
+                f"has (at least {MIN_STICK_DENSITY:g}); weigh it in kg"
+            )
         return self
 
     @property
@@ -142,73 +141,21 @@ class Stirring(Section, frozen=True):
     """
 
     pattern: Literal["star", "circle"] = "star"
-    points: Annotated[int, Field(ge=5), AfterValidator(_odd)] = 9
-    radius: Length = 0.025
-    speed: Positive = 0.1
-    acceleration: Positive = 0.5
+    points: Annotated[int, Field(ge=5, le=99), AfterValidator(_odd)] = 9
+    radius: Annotated[
+        Length, within(0.005, 0.15, "m", "a smaller star moves no liquid, a larger one fits no cup")
+    ] = 0.025
+    speed: Speed = 0.1
+    acceleration: Annotated[
+        Positive, within(0.02, 0.6, "m/s2", "a softer stroke never gets going, a harder one jerks")
+    ] = 0.5
     height: Length
     clear_height: Length
-    approach_speed: Positive = 0.05
-    rest: Positive = 2.0
-    cycles: Annotated[int, Field(ge=1, le=100)] = 1
-
-
-class Box(Section, frozen=True):
-    """A range for each axis [m], in the cup's frame."""
-
-    x: tuple[Coordinate, Coordinate]
-    y: tuple[Coordinate, Coordinate]
-    z: tuple[Coordinate, Coordinate]
-
-    @model_validator(mode="after")
-    def _ascend(self) -> "Box":
-        for name in ("x", "y", "z"):
-            low, high = getattr(self, name)
-            if not low < high:
-                raise ValueError(f"{name} must ascend, got [{low}, {high}]")
-        return self
-
-    @property
-    def low(self) -> np.ndarray:
-        """Lower corner, shape (3,)."""
-        return np.array([self.x[0], self.y[0], self.z[0]])
-
-    @property
-    def high(self) -> np.ndarray:
-        """Upper corner, shape (3,)."""
-        return np.array([self.x[1], self.y[1], self.z[1]])
-
-
-class Limits(Section, frozen=True):
-    """What a commanded motion and a running one must keep.
-
-    Attributes:
-        stirring: Where the pivot may go.
-        pouring: Where the source's lip may go.
-        speed: Of the tool's centre [m/s].
-        acceleration: Of it [m/s2].
-        tilt_rate_deg_s: Of the tool.
-        force: Change of the tool's force since rest [N].
-        tracking_error: Between where the tool is and where it was told to be [m].
-        latency: Between a command and its effect, which the box's margin allows for [s].
-        silence: For which the controller may say nothing new [s].
-        frame_age: Of a camera's latest picture [s].
-        overrun: By which a tick of the motion loop may be late [s].
-        reduced_mode: Whether the controller's reduced safety mode is good enough.
-    """
-
-    stirring: Box
-    pouring: Box
-    speed: Annotated[float, Field(gt=0, le=0.25)] = 0.15
-    acceleration: Annotated[float, Field(gt=0, le=0.6)] = 0.5
-    tilt_rate_deg_s: Annotated[float, Field(gt=0, le=180)] = 180.0
-    force: Annotated[float, Field(gt=0, le=100)] = 20.0
-    tracking_error: Length = 0.01
-    latency: Annotated[float, Field(ge=0, le=0.5)] = 0.05
-    silence: Annotated[float, Field(gt=0, le=0.05)] = 0.05
-    frame_age: Annotated[float, Field(gt=0, le=0.15)] = 0.15
-    overrun: Annotated[float, Field(gt=0, le=0.05)] = 0.05
-    reduced_mode: bool = False
+    approach_speed: Speed = 0.05
+    rest: Annotated[
+        Positive, within(0.1, 60.0, "s", "the cameras' noise is learned from some pictures")
+    ] = 2.0
+    cycles: Annotated[int, Field(ge=1, le=MAX_CYCLES)] = 1
 
 
 class Camera(Section, frozen=True):
@@ -230,7 +177,7 @@ class Camera(Section, frozen=True):
     """
 
     view: View
-    source: int | str = 0
+    source: Annotated[int, Field(ge=0)] | str = 0
     width: Annotated[int, Field(ge=160, le=4096)] = 640
     height: Annotated[int, Field(ge=120, le=4096)] = 480
     rate: Annotated[float, Field(ge=5, le=240)] = 30.0
@@ -238,9 +185,14 @@ class Camera(Section, frozen=True):
     target: Point
     roll_deg: Annotated[float, Field(ge=-45, le=45)] = 0.0
     intrinsics: str | None = None
-    focal_length: Positive | None = None
+    focal_length: (
+        Annotated[Positive, within(50.0, 20_000.0, "px", "no webcam sees as wide or as narrow")]
+        | None
+    ) = None
     marker: Point
-    marker_radius: Length = 0.006
+    marker_radius: Annotated[
+        Length, within(0.001, 0.05, "m", "a disc on a gripper is seen, and fits on it")
+    ] = 0.006
 
     @property
     def is_device(self) -> bool:
@@ -251,6 +203,12 @@ class Camera(Section, frozen=True):
     def _knows_its_lens(self) -> "Camera":
         if self.intrinsics is None and self.focal_length is None:
             raise ValueError("neither intrinsics nor focal_length is given")
+        return self
+
+    @model_validator(mode="after")
+    def _looks_somewhere(self) -> "Camera":
+        if np.linalg.norm(np.subtract(self.target, self.position)) < MIN_LOOK:
+            raise ValueError(f"position and target are less than {MIN_LOOK:g} m apart")
         return self
 
 
@@ -266,8 +224,10 @@ class Pouring(Section, frozen=True):
 
     receiver: Point
     heading_deg: Degrees = 0.0
-    approach_height: Length = 0.1
-    approach_speed: Positive = 0.05
+    approach_height: Annotated[
+        Length, within(0.02, 0.5, "m", "the source must come from above the receiver's rim")
+    ] = 0.1
+    approach_speed: Speed = 0.05
 
 
 class Rig(Section, frozen=True):
@@ -284,36 +244,97 @@ class Rig(Section, frozen=True):
 
     @model_validator(mode="after")
     def _fits_together(self) -> "Rig":
-        views = sorted(camera.view for camera in self.cameras)
-        if views != ["xz", "yz"]:
-            raise ValueError(f"cameras: one must see xz and one yz, got {' and '.join(views)}")
-        if self.stirring.speed > self.limits.speed:
-            raise ValueError(
-                f"stirring.speed {self.stirring.speed} m/s is above limits.speed "
-                f"{self.limits.speed} m/s"
-            )
-        tip = self.stirring.height - self.stick.length
-        if not 0.0 < tip < self.cup.fill:
-            raise ValueError(
-                f"stirring.height: the stick's tip is {tip:.3f} m above the floor, "
-                f"outside the liquid (cup.fill = {self.cup.fill} m)"
-            )
-        if self.stirring.radius + self.stick.radius >= self.cup.radius:
-            raise ValueError(
-                f"stirring.radius {self.stirring.radius} m brings the stick to the cup's wall "
-                f"(cup.radius = {self.cup.radius} m)"
-            )
-        if self.limits.stirring.z[0] <= self.stick.length:
-            raise ValueError(
-                f"limits.stirring.z {self.limits.stirring.z[0]} m lets the stick's tip reach the "
-                f"cup's floor (stick.length = {self.stick.length} m)"
-            )
-        if self.stirring.clear_height - self.stick.length <= self.cup.height:
-            raise ValueError(
-                f"stirring.clear_height {self.stirring.clear_height} m leaves the stick in the cup"
-            )
+        _check_cameras(self.cameras, self.limits)
+        _check_speeds(self)
+        _check_stick(self)
+        _check_heights(self)
+        _check_receiver(self)
         return self
 
     def camera(self, view: View) -> Camera:
         """The camera of one view."""
         return next(camera for camera in self.cameras if camera.view == view)
+
+
+def _check_cameras(cameras: tuple[Camera, Camera], limits: Limits) -> None:
+    views = sorted(camera.view for camera in cameras)
+    if views != ["xz", "yz"]:
+        raise ValueError(f"cameras: one must see xz and one yz, got {' and '.join(views)}")
+    slowest = min(camera.rate for camera in cameras)
+    if limits.frame_age < 1.0 / slowest:
+        raise ValueError(
+            f"limits.frame_age {limits.frame_age} s is below the {1.0 / slowest:.3g} s from one "
+            "picture of a camera to the next"
+        )
+
+
+def _check_speeds(rig: Rig) -> None:
+    stirring, limits = rig.stirring, rig.limits
+    speeds = (
+        ("stirring.speed", stirring.speed),
+        ("stirring.approach_speed", stirring.approach_speed),
+        ("pouring.approach_speed", rig.pouring.approach_speed),
+    )
+    for name, speed in speeds:
+        if speed > limits.speed:
+            raise ValueError(f"{name} {speed} m/s is above limits.speed {limits.speed} m/s")
+    if stirring.acceleration > limits.acceleration:
+        raise ValueError(
+            f"stirring.acceleration {stirring.acceleration} m/s2 is above limits.acceleration "
+            f"{limits.acceleration} m/s2"
+        )
+
+
+def _check_stick(rig: Rig) -> None:
+    cup, stick, stirring = rig.cup, rig.stick, rig.stirring
+    tip = stirring.height - stick.length
+    if not 0.0 < tip < cup.fill:
+        raise ValueError(
+            f"stirring.height: the stick's tip is {tip:.3f} m above the floor, "
+            f"outside the liquid (cup.fill = {cup.fill} m)"
+        )
+    if stirring.radius + stick.radius >= cup.radius:
+        raise ValueError(
+            f"stirring.radius {stirring.radius} m brings the stick to the cup's wall "
+            f"(cup.radius = {cup.radius} m)"
+        )
+    if stick.mass >= rig.robot.payload:
+        raise ValueError(
+            f"stick.mass {stick.mass} kg is not below robot.payload {rig.robot.payload} kg, of "
+            "which the stick is a part"
+        )
+    wet = cup.fill - tip
+    lifted = rig.liquid.density * np.pi * stick.radius**2 * wet * (stick.length - wet / 2)
+    if lifted >= stick.mass * stick.length / 2:  # moments about the pivot
+        raise ValueError(
+            f"stick.mass {stick.mass} kg: the stick floats up in a liquid of "
+            f"{rig.liquid.density:g} kg/m3 (liquid.density); it must hang"
+        )
+
+
+def _check_heights(rig: Rig) -> None:
+    stick, stirring, box = rig.stick, rig.stirring, rig.limits.stirring
+    if box.z[0] <= stick.length:
+        raise ValueError(
+            f"limits.stirring.z {box.z[0]} m lets the stick's tip reach the "
+            f"cup's floor (stick.length = {stick.length} m)"
+        )
+    if stirring.clear_height - stick.length <= rig.cup.height:
+        raise ValueError(
+            f"stirring.clear_height {stirring.clear_height} m leaves the stick in the cup"
+        )
+    for name in ("height", "clear_height"):
+        height = getattr(stirring, name)
+        if not box.z[0] <= height <= box.z[1]:
+            raise ValueError(
+                f"stirring.{name} {height} m is outside of limits.stirring.z {list(box.z)} m"
+            )
+
+
+def _check_receiver(rig: Rig) -> None:
+    apart = float(np.hypot(*np.subtract(rig.pouring.receiver[:2], rig.cup.position[:2])))
+    if apart <= rig.cup.radius:
+        raise ValueError(
+            f"pouring.receiver is {apart:.3f} m from cup.position: it stands in the stirred cup "
+            f"(cup.radius = {rig.cup.radius} m)"
+        )

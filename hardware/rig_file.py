@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from .errors import RigError
 from .rig import Rig
+from .rig_geometry import check_geometry
 
 BUNDLED = "rig.toml"
 
@@ -31,8 +32,8 @@ def open_rig(path: str | Path) -> Rig:
     try:
         rig = Rig.model_validate(written)
     except ValidationError as err:
-        raise _explained(err, path) from err
-    return _beside(rig, path.parent)
+        raise _explained(err, str(path)) from err
+    return _beside(check_geometry(rig, str(path)), path.parent)
 
 
 def bundled_rig() -> Rig:
@@ -41,7 +42,20 @@ def bundled_rig() -> Rig:
         return open_rig(path)
 
 
-def _explained(err: ValidationError, path: Path) -> RigError:
+def checked_rig(rig: Rig, where: str = "rig") -> Rig:
+    """The rig itself: copies of a rig may hold numbers that its file may not.
+
+    Raises:
+        RigError: A number is not allowed, or they contradict each other.
+    """
+    try:
+        Rig.model_validate(rig.model_dump())
+    except ValidationError as err:
+        raise _explained(err, where) from err
+    return check_geometry(rig, where)
+
+
+def _explained(err: ValidationError, file: str) -> RigError:
     found = err.errors(include_url=False, include_context=False)
     # a mistyped name is also a missing one
     first = next((one for one in found if one["type"] == "extra_forbidden"), found[0])
@@ -51,7 +65,7 @@ def _explained(err: ValidationError, path: Path) -> RigError:
     what = message if isinstance(given, dict) else f"{message}, got {given!r:.60}"
     return RigError(
         what,
-        where=f"{path}: {field}" if field else str(path),
+        where=f"{file}: {field}" if field else file,
         fix="compare with the bundled rig.toml (SI units unless the name says otherwise)",
     )
 

@@ -1,7 +1,9 @@
 """Tests in which processes must keep time, on computers that may not; what JAX compiled is kept."""
 
+import json
 import os
 import sys
+import tarfile
 import time
 from pathlib import Path
 from threading import Event, Thread
@@ -53,6 +55,18 @@ def _simulates(item):
     folders = _folders(item)
     application = folders[0] == APPLICATION and bool(SIMULATED & set(item.fixturenames))
     return application or any(one in SIMULATING for one in folders)
+
+
+@pytest.fixture
+def poured_run(tmp_path):
+    """A run that has chosen a pour: a small one of version 0.1, without its criticism."""
+    with tarfile.open(Path(__file__).parent / "data" / "run_0_1.tar.xz") as archive:
+        archive.extractall(tmp_path, filter="data")
+    run = tmp_path / "run_0_1"
+    summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
+    del summary["criticise"]
+    (run / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
+    return run
 
 
 @pytest.fixture(autouse=True)

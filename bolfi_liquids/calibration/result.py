@@ -1,5 +1,6 @@
 """What stirring taught: the posterior of a run and what came with it."""
 
+import shlex
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -76,8 +77,8 @@ class Calibration:
             raise InputError(
                 "the calibration in it is not finished",
                 where=str(run),
-                fix=f"go on with it: bolfi-liquids calibrate RECORDING... --out {run} --resume"
-                + _given_options(record),
+                fix="go on with it: bolfi-liquids calibrate RECORDING... --out "
+                + f"{shlex.quote(str(run))} --resume{_given_options(record)}",
             )
         loaded = read_tree(
             run / POSTERIOR, fix="delete it and go on with --resume: no simulation is lost"

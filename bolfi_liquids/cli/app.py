@@ -165,6 +165,11 @@ def pour(
     a dry run of the chosen pour, unless armed.
     """
     if execution.execute:
+        if options != PourOptions():
+            raise typer.BadParameter(
+                "--execute carries out the pour that RUN has chosen already; --cups, --iterations "
+                "and --risk belong to the choice, which is made without --execute"
+            )
         cli_record.execute(run, execution.rig, arm=execution.arm, emulator=execution.emulator)
         return
     from ..pouring.choose import choose_pour

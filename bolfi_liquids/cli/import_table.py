@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from ..wording import command
 from .examples import examples
 
 EPILOG = examples("import --template columns.toml", "import stir.csv --columns columns.toml")
@@ -33,10 +34,11 @@ def import_table(
 
     if template is not None:
         written = write_template(template)
-        typer.echo(f"{written}: change it, then: bolfi-liquids import TABLE --columns {written}")
+        then = command("import", "TABLE", "--columns", written)
+        typer.echo(f"{written}: change it, then: {then}")
         return
     if table is None or columns is None:
         raise typer.BadParameter("give TABLE and --columns FILE, or --template FILE")
     recording = run_import(table, columns, table.with_suffix(".nc") if out is None else out)
     typer.echo(outline(recording))
-    typer.echo(f"next: bolfi-liquids calibrate {recording.path} --out RUN")
+    typer.echo(f"next: {command('calibrate', recording.path, '--out', 'RUN')}")

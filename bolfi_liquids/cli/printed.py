@@ -1,6 +1,5 @@
 """What commands print when they are done."""
 
-import shlex
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
+
+from ..wording import command
 
 if TYPE_CHECKING:
     from ..criticism.result import Criticism
@@ -25,9 +26,7 @@ def complaints_among_results() -> Iterator[None]:
 
 def print_next(run: Path, *commands: str) -> None:
     """The commands that may follow, to be copied."""
-    typer.echo(
-        "next: " + " or: ".join(f"bolfi-liquids {c} {shlex.quote(str(run))}" for c in commands)
-    )
+    typer.echo("next: " + " or: ".join(command(one, run) for one in commands))
 
 
 def print_section(run: Path, name: str) -> None:

@@ -12,6 +12,7 @@ import typer
 
 from ..errors import InputError
 from ..online.settings import OnlineSettings
+from ..wording import command
 from .errors import FAILED, INTERRUPTED, Aborted
 from .examples import examples
 from .grouped import grouped
@@ -133,6 +134,15 @@ def record(
     if recording.attrs["status"] == "aborted":
         reason = recording.attrs.get("reason") or "no reason is told"
         raise Aborted(f"{recording.path}: the recording was aborted: {reason}")
+    calibrated = None if choice is None else choice.run
+    typer.echo("next: " + " or: ".join(next_commands(recording.path, calibrated)))
+
+
+def next_commands(recording: Path, calibrated: Path | None) -> list[str]:
+    """What may follow a recording, which was perhaps calibrated into a RUN directory already."""
+    if calibrated is None:
+        return [command("calibrate", recording, "--out", "RUN")]
+    return [command("criticise", calibrated), command("pour", calibrated)]
 
 
 @contextmanager

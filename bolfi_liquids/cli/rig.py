@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from ..wording import command
 from .errors import FAILED
 from .examples import examples
 from .grouped import grouped
@@ -59,7 +60,8 @@ def template(
     """Write the bundled rig.toml, to be changed into your own."""
     from ..inputs.rigs import write_template
 
-    typer.echo(f"{write_template(out)}: change it, then: bolfi-liquids rig check --rig {out}")
+    then = command("rig", "check", "--rig", out)
+    typer.echo(f"{write_template(out)}: change it, then: {then}")
 
 
 @app.command(

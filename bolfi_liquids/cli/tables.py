@@ -116,7 +116,7 @@ def print_checks(checks: "Sequence[Check]", console: Console) -> None:
 
 
 def print_recording(recording: "Recording", console: Console) -> None:
-    """How long a recording is, how it went, and what can be done with it."""
+    """How long a recording is, and how it went."""
     seen = np.isfinite(recording.inclination).all(axis=1)
     largest = np.degrees(np.nanmax(np.abs(recording.inclination)))
     console.print(
@@ -124,7 +124,4 @@ def print_recording(recording: "Recording", console: Console) -> None:
         f"{seen.mean():.0%} of the samples with both views, inclination up to {largest:.1f} deg",
         highlight=False,
         soft_wrap=True,
-    )
-    console.print(
-        f"next: bolfi-liquids calibrate {recording.path} --out RUN", highlight=False, soft_wrap=True
     )

@@ -12,7 +12,7 @@ from ..drawing import given_or_shown
 from ..errors import InputError
 from ..run.directory import CRITICISM, CRITICISM_FORMAT, Run, run_path
 from ..run.summary import SUMMARY_FILE, made_by, read_summary
-from ..wording import html_table, sentence, spoken
+from ..wording import command, html_table, sentence, spoken
 from .summary import CriticismSummary
 from .verdict import Verdict
 
@@ -69,7 +69,7 @@ class Criticism:
             raise InputError(
                 "the calibration in it was not criticised",
                 where=str(run),
-                fix=f"run: bolfi-liquids criticise {run}",
+                fix=f"run: {command('criticise', run)}",
             )
         tree = read_tree(run / CRITICISM, fix=_again(run))
         summary = CriticismSummary.read(run)
@@ -203,7 +203,7 @@ def finished_criticism(run: Path, made_from: Mapping[str, Any]) -> Criticism | N
 
 
 def _again(run: Path) -> str:
-    return f"write it again: bolfi-liquids criticise {run}"
+    return f"write it again: {command('criticise', run)}"
 
 
 def latest_calibration(given: "Run") -> Calibration:

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..inputs.settings import PourSettings
 from ..run.directory import POUR
 from ..run.summary import Number, Section
-from ..wording import html_table, percent
+from ..wording import command, html_table, percent
 from .spillage import ACTION, FRACTIONS
 
 if TYPE_CHECKING:
@@ -95,12 +95,9 @@ class Pour:
             InputError: There is none in the directory, or its file is damaged.
         """
         run = Path(run)
-        if not (run / POUR).is_file():
-            raise InputError(
-                "no pour was chosen", where=str(run), fix=f"choose one: bolfi-liquids pour {run}"
-            )
+        check_poured(run)
         tree = read_pour(run)
-        return cls(run, *(_judged(tree, name) for name in ("chosen", "plug_in")))
+        return cls(run, *(judged(tree, name) for name in ("chosen", "plug_in")))
 
     def plot_map(self, ax: "Axes | None" = None) -> "Axes":
         """Expected spillage over angular velocity and distance, with both actions.
@@ -117,12 +114,7 @@ class Pour:
         from ..drawing import given_or_shown, panels, styled
         from .figures import draw_expected
 
-        tree = read_pour(self.path)
-        if not self._is_in(tree):
-            raise ValueError(
-                f"another pour was chosen in {self.path} since; open it by Pour.open, or choose "
-                "this one again"
-            )
+        tree = self.check_current()
         canvas = given_or_shown(ax)
         with styled():
             drawn = panels(canvas, (1, 1), (4.6, 3.6))
@@ -131,10 +123,20 @@ class Pour:
             drawn.legend(*axes.get_legend_handles_labels())
         return axes
 
-    def _is_in(self, tree: "DataTree") -> bool:
-        """Whether a pour.nc holds this pour."""
+    def check_current(self) -> "DataTree":
+        """pour.nc of the run, which must hold this pour.
+
+        Raises:
+            ValueError: Another pour was chosen in the run since.
+        """
+        tree = read_pour(self.path)
         pairs = ((self.chosen, "chosen"), (self.plug_in, "plug_in"))
-        return all(one.equals(_judged(tree, name)) for one, name in pairs)
+        if not all(one.equals(judged(tree, name)) for one, name in pairs):
+            raise ValueError(
+                f"another pour was chosen in {self.path} since; open it by Pour.open, or choose "
+                "this one again"
+            )
+        return tree
 
 
 @dataclass(frozen=True)
@@ -205,16 +207,30 @@ class PourSummary(ActionSummary, Section):
         )
 
 
+def check_poured(run: Path) -> None:
+    """Refuse a run that has chosen no pour.
+
+    Raises:
+        InputError: It has not.
+    """
+    if not (run / POUR).is_file():
+        raise InputError(
+            "no pour was chosen",
+            where=str(run),
+            fix=f"choose one: {command('pour', run)}",
+        )
+
+
 def read_pour(run: Path) -> "DataTree":
     """pour.nc of a run.
 
     Raises:
         InputError: The file is damaged.
     """
-    return read_tree(run / POUR, fix=f"write it again: bolfi-liquids pour {run}")
+    return read_tree(run / POUR, fix=f"write it again: {command('pour', run)}")
 
 
-def _judged(tree: "DataTree", name: str) -> Judged:
+def judged(tree: "DataTree", name: str) -> Judged:
     """The action in one of the groups `chosen` and `plug_in`."""
     outcomes = tree[name].to_dataset()
     columns = [outcomes[fraction].to_numpy() for fraction in FRACTIONS]

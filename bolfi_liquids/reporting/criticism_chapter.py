@@ -25,7 +25,7 @@ from ..criticism.summary import CriticismSummary
 from ..drawing import to_svg
 from ..hover_labels import lines_of, to_chart
 from ..run.directory import CRITICISM
-from ..wording import Sentence, spoken, unit_of
+from ..wording import Sentence, command, spoken, unit_of
 from . import criticism_sentences as sentences
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def criticism_context(calibration: Calibration) -> dict[str, Any] | None:
     if not is_criticised(run):
         return None
     summary = CriticismSummary.read(run)
-    tree = read_tree(run / CRITICISM, fix=f"write it again: bolfi-liquids criticise {run}")
+    tree = read_tree(run / CRITICISM, fix=f"write it again: {command('criticise', run)}")
     return {"summary": summary, **criticism_chapter(summary, tree, calibration.summary)}
 
 

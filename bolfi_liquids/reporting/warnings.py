@@ -8,11 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..calibration.result import Calibration
 from ..calibration.summary import CalibrationSummary
+from ..criticism.result import is_criticised, latest_calibration
 from ..criticism.summary import CriticismSummary
 from ..criticism.verdict import Verdict
-from ..pouring.result import PourSummary
+from ..pouring.result import PourSummary, read_pour
 from ..pouring.spillage import ACTION
+from ..run.directory import POUR
+from ..run.summary import read_summary
 from ..wording import Sentence, sentence
 from .criticism_sentences import verdict_sentence
 from .sentences import (
@@ -62,13 +66,32 @@ class Results:
     searched: int
 
 
+def results_of(calibration: Calibration) -> Results:
+    """What the run of a calibration holds.
+
+    Raises:
+        InputError: A file is damaged, or of another version.
+    """
+    run, summary = calibration.path, calibration.summary
+    poured = PourSummary.SECTION in read_summary(run) and (run / POUR).is_file()
+    criticised = is_criticised(run)
+    return Results(
+        calibrated=summary,
+        criticised=CriticismSummary.read(run) if criticised else None,
+        poured=PourSummary.read(run) if poured else None,
+        pour=read_pour(run) if poured else None,
+        posterior=latest_calibration(run if criticised else calibration).posterior,
+        searched=summary.n_simulations - int(calibration.tree.attrs["initial"]),
+    )
+
+
 def warnings_of(run: Results) -> list[Sentence]:
     """The gravest first; none if nothing is known to be wrong."""
     return [
         *sampler_sentences(run.calibrated),
         *surrogate_sentences(run.calibrated),
         *_of_the_search(run.calibrated, run.searched),
-        *_of_a_stale_pour(run.pour, run.posterior),
+        *stale_sentences(run),
         *_of_the_model(run.calibrated, run.criticised),
         *least_viscosity_sentences(run.calibrated),
         *_of_the_pour(run.poured, run.pour),
@@ -81,8 +104,9 @@ def _of_the_search(calibrated: CalibrationSummary, searched: int) -> list[Senten
     return [sentence("warning.no_search", total=calibrated.n_simulations, searched=searched)]
 
 
-def _of_a_stale_pour(pour: "DataTree | None", posterior: "Dataset") -> list[Sentence]:
-    if pour is None or was_poured_over(pour, posterior):
+def stale_sentences(run: Results) -> list[Sentence]:
+    """That the pour was chosen over another posterior than the latest, where it was."""
+    if run.pour is None or was_poured_over(run.pour, run.posterior):
         return []
     return [sentence("warning.stale_pour")]
 

@@ -24,6 +24,7 @@ class Task(NamedTuple):
         paths: That will be followed.
         out: Directory of what is recorded; new or empty.
         cameras: Whether the rig's cameras look on.
+        about: What a person is told before the motions.
     """
 
     rig: "Rig"
@@ -31,6 +32,7 @@ class Task(NamedTuple):
     paths: "Sequence[PosePath]"
     out: Path
     cameras: bool = False
+    about: str = ""
 
 
 class Emulation(NamedTuple):
@@ -90,7 +92,7 @@ def armed_session(
     from ..hardware.session.confirmation import describe
 
     check_one(ask, emulation, "armed_session")
-    text = describe(task.paths, task.rig, task.tool)
+    text = f"{task.about}\n{describe(task.paths, task.rig, task.tool)}".lstrip()
     with ExitStack() as stack:
         if emulation is not None:
             running = stack.enter_context(emulation.start)

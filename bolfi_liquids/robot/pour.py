@@ -1,14 +1,14 @@
 """The chosen pour carried out: by the robot, or by the emulator."""
 
-import json
+import logging
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError
 from ..inputs.rigs import rig_of
-from ..run.directory import POUR, RUN_TOML, Run, run_path
+from ..pouring.result import Pour
+from ..run.directory import Run, run_path
 from .armed_session import (
     Ask,
     Emulation,
@@ -16,12 +16,14 @@ from .armed_session import (
     armed_session,
     check_one,
 )
+from .chosen_pour import ChosenPour, chosen_pour
 from .live_view import SessionView
 
 if TYPE_CHECKING:
     from ..hardware import Check, HiddenLiquid, Rig
     from ..hardware.motion import PosePath
-    from ..pouring.result import PourSummary
+
+logger = logging.getLogger(__name__)
 
 POURS_FOLDER = "pours"  # directories of what the arm did, in the RUN
 
@@ -30,46 +32,44 @@ class PourPlan(NamedTuple):
     """A pour as a motion.
 
     Attributes:
-        angular_velocity: Of the source about its lip [rad/s].
-        distance: Horizontally from the lip to the receiver's axis [m].
-        lip_height: Above the receiver's floor [m].
+        chosen: What is carried out.
         ready: Lip above the place of the pour, in the cup's frame, shape (6,).
         path: From there, down, the turn, back upright and up again.
     """
 
-    angular_velocity: float
-    distance: float
-    lip_height: float
+    chosen: ChosenPour
     ready: np.ndarray
     path: "PosePath"
+
+    @property
+    def place(self) -> dict[str, float]:
+        """`distance` of the lip from the receiver's axis and `lip_height` above its floor [m]."""
+        lip_height = self.chosen.cups.pour.lip_height
+        return {"distance": self.chosen.judged.distance, "lip_height": lip_height}
 
 
 def plan_pour(run: str | Path, rig: "Rig") -> PourPlan:
     """The motion of the pour that a run has chosen.
 
     Raises:
-        InputError: The run has chosen none.
+        InputError: The run has chosen none, or none that may be carried out.
         MotionRejected: The motion breaks one of the rig's limits.
     """
     from ..hardware import check_path
     from ..hardware.motion import pour_path, ready_to_pour
 
-    chosen, cups = _chosen(Path(run))
-    turn = cups["pour"]
-    action = {
-        "angular_velocity": float(np.radians(chosen.angular_velocity_deg_s)),
-        "distance": chosen.distance_cm / 100,
-        "lip_height": float(turn["lip_height"]),
-    }
+    chosen = chosen_pour(Path(run))
+    action, turn = chosen.judged, chosen.cups.pour
+    place = {"distance": action.distance, "lip_height": turn.lip_height}
     path = pour_path(
         rig,
-        final_angle=float(np.radians(turn["final_angle_deg"])),
-        hold=float(turn["hold"]),
-        **action,
+        angular_velocity=action.angular_velocity,
+        final_angle=turn.final_angle,
+        hold=turn.hold,
+        **place,
     )
     check_path(path, rig, "pouring")
-    ready = ready_to_pour(rig, action["distance"], action["lip_height"])
-    return PourPlan(ready=ready, path=path, **action)
+    return PourPlan(chosen, ready_to_pour(rig, **place), path)
 
 
 def execute_pour(
@@ -95,8 +95,10 @@ def execute_pour(
         The directory of what the arm did.
 
     Raises:
-        InputError: The run has chosen no pour, or neither or both of `ask` and `emulate` are
-            given.
+        InputError: The run has chosen no pour, its files contradict each other, its cups forbid
+            the pour, or neither or both of `ask` and `emulate` are given. For a real arm also:
+            the pour was chosen over another posterior than the latest.
+        ValueError: Another pour was chosen in the run than the one given.
         MotionRejected: The motion breaks one of the rig's limits.
         SessionStopped: The arm was stopped.
     """
@@ -104,9 +106,15 @@ def execute_pour(
     from ..hardware.motion import approach_pour
 
     check_one(ask, emulate, "execute_pour")
+    if isinstance(run, Pour):
+        run.check_current()
     run, rig = run_path(run), rig_of(rig)
     plan = plan_pour(run, rig)
-    task = Task(rig, "pouring", [plan.path], _next_directory(run))
+    if ask is not None:
+        plan.chosen.check_fresh()
+    for sentence in plan.chosen.stale:
+        logger.warning(str(sentence))
+    task = Task(rig, "pouring", [plan.path], _next_directory(run), about=str(plan.chosen))
     emulation = None
     if emulate:
         start = emulated(rig, plan.ready, tool="pouring")
@@ -116,8 +124,7 @@ def execute_pour(
             armed_session(task, ask=ask, emulation=emulation) as session,
             SessionView("pouring" if ask else "pouring, emulated", shown=progress) as view,
         ):
-            place = {"distance": plan.distance, "lip_height": plan.lip_height}
-            session.follow(approach_pour(rig, session.pose(), **place))
+            session.follow(approach_pour(rig, session.pose(), **plan.place))
             view.until_done(session, session.follow(plan.path))
     except KeyboardInterrupt:
         raise SessionStopped(f"interrupted, the arm was stopped; look at {task.out}") from None
@@ -125,30 +132,19 @@ def execute_pour(
 
 
 def dry_pour(run: str | Path, rig: "Rig", out: Path) -> "tuple[str, list[Check]]":
-    """What the arm would do, and the pre-flight list of a session that cannot move it."""
+    """What the arm would do, and the pre-flight list of a session that cannot move it.
+
+    Raises:
+        InputError, MotionRejected: As `plan_pour`.
+    """
     from ..hardware import Session, SessionSetup
     from ..hardware.session.confirmation import describe
 
     plan = plan_pour(run, rig)
     setup = SessionSetup(rig, out, tool="pouring", plan=[plan.path])
     with Session(setup) as session:
-        return describe([plan.path], rig, "pouring"), session.preflight()
-
-
-def _chosen(run: Path) -> "tuple[PourSummary, dict[str, Any]]":
-    """The section "pour" of a run, and the cups that it was chosen for."""
-    from ..pouring.result import PourSummary, read_pour
-
-    if not (run / RUN_TOML).exists() and not (run / POUR).exists():
-        raise InputError(
-            "no run", where=str(run), fix="calibrate first: bolfi-liquids calibrate RECORDING"
-        )
-    if not (run / POUR).exists():
-        raise InputError(
-            "no pour was chosen", where=str(run), fix=f"choose one: bolfi-liquids pour {run}"
-        )
-    tree = read_pour(run)
-    return PourSummary.read(run), json.loads(tree.attrs["cups"])
+        text = f"{plan.chosen}\n{describe([plan.path], rig, 'pouring')}"
+        return text, session.preflight()
 
 
 def _next_directory(run: Path) -> Path:

@@ -48,15 +48,17 @@ def plan_stir(rig: "Rig", cycles: int | None = None) -> StirPlan:
         cycles: How often the pattern is repeated; None as in the rig's file.
 
     Raises:
-        InputError: `cycles` is below 1.
+        InputError: `cycles` is below 1 or above `MAX_CYCLES`.
         MotionRejected: The plan breaks one of the rig's limits.
     """
     from ..hardware import check_path
     from ..hardware.motion import insert, retract, strokes
+    from ..hardware.rig import MAX_CYCLES
 
     cycles = rig.stirring.cycles if cycles is None else cycles
-    if cycles < 1:
-        raise InputError(f"{cycles}", where="--cycles", fix="give a whole number of at least 1")
+    if not 1 <= cycles <= MAX_CYCLES:
+        fix = f"give a whole number from 1 to {MAX_CYCLES}"
+        raise InputError(f"{cycles}", where="--cycles", fix=fix)
     stir = tuple(strokes(rig, cycles))
     plan = StirPlan(insert(rig), stir, retract(rig, stir[-1].pose[-1, :3]))
     joints = None

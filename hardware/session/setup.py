@@ -11,6 +11,7 @@ from ..errors import RigError
 from ..motion.cup_frame import cup_frame
 from ..motion.stir_paths import PosePath
 from ..rig import Rig, View
+from ..rig_geometry import check_geometry
 from ..robot.orders import Assignment
 from ..safety.limits import Tool
 from .confirmation import Confirmation
@@ -69,9 +70,9 @@ class SessionSetup:
         """The rig, validated: copies of a rig may hold numbers that its file may not.
 
         Raises:
-            ValueError: A number is not allowed.
+            ValueError: A number is not allowed, or they contradict each other.
         """
-        return Rig.model_validate(self.rig.model_dump())
+        return check_geometry(Rig.model_validate(self.rig.model_dump()))
 
     def guarded_rig(self) -> Rig:
         """The rig by whose limits the arm is guarded; wider ones in a rehearsal."""

@@ -95,6 +95,7 @@ def test_bad_actions_are_named(cups):
         ("hold = 0.9 ", "hold = 'long' ", r"pour\.hold.*long"),
         ("lip_height = 0.20", "lip_height = 0.05", "lip.*not above the receiver's rim"),
         ("[0.0, 0.07]", "[0.07, 0.0]", "distance must ascend"),
+        ("[0.0, 0.07]", "[-50.0, 0.07]", "-50 m looks like millimetres"),
         ("hold = 0.9 ", "hold = inf ", r"pour\.hold.*inf"),
         ("radius = 0.028", "radius = inf", r"source\.radius.*inf"),
         ("radius = 0.028", "radius = 0.56", r"source\.radius.*0.56 m looks like centimetres"),

@@ -18,10 +18,13 @@ import pytest
 import typer.main
 from bolfi_liquids.hardware.session.confirmation import CONFIRMATION, Confirmation
 from pexpect.fdpexpect import fdspawn
+from xarray import DataTree, load_datatree
 
 import bolfi_liquids as bl
 from bolfi_liquids import hardware
+from bolfi_liquids.calibration.posterior_file import write_tree
 from bolfi_liquids.cli.app import app
+from bolfi_liquids.wording import sentence
 
 # a dry run of them looks at the arm, whose controller may not be silent for long
 LOOKS = ("record", "pour")
@@ -93,29 +96,6 @@ def rig_file(tmp_path, emulator, pictures):
     path = tmp_path / "rig.toml"
     path.write_text(text)
     return path
-
-
-@pytest.fixture
-def run_with_a_pour(tmp_path):
-    """A run that has chosen a pour, without its simulations."""
-    import json
-
-    from xarray import DataTree
-
-    from bolfi_liquids.calibration.posterior_file import write_tree
-    from bolfi_liquids.inputs.cups import bundled_cups
-    from bolfi_liquids.pouring.result import ActionSummary, PourSummary
-
-    run = tmp_path / "run"
-    run.mkdir()
-    tree = DataTree()
-    tree.attrs["cups"] = json.dumps(bundled_cups().settings())
-    write_tree(tree, run / "pour.nc")
-    action = ActionSummary(60.0, 2.0, expected_spillage=0.01, spillage_q95=0.03)
-    PourSummary(
-        **vars(action), least_viscosity=0.01, n_simulations=1, risk="mean", seed=0, plug_in=action
-    ).write(run)
-    return run
 
 
 def bolfi_liquids(*arguments, typed=""):
@@ -199,9 +179,9 @@ def test_one_file_knows_the_library_that_moves_arms():
     "words",
     [pytest.param(one, marks=[pytest.mark.alone] if one in LOOKS else []) for one in OF_A_RIG],
 )
-def test_unarmed_command_moves_nothing(words, rig_file, run_with_a_pour, boards, emulator):
+def test_unarmed_command_moves_nothing(words, rig_file, poured_run, boards, emulator):
     before = emulator.admin.motions()
-    names = {"RUN": run_with_a_pour, "BOARDS": boards, "CALIBRATED": rig_file.parent / "c"}
+    names = {"RUN": poured_run, "BOARDS": boards, "CALIBRATED": rig_file.parent / "c"}
     arguments = [names.get(one, one) for one in OF_A_RIG[words]]
     # the sentence is typed all the same
     result = bolfi_liquids(*words.split(), *arguments, "--rig", rig_file, typed=f"{CONFIRMATION}\n")
@@ -213,10 +193,10 @@ def test_unarmed_command_moves_nothing(words, rig_file, run_with_a_pour, boards,
 
 @pytest.mark.parametrize("words", ["record", "pour"])
 def test_a_sentence_through_a_pipe_was_typed_by_nobody(
-    words, rig_file, run_with_a_pour, emulator, tmp_path
+    words, rig_file, poured_run, emulator, tmp_path
 ):
     before = emulator.admin.motions()
-    extra = {"record": ["--out", tmp_path / "out"], "pour": [run_with_a_pour, "--execute"]}[words]
+    extra = {"record": ["--out", tmp_path / "out"], "pour": [poured_run, "--execute"]}[words]
     command = [words, *extra, "--rig", rig_file, "--arm"]
     result = bolfi_liquids(*command, typed=f"{CONFIRMATION}\n")
     assert result.returncode == REFUSED, result.stderr
@@ -228,14 +208,31 @@ def test_a_sentence_through_a_pipe_was_typed_by_nobody(
 @pytest.mark.parametrize("typed", ["", "yes", CONFIRMATION.upper()])
 @pytest.mark.parametrize("words", ["record", "pour"])
 def test_armed_without_the_sentence_moves_nothing(
-    words, typed, rig_file, run_with_a_pour, emulator, tmp_path
+    words, typed, rig_file, poured_run, emulator, tmp_path
 ):
     before = emulator.admin.motions()
     # a real arm asks for real cameras, which nobody opens before the sentence is there
     rig_file.write_text(re.sub(r'source = ".*"', "source = 0", rig_file.read_text()))
-    extra = {"record": ["--out", tmp_path / "out"], "pour": [run_with_a_pour, "--execute"]}[words]
+    extra = {"record": ["--out", tmp_path / "out"], "pour": [poured_run, "--execute"]}[words]
     status, said = in_a_terminal(words, *extra, "--rig", rig_file, "--arm", typed=typed)
     assert status == REFUSED, said
+    assert emulator.admin.motions() == before
+
+
+@pytest.mark.alone  # a look at an arm, whose controller may not be silent for long
+def test_a_stale_pour_is_refused_and_a_dry_run_begins_with_that(poured_run, rig_file, emulator):
+    before = emulator.admin.motions()
+    tree = load_datatree(poured_run / "posterior.nc", engine="h5netcdf")
+    tree["posterior"] = DataTree(tree["posterior"].to_dataset() * 1.001)
+    write_tree(tree, poured_run / "posterior.nc")
+    command = ["pour", poured_run, "--execute", "--rig", rig_file]
+    dry = bolfi_liquids(*command)
+    assert dry.stdout.startswith(str(sentence("warning.stale_pour"))), dry.stderr
+    assert "nothing was moved" in dry.stdout
+    armed = bolfi_liquids(*command, "--arm", typed=f"{CONFIRMATION}\n")
+    # refused before the plan, not for want of a terminal
+    assert armed.returncode == REFUSED and armed.stdout == ""
+    assert "bolfi-liquids pour" in armed.stderr and "terminal" not in armed.stderr
     assert emulator.admin.motions() == before
 
 
@@ -247,16 +244,17 @@ def test_armed_without_the_sentence_moves_nothing(
         pytest.param(True, marks=pytest.mark.minutes, id="whole"),
     ],
 )
-def test_the_sentence_does_move_the_arm(whole, run_with_a_pour, tmp_path):
+def test_the_sentence_does_move_the_arm(whole, poured_run, tmp_path):
     """Without this the tests above could not fail."""
     rig = hardware.bundled_rig()
-    ready = hardware.motion.ready_to_pour(rig, 0.02, 0.2)
+    chosen = bl.Pour.open(poured_run).chosen
+    ready = hardware.motion.ready_to_pour(rig, chosen.distance, 0.2)
     with hardware.emulated(rig, ready, tool="pouring") as running:
         text = (files("bolfi_liquids.hardware.data") / "rig.toml").read_text()
         path = tmp_path / "rig.toml"
         address = running.emulator.address
         path.write_text(text.replace('host = "127.0.0.1"', f'host = "{address}"'))
-        command = ["pour", run_with_a_pour, "--execute", "--rig", path, "--arm"]
+        command = ["pour", poured_run, "--execute", "--rig", path, "--arm"]
         motions = running.emulator.admin.motions
         until = None if whole else lambda: motions() > 0
         status, said = in_a_terminal(*command, typed=CONFIRMATION, until=until)

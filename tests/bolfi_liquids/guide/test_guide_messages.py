@@ -1,5 +1,6 @@
 """Messages that troubleshooting.md quotes are those that people get."""
 
+import json
 import re
 import shutil
 import sys
@@ -11,6 +12,7 @@ import pytest
 import xarray
 from typer.testing import CliRunner
 
+from bolfi_liquids.calibration.posterior_file import write_tree
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.guide import read_page
 
@@ -114,6 +116,7 @@ def test_refused_recordings(told, tmp_path, part):
         "record --arm --out runs/stir --rig video.toml",
         "record --rig slow.toml",
         "record --out runs/stir",
+        "record --rig moved.toml",
     ],
 )
 def test_refused_commands(told, tmp_path, command):
@@ -122,10 +125,12 @@ def test_refused_commands(told, tmp_path, command):
     (tmp_path / "video.toml").write_text(video, encoding="utf-8")
     slow = bundled.replace("\nspeed = 0.15", "\nspeed = 0.05")
     (tmp_path / "slow.toml").write_text(slow, encoding="utf-8")
+    moved = bundled.replace("position = [0.3,", "position = [0.4,")
+    (tmp_path / "moved.toml").write_text(moved, encoding="utf-8")
     (tmp_path / "runs" / "stir").mkdir(parents=True)
     if command.endswith("--out runs/stir"):
         (tmp_path / "runs" / "stir" / "rig.json").touch()
-    assert told(command).replace("slow.toml", "rig.toml") in QUOTED
+    assert re.sub("slow.toml|moved.toml", "rig.toml", told(command)) in QUOTED
 
 
 def test_missing_and_damaged_files(told, tmp_path):
@@ -183,6 +188,22 @@ def test_runs_that_cannot_go_on(told, run, calibration):
 def test_a_run_without_a_pour_executes_none(told, run):
     (run / "pour.nc").unlink(missing_ok=True)
     assert told("pour runs/mine --execute") in QUOTED
+
+
+def test_pours_that_may_not_be_executed(told, poured_run, tmp_path):
+    run = shutil.move(poured_run, tmp_path / "runs" / "mine")
+    summary = run / "summary.json"
+    whole = json.loads(summary.read_text(encoding="utf-8"))
+    other = whole | {"pour": whole["pour"] | {"distance_cm": -5.0}}
+    summary.write_text(json.dumps(other), encoding="utf-8")
+    distance = whole["pour"]["distance_cm"]
+    said = told("pour runs/mine --execute").replace(f"but {distance:g} in", "but 0 in")
+    assert said in QUOTED
+    summary.write_text(json.dumps(whole), encoding="utf-8")
+    posterior = xarray.load_datatree(run / "posterior.nc", engine="h5netcdf")
+    posterior["posterior"] = xarray.DataTree(posterior["posterior"].to_dataset() * 1.001)
+    write_tree(posterior, run / "posterior.nc")
+    assert told("pour runs/mine --execute --arm") in QUOTED
 
 
 def test_criticism_without_proof_or_with_none(told, run, criticism_summary):

@@ -4,6 +4,7 @@ import pytest
 
 import bolfi_liquids as bl
 from bolfi_liquids import hardware
+from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.rigs import rig_of
 from bolfi_liquids.robot.armed_session import EMULATED_VISCOSITY, hidden_liquid
 from bolfi_liquids.robot.live_view import SessionView
@@ -23,6 +24,23 @@ def test_a_rig_may_be_itself_or_its_file_or_none(tmp_path):
     assert rig_of(None) == bundled
     with pytest.raises(ValueError, match=r"none\.toml"):
         rig_of(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize(
+    ("section", "number"),
+    [("limits", {"speed": 2.0}), ("robot", {"stirring_orientation": (0.0, 0.0, 0.0)})],
+)
+def test_a_copy_of_a_rig_is_checked_before_anybody_is_asked(tmp_path, section, number):
+    rig = hardware.bundled_rig()
+    part = getattr(rig, section).model_copy(update=number)
+    wrong = rig.model_copy(update={section: part})
+    (name,) = number
+    with pytest.raises(hardware.RigError, match=name):
+        bl.record(wrong, out=tmp_path / "out", ask=lambda plan: pytest.fail(plan))
+    with pytest.raises(hardware.RigError, match=name):
+        rig_of(wrong)
+    with pytest.raises(InputError, match="no rig"):
+        rig_of({"robot": 1})  # pyright: ignore
 
 
 @pytest.mark.parametrize("shown", [False, True])

@@ -1,0 +1,147 @@
+"""The pour that a run has chosen, as far as an arm may carry it out."""
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..calibration.result import Calibration
+from ..errors import InputError
+from ..inputs.cups import kept_cups
+from ..pouring.result import ActionSummary, Judged, PourSummary, check_poured, judged
+from ..reporting.warnings import results_of, stale_sentences, warnings_of
+from ..run.directory import POUR, RUN_TOML
+from ..run.summary import SUMMARY_FILE
+from ..wording import Sentence, command, percent
+
+if TYPE_CHECKING:
+    from xarray import DataTree
+
+    from ..models import Cups
+
+ROUNDING = 1e-9  # relative, of an action that was written and read again
+GROUPS = ("actions", "chosen", "plug_in", "liquids")
+"""Of pour.nc, from which plan and warnings are made."""
+
+
+@dataclass(frozen=True)
+class ChosenPour:
+    """What is to be carried out, and what a person should know before it is.
+
+    Attributes:
+        run: The RUN directory.
+        judged: The action and what it spills, as pour.nc has them.
+        cups: For which it was chosen.
+        stale: That it was chosen over another posterior than the latest; empty if it was not.
+        worries: The report's other warnings.
+    """
+
+    run: Path
+    judged: Judged
+    cups: "Cups"
+    stale: tuple[Sentence, ...]
+    worries: tuple[Sentence, ...]
+
+    def check_fresh(self) -> None:
+        """Refuse a pour of another posterior than the latest.
+
+        Raises:
+            InputError: It is one.
+        """
+        if self.stale:
+            raise InputError(
+                f"the pour in it is out of date: {str(self.stale[0]).rstrip('.')}",
+                where=str(self.run),
+                fix=_again(self.run),
+            )
+
+    def __str__(self) -> str:
+        """As a person reads it before the motion, what is wrong first."""
+        chosen = self.judged
+        return "\n".join(
+            [
+                *map(str, self.stale),
+                f"the pour that {self.run} has chosen: "
+                f"{np.degrees(chosen.angular_velocity):.1f} deg/s, the lip "
+                f"{100 * chosen.distance:.2f} cm from the receiver's axis",
+                f"expected to spill {percent(chosen.expected_spillage)}, "
+                f"at most {percent(chosen.spillage_q95)} in 95 % of outcomes",
+                *(f"warning: {worry}" for worry in self.worries),
+            ]
+        )
+
+
+def chosen_pour(run: Path) -> ChosenPour:
+    """The pour of a run, from pour.nc.
+
+    Raises:
+        InputError: The run has chosen none, a file is damaged, or the pour is not that of
+            summary.json or lies outside of what its cups allow.
+    """
+    if not (run / RUN_TOML).exists() and not (run / POUR).exists():
+        raise InputError(
+            "no run", where=str(run), fix="calibrate first: bolfi-liquids calibrate RECORDING"
+        )
+    check_poured(run)
+    results = results_of(Calibration.open(run))
+    if results.pour is None or results.poured is None:
+        raise InputError(
+            f"has no section pour, though there is a {POUR}",
+            where=str(run / SUMMARY_FILE),
+            fix=_again(run),
+        )
+    chosen, cups = _kept(run, results.pour)
+    _check_summary(run, results.poured, chosen)
+    _check_ranges(run, chosen, cups)
+    stale = stale_sentences(results)
+    worries = [one for one in warnings_of(results) if one not in stale]
+    return ChosenPour(run, chosen, cups, tuple(stale), tuple(worries))
+
+
+def _kept(run: Path, tree: "DataTree") -> "tuple[Judged, Cups]":
+    """The action of pour.nc and the cups that it was chosen for."""
+    try:
+        for group in GROUPS:
+            tree[group]  # KeyError, if it is not there
+        return judged(tree, "chosen"), kept_cups(json.loads(tree.attrs["cups"]))
+    except (KeyError, TypeError, ValueError) as err:
+        raise InputError(
+            "damaged, it holds no whole pour", where=str(run / POUR), fix=_again(run)
+        ) from err
+
+
+def _check_summary(run: Path, told: PourSummary, chosen: Judged) -> None:
+    """Refuse a pour that a person has read about otherwise."""
+    held = ActionSummary.of(chosen)
+    for name in ActionSummary.__dataclass_fields__:
+        written, kept = getattr(told, name), getattr(held, name)
+        if not math.isclose(written, kept, rel_tol=ROUNDING, abs_tol=ROUNDING):
+            raise InputError(
+                f"pour.{name} is {written:g}, but {kept:g} in {POUR}",
+                where=str(run / SUMMARY_FILE),
+                fix=_again(run),
+            )
+
+
+def _check_ranges(run: Path, chosen: Judged, cups: "Cups") -> None:
+    """Refuse an action that was never to be chosen."""
+    checked = (
+        ("angular_velocity", cups.angular_velocity_range, "rad/s"),
+        ("distance", cups.distance_range, "m"),
+    )
+    for name, (low, high), unit in checked:
+        value, slack = getattr(chosen, name), ROUNDING * max(abs(low), abs(high))
+        if not low - slack <= value <= high + slack:
+            raise InputError(
+                f"{name} {value:g} {unit} is outside of {low:g} to {high:g} {unit}, which the "
+                "cups allow",
+                where=str(run / POUR),
+                fix=_again(run),
+            )
+
+
+def _again(run: Path) -> str:
+    return f"choose the pour again: {command('pour', run)}"

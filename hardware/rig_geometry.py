@@ -1,0 +1,107 @@
+"""Whether a rig's tools, joints and places can be true together: what single numbers cannot tell.
+
+A stick hangs from a gripper that points down, a source cup is upright before it pours, and `start`
+are the joints that a person read off with the stick's pivot above the cup: they say independently
+where the cup stands.
+"""
+
+import numpy as np
+
+from .errors import RigError
+from .motion.cup_frame import cup_frame
+from .motion.kinematics import forward, inverse
+from .motion.poses import rotation_matrix
+from .motion.stir_paths import above_cup
+from .rig import Rig
+from .safety.limits import MAX_TILT, Workspace, workspace
+
+LEVEL_TILT = np.radians(20.0)  # of a gripper that holds a source cup, from level
+LIP_AWAY = 0.005  # m, of a source's lip from the gripper's axis, above it and towards the receiver
+START_AWAY = 0.04  # m, of the pivot at `start` from its place above the cup; a cup is as wide
+
+
+def check_geometry(rig: Rig, where: str = "rig") -> Rig:
+    """The rig itself.
+
+    Args:
+        rig: Whose numbers are each within their ends.
+        where: Its file, for messages.
+
+    Raises:
+        RigError: A tool points where it cannot, or the cup is not where `start` leads to.
+    """
+    _check_stirring_tool(workspace(rig, "stirring"), where)
+    _check_source_cup(rig, workspace(rig, "pouring"), where)
+    _check_start(rig, workspace(rig, "stirring"), where)
+    return rig
+
+
+def _check_stirring_tool(space: Workspace, where: str) -> None:
+    for name, turn in _turns(space).items():
+        tilt = _angle(turn[:, 2], (0.0, 0.0, -1.0))
+        if tilt > MAX_TILT["stirring"]:
+            raise RigError(
+                f"with it the {name} points {np.degrees(tilt):.0f} deg away from straight down",
+                where=f"{where}: robot.stirring_orientation",
+                fix="correct it or the turn in robot.stirring_tcp: the stick hangs from it",
+            )
+
+
+def _check_source_cup(rig: Rig, space: Workspace, where: str) -> None:
+    flange = _turns(space)["flange"]
+    tilt = abs(np.arcsin(np.clip(flange[2, 2], -1.0, 1.0)))
+    if tilt > LEVEL_TILT:
+        raise RigError(
+            f"with it the flange points {np.degrees(tilt):.0f} deg away from level",
+            where=f"{where}: robot.pouring_orientation",
+            fix="correct it or the turn in robot.pouring_tcp: the cup is held from a side",
+        )
+    heading = np.radians(rig.pouring.heading_deg)
+    lip = flange @ space.tcp[:3]
+    ahead = float(lip @ (np.cos(heading), np.sin(heading), 0.0))
+    for value, side in ((float(lip[2]), "above"), (ahead, "on the receiver's side of")):
+        if value < LIP_AWAY:
+            raise RigError(
+                f"with it the source's lip is {1e3 * value:.0f} mm {side} the gripper's axis, not "
+                f"{1e3 * LIP_AWAY:.0f} mm or more",
+                where=f"{where}: robot.pouring_tcp",
+                fix="correct it, robot.pouring_orientation or pouring.heading_deg: the cup must be "
+                "upright, and turn towards the receiver",
+            )
+
+
+def _check_start(rig: Rig, space: Workspace, where: str) -> None:
+    goal = cup_frame(rig.cup).to_base(above_cup(rig))
+    if inverse(space.arm, goal, space.start, tcp=space.tcp).status == "unreachable":
+        raise RigError(
+            f"{list(rig.cup.position)} m: the arm does not reach the place above the cup",
+            where=f"{where}: cup.position",
+            fix="correct it, or place the cup nearer to the robot",
+        )
+    at = forward(space.arm, space.start, tcp=space.tcp)
+    away, tilt = float(np.linalg.norm(at[:3] - goal[:3])), _angle(_axis(at), _axis(goal))
+    if away > START_AWAY or tilt > MAX_TILT["stirring"]:
+        raise RigError(
+            f"these joints put the stick's pivot {100 * away:.0f} cm and "
+            f"{np.degrees(tilt):.0f} deg from its place above the cup (cup.position, "
+            "stirring.clear_height)",
+            where=f"{where}: robot.start",
+            fix="move the pivot there by hand and write down the joints, or correct "
+            "cup.position or robot.stirring_tcp",
+        )
+
+
+def _turns(space: Workspace) -> dict[str, np.ndarray]:
+    """Turn of the tool and of the flange that carries it, in the base frame, shape (3, 3)."""
+    tool = rotation_matrix(space.orientation)
+    return {"tool": tool, "flange": tool @ rotation_matrix(space.tcp[3:]).T}
+
+
+def _axis(pose: np.ndarray) -> np.ndarray:
+    """Where the tool at a pose points, shape (3,)."""
+    return rotation_matrix(pose[3:])[:, 2]
+
+
+def _angle(first: np.ndarray, second: "np.ndarray | tuple[float, ...]") -> float:
+    """Between two directions of length 1 [rad]."""
+    return float(np.arccos(np.clip(np.dot(first, second), -1.0, 1.0)))

@@ -1,0 +1,216 @@
+"""What may be poured by an arm, and what a person reads before it is."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from bolfi_liquids.hardware import RigError, bundled_rig
+from typer.testing import CliRunner
+
+import bolfi_liquids as bl
+from bolfi_liquids.calibration.posterior_file import write_tree
+from bolfi_liquids.cli.app import app
+from bolfi_liquids.cli.record import next_commands
+from bolfi_liquids.errors import InputError
+from bolfi_liquids.reporting.warnings import results_of, warnings_of
+from bolfi_liquids.robot.chosen_pour import chosen_pour
+from bolfi_liquids.robot.pour import plan_pour
+from bolfi_liquids.robot.stir import plan_stir
+from bolfi_liquids.wording import percent, sentence
+
+
+def rewritten(path, change):
+    """A file of a run, changed within."""
+    tree = xarray.load_datatree(path, engine="h5netcdf")
+    change(tree)
+    write_tree(tree, path)
+
+
+def with_section(run, **fields):
+    """Fields of the section pour of summary.json, changed."""
+    path = run / "summary.json"
+    summary = json.loads(path.read_text(encoding="utf-8"))
+    summary["pour"] |= fields
+    path.write_text(json.dumps(summary), encoding="utf-8")
+
+
+def with_action(run, **action):
+    """Another action in both files."""
+    rewritten(run / "pour.nc", lambda tree: tree["chosen"].attrs.update(action))
+    told = {}
+    if "distance" in action:
+        told["distance_cm"] = 100.0 * action["distance"]
+    if "angular_velocity" in action:
+        told["angular_velocity_deg_s"] = float(np.degrees(action["angular_velocity"]))
+    with_section(run, **told)
+
+
+def of_another_posterior(run):
+    def changed(tree):
+        tree["posterior"] = xarray.DataTree(tree["posterior"].to_dataset() * 1.001)
+
+    rewritten(run / "posterior.nc", changed)
+
+
+def refused(*_):
+    raise AssertionError("nobody may be asked")
+
+
+def test_the_action_is_that_of_pour_nc_to_the_last_digit(poured_run):
+    chosen = bl.Pour.open(poured_run).chosen
+    plan = plan_pour(poured_run, bundled_rig())
+    assert plan.chosen.judged.action == chosen.action
+    turned = plan.path.pose[:, 3:]
+    assert np.ptp(turned, axis=0).max() > 1.0  # it does pour
+    # what a person would read elsewhere moves nothing
+    with_section(poured_run, risk="cvar", n_simulations=1)
+    assert np.array_equal(plan_pour(poured_run, bundled_rig()).path.pose, plan.path.pose)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("distance_cm", -5.0),
+        ("angular_velocity_deg_s", 31.4),
+        ("expected_spillage", 0.0),
+        ("spillage_q95", 0.5),
+    ],
+)
+def test_files_that_contradict_each_other_are_refused(poured_run, field, value):
+    with_section(poured_run, **{field: value})
+    with pytest.raises(InputError, match=rf"summary\.json: pour\.{field} is .*bolfi-liquids pour"):
+        bl.execute_pour(poured_run, ask=refused)
+
+
+def test_a_summary_without_the_pour_is_refused(poured_run):
+    path = poured_run / "summary.json"
+    summary = json.loads(path.read_text(encoding="utf-8"))
+    del summary["pour"]
+    path.write_text(json.dumps(summary), encoding="utf-8")
+    with pytest.raises(InputError, match=r"summary\.json"):
+        bl.execute_pour(poured_run, ask=refused)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("distance", -0.05),
+        ("distance", 0.0701),
+        ("distance", float("inf")),
+        ("angular_velocity", 0.1),
+        ("angular_velocity", np.radians(181.0)),
+        ("angular_velocity", -1.0),
+    ],
+)
+@pytest.mark.parametrize("emulate", [False, True])
+def test_an_action_outside_of_what_the_cups_allow_is_refused(poured_run, name, value, emulate):
+    with_action(poured_run, **{name: value})
+    with pytest.raises(InputError) as caught:
+        bl.execute_pour(poured_run, ask=None if emulate else refused, emulate=emulate)
+    said = str(caught.value)
+    assert name in said or f"pour.{name}" in said
+
+
+@pytest.mark.parametrize("end", [0, -1])
+@pytest.mark.parametrize("name", ["distance", "angular_velocity"])
+def test_both_ends_of_what_the_cups_allow_may_be_poured(poured_run, name, end):
+    cups = chosen_pour(poured_run).cups
+    ends = {"distance": cups.distance_range, "angular_velocity": cups.angular_velocity_range}
+    with_action(poured_run, **{name: ends[name][end]})
+    assert chosen_pour(poured_run).judged.action[name] == ends[name][end]
+
+
+SPOILED = {
+    "no chosen": lambda tree: tree.__delitem__("chosen"),
+    "no liquids": lambda tree: tree.__delitem__("liquids"),
+    "no cups": lambda tree: tree.attrs.pop("cups"),
+    "cups are no JSON": lambda tree: tree.attrs.update(cups="{"),
+    "cups are a list": lambda tree: tree.attrs.update(cups="[]"),
+    "cups without a pour": lambda tree: tree.attrs.update(cups='{"source": 1}'),
+    "action is a word": lambda tree: tree["chosen"].attrs.update(distance="near"),
+}
+
+
+@pytest.mark.parametrize("what", SPOILED)
+def test_a_pour_nc_that_is_not_whole_is_one_line(poured_run, what):
+    rewritten(poured_run / "pour.nc", SPOILED[what])
+    with pytest.raises(InputError, match=r"pour\.nc") as caught:
+        bl.execute_pour(poured_run, ask=refused)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_stale_pour_is_never_asked_about(poured_run):
+    assert chosen_pour(poured_run).stale == ()
+    of_another_posterior(poured_run)
+    chosen = chosen_pour(poured_run)
+    assert [one.key for one in chosen.stale] == ["warning.stale_pour"]
+    with pytest.raises(InputError, match="bolfi-liquids pour"):
+        bl.execute_pour(poured_run, ask=refused)
+    # what a dry run tells begins with it, and does not say it twice
+    stale = str(sentence("warning.stale_pour"))
+    assert str(chosen).startswith(stale) and str(chosen).count(stale) == 1
+
+
+def test_a_person_reads_the_pour_and_the_worries_before_the_question(poured_run):
+    read = []
+
+    def ask(plan):
+        read.append(plan)
+        return "no"
+
+    with pytest.raises(RigError, match="confirmation"):
+        bl.execute_pour(poured_run, ask=ask)
+    (plan,) = read
+    chosen = chosen_pour(poured_run)
+    judged = chosen.judged
+    for text in (
+        f"{np.degrees(judged.angular_velocity):.1f} deg/s",
+        f"{100 * judged.distance:.2f} cm",
+        percent(judged.expected_spillage),
+        f"{percent(judged.spillage_q95)} in 95 %",
+    ):
+        assert text in plan.split("allowed")[0]
+    told = warnings_of(results_of(bl.Calibration.open(poured_run)))
+    assert chosen.worries == tuple(told) and told  # as the report has them
+    assert all(str(worry) in plan for worry in chosen.worries)
+    assert "emergency stop" in plan
+
+
+def test_a_pour_that_was_replaced_in_its_run_is_refused(poured_run):
+    pour = bl.Pour.open(poured_run)
+    other = replace(pour, chosen=replace(pour.chosen, distance=0.0123))
+    with pytest.raises(ValueError, match="another pour was chosen"):
+        bl.execute_pour(other, ask=refused)
+
+
+@pytest.mark.parametrize(
+    "option", [["--cups", "other.toml"], ["--iterations", "9"], ["--risk", "cvar"]]
+)
+def test_what_belongs_to_the_choice_is_not_taken_with_execute(poured_run, option):
+    result = CliRunner().invoke(app, ["pour", str(poured_run), "--execute", *option])
+    assert result.exit_code == 2
+    assert option[0] in result.stderr and "--execute" in result.stderr
+
+
+@pytest.mark.parametrize("cycles", [0, -1, 101, 10**12])
+def test_cycles_have_two_ends(cycles):
+    with pytest.raises(InputError, match=f"--cycles: {cycles}"):
+        plan_stir(bundled_rig(), cycles)
+
+
+def test_what_comes_next_fits_what_was_done_and_any_path(tmp_path):
+    there, run = Path("my runs/stir/recording.nc"), Path("my runs/mine")
+    assert next_commands(there, None) == [
+        "bolfi-liquids calibrate 'my runs/stir/recording.nc' --out RUN"
+    ]
+    assert next_commands(there, run) == [
+        "bolfi-liquids criticise 'my runs/mine'",
+        "bolfi-liquids pour 'my runs/mine'",
+    ]
+    empty = tmp_path / "a b"
+    empty.mkdir()
+    with pytest.raises(InputError, match="bolfi-liquids pour '.*a b'$"):
+        bl.Pour.open(empty)
