@@ -11,17 +11,15 @@ from ..calibration.posterior_figure import posterior_figure
 from ..calibration.result import Calibration
 from ..calibration.search_figure import search_figure
 from ..calibration.summary import CalibrationSummary
-from ..criticism.result import latest_calibration
 from ..files import write_text
 from ..hover_labels import script_json
 from ..inputs.prior import Described
-from ..pouring.result import PourSummary, read_pour
-from ..run.directory import POUR, REPORT, Run, run_path
-from ..run.summary import read_summary
+from ..pouring.result import PourSummary
+from ..run.directory import REPORT, Run, run_path
 from ..wording import LIQUID_UNITS, sentence
 from . import sentences
 from .criticism_chapter import criticism_context
-from .warnings import Results, warnings_of
+from .warnings import pour_of, results_of, warnings_of
 
 if TYPE_CHECKING:
     from xarray import DataTree
@@ -56,7 +54,7 @@ def report(
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     calibration = Calibration.open(run_path(run))
-    poured, criticism = _poured(calibration.path), criticism_context(calibration)
+    poured, criticism = pour_of(calibration.path), criticism_context(calibration)
     how = {"executor": executor, "timeout": timeout, "progress": progress}
     pictures = _moving(calibration, how) if moving else None
     environment = Environment(
@@ -70,7 +68,7 @@ def report(
         calibration=_calibration_context(calibration),
         criticism=criticism,
         pour=poured and _pour_context(*poured),
-        warnings=warnings_of(_results(calibration, criticism, poured)),
+        warnings=warnings_of(results_of(calibration.path)),
         moving=pictures,
         moving_json=script_json(pictures),
         style=_text("report.css"),
@@ -128,30 +126,6 @@ def _row(name: str, summary: CalibrationSummary) -> dict[str, Any]:
         "unit": LIQUID_UNITS.get(name, "1"),
         "numbers": [f"{number:.3g}" for number in numbers],
     }
-
-
-def _results(
-    calibration: Calibration,
-    criticism: Mapping[str, Any] | None,
-    poured: "tuple[PourSummary, DataTree] | None",
-) -> Results:
-    calibrated, initial = calibration.summary, int(calibration.tree.attrs["initial"])
-    summary, tree = poured or (None, None)
-    return Results(
-        calibrated=calibrated,
-        criticised=criticism["summary"] if criticism else None,
-        poured=summary,
-        pour=tree,
-        posterior=latest_calibration(calibration.path).posterior,
-        searched=calibrated.n_simulations - initial,
-    )
-
-
-def _poured(run: Path) -> "tuple[PourSummary, DataTree] | None":
-    """The section "pour" and pour.nc, where a pour was chosen."""
-    if PourSummary.SECTION not in read_summary(run) or not (run / POUR).is_file():
-        return None
-    return PourSummary.read(run), read_pour(run)
 
 
 def _pour_context(summary: PourSummary, tree: "DataTree") -> dict[str, Any]:

@@ -1,18 +1,24 @@
-"""Warnings of the report: what to consider before a run's pour is trusted.
+"""Warnings of report and terminal: what to consider before a run's pour is trusted.
 
 Their wording is in `data/warning_sentences.jinja`.
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..calibration.bad_fit import bad_fit
+from ..calibration.result import Calibration
 from ..calibration.summary import CalibrationSummary
+from ..criticism.result import is_criticised, latest_calibration
 from ..criticism.summary import CriticismSummary
 from ..criticism.verdict import Verdict
-from ..pouring.result import PourSummary
+from ..pouring.result import PourSummary, read_pour
 from ..pouring.spillage import ACTION
+from ..run.directory import POUR
+from ..run.summary import read_summary
 from ..wording import Sentence, sentence
 from .criticism_sentences import verdict_sentence
 from .sentences import (
@@ -49,12 +55,14 @@ class Results:
 
     Attributes:
         calibrated, criticised, poured: Sections of summary.json; None where there is none.
+        latest: Of the calibration that is poured, with what a criticism accepted.
         pour: pour.nc; None where there is none.
         posterior: Draws of the latest calibration.
         searched: Number of simulations at points that were chosen by what was learned.
     """
 
     calibrated: CalibrationSummary
+    latest: CalibrationSummary
     criticised: CriticismSummary | None
     poured: PourSummary | None
     pour: "DataTree | None"
@@ -62,9 +70,37 @@ class Results:
     searched: int
 
 
+def results_of(run: Path) -> Results:
+    """What a run holds.
+
+    Raises:
+        InputError: It holds no finished calibration, or a file of it is damaged.
+    """
+    calibration, latest = Calibration.open(run), latest_calibration(run)
+    summary, tree = pour_of(run) or (None, None)
+    calibrated, initial = calibration.summary, int(calibration.tree.attrs["initial"])
+    return Results(
+        calibrated=calibrated,
+        latest=latest.summary,
+        criticised=CriticismSummary.read(run) if is_criticised(run) else None,
+        poured=summary,
+        pour=tree,
+        posterior=latest.posterior,
+        searched=calibrated.n_simulations - initial,
+    )
+
+
+def pour_of(run: Path) -> "tuple[PourSummary, DataTree] | None":
+    """The section "pour" and pour.nc, where a pour was chosen."""
+    if PourSummary.SECTION not in read_summary(run) or not (run / POUR).is_file():
+        return None
+    return PourSummary.read(run), read_pour(run)
+
+
 def warnings_of(run: Results) -> list[Sentence]:
     """The gravest first; none if nothing is known to be wrong."""
     return [
+        *filter(None, [bad_fit(run.latest)]),
         *sampler_sentences(run.calibrated),
         *surrogate_sentences(run.calibrated),
         *_of_the_search(run.calibrated, run.searched),
