@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..inputs.frame import frame_warnings
 from ..inputs.open import Source, open_recordings
 from ..inputs.prior import check_prior, default_prior, describe_prior
 from ..inputs.recording import Recording, aborted_recordings
@@ -113,7 +114,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         run = Path(mkdtemp(prefix="bolfi_liquids_") if out is None else out)
         _enter(run, run_record(settings, prior, stirring), resume)
         keep_recordings(run, stirring.recordings)
-        for notice in aborted_recordings(opened):
+        for notice in [*aborted_recordings(opened), *frame_warnings(opened)]:
             logger.warning(notice)
         if not is_calibrated(run):
             _calibrate(run, stirring, prior, settings, Execution(workers, timeout, progress))

@@ -15,6 +15,7 @@ from ..inputs.settings import CalibrationSettings
 from ..run.directory import POSTERIOR, read_run
 from ..run.summary import read_summary
 from ..wording import html_table, with_unit
+from .bad_fit import bad_fit
 from .draws import pick_draws
 from .summary import CalibrationSummary
 
@@ -48,11 +49,14 @@ class Calibration:
 
     def __repr__(self) -> str:
         rows = ", ".join(f"{name} {text}" for name, text in self._quantiles().items())
-        return f"Calibration({str(self.path)!r}: {rows}; {self.summary.sampler_status})"
+        fit = "" if bad_fit(self.summary) is None else f", fit {self.summary.fit_status}"
+        return f"Calibration({str(self.path)!r}: {rows}; {self.summary.sampler_status}{fit})"
 
     def _repr_html_(self) -> str:
         status = self.summary.sampler_status
         rows = {"run": self.path, **self._quantiles(), "sampler": status, "next": status.advice}
+        if (bad := bad_fit(self.summary)) is not None:
+            rows["warning"] = bad
         return html_table("Calibration (median, 5 % to 95 %)", rows)
 
     def _quantiles(self) -> dict[str, str]:

@@ -4,9 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
+from pydantic import computed_field
 
 from ..run.summary import Number, Section
 from .check import Check
@@ -22,6 +23,14 @@ QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
 RHAT_MAX, ESS_MIN = 1.01, 400.0  # Vehtari et al. 2021
 DIVERGENT_SHARE_MAX = 0.01  # of the draws
 
+BAD_FIT_RATIO = 3.0
+"""Times the noise from which a fit is bad: wrong signs and turned axes leave 5 to 9 times, a stir
+that starts in motion 3 times. Right recordings leave less than 2 times."""
+
+MIN_NOISE_DEG = 0.1
+"""Noise [deg] below which no camera measures: simulated recordings without noise count as if they
+had as much, or an unfinished search would pass for a wrong sign."""
+
 
 class SamplerStatus(StrEnum):
     """Whether draws can be relied upon."""
@@ -36,6 +45,13 @@ class SamplerStatus(StrEnum):
             SamplerStatus.CONVERGED: "the intervals of the posterior may be used",
             SamplerStatus.NOT_CONVERGED: "calibrate again with more draws or another sampler",
         }[self]
+
+
+class FitStatus(StrEnum):
+    """Whether the closest simulation is near enough to the recording."""
+
+    ACCEPTABLE = "acceptable"
+    BAD = "bad"
 
 
 @dataclass(frozen=True)
@@ -63,6 +79,13 @@ class Seconds:
     simulator: Number
     engine: Number
     sampling: Number
+
+
+class Fitted(NamedTuple):
+    """How near a model comes to the recordings, and how near the right one would [deg], RMS."""
+
+    rms_deg: float
+    noise_deg: float
 
 
 @dataclass(frozen=True)
@@ -138,15 +161,30 @@ class CalibrationSummary(Section):
         posterior: "Dataset",
         parameters: Mapping[str, ParameterSummary],
         best: Mapping[str, float],
+        fit: Fitted,
     ) -> Self:
         """These numbers with those of another posterior, in which effects were added."""
         return replace(
             self,
+            fit_rms_deg=fit.rms_deg,
+            noise_deg=fit.noise_deg,
             parameters=parameters,
             best=best,
             below_least_viscosity=_below(posterior, self.least_viscosity),
             **_sampling(posterior),
         )
+
+    @computed_field
+    @property
+    def fit_to_noise(self) -> Number:
+        """`fit_rms_deg` in units of the noise."""
+        return self.fit_rms_deg / max(self.noise_deg, MIN_NOISE_DEG)
+
+    @computed_field
+    @property
+    def fit_status(self) -> FitStatus:
+        """Bad from `BAD_FIT_RATIO` on, and where the ratio is not known."""
+        return FitStatus.ACCEPTABLE if self.fit_to_noise < BAD_FIT_RATIO else FitStatus.BAD
 
     @property
     def divergent_share(self) -> float:

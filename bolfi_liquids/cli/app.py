@@ -34,6 +34,7 @@ from .printed import (
     print_findings,
     print_next,
     print_section,
+    print_warnings,
 )
 
 app = typer.Typer(
@@ -109,6 +110,7 @@ def calibrate(
             **asdict(options),
         )
     print_section(out, "calibrate")
+    print_warnings(out)
     print_next(out, "criticise", "pour")
 
 
@@ -180,10 +182,12 @@ def pour(
             options.cups,
             iterations=options.iterations,
             risk=options.risk,
+            force=options.force,
             executor=executor,
             timeout=compute.timeout,
         )
     print_section(run, "pour")
+    print_warnings(run)
     print_next(run, "report")
 
 
@@ -225,6 +229,7 @@ def demo(
     print_section(out, "calibrate")
     print_findings(Criticism.open(out))
     print_section(out, "pour")
+    print_warnings(out)
     typer.echo(f"report: {path}")
 
 

@@ -119,6 +119,9 @@ class PourOptions:
             metavar="|".join(RISKS), help="Spillage to keep low: the mean, or the worst tenth's."
         ),
     ] = PourSettings.risk
+    force: Annotated[
+        bool, typer.Option("--force", help="Choose a pour even though the fit is bad.")
+    ] = False
 
 
 @dataclass(frozen=True)

@@ -43,6 +43,17 @@ def print_section(run: Path, name: str) -> None:
         print_pour(PourSummary.read(run), Console())
 
 
+def print_warnings(run: Path) -> None:
+    """What the report would warn of."""
+    from rich.console import Console
+
+    from ..calibration.result import Calibration
+    from ..reporting.warnings import results_of, warnings_of
+    from . import tables
+
+    tables.print_warnings(warnings_of(results_of(Calibration.open(run))), Console())
+
+
 def print_findings(criticism: "Criticism") -> None:
     """What a criticism found."""
     from rich.console import Console

@@ -116,6 +116,7 @@ def record(
     from ..inputs.rigs import rig_of
     from ..online.record import record_online
     from ..robot.record import record as run_record
+    from .printed import print_section, print_warnings
     from .tables import print_recording
 
     opened = rig_of(rig)
@@ -131,6 +132,9 @@ def record(
         else:
             recording = record_online(opened, online=choice, **given)
     print_recording(recording, Console())
+    if choice is not None:
+        print_section(Path(choice.run), "calibrate")
+        print_warnings(Path(choice.run))
     if recording.attrs["status"] == "aborted":
         reason = recording.attrs.get("reason") or "no reason is told"
         raise Aborted(f"{recording.path}: the recording was aborted: {reason}")

@@ -11,11 +11,6 @@ from rich.table import Column, Table
 
 from ..criticism.verdict import Verdict
 from ..reporting import criticism_sentences as criticism
-from ..reporting.sentences import (
-    least_viscosity_sentences,
-    sampler_sentences,
-    surrogate_sentences,
-)
 from ..wording import LIQUID_UNITS, Sentence
 
 if TYPE_CHECKING:
@@ -45,14 +40,12 @@ def print_calibration(summary: "CalibrationSummary", console: Console) -> None:
         f" sampling {seconds.sampling:.1f}",
         highlight=False,
     )
-    _print(least_viscosity_sentences(summary), console)
-    _print([*sampler_sentences(summary), *surrogate_sentences(summary)], console, "warning: ")
 
 
-def _print(sentences: Iterable[Sentence], console: Console, before: str = "") -> None:
+def print_warnings(sentences: Iterable[Sentence], console: Console) -> None:
     """Each on a line of its own, however long."""
     for sentence in sentences:
-        console.print(f"{before}{sentence}", highlight=False, markup=False, soft_wrap=True)
+        console.print(f"warning: {sentence}", highlight=False, markup=False, soft_wrap=True)
 
 
 def print_pour(summary: "PourSummary", console: Console) -> None:

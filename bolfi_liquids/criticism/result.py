@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..calibration.posterior_file import read_tree
 from ..calibration.result import Calibration
+from ..calibration.summary import Fitted
 from ..drawing import given_or_shown
 from ..errors import InputError
 from ..run.directory import CRITICISM, CRITICISM_FORMAT, Run, run_path
@@ -105,9 +106,21 @@ class Criticism:
         tree["posterior"] = self.tree["posterior"]
         posterior = tree["posterior"].to_dataset()
         summary = self.base.summary.of_posterior(
-            posterior, self.summary.parameters, self.summary.best
+            posterior, self.summary.parameters, self.summary.best, self._fitted
         )
         return replace(self.base, tree=tree, summary=summary)
+
+    @property
+    def _fitted(self) -> Fitted:
+        """How near the accepted effects bring the model to the stirs.
+
+        Effects that pours alone have shown bring it no nearer; what is told then is of ties.
+        """
+        gap, before = self.summary.gap, self.base.summary
+        of_a_tie = self.summary.stirs.verdict is Verdict.TIE and not self.summary.requested
+        if gap.rms_after is None or of_a_tie:
+            return Fitted(before.fit_rms_deg, before.noise_deg)
+        return Fitted(gap.rms_after, gap.noise)
 
     def plot_residuals(self, axes: "ArrayLike | None" = None) -> "NDArray[Any]":
         """Observed less expected against time, before and after, strokes that differ marked."""

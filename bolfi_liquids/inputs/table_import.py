@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import new_netcdf, write_netcdf, write_text
@@ -20,6 +19,7 @@ from .fields import (
     LENGTHS,
     PLANES,
 )
+from .frame import found_turn, frame_faults, trailing
 from .open import read_recording
 from .recording import Recording, as_recording, recording_dataset
 from .start import check_start
@@ -35,8 +35,6 @@ logger = logging.getLogger(__name__)
 TEMPLATE = "columns.toml"
 OTHER_NAME = "choose another name"
 STICK_WEIGHT_UNITS = {"stick_density": "kg/m3", "stick_mass": "kg"}
-MIN_TRAVEL = 5e-3  # of the gripper [m], on which an inclination can be seen to trail
-MAX_CORRELATION = 0.2  # between a stick that trails and the gripper; thin liquids let it swing
 HEADER_FIX = "correct the map: `column`, `skip` or `delimiter`, or leave `delimiter` out"
 
 
@@ -122,7 +120,7 @@ def _dataset(table: Table, meaning: TableMap) -> "Dataset":
         "imported_sha256": hashlib.sha256(table.path.read_bytes()).hexdigest(),
         "imported_with": f"bolfi-liquids {version('bolfi-liquids')}: {meaning.model_dump_json()}",
     }
-    return recording_dataset(values, attributes | made)
+    return recording_dataset(meaning.turned(values), attributes | made)
 
 
 def outline(recording: Recording) -> str:
@@ -158,21 +156,16 @@ def _sizes(recording: Recording) -> Iterator[str]:
 
 
 def _trailing(recording: Recording) -> Iterator[str]:
-    """Correlation of inclinations and gripper, and a warning where it is unusual."""
-    for name, angle, at in zip(PLANES, recording.inclination.T, (0, 1), strict=True):
-        along, across = (
-            _correlation(angle, recording.gripper.position[:, axis]) for axis in (at, 1 - at)
-        )
-        if not np.isfinite(along):
-            continue
-        yield f"{name}: correlation with the gripper's {AXES[at]} {along:+.2f} (usual: -0.4 to -1)"
-        if along > MAX_CORRELATION:
-            yield f"warning: {name}: the stick leans ahead of the gripper; is `flip` right?"
-        elif abs(along) < abs(across):
+    """Correlation of inclinations and gripper, and a warning where their frames differ."""
+    for name, axis, follows in zip(PLANES, AXES, trailing(recording), strict=False):
+        if np.isfinite(follows):
             yield (
-                f"warning: {name}: the stick follows {AXES[1 - at]} ({across:+.2f}) more than "
-                f"{AXES[at]}; are the planes exchanged?"
+                f"{name}: correlation with the movement along {axis} {follows:+.2f} "
+                "(usual: -0.4 to -1)"
             )
+    if (turn := found_turn(recording)) is not None and not turn.mirrored:
+        yield f"turn between inclination and gripper: {turn}"
+    yield from (f"warning: {fault}" for fault in frame_faults(recording))
 
 
 def _start(recording: Recording) -> Iterator[str]:
@@ -181,11 +174,3 @@ def _start(recording: Recording) -> Iterator[str]:
         check_start(recording)
     except InputError as err:
         yield f"warning: {err}"
-
-
-def _correlation(angle: NDArray, position: NDArray) -> float:
-    """NaN where the gripper hardly moves that way."""
-    seen = np.isfinite(angle) & np.isfinite(position)
-    if np.ptp(position[seen]) < MIN_TRAVEL or np.ptp(angle[seen]) == 0.0:
-        return float("nan")
-    return float(np.corrcoef(angle[seen], position[seen])[0, 1])

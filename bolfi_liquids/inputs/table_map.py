@@ -68,6 +68,8 @@ class TableMap(Given):
         skip: Lines before the header.
         columns: Of `time`, `x`, `y`, `z`, `inclination_xz` and `inclination_yz`.
         attributes: Sizes and densities.
+        yaw_deg: By which x and y are turned, counterclockwise seen from above, to lie in the
+            cameras' planes [deg].
         source: Where the data come from.
     """
 
@@ -76,6 +78,7 @@ class TableMap(Given):
     skip: Annotated[int, Field(ge=0)] = 0
     columns: dict[str, Column]
     attributes: dict[str, Quantity]
+    yaw_deg: Annotated[float, Field(ge=-360.0, le=360.0, allow_inf_nan=False)] = 0.0
     source: str = "imported"
 
     @model_validator(mode="after")
@@ -91,6 +94,13 @@ class TableMap(Given):
             if (other := owners.setdefault(one.column, name)) != name:
                 raise ValueError(f"columns.{name} and columns.{other} are both {one.column!r}")
         return self
+
+    def turned(self, values: dict[str, NDArray]) -> dict[str, NDArray]:
+        """Values of a recording, by name, with x and y turned by `yaw_deg`."""
+        if self.yaw_deg == 0.0:
+            return values
+        way = np.exp(1j * np.radians(self.yaw_deg)) * (values["x"] + 1j * values["y"])
+        return values | {"x": way.real, "y": way.imag}
 
 
 def open_table_map(path: str | Path) -> TableMap:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibration.bad_fit import refuse_bad_fit
 from ..calibration.posterior_file import write_tree
 from ..calibration.result import Calibration
 from ..criticism.result import latest_calibration
@@ -61,6 +62,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     draws: int = 16,
     risk: str = "mean",
     seed: int = 0,
+    force: bool = False,
     executor: "Workers | None" = None,
     timeout: float | None = None,
     progress: bool = True,
@@ -83,18 +85,21 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         draws: Posterior draws that each action is tried on, and again those that promise most.
         risk: "mean", or "cvar": the mean over the worst tenth of the draws.
         seed: Seed of all random draws.
+        force: Whether to choose even though the fit is bad, see `calibration.bad_fit`.
         executor: Where pours are simulated, see `calibrate`; the result has the same bits.
         timeout: Seconds that one pour may take; None sets no limit.
         progress: Whether to show a bar on stderr.
 
     Raises:
-        InputError: A setting, `timeout` or the file of the cups cannot be used.
+        InputError: A setting, `timeout` or the file of the cups cannot be used; or the fit is bad.
         ValueError, ImportError, ConnectionError: `executor` cannot be used.
         RuntimeError: Pours failed at every angular velocity, or at all of the promising ones.
     """
     from ..inference.simulations import Keep
 
     calibration = latest_calibration(calibration)
+    if not force:
+        refuse_bad_fit(calibration.summary, calibration.path)
     settings = PourSettings(iterations=iterations, draws=draws, risk=risk, seed=seed)
     cups, actions = cups_of(cups), 2 * settings.iterations + N_FINALISTS + 3
     drawn = strata(calibration, settings.draws, settings.seed)

@@ -1,4 +1,4 @@
-"""Warnings of the report: what to consider before a run's pour is trusted.
+"""Warnings of report and terminal: what to consider before a run's pour is trusted.
 
 Their wording is in `data/warning_sentences.jinja`.
 """
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..calibration.bad_fit import bad_fit
 from ..calibration.result import Calibration
 from ..calibration.summary import CalibrationSummary
 from ..criticism.result import is_criticised, latest_calibration
@@ -53,12 +54,14 @@ class Results:
 
     Attributes:
         calibrated, criticised, poured: Sections of summary.json; None where there is none.
+        latest: Of the calibration that is poured, with what a criticism accepted.
         pour: pour.nc; None where there is none.
         posterior: Draws of the latest calibration.
         searched: Number of simulations at points that were chosen by what was learned.
     """
 
     calibrated: CalibrationSummary
+    latest: CalibrationSummary
     criticised: CriticismSummary | None
     poured: PourSummary | None
     pour: "DataTree | None"
@@ -75,12 +78,14 @@ def results_of(calibration: Calibration) -> Results:
     run, summary = calibration.path, calibration.summary
     poured = PourSummary.SECTION in read_summary(run) and (run / POUR).is_file()
     criticised = is_criticised(run)
+    latest = latest_calibration(run if criticised else calibration)
     return Results(
         calibrated=summary,
+        latest=latest.summary,
         criticised=CriticismSummary.read(run) if criticised else None,
         poured=PourSummary.read(run) if poured else None,
         pour=read_pour(run) if poured else None,
-        posterior=latest_calibration(run if criticised else calibration).posterior,
+        posterior=latest.posterior,
         searched=summary.n_simulations - int(calibration.tree.attrs["initial"]),
     )
 
@@ -88,6 +93,7 @@ def results_of(calibration: Calibration) -> Results:
 def warnings_of(run: Results) -> list[Sentence]:
     """The gravest first; none if nothing is known to be wrong."""
     return [
+        *filter(None, [bad_fit(run.latest)]),
         *sampler_sentences(run.calibrated),
         *surrogate_sentences(run.calibrated),
         *_of_the_search(run.calibrated, run.searched),

@@ -82,6 +82,7 @@ def _chosen(
         shared.calibration(liquid, budget, surrogate),
         iterations=scale.rates,
         seed=scale.seed,
+        force=True,  # the choice over a bad fit is judged, too
         **shared.execution._asdict(),
     )
     return {

@@ -61,7 +61,7 @@ def spilled_where_it_sticks(
         resume=True,
         **execution._asdict(),
     )
-    tried = {"iterations": scale.rates, "seed": seed, **execution._asdict()}
+    tried = {"iterations": scale.rates, "seed": seed, "force": True, **execution._asdict()}
     before = choose_pour(calibration, cups, **tried)
     effects = scale.considered
     criticism = criticise(

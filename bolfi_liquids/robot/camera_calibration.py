@@ -101,6 +101,8 @@ def _about_lens(calibrated: "CalibratedCamera", path: Path) -> Iterator[str]:
         f"lens: focal length {lens.focal[0]:.1f} x {lens.focal[1]:.1f} px "
         f"(+- {max(lens.focal_error):.1f}), corners {lens.rms:.2f} px off, {lens.views} pictures"
     )
+    if lens.legacy:
+        yield "board: its pattern is the older one (OpenCV before 4.6), and was read as such"
     yield f'wrote {path}: set intrinsics = "{path.name}" for this camera in rig.toml'
 
 

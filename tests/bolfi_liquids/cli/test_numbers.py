@@ -1,24 +1,26 @@
 """Noise estimates, picked draws and contour levels, against what is known of them."""
 
-import io
+import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import xarray as xr
-from rich.console import Console
 
+import bolfi_liquids as bl
+from bolfi_liquids.calibration.bad_fit import bad_fit
 from bolfi_liquids.calibration.draws import pick_draws
 from bolfi_liquids.calibration.noise import irreducible_rms, replicate_noise, sensor_noise
 from bolfi_liquids.calibration.posterior_figure import contour_levels, marginal
-from bolfi_liquids.calibration.summary import ParameterSummary
-from bolfi_liquids.cli.tables import print_calibration
+from bolfi_liquids.calibration.summary import CalibrationSummary, ParameterSummary
+from bolfi_liquids.cli.printed import print_warnings
 from bolfi_liquids.pouring.spillage import mean_spillage, tail_spillage
 from bolfi_liquids.reporting.sentences import (
     least_viscosity_sentences,
     parameter_sentence,
     sampler_sentences,
 )
+from bolfi_liquids.reporting.warnings import results_of, warnings_of
 from bolfi_liquids.wording import percent
 
 
@@ -100,13 +102,47 @@ def test_thin_liquids_that_look_alike_are_told(calibration):
 
 
 @pytest.mark.parametrize("share", [0.0, 0.42])
-def test_the_printed_summary_tells_them_too(calibration, share):
-    console = Console(file=io.StringIO())
-    summary = replace(calibration.summary, below_least_viscosity=share)
-    print_calibration(summary, console)
-    sentences = least_viscosity_sentences(summary)
-    assert len(sentences) == (share > 0.0)
-    assert all(str(sentence) in console.file.getvalue() for sentence in sentences)
+def test_the_terminal_warns_of_what_the_report_warns_of(calibration, tmp_path, capsys, share):
+    run = shutil.copytree(calibration.path, tmp_path / "run")
+    far = {"fit_rms_deg": 2.0, "noise_deg": 0.5, "below_least_viscosity": share}
+    summary = replace(calibration.summary, **far)
+    summary.write(run)
+    print_warnings(run)
+    told = capsys.readouterr().out.splitlines()
+    assert told == [
+        f"warning: {sentence}" for sentence in warnings_of(results_of(bl.Calibration.open(run)))
+    ]
+    thin = [f"warning: {sentence}" for sentence in least_viscosity_sentences(summary)]
+    assert len(thin) == (share > 0.0) and set(thin) <= set(told)
+    assert told[0] == f"warning: {bad_fit(summary)}"
+
+
+@pytest.mark.parametrize(
+    ("rms", "noise", "status"),
+    [
+        (0.5, 0.2, "acceptable"),
+        (0.61, 0.2, "bad"),
+        (0.25, 0.01, "acceptable"),  # no camera measures so well: the search has not ended
+        (0.31, 0.01, "bad"),
+        (np.nan, 0.2, "bad"),
+        (0.2, np.nan, "bad"),
+    ],
+)
+def test_a_fit_is_bad_from_three_times_the_noise_on(calibration, rms, noise, status):
+    summary = replace(calibration.summary, fit_rms_deg=rms, noise_deg=noise)
+    assert summary.fit_status == status
+    assert (bad_fit(summary) is None) == (status == "acceptable")
+    section = summary.to_json()
+    assert section["fit_status"] == status
+    assert section["fit_to_noise"] == pytest.approx(summary.fit_to_noise, nan_ok=True)
+    again = CalibrationSummary.from_json(section)
+    assert again.fit_status == status
+
+
+def test_a_section_that_was_written_before_the_status_was_is_judged_too(calibration):
+    section = calibration.summary.to_json()
+    del section["fit_status"], section["fit_to_noise"]
+    assert CalibrationSummary.from_json(section).fit_status == calibration.summary.fit_status
 
 
 def test_a_sampler_that_did_not_converge_is_told(calibration):

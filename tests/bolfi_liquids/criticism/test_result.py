@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import bolfi_liquids as bl
+from bolfi_liquids.calibration.bad_fit import bad_fit
 from bolfi_liquids.calibration.posterior_file import write_tree
 from bolfi_liquids.criticism.criticise import _learned_from
 from bolfi_liquids.criticism.result import finished_criticism, is_criticised, latest_calibration
@@ -57,6 +58,27 @@ def test_an_extended_calibration_shows_its_own_parameters(extended, calibration,
 def test_its_search_is_that_of_the_base(extended):
     figure = new_figure(6.0, 6.0)
     assert extended.plot_search(figure.subplots(3, 1, squeeze=False)).shape == (3, 1)
+
+
+def test_an_effect_that_was_accepted_is_judged_by_the_fit_that_it_leaves(criticised):
+    calibration = bl.Calibration.open(criticised)
+    replace(calibration.summary, fit_rms_deg=2.0, noise_deg=0.2).write(criticised)
+    assert bad_fit(bl.Calibration.open(criticised).summary) is not None
+    assert bad_fit(latest_calibration(criticised).summary) is None
+    for change in ({"rms_after": 2.0}, {"rms_after": None}):
+        section = read_summary(criticised)["criticise"]
+        section["gap_deg"] |= change
+        write_section(criticised, "criticise", section)
+        assert bad_fit(latest_calibration(criticised).summary) is not None
+
+
+def test_an_effect_of_pours_alone_mends_no_stir(criticised):
+    calibration = bl.Calibration.open(criticised)
+    replace(calibration.summary, fit_rms_deg=2.0, noise_deg=0.2).write(criticised)
+    section = read_summary(criticised)["criticise"]
+    section["stirs"] |= {"verdict": "tie", "effects": ["stick_mass", "camera_tilt"]}
+    write_section(criticised, "criticise", section)
+    assert bad_fit(latest_calibration(criticised).summary) is not None
 
 
 def test_plots_of_the_base_model_are_refused(extended, criticised):

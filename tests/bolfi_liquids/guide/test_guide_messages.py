@@ -6,6 +6,7 @@ import shutil
 import sys
 from dataclasses import replace
 from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -250,6 +251,24 @@ def test_warnings_of_the_engine(calibration):
     assert str(unconverged) in QUOTED
     (thin,) = sentences.least_viscosity_sentences(summary)
     assert any(str(thin).startswith(message) for message in QUOTED)
+
+
+def test_warnings_of_a_wrong_frame_and_of_a_bad_fit(calibration):
+    from bolfi_liquids.calibration.bad_fit import bad_fit
+    from bolfi_liquids.inputs.bundled import bundled_recording
+    from bolfi_liquids.inputs.frame import frame_warnings
+
+    recording = bundled_recording("glycerin")
+    xz, yz = recording.inclination.T
+    turned = replace(
+        recording,
+        path=Path("stir.nc"),
+        inclination=np.column_stack([xz - yz, xz + yz]) / np.sqrt(2.0),
+    )
+    (warning,) = frame_warnings([turned])
+    assert warning in QUOTED
+    far = replace(calibration.summary, fit_rms_deg=2.1, noise_deg=0.24)
+    assert str(bad_fit(far)) in QUOTED
 
 
 def test_sentences_that_the_page_on_priors_quotes(calibration):

@@ -211,3 +211,29 @@ def test_the_template_is_a_map_and_overwrites_nothing(tmp_path):
     assert open_table_map(path).columns["time"].unit == "ms"
     with pytest.raises(ValueError, match="exists already"):
         write_template(path)
+
+
+def test_a_turned_cup_frame_is_warned_of_and_yaw_turns_it_back(tmp_path, written, truth):
+    def turn(rows):
+        """As a robot writes it whose x axis points 30 degrees clockwise of the cameras'."""
+        for row in rows[1:]:
+            x, y = (float(row[k].replace(",", ".")) for k in (1, 2))
+            way = np.exp(-1j * np.radians(30.0)) * (x - 1j * y)  # the table's y is flipped
+            row[1:3] = [f"{value:.9g}".replace(".", ",") for value in (way.real, -way.imag)]
+
+    table, columns = table_of(tmp_path / "turned.csv", truth, turn), written[1]
+    found = import_table(table, columns, tmp_path / "turned.nc")
+    (warning,) = [line for line in outline(found).splitlines() if line.startswith("warning")]
+    (yaw,) = re.findall(r"yaw_deg = (-?\d+)", warning)
+    assert int(yaw) == pytest.approx(30, abs=6)  # water turns the stick by some degrees itself
+    columns.write_text("yaw_deg = 30\n" + columns.read_text())
+    mended = import_table(table, columns, tmp_path / "mended.nc")
+    np.testing.assert_allclose(mended.gripper.position, truth.gripper.position, atol=1e-8)
+    assert "warning" not in outline(mended)
+
+
+def test_a_yaw_that_is_no_angle_is_refused(tmp_path, written):
+    table, columns = written
+    columns.write_text("yaw_deg = 4500\n" + columns.read_text())
+    with pytest.raises(ValueError, match="yaw_deg"):
+        import_table(table, columns, tmp_path / "stir.nc")

@@ -8,9 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from typer.testing import CliRunner
 
 import bolfi_liquids as bl
 from bolfi_liquids import models
+from bolfi_liquids.cli.app import app
 from bolfi_liquids.drawing import new_figure
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.cups import bundled_cups
@@ -25,6 +27,34 @@ def rows(run):
     count = connection.execute("SELECT count(*) FROM simulation").fetchone()[0]
     connection.close()
     return count
+
+
+@pytest.fixture
+def far_off(pour, tmp_path):
+    """A run with a pour, whose fit is bad."""
+    run = shutil.copytree(pour.path, tmp_path / "far")
+    calibration = bl.Calibration.open(run)
+    replace(calibration.summary, fit_rms_deg=2.1, noise_deg=0.24).write(run)
+    return run
+
+
+def test_no_pour_is_chosen_over_a_bad_fit(far_off):
+    before = rows(far_off)
+    for given in (far_off, bl.Calibration.open(far_off)):
+        with pytest.raises(InputError, match="8.8 times") as refused:
+            bl.choose_pour(given, progress=False)
+        assert refused.value.where == str(far_off) and "force" in refused.value.fix
+    result = CliRunner().invoke(app, ["pour", str(far_off)])
+    assert result.exit_code == 2
+    (line,) = result.stderr.strip().splitlines()
+    assert "--force" in line and "8.8 times" in line
+    assert rows(far_off) == before
+
+
+def test_a_person_may_insist(far_off, pour):
+    again = bl.choose_pour(far_off, iterations=7, draws=4, force=True, progress=False)
+    assert again.chosen.action == pour.chosen.action
+    assert rows(far_off) == rows(pour.path)
 
 
 def test_fractions_add_up_and_the_action_is_allowed(pour):

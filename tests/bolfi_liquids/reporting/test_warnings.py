@@ -50,6 +50,7 @@ def fine(calibration, criticism_summary):
     """Results without anything to warn of."""
     return Results(
         calibrated=replace(calibration.summary, **FINE),
+        latest=replace(calibration.summary, **FINE),
         criticised=replace(criticism_summary, **AGREES),
         poured=POURED,
         pour=poured(),
@@ -109,6 +110,16 @@ def test_a_misfit_that_was_not_criticised_is_told(fine):
     far = replace(fine.calibrated, fit_rms_deg=0.9)
     (sentence,) = warnings_of(replace(fine, calibrated=far, criticised=None))
     assert sentence.key == "warning.misfit_not_criticised"
+
+
+def test_a_bad_fit_is_told_first(fine):
+    """Of the calibration that is poured: an effect that was accepted may have mended it."""
+    far = replace(fine.calibrated, fit_rms_deg=0.9001)
+    first, *_ = warnings_of(replace(fine, calibrated=far, latest=far, criticised=None))
+    assert (first.key, first.values) == ("calibration.bad_fit", {"summary": far})
+    assert "3.0 times" in str(first)
+    mended = replace(fine, calibrated=far)
+    assert "calibration.bad_fit" not in [one.key for one in warnings_of(mended)]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,207 @@
+"""Whether the stick's inclination and the gripper's positions are told in one frame.
+
+A cup is round, and a stick hangs freely. So the inclination xz + i yz, as a complex number,
+answers the gripper's x + i y by one real response in time, the same in all directions. A frame
+that is turned multiplies it by a phase. The wrong sign of one plane, or planes that are
+exchanged, conjugate it. Least squares find both, without any simulator.
+"""
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .fields import PLANES
+from .recording import Recording
+
+DELAYS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45)
+"""At which the inclination may follow the gripper [s]."""
+
+MIN_SAMPLES_PER_BLOCK = 5
+N_BLOCKS = 8
+"""Parts of a recording that are left out in turn, for the standard error of the turn."""
+
+MIN_TRAVEL = 5e-3
+"""Of the gripper, along its longer way [m], on which an inclination can be seen to follow."""
+
+MIN_FOLLOWED = 0.3
+"""Share of the inclination's variance that must follow the gripper before anything is concluded."""
+
+MAX_RESIDUAL_RATIO = 0.5
+"""Residual of the best frame over that of the worst, or of the unmirrored one: above it the path
+does not tell the frames apart, as on a circle, where a turn is a delay."""
+
+MIN_RESIDUAL_SHARE = 1e-3
+"""Of the inclination's variance: what is less is as good as nothing."""
+
+MAX_TURN_DEG = 15.0
+"""Turn that is let pass: the swirl of a thin liquid turns the answer by up to 10 degrees."""
+
+MAX_TURN_ERRORS = 3.0
+"""Standard errors by which a turn must differ from none."""
+
+
+class Turn(NamedTuple):
+    """How the frame of the inclination lies to that of the positions.
+
+    Attributes:
+        angle_deg: By which positions must be turned to fit, counterclockwise seen from above; of
+            a mirrored frame, after the sign of yz was changed. In (-180, 180].
+        error_deg: Its standard error.
+        mirrored: Whether one of the two is left-handed.
+    """
+
+    angle_deg: float
+    error_deg: float
+    mirrored: bool
+
+    def __str__(self) -> str:
+        return f"{_whole(self.angle_deg)} +- {_whole(self.error_deg)} deg"
+
+
+def _whole(angle_deg: float) -> int:
+    """Without the sign that a format gives to a rounded zero."""
+    return round(angle_deg)
+
+
+def found_turn(recording: Recording) -> Turn | None:
+    """The turn of a recording's frame; None where its path does not tell it."""
+    pair = _pair(recording)
+    if pair is None:
+        return None
+    inclination, delayed = pair
+    straight, mirrored = _fit(inclination, delayed), _fit(inclination.conj(), delayed)
+    is_mirrored = mirrored.residual < MAX_RESIDUAL_RATIO * straight.residual
+    best = mirrored if is_mirrored else straight
+    if best.residual > MAX_RESIDUAL_RATIO * best.worst or best.followed < MIN_FOLLOWED:
+        return None
+    seen = inclination.conj() if is_mirrored else inclination
+    return Turn(float(np.degrees(best.angle)), _error_deg(seen, delayed, best.angle), is_mirrored)
+
+
+def trailing(recording: Recording) -> tuple[float, ...]:
+    """Correlation of each plane's inclination with what the gripper has moved of late along it.
+
+    From -0.4 to -1 for a stick that trails. NaN where the gripper hardly moves that way.
+    """
+    pair = _pair(recording)
+    if pair is None:
+        return (np.nan, np.nan)
+    inclination, way = pair
+    moved = way[:, 0] - way.mean(axis=1)
+    return tuple(
+        float(np.corrcoef(angle, along)[0, 1])
+        if np.ptp(at) >= MIN_TRAVEL and np.ptp(angle) > 0.0
+        else np.nan
+        for angle, along, at in (
+            (inclination.real, moved.real, way[:, 0].real),
+            (inclination.imag, moved.imag, way[:, 0].imag),
+        )
+    )
+
+
+def frame_warnings(recordings: Iterable[Recording]) -> list[str]:
+    """What is wrong with the frames of recordings, and how it is mended."""
+    return [f"{one.path}: {text}" for one in recordings for text in frame_faults(one)]
+
+
+def frame_faults(recording: Recording) -> Iterator[str]:
+    """What is wrong with the frame of a recording; nothing where none is found."""
+    turn = found_turn(recording)
+    if turn is None or not (turn.mirrored or _is_turned(turn)):
+        return
+    xz, yz = PLANES
+    quarters = round(turn.angle_deg / 90.0)
+    quarter = quarters % 4 if abs(turn.angle_deg - 90.0 * quarters) <= MAX_TURN_DEG else None
+    ahead = "the stick leans ahead of the gripper; is its sign (`flip`) or that of"
+    if not turn.mirrored and quarter == 2:
+        yield f"{xz}: {ahead} x right? The same holds for {yz} and y (or yaw_deg = 180)"
+    elif not turn.mirrored:
+        yield (
+            f"the inclination is turned by {turn} against x and y: correct the axes, or give "
+            f"`yaw_deg = {_whole(turn.angle_deg)}` in the map of `bolfi-liquids import`"
+        )
+    elif quarter == 0:
+        yield f"{yz}: {ahead} y right?"
+    elif quarter == 2:
+        yield f"{xz}: {ahead} x right?"
+    elif quarter is not None:
+        yield f"{xz}: the stick follows y more than x; are the planes exchanged?"
+    else:
+        yield (
+            "x and y, or the planes, form a mirrored frame, which is turned as well "
+            f"({turn}): correct one sign (`flip`) first, and then `yaw_deg`"
+        )
+
+
+def _is_turned(turn: Turn) -> bool:
+    return abs(turn.angle_deg) > max(MAX_TURN_DEG, MAX_TURN_ERRORS * turn.error_deg)
+
+
+def _pair(recording: Recording) -> tuple[NDArray, NDArray] | None:
+    """Inclination (n,) and positions at each delay before it (n, delays); None where too few."""
+    time, position = recording.time, recording.gripper.position[:, :2]
+    if max(np.ptp(axis[np.isfinite(axis)]) for axis in position.T) < MIN_TRAVEL:
+        return None
+    way = np.empty((len(time), len(DELAYS)), dtype=complex)
+    for at, delay in enumerate(DELAYS):
+        x, y = (_at(time - delay, time, axis) for axis in position.T)
+        way[:, at] = x + 1j * y
+    inclination = recording.inclination[:, 0] + 1j * recording.inclination[:, 1]
+    seen = np.isfinite(inclination)
+    if seen.sum() < N_BLOCKS * MIN_SAMPLES_PER_BLOCK:
+        return None
+    return inclination[seen], way[seen]
+
+
+def _at(wanted: NDArray, time: NDArray, values: NDArray) -> NDArray:
+    known = np.isfinite(values)
+    return np.interp(wanted, time[known], values[known])
+
+
+class _Fit(NamedTuple):
+    """Angle [rad]; residual sums of squares at it and at its worst; share that it explains."""
+
+    angle: float
+    residual: float
+    worst: float
+    followed: float
+
+
+def _fit(inclination: NDArray, delayed: NDArray) -> _Fit:
+    """Inclination = phase x (real response to the delayed positions).
+
+    Turned back by an angle, the inclination is linear in its cosine and sine, and so is what a real
+    response leaves of it: the best angle is the eigenvector of a 2 x 2 matrix.
+    """
+    seen, way = inclination - inclination.mean(), delayed - delayed.mean(axis=0)
+    design = np.vstack([way.real, way.imag])
+    turned = np.column_stack([_real(seen), _real(-1j * seen)])
+    left = turned - design @ np.linalg.lstsq(design, turned, rcond=None)[0]
+    (least, most), vectors = np.linalg.eigh(left.T @ left)
+    angle = float(np.arctan2(vectors[1, 0], vectors[0, 0]))
+    power = max(float(np.sum(np.abs(seen) ** 2)), np.finfo(float).tiny)
+    floor = MIN_RESIDUAL_SHARE * power
+    # the stick trails what the gripper has moved of late, even where it swings in a thin liquid
+    moved = way[:, 0] - way.mean(axis=1)
+    if np.sum(np.exp(-1j * angle) * seen * moved.conj()).real > 0.0:
+        angle += np.pi
+    wrapped = float(np.pi - (np.pi - angle) % (2.0 * np.pi))
+    residual, worst = (max(float(value), floor) for value in (least, most))
+    return _Fit(wrapped, residual, worst, 1.0 - residual / power)
+
+
+def _real(values: NDArray) -> NDArray:
+    return np.concatenate([values.real, values.imag])
+
+
+def _error_deg(inclination: NDArray, delayed: NDArray, angle: float) -> float:
+    """Standard error of the angle, by a jackknife over stretches: what is left is correlated."""
+    blocks = np.arange(len(inclination)) * N_BLOCKS // len(inclination)
+    apart = [
+        _fit(inclination[blocks != block], delayed[blocks != block]).angle - angle
+        for block in range(N_BLOCKS)
+    ]
+    wrapped = np.degrees((np.array(apart) + np.pi) % (2.0 * np.pi) - np.pi)
+    return float(np.sqrt((N_BLOCKS - 1) / N_BLOCKS * np.sum((wrapped - wrapped.mean()) ** 2)))
