@@ -53,7 +53,7 @@ class ChosenPour:
         """
         if self.stale:
             raise InputError(
-                f"the pour in it is out of date: {str(self.stale[0]).rstrip('.')}",
+                "its pour is out of date: it was chosen over another posterior than the latest",
                 where=str(self.run),
                 fix=_again(self.run),
             )

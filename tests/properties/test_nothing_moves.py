@@ -219,6 +219,7 @@ def test_armed_without_the_sentence_moves_nothing(
     assert emulator.admin.motions() == before
 
 
+@pytest.mark.slow
 @pytest.mark.alone  # a look at an arm, whose controller may not be silent for long
 def test_a_stale_pour_is_refused_and_a_dry_run_begins_with_that(poured_run, rig_file, emulator):
     before = emulator.admin.motions()

@@ -110,8 +110,8 @@ def test_an_action_outside_of_what_the_cups_allow_is_refused(poured_run, name, v
     with_action(poured_run, **{name: value})
     with pytest.raises(InputError) as caught:
         bl.execute_pour(poured_run, ask=None if emulate else refused, emulate=emulate)
-    said = str(caught.value)
-    assert name in said or f"pour.{name}" in said
+    # a number that JSON does not know damages the summary already
+    assert (name if np.isfinite(value) else "summary.json") in str(caught.value)
 
 
 @pytest.mark.parametrize("end", [0, -1])
