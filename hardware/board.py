@@ -44,6 +44,7 @@ class Trouble(IntEnum):
     SOURCE_LOST = 2
     SAME_PICTURE = 3
     STOPPED = 4
+    BAD_STAMPS = 5
 
 
 class Row(NamedTuple):

@@ -1,5 +1,6 @@
 """Frames from a video file or a directory of pictures, through the interface of a camera."""
 
+import re
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +18,9 @@ class FilesCamera:
     """Reads what was recorded, as fast as it is asked for."""
 
     def __init__(self, path: str | Path, *, rate: float = 30.0) -> None:
-        """Open a video file, or a directory of pictures that are read in the order of their names.
+        """Open a video file, or a directory of pictures, in the order of their names.
+
+        Numbers in names count as numbers: 2.png comes before 10.png. Hidden files are passed over.
 
         Args:
             path: File or directory.
@@ -59,10 +62,18 @@ class FilesCamera:
 
 
 def _names(directory: Path) -> list[Path]:
-    names = sorted(p for p in directory.iterdir() if p.suffix.lower() in PICTURES)
+    pictures = (path for path in directory.iterdir() if path.suffix.lower() in PICTURES)
+    # a hidden one, such as `._1.png`, is a note of the system about a picture
+    names = sorted((path for path in pictures if not path.name.startswith(".")), key=_in_order)
     if not names:
         raise CameraError(f"{directory} holds no pictures ({', '.join(PICTURES)})")
     return names
+
+
+def _in_order(path: Path) -> tuple[list[int | str], str]:
+    """So that 2.png comes before 10.png; of two equal numbers, by the whole name."""
+    parts = re.split(r"([0-9]+)", path.name.casefold())
+    return [int(part) if at % 2 else part for at, part in enumerate(parts)], path.name
 
 
 def _pictures(names: list[Path], rate: float) -> Iterator[Frame]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..rig import Rig
 from ..vision.frame_measurement import BAD_LINE, Flag
+from .clock_steps import without_steps
 from .directory import VIEWS
 from .events import drop_reserve, read_events
 from .outcome import outcome
@@ -41,7 +42,7 @@ def finalise(directory: str | Path) -> Path:
         OSError: The file cannot be written.
     """
     directory = Path(directory)
-    raw = read_raw(directory)
+    raw = without_steps(read_raw(directory), str(directory))
     stir = extract_stir(raw, str(directory))
     drop_reserve(directory)  # room for the recording, where the disk is full
     dataset = _as_dataset(stir, _attributes(directory, raw, stir))
@@ -107,6 +108,7 @@ def _attributes(directory: Path, raw: Raw, stir: Stir) -> dict[str, float | int 
             "marker_misfit_px": clock.misfit,
             "flagged": float(doubtful.mean()),
             "frame_rate": _rate(frames["stamp"]),
+            "bad_stamps": raw.stamps[view].left_out,
             "lost_frames": max(lost_rows(frames["index"]), missed(frames["stamp"])),
         }
         attributes |= {f"camera_{view}_{name}": value for name, value in numbers.items()}

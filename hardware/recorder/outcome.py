@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 CONTROL = "control"  # the source whose word counts
-TROUBLES = ("refused", "write_failed", "source_lost", "same_picture", "failed")
+BAD_STAMPS = "bad_stamps"
+TROUBLES = ("refused", "write_failed", "source_lost", "same_picture", BAD_STAMPS, "failed")
 SILENT = "the session ended without a word: it was killed, or power was lost"
 
 Events = Sequence[dict[str, Any]]
@@ -27,7 +28,9 @@ def outcome(events: Events, cut: str = "") -> Outcome:
     told = [event for event in events if event["kind"] == "stopped"]
     told += [event for event in events if event["kind"] in TROUBLES]
     if told:
-        return Outcome("aborted", _reason(told[0]))
+        # control tells only that a camera's stamps are bad, the camera from which frame on
+        stamps = [_reason(event) for event in told[1:] if event["kind"] == BAD_STAMPS]
+        return Outcome("aborted", "; ".join([_reason(told[0]), *stamps[:1]]))
     if not _carried_out(events):
         return Outcome("aborted", f"{SILENT} ({cut})" if cut else SILENT)
     return Outcome("aborted", cut) if cut else Outcome("complete", "the plan was carried out")

@@ -15,6 +15,7 @@ from .csv_file import read_csv
 from .directory import VIEWS, Provenance, read_provenance
 from .names import frames_file
 from .sample import SAMPLES, Sample
+from .stamps import JudgedStamps, judged_stamps
 
 LEAST_SAMPLES = 50
 LEAST_FRAMES = 30
@@ -29,12 +30,14 @@ class Raw(NamedTuple):
         samples: Columns of samples.csv, times rising.
         frames: Columns of each view's frames, stamps rising.
         lost_samples: Rows that the control process took and samples.csv lacks.
+        stamps: What each view's frames were judged by; those that are no times are left out.
     """
 
     provenance: Provenance
     samples: Columns
     frames: dict[View, Columns]
     lost_samples: int
+    stamps: dict[View, JudgedStamps]
 
 
 def read_raw(directory: Path) -> Raw:
@@ -46,14 +49,19 @@ def read_raw(directory: Path) -> Raw:
     provenance = read_provenance(directory)
     rows = _read(directory / SAMPLES, Sample._fields)
     samples = _rising(rows, "time")
+    seen = {view: _read(directory / frames_file(view), FrameMeasurement._fields) for view in VIEWS}
+    stamps: dict[View, JudgedStamps] = {
+        view: judged_stamps(of["index"], of["stamp"], of["host"]) for view, of in seen.items()
+    }
     frames: dict[View, Columns] = {
-        view: _rising(_read(directory / frames_file(view), FrameMeasurement._fields), "stamp")
-        for view in VIEWS
+        view: {name: values[stamps[view].good] for name, values in of.items()}
+        for view, of in seen.items()
     }
     counts = {SAMPLES: len(samples["time"])}
     counts |= {frames_file(view): len(frames[view]["stamp"]) for view in VIEWS}
-    _check_enough(directory, counts)
-    return Raw(provenance, samples, frames, lost_rows(rows["index"]))
+    faults = [f"view {view}: {one.fault}" for view, one in stamps.items() if one.fault]
+    _check_enough(directory, counts, faults)
+    return Raw(provenance, samples, frames, lost_rows(rows["index"]), stamps)
 
 
 def frame_series(frames: Columns) -> FrameSeries:
@@ -103,11 +111,12 @@ def _rising(columns: Columns, clock: str) -> Columns:
     return {name: values[kept] for name, values in columns.items()}
 
 
-def _check_enough(directory: Path, counts: dict[str, int]) -> None:
+def _check_enough(directory: Path, counts: dict[str, int], faults: list[str]) -> None:
     needed = {SAMPLES: LEAST_SAMPLES} | {frames_file(view): LEAST_FRAMES for view in VIEWS}
     short = [name for name, count in counts.items() if count < needed[name]]
     if short:
         there = ", ".join(f"{name} has {count} rows" for name, count in counts.items())
+        there = "; ".join([there, *faults])
         raise RigError(
             f"{' and '.join(short)} hold too little: {there}",
             where=str(directory),

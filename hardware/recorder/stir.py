@@ -47,7 +47,9 @@ class Stir(NamedTuple):
     cut: str
 
 
-class _Span(NamedTuple):
+class Span(NamedTuple):
+    """Of the robot's time [s], and why it ends before the stir does."""
+
     first: float
     last: float
     cut: str = ""
@@ -64,12 +66,12 @@ def extract_stir(raw: Raw, where: str, until: float = np.inf) -> Stir:
     Raises:
         RigError: There is no stir, it is too short, or a camera's clock cannot be found.
     """
-    span = _stirred(raw.samples, where, until)
+    span = stirred(raw.samples, where, until)
     _check_length(span, where)
     series = {view: frame_series(raw.frames[view]) for view in VIEWS}
-    clocks: dict[View, Clock] = {view: _clock(raw, view, series[view], span) for view in VIEWS}
+    clocks: dict[View, Clock] = {view: view_clock(raw, view, span) for view in VIEWS}
     for view in VIEWS:
-        span = _seen(span, series[view], clocks[view], view)
+        span = _seen(span, series[view], clocks[view], f"view {view}", raw.stamps[view].fault)
     _check_length(span, where)
     time = np.arange(np.floor((span.last - span.first) * TABLE_RATE + 1e-6) + 1) / TABLE_RATE
     times = span.first + time
@@ -95,7 +97,7 @@ def _in_gap(time: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np
     return time[after] - time[after - 1] > LONGEST_GAP
 
 
-def _stirred(samples: Columns, where: str, until: float) -> _Span:
+def stirred(samples: Columns, where: str, until: float = np.inf) -> Span:
     """From the first to the last sample of the stir, or up to a gap between them."""
     time = samples["time"]
     stirring = np.flatnonzero((samples["stirring"] == 1) & (time <= until))
@@ -108,37 +110,49 @@ def _stirred(samples: Columns, where: str, until: float) -> _Span:
     first, last = int(stirring[0]), int(stirring[-1])
     gaps = np.flatnonzero(np.diff(time[first : last + 1]) > MOST_GAP)
     if len(gaps) == 0:
-        return _Span(float(time[first]), float(time[last]))
+        return Span(float(time[first]), float(time[last]))
     before = first + int(gaps[0])
     lacking = time[before + 1] - time[before]
-    return _Span(
+    return Span(
         float(time[first]), float(time[before]), f"no samples of the robot for {lacking:.2f} s"
     )
 
 
-def _clock(raw: Raw, view: View, series: FrameSeries, span: _Span) -> Clock:
-    samples, frames = raw.samples, raw.frames[view]
+def way_near(samples: Columns, span: Span) -> Trajectory:
+    """The gripper's positions that the clocks of a stir are learned from."""
     near = (samples["time"] > span.first - CLOCK_MARGIN) & (
         samples["time"] < span.last + CLOCK_MARGIN
     )
     path = np.column_stack([samples[axis][near] for axis in "xyz"])
+    return Trajectory(samples["time"][near], path)
+
+
+def view_clock(raw: Raw, view: View, span: Span) -> Clock:
+    """The clock of a camera.
+
+    Raises:
+        RigError: It cannot be found.
+    """
+    samples, frames, fault = raw.samples, raw.frames[view], raw.stamps[view].fault
     to_host = float(np.median(samples["time"] - samples["host"]))
     guess = to_host + float(np.median(frames["host"] - frames["stamp"]))
     try:
         return fit_clock(
-            series,
-            Trajectory(samples["time"][near], path),
+            frame_series(frames),
+            way_near(samples, span),
             raw.provenance.cameras[view],
             raw.provenance.rig.camera(view).marker,
             guess=guess,
         )
     except ClockError as err:
         raise RigError(
-            str(err), where=f"view {view}", fix="see the video; the marker must be in view"
+            f"{err}; {fault}" if fault else str(err),
+            where=f"view {view}",
+            fix="see the video; the marker must be in view",
         ) from err
 
 
-def _seen(span: _Span, series: FrameSeries, clock: Clock, view: View) -> _Span:
+def _seen(span: Span, series: FrameSeries, clock: Clock, where: str, fault: str) -> Span:
     """The part of the span in which a view has seen the stick, up to `LONGEST_GAP` at its ends."""
     good = ((series.flags & int(BAD_LINE)) == 0) & np.isfinite(series.lines.angle)
     time = clock.to_robot(series.stamp[good])
@@ -146,20 +160,21 @@ def _seen(span: _Span, series: FrameSeries, clock: Clock, view: View) -> _Span:
     if len(time) == 0:
         raise RigError(
             "the stick is not seen during the stir",
-            where=f"view {view}",
+            where=where,
             fix="see the video; the stick must stand out from what is behind it",
         )
     late, early = time[0] - span.first, span.last - time[-1]
     if early > LONGEST_GAP:
-        cut = f"view {view} has not seen the stick for its last {early:.2f} s"
-        span = _Span(span.first, float(time[-1]), cut)
+        unseen = f"{where} has not seen the stick for its last {early:.2f} s"
+        cut = f"{where}: {fault}" if fault else unseen
+        span = Span(span.first, float(time[-1]), cut)
     if late > LONGEST_GAP:
-        cut = f"view {view} has not seen the stick for its first {late:.2f} s"
-        span = _Span(float(time[0]), span.last, cut)
+        cut = f"{where} has not seen the stick for its first {late:.2f} s"
+        span = Span(float(time[0]), span.last, cut)
     return span
 
 
-def _check_length(span: _Span, where: str) -> None:
+def _check_length(span: Span, where: str) -> None:
     if span.last - span.first < LEAST_TIME:
         reason = f" ({span.cut})" if span.cut else ""
         raise RigError(

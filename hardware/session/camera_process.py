@@ -19,6 +19,7 @@ from ..recorder.disk import Disk, told_if_fails
 from ..recorder.events import EventLog
 from ..recorder.names import frames_file, video_file
 from ..recorder.rate import Rate, counted, no_rate
+from ..recorder.stamps import StampWatch
 from ..recorder.video import VideoWriter
 from ..recorder.views import stick_view
 from ..rig import Rig, View
@@ -120,6 +121,8 @@ class _CameraProcess:
         self._disk = disk
         self._trouble = Trouble.NONE
         self._tally = _Tally(no_rate(host_time()))
+        # a file is read faster than it was recorded
+        self._stamps = StampWatch() if rig.camera(view).is_device else None
         self._meter = FrameMeter(stick_view(rig, view))
         self._table: CsvAppender | None = None
         self._video: VideoWriter | None = None
@@ -165,10 +168,21 @@ class _CameraProcess:
         self._keep(frame, row)
         seen = row.angle if line_is_good(row.flags) else float("nan")
         self._tally = tallied(self._tally, frame, seen, frame.host)
+        self._watch_stamp(frame)
         if self._tally.same == SAME_PICTURES:
             reason = f"the same picture came {SAME_PICTURES} times in a row"
             self._complain(Trouble.SAME_PICTURE, "same_picture", reason=reason, index=frame.index)
         self._beat()
+
+    def _watch_stamp(self, frame: Frame) -> None:
+        """Complain once of a camera's clock that is lost: what follows could not be used."""
+        watch = self._stamps
+        if watch is None or watch.fault is not None:
+            return
+        watch.take(frame.index, frame.stamp, frame.host)
+        if watch.fault is not None:
+            index, reason = watch.fault.index, str(watch.fault)
+            self._complain(Trouble.BAD_STAMPS, "bad_stamps", reason=reason, index=index)
 
     def _keep(self, frame: Frame, row: FrameMeasurement) -> None:
         table, video = self._table, self._video

@@ -1,7 +1,7 @@
 """Intrinsics of a camera from pictures of a ChArUco board."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,18 +28,23 @@ class Board:
         columns, rows: Number of squares.
         square: Side of a square, as measured on the print [m].
         marker: Side of a marker [m].
+        legacy: Whether the pattern is that of OpenCV before version 4.6 (2022), which with an even
+            number of rows has a marker in its first square.
     """
 
     columns: int = 8
     rows: int = 6
     square: float = 0.025
     marker: float = 0.018
+    legacy: bool = False
 
     def opencv_board(self) -> Any:
         """The same as OpenCV's `CharucoBoard`."""
         aruco = opencv().aruco
         words = aruco.getPredefinedDictionary(aruco.DICT_5X5_100)
-        return aruco.CharucoBoard((self.columns, self.rows), self.square, self.marker, words)
+        board = aruco.CharucoBoard((self.columns, self.rows), self.square, self.marker, words)
+        board.setLegacyPattern(self.legacy)
+        return board
 
     def print_image(self, square_pixels: int = 100) -> np.ndarray:
         """The board to be printed, uint8, with no margin."""
@@ -58,6 +63,7 @@ class Intrinsics(NamedTuple):
         rms: Root mean square distance between corners seen and corners expected [px].
         focal_error: Standard errors of `focal` [px].
         views: Number of pictures used.
+        legacy: Whether the board's pattern was found to be the older one, see `Board`.
     """
 
     focal: tuple[float, float]
@@ -67,6 +73,7 @@ class Intrinsics(NamedTuple):
     rms: float
     focal_error: tuple[float, float]
     views: int
+    legacy: bool = False
 
     def placed(self, rotation: np.ndarray, position: np.ndarray) -> CameraModel:
         """The camera with these intrinsics at a pose; see `look_at`."""
@@ -88,7 +95,8 @@ class _View(NamedTuple):
 def calibrate_intrinsics(images: Sequence[np.ndarray], board: Board) -> Intrinsics:
     """Focal lengths, centre and distortion from pictures of a board.
 
-    Pictures with fewer than 8 corners are left out. The sixth-order distortion k3 stays 0: a
+    Both patterns of boards are tried, that of `board` first. Pictures with fewer than 8 corners are
+    left out. The sixth-order distortion k3 stays 0: a
     webcam does not need it, and few pictures do not determine it.
 
     Args:
@@ -106,12 +114,13 @@ def calibrate_intrinsics(images: Sequence[np.ndarray], board: Board) -> Intrinsi
             f"{sorted(sizes)}"
         )
     height, width = sizes.pop()
-    found = [_corners(image, board) for image in images]
-    views = [view for view in found if view is not None]
+    legacy, views = _views(images, board)
     if len(views) < LEAST_VIEWS:
         raise CalibrationError(
             f"{len(views)} of {len(images)} pictures show at least {LEAST_CORNERS} corners of the "
-            f"board; {LEAST_VIEWS} such pictures are needed. Hold it near, flat, lit and still"
+            f"board, of the older pattern or the newer; {LEAST_VIEWS} such pictures are needed. "
+            f"Is it a board of {board.columns} x {board.rows} squares, as --print-board makes? "
+            "Hold it near, flat, lit and still"
         )
     _check_coverage(views, (width, height))
     intrinsics, turns = _solve(views, (width, height))
@@ -121,7 +130,20 @@ def calibrate_intrinsics(images: Sequence[np.ndarray], board: Board) -> Intrinsi
             f"the corners lie {intrinsics.rms:.2f} px from where they should, more than "
             f"{MOST_RMS} px: is the board flat, and are its squares {1e3 * board.square:.1f} mm?"
         )
-    return intrinsics
+    return intrinsics._replace(legacy=legacy)
+
+
+def _views(images: Sequence[np.ndarray], board: Board) -> tuple[bool, list[_View]]:
+    """Whether the older pattern is seen in more pictures, and those that show enough of it."""
+    found: dict[bool, list[_View]] = {}
+    for legacy in (board.legacy, not board.legacy):
+        printed = replace(board, legacy=legacy)
+        seen = [_corners(image, printed) for image in images]
+        found[legacy] = [view for view in seen if view is not None]
+        if len(found[legacy]) >= LEAST_VIEWS:
+            break
+    best = max(found, key=lambda legacy: len(found[legacy]))
+    return best, found[best]
 
 
 def _corners(image: np.ndarray, board: Board) -> _View | None:

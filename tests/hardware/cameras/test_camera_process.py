@@ -19,6 +19,7 @@ from bolfi_liquids.hardware.cameras.rendered import RenderedCamera, Timing  # no
 from bolfi_liquids.hardware.recorder.csv_file import read_csv  # noqa: E402
 from bolfi_liquids.hardware.recorder.events import read_events  # noqa: E402
 from bolfi_liquids.hardware.recorder.rate import no_rate  # noqa: E402
+from bolfi_liquids.hardware.recorder.stamps import MAX_BAD_STAMPS  # noqa: E402
 from bolfi_liquids.hardware.recorder.video import VideoWriter  # noqa: E402
 from bolfi_liquids.hardware.recorder.views import camera_model, stick_view  # noqa: E402
 from bolfi_liquids.hardware.rendering.drawing import prepare, render  # noqa: E402
@@ -228,6 +229,33 @@ def test_the_same_picture_again_looks_dead_and_is_recorded(start, tmp_path):
     assert same["kind"] == "same_picture"
     shown_since = table["stamp"][table["index"] == same["index"]] - 1000.0 - stop
     assert 0 < shown_since[0] < 4 / 30
+
+
+class StandingClock:
+    """A camera whose stamps stand still from a frame on."""
+
+    def __init__(self, make, after):
+        self._camera, self._after, self._stamp = make(), after, None
+
+    def read(self):
+        frame = self._camera.read()
+        if frame.index < self._after:
+            self._stamp = frame.stamp
+        return frame._replace(stamp=self._stamp)
+
+    def close(self):
+        self._camera.close()
+
+
+def test_a_clock_that_stands_still_after_the_start_is_told(start, tmp_path):
+    running = start(partial(StandingClock, rendered(), 30))
+    row = running.wait(lambda row: row.trouble, timeout=120.0)
+    assert row.trouble == Trouble.BAD_STAMPS
+    running.end()
+    (told,) = (event for event in read_events(tmp_path) if event["kind"] == "bad_stamps")
+    # a frame that came very late, just before, may count as the first
+    assert told["index"] > 30 - MAX_BAD_STAMPS
+    assert "stand still" in told["reason"] and f"frame {told['index']}" in told["reason"]
 
 
 def test_a_camera_that_ends_or_cannot_be_opened_is_told(start, tmp_path):

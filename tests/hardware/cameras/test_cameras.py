@@ -57,6 +57,33 @@ def test_a_directory_of_pictures_is_read_in_order_and_unchanged(tmp_path):
     assert camera.read() is None
 
 
+@pytest.mark.parametrize(
+    "names",
+    [
+        [f"{k}.png" for k in range(1, 13)],
+        [f"Frame {k}.PNG" if k % 2 else f"frame {k}.png" for k in range(8, 12)],
+        ["b2_9.png", "b2_10.png", "b10_1.png"],
+        ["1.png", "01.jpg", "2.png"][1:],
+    ],
+)
+def test_numbers_in_names_count_as_numbers(tmp_path, names):
+    for level, name in enumerate(names):
+        cv2.imwrite(str(tmp_path / name), np.full((48, 64), 10 * level + 20, np.uint8))
+    camera = FilesCamera(tmp_path)
+    levels = [frame.image.mean() for frame in iter(camera.read, None)]
+    np.testing.assert_allclose(levels, 10.0 * np.arange(len(names)) + 20.0, atol=1.0)
+
+
+def test_hidden_files_are_no_pictures(tmp_path):
+    cv2.imwrite(str(tmp_path / "1.png"), np.zeros((48, 64), np.uint8))
+    for name in ("._1.png", ".DS_Store", "Thumbs.db", ".2.png"):
+        (tmp_path / name).write_bytes(b"a note of the system")
+    assert len(list(iter(FilesCamera(tmp_path).read, None))) == 1
+    (tmp_path / "1.png").unlink()
+    with pytest.raises(CameraError, match="no pictures"):
+        FilesCamera(tmp_path)
+
+
 def test_a_video_has_its_own_times_and_becomes_grey(video):
     camera, frames = FilesCamera(video), []
     while (frame := camera.read()) is not None:

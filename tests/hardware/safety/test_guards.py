@@ -85,6 +85,7 @@ CASES = {
     "camera age": (row(Who.CAMERA_XZ, beat=NOW - 0.16), "camera xz: .* s, the limit is 0.15"),
     "camera never": (row(Who.CAMERA_YZ, beat=0.0), "camera yz: .*inf s"),
     "same picture": (row(Who.CAMERA_YZ, trouble=Trouble.SAME_PICTURE), "camera yz.*same picture"),
+    "bad stamps": (row(Who.CAMERA_XZ, trouble=Trouble.BAD_STAMPS), "camera xz.*stamps"),
     "camera lost": (row(Who.CAMERA_XZ, trouble=Trouble.SOURCE_LOST), "xz gives no more pictures"),
     "disk": (row(Who.RECORDER, trouble=Trouble.WRITE_FAILED), "recorder cannot write"),
     "recorder": (row(Who.RECORDER, beat=NOW - 0.31), "recorder: .* s, the limit is 0.3"),

@@ -29,25 +29,30 @@ TRUTH = CameraModel(
 )
 
 
-def board_picture(turn, place, seed: int) -> np.ndarray:
+def board_picture(turn, place, seed: int, board: Board = BOARD) -> np.ndarray:
     """The board's middle at `place` [m] in the camera frame, turned by a rotation vector."""
     rotation = Rotation.from_rotvec(turn).as_matrix()
     middle = 0.5 * BOARD.square * np.array([BOARD.columns, BOARD.rows, 0.0])
     rng = np.random.default_rng(seed)
-    return render_board(BOARD, TRUTH, rotation, np.array(place) - rotation @ middle, rng)
+    return render_board(board, TRUTH, rotation, np.array(place) - rotation @ middle, rng)
 
 
-@pytest.fixture(scope="module")
-def pictures() -> list[np.ndarray]:
+def board_pictures(board: Board) -> list[np.ndarray]:
     rng = np.random.default_rng(1)
     return [
         board_picture(
             rng.uniform([-0.5, -0.5, -0.2], [0.5, 0.5, 0.2]),
             rng.uniform([-0.08, -0.06, 0.28], [0.08, 0.06, 0.4]),
             seed,
+            board,
         )
         for seed in range(12)
     ]
+
+
+@pytest.fixture(scope="module")
+def pictures() -> list[np.ndarray]:
+    return board_pictures(BOARD)
 
 
 def test_focal_lengths_are_right_to_half_a_percent(pictures):
@@ -67,6 +72,23 @@ def test_the_calibrated_lens_maps_the_picture_like_the_true_one(pictures):
     apart = found.project(np.concatenate([seen, np.ones((*seen.shape[:-1], 1))], axis=-1)) - pixels
     apart -= apart.mean(axis=(0, 1))  # a shifted centre is a turned camera
     assert np.abs(apart).max() < 1.5
+
+
+def test_a_board_of_the_older_pattern_is_read_and_told():
+    """Most boards that were printed before 2022, of an even number of rows."""
+    older = dataclasses.replace(BOARD, legacy=True)
+    assert (older.print_image() != BOARD.print_image()).any()
+    seen = board_pictures(older)
+    found = calibrate_intrinsics(seen, BOARD)
+    assert found.legacy and found.views == 12 and found.rms < 0.4
+    np.testing.assert_allclose(found.focal, TRUTH.focal, rtol=5e-3)
+    again = calibrate_intrinsics(seen, older)
+    assert again == found
+
+
+def test_the_newer_pattern_is_not_taken_for_the_older(pictures):
+    assert not calibrate_intrinsics(pictures, BOARD).legacy
+    assert not calibrate_intrinsics(pictures, dataclasses.replace(BOARD, legacy=True)).legacy
 
 
 def test_too_few_pictures_are_refused(pictures):

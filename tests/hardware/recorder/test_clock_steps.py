@@ -1,0 +1,61 @@
+"""Camera clocks that fail in the middle of a stir: the recording ends there, and says why."""
+
+import numpy as np
+import pytest
+from bolfi_liquids.hardware.recorder.finalise import finalise
+from closed_form_session import WAY, inclination
+
+import bolfi_liquids as bl
+
+FAULT = 250  # frame of a stir of 12 s, in its middle
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda frame: frame._replace(stamp=1e3 * frame.stamp), "unit"),
+        (lambda frame: frame._replace(stamp=frame.stamp + 2.0), "jump by"),
+        (lambda frame: frame._replace(stamp=7.0), "stand still"),
+    ],
+    ids=["unit", "jump", "stand"],
+)
+@pytest.mark.parametrize("view", ["xz", "yz"])
+def test_a_camera_whose_stamps_fail_ends_the_recording_and_is_named(session, view, change, told):
+    def fail(_, frames):
+        frames[view][FAULT:] = map(change, frames[view][FAULT:])
+
+    recording = bl.open_recording(finalise(session(change=fail)))
+    assert recording.time[-1] == pytest.approx(FAULT / 30 - WAY, abs=0.1)
+    reason = recording.attrs["reason"]
+    assert recording.attrs["status"] == "aborted"
+    assert f"view {view}" in reason and told in reason and f"frame {FAULT}" in reason
+    assert recording.attrs[f"camera_{view}_bad_stamps"] == 12 * 30 + 2 * WAY * 30 - FAULT
+    apart = recording.inclination - inclination(WAY + recording.time)
+    assert np.degrees(np.nanmax(np.abs(apart))) < 0.15
+
+
+@pytest.mark.parametrize("step", [0.1, -0.1, 0.4])
+def test_a_step_that_only_the_marker_shows_ends_the_recording(session, step):
+    def jump(_, frames):
+        later = [f._replace(stamp=f.stamp + step) for f in frames["yz"][FAULT:]]
+        frames["yz"][FAULT:] = later
+
+    recording = bl.open_recording(finalise(session(change=jump)))
+    assert recording.time[-1] <= FAULT / 30 - WAY + 0.1
+    assert recording.attrs["status"] == "aborted"
+    assert "view yz: its stamps jump by" in recording.attrs["reason"]
+    apart = recording.inclination - inclination(WAY + recording.time)
+    assert np.degrees(np.nanmax(np.abs(apart))) < 0.15
+
+
+def test_odd_stamps_are_left_out_and_counted(session):
+    def odd(_, frames):
+        for k in (100, 180, 181, 300):
+            frames["xz"][k] = frames["xz"][k]._replace(stamp=1e6)
+
+    recording = bl.open_recording(finalise(session(change=odd)))
+    assert recording.attrs["status"] == "complete"
+    assert recording.attrs["camera_xz_bad_stamps"] == 4
+    assert recording.attrs["camera_yz_bad_stamps"] == 0
+    apart = recording.inclination - inclination(WAY + recording.time)
+    assert np.degrees(np.nanmax(np.abs(apart))) < 0.2
