@@ -17,6 +17,8 @@ def bad_fit(summary: CalibrationSummary) -> Sentence | None:
     """
     if summary.fit_status is FitStatus.ACCEPTABLE:
         return None
+    if summary.frame_faults:
+        return sentence("calibration.wrong_frame", faults=summary.frame_faults)
     return sentence("calibration.bad_fit", summary=summary)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 import numpy as np
 from pydantic import computed_field
 
+from ..inputs.frame import frame_faults
 from ..run.summary import Number, Section
 from .check import Check
 from .noise import irreducible_rms, rms
@@ -25,11 +26,14 @@ DIVERGENT_SHARE_MAX = 0.01  # of the draws
 
 BAD_FIT_RATIO = 3.0
 """Times the noise from which a fit is bad: wrong signs and turned axes leave 5 to 9 times, a stir
-that starts in motion 3 times. Right recordings leave less than 2 times."""
+that starts in motion 3 times. The bundled recordings leave 1 to 2.6 times."""
 
 MIN_NOISE_DEG = 0.1
 """Noise [deg] below which no camera measures: simulated recordings without noise count as if they
 had as much, or an unfinished search would pass for a wrong sign."""
+
+TURNING_EFFECT = "camera_rotation"
+"""Effect that accounts for a turned frame, once a criticism has accepted it."""
 
 
 class SamplerStatus(StrEnum):
@@ -109,6 +113,8 @@ class CalibrationSummary(Section):
         seconds: Time spent.
         seed: Of all random draws.
         version: Of this package.
+        frame_faults: Recordings whose inclination and positions are not told in one frame, and how
+            it is mended; see `inputs.frame`.
     """
 
     SECTION: ClassVar[str] = "calibrate"
@@ -130,6 +136,7 @@ class CalibrationSummary(Section):
     seconds: Seconds
     seed: int
     version: str
+    frame_faults: tuple[str, ...] = ()
 
     @classmethod
     def from_fit(cls, tree: "DataTree", fit: "Fit", stirring: Stirring, check: Check) -> Self:
@@ -154,6 +161,11 @@ class CalibrationSummary(Section):
             seconds=Seconds(**{name: float(value) for name, value in spent.items()}),
             seed=int(tree.attrs["seed"]),
             version=version("bolfi-liquids"),
+            frame_faults=tuple(
+                f"{one.path.name}: {fault}"
+                for one in stirring.recordings
+                for fault in frame_faults(one)
+            ),
         )
 
     def of_posterior(
@@ -170,6 +182,7 @@ class CalibrationSummary(Section):
             noise_deg=fit.noise_deg,
             parameters=parameters,
             best=best,
+            frame_faults=() if TURNING_EFFECT in parameters else self.frame_faults,
             below_least_viscosity=_below(posterior, self.least_viscosity),
             **_sampling(posterior),
         )
@@ -183,8 +196,12 @@ class CalibrationSummary(Section):
     @computed_field
     @property
     def fit_status(self) -> FitStatus:
-        """Bad from `BAD_FIT_RATIO` on, and where the ratio is not known."""
-        return FitStatus.ACCEPTABLE if self.fit_to_noise < BAD_FIT_RATIO else FitStatus.BAD
+        """Bad from `BAD_FIT_RATIO` on, where the ratio is not known, and in a wrong frame.
+
+        The parameters of a thin liquid take up a turned frame: the fit alone does not show it.
+        """
+        good = self.fit_to_noise < BAD_FIT_RATIO and not self.frame_faults
+        return FitStatus.ACCEPTABLE if good else FitStatus.BAD
 
     @property
     def divergent_share(self) -> float:

@@ -63,14 +63,14 @@ def truly_spilled(pour):
 @pytest.mark.minutes
 def test_adhesion_is_found_in_pours_and_the_next_pour_spills_less(tmp_path):
     calibration = bl.calibrate(stirred(tmp_path / "stir.nc"), out=tmp_path / "run", progress=False)
-    before = bl.choose_pour(calibration, bundled_cups(), progress=False)
+    before = bl.choose_pour(calibration, bundled_cups(), force=True, progress=False)
     criticism = bl.criticise(
         calibration,
         pours=table_of_pours(tmp_path / "pours.csv"),
         effects=["adhesion", "shear_thinning", "yield_stress"],
         progress=False,
     )
-    after = bl.choose_pour(criticism.calibration, bundled_cups(), progress=False)
+    after = bl.choose_pour(criticism.calibration, bundled_cups(), force=True, progress=False)
     assert criticism.verdict == "effect"
     assert criticism.effects == ("adhesion",)
     pours = criticism.summary.pours

@@ -139,9 +139,19 @@ def test_a_fit_is_bad_from_three_times_the_noise_on(calibration, rms, noise, sta
     assert again.fit_status == status
 
 
+def test_a_wrong_frame_is_bad_however_near_the_fit(calibration):
+    near = replace(calibration.summary, fit_rms_deg=0.2, noise_deg=0.2)
+    turned = replace(near, frame_faults=("stir.nc: turned by 45 deg",))
+    assert (near.fit_status, turned.fit_status) == ("acceptable", "bad")
+    found = bad_fit(turned)
+    assert found is not None and "stir.nc: turned by 45 deg" in str(found)
+    again = CalibrationSummary.from_json(turned.to_json())
+    assert again.frame_faults == turned.frame_faults
+
+
 def test_a_section_that_was_written_before_the_status_was_is_judged_too(calibration):
     section = calibration.summary.to_json()
-    del section["fit_status"], section["fit_to_noise"]
+    del section["fit_status"], section["fit_to_noise"], section["frame_faults"]
     assert CalibrationSummary.from_json(section).fit_status == calibration.summary.fit_status
 
 
