@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..files import (
     existing_file,
+    given_path,
     new_netcdf,
     write_netcdf,
     write_text,
@@ -47,7 +48,7 @@ def write_template(path: str | Path) -> Path:
     Raises:
         InputError: There is a file of that name.
     """
-    path = Path(path)
+    path = given_path(path, "--template")
     if path.exists():
         raise InputError("exists already", where=str(path), fix=OTHER_NAME)
     return write_text(path, (files("bolfi_liquids.data") / TEMPLATE).read_text(encoding="utf-8"))
@@ -66,7 +67,7 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
         InputError: The table or the map cannot be used; the message names line, column and value.
             Or `out` is something else that is there already. Nothing was written.
     """
-    table, out = existing_file(table), Path(out)
+    table, out = existing_file(table), given_path(out, "--out")
     meaning = columns if isinstance(columns, TableMap) else open_table_map(columns)
     dataset = _dataset(table, meaning)
     try:

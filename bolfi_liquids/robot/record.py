@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..files import given_path
 from ..inputs.open import open_recording
 from ..inputs.recording import Recording
 from ..inputs.rigs import rig_of
@@ -52,7 +53,7 @@ def record(
 
     check_one(ask, emulate, "record")
     opened, hidden = rig_of(rig), hidden_liquid(emulate)
-    plan, out = plan_stir(opened, cycles), Path(out)
+    plan, out = plan_stir(opened, cycles), given_path(out, "--out")
     title = "stirring" if hidden is None else "stirring, emulated"
     with (
         kept(out),
