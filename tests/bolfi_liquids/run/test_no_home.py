@@ -55,7 +55,9 @@ main()
 """
 
 
-@pytest.mark.parametrize("home", HOMES)
+@pytest.mark.parametrize(
+    "home", ["none", *(pytest.param(home, marks=pytest.mark.slow) for home in [*HOMES][1:])]
+)
 @as_unknown
 def test_libraries_load_and_draw(tmp_path, home):
     code = "import bolfi_liquids\n" + DRAW
