@@ -1,5 +1,6 @@
 """Files that are there to be read, and files that are written whole or not at all."""
 
+import errno
 import os
 import tempfile
 from collections.abc import Callable
@@ -23,6 +24,22 @@ def existing_file(path: str | Path) -> Path:
         what = "a directory, not a file" if path.is_dir() else "no such file"
         raise InputError(what, where=str(path), fix="check the path")
     return path
+
+
+def given_path(path: str | Path, where: str) -> Path:
+    """A path that a person gave to be written to.
+
+    Args:
+        path: As given.
+        where: The option or argument.
+
+    Raises:
+        InputError: It is empty, as a shell leaves a variable that is not set; "." says the
+            current directory.
+    """
+    if not str(path).strip():
+        raise InputError("is empty", where=where, fix="give a path; was a variable not set?")
+    return Path(path)
 
 
 def new_netcdf(path: str | Path) -> Path:
@@ -63,23 +80,68 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
     Returns:
         `path`.
     """
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    os.close(handle)
-    temporary = Path(name)
+    return _written(path, write, Path.replace)
+
+
+def _written(
+    path: Path, write: Callable[[Path], object], place: Callable[[Path, Path], object]
+) -> Path:
+    temporary = None
     try:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        os.close(handle)
+        temporary = Path(name)
         write(temporary)
         temporary.chmod(0o644)  # mkstemp's own mode hides results from a group
-        temporary.replace(path)
+        place(temporary, path)
+    except OSError as err:
+        if (why := disk_errno(err)) is None:
+            raise
+        raise OSError(why, os.strerror(why), str(path)) from err
     finally:
-        temporary.unlink(missing_ok=True)
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
     return path
+
+
+_OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
+
+
+def disk_errno(err: BaseException) -> int | None:
+    """The number of the disk's refusal to write that an error tells of; None if of none."""
+    number = getattr(err, "errno", None)
+    return number if number in _OF_THE_DISK else None
 
 
 def write_netcdf(data: "Dataset | DataTree", path: Path) -> Path:
     """Write data by `write_whole`, such that xarray reads them back with h5netcdf."""
-    return write_whole(path, lambda temporary: data.to_netcdf(temporary, engine="h5netcdf"))
+    # in memory first: after a write that the disk refused, HDF5 crashes when the process ends
+    content = data.to_netcdf(engine="h5netcdf")
+    return write_whole(path, lambda temporary: temporary.write_bytes(content))
 
 
 def write_text(path: Path, text: str) -> Path:
     """Write UTF-8 text by `write_whole`."""
     return write_whole(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+
+
+def write_new_text(path: Path, text: str) -> Path:
+    """Write UTF-8 text whole, to a file that is not there yet.
+
+    Raises:
+        FileExistsError: It is there, perhaps since a moment; it was left as it is.
+    """
+    return _written(path, lambda temporary: temporary.write_text(text, encoding="utf-8"), _linked)
+
+
+def _linked(temporary: Path, path: Path) -> None:
+    """Give a file its name, unless another has it."""
+    try:
+        path.hardlink_to(temporary)
+    except FileExistsError:
+        raise
+    except OSError as err:
+        if disk_errno(err):
+            raise
+        with path.open("xb") as file:  # a disk without links
+            file.write(temporary.read_bytes())

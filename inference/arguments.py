@@ -1,37 +1,112 @@
-"""Arguments as users give them: made what they should be, or refused by name."""
+"""What users give, and what their code returns: made what it should be, or refused by name.
+
+Loads nothing but NumPy, for workers import it.
+"""
 
 import math
+from operator import index
 
 import numpy as np
 
 LARGEST_INTEGER = 2**31 - 1  # that every random number generator takes as a seed
+NUMBERS = "biufV"  # kinds of dtypes that become float64; V is bfloat16 and its like
+
+
+class Unusable(ValueError):
+    """What came is no array of numbers, or not of the shape that is needed.
+
+    Args:
+        got: What came, in a few words.
+        shape: Of the numbers that came; None where there are none.
+    """
+
+    def __init__(self, got: str, shape: tuple[int, ...] | None = None):
+        super().__init__(got)
+        self.got, self.shape = got, shape
+
+
+def float64(value: object) -> np.ndarray:
+    """`value` as a float64 array of its own; what is masked is NaN, and so is None within it.
+
+    Booleans and integers are numbers; a number that float64 cannot hold becomes infinite.
+
+    Raises:
+        Unusable: complex numbers, whose imaginary part would be lost; text, which would have to
+            be guessed at; dates, records, rows of unequal length, None, and what is no array.
+    """
+    try:
+        with np.errstate(all="ignore"):  # a user may have made NumPy raise
+            array = np.ma.asarray(value)
+            if array.dtype.kind == "O" and value is not None:
+                return _of_objects(array)
+            if array.dtype.kind in NUMBERS and array.dtype.names is None:
+                # `astype` copies: a simulator may fill the same array again
+                return np.ma.filled(array.astype(np.float64), np.nan)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise Unusable(described(value)) from error
+    raise Unusable(described(value))
+
+
+def _of_objects(array: np.ma.MaskedArray) -> np.ndarray:
+    hidden = np.ma.getmaskarray(array).ravel()
+    items = np.ma.getdata(array).ravel()
+    numbers = [np.nan if out else _number(one) for one, out in zip(items, hidden, strict=True)]
+    return np.array(numbers, np.float64).reshape(array.shape)
+
+
+def _number(item: object) -> float:
+    if item is None or item is np.ma.masked:
+        return np.nan
+    if isinstance(item, str | bytes) or np.iscomplexobj(item) or np.ndim(item):
+        raise TypeError("not a real number")
+    try:
+        return float(item)  # pyright: ignore[reportArgumentType]  or TypeError
+    except OverflowError:  # an integer of hundreds of digits
+        return np.inf
+
+
+def described(value: object) -> str:
+    """What came, in a few words for a message."""
+    if value is None:
+        return "None"
+    kind = type(value).__name__
+    shape, dtype = getattr(value, "shape", None), getattr(value, "dtype", None)
+    if shape is not None and dtype is not None:
+        return f"{shape} of {dtype}"
+    if isinstance(value, str | bytes):
+        return f"{kind} {value!r:.40}"
+    if isinstance(value, list | tuple):
+        return f"a {kind} of {len(value)}, which is no array of numbers"
+    return f"an object of type {kind}"
 
 
 def checked_integer(name: str, value: object, least: int = 1) -> int:
-    """`value` as int.
+    """`value`, an integer of any library, as Python's own.
 
     Raises:
         ValueError: not an integer, or not from `least` to `LARGEST_INTEGER`.
     """
-    if isinstance(value, int | np.integer) and not isinstance(value, bool):
-        number = int(value)
-        if least <= number <= LARGEST_INTEGER:
-            return number
-    raise ValueError(f"{name} must be an integer from {least} to {LARGEST_INTEGER}, got {value!r}")
+    refusal = f"{name} must be an integer from {least} to {LARGEST_INTEGER}, got {value!r:.100}"
+    if isinstance(value, bool):
+        raise ValueError(refusal)
+    try:
+        number = index(value)  # pyright: ignore[reportArgumentType]  or TypeError
+    except TypeError as error:
+        raise ValueError(refusal) from error
+    if not least <= number <= LARGEST_INTEGER:
+        raise ValueError(refusal)
+    return number
 
 
 def checked_array(name: str, value: object) -> np.ndarray:
-    """`value` as float64.
+    """`value` as float64, by the rules of `float64`.
 
     Raises:
         ValueError: not numbers, or not of one shape.
     """
     try:
-        array = np.ma.asarray(value)
-        if array.dtype.kind == "c":
-            raise TypeError("complex")
-        return np.ma.filled(array.astype(np.float64), np.nan)  # what is masked is missing
-    except (TypeError, ValueError) as error:
+        return float64(value)
+    except Unusable as error:
         raise ValueError(f"{name} must be an array of numbers, got {value!r:.100}") from error
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ._float64 import in_float64
 from .acquisition import rules as acquisitions
 from .acquisition.replicates import next_replicate
-from .arguments import checked_array, checked_integer
+from .arguments import Unusable, checked_array, checked_integer
 from .describe import describe
 from .gp.process import padded_rows
 from .history import (
@@ -26,6 +26,8 @@ from .history import (
 from .notebook_display import as_html, as_text
 from .prior import Prior
 from .result import Fit
+from .simulations.failures import unusable
+from .simulations.returned import told_signals
 from .sobol import sobol, start_size
 from .surrogates.base import Acquisition
 from .surrogates.families import Family, Learnable, resolve
@@ -223,11 +225,12 @@ class Bolfi:
     ) -> None:
         """Give the engine finished simulations: any number, any order, asked for or not.
 
-        A row of NaN reports a failed run. It counts as told, but nothing is learned from it.
+        A row of NaN reports a failed run. It counts as told, but nothing is learned from it. So
+        does whatever is no signal among a list or tuple of signals.
 
         Args:
             theta: Name -> [n], in the prior's support.
-            signals: [n, *signal_shape].
+            signals: [n, *signal_shape], or a list of n signals.
             seeds: Seeds of the runs [n], to be kept with the results. Of runs with equal theta
                 and seed one is learned from.
             errors: Why a run failed [n], to be kept for rows of NaN; "" elsewhere.
@@ -238,12 +241,12 @@ class Bolfi:
         started = time.perf_counter()
         natural = np.atleast_2d(self.prior.to_array(theta))
         rows = self.prior.to_dict(natural)
-        signals = checked_array("signals", signals)
-        self._check_signals(len(natural), signals)
+        signals, faults = self._signals(len(natural), signals)
         outside = np.flatnonzero(~self.prior.contains(rows))
         if outside.size:
             first = {name: float(column[outside[0]]) for name, column in rows.items()}
             raise ValueError(f"theta must lie in the support of the prior, got {first}")
+        given_errors = _errors(errors, len(natural))
         features, discrepancy = self._learner.measure(signals)
         told = History(
             theta=natural,
@@ -253,17 +256,29 @@ class Bolfi:
             discrepancy=discrepancy,
             seeds=_seeds(seeds, len(natural)),
             rounds=np.full(len(natural), UNKNOWN),
-            errors=explain(signals, discrepancy, _errors(errors, len(natural))),
+            errors=explain(signals, discrepancy, np.where(faults == "", given_errors, faults)),
         )
         self._state = remember_told(self._state, told)
         self._seconds += time.perf_counter() - started
 
-    def _check_signals(self, n: int, signals: np.ndarray) -> None:
-        shape = signals.shape[1:] if self.expected_shape is None else self.expected_shape
-        if signals.shape != (n, *shape):
+    def _signals(self, n: int, signals: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+        """Signals [n, *signal_shape] as told, and what was told in the place of each, str [n]."""
+        shape = self.expected_shape
+        try:
+            rows, faults = told_signals(signals, n, shape)
+        except Unusable as error:
+            if error.shape is None:
+                raise ValueError(
+                    f"signals must be an array of numbers, got {signals!r:.100}"
+                ) from error
+            due = (n, *(error.shape[1:] if shape is None else shape))
             raise ValueError(
-                f"signals must have shape {(n, *shape)}, one row per theta, got {signals.shape}"
-            )
+                f"signals must have shape {due}, one row per theta, got {error.shape}"
+            ) from error
+        told = [
+            fault and unusable(f"{fault} was told, {rows.shape[1:]} is due") for fault in faults
+        ]
+        return rows, np.array(told, str)
 
     def fit(
         self,

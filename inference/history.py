@@ -37,7 +37,7 @@ class History(NamedTuple):
 
     @property
     def failures(self) -> dict[str, int]:
-        """Failed runs by kind: "raised", "not finite", "timeout"."""
+        """Failed runs by kind: "raised", "not finite", "timeout", "unusable"."""
         return count(self.errors)
 
 

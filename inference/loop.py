@@ -24,7 +24,16 @@ from .progress import progress_bar
 from .result import Fit
 from .simulations.bank import Simulation, SimulationBank
 from .simulations.executors import Workers, open_executor
-from .simulations.job import BATCH, Job, OneByOne, columns, jobs, simulation_seed, stacked
+from .simulations.job import (
+    BATCH,
+    Job,
+    OneByOne,
+    columns,
+    jobs,
+    of_one_shape,
+    simulation_seed,
+    stacked,
+)
 from .simulations.runner import Keep, Runner
 from .sobol import start_size
 from .surrogates.base import Acquisition
@@ -71,8 +80,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
     Args:
         simulate: Callable (theta: name -> [b], seeds: [b]) -> signals [b, *signal_shape]; or,
             with vectorised=False, (theta: name -> float, seed) -> signal [*signal_shape].
-            A run that raises, returns NaN or takes too long costs that run only, see
-            `Fit.failures`.
+            A run that raises, takes too long, returns NaN or something else than a signal costs
+            that run only, see `Fit.failures`; a masked value is NaN.
         prior: The parameters and their priors.
         observed: The measured signal [*signal_shape], time first; NaN is a missing sample.
         budget: Simulations in all, failed ones and those found in the bank included.
@@ -110,7 +119,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
             before anything is simulated.
 
     Raises:
-        ValueError: bad argument; budget smaller than the start design; signals of wrong shape.
+        ValueError: bad argument; budget smaller than the start design; no run of the first batch
+            returned a signal.
         RuntimeError: no run of the start design succeeded, or fewer than three in all, of which
             the bank keeps those that did; the executor lost its workers.
         ImportError, ConnectionError: Dask is not installed, or does not answer.
@@ -152,7 +162,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         workers = stack.enter_context(open_executor(executor))
         simulator: Any = simulate if vectorised else OneByOne(cast(SingleSimulator, simulate))
         keep = Keep(bank, identity, batch, workers, timeout)
-        runner = stack.enter_context(Runner(simulator, keep))
+        runner = stack.enter_context(Runner(simulator, keep, first=min(batch, budget)))
         schedule = _in_rounds if in_rounds else _in_flight
         finished = schedule(engine, runner, budget, batch)
         seconds = 0.0
@@ -204,6 +214,7 @@ def _tell(engine: Bolfi, asked: list[Job], results: list[Simulation]) -> list[Si
         RuntimeError: the start design is over, and nothing succeeded.
     """
     theta, seeds = columns(asked)
+    results = of_one_shape(results, asked, engine.expected_shape)
     errors = [result.error or "" for result in results]
     engine.tell(theta, stacked(results, engine.signal_shape), seeds, errors)
     if engine.told >= engine.initial and engine.succeeded == 0:
@@ -224,4 +235,6 @@ def _length(earlier: Any) -> int:
             "earlier must be (theta, signals) or (theta, signals, seeds), theta a mapping of "
             f"names to values, or None, got {earlier!r:.100}"
         )
+    if isinstance(earlier[1], list | tuple):
+        return len(earlier[1])  # `tell` looks at each of them
     return len(np.atleast_1d(checked_array("earlier's signals", earlier[1])))

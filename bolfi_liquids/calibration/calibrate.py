@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..files import given_path
 from ..inputs.frame import frame_warnings
 from ..inputs.open import Source, open_recordings
 from ..inputs.prior import check_prior, default_prior, describe_prior
@@ -21,14 +22,14 @@ from ..inputs.start import check_start
 from ..progress import after_first, progress_bar
 from ..run.directory import (
     POSTERIOR,
-    enter_run,
     note_timeout,
     open_bank,
     read_run,
 )
+from ..run.entering import entered
 from ..run.execution import Execution
 from ..run.provenance import LIBRARIES, versions
-from ..run.recordings import keep_recordings
+from ..run.recordings import check_names, keep_recordings
 from ..run.simulations import warn_of_timeouts
 from ..run.workers import open_workers
 from .draws import pick_draws
@@ -110,22 +111,22 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     prior = default_prior() if prior is None else prior
     check_prior(prior)
     stirring = stirring_of(opened, settings.particles)
-    with open_workers(executor, timeout) as workers:
-        run = Path(mkdtemp(prefix="bolfi_liquids_") if out is None else out)
-        _enter(run, run_record(settings, prior, stirring), resume)
+    check_names(stirring.recordings)
+    run = Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, "--out")
+    record = run_record(settings, prior, stirring)
+    with (
+        open_workers(executor, timeout) as workers,
+        entered(run, record, resume=resume, growing="settings.budget") as removed,
+    ):
+        if removed:
+            what = f"removed {', '.join(removed)}, concluded from fewer simulations"
+            logger.warning("%s: %s; every simulation is kept", run, what)
         keep_recordings(run, stirring.recordings)
         for notice in [*aborted_recordings(opened), *frame_warnings(opened)]:
             logger.warning(notice)
         if not is_calibrated(run):
             _calibrate(run, stirring, prior, settings, Execution(workers, timeout, progress))
     return Calibration.open(run)
-
-
-def _enter(run: Path, record: dict[str, Any], resume: bool) -> None:
-    removed = enter_run(run, record, resume=resume, growing="settings.budget")
-    if removed:
-        what = f"removed {', '.join(removed)}, concluded from fewer simulations"
-        logger.warning("%s: %s; every simulation is kept", run, what)
 
 
 def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring) -> dict[str, Any]:

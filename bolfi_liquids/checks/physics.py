@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import InputError
-from ..files import write_text
+from ..files import given_path, write_text
+from ..inputs.settings import checked_seed
 from ..progress import fraction_bar, progress_bar
 from ..run.workers import open_workers
 from .physics_records import (
@@ -92,9 +93,8 @@ def check_physics(
     """
     registry = all_cases()
     chosen = _chosen(names, registry)
-    if seed < 0:
-        raise InputError(f"is {seed}", where="--seed", fix="give an integer of at least 0")
-    out = Path(out)
+    seed = checked_seed(seed)
+    out = given_path(out, "--out")
     if out.exists() and not out.is_dir():
         raise InputError("not a directory", where=str(out), fix="choose another --out")
     (out / CASES).mkdir(parents=True, exist_ok=True)

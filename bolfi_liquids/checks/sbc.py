@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.stir_simulator import Stirring, stirring_of
+from ..files import given_path
 from ..inputs.bundled import bundled_recording
 from ..inputs.open import open_recordings
 from ..inputs.prior import default_prior, describe_prior
@@ -30,6 +31,7 @@ from ..inputs.settings import (
 )
 from ..progress import progress_bar
 from ..run.directory import SIMULATIONS, enter_run
+from ..run.entering import working_in
 from ..run.provenance import LIBRARIES, versions
 from ..run.workers import open_workers
 from ..seeds import Phase, generator, simulation_seeds
@@ -80,10 +82,10 @@ def check_sbc(
     settings = settings or SbcSettings()
     given = bundled_recording("water") if recording is None else recording
     stirring = stirring_of(open_recordings(given), settings.particles)
-    prior, out = default_prior(), Path(out)
+    prior, out = default_prior(), given_path(out, "--out")
     record = _record(settings, prior, stirring)
     found = {}
-    with open_workers(executor, timeout) as workers:
+    with open_workers(executor, timeout) as workers, working_in(out):
         enter_run(out, record, resume=True)
         study = SbcStudy(out, stirring, prior, settings, workers, timeout, progress)
         for name in SURROGATES:

@@ -1,5 +1,6 @@
 """The command line; each command calls the function of the same name."""
 
+import signal
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -7,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .. import __version__
-from ..run.directory import RUN_TOML
+from ..run.directory import check_resumable
 from ..run.jax_cache import keep_compilations
 from . import check as cli_check
 from . import guide, import_table, reproduce
@@ -97,9 +98,9 @@ def calibrate(
     from ..calibration.calibrate import calibrate as run_calibrate
     from ..inputs.open import open_recordings
 
+    if resume:
+        check_resumable(out)
     opened = open_recordings(recordings)
-    if resume and not (out / RUN_TOML).exists():
-        typer.echo(f"{out}: holds no run to resume: this is a new one", err=True)
     with complaints_among_results(), compute.executor() as executor:
         run_calibrate(
             opened,
@@ -246,4 +247,6 @@ app.add_typer(cli_check.app, name="check")
 
 def main() -> None:
     """Entry point of `bolfi-liquids`."""
+    if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # says how to go on, as Ctrl-C
     app()

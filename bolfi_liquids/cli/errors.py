@@ -1,5 +1,7 @@
 """Errors on the command line: one line for what a person can mend, a traceback on --debug."""
 
+import errno
+import os
 import shlex
 import sqlite3
 import sys
@@ -10,10 +12,14 @@ import typer
 from typer.core import TyperGroup
 from typer.exceptions import TyperException
 
+from ..errors import InputError
+from ..files import disk_errno
+
 FAILED = 1
 USAGE_ERROR = 2
 ABORTED = 3  # something ended a recording early; what there is was kept
 INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+GIVEN = "bolfi_liquids.given"  # key of the arguments as they were typed
 
 
 class Aborted(RuntimeError):
@@ -36,8 +42,13 @@ class OneLineErrors(TyperGroup):
     One that records has 3 for a recording that was aborted.
     """
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        ctx.meta[GIVEN] = list(args)
+        return super().parse_args(ctx, args)
+
     def invoke(self, ctx: Any) -> Any:
         try:
+            _refuse_empty(ctx.meta[GIVEN])
             return super().invoke(ctx)
         except KeyboardInterrupt:
             _say(_how_to_go_on(sys.argv[1:]))
@@ -63,7 +74,30 @@ def _status(err: Exception) -> int:
     return FAILED if isinstance(err, RuntimeError) else USAGE_ERROR
 
 
+def _refuse_empty(arguments: list[str]) -> None:
+    """An empty argument is a variable that was not set; as a path it would be the directory that
+    one is in.
+
+    Raises:
+        InputError: There is one.
+    """
+    for before, argument in zip(["", *arguments], arguments, strict=False):
+        option, given, value = argument.partition("=")
+        if not argument.strip():
+            option = before if before.startswith("-") else "an argument"
+        elif not (option.startswith("--") and given and not value.strip()):
+            continue
+        raise InputError("is empty", where=option, fix="give a value; was a variable not set?")
+
+
 def _explained(err: Exception) -> str:
+    if (number := disk_errno(err)) is not None:
+        where = getattr(err, "filename", None) or "a file that the command writes"
+        cure = "make it writable" if number == errno.EROFS else "make room"
+        return (
+            f"{where}: {os.strerror(number)}; {cure}, then repeat the command (calibrate with "
+            "--resume): nothing that was simulated is lost"
+        )
     if isinstance(err, OSError) and err.filename is not None:
         return f"{err.filename}: {err.strerror}; choose a place that can be read and written"
     return _one_line(str(err))

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
+from ..files import given_path, new_file, write_new_text
 
 if TYPE_CHECKING:
     from ..hardware import Rig
@@ -33,17 +34,20 @@ def rig_of(given: "Rig | str | Path | None") -> "Rig":
     return checked_rig(given)
 
 
-def write_template(path: Path) -> Path:
+def write_template(path: str | Path) -> Path:
     """Write the bundled rig.toml.
 
     Raises:
         InputError: There is a file already.
     """
+    path, fix = given_path(path, "FILE"), "name a file that does not"
     if path.exists():
-        raise InputError("exists already", where=str(path), fix="name a file that does not")
+        raise InputError("exists already", where=str(path), fix=fix)
     text = (files("bolfi_liquids.hardware.data") / "rig.toml").read_text(encoding="utf-8")
-    path.write_text(text, encoding="utf-8")
-    return path
+    try:
+        return write_new_text(new_file(path), text)
+    except FileExistsError:
+        raise InputError("exists already", where=str(path), fix=fix) from None
 
 
 def emulator_until_interrupted(

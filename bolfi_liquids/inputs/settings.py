@@ -25,6 +25,8 @@ FALSE_ALARM_RATE = 0.05
 """Of the comparison between simulation and data."""
 MIN_SIMULATIONS = 7
 """With fewer, the posterior over two parameters says next to nothing."""
+LARGEST_SEED = 2**31 - 1
+"""That every random number generator takes."""
 MIN_PARTICLES = 100
 """With fewer, the stick is thinner than the gaps between them."""
 
@@ -49,7 +51,7 @@ def _plain_integer(value: Any) -> Any:
 
 
 Integer = Annotated[int, BeforeValidator(_plain_integer)]
-Seed = Annotated[Integer, Field(ge=0)]
+Seed = Annotated[Integer, Field(ge=0, le=LARGEST_SEED)]
 Count = Annotated[Integer, Field(ge=1)]
 Simulations = Annotated[Integer, Field(ge=MIN_SIMULATIONS)]
 Particles = Annotated[Integer, Field(ge=MIN_PARTICLES)]
@@ -89,6 +91,22 @@ def checked(where: str = "--{}", **fields: str) -> Callable[[type[T]], type[T]]:
         return made
 
     return decorate
+
+
+@checked()
+class SeedSetting:
+    """The seed of a command that has no other setting."""
+
+    seed: Seed
+
+
+def checked_seed(value: Any) -> int:
+    """`value` as a seed.
+
+    Raises:
+        InputError: It is no integer from 0 to `LARGEST_SEED`.
+    """
+    return SeedSetting(value).seed
 
 
 @checked()

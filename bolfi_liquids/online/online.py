@@ -9,6 +9,7 @@ supervises the robot: `update` and `poll` return at once, and what goes wrong is
 import multiprocessing
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..calibration.calibrate import calibrate
 from ..errors import InputError
+from ..files import given_path
 from ..inputs.cups import bundled_cups
 from ..inputs.open import Source, open_recording
 from ..inputs.prior import (
@@ -30,6 +32,7 @@ from ..inputs.prior import (
 from ..inputs.recording import Recording
 from ..pouring.map import make_pours
 from ..run.directory import RUN_TOML
+from ..run.entering import working_in
 from .learner import learn_online
 from .newest_message import Outbox
 from .online_choice import OnlineChoice
@@ -58,7 +61,7 @@ class OnlineCalibration:
         estimates: All so far.
     """
 
-    def __init__(self, request: Request, out: Path):
+    def __init__(self, request: Request, out: Path, alone: ExitStack):
         self.settings, self.plan, self.out = request.settings, request.plan(), out
         self.ends = stroke_ends(self.plan)
         self.status = Status(OnlinePhase.PREPARING, "starting")
@@ -66,6 +69,7 @@ class OnlineCalibration:
         self._prior = read_prior(request.prior)
         self._link, self._workers = _launch(request)
         self._outbox = Outbox(self._link)
+        self._alone = alone  # in `out`, until it is closed
 
     @classmethod
     def start(
@@ -99,23 +103,29 @@ class OnlineCalibration:
         prior = default_prior() if choice.prior is None else choice.prior
         check_prior(prior)
         cups = bundled_cups() if choice.cups is None else choice.cups
-        plan, out = planned(path.time, path.position, attrs), _fresh(Path(choice.run))
+        plan, out = planned(path.time, path.position, attrs), given_path(choice.run, "--calibrate")
         bank = out / BANK if choice.bank is None else Path(choice.bank)
-        (out / LOG).unlink(missing_ok=True)
         density = plan.number("liquid_density")
-        with SimulationBank(bank) as kept:
-            make_pours(cups, density, kept, prior=prior, pours=settings.pours, progress=progress)
-        request = Request(
-            time=plan.gripper.time,
-            position=plan.gripper.position,
-            attrs=dict(attrs),
-            cups=cups,
-            prior=describe_prior(prior),
-            settings=settings,
-            bank=bank,
-            log=out / LOG,
-        )
-        return cls(request, out)
+        with ExitStack() as alone:
+            alone.enter_context(working_in(out))
+            if (out / RUN_TOML).exists():
+                raise InputError("holds a run already", where=str(out), fix="choose another --out")
+            (out / LOG).unlink(missing_ok=True)
+            with SimulationBank(bank) as kept:
+                make_pours(
+                    cups, density, kept, prior=prior, pours=settings.pours, progress=progress
+                )
+            request = Request(
+                time=plan.gripper.time,
+                position=plan.gripper.position,
+                attrs=dict(attrs),
+                cups=cups,
+                prior=describe_prior(prior),
+                settings=settings,
+                bank=bank,
+                log=out / LOG,
+            )
+            return cls(request, out, alone.pop_all())
 
     def wait_until_ready(self, timeout: float | None = None) -> bool:
         """Wait until data may come, or preparation failed, or `timeout` [s] has passed.
@@ -204,6 +214,7 @@ class OnlineCalibration:
             worker.join(JOIN_SECONDS)
             if worker.is_alive():
                 worker.kill()
+        self._alone.close()
 
     def __enter__(self) -> "OnlineCalibration":
         return self
@@ -260,15 +271,6 @@ def _until(recording: Recording, end: float) -> SoFar:
     seen = recording.time <= end + 1e-9
     path: NDArray = recording.gripper.position[seen]
     return SoFar(recording.time[seen], path, recording.inclination[seen], time.monotonic())
-
-
-def _fresh(out: Path) -> Path:
-    if out.exists() and not out.is_dir():
-        raise InputError("not a directory", where=str(out), fix="choose another --out")
-    if (out / RUN_TOML).exists():
-        raise InputError("holds a run already", where=str(out), fix="choose another --out")
-    out.mkdir(parents=True, exist_ok=True)
-    return out
 
 
 def _launch(request: Request) -> tuple[Connection, dict[str, BaseProcess]]:

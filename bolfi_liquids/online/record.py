@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..files import given_path
 from ..inputs.recording import Recording
 from ..inputs.rigs import rig_of
 from ..robot.armed_session import Ask, check_one, hidden_liquid
@@ -71,7 +72,7 @@ def record_online(
 
     check_one(ask, emulate, "record")
     rig, hidden = rig_of(rig), hidden_liquid(emulate)
-    plan, out = plan_stir(rig, online.cycles), Path(out)
+    plan, out = plan_stir(rig, online.cycles), given_path(out, "--out")
     with OnlineCalibration.start(
         _simulated(plan),
         rig_attributes(rig),

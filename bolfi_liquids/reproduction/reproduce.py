@@ -7,8 +7,10 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ..errors import InputError
+from ..files import given_path
 from ..inference.simulations import Workers
 from ..run.directory import open_bank
+from ..run.entering import working_in
 from ..run.execution import Execution
 from ..run.provenance import LIBRARIES, generations, versions
 from ..run.workers import open_workers
@@ -66,7 +68,8 @@ def reproduce(
         InputError: There is no figure of that name.
     """
     with open_workers(executor, timeout) as pool:
-        return dict(draw_figures(names, Path(out), scale, Execution(pool, timeout, progress)))
+        out = given_path(out, "--out")
+        return dict(draw_figures(names, out, scale, Execution(pool, timeout, progress)))
 
 
 def draw_figures(
@@ -74,9 +77,8 @@ def draw_figures(
 ) -> Iterator[tuple[str, Drawn]]:
     """As `reproduce`, each figure with its name as soon as it is written."""
     chosen = _chosen(names)
-    out.mkdir(parents=True, exist_ok=True)
     made_with = {"scale": asdict(scale), **generations(), "versions": versions(LIBRARIES)}
-    with open_bank(out) as bank:
+    with working_in(out), open_bank(out) as bank:
         shared = SharedSimulations(out, scale, bank, execution)
         if "adhesion" in chosen:
             shared.begin_sticky()

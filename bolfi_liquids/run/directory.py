@@ -4,13 +4,14 @@ import sqlite3
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import tomli_w
 
 from ..errors import InputError
-from ..files import write_text
+from ..files import write_new_text, write_text
 from .formats import upgraded
 from .summary import SUMMARY_FILE as SUMMARY
 
@@ -83,11 +84,7 @@ def enter_run(
         raise InputError("not a directory", where=str(run), fix="choose another --out")
     if path.exists():
         if not resume:
-            raise InputError(
-                "holds a run already",
-                where=str(run),
-                fix="give --resume to go on with it, or another --out",
-            )
+            raise _held(run)
         held = read_run(run)
         differing = _differences(held, record)
         grows = growing in differing and _larger(*differing[growing])
@@ -102,8 +99,36 @@ def enter_run(
             fix="choose another --out; nothing was overwritten",
         )
     run.mkdir(parents=True, exist_ok=True)
-    write_text(path, tomli_w.dumps(record))
+    try:
+        write_new_text(path, tomli_w.dumps(record))
+    except FileExistsError:  # another call has begun here meanwhile
+        raise _held(run) from None
     return []
+
+
+def _held(run: Path) -> InputError:
+    return InputError(
+        "holds a run already",
+        where=str(run),
+        fix="give --resume to go on with it, or another --out",
+    )
+
+
+def check_resumable(run: Path) -> None:
+    """Refuse to go on where nothing has begun, as with a mistyped name.
+
+    Raises:
+        InputError: There is no run; the message names the nearest one.
+    """
+    if (run / RUN_TOML).exists():
+        return
+    around = (*run.glob(f"*/{RUN_TOML}"), *run.parent.glob(f"*/{RUN_TOML}"), run.parent / RUN_TOML)
+    runs = {str(path.parent): path.parent for path in around if path.exists()}
+    near = get_close_matches(str(run), runs, n=1, cutoff=0.0)
+    fix = f"did you mean {near[0]}? To begin" if near else "to begin"
+    raise InputError(
+        "holds no run to resume", where=str(run), fix=f"{fix} a new run, leave --resume out"
+    )
 
 
 def note_timeout(run: Path, timeout: float | None) -> None:
@@ -123,6 +148,7 @@ def open_bank(run: Path) -> "Iterator[SimulationBank]":
 
     Raises:
         InputError: The file is damaged or cannot be written.
+        OSError: The disk is full or fails.
     """
     from ..inference import SimulationBank
 
@@ -139,8 +165,10 @@ def open_bank(run: Path) -> "Iterator[SimulationBank]":
 
 
 def _unusable(path: Path, err: Exception) -> InputError:
+    # the bank's own error names the path and another cure
+    cause = err.__cause__ if isinstance(err.__cause__, sqlite3.Error) else err
     return InputError(
-        f"cannot be used ({err})",
+        f"cannot be used ({cause})",
         where=str(path),
         fix="make it writable, restore it from a copy, or start again with another --out",
     )

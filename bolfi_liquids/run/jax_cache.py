@@ -6,21 +6,26 @@ import warnings
 
 from platformdirs import user_cache_path
 
+from ..home import temporary_home
+
 
 def keep_compilations() -> None:
     """Have JAX cache compilations in the user's cache, for this process and those it starts.
 
     Call it before anything imports JAX. If the environment names a directory
-    (`JAX_COMPILATION_CACHE_DIR`), it is used. If the directory is not writable, nothing is cached.
+    (`JAX_COMPILATION_CACHE_DIR`), it is used. If there is no home directory, or it is not
+    writable, nothing is cached.
     """
     ignore_torn_entries()
     if "JAX_COMPILATION_CACHE_DIR" in os.environ:
         return
     # compiled for this computer's processor, and a home directory may be shared
-    place = user_cache_path("bolfi-liquids") / "jax" / (platform.node() or "here")
+    if os.environ.get("HOME") == temporary_home():
+        return
     try:
+        place = user_cache_path("bolfi-liquids") / "jax" / (platform.node() or "here")
         place.mkdir(parents=True, exist_ok=True)
-    except OSError:
+    except (OSError, RuntimeError):  # the latter where platformdirs finds no home
         return
     if not os.access(place, os.W_OK):
         return

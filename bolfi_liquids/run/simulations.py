@@ -17,6 +17,7 @@ CURES = {
     Failure.RAISED: "remove the cause and repeat the call: nothing that has finished is lost",
     Failure.NOT_FINITE: "simulate with more particles, or leave such liquids out of the prior",
     Failure.TIMEOUT: "allow more time, and repeat the call",
+    Failure.UNUSABLE: "mend the simulator and repeat the call",
 }
 """What to do where every simulation failed, by the kind of the first one's failure."""
 

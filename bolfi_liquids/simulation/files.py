@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..files import new_file, new_netcdf
+from ..files import given_path, new_file, new_netcdf
 from ..inputs.fields import PLANES
 from ..inputs.recording import Recording, along_path, recording_dataset
 from ..movie.file import check_movie
@@ -50,7 +50,10 @@ def check_targets(movie: str | Path | None, out: str | Path | None) -> Targets:
     Raises:
         InputError, ImportError: Where and why.
     """
-    targets = Targets(*(None if file is None else Path(file) for file in (movie, out)))
+    targets = Targets(
+        None if movie is None else given_path(movie, "--movie"),
+        None if out is None else given_path(out, "--out"),
+    )
     if targets.movie is not None:
         check_movie(targets.movie)
         new_file(targets.movie)

@@ -14,7 +14,7 @@ from ..board import host_time
 from ..errors import RigError
 from ..rig import Rig, View
 from ..vision.camera_model import CameraModel, as_fields, from_fields
-from .events import make_reserve
+from .events import drop_reserve, make_reserve
 from .views import camera_model
 
 RIG = "rig.json"
@@ -84,8 +84,8 @@ def start_directory(
         directory.mkdir(parents=True, exist_ok=True)
         _check_empty(directory)
         _check_room(directory, expected_bytes(rig, duration, videos=videos))
-        make_reserve(directory)
-        (directory / RIG).write_text(json.dumps(written, indent=1) + "\n", encoding="utf-8")
+        _write_first(directory / RIG, json.dumps(written, indent=1) + "\n")
+        _reserve(directory)
     except OSError as err:
         raise RigError(
             err.strerror or str(err),
@@ -145,6 +145,25 @@ def _check_empty(directory: Path) -> None:
             where=str(directory),
             fix="give a new directory; nothing is ever overwritten",
         )
+
+
+def _write_first(path: Path, text: str) -> None:
+    """Write a file that nobody else has begun: of two sessions that start together one goes on."""
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        _check_empty(path.parent)
+        raise
+
+
+def _reserve(directory: Path) -> None:
+    try:
+        make_reserve(directory)
+    except OSError:  # leave nothing in the way of the next try
+        drop_reserve(directory)
+        (directory / RIG).unlink()
+        raise
 
 
 def _check_room(directory: Path, need: float) -> None:

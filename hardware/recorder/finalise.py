@@ -143,13 +143,17 @@ def _as_dataset(stir: Stir, attributes: dict[str, float | int | str]) -> "Datase
 
 
 def _write_whole(dataset: "Dataset", path: Path) -> Path:
+    # in memory first: after a write that the disk refused, HDF5 crashes when the process ends
+    content = dataset.to_netcdf(engine="h5netcdf")
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     os.close(handle)
     temporary = Path(name)
     try:
-        dataset.to_netcdf(temporary, engine="h5netcdf")
+        temporary.write_bytes(content)
         temporary.chmod(0o644)  # mkstemp's own mode hides it from a group
         temporary.replace(path)
+    except OSError as err:
+        raise OSError(err.errno, err.strerror, str(path)) from err
     finally:
         temporary.unlink(missing_ok=True)
     return path

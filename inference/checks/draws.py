@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from arviz_stats.base.array import array_stats
 
+from ..arguments import checked_array
+
 DRAW_SPACING = 2  # autocorrelation times between kept draws: an AR(1) chain keeps exp(-4) = 0.02
 MIN_DRAWS = 4  # draws per chain that an effective sample size can be estimated from
 
@@ -36,7 +38,7 @@ def posterior_array(drawn: Any, names: Sequence[str]) -> np.ndarray:
             f"the pipeline's draws must hold the parameters {tuple(names)}, "
             f"got {tuple(map(str, posterior))}"
         )
-    columns = [np.asarray(posterior[name], np.float64) for name in names]
+    columns = [checked_array(f"draws of {name!r}", posterior[name]) for name in names]
     shapes = {name: column.shape for name, column in zip(names, columns, strict=True)}
     if len(set(shapes.values())) > 1 or columns[0].ndim not in (1, 2) or columns[0].size == 0:
         raise ValueError(

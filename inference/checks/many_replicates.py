@@ -1,8 +1,8 @@
 """Running a pipeline many times on data whose truth is known."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from concurrent.futures import Executor, as_completed
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,8 @@ from ..describe import describe
 from ..prior import Prior
 from ..progress import progress_bar
 from ..simulations.executors import Workers, open_executor
+from ..simulations.failures import Failure, kind, unusable
+from ..simulations.job import BATCH
 from ..types import Simulator
 from .finished_replicates import Replicates
 from .one_replicate import Observe, Pipeline, Plan, Replicate, run_replicate
@@ -74,8 +76,9 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
             replicate.
 
     Raises:
-        ValueError: bad argument; a store made with other settings; a simulator or pipeline
-            that returns something of the wrong form.
+        ValueError: bad argument; a store made with other settings; a pipeline that returns
+            something of the wrong form, or a simulator that does so in all of the first
+            replicates, which are not kept then.
     """
     check_function("pipeline", pipeline)
     simulator = _own(pipeline, "simulate", simulate)
@@ -101,10 +104,11 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
         }
         advance = stack.enter_context(progress_bar("replicates", n, shown=progress, done=len(done)))
         missing = [number for number in range(n) if number not in done]
-        for replicate in _run(plan, missing, truths, workers):
-            kept.put(replicate)
-            done[replicate.number] = replicate
-            advance(1)
+        with closing(_run(plan, missing, truths, workers)) as made:
+            for replicate in _unless_all_are_misshapen(made, min(BATCH, len(missing))):
+                kept.put(replicate)
+                done[replicate.number] = replicate
+                advance(1)
     ordered = [done[number] for number in range(n)]
     finished = tuple(r for r in ordered if r.error is None)
     return Replicates(prior, seed, draws, finished, tuple(r for r in ordered if r.error))
@@ -154,7 +158,7 @@ def _own(pipeline: Pipeline, name: str, given: Any) -> Any:
 
 def _run(
     plan: Plan, numbers: list[int], truths: np.ndarray, executor: Executor | None
-) -> Iterator[Replicate]:
+) -> Generator[Replicate, None, None]:
     """Replicates as they finish."""
     if executor is None:
         yield from (run_replicate(plan, number, truths[number]) for number in numbers)
@@ -166,3 +170,23 @@ def _run(
     finally:
         for future in futures:
             future.cancel()  # after a mistake or Ctrl-C there is no use in the rest
+
+
+def _unless_all_are_misshapen(made: Iterator[Replicate], first: int) -> Iterator[Replicate]:
+    """The same replicates; those whose simulator returned no signal wait until another comes.
+
+    Raises:
+        ValueError: none came among the first; all would fail in the same way.
+    """
+    waiting: list[Replicate] | None = []
+    for replicate in made:
+        stage, _, why = (replicate.error or "").partition(": ")
+        if waiting is not None and kind(why) is Failure.UNUSABLE:
+            waiting.append(replicate)
+            if len(waiting) == first:
+                raise ValueError(f"{stage}: {why.removeprefix(unusable(''))}")
+            continue
+        yield from waiting or ()
+        waiting = None
+        yield replicate
+    yield from waiting or ()

@@ -6,8 +6,10 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..simulations.failures import timed_out
-from ..simulations.job import Overdue, limit_of, within
+from ..arguments import Unusable, float64
+from ..simulations.failures import timed_out, unusable
+from ..simulations.job import Job, Overdue, limit_of, misshapen, within
+from ..simulations.returned import signals_of
 from ..types import Simulator
 from .draws import effective_size, posterior_array, thin
 
@@ -72,11 +74,11 @@ def run_replicate(plan: Plan, number: int, truth: np.ndarray) -> Replicate:
     """Simulate at `truth` [d], run the pipeline, thin its draws.
 
     An exception of the simulator, of `observe` or of the pipeline is kept, and so are draws
-    that are not finite.
+    that are not finite, and that the simulator returned something else than a signal.
 
     Raises:
-        ValueError: the simulator or the pipeline returned something of the wrong form, which
-            is a mistake that every replicate would repeat.
+        ValueError: the pipeline returned something of the wrong form, which is a mistake that
+            every replicate would repeat.
     """
     started = time.perf_counter()
     empty = Replicate(number, truth, np.zeros(0), truth[None][:0], None, np.nan, np.nan, None)
@@ -86,17 +88,18 @@ def run_replicate(plan: Plan, number: int, truth: np.ndarray) -> Replicate:
         return empty._replace(observed=observed, seconds=seconds, error=f"{stage}: {error}")
 
     try:
-        signals = _simulated(plan, number, truth)
+        signal = _simulated(plan, number, truth)
     except Overdue:
         return failed("simulator", timed_out(plan.timeout or 0.0))
+    except Unusable as error:
+        job = Job(dict(zip(plan.names, truth.tolist(), strict=True)), _data_seed(plan, number))
+        return failed("simulator", misshapen(plan.simulate, [job], None, error))
     except FAILURES as error:  # whatever the user's code raises costs this replicate only
         return failed("simulator", f"{type(error).__name__}: {error}")
-    if signals.shape[:1] != (1,):
-        raise ValueError(
-            f"simulate must return one signal for one theta, shape [1, ...], got {signals.shape}"
-        )
     try:
-        observed = _observed(plan, number, signals[0])
+        observed = _observed(plan, number, signal)
+    except Unusable as error:
+        return failed("observe", unusable(f"an array of numbers is expected, got {error.got}"))
     except FAILURES as error:
         return failed("observe", f"{type(error).__name__}: {error}")
     if not np.isfinite(observed).any():
@@ -121,19 +124,23 @@ def run_replicate(plan: Plan, number: int, truth: np.ndarray) -> Replicate:
 
 def _simulated(plan: Plan, number: int, truth: np.ndarray) -> np.ndarray:
     theta = {name: truth[j : j + 1] for j, name in enumerate(plan.names)}
-    seeds = np.array([_seed(plan.seed, number, SIMULATOR)], np.int64)
+    seeds = np.array([_data_seed(plan, number)], np.int64)
     return within(
         plan.timeout,
-        lambda: np.asarray(plan.simulate(theta, seeds), np.float64),
+        lambda: signals_of(plan.simulate(theta, seeds), 1, None)[0],
         limit_of(plan.simulate),
     )
+
+
+def _data_seed(plan: Plan, number: int) -> int:
+    return _seed(plan.seed, number, SIMULATOR)
 
 
 def _observed(plan: Plan, number: int, signal: np.ndarray) -> np.ndarray:
     if plan.observe is None:
         return signal
     rng = np.random.default_rng(stream(plan.seed, number, NOISE))
-    return np.asarray(plan.observe(signal, rng), np.float64)
+    return float64(plan.observe(signal, rng))
 
 
 def _densities(
@@ -144,7 +151,7 @@ def _densities(
     # always as many rows, so that a compiled density is compiled once
     filler = np.repeat(truth[None], plan.draws - len(draws), axis=0)
     rows = np.concatenate([truth[None], draws, filler])
-    values = np.asarray(log_density(as_theta(rows, plan.names)), np.float64)
+    values = float64(log_density(as_theta(rows, plan.names)))
     if values.shape != (len(rows),):
         raise ValueError(f"log_density must return shape {(len(rows),)}, got {values.shape}")
     if np.isnan(values).any():

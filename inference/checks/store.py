@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..simulations.database import opened_database
+from ..simulations.database import disk_errors, opened_database
 from .one_replicate import Replicate
 
 MARK = 0x424C4652  # "BLFR"
@@ -45,7 +45,8 @@ class ReplicateStore:
         self.path = str(path)
         self._connection = opened_database(path, MARK, SCHEMA, "replicate store")
         try:
-            self._agree_on({**settings, **FORMAT})
+            with disk_errors(path):
+                self._agree_on({**settings, **FORMAT})
         except BaseException:
             self._connection.close()
             raise
@@ -73,12 +74,14 @@ class ReplicateStore:
         file = io.BytesIO()
         np.savez_compressed(file, **{k: v for k, v in held.items() if v is not None})
         effective = None if np.isnan(replicate.effective) else replicate.effective
-        self._connection.execute(
-            "INSERT INTO replicate VALUES (?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET "
-            "arrays = excluded.arrays, effective = excluded.effective, "
-            "seconds = excluded.seconds, error = excluded.error WHERE error IS NOT NULL",
-            (replicate.number, file.getvalue(), effective, replicate.seconds, replicate.error),
-        )
+        row = (replicate.number, file.getvalue(), effective, replicate.seconds, replicate.error)
+        with disk_errors(self.path):
+            self._connection.execute(
+                "INSERT INTO replicate VALUES (?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET "
+                "arrays = excluded.arrays, effective = excluded.effective, "
+                "seconds = excluded.seconds, error = excluded.error WHERE error IS NOT NULL",
+                row,
+            )
 
     def close(self) -> None:
         self._connection.close()

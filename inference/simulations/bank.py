@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..notebook_display import as_html, as_text
-from .database import opened_database
+from .database import disk_errors, opened_database
 from .simulation_locks import Claims
 
 MARK = 0x424C4651  # "BLFQ"
@@ -127,6 +127,9 @@ class SimulationBank:
 
         A signal that is already there is kept, for whoever looked it up may have used it; an
         error gives way to whatever came of trying again.
+
+        Raises:
+            OSError: the disk is full or fails; what is in the bank is kept.
         """
         blob, dtype, shape = None, None, None
         if simulation.signal is not None:
@@ -136,7 +139,7 @@ class SimulationBank:
             *(identity, theta_key(theta), int(seed), blob, dtype, shape),
             *(simulation.error, simulation.seconds, time.time()),
         )
-        with self._lock:
+        with self._lock, disk_errors(self.path):
             self._connection.execute(
                 "INSERT INTO simulation VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?) "
                 "ON CONFLICT DO UPDATE SET signal = excluded.signal, dtype = excluded.dtype, "

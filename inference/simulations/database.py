@@ -1,10 +1,35 @@
 """SQLite files of our own, told from all others by a mark."""
 
+import errno
 import os
 import sqlite3
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 
 BUSY_MS = 60_000  # wait this long for another process's write
+
+
+_OF_THE_DISK = {
+    sqlite3.SQLITE_FULL: errno.ENOSPC,
+    sqlite3.SQLITE_IOERR: errno.EIO,  # so SQLite names a limit on the size of files, too
+}
+
+
+@contextmanager
+def disk_errors(path: object) -> Iterator[None]:
+    """SQLite's errors of the disk as those of Python, with the file and what to do.
+
+    Raises:
+        OSError: the disk is full or fails.
+    """
+    try:
+        yield
+    except sqlite3.OperationalError as error:
+        number = _OF_THE_DISK.get(error.sqlite_errorcode & 0xFF)  # without its extension
+        if number is None:
+            raise
+        told = f"{error}; make room and repeat the call: what was stored is kept"
+        raise OSError(number, told, str(path)) from error
 
 
 def opened_database(path: object, mark: int, schema: str, what: str) -> sqlite3.Connection:
@@ -18,13 +43,14 @@ def opened_database(path: object, mark: int, schema: str, what: str) -> sqlite3.
 
     Raises:
         ValueError: `path` is no path, another file, or cannot be read and written.
+        OSError: the disk is full or fails.
     """
     if not isinstance(path, str | os.PathLike) or not str(path):
         raise ValueError(f"a {what} needs the path of a file, got {path!r}")
     # threads may share it, if they take turns
     options = {"timeout": BUSY_MS / 1000, "isolation_level": None, "check_same_thread": False}
     try:
-        with ExitStack() as undo:
+        with disk_errors(path), ExitStack() as undo:
             connection = sqlite3.connect(str(path), **options)
             undo.callback(connection.close)
             _prepare(connection, mark, schema, f"{path} is an SQLite file but not a {what}")

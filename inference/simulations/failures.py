@@ -14,6 +14,7 @@ class Failure(StrEnum):
     RAISED = "raised"
     NOT_FINITE = "not finite"  # the simulator returned NaN or infinity
     TIMEOUT = "timeout"
+    UNUSABLE = "unusable"  # the simulator returned something else than a signal
 
 
 _ENGINE = f"{Path(__file__).parents[1]}{os.sep}"
@@ -42,10 +43,14 @@ def not_finite(what: str) -> str:
     return f"{Failure.NOT_FINITE}: {what}"
 
 
+def unusable(what: str) -> str:
+    return f"{Failure.UNUSABLE}: {what}"
+
+
 def kind(error: str) -> Failure:
     """The kind of a failure of which a sentence is kept."""
     prefix = error.partition(":")[0]
-    told = Failure.NOT_FINITE, Failure.TIMEOUT
+    told = Failure.NOT_FINITE, Failure.TIMEOUT, Failure.UNUSABLE
     return next((one for one in told if one == prefix), Failure.RAISED)
 
 

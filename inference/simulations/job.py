@@ -13,9 +13,11 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from ..arguments import Unusable, checked_integer, float64
 from ..types import Simulator, SingleSimulator
 from .bank import Simulation
-from .failures import raised, timed_out
+from .failures import Failure, kind, raised, timed_out, unusable
+from .returned import commonest, signals_of
 
 R = TypeVar("R")
 BATCH = 4  # runs in one call, or in flight, where nobody says how many
@@ -41,9 +43,16 @@ def simulation_seed(seed: int, index: int) -> int:
 
 
 def jobs(theta: Mapping[str, np.ndarray], seeds: Sequence[int] | np.ndarray) -> list[Job]:
-    """One job per seed, with the rows of theta (name -> [n or more]) in order."""
+    """One job per seed, with the rows of theta (name -> [n or more]) in order.
+
+    Raises:
+        ValueError: a seed is no integer, or not from 0 to 2^31 - 1.
+    """
     return [
-        Job({name: float(column[i]) for name, column in theta.items()}, int(seed))
+        Job(
+            {name: float(column[i]) for name, column in theta.items()},
+            checked_integer("seed", seed, 0),
+        )
         for i, seed in enumerate(seeds)
     ]
 
@@ -70,9 +79,42 @@ class OneByOne:
         return limit_of(self.simulate)
 
     def __call__(self, theta: Mapping[str, np.ndarray], seeds: np.ndarray) -> np.ndarray:
-        """theta: name -> [n]; seeds: int64 [n]  ->  signals [n, *signal_shape]."""
-        runs = [np.asarray(self.simulate(*job), np.float64) for job in jobs(theta, seeds.tolist())]
-        return np.stack(runs)
+        """theta: name -> [n]; seeds: int64 [n]  ->  signals [n, *signal_shape].
+
+        The simulator gets Python's own numbers: `random.seed` takes no others.
+
+        Raises:
+            Unusable: it returned something else than numbers.
+        """
+        return np.stack([float64(self.simulate(*job)) for job in jobs(theta, seeds)])
+
+
+def is_unusable(result: Simulation) -> bool:
+    """Whether the simulator returned something else than a signal."""
+    return result.error is not None and kind(result.error) is Failure.UNUSABLE
+
+
+def of_one_shape(
+    results: Sequence[Simulation], batch: Sequence[Job], shape: tuple[int, ...] | None
+) -> list[Simulation]:
+    """The results of jobs; a signal of another shape than the others is a failed run.
+
+    Args:
+        shape: Of one signal; None takes the commonest.
+    """
+    shapes = [result.signal.shape for result in results if result.signal is not None]
+    due = commonest(shapes) if shape is None else shape
+    return [
+        result
+        if result.signal is None or result.signal.shape == due
+        else result._replace(
+            signal=None,
+            error=unusable(
+                f"a signal of shape {due} is expected, got {result.signal.shape} of {job}"
+            ),
+        )
+        for result, job in zip(results, batch, strict=True)
+    ]
 
 
 def stacked(results: Sequence[Simulation], shape: tuple[int, ...] | None = None) -> np.ndarray:
@@ -111,46 +153,59 @@ def run_batch(
 ) -> list[Simulation]:
     """Simulate all jobs in one call.
 
-    An exception, or taking too long, costs only the run to blame: the batch is then repeated one
-    by one. Seconds are shared out evenly.
+    An exception, taking too long, or returning other than one signal per job costs only the run
+    to blame: the batch is then repeated one by one. Seconds are shared out evenly.
 
     Args:
         shape: Of one signal; None accepts any.
         timeout: Seconds per job that the call may take, see `within`.
-
-    Raises:
-        ValueError: the simulator returned other than one such row per job.
     """
     theta, seeds = columns(batch)
     started = time.perf_counter()
     try:
         signals = within(
             None if timeout is None else timeout * len(batch),
-            lambda: np.asarray(simulate(theta, seeds), np.float64),
+            lambda: signals_of(simulate(theta, seeds), len(batch), shape),
             limit_of(simulate),
         )
     # whatever the user's code raises is a failed run, and kept; many programs end by SystemExit
     except (Exception, SystemExit) as error:
         if len(batch) > 1:
-            return [run_batch(simulate, [job], shape, timeout)[0] for job in batch]
+            made = [run_batch(simulate, [job], shape, timeout)[0] for job in batch]
+            if isinstance(error, Unusable) and all(map(is_unusable, made)):
+                # no run is right alone either: tell of the call that the user's code got
+                told = misshapen(simulate, batch, shape, error)
+                return [one._replace(error=told) for one in made]
+            return of_one_shape(made, batch, shape)
         if isinstance(error, Overdue) and timeout is not None:
             return [Simulation(None, timed_out(timeout), timeout)]
-        return [Simulation(None, raised(error), time.perf_counter() - started)]
+        bad = isinstance(error, Unusable)
+        told = misshapen(simulate, batch, shape, error) if bad else raised(error)
+        return [Simulation(None, told, time.perf_counter() - started)]
     seconds = (time.perf_counter() - started) / len(batch)
-    expected = (len(batch), *(signals.shape[1:] if shape is None else shape))
-    if signals.shape != expected:
-        raise ValueError(_misshapen(simulate, expected, signals.shape))
     return [Simulation(signal, None, seconds) for signal in signals]
 
 
-def _misshapen(simulate: Simulator, expected: tuple[int, ...], got: tuple[int, ...]) -> str:
+def misshapen(
+    simulate: Simulator, batch: Sequence[Job], shape: tuple[int, ...] | None, error: Unusable
+) -> str:
+    """What is kept of a simulator that returned something else than signals for these jobs."""
+    of_which = f" for {batch[0].theta}, seed {batch[0].seed}" if len(batch) == 1 else ""
     if isinstance(simulate, OneByOne):
-        return (
-            f"with vectorised=False simulate must return the signal of one run, of shape "
-            f"{expected[1:]}, got {got[1:]}"
+        due = "" if shape is None else f", of shape {shape}"
+        # `OneByOne` puts an axis for the one run before the signal's
+        got = error.got if error.shape is None else error.shape[1:]
+        return unusable(
+            f"with vectorised=False simulate must return the signal of one run{due}, got "
+            f"{got}{of_which}"
         )
-    cure = "; if it makes one run at a time, pass vectorised=False" if got == expected[1:] else ""
-    return f"simulate must return signals of shape {expected}, one row per theta, got {got}{cure}"
+    single = error.shape is not None and error.shape == shape
+    cure = "; if it makes one run at a time, pass vectorised=False" if single else ""
+    due = f"({len(batch)}, ...)" if shape is None else (len(batch), *shape)
+    return unusable(
+        f"simulate must return signals of shape {due}, one row per theta, got {error.got}"
+        f"{of_which}{cure}"
+    )
 
 
 def limit_of(simulate: Simulator | SingleSimulator) -> Limit | None:

@@ -10,8 +10,8 @@ from ..arguments import check_timeout, checked_integer
 from ..types import Simulator
 from .bank import Simulation, SimulationBank
 from .executors import killed_its_worker
-from .failures import Failure, kind, raised
-from .job import Job, OneByOne, run_batch
+from .failures import Failure, kind, raised, unusable
+from .job import BATCH, Job, OneByOne, is_unusable, of_one_shape, run_batch
 
 POLL_SECONDS = 0.2  # seconds between looks at what somebody else is simulating
 
@@ -53,17 +53,24 @@ class Runner:
     disk, may have gone, and what was given up after less time than is allowed now. What another
     thread or process is simulating for the same bank is waited for.
 
+    A run for which the simulator returns something else than a signal is a failed one, and is not
+    kept. Where none of the first runs gives a signal, all would fail in the same way: `result`
+    then raises.
+
     Args:
         simulate: The user's simulator.
         keep: Where simulations are made and kept; the caller decides on batches.
+        first: Results, of which one at least must be a signal or another failure.
 
     Raises:
         ValueError: a batch or timeout that is not positive.
     """
 
-    def __init__(self, simulate: Simulator, keep: Keep):
+    def __init__(self, simulate: Simulator, keep: Keep, first: int = BATCH):
         check_keep(keep.batch, keep.timeout)
         self.simulate = simulate
+        self._misshapen_until = first  # results; 0 once another came
+        self._misshapen = 0
         self.bank, self.identity, _, self.executor, self.timeout = keep
         self._elsewhere: list[Order] = []  # claimed by somebody else
         self._mine: dict[Future[Simulation], Job] = {}  # claimed here, by outcome
@@ -90,7 +97,7 @@ class Runner:
         """Results of all jobs, in order, once all are finished.
 
         Raises:
-            ValueError: signals not of this shape.
+            ValueError: none of the first runs gave a signal of this shape.
             RuntimeError: the executor lost a simulation.
         """
         return [self.result(outcome) for outcome in self.start(batch, shape)]
@@ -115,7 +122,19 @@ class Runner:
         while self._elsewhere and not outcome.done():
             wait([outcome], timeout=POLL_SECONDS)
             self._begin()
-        return outcome.result()
+        made = outcome.result()
+        self._check_first(made)
+        return made
+
+    def _check_first(self, made: Simulation) -> None:
+        if not self._misshapen_until:
+            return
+        if not is_unusable(made):
+            self._misshapen_until = 0
+            return
+        self._misshapen += 1
+        if self._misshapen == self._misshapen_until:
+            raise ValueError(str(made.error).removeprefix(unusable("")))
 
     def _begin(self) -> None:
         """Take from the bank or simulate whatever nobody else is simulating."""
@@ -143,11 +162,12 @@ class Runner:
         if found is None or not is_final(found, self.timeout):
             return False
         if found.signal is not None and order.shape not in (None, found.signal.shape):
-            raise ValueError(
+            told = (
                 f"the bank {self.bank.path} holds a signal of shape {found.signal.shape} under "
                 f"identity={self.identity!r}, where {order.shape} is expected; it is another "
                 "simulator's: give each its own identity=, or choose another bank"
             )
+            found = Simulation(None, unusable(told), found.seconds)
         order.outcome.set_result(found)
         return True
 
@@ -185,7 +205,8 @@ class Runner:
             self._fail(order, error)
 
     def _keep(self, order: Order, made: Simulation) -> None:
-        self.bank.put(self.identity, *order.job, made)
+        if not is_unusable(made):  # which the next call tries again, as it does what raised
+            self.bank.put(self.identity, *order.job, made)
         self._release(order.outcome)
         order.outcome.set_result(made)
 
@@ -272,12 +293,16 @@ def run_missing(
         keep: Where simulations are made and kept.
         shape: Of one signal; None accepts any.
         advance: Called with 1 for each result, in order; those of a batch come together.
+
+    Raises:
+        ValueError: the simulator returned something else than signals for all of the first runs.
     """
     at_once = len(jobs) if keep.batch is None or keep.executor is not None else keep.batch
     results = []
-    with Runner(simulate, keep) as runner:
+    first = min(keep.batch or BATCH, len(jobs))
+    with Runner(simulate, keep, first) as runner:
         for start in range(0, len(jobs), max(at_once, 1)):
             for outcome in runner.start(jobs[start : start + at_once], shape):
                 results.append(runner.result(outcome))
                 advance(1)
-    return results
+    return of_one_shape(results, jobs, shape)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import checked_array
 from ..types import Discrepancy
 
 
@@ -87,7 +88,10 @@ def evaluate(
     for i, signal in enumerate(signals):
         if np.isnan(signal).all():
             continue  # the mark of a failed run, on which a user's function may stumble
-        value = np.asarray(discrepancy(observed, signal), np.float64)
+        returned = discrepancy(observed, signal)
+        if returned is None:
+            continue
+        value = checked_array("what discrepancy returns", returned)
         if value.shape != ():
             raise ValueError(f"discrepancy must return one number, got shape {value.shape}")
         values[i] = value if np.isfinite(value) else np.nan

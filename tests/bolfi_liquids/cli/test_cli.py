@@ -142,16 +142,75 @@ def test_bad_cups_are_refused_in_one_line(calibration, tmp_path, old, new, named
     assert named in line
 
 
-def test_resuming_where_no_run_is_says_so(monkeypatch, short_recording, tmp_path):
-    def stop(*_, **__):
-        raise KeyboardInterrupt
+def test_resuming_where_no_run_is_is_refused(short_recording, tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "run.toml").touch()
+    mistyped = tmp_path / "mien"
+    command = ["calibrate", str(short_recording), "--out", str(mistyped), "--resume"]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 2
+    (line,) = result.stderr.strip().splitlines()
+    assert line.startswith(f"error: {mistyped}: holds no run to resume")
+    assert str(tmp_path / "mine") in line
+    assert not mistyped.exists()
 
-    monkeypatch.setattr("bolfi_liquids.calibration.calibrate.calibrate", stop)
-    mistyped = str(tmp_path / "mien")
-    command = ["calibrate", str(short_recording), "--out", mistyped]
-    said = CliRunner().invoke(app, [*command, "--resume"]).stderr
-    assert said.startswith(f"{mistyped}: holds no run to resume: this is a new one")
-    assert "no run to resume" not in CliRunner().invoke(app, command).stderr
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["calibrate", "stir.nc", "--out", ""],
+        ["calibrate", "stir.nc", "--out="],
+        ["record", "--emulator", "--out", ""],
+        ["record", "--emulator", "--calibrate", ""],
+        ["simulate", "stir", "--out", ""],
+        ["simulate", "pour", "--movie="],
+        ["reproduce", "--quick", "--out", ""],
+        ["check", "sbc", "--out", ""],
+        ["check", "physics", "--out", ""],
+        ["demo", "--out", ""],
+        ["import", "stir.csv", "--columns", "columns.toml", "--out", ""],
+        ["import", "--template", ""],
+        ["rig", "template", ""],
+        ["rig", "calibrate-cameras", "--print-board", ""],
+        ["criticise", ""],
+        ["pour", ""],
+        ["report", ""],
+    ],
+)
+def test_a_variable_that_was_not_set_is_no_path(monkeypatch, tmp_path, command):
+    """As a path it would be the current directory."""
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 2
+    (line,) = result.stderr.strip().splitlines()
+    *before, last = command
+    option = last.rstrip("=") or before[-1]
+    named = option if option.startswith("--") else "argument"
+    assert "is empty" in line and named in line
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["calibrate", "{recording}", "--out", "run"],
+        ["check", "sbc", "--out", "run"],
+        ["check", "physics", "--out", "run"],
+        ["simulate", "stir", "--out", "stir.nc"],
+        ["simulate", "pour", "--out", "pour.nc"],
+    ],
+)
+@pytest.mark.parametrize("seed", ["-1", str(2**31)])
+def test_a_seed_out_of_range_is_refused_before_anything_is_written(
+    monkeypatch, short_recording, tmp_path, command, seed
+):
+    monkeypatch.chdir(tmp_path)
+    command = [part.format(recording=short_recording) for part in command]
+    result = CliRunner().invoke(app, [*command, "--seed", seed])
+    assert result.exit_code == 2
+    (line,) = result.stderr.strip().splitlines()
+    assert "seed" in line and seed in line
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_interruption_says_how_to_go_on(monkeypatch, tmp_path):
@@ -166,6 +225,27 @@ def test_interruption_says_how_to_go_on(monkeypatch, tmp_path):
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 130
     assert f"bolfi-liquids calibrate '{recording}' --out {tmp_path} --resume" in result.stderr
+
+
+STOPPED = """
+import os, signal, sys, time
+from bolfi_liquids.calibration import calibrate
+from bolfi_liquids.cli.app import main
+
+def stop_this_process(*_, **__):
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(60.0)
+
+calibrate.calibrate = stop_this_process
+main()
+"""
+
+
+def test_a_command_that_is_terminated_says_how_to_go_on(short_recording, tmp_path):
+    command = ["calibrate", str(short_recording), "--out", str(tmp_path / "run")]
+    done = subprocess.run([sys.executable, "-c", STOPPED, *command], capture_output=True, text=True)
+    assert done.returncode == 130
+    assert f"--out {tmp_path / 'run'} --resume" in done.stderr and "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["guide"], ["guide", "files"]])

@@ -1,5 +1,6 @@
 """Messages that troubleshooting.md quotes are those that people get."""
 
+import errno
 import json
 import re
 import shutil
@@ -132,6 +133,30 @@ def test_refused_commands(told, tmp_path, command):
     if command.endswith("--out runs/stir"):
         (tmp_path / "runs" / "stir" / "rig.json").touch()
     assert re.sub("slow.toml|moved.toml", "rig.toml", told(command)) in QUOTED
+
+
+def test_directories_that_cannot_be_worked_in(told, tmp_path):
+    from bolfi_liquids.run.entering import LOCK, working_in
+
+    assert told("calibrate stir.nc --out=") in QUOTED
+    (tmp_path / "runs" / "mine").mkdir(parents=True)
+    (tmp_path / "runs" / "mine" / "run.toml").touch()
+    assert told("calibrate stir.nc --out runs/mien --resume") in QUOTED
+    with working_in(tmp_path / "runs" / "mine"):
+        who = json.loads((tmp_path / "runs" / "mine" / LOCK).read_text(encoding="utf-8"))
+        said = told("calibrate stir.nc --out runs/mine")
+    sentence = "process {process} on {host} has worked in it since {since}"
+    as_quoted = {"process": 4711, "host": "bench", "since": "2026-01-01T12:00:00+00:00"}
+    assert sentence.format_map(who) in said
+    said = said.replace(sentence.format_map(who), sentence.format_map(as_quoted))
+    assert said in QUOTED
+
+
+def test_a_full_disk():
+    from bolfi_liquids.cli.errors import _explained
+
+    full = OSError(errno.ENOSPC, "", "runs/mine/simulations.sqlite")
+    assert f"error: {_explained(full)}" in QUOTED
 
 
 def test_missing_and_damaged_files(told, tmp_path):

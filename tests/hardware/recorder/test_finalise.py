@@ -1,4 +1,6 @@
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
 import numpy as np
@@ -300,3 +302,22 @@ def test_a_damaged_rig_file_is_refused(tmp_path):
     (tmp_path / "rig.json").write_text('{"rig": ')
     with pytest.raises(RigError, match=r"rig\.json: cannot be used"):
         finalise(tmp_path)
+
+
+def test_of_two_sessions_that_start_together_one_gets_the_directory(tmp_path):
+    together = threading.Barrier(2)
+
+    def start(directory):
+        together.wait(30.0)
+        try:
+            start_directory(directory, RIG, duration=0.0, videos=False)
+        except RigError as err:
+            return str(err)
+        return ""
+
+    with ThreadPoolExecutor(2) as pool:
+        for number in range(20):
+            directory = tmp_path / str(number)
+            told = sorted(pool.map(start, [directory, directory]))
+            assert told[0] == "" and "holds " in told[1], told
+            read_provenance(directory)

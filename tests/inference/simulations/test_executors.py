@@ -232,13 +232,15 @@ def test_another_error_of_an_executor_is_told_as_it_is(worker_side, prior, obser
 def test_after_an_error_the_bank_is_free_for_the_next_call(prior, observed, simulate):
     """What was claimed is released, and what was running is stored, though nobody waits."""
     running, finish = threading.Event(), threading.Event()
+    first = [simulation_seed(0, index) for index in range(3)]
 
     def misshapen(theta, seeds):
-        if int(seeds[0]) != simulation_seed(0, 0):
+        if int(seeds[0]) not in first:
             running.set()
             finish.wait(30.0)
             return simulate(theta, seeds)
-        running.wait(30.0)
+        if int(seeds[0]) == first[-1]:
+            running.wait(30.0)
         return np.zeros(3)
 
     with inference.SimulationBank() as bank:
@@ -246,7 +248,7 @@ def test_after_an_error_the_bank_is_free_for_the_next_call(prior, observed, simu
             with pytest.raises(ValueError, match="signals of shape"):
                 inference.fit(misshapen, prior, observed, bank=bank, **options(pool))
             finish.set()
-        assert 1 <= len(bank) <= 2  # the worker that failed may have begun another
+        assert 1 <= len(bank) <= 2  # the other worker may have begun another
         fit = inference.fit(simulate, prior, observed, budget=5, initial=5, bank=bank)
     assert fit.failures == {}
 

@@ -1,0 +1,169 @@
+"""One command at a time works in a RUN directory."""
+
+import json
+import os
+import platform
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from .directory import RUN_TOML, SIMULATIONS, enter_run, open_bank
+from .recordings import RECORDINGS_FOLDER
+
+try:
+    import fcntl
+except ModuleNotFoundError:  # Windows: there run.toml alone, which is made once, keeps others out
+    fcntl = None
+
+LOCK = "run.lock"
+LOCK_TRIES = 100  # each lost to a command that ended at this very moment
+NAME_SECONDS = 1.0  # that a command may take to write its name into the lock that it holds
+
+
+@contextmanager
+def entered(
+    run: Path, record: Mapping[str, Any], *, resume: bool, growing: str = ""
+) -> Iterator[list[str]]:
+    """Work in a run, new or resumed, alone; see `enter_run` for the arguments.
+
+    A run that begins here and is refused before its first simulation leaves nothing behind.
+
+    Yields:
+        Names of the conclusions that were removed.
+
+    Raises:
+        InputError: Another command works in the directory, or `enter_run` refuses it.
+    """
+    with working_in(run):
+        before = set(_own_files(run))
+        removed = enter_run(run, record, resume=resume, growing=growing)
+        try:
+            yield removed
+        except (ValueError, OSError):
+            if run / RUN_TOML not in before and not _has_simulated(run):
+                _remove(run, set(_own_files(run)) - before)
+            raise
+
+
+@contextmanager
+def working_in(directory: Path) -> Iterator[None]:
+    """Keep other commands out of a directory, which is made if it is missing.
+
+    The lock belongs to the process and ends with it, however it ends. A directory that was made
+    here and is still empty afterwards is removed.
+
+    Raises:
+        InputError: Another command works in it, here or on another computer that shares the disk;
+            or it is no directory.
+    """
+    missing = [one for one in (directory, *directory.parents) if not one.exists()]
+    lock = None
+    try:
+        lock = _locked(directory)
+        yield
+    finally:
+        if lock is not None:
+            with suppress(OSError):
+                (directory / LOCK).unlink()  # while it is held: `_locked` looks whether it is there
+            os.close(lock)
+        for one in missing:
+            with suppress(OSError):
+                one.rmdir()
+
+
+def _locked(directory: Path) -> int | None:
+    """Descriptor of the lock; None where the directory is read-only, for nothing changes there."""
+    path = directory / LOCK
+    for _ in range(LOCK_TRIES):
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+        except (FileExistsError, NotADirectoryError) as err:
+            fix = "choose another --out"
+            raise InputError("not a directory", where=str(directory), fix=fix) from err
+        try:
+            lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        except FileNotFoundError:
+            continue  # whoever made the directory has just removed it
+        except PermissionError:
+            return None
+        try:
+            if _taken(lock, path):
+                return lock
+        except BaseException:
+            os.close(lock)
+            raise
+        os.close(lock)
+    raise InputError("others keep coming and going", where=str(path), fix="repeat the command")
+
+
+def _taken(lock: int, path: Path) -> bool:
+    """Whether the lock is ours now; False if the file was removed meanwhile.
+
+    Raises:
+        InputError: It is another command's.
+    """
+    if fcntl is not None:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise _occupied(path) from None
+        except OSError:
+            pass  # a disk without locks: run.toml, which is made once, keeps others out
+    try:
+        there = os.stat(path)
+    except FileNotFoundError:
+        return False
+    if not os.path.samestat(there, os.fstat(lock)):
+        return False
+    who = {"process": os.getpid(), "host": platform.node() or "an unnamed host"}
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    os.ftruncate(lock, 0)
+    os.pwrite(lock, json.dumps({**who, "since": now}).encode(), 0)
+    return True
+
+
+def _occupied(path: Path) -> InputError:
+    """A refusal that names who works there."""
+    named: dict[str, Any] = {}
+    deadline = time.monotonic() + NAME_SECONDS
+    while not named and time.monotonic() < deadline:
+        with suppress(OSError, ValueError):
+            named = json.loads(path.read_text(encoding="utf-8"))
+        time.sleep(0.01)
+    who = "another process works in it"
+    if named:
+        who = "process {process} on {host} has worked in it since {since}".format_map(named)
+    return InputError(
+        who,
+        where=str(path.parent),
+        fix="wait until it has ended, or choose another directory; where it was stopped, go on "
+        "from there with --resume",
+    )
+
+
+def _own_files(run: Path) -> list[Path]:
+    """What a run has before its first result."""
+    own = (RUN_TOML, f"{SIMULATIONS}*", f"{RECORDINGS_FOLDER}/*")
+    return [path for pattern in own for path in run.glob(pattern)]
+
+
+def _has_simulated(run: Path) -> bool:
+    if not (run / SIMULATIONS).exists():
+        return False
+    try:
+        with open_bank(run) as bank:
+            return len(bank) > 0
+    except (ValueError, OSError):
+        return True  # what cannot be read is left alone
+
+
+def _remove(run: Path, made: set[Path]) -> None:
+    for path in made:
+        with suppress(OSError):
+            path.unlink()
+    with suppress(OSError):  # it holds what is not ours
+        (run / RECORDINGS_FOLDER).rmdir()

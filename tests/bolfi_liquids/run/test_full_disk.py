@@ -1,0 +1,144 @@
+"""A disk on which nothing more can be written costs nothing that was simulated, and is said.
+
+A limit on the size of files (EFBIG) stands for a full disk: it needs no right to mount one.
+"""
+
+import errno
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import bolfi_liquids as bl
+from bolfi_liquids import inference
+from bolfi_liquids.cli.errors import _explained
+from bolfi_liquids.files import disk_errno
+
+LIMITED = """
+import resource, sys
+from pathlib import Path
+import numpy as np
+
+def limit(size):
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
+
+folder = Path(sys.argv[1])
+"""
+WRITES = {
+    "summary.json": """
+from bolfi_liquids.run.summary import write_section
+limit(1000)
+write_section(folder, "calibrate", {"numbers": list(range(1000))})
+""",
+    "run.toml": """
+from bolfi_liquids.run.directory import enter_run
+limit(1000)
+enter_run(folder, {"settings": {"names": [str(n) for n in range(1000)]}}, resume=False)
+""",
+    "posterior.nc": """
+from xarray import DataTree, Dataset
+from bolfi_liquids.calibration.posterior_file import write_tree
+draws = np.random.default_rng(0).random(99999)
+tree = DataTree.from_dict({"/posterior": Dataset({"x": ("t", draws)})})
+limit(20000)
+write_tree(tree, folder / "posterior.nc")
+""",
+    "figure.png": """
+from bolfi_liquids.drawing import new_figure, write_figure
+figure = new_figure(4.0, 3.0)
+figure.subplots().plot(np.random.default_rng(0).random(999))
+limit(1000)
+write_figure(figure, folder, "figure")
+""",
+    "simulations.sqlite": """
+from bolfi_liquids.inference.simulations import Simulation
+from bolfi_liquids.run.directory import open_bank
+with open_bank(folder) as bank:
+    bank.put("stir", {}, 0, Simulation(np.zeros(9), None, 1.0))
+    limit(200_000)
+    for seed in range(1, 100):
+        bank.put("stir", {}, seed, Simulation(np.zeros(9999), None, 1.0))
+""",
+    "kept.sqlite": """
+from bolfi_liquids.inference.checks.one_replicate import Replicate
+from bolfi_liquids.inference.checks.store import ReplicateStore
+data = np.random.default_rng(0).random(9999)
+with ReplicateStore(folder / "kept.sqlite", {"a": "b"}) as store:
+    limit(200_000)
+    for n in range(99):
+        store.put(Replicate(n, data[:1], data, data[:, None], None, 1.0, 1.0, None))
+""",
+}
+TELL = """
+try:
+    exec(compile(sys.argv[2], "writes", "exec"))
+except OSError as err:
+    from bolfi_liquids.cli.errors import _explained
+    print(err.filename)
+    print(_explained(err))
+    raise SystemExit(3) from None
+"""
+
+
+@pytest.mark.parametrize("name", WRITES)
+def test_what_cannot_be_written_whole_is_named_and_left_out(tmp_path, name):
+    command = [sys.executable, "-c", LIMITED + TELL, str(tmp_path), WRITES[name]]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 3, done.stdout + done.stderr
+    file, line = done.stdout.splitlines()
+    assert file == str(tmp_path / name)
+    assert line.startswith(f"{tmp_path / name}: ")
+    assert (
+        "make room" in line and "--resume" in line and "nothing that was simulated is lost" in line
+    )
+    left = {path.name for path in tmp_path.iterdir()}
+    if name.endswith(".sqlite"):
+        assert {name} <= left  # with all that was stored before
+    else:
+        assert left == set()
+    if name == "simulations.sqlite":
+        with inference.SimulationBank(tmp_path / name) as bank:
+            assert len(bank) >= 1
+            assert bank.get("stir", {}, 0).signal.tolist() == [0.0] * 9
+            bank.put("stir", {}, 999, inference.simulations.Simulation(np.ones(1), None, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("number", "cure"),
+    [
+        (errno.ENOSPC, "make room"),
+        (errno.EDQUOT, "make room"),
+        (errno.EFBIG, "make room"),
+        (errno.EROFS, "make it writable"),
+    ],
+)
+def test_every_way_in_which_a_disk_refuses_has_its_cure(number, cure):
+    line = _explained(OSError(number, "refused", "runs/mine/report.html"))
+    assert line.startswith("runs/mine/report.html: ") and cure in line
+    assert "nothing that was simulated is lost" in line
+    assert disk_errno(FileNotFoundError(errno.ENOENT, "no")) is None
+
+
+CALIBRATE = """
+import resource
+resource.setrlimit(resource.RLIMIT_FSIZE, (35_000, resource.RLIM_INFINITY))
+from bolfi_liquids.cli.app import main
+main()
+"""
+
+
+@pytest.mark.slow
+def test_a_calibration_goes_on_once_there_is_room(short_recording, settings, calibration, tmp_path):
+    run = tmp_path / "run"
+    options = [part for name, value in settings.items() for part in (f"--{name}", str(value))]
+    command = ["calibrate", str(short_recording), "--out", str(run), *options]
+    done = subprocess.run(
+        [sys.executable, "-c", CALIBRATE, *command], capture_output=True, text=True
+    )
+    assert done.returncode == 2, done.stderr
+    *_, line = done.stderr.strip().splitlines()
+    assert line.startswith(f"error: {run}") and "make room" in line and "--resume" in line
+    again = bl.calibrate(short_recording, out=run, resume=True, progress=False, **settings)
+    for name, draws in calibration.posterior.items():
+        np.testing.assert_array_equal(again.posterior[name], draws)

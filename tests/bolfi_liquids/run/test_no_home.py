@@ -1,0 +1,79 @@
+"""Commands and imports work without a home directory, as in a container."""
+
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+UNKNOWN_USER = "54321"  # without an entry in passwd
+AS_UNKNOWN = ["unshare", "--user", f"--map-user={UNKNOWN_USER}", f"--map-group={UNKNOWN_USER}"]
+
+
+def others_can_be_played():
+    if shutil.which("unshare") is None:
+        return False
+    return subprocess.run([*AS_UNKNOWN, "true"], capture_output=True).returncode == 0
+
+
+as_unknown = pytest.mark.skipif(not others_can_be_played(), reason="needs user namespaces")
+HOMES = {
+    "none": lambda folder: {},
+    "empty": lambda folder: {"HOME": ""},
+    "a file": lambda folder: {"HOME": str(folder / "file")},
+    "not writable": lambda folder: {"HOME": "/proc"},
+    "relative": lambda folder: {"HOME": "elsewhere"},
+}
+
+
+def without_home(home, folder, code, *arguments):
+    """What a process says whose user has no home; it may write in `folder` alone."""
+    (folder / "file").touch()
+    environment = {"PATH": os.environ["PATH"], "TMPDIR": str(folder)}
+    return subprocess.run(
+        [*AS_UNKNOWN, sys.executable, "-c", code, *arguments],
+        env=environment | HOMES[home](folder),
+        cwd=folder,
+        capture_output=True,
+        text=True,
+    )
+
+
+DRAW = """
+from pathlib import Path
+import arviz_stats
+from bolfi_liquids.drawing import new_figure, write_figure
+
+figure = new_figure(4.0, 3.0)
+figure.subplots().plot([1.0, 2.0])
+write_figure(figure, Path(), "drawn")
+"""
+COMMAND = """
+from bolfi_liquids.cli.app import main
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    "home", ["none", *(pytest.param(home, marks=pytest.mark.slow) for home in [*HOMES][1:])]
+)
+@as_unknown
+def test_libraries_load_and_draw(tmp_path, home):
+    code = "import bolfi_liquids\n" + DRAW
+    done = without_home(home, tmp_path, code)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == "" and (tmp_path / "drawn.png").exists()
+    left = {path.name for path in tmp_path.iterdir()}
+    assert not left & {"~", "elsewhere", ".cache"}  # no home is made up beside what was asked for
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("home", ["none", "not writable"])
+@as_unknown
+def test_a_command_simulates(tmp_path, home):
+    """Taichi, which compiles the fluid, would abort or end by a signal."""
+    stir = ["simulate", "stir", "--particles", "100", "--out", "stir.nc"]
+    done = without_home(home, tmp_path, COMMAND, *stir)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == "" and (tmp_path / "stir.nc").exists()

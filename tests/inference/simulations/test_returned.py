@@ -1,0 +1,349 @@
+"""What a simulator returns: converted, or refused as the one run that it is, wherever it ran."""
+
+import importlib
+import json
+import multiprocessing
+import random
+import sys
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
+from decimal import Decimal
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from bolfi_liquids.inference.arguments import Unusable, checked_integer, float64
+from bolfi_liquids.inference.simulations import Job, Keep, OneByOne, Simulation, jobs, run_missing
+from bolfi_liquids.inference.simulations.failures import Failure, kind
+from distributed import LocalCluster
+
+from bolfi_liquids import inference
+
+MASKED = np.ma.masked_array([1.0, 1e36], [False, True])
+
+NUMBERS = {
+    "integers": (np.array([1, 2], np.int16), [1.0, 2.0]),
+    "booleans": ([True, False], [1.0, 0.0]),
+    "half": (np.array([0.5, 2.0], np.float16), [0.5, 2.0]),
+    "objects": (np.array([1, Decimal("2.5")], object), [1.0, 2.5]),
+    "a missing object": (np.array([1.0, None], object), [1.0, np.nan]),
+    "masked": (MASKED, [1.0, np.nan]),
+    "masked integers": (np.ma.masked_array([1, 7], [False, True]), [1.0, np.nan]),
+    "a list of masked rows": ([MASKED, MASKED], [[1.0, np.nan]] * 2),
+    "the constant": ([1.0, np.ma.masked], [1.0, np.nan]),
+    "labelled": (xr.DataArray([1.0, 2.0], dims="time"), [1.0, 2.0]),
+    "a table": (pd.DataFrame({"x": [1, 2], "y": [3, 4]}), [[1.0, 3.0], [2.0, 4.0]]),
+    "a row of lists": ([[1, 2], [3, 4]], [[1.0, 2.0], [3.0, 4.0]]),
+    "too large": ([1, 10**400], [1.0, np.inf]),
+    "too large for float64": (np.array([1, "1e4000"], np.longdouble), [1.0, np.inf]),
+}
+
+
+@pytest.mark.filterwarnings("ignore:Warning. converting a masked element")  # NumPy says so
+@pytest.mark.parametrize("case", NUMBERS)
+def test_numbers_of_any_kind_become_float64(case):
+    given, due = NUMBERS[case]
+    with np.errstate(all="raise"):  # as a user may have it
+        found = float64(given)
+    assert found.dtype == np.float64 and type(found) is np.ndarray
+    np.testing.assert_array_equal(found, np.array(due))
+
+
+OTHERS = {
+    "nothing": None,
+    "complex": np.array([1.0 + 0.0j, 2.0]),
+    "complex objects": np.array([1.0, np.complex64(2.0)], object),
+    "text": np.array(["1", "2"]),
+    "a word": "done",
+    "text among objects": np.array(["1", 2.0], object),
+    "dates": np.array(["2026-01-01"], "datetime64[s]"),
+    "records": np.zeros(2, [("x", float)]),
+    "ragged": [[1.0, 2.0], [1.0]],
+    "a mapping": {"x": [1.0, 2.0]},
+    "a set": {1.0, 2.0},
+    "a generator": (value for value in (1.0, 2.0)),
+    "rows of objects": np.array([np.zeros(2), np.zeros(1)], object),
+}
+
+
+@pytest.mark.parametrize("case", OTHERS)
+def test_what_would_lose_or_invent_something_is_refused(case):
+    with pytest.raises(Unusable):
+        float64(OTHERS[case])
+
+
+WORKER_SIDE = """
+import random
+import numpy as np
+
+def signal(theta, seed):
+    return theta["a"] * np.arange(5.0) + seed
+
+SPOILT = {
+    "shorter": lambda good: good[:4],
+    "longer": lambda good: np.append(good, 0.0),
+    "with another axis": lambda good: good[None, :, None],
+    "nothing": lambda good: None,
+    "a mapping": lambda good: {"signal": good},
+    "text": lambda good: [str(value) for value in good],
+    "complex": lambda good: good + 0j,
+    "ragged": lambda good: [[1.0, 2.0], [1.0]],
+    "one number": lambda good: 1.0,
+}
+
+class One:
+    '''Of single runs; that of one seed is spoilt.'''
+    def __init__(self, how, seed):
+        self.how, self.seed = how, seed
+
+    def __call__(self, theta, seed):
+        random.seed(seed)  # which takes no integer of NumPy's
+        good = signal(theta, seed)
+        return SPOILT[self.how](good) if seed == self.seed else good.tolist()
+
+class Many(One):
+    def __call__(self, theta, seeds):
+        rows = [One.__call__(self, {"a": a}, int(s)) for a, s in zip(theta["a"], seeds)]
+        return rows
+"""
+
+
+@pytest.fixture
+def worker_side(tmp_path, monkeypatch):
+    """A module that spawned workers find, for they are given this process's path."""
+    (tmp_path / "worker_side.py").write_text(WORKER_SIDE)
+    monkeypatch.syspath_prepend(tmp_path)
+    yield importlib.import_module("worker_side")
+    sys.modules.pop("worker_side")
+
+
+@contextmanager
+def nowhere_else():
+    yield None
+
+
+@contextmanager
+def threads():
+    with ThreadPoolExecutor(2) as pool:
+        yield pool
+
+
+@contextmanager
+def processes():
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+        yield pool
+
+
+@contextmanager
+def dask():
+    local = {"processes": False, "n_workers": 1, "threads_per_worker": 2, "protocol": "tcp://"}
+    with LocalCluster(**local, dashboard_address=None) as cluster, cluster.get_client() as client:
+        yield client.get_executor(pure=False)
+
+
+PLACES = [
+    nowhere_else,
+    threads,
+    pytest.param(processes, marks=pytest.mark.slow),
+    pytest.param(dask, marks=pytest.mark.slow),
+]
+HOW = [
+    *("shorter", "longer", "with another axis", "nothing", "a mapping", "text", "complex"),
+    *("ragged", "one number"),
+]
+SPOILT_SEED = 12
+JOBS = jobs({"a": np.arange(8.0)}, np.arange(10, 18))
+
+
+@pytest.mark.parametrize("shape", [(5,), None])
+@pytest.mark.parametrize("single", [True, False], ids=["one by one", "in batches"])
+@pytest.mark.parametrize("place", PLACES)
+def test_a_run_without_a_signal_costs_itself_alone(worker_side, place, single, shape):
+    with place() as executor:
+        for how in HOW:
+            made = OneByOne(worker_side.One(how, SPOILT_SEED)) if single else None
+            simulate = made or worker_side.Many(how, SPOILT_SEED)
+            with inference.SimulationBank() as bank:
+                found = run_missing(simulate, JOBS, Keep(bank, "", 4, executor), shape)
+                kept = bank.get("", JOBS[2].theta, SPOILT_SEED)
+            for job, one in zip(JOBS, found, strict=True):
+                if job.seed != SPOILT_SEED:
+                    assert one.error is None, how
+                    np.testing.assert_array_equal(
+                        one.signal, worker_side.signal(job.theta, job.seed)
+                    )
+                    continue
+                assert one.signal is None and one.error is not None, how
+                assert kind(one.error) is Failure.UNUSABLE
+                assert str(job.theta["a"]) in one.error and str(SPOILT_SEED) in one.error
+                assert "(4,)" in one.error or "(1, 4)" in one.error or how != "shorter"
+            if shape is not None:
+                assert kept is None  # the next call tries it again
+
+
+def test_a_fit_ends_only_if_none_of_the_first_runs_gives_a_signal(prior, observed, simulate):
+    """Without a cure it would end at each repetition, and with a bank at the same run."""
+
+    def spoilt(*places):
+        def one(theta, seed):
+            made.append(seed)
+            signal = simulate({k: np.array([v]) for k, v in theta.items()}, [seed])[0]
+            return signal[:29] if len(made) - 1 in places else signal
+
+        made = []
+        return one
+
+    options = {"budget": 9, "batch": 3, "vectorised": False}
+    fit = inference.fit(spoilt(0, 1, 7), prior, observed, **options)
+    assert fit.failures == {"unusable": 3}
+    failed = np.flatnonzero(fit.simulations["failed"].to_numpy())
+    assert failed.tolist() == [0, 1, 7]
+    for row in failed:
+        told = str(fit.simulations["error"][row].item())
+        assert "(30,)" in told and "(29,)" in told
+        assert str(int(fit.simulations["seed"][row])) in told
+    later = inference.fit(spoilt(6, 7, 8), prior, observed, **options)
+    assert later.failures == {"unusable": 3}
+    with pytest.raises(ValueError, match=r"of shape \(30,\), got \(29,\)"):
+        inference.fit(spoilt(0, 1, 2), prior, observed, **options)
+
+
+def test_a_masked_value_is_a_missing_one(prior, observed, simulate):
+    """The value behind a mask is not learned from."""
+
+    def masked(theta, seeds):
+        signals = np.ma.masked_array(simulate(theta, seeds))
+        signals[seeds == hidden, 3] = np.ma.masked
+        return signals
+
+    hidden = int(inference.fit(simulate, prior, observed, budget=7).history.seeds[2])
+    fit = inference.fit(masked, prior, observed, budget=7)
+    assert fit.failures == {"not finite": 1}
+    assert np.isnan(fit.history.signals[2, 3]) and fit.history.seeds[2] == hidden
+
+
+def test_a_simulator_may_fill_the_same_array_again(prior, observed, simulate):
+    """With several in flight, signals are told after others were made."""
+    buffer = np.empty((1, 30))
+
+    def thrifty(theta, seeds):
+        buffer[:] = simulate(theta, seeds)
+        return buffer
+
+    options = {"budget": 7, "batch": 3, "in_rounds": False}
+    reused = inference.fit(thrifty, prior, observed, **options)
+    fresh = inference.fit(simulate, prior, observed, **options)
+    np.testing.assert_array_equal(reused.history.signals, fresh.history.signals)
+
+
+def test_another_simulator_s_signal_in_the_bank_costs_itself_alone():
+    with inference.SimulationBank() as bank:
+        bank.put("", JOBS[3].theta, JOBS[3].seed, Simulation(np.zeros(9), None, 0.0))
+        found = run_missing(
+            lambda theta, seeds: np.zeros((len(seeds), 5)), JOBS, Keep(bank, "", 4), (5,)
+        )
+    assert [one.signal is None for one in found] == [False] * 3 + [True] + [False] * 4
+    assert "(9,)" in str(found[3].error)
+
+
+@pytest.mark.parametrize("place", [nowhere_else, threads])
+def test_a_simulator_of_single_runs_gets_python_s_own_numbers(place):
+    got = []
+
+    def simulate(theta, seed):
+        random.seed(seed)
+        json.dumps({"seed": seed, **theta})
+        got.append(type(seed))
+        return [random.random()]
+
+    with place() as executor, inference.SimulationBank() as bank:
+        run_missing(OneByOne(simulate), JOBS, Keep(bank, "", 4, executor), (1,))
+    assert got == [int] * len(JOBS)
+
+
+@pytest.mark.parametrize("seed", [np.int64(7), np.uint8(7), np.array(7), 7])
+def test_seeds_of_every_integer_type_are_taken(prior, observed, seed):
+    assert type(inference.Bolfi(prior, observed, seed=seed).seed) is int
+    assert jobs({}, [seed]) == [Job({}, 7)] and type(jobs({}, [seed])[0].seed) is int
+
+
+@pytest.mark.parametrize(
+    "seed", [2**31, 2**80, -1, np.uint64(2**63), 1.0, np.float64(3), True, "7", None, [7, 8]]
+)
+def test_other_seeds_are_refused_before_anything_is_simulated(prior, observed, seed):
+    def simulate(theta, seeds):
+        raise AssertionError("it was called")
+
+    with pytest.raises(ValueError, match="seed must be an integer from 0 to 2147483647"):
+        inference.fit(simulate, prior, observed, seed=seed)
+    with pytest.raises(ValueError, match="seed must be an integer from 0"):
+        jobs({}, [seed])
+    with pytest.raises(ValueError, match="seed must be an integer from 0"):
+        checked_integer("seed", seed, 0)
+
+
+def test_a_bad_signal_among_those_that_are_told_is_a_failed_run(prior, observed, simulate):
+    engine = inference.Bolfi(prior, observed)
+    theta = engine.ask(6)
+    good = list(simulate(theta, range(6)))
+    engine.tell(theta, [good[0], None, good[2][:29], good[3] + 0j, good[4], "diverged"])
+    assert engine.told == 6 and engine.succeeded == 2
+    assert [kind(error) for error in engine.errors] == [Failure.UNUSABLE] * 4
+    with pytest.raises(ValueError, match=r"signals must have shape \(6, 30\)|array of numbers"):
+        engine.tell(theta, [row[:29] for row in good])
+    assert engine.told == 6
+
+
+def test_a_discrepancy_that_is_no_real_number_is_refused(prior, observed, simulate):
+    with pytest.raises(ValueError, match="what discrepancy returns must be an array of numbers"):
+        inference.fit(
+            simulate, prior, observed, budget=7, discrepancy=lambda a, b: np.sum((a - b) ** 2) + 0j
+        )
+
+
+def draws_of_prior(observed, seed):
+    rng = np.random.default_rng(seed)
+    return {"slope": rng.uniform(-1.0, 1.0, 31), "offset": rng.random(31)}
+
+
+def test_a_replicate_whose_data_are_none_costs_itself_alone(tmp_path, prior, simulate):
+    calls = []
+
+    def spoilt(theta, seeds):
+        calls.append(seeds)
+        return None if len(calls) in (1, 3) else simulate(theta, seeds)
+
+    options = {"draws": 15, "independent": True, "progress": False}
+    made = inference.replicates(draws_of_prior, spoilt, prior, 6, **options)
+    assert [one.number for one in made.failed] == [0, 2] and len(made.finished) == 4
+    assert all(str(int(calls[one.number][0])) in str(one.error) for one in made.failed)
+    options["store"] = tmp_path / "kept.sqlite"
+    licence = tmp_path / "licence"
+
+    def licensed(theta, seeds):
+        return simulate(theta, seeds) if licence.exists() else None
+
+    with pytest.raises(ValueError, match="got None"):
+        inference.replicates(draws_of_prior, licensed, prior, 6, **options)
+    licence.touch()
+    mended = inference.replicates(draws_of_prior, licensed, prior, 6, **options)
+    assert not mended.failed  # what failed in this way was not kept
+
+
+def test_observations_of_replicates_are_numbers_by_the_same_rules(prior, simulate):
+    def observe(signal, rng):
+        made.append(signal)
+        return signal + 0j if len(made) in broken else np.ma.masked_less(signal, signal.mean())
+
+    made, broken, options = [], {2}, {"draws": 15, "independent": True, "progress": False}
+    found = inference.replicates(draws_of_prior, simulate, prior, 4, observe=observe, **options)
+    assert [one.number for one in found.failed] == [1]
+    assert "complex" in str(found.failed[0].error)
+    for one in found.finished:
+        signal = made[one.number]
+        np.testing.assert_array_equal(np.isnan(one.observed), signal < signal.mean())
+    made.clear()
+    broken |= {1, 3, 4}
+    with pytest.raises(ValueError, match="complex"):
+        inference.replicates(draws_of_prior, simulate, prior, 4, observe=observe, **options)
