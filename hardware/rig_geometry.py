@@ -57,7 +57,7 @@ def _check_source_cup(rig: Rig, space: Workspace, where: str) -> None:
             fix="correct it or the turn in robot.pouring_tcp: the cup is held from a side",
         )
     heading = np.radians(rig.pouring.heading_deg)
-    lip = flange @ space.tcp[:3]
+    lip = flange[:, :2] @ space.tcp[:2]  # from the axis, wherever along it the cup is held
     ahead = float(lip @ (np.cos(heading), np.sin(heading), 0.0))
     for value, side in ((float(lip[2]), "above"), (ahead, "on the receiver's side of")):
         if value < LIP_AWAY:

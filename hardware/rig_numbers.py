@@ -9,7 +9,7 @@ MAX_LENGTH = 3.0  # [m]; more looks like millimetres
 MAX_MASS = 30.0  # [kg]; more looks like grams
 
 
-class Section(BaseModel, frozen=True, extra="forbid"):
+class Section(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Part of a file that a person writes: no unknown fields, no change after reading."""
 
 

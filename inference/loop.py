@@ -162,7 +162,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         workers = stack.enter_context(open_executor(executor))
         simulator: Any = simulate if vectorised else OneByOne(cast(SingleSimulator, simulate))
         keep = Keep(bank, identity, batch, workers, timeout)
-        runner = stack.enter_context(Runner(simulator, keep, first=min(batch, budget)))
+        runner = stack.enter_context(Runner(simulator, keep))
         schedule = _in_rounds if in_rounds else _in_flight
         finished = schedule(engine, runner, budget, batch)
         seconds = 0.0

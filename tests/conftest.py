@@ -58,6 +58,12 @@ def _simulates(item):
 
 
 @pytest.fixture
+def importable(monkeypatch):
+    """Started processes find the modules of tests, however pytest was started."""
+    monkeypatch.syspath_prepend(Path(__file__).parents[1])
+
+
+@pytest.fixture
 def poured_run(tmp_path):
     """A run that has chosen a pour: a small one of version 0.1, without its criticism."""
     with tarfile.open(Path(__file__).parent / "data" / "run_0_1.tar.xz") as archive:

@@ -170,8 +170,8 @@ def pour(
     if execution.execute:
         if options != PourOptions():
             raise typer.BadParameter(
-                "--execute carries out the pour that RUN has chosen already; --cups, --iterations "
-                "and --risk belong to the choice, which is made without --execute"
+                "--execute carries out the pour that RUN has chosen already; --cups, --iterations, "
+                "--risk and --force belong to the choice, which is made without --execute"
             )
         cli_record.execute(run, execution.rig, arm=execution.arm, emulator=execution.emulator)
         return

@@ -172,7 +172,8 @@ def execute(run: Path, rig: Path | None, *, arm: bool, emulator: bool) -> None:
     if not (arm or emulator):
         _dry_pour(run, opened)
         return
-    done = execute_pour(run, opened, ask=typed_sentence if arm else None, emulate=emulator)
+    with aborted_is_told():
+        done = execute_pour(run, opened, ask=typed_sentence if arm else None, emulate=emulator)
     typer.echo(f"poured; what the arm did is in {done}")
 
 

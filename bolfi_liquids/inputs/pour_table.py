@@ -164,10 +164,11 @@ def _check_liquid_named(table: Table) -> None:
     """Refuse a table whose column of liquids would be taken for a remark."""
     if table.has(LIQUID):
         return
+    known = {*ACTIONS, *AMOUNTS}
     strange = {
         name.casefold(): name
-        for name in table.others((*ACTIONS, *AMOUNTS))
-        if not all(map(is_number, filter(None, table.column(name))))
+        for name, cells in zip(table.header, table.cells.T, strict=True)
+        if name in table.others(known) and not all(map(is_number, filter(None, cells)))
     }
     near = [name for name in strange if LIQUID in name]
     near += get_close_matches(LIQUID, strange, n=1, cutoff=0.7)

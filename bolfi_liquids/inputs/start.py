@@ -55,6 +55,8 @@ def first_rest(recording: Recording) -> float | None:
     Returns:
         On the recording's clock; None where there is no such time.
     """
+    if np.isfinite(recording.gripper.position).all(axis=1).sum() < 2:
+        return None
     usual = _usual(recording)
     for first in _candidates(recording, *usual[:2]):
         if _rests(recording, first) and _fault(recording, first, *usual) is None:

@@ -102,14 +102,14 @@ def execute_pour(
         MotionRejected: The motion breaks one of the rig's limits.
         SessionStopped: The arm was stopped.
     """
-    from ..hardware import SessionStopped, emulated
+    from ..hardware import SessionInterrupted, emulated
     from ..hardware.motion import approach_pour
 
     check_one(ask, emulate, "execute_pour")
-    if isinstance(run, Pour):
-        run.check_current()
-    run, rig = run_path(run), rig_of(rig)
+    given, run, rig = run, run_path(run), rig_of(rig)
     plan = plan_pour(run, rig)
+    if isinstance(given, Pour):
+        given.check_current()  # after the plan was read, so that nothing came between
     if ask is not None:
         plan.chosen.check_fresh()
     for sentence in plan.chosen.stale:
@@ -127,7 +127,7 @@ def execute_pour(
             session.follow(approach_pour(rig, session.pose(), **plan.place))
             view.until_done(session, session.follow(plan.path))
     except KeyboardInterrupt:
-        raise SessionStopped(f"interrupted, the arm was stopped; look at {task.out}") from None
+        raise SessionInterrupted(f"interrupted, the arm was stopped; look at {task.out}") from None
     return task.out
 
 

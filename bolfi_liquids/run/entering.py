@@ -1,5 +1,6 @@
-"""One command at a time works in a RUN directory."""
+"""One command at a time enters a RUN directory."""
 
+import errno
 import json
 import os
 import platform
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..files import disk_errno
 from .directory import RUN_TOML, SIMULATIONS, enter_run, open_bank
 from .recordings import RECORDINGS_FOLDER
 
@@ -21,7 +23,7 @@ except ModuleNotFoundError:  # Windows: there run.toml alone, which is made once
 
 LOCK = "run.lock"
 LOCK_TRIES = 100  # each lost to a command that ended at this very moment
-NAME_SECONDS = 1.0  # that a command may take to write its name into the lock that it holds
+NAME_SECONDS = 5.0  # that a command may take to write its name into the lock that it holds
 
 
 @contextmanager
@@ -43,8 +45,9 @@ def entered(
         removed = enter_run(run, record, resume=resume, growing=growing)
         try:
             yield removed
-        except (ValueError, OSError):
-            if run / RUN_TOML not in before and not _has_simulated(run):
+        except (ValueError, OSError) as err:
+            # where the disk is full the same run goes on later, with --resume
+            if disk_errno(err) is None and run / RUN_TOML not in before and not _has_simulated(run):
                 _remove(run, set(_own_files(run)) - before)
             raise
 
@@ -88,7 +91,9 @@ def _locked(directory: Path) -> int | None:
             lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         except FileNotFoundError:
             continue  # whoever made the directory has just removed it
-        except PermissionError:
+        except OSError as err:
+            if not isinstance(err, PermissionError) and err.errno != errno.EROFS:
+                raise
             return None
         try:
             if _taken(lock, path):

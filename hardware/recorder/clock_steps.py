@@ -17,6 +17,7 @@ from .stir import Span, stirred, view_clock, way_near
 STRETCH = 4.0  # s of the camera's clock; shorter ones hold too few frames
 MAX_STEP = 0.03  # s between two stretches: one frame; drifts take hours for it
 MAX_STEP_ERRORS = 6.0  # standard errors by which a step must differ from none
+MIN_UNEVENNESS = 0.25  # of a marker's motion that no uniform one explains: only that tells a time
 
 
 def without_steps(raw: Raw, where: str) -> Raw:
@@ -69,7 +70,7 @@ def _first_step(raw: Raw, view: View, span: Span) -> tuple[float, float] | None:
         between = 0.5 * (one.reference + other.reference)
         size = float(one.to_robot(between) - other.to_robot(between))
         error = float(np.hypot(one.offset_error, other.offset_error))
-        if abs(size) > max(MAX_STEP, MAX_STEP_ERRORS * error):
+        if np.isfinite(error) and abs(size) > max(MAX_STEP, MAX_STEP_ERRORS * error):
             return float(start), size
     return None
 
@@ -80,9 +81,26 @@ def _part(series: FrameSeries, start: float) -> FrameSeries:
     return FrameSeries(series.stamp[kept], series.marker[kept], lines, series.flags[kept])
 
 
+def unevenness(stamp: np.ndarray, marker: np.ndarray) -> float:
+    """Share of a motion that a uniform one does not explain; 0 where there is none.
+
+    Args:
+        stamp: Times [s], shape (F,).
+        marker: Places [px], shape (F, 2); NaN where the marker is hidden.
+    """
+    seen = np.isfinite(marker).all(axis=1)
+    if seen.sum() < 3:
+        return 0.0
+    time = np.stack([np.ones(seen.sum()), stamp[seen] - stamp[seen].mean()], axis=1)
+    left = marker[seen] - time @ np.linalg.lstsq(time, marker[seen], rcond=None)[0]
+    spread = float(marker[seen].std(axis=0).max())
+    return float(left.std(axis=0).max()) / spread if spread > 0.0 else 0.0
+
+
 def _clock_in(raw: Raw, view: View, part: FrameSeries, whole: Clock) -> Clock | None:
-    """The clock of a stretch; None where the gripper rests, or the marker is hidden."""
-    if len(part.stamp) == 0:
+    """The clock of a stretch; None where the gripper rests or keeps its velocity, or the marker is
+    hidden."""
+    if unevenness(part.stamp, part.marker) < MIN_UNEVENNESS:
         return None
     middle = float(part.stamp.mean())
     guess = float(whole.to_robot(np.array(middle))) - middle

@@ -105,7 +105,7 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
         advance = stack.enter_context(progress_bar("replicates", n, shown=progress, done=len(done)))
         missing = [number for number in range(n) if number not in done]
         with closing(_run(plan, missing, truths, workers)) as made:
-            for replicate in _unless_all_are_misshapen(made, min(BATCH, len(missing))):
+            for replicate in _unless_all_are_misshapen(made, BATCH):
                 kept.put(replicate)
                 done[replicate.number] = replicate
                 advance(1)

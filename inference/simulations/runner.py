@@ -60,16 +60,15 @@ class Runner:
     Args:
         simulate: The user's simulator.
         keep: Where simulations are made and kept; the caller decides on batches.
-        first: Results, of which one at least must be a signal or another failure.
 
     Raises:
         ValueError: a batch or timeout that is not positive.
     """
 
-    def __init__(self, simulate: Simulator, keep: Keep, first: int = BATCH):
+    def __init__(self, simulate: Simulator, keep: Keep):
         check_keep(keep.batch, keep.timeout)
         self.simulate = simulate
-        self._misshapen_until = first  # results; 0 once another came
+        self._misshapen_until = BATCH  # results, whatever the batch; 0 once another came
         self._misshapen = 0
         self.bank, self.identity, _, self.executor, self.timeout = keep
         self._elsewhere: list[Order] = []  # claimed by somebody else
@@ -299,8 +298,7 @@ def run_missing(
     """
     at_once = len(jobs) if keep.batch is None or keep.executor is not None else keep.batch
     results = []
-    first = min(keep.batch or BATCH, len(jobs))
-    with Runner(simulate, keep, first) as runner:
+    with Runner(simulate, keep) as runner:
         for start in range(0, len(jobs), max(at_once, 1)):
             for outcome in runner.start(jobs[start : start + at_once], shape):
                 results.append(runner.result(outcome))

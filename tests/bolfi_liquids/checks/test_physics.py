@@ -11,7 +11,6 @@ import xml.etree.ElementTree as ET
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -148,12 +147,6 @@ def off(progress, seed):
 
 def dies(progress, seed):
     os._exit(1)
-
-
-@pytest.fixture
-def importable(monkeypatch):
-    """Started processes find this module, however pytest was started."""
-    monkeypatch.syspath_prepend(Path(__file__).parents[3])
 
 
 @pytest.mark.usefixtures("importable")

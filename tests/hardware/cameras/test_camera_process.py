@@ -247,6 +247,7 @@ class StandingClock:
         self._camera.close()
 
 
+@pytest.mark.usefixtures("importable")
 def test_a_clock_that_stands_still_after_the_start_is_told(start, tmp_path):
     running = start(partial(StandingClock, rendered(), 30))
     row = running.wait(lambda row: row.trouble, timeout=120.0)

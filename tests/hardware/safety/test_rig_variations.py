@@ -70,6 +70,8 @@ DANGEROUS = [  # seen at the first full state
     ("robot.payload", "payload", 0.0009),
     ("robot.pouring_tcp", "pouring_tcp", [-0.028, 0.03, 0.19, 0.0, 0.0, 0.0]),
     ("robot.pouring_tcp", "pouring_orientation", [-1.57079633, 0.0, 0.0]),
+    ("robot.pouring_tcp", "heading_deg", -90.0),
+    ("robot.pouring_tcp", "heading_deg", -160.0),
     ("stirring.radius", "radius", 0.000025),
     ("stick", "mass", 0.00002),
     ("cup.position", "position", [1.2, -1.2, 0.05]),
