@@ -25,9 +25,8 @@ def disk_errors(path: object) -> Iterator[None]:
     try:
         yield
     except sqlite3.OperationalError as error:
-        number = _OF_THE_DISK.get(
-            getattr(error, "sqlite_errorcode", 0) & 0xFF
-        )  # without its extension
+        code = getattr(error, "sqlite_errorcode", 0) & 0xFF  # without its extension
+        number = _OF_THE_DISK.get(code)
         if number is None:
             raise
         told = f"{error}; make room and repeat the call: what was stored is kept"

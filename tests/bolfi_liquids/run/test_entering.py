@@ -1,5 +1,6 @@
 """One command at a time works in a RUN directory, and a refused one leaves nothing behind."""
 
+import errno
 import json
 import os
 import signal
@@ -170,6 +171,14 @@ def test_a_refusal_before_the_first_simulation_leaves_nothing(tmp_path, error):
         raise error
     left = {str(path.relative_to(run)) for path in run.rglob("*") if path.is_file()}
     assert left == {"notes.txt", "recordings/precious.nc"}
+
+
+def test_a_run_that_a_full_disk_ended_can_be_resumed(tmp_path):
+    run = tmp_path / "mine"
+    with pytest.raises(OSError), entered(run, RECORD, resume=False):
+        raise OSError(errno.ENOSPC, "full")
+    with entered(run, RECORD, resume=True):
+        pass
 
 
 @pytest.mark.parametrize("error", [InputError("no", where="there", fix="do"), KeyboardInterrupt()])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from bolfi_liquids.hardware.recorder.clock_steps import MIN_UNEVENNESS, unevenness
 from bolfi_liquids.hardware.recorder.finalise import finalise
 from closed_form_session import WAY, inclination
 
@@ -59,3 +60,17 @@ def test_odd_stamps_are_left_out_and_counted(session):
     assert recording.attrs["camera_yz_bad_stamps"] == 0
     apart = recording.inclination - inclination(WAY + recording.time)
     assert np.degrees(np.nanmax(np.abs(apart))) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("turns", "tells"), [((), False), ((3.9,), False), ((2.0,), True), ((1.0, 2.0, 3.0), True)]
+)
+def test_only_a_change_of_velocity_tells_a_clock(turns, tells):
+    """A slow straight stroke fits any clock; one that turns back fits its own."""
+    stamp = np.arange(0.0, 4.0, 1 / 30)
+    velocity = 16.0 * (-1.0) ** np.searchsorted(np.array(turns), stamp)
+    marker = np.stack([np.cumsum(velocity) / 30, np.zeros(len(stamp))], axis=1)
+    marker += np.random.default_rng(0).normal(0.0, 0.05, marker.shape)
+    marker[::20] = np.nan
+    assert (unevenness(stamp, marker) > MIN_UNEVENNESS) == tells
+    assert unevenness(stamp, np.full_like(marker, np.nan)) == 0.0

@@ -11,7 +11,7 @@ from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 import dask
 import numpy as np
 import pytest
-from bolfi_liquids.inference.simulations.job import simulation_seed
+from bolfi_liquids.inference.simulations.job import BATCH, simulation_seed
 from distributed import LocalCluster
 
 from bolfi_liquids import inference
@@ -160,7 +160,7 @@ def test_progress_is_told_of_every_simulation(prior, observed, simulate):
 def test_keeps_batch_in_flight_and_no_more(prior, observed, simulate):
     """Runs 0 to 2 wait for one another, so all three must run at once; a fourth never does."""
     together, lock, flying, most = threading.Barrier(3), threading.Lock(), [0], [0]
-    first = [simulation_seed(0, index) for index in range(3)]
+    first = [simulation_seed(0, index) for index in range(BATCH)]
 
     def counted(theta, seeds):
         with lock:
@@ -232,7 +232,7 @@ def test_another_error_of_an_executor_is_told_as_it_is(worker_side, prior, obser
 def test_after_an_error_the_bank_is_free_for_the_next_call(prior, observed, simulate):
     """What was claimed is released, and what was running is stored, though nobody waits."""
     running, finish = threading.Event(), threading.Event()
-    first = [simulation_seed(0, index) for index in range(3)]
+    first = [simulation_seed(0, index) for index in range(BATCH)]
 
     def misshapen(theta, seeds):
         if int(seeds[0]) not in first:

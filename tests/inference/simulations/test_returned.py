@@ -16,6 +16,7 @@ import xarray as xr
 from bolfi_liquids.inference.arguments import Unusable, checked_integer, float64
 from bolfi_liquids.inference.simulations import Job, Keep, OneByOne, Simulation, jobs, run_missing
 from bolfi_liquids.inference.simulations.failures import Failure, kind
+from bolfi_liquids.inference.simulations.job import BATCH
 from distributed import LocalCluster
 
 from bolfi_liquids import inference
@@ -206,7 +207,9 @@ def test_a_fit_ends_only_if_none_of_the_first_runs_gives_a_signal(prior, observe
     later = inference.fit(spoilt(6, 7, 8), prior, observed, **options)
     assert later.failures == {"unusable": 3}
     with pytest.raises(ValueError, match=r"of shape \(30,\), got \(29,\)"):
-        inference.fit(spoilt(0, 1, 2), prior, observed, **options)
+        inference.fit(spoilt(*range(BATCH)), prior, observed, **options)
+    alone = inference.fit(spoilt(0), prior, observed, **(options | {"batch": 1}))
+    assert alone.failures == {"unusable": 1}
 
 
 def test_a_masked_value_is_a_missing_one(prior, observed, simulate):
