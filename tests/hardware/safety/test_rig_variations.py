@@ -33,6 +33,7 @@ def test_the_walk_finds_the_numbers_of_all_sections():
     assert ("limits", "stirring", "x", 1) in NUMBERS and ("robot", "start", 5) in NUMBERS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", FACTORS)
 @pytest.mark.parametrize("field", NUMBERS, ids=name_of)
 def test_a_wrong_number_is_refused_or_harmless(field, factor, tmp_path):

@@ -160,7 +160,7 @@ def test_progress_is_told_of_every_simulation(prior, observed, simulate):
 def test_keeps_batch_in_flight_and_no_more(prior, observed, simulate):
     """Runs 0 to 2 wait for one another, so all three must run at once; a fourth never does."""
     together, lock, flying, most = threading.Barrier(3), threading.Lock(), [0], [0]
-    first = [simulation_seed(0, index) for index in range(BATCH)]
+    first = [simulation_seed(0, index) for index in range(3)]
 
     def counted(theta, seeds):
         with lock:
