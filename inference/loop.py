@@ -119,7 +119,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
             before anything is simulated.
 
     Raises:
-        ValueError: bad argument; budget smaller than the start design; no run of the first batch
+        ValueError: bad argument; budget smaller than the start design; none of the first four runs
             returned a signal.
         RuntimeError: no run of the start design succeeded, or fewer than three in all, of which
             the bank keeps those that did; the executor lost its workers.

@@ -28,6 +28,7 @@ from bolfi_liquids.wording import sentence
 
 # a dry run of them looks at the arm, whose controller may not be silent for long
 LOOKS = ("record", "pour")
+ALONE = [pytest.mark.alone, pytest.mark.slow]
 ROOT = Path(__file__).parents[2]
 PARTS = ("bolfi_liquids", "hardware", "inference", "models")
 SOURCES = {str(p.relative_to(ROOT)): p for part in PARTS for p in (ROOT / part).rglob("*.py")}
@@ -177,7 +178,7 @@ def test_one_file_knows_the_library_that_moves_arms():
 
 @pytest.mark.parametrize(
     "words",
-    [pytest.param(one, marks=[pytest.mark.alone] if one in LOOKS else []) for one in OF_A_RIG],
+    [pytest.param(one, marks=ALONE if one in LOOKS else []) for one in OF_A_RIG],
 )
 def test_unarmed_command_moves_nothing(words, rig_file, poured_run, boards, emulator):
     before = emulator.admin.motions()

@@ -33,7 +33,7 @@ def test_a_wrong_frame_is_never_passed_on(tmp_path, caplog, change, fault):
     warned = [record.getMessage() for record in caplog.records]
     found = bad_fit(calibration.summary)
     assert (found is not None) == (fault is not None)
-    assert (found in warnings_of(results_of(calibration.path))) == (fault is not None)
+    assert (found in warnings_of(results_of(calibration))) == (fault is not None)
     if fault is None:
         assert not any("stir.nc" in text for text in warned)
         return
