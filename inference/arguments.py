@@ -54,13 +54,13 @@ def _of_objects(array: np.ma.MaskedArray) -> np.ndarray:
     return np.array(numbers, np.float64).reshape(array.shape)
 
 
-def _number(item: object) -> float:
+def _number(item: Any) -> float:
     if item is None or item is np.ma.masked:
         return np.nan
     if isinstance(item, str | bytes) or np.iscomplexobj(item) or np.ndim(item):
         raise TypeError("not a real number")
     try:
-        return float(item)  # pyright: ignore[reportArgumentType]  or TypeError
+        return float(item)
     except OverflowError:  # an integer of hundreds of digits
         return np.inf
 

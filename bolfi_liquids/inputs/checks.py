@@ -72,8 +72,12 @@ def _check_numbers(recording: Recording) -> None:
     names = LENGTHS + DENSITIES + tuple(n for n in STICK_WEIGHT if n in recording.attrs)
     for name in names:
         value = recording.attrs[name]
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not np.isfinite(value) or value <= 0:
+        if (
+            not isinstance(value, int | float)
+            or isinstance(value, bool)
+            or not np.isfinite(value)
+            or value <= 0
+        ):
             raise InputError(
                 f"{' '.join(repr(value).split()):.80}",
                 where=f"{recording.path}: attribute {name}",

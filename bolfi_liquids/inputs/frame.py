@@ -95,8 +95,8 @@ def trailing(recording: Recording) -> tuple[float, ...]:
         if np.ptp(at) >= MIN_TRAVEL and np.ptp(angle) > 0.0
         else np.nan
         for angle, along, at in (
-            (inclination.real, moved.real, way[:, 0].real),
-            (inclination.imag, moved.imag, way[:, 0].imag),
+            (np.real(inclination), np.real(moved), np.real(way[:, 0])),
+            (np.imag(inclination), np.imag(moved), np.imag(way[:, 0])),
         )
     )
 
@@ -193,7 +193,7 @@ def _fit(inclination: NDArray, delayed: NDArray) -> _Fit:
 
 
 def _real(values: NDArray) -> NDArray:
-    return np.concatenate([values.real, values.imag])
+    return np.concatenate([np.real(values), np.imag(values)])
 
 
 def _error_deg(inclination: NDArray, delayed: NDArray, angle: float) -> float:

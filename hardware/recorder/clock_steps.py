@@ -67,7 +67,7 @@ def _first_step(raw: Raw, view: View, span: Span) -> tuple[float, float] | None:
     clocks = [(start, _clock_in(raw, view, _part(series, start), whole)) for start in starts]
     known = [(start, clock) for start, clock in clocks if clock is not None]
     for (start, one), (_, other) in zip(known, known[1:], strict=False):
-        between = 0.5 * (one.reference + other.reference)
+        between = np.array(0.5 * (one.reference + other.reference))
         size = float(one.to_robot(between) - other.to_robot(between))
         error = float(np.hypot(one.offset_error, other.offset_error))
         if np.isfinite(error) and abs(size) > max(MAX_STEP, MAX_STEP_ERRORS * error):

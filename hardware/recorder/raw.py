@@ -49,7 +49,9 @@ def read_raw(directory: Path) -> Raw:
     provenance = read_provenance(directory)
     rows = _read(directory / SAMPLES, Sample._fields)
     samples = _rising(rows, "time")
-    seen = {view: _read(directory / frames_file(view), FrameMeasurement._fields) for view in VIEWS}
+    seen: dict[View, Columns] = {
+        view: _read(directory / frames_file(view), FrameMeasurement._fields) for view in VIEWS
+    }
     stamps: dict[View, JudgedStamps] = {
         view: judged_stamps(of["index"], of["stamp"], of["host"]) for view, of in seen.items()
     }

@@ -1,6 +1,7 @@
 """A camera's stamps against this computer's clock, from the first frame to the last."""
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,8 @@ MAX_BAD_STAMPS = 10
 """In a row, before the camera's clock counts as lost: it does not come back by itself."""
 
 
-class StampFault(NamedTuple):
+@dataclass(frozen=True)
+class StampFault:
     """From where on a camera's stamps are no times.
 
     Attributes:
