@@ -5,6 +5,7 @@ Loads nothing but NumPy, for workers import it.
 
 import math
 from operator import index
+from typing import Any
 
 import numpy as np
 
