@@ -51,8 +51,8 @@ def test_no_pour_is_chosen_over_a_bad_fit(far_off):
     assert rows(far_off) == before
 
 
-def test_a_person_may_insist(far_off, pour):
-    again = bl.choose_pour(far_off, iterations=7, draws=4, force=True, progress=False)
+def test_a_person_may_insist(far_off, pour, pour_settings):
+    again = bl.choose_pour(far_off, **pour_settings, force=True, progress=False)
     assert again.chosen.action == pour.chosen.action
     assert rows(far_off) == rows(pour.path)
 

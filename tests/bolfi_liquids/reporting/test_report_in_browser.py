@@ -147,9 +147,10 @@ def test_the_frames_lose_no_liquid_and_lean_as_the_simulator_says(frames):
             assert np.abs(between - leaning[draw, :, plane]).max() < np.radians(0.3)
 
 
-def test_a_draw_that_failed_is_not_shown(calibration, frames):
+def test_a_draw_that_failed_is_not_shown(pour, frames):
     broken = frames.copy(deep=True)
     broken["tip"][1] = np.nan
+    calibration = bl.Calibration.open(pour.path)
     shown = moving_context(calibration, broken)
     kept = [draw["theta"]["viscosity"] for draw in shown["draws"]]
     assert kept == frames["viscosity"].to_numpy()[[0, 2]].tolist()
