@@ -115,8 +115,9 @@ def disk_errno(err: BaseException) -> int | None:
 
 def write_netcdf(data: "Dataset | DataTree", path: Path) -> Path:
     """Write data by `write_whole`, such that xarray reads them back with h5netcdf."""
-    # in memory first: after a write that the disk refused, HDF5 crashes when the process ends
-    content = data.to_netcdf(engine="h5netcdf")
+    from .hardware.netcdf import netcdf_content
+
+    content = netcdf_content(data)
     return write_whole(path, lambda temporary: temporary.write_bytes(content))
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..netcdf import netcdf_content
 from ..rig import Rig
 from ..vision.frame_measurement import BAD_LINE, Flag
 from .clock_steps import without_steps
@@ -143,8 +144,7 @@ def _as_dataset(stir: Stir, attributes: dict[str, float | int | str]) -> "Datase
 
 
 def _write_whole(dataset: "Dataset", path: Path) -> Path:
-    # in memory first: after a write that the disk refused, HDF5 crashes when the process ends
-    content = dataset.to_netcdf(engine="h5netcdf")
+    content = netcdf_content(dataset)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     os.close(handle)
     temporary = Path(name)

@@ -20,7 +20,7 @@ GROUPS = ("posterior", "simulations", "posterior_predictive", "replicates", "clo
 def cluster():
     """A Dask cluster on this computer; its scheduler's address."""
     with LocalCluster(
-        n_workers=2, threads_per_worker=1, protocol="tcp://", dashboard_address=None
+        n_workers=2, threads_per_worker=1, protocol="tcp://", dashboard_address=":0"
     ) as made:
         yield made.scheduler_address
 

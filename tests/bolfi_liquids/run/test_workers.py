@@ -99,7 +99,7 @@ def test_workers_of_dask_have_one_thread_each(threads):
         n_workers=1,
         threads_per_worker=threads,
         protocol="tcp://",
-        dashboard_address=None,
+        dashboard_address=":0",
     )
     with cluster, cluster.get_client() as client:
         for given in (client, client.get_executor(), cluster.scheduler_address):

@@ -105,7 +105,7 @@ def test_spawned_processes_that_load_no_jax(prior, observed, by_hand, worker_sid
 @pytest.mark.slow
 def test_dask_by_its_client_and_by_its_address(prior, observed, simulate, by_hand):
     local = {"processes": False, "n_workers": 1, "threads_per_worker": 2, "protocol": "tcp://"}
-    with LocalCluster(**local, dashboard_address=None) as cluster:
+    with LocalCluster(**local, dashboard_address=":0") as cluster:
         with cluster.get_client() as client:
             given = inference.fit(simulate, prior, observed, **options(client))
         address = cluster.scheduler_address
@@ -202,7 +202,7 @@ def test_a_worker_of_dask_that_dies_costs_one_run(tmp_path, prior, observed, wor
     local = {"processes": True, "n_workers": 2, "threads_per_worker": 1}
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 1}),
-        LocalCluster(**local, dashboard_address=None, silence_logs=50) as cluster,
+        LocalCluster(**local, dashboard_address=":0", silence_logs=50) as cluster,
         cluster.get_client() as client,
     ):
         fit = inference.fit(simulate, prior, observed, **options(client.get_executor()))

@@ -139,7 +139,7 @@ def processes():
 @contextmanager
 def dask():
     local = {"processes": False, "n_workers": 1, "threads_per_worker": 2, "protocol": "tcp://"}
-    with LocalCluster(**local, dashboard_address=None) as cluster, cluster.get_client() as client:
+    with LocalCluster(**local, dashboard_address=":0") as cluster, cluster.get_client() as client:
         yield client.get_executor(pure=False)
 
 
