@@ -90,7 +90,7 @@ def test_a_neutral_coefficient_leaves_every_bit(stir, name):
     np.testing.assert_array_equal(alone[0], mixed[1])
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_all_effects_together_stay_neutral_where_they_are(stir):
     neutral = {name: effect.neutral for name, effect in models.EFFECTS.items()}
     base = stir()
@@ -99,7 +99,7 @@ def test_all_effects_together_stay_neutral_where_they_are(stir):
     np.testing.assert_array_equal(mixed[1:], base[1:])
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_effects_compose_whatever_the_order_they_are_given_in(stir):
     every = {name: coefficient(name) for name in models.EFFECTS}
     together = stir(every)
@@ -122,7 +122,7 @@ def test_sensors_act_after_the_rig_in_the_order_of_their_names(stir):
     np.testing.assert_array_equal(seen, expected)
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_a_pour_keeps_every_bit_where_coefficients_are_neutral(pour):
     neutral = {name: effect.neutral for name, effect in models.EFFECTS.items()}
     mixed = pour({name: [neutral[name], coefficient(name), neutral[name]] for name in neutral})

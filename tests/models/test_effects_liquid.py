@@ -76,7 +76,7 @@ def test_hooks_from_outside_act(register):
     assert flow(1.0, 0.0, 0.5, 2.0) < 0.7 * base
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_gels_flow_as_plugs():
     """A plug of a quarter of the gap, within a tenth of its speed (Herschel-Bulkley)."""
     channel, push, stress, still = Channel(layers=12), 1.0, 10.0, np.zeros(2)
@@ -142,7 +142,7 @@ def test_a_film_sticks_and_drains(cups):
     assert (later < sticky).all() and (later > bare).all()
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_adhesion_keeps_liquid_in_the_cup(cups):
     bare, sticky = (retained(cups, a, np.array([0.05]))[0] for a in (0.0, 1.0))
     assert bare == 0.0

@@ -79,7 +79,7 @@ def test_without_liquid_the_stick_is_the_driven_spherical_pendulum(glycerin):
 @pytest.mark.parametrize(
     ("numerics", "tolerance"),
     [
-        pytest.param(models.Numerics(), 0.2, marks=pytest.mark.slow),
+        pytest.param(models.Numerics(), 0.2, marks=pytest.mark.minutes),
         pytest.param(models.PUBLISHED_DRAG, 0.1, marks=pytest.mark.minutes),
     ],
 )
@@ -143,7 +143,7 @@ def test_no_particle_is_ever_outside_the_cup(water, speed, monkeypatch):
     assert seen[..., 2].max() < setup.cup.height
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_a_wide_stick_leaves_room_for_all_particles(glycerin):
     attrs = {**glycerin.attrs, "stick_radius": 0.025}
     short = first_seconds(glycerin, 0.2)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "notebooks").glob("*.ipynb"))
-IN_CI = {"quickstart", "your_simulator"}  # `make test-long` runs the others
+IN_CI = {"your_simulator"}  # `make test-long` runs the others
 RECORDS = {"dry_run"}  # on the emulator, which must keep time
 LONGEST = 600  # s after which a cell hangs, on a slow computer that does something else as well
 

@@ -116,7 +116,14 @@ def in_a_terminal(*arguments, typed, until=None):
     With `until` it is interrupted as soon as that is so.
     """
     words = " ".join(map(str, arguments))
-    code = f"from bolfi_liquids.cli.app import app; app({words!r}.split())"
+    code = f"""
+import signal
+from bolfi_liquids.cli.app import app
+
+# these tests may themselves be run where it is ignored
+signal.signal(signal.SIGINT, signal.default_int_handler)
+app({words!r}.split())
+"""
     # not pexpect.spawn, which forks this process with all of its threads
     ours, its = os.openpty()
     command = [sys.executable, "-c", code]

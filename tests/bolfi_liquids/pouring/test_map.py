@@ -108,7 +108,7 @@ def test_too_few_pours_are_refused():
 @pytest.mark.parametrize(
     ("pours", "viscosities"),
     [
-        pytest.param(128, (1.0,), marks=pytest.mark.slow),
+        pytest.param(128, (1.0,), marks=pytest.mark.minutes),
         pytest.param(512, (0.03, 1.0), marks=pytest.mark.minutes),  # the map that `pour` makes
     ],
 )

@@ -129,7 +129,7 @@ def test_pictures_that_take_too_long_leave_nothing(unseen):
     assert not (unseen / "frames.nc").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_pictures_by_processes_have_the_same_bits(unseen, pour):
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         there = frames.frames_of(unseen, executor=pool, progress=False)

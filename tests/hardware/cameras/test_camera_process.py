@@ -332,7 +332,7 @@ def test_lost_and_repeated_pictures_are_counted():
     assert tally.worst == pytest.approx(1 / 30)
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_memory_and_open_files_do_not_grow(start):
     running = start(rendered(timing=Timing(rate=60.0), world=moving_world(400.0)))
     process = Path(f"/proc/{running.process.pid}")

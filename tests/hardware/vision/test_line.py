@@ -289,7 +289,7 @@ def test_faults_leave_no_gross_error_unflagged():
     assert flagged < 0.1
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_faults_leave_no_gross_error_unflagged_in_thousands_of_frames():
     rms, greatest, normalised, flagged = gross_errors(2000, seed=1)
     print(f"RMS {rms:.4f} deg, greatest {greatest:.3f} deg, z {normalised:.2f}, {flagged:.1%}")

@@ -4,10 +4,11 @@ Three simulators with a closed form, chosen for what they ask of the engine: a l
 whose noise is correlated in time, one whose posterior has two modes. The draws are quadrature's,
 so that the posterior is judged and not a sampler, which has tests of its own. 256 ranks find
 draws 30 % too narrow always and 20 % eight times in ten; the standard error of a rate of 0.9 is
-0.019. All of it takes about ten minutes on two cores, so continuous integration takes one case
-alone: correlated noise and a shared design, 64 replicates. Their coverage finds intervals half as
-wide as they should be (planted below) nearly always, 30 % too narrow ones one time in four. The
-surrogate of the discrepancy is judged there by `test_calibration` alone.
+0.019. With a shared design, 64 replicates: coverage finds intervals half as wide as they should be
+(planted below) nearly always, 30 % too narrow ones one time in four.
+
+All of it takes about ten minutes on two cores. Continuous integration judges the coverage of the
+signal's surrogate in `test_signal` and of the discrepancy's in `test_calibration`.
 """
 
 import importlib
@@ -30,11 +31,8 @@ SAMPLING = {"sampler": "quadrature", "chains": 2, "draws": 64}
 TASKS = ("line", "decay", "bimodal")
 
 
-def every_task(*slow):
-    """A case for each task, marked slow if named and else as one of minutes."""
-    marks = {task: pytest.mark.slow if task in slow else pytest.mark.minutes for task in TASKS}
-    cases = [pytest.param(task, marks=marks[task]) for task in TASKS]
-    return pytest.mark.parametrize("task", cases)
+pytestmark = pytest.mark.minutes
+every_task = pytest.mark.parametrize("task", TASKS)
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +83,7 @@ def narrowed(made, factor):
     return replace(made, finished=finished)
 
 
-@every_task()
+@every_task
 def test_signal_surrogate_is_calibrated(run, task):
     made = run(task, "signal")
     uniform = inference.sbc(made)
@@ -94,7 +92,7 @@ def test_signal_surrogate_is_calibrated(run, task):
     assert covers(made)
 
 
-@every_task("decay")
+@every_task
 def test_signal_surrogate_of_a_shared_design_is_calibrated(toys, task):
     """One design for all data sets: no acquisition is involved. The fits run here, one by one:
     each process of a pool would compile the engine for itself."""
@@ -108,7 +106,7 @@ def test_signal_surrogate_of_a_shared_design_is_calibrated(toys, task):
     assert not covers(narrowed(made, 0.5))
 
 
-@every_task()
+@every_task
 def test_discrepancy_surrogate_covers_at_least_as_it_says(run, task):
     """It is wide by construction: a threshold posterior, whose ranks need not be uniform."""
     made = run(task, "discrepancy")
