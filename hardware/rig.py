@@ -3,22 +3,26 @@
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import ValidationInfo, model_validator
 
 from .rig_limits import Box as Box
 from .rig_limits import Limits
 from .rig_numbers import (
+    Acceleration,
     Angle,
     Balance,
     Degrees,
     Length,
     Mass,
+    Number,
     Point,
-    Positive,
     Section,
     Speed,
     Tcp,
     Turn,
+    contradiction,
+    is_recorded,
+    unless_recorded,
     within,
 )
 
@@ -27,6 +31,24 @@ MIN_STICK_DENSITY = 300.0  # [kg/m3]; balsa and cork are lighter, and swim
 MAX_STICK_DENSITY = 25_000.0  # [kg/m3]; no stick is denser
 MAX_CYCLES = 100  # stars in a recording
 MIN_LOOK = 0.05  # [m], from a camera to what it looks at
+MIN_CUP_RADIUS = 0.01  # [m]
+
+
+def checked_cycles(count: int) -> int:
+    """How often a pattern is stirred.
+
+    Raises:
+        ValueError: It is below 1 or above `MAX_CYCLES`.
+    """
+    if not 1 <= count <= MAX_CYCLES:
+        raise ValueError(f"{count} is not from 1 to {MAX_CYCLES}: so often a pattern is stirred")
+    return count
+
+
+def _device(number: int) -> int:
+    if number < 0:
+        raise ValueError(f"{number} is no number of a device; they count from 0")
+    return number
 
 
 def _odd(points: int) -> int:
@@ -59,7 +81,9 @@ class Robot(Section, frozen=True):
     driver: Literal["ur"] = "ur"
     host: str
     controller: Literal["cb3", "e-series"] = "cb3"
-    rate: Annotated[float, Field(ge=50, le=500)] = 125.0
+    rate: Annotated[
+        Number, within(50.0, 500.0, "Hz", "a slower loop jerks, and no controller is faster")
+    ] = 125.0
     payload: Annotated[Mass, within(0.1, 5.0, "kg", "so much weigh a gripper and what it holds")]
     payload_centre: Balance = (0.0, 0.0, 0.0)
     stirring_tcp: Tcp
@@ -68,14 +92,13 @@ class Robot(Section, frozen=True):
     pouring_orientation: Turn
     start: tuple[Angle, Angle, Angle, Angle, Angle, Angle]
 
-    @model_validator(mode="after")
-    def _divides_the_clock(self) -> "Robot":
+    @contradiction
+    def _divides_the_clock(self) -> None:
         base = CONTROLLER_RATE[self.controller]
         if base % self.rate:
             raise ValueError(
                 f"rate {self.rate:g} Hz does not divide the controller's {base:g} Hz; use 125"
             )
-        return self
 
 
 class Cup(Section, frozen=True):
@@ -83,15 +106,16 @@ class Cup(Section, frozen=True):
 
     position: Point
     yaw_deg: Degrees = 0.0
-    radius: Annotated[Length, within(0.01, 0.2, "m", "a cup is as large as a hand can hold")]
+    radius: Annotated[
+        Length, within(MIN_CUP_RADIUS, 0.2, "m", "a cup is as large as a hand can hold")
+    ]
     height: Annotated[Length, within(0.01, 0.4, "m", "a cup is as high as a hand can hold")]
     fill: Length
 
-    @model_validator(mode="after")
-    def _holds_its_fill(self) -> "Cup":
+    @contradiction
+    def _holds_its_fill(self) -> None:
         if self.fill >= self.height:
             raise ValueError(f"fill {self.fill} m is not below height {self.height} m")
-        return self
 
 
 class Stick(Section, frozen=True):
@@ -102,8 +126,8 @@ class Stick(Section, frozen=True):
     mass: Mass
     colour: Literal["dark", "bright"] = "dark"
 
-    @model_validator(mode="after")
-    def _weighs_as_a_stick(self) -> "Stick":
+    @contradiction
+    def _weighs_as_a_stick(self) -> None:
         if self.density > MAX_STICK_DENSITY:
             raise ValueError(f"mass {self.mass:g} kg looks like grams; convert it to kg")
         if self.density < MIN_STICK_DENSITY:
@@ -111,7 +135,6 @@ class Stick(Section, frozen=True):
                 f"mass {self.mass:g} kg is a density of {self.density:.3g} kg/m3, which no stick "
                 f"has (at least {MIN_STICK_DENSITY:g}); weigh it in kg"
             )
-        return self
 
     @property
     def density(self) -> float:
@@ -122,7 +145,7 @@ class Stick(Section, frozen=True):
 class Liquid(Section, frozen=True):
     """What is known of the liquid before it is stirred: its weighed density [kg/m3]."""
 
-    density: Annotated[float, Field(ge=50, le=20_000)]
+    density: Annotated[Number, within(50.0, 20_000.0, "kg/m3", "no liquid is as light or as heavy")]
 
 
 class Stirring(Section, frozen=True):
@@ -141,21 +164,21 @@ class Stirring(Section, frozen=True):
     """
 
     pattern: Literal["star", "circle"] = "star"
-    points: Annotated[int, Field(ge=5, le=99), AfterValidator(_odd)] = 9
+    points: Annotated[
+        int, within(5, 99, "vertices", "fewer make no star"), unless_recorded(_odd)
+    ] = 9
     radius: Annotated[
         Length, within(0.005, 0.15, "m", "a smaller star moves no liquid, a larger one fits no cup")
     ] = 0.025
     speed: Speed = 0.1
-    acceleration: Annotated[
-        Positive, within(0.02, 0.6, "m/s2", "a softer stroke never gets going, a harder one jerks")
-    ] = 0.5
+    acceleration: Acceleration = 0.5
     height: Length
     clear_height: Length
     approach_speed: Speed = 0.05
     rest: Annotated[
-        Positive, within(0.1, 60.0, "s", "the cameras' noise is learned from some pictures")
+        Number, within(0.1, 60.0, "s", "the cameras' noise is learned from some pictures")
     ] = 2.0
-    cycles: Annotated[int, Field(ge=1, le=MAX_CYCLES)] = 1
+    cycles: Annotated[int, unless_recorded(checked_cycles)] = 1
 
 
 class Camera(Section, frozen=True):
@@ -177,16 +200,18 @@ class Camera(Section, frozen=True):
     """
 
     view: View
-    source: Annotated[int, Field(ge=0)] | str = 0
-    width: Annotated[int, Field(ge=160, le=4096)] = 640
-    height: Annotated[int, Field(ge=120, le=4096)] = 480
-    rate: Annotated[float, Field(ge=5, le=240)] = 30.0
+    source: Annotated[int, unless_recorded(_device)] | str = 0
+    width: Annotated[int, within(160, 4096, "px", "no webcam's picture is as wide")] = 640
+    height: Annotated[int, within(120, 4096, "px", "no webcam's picture is as high")] = 480
+    rate: Annotated[Number, within(5.0, 240.0, "Hz", "no webcam is as slow or as fast")] = 30.0
     position: Point
     target: Point
-    roll_deg: Annotated[float, Field(ge=-45, le=45)] = 0.0
+    roll_deg: Annotated[
+        Number, within(-45.0, 45.0, "deg", "a camera stands upright, or nearly so")
+    ] = 0.0
     intrinsics: str | None = None
     focal_length: (
-        Annotated[Positive, within(50.0, 20_000.0, "px", "no webcam sees as wide or as narrow")]
+        Annotated[Number, within(50.0, 20_000.0, "px", "no webcam sees as wide or as narrow")]
         | None
     ) = None
     marker: Point
@@ -199,17 +224,15 @@ class Camera(Section, frozen=True):
         """Whether it is a camera, and not a file of pictures."""
         return isinstance(self.source, int) or self.source.startswith("/dev/")
 
-    @model_validator(mode="after")
-    def _knows_its_lens(self) -> "Camera":
+    @contradiction
+    def _knows_its_lens(self) -> None:
         if self.intrinsics is None and self.focal_length is None:
             raise ValueError("neither intrinsics nor focal_length is given")
-        return self
 
-    @model_validator(mode="after")
-    def _looks_somewhere(self) -> "Camera":
+    @contradiction
+    def _looks_somewhere(self) -> None:
         if np.linalg.norm(np.subtract(self.target, self.position)) < MIN_LOOK:
             raise ValueError(f"position and target are less than {MIN_LOOK:g} m apart")
-        return self
 
 
 class Pouring(Section, frozen=True):
@@ -243,12 +266,14 @@ class Rig(Section, frozen=True):
     pouring: Pouring
 
     @model_validator(mode="after")
-    def _fits_together(self) -> "Rig":
-        _check_cameras(self.cameras, self.limits)
-        _check_speeds(self)
-        _check_stick(self)
-        _check_heights(self)
-        _check_receiver(self)
+    def _fits_together(self, info: ValidationInfo) -> "Rig":
+        _check_views(self.cameras)
+        if not is_recorded(info):
+            _check_frame_age(self)
+            _check_speeds(self)
+            _check_stick(self)
+            _check_heights(self)
+            check_receiver(self, MIN_CUP_RADIUS)
         return self
 
     def camera(self, view: View) -> Camera:
@@ -256,11 +281,33 @@ class Rig(Section, frozen=True):
         return next(camera for camera in self.cameras if camera.view == view)
 
 
-def _check_cameras(cameras: tuple[Camera, Camera], limits: Limits) -> None:
+def check_receiver(rig: Rig, radius: float) -> None:
+    """Refuse a receiver that stands in the stirred cup.
+
+    Args:
+        rig: Says where both stand.
+        radius: Of the receiver [m], which is not the rig's but that of the cups that are poured
+            with.
+
+    Raises:
+        ValueError: They overlap.
+    """
+    apart = float(np.hypot(*np.subtract(rig.pouring.receiver[:2], rig.cup.position[:2])))
+    if apart <= rig.cup.radius + radius:
+        raise ValueError(
+            f"pouring.receiver is {apart:.3f} m from cup.position: it stands in the stirred cup "
+            f"(cup.radius = {rig.cup.radius} m, the receiver's is at least {radius:g} m)"
+        )
+
+
+def _check_views(cameras: tuple[Camera, Camera]) -> None:
     views = sorted(camera.view for camera in cameras)
     if views != ["xz", "yz"]:
         raise ValueError(f"cameras: one must see xz and one yz, got {' and '.join(views)}")
-    slowest = min(camera.rate for camera in cameras)
+
+
+def _check_frame_age(rig: Rig) -> None:
+    slowest, limits = min(camera.rate for camera in rig.cameras), rig.limits
     if limits.frame_age < 1.0 / slowest:
         raise ValueError(
             f"limits.frame_age {limits.frame_age} s is below the {1.0 / slowest:.3g} s from one "
@@ -329,12 +376,3 @@ def _check_heights(rig: Rig) -> None:
             raise ValueError(
                 f"stirring.{name} {height} m is outside of limits.stirring.z {list(box.z)} m"
             )
-
-
-def _check_receiver(rig: Rig) -> None:
-    apart = float(np.hypot(*np.subtract(rig.pouring.receiver[:2], rig.cup.position[:2])))
-    if apart <= rig.cup.radius:
-        raise ValueError(
-            f"pouring.receiver is {apart:.3f} m from cup.position: it stands in the stirred cup "
-            f"(cup.radius = {rig.cup.radius} m)"
-        )

@@ -5,6 +5,8 @@ are the joints that a person read off with the stick's pivot above the cup: they
 where the cup stands.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from .errors import RigError
@@ -17,7 +19,28 @@ from .safety.limits import MAX_TILT, Workspace, workspace
 
 LEVEL_TILT = np.radians(20.0)  # of a gripper that holds a source cup, from level
 LIP_AWAY = 0.005  # m, of a source's lip from the gripper's axis, above it and towards the receiver
-START_AWAY = 0.04  # m, of the pivot at `start` from its place above the cup; a cup is as wide
+MAX_START_AWAY = 0.04  # m, of the pivot at `start` from its place above the cup; a cup is as wide
+
+
+class Clearance(NamedTuple):
+    """How far the cup may stand from where a rig's file puts it before the stick meets it [m].
+
+    Attributes:
+        aside: From the stick at a vertex of the star to the cup's wall.
+        along: From the stick's tip to the cup's floor while it stirs, or to the cup's rim while it
+            is carried above it: the smaller of both.
+    """
+
+    aside: float
+    along: float
+
+
+def clearance(rig: Rig) -> Clearance:
+    """Of the stick of a rig, on all ways that are planned with it; both are positive."""
+    cup, stick, plan = rig.cup, rig.stick, rig.stirring
+    floor = plan.height - stick.length
+    rim = plan.clear_height - stick.length - cup.height
+    return Clearance(cup.radius - plan.radius - stick.radius, min(floor, rim))
 
 
 def check_geometry(rig: Rig, where: str = "rig") -> Rig:
@@ -79,15 +102,19 @@ def _check_start(rig: Rig, space: Workspace, where: str) -> None:
             fix="correct it, or place the cup nearer to the robot",
         )
     at = forward(space.arm, space.start, tcp=space.tcp)
-    away, tilt = float(np.linalg.norm(at[:3] - goal[:3])), _angle(_axis(at), _axis(goal))
-    if away > START_AWAY or tilt > MAX_TILT["stirring"]:
+    x, y, z = (at - goal)[:3]
+    aside, along, tilt = float(np.hypot(x, y)), float(abs(z)), _angle(_axis(at), _axis(goal))
+    # two places of the cup that differ by more than the stick's clearance cannot both be safe
+    wall, floor = np.minimum(clearance(rig), MAX_START_AWAY)
+    if aside > wall or along > floor or tilt > MAX_TILT["stirring"]:
         raise RigError(
-            f"these joints put the stick's pivot {100 * away:.0f} cm and "
-            f"{np.degrees(tilt):.0f} deg from its place above the cup (cup.position, "
-            "stirring.clear_height)",
+            f"these joints put the stick's pivot {1e3 * aside:.1f} mm aside of its place above the "
+            f"cup (cup.position, stirring.clear_height), {1e3 * along:.1f} mm from its height and "
+            f"{np.degrees(tilt):.0f} deg from its direction; this stick may be {1e3 * wall:.1f} mm "
+            f"aside and {1e3 * floor:.1f} mm from its height before it meets the cup",
             where=f"{where}: robot.start",
             fix="move the pivot there by hand and write down the joints, or correct "
-            "cup.position or robot.stirring_tcp",
+            "cup.position, robot.stirring_tcp or robot.controller",
         )
 
 

@@ -1,16 +1,48 @@
-"""Numbers that a rig.toml may hold: each with a lower and an upper end, and the reason for them."""
+"""Numbers that a rig.toml may hold: each with a lower and an upper end, and the reason for them.
 
-from typing import Annotated
+The ends keep an arm from doing harm. They do not hold for the rig of a recording that was made, by
+which nothing moves any more: it is read with `RECORDED` as its context.
+"""
+
+from collections.abc import Callable
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, Field
+from pydantic import AfterValidator, BaseModel, Field, ValidationInfo, model_validator
 
 MAX_LENGTH = 3.0  # [m]; more looks like millimetres
 MAX_MASS = 30.0  # [kg]; more looks like grams
+RECORDED = {"recorded": True}
+"""Context of a validation that asks for the right fields and types, and for no ends."""
 
 
 class Section(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Part of a file that a person writes: no unknown fields, no change after reading."""
+
+
+def is_recorded(info: ValidationInfo) -> bool:
+    """Whether a rig is read back that was recorded."""
+    return info.context is not None and info.context == RECORDED
+
+
+def unless_recorded(check: Callable[[Any], Any]) -> AfterValidator:
+    """A validator of a number that the rig of a recording need not pass."""
+
+    def checked(value: Any, info: ValidationInfo) -> Any:
+        return value if is_recorded(info) else check(value)
+
+    return AfterValidator(checked)
+
+
+def contradiction(check: Callable[[Any], None]) -> Any:
+    """A method of a section which refuses numbers that cannot be true together, unless recorded."""
+
+    def checked(self: Any, info: ValidationInfo) -> Any:
+        if not is_recorded(info):
+            check(self)
+        return self
+
+    return model_validator(mode="after")(checked)
 
 
 def within(low: float, high: float, unit: str, why: str) -> AfterValidator:
@@ -21,7 +53,7 @@ def within(low: float, high: float, unit: str, why: str) -> AfterValidator:
             raise ValueError(f"{value:g} {unit} is not within {low:g} to {high:g} {unit}: {why}")
         return value
 
-    return AfterValidator(check)
+    return unless_recorded(check)
 
 
 def _in_metres(length: float) -> float:
@@ -36,19 +68,34 @@ def _in_kilograms(mass: float) -> float:
     return mass
 
 
+def _above_zero(value: float) -> float:
+    if value <= 0.0:
+        raise ValueError(f"{value:g} is not greater than 0")
+    return value
+
+
 Number = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Coordinate = Annotated[Number, AfterValidator(_in_metres)]
-Length = Annotated[Positive, AfterValidator(_in_metres)]
-Mass = Annotated[Positive, AfterValidator(_in_kilograms)]
+Positive = Annotated[Number, unless_recorded(_above_zero)]
+Coordinate = Annotated[Number, unless_recorded(_in_metres)]
+Length = Annotated[Positive, unless_recorded(_in_metres)]
+Mass = Annotated[Positive, unless_recorded(_in_kilograms)]
 Point = tuple[Coordinate, Coordinate, Coordinate]
-Angle = Annotated[float, Field(ge=-2 * np.pi, le=2 * np.pi)]
+Angle = Annotated[
+    Number,
+    within(-2 * np.pi, 2 * np.pi, "rad", "a joint turns once at the most; convert degrees to rad"),
+]
 Turn = tuple[Angle, Angle, Angle]
-Degrees = Annotated[float, Field(ge=-360, le=360)]
+Degrees = Annotated[Number, within(-360.0, 360.0, "deg", "more than a turn says nothing new")]
 Speed = Annotated[
-    Positive,
+    Number,
     within(
         0.005, 0.25, "m/s", "a slower arm never arrives, a faster one is not safe beside a person"
+    ),
+]
+Acceleration = Annotated[
+    Number,
+    within(
+        0.02, 0.6, "m/s2", "a softer arm needs more way to stop than a box has, a harder one jerks"
     ),
 ]
 

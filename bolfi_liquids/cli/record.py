@@ -82,7 +82,7 @@ class OnlineOptions:
     def choice(self, cycles: int | None) -> "OnlineChoice | None":
         """What to calibrate, with so many cycles at the most; None for nothing."""
         from ..inputs.cups import open_cups
-        from ..online.online_choice import MAX_CYCLES, OnlineChoice
+        from ..online.online_choice import USUAL_CYCLES, OnlineChoice
 
         if self.calibrate is None:
             return None
@@ -91,7 +91,7 @@ class OnlineOptions:
             self.calibrate,
             None if self.cups is None else open_cups(self.cups),
             settings,
-            cycles=MAX_CYCLES if cycles is None else cycles,
+            cycles=USUAL_CYCLES if cycles is None else cycles,
         )
 
 

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import given_path, new_netcdf, write_netcdf, write_text
-from .checks import check_hangs, check_values
+from .checks import MAX_GRIPPER_GAP, MIN_SEEN, check_hangs, check_values
 from .fields import (
     AXES,
     DENSITIES,
@@ -35,6 +36,8 @@ logger = logging.getLogger(__name__)
 TEMPLATE = "columns.toml"
 OTHER_NAME = "choose another name"
 STICK_WEIGHT_UNITS = {"stick_density": "kg/m3", "stick_mass": "kg"}
+REGULAR_SHARE = 0.8  # of a camera's rows that follow at its rate; a camera misses some
+SLOWER = 1.5  # times a step of a log: a longer one is another's, or leaves a row out
 HEADER_FIX = "correct the map: `column`, `skip` or `delimiter`, or leave `delimiter` out"
 
 
@@ -68,7 +71,7 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
     read = read_table(
         table, delimiter=meaning.delimiter, decimal=meaning.decimal, skip=meaning.skip
     )
-    dataset = _dataset(read, meaning)
+    dataset, told = _dataset(read, meaning)
     made = as_recording(dataset, read.path)
     try:
         check_values(made)
@@ -81,6 +84,8 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
         ) from err
     _check_target(out)
     write_netcdf(dataset, out)
+    if told:
+        logger.info("%s: %s", read.path, told)
     if unused := read.others(column.column for column in meaning.columns.values()):
         logger.info("%s: columns not used: %s", read.path, ", ".join(unused))
     return read_recording(out)
@@ -104,7 +109,8 @@ def _attributes(path: Path) -> dict[str, Any]:
         return {}
 
 
-def _dataset(table: Table, meaning: TableMap) -> "Dataset":
+def _dataset(table: Table, meaning: TableMap) -> "tuple[Dataset, str]":
+    """The recording, and what was done to its rows; "" if nothing was."""
     values = {
         name: column.in_si(name, table.numbers(column.column, fix=HEADER_FIX))
         for name, column in meaning.columns.items()
@@ -120,7 +126,55 @@ def _dataset(table: Table, meaning: TableMap) -> "Dataset":
         "imported_sha256": hashlib.sha256(table.path.read_bytes()).hexdigest(),
         "imported_with": f"bolfi-liquids {version('bolfi-liquids')}: {meaning.model_dump_json()}",
     }
-    return recording_dataset(meaning.turned(values), attributes | made)
+    values, told = at_camera_times(values)
+    if told:
+        made["history"] = told
+    return recording_dataset(meaning.turned(values), attributes | made), told
+
+
+def at_camera_times(values: dict[str, NDArray]) -> tuple[dict[str, NDArray], str]:
+    """A robot's rows with a camera's slower ones between them, as rows of the camera alone.
+
+    Two logs that are merged by their times have empty cells wherever one of them has no row. The
+    gripper moves a few millimetres between two rows of its own, and is interpolated linearly; an
+    inclination never is.
+
+    Args:
+        values: By field of a recording, of equal shape (rows,); NaN where a cell is empty.
+
+    Returns:
+        The values, and what was done; the same values and "" where the rows are of one kind.
+    """
+    time = values["time"]
+    seen = np.isfinite(values[PLANES[0]]) | np.isfinite(values[PLANES[1]])
+    if not _is_merged(time, seen):
+        return values, ""
+    known = {axis: np.isfinite(values[axis]) for axis in AXES}
+    kept = {name: one[seen] for name, one in values.items()}
+    for axis in AXES:
+        own = time[known[axis]]
+        if len(own):
+            filled = np.interp(kept["time"], own, values[axis][known[axis]], np.nan, np.nan)
+            after = np.clip(np.searchsorted(own, kept["time"]), 1, max(len(own) - 1, 1))
+            far = np.diff(own, append=np.inf)[after - 1] > MAX_GRIPPER_GAP
+            kept[axis] = np.where(far & np.isnan(kept[axis]), np.nan, filled)
+    told = (
+        f"{', '.join(AXES)} were interpolated to the {seen.sum()} of {len(time)} times at which "
+        f"{' or '.join(PLANES)} is given"
+    )
+    return kept, told
+
+
+def _is_merged(time: NDArray, seen: NDArray[np.bool_]) -> bool:
+    """Whether the rows with an inclination are few, and come as regularly as a camera's do."""
+    if not seen.any() or seen.mean() >= MIN_SEEN:
+        return False
+    if not np.isfinite(time).all() or (np.diff(time) <= 0.0).any():
+        return False
+    steps = np.diff(time[seen])
+    if not len(steps) or np.median(steps) < SLOWER * np.median(np.diff(time)):
+        return False
+    return float(np.mean(steps < SLOWER * np.median(steps))) >= REGULAR_SHARE
 
 
 def outline(recording: Recording) -> str:

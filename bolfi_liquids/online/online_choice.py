@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from ..models import Cups
     from .estimate import OnlineEstimate
 
-MAX_CYCLES = 5  # of the pattern, by default
+USUAL_CYCLES = 5  # of the pattern at the most, by default
 
 
 class OnlineChoice(NamedTuple):
@@ -33,5 +33,5 @@ class OnlineChoice(NamedTuple):
     settings: OnlineSettings = OnlineSettings()
     bank: Path | None = None
     prior: "Prior | None" = None
-    cycles: int = MAX_CYCLES
+    cycles: int = USUAL_CYCLES
     told: "Callable[[OnlineEstimate], None] | None" = None

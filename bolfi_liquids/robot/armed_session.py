@@ -116,4 +116,13 @@ def armed_session(
             rehearsal=emulation is not None,
             source=source,
         )
-        yield stack.enter_context(Session(setup))
+        yield stack.enter_context(_discarded_unless_moved(Session(setup)))
+
+
+@contextmanager
+def _discarded_unless_moved(session: "Session") -> "Iterator[Session]":
+    """The session entered; what a device that failed before any motion has left is removed."""
+    with ExitStack() as stack:
+        with session:  # which refuses a directory that holds something
+            stack.callback(session.discard_unless_moved)
+            yield session

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..errors import InputError
 from ..inputs.rigs import rig_of
 from ..pouring.result import Pour
 from ..run.directory import Run, run_path
@@ -52,13 +53,15 @@ def plan_pour(run: str | Path, rig: "Rig") -> PourPlan:
     """The motion of the pour that a run has chosen.
 
     Raises:
-        InputError: The run has chosen none, or none that may be carried out.
+        InputError: The run has chosen none, or none that may be carried out, or its receiver stands
+            in the cup that is stirred.
         MotionRejected: The motion breaks one of the rig's limits.
     """
     from ..hardware import check_path
     from ..hardware.motion import pour_path, ready_to_pour
 
     chosen = chosen_pour(Path(run))
+    _check_receiver(chosen, rig)
     action, turn = chosen.judged, chosen.cups.pour
     place = {"distance": action.distance, "lip_height": turn.lip_height}
     path = pour_path(
@@ -70,6 +73,18 @@ def plan_pour(run: str | Path, rig: "Rig") -> PourPlan:
     )
     check_path(path, rig, "pouring")
     return PourPlan(chosen, ready_to_pour(rig, **place), path)
+
+
+def _check_receiver(chosen: ChosenPour, rig: "Rig") -> None:
+    """Only the cups of the pour say how wide its receiver is."""
+    from ..hardware.rig import check_receiver
+
+    try:
+        check_receiver(rig, chosen.cups.receiver.radius)
+    except ValueError as err:
+        raise InputError(
+            str(err), where="rig.toml", fix="move the receiver away, and correct pouring.receiver"
+        ) from err
 
 
 def execute_pour(
@@ -127,7 +142,8 @@ def execute_pour(
             session.follow(approach_pour(rig, session.pose(), **plan.place))
             view.until_done(session, session.follow(plan.path))
     except KeyboardInterrupt:
-        raise SessionInterrupted(f"interrupted, the arm was stopped; look at {task.out}") from None
+        left = f"look at {task.out}" if task.out.exists() else "nothing had moved"
+        raise SessionInterrupted(f"interrupted, the arm was stopped; {left}") from None
     return task.out
 
 

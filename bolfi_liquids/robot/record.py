@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from ..files import given_path
+from ..files import disk_errno, given_path
 from ..inputs.open import check_recording, read_recording
 from ..inputs.recording import Recording
 from ..inputs.rigs import rig_of
+from ..wording import command
 from .armed_session import Ask, check_one, hidden_liquid
 from .live_view import SessionView
 from .stir import follow_plan, plan_stir, stir_session
@@ -103,7 +104,13 @@ def kept(directory: Path) -> Iterator[None]:
 def _left(directory: Path) -> str:
     from ..hardware import RigError, finalise
 
+    if not directory.exists():  # `armed_session` has removed it
+        return "nothing had moved, and nothing was recorded"
     try:
         return f"what was recorded until then is in {finalise(directory)}"
-    except (RigError, OSError, ValueError) as err:
+    except OSError as err:
+        cure = "make room" if disk_errno(err) is not None else "make it writable"
+        again = command("trim", directory, "--out", "FILE")
+        return f"{directory}: {err.strerror or err}: {cure}, then make its recording by: {again}"
+    except (RigError, ValueError) as err:
         return f"no recording can be made of it ({err})"

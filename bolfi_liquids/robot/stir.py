@@ -48,18 +48,18 @@ def plan_stir(rig: "Rig", cycles: int | None = None) -> StirPlan:
         cycles: How often the pattern is repeated; None as in the rig's file.
 
     Raises:
-        InputError: `cycles` is below 1 or above `MAX_CYCLES`.
+        InputError: `cycles` is below 1 or too large.
         MotionRejected: The plan breaks one of the rig's limits.
     """
     from ..hardware import check_path
     from ..hardware.motion import insert, retract, strokes
-    from ..hardware.rig import MAX_CYCLES
+    from ..hardware.rig import checked_cycles
 
-    cycles = rig.stirring.cycles if cycles is None else cycles
-    if not 1 <= cycles <= MAX_CYCLES:
-        fix = f"give a whole number from 1 to {MAX_CYCLES}"
-        raise InputError(f"{cycles}", where="--cycles", fix=fix)
-    stir = tuple(strokes(rig, cycles))
+    try:
+        count = checked_cycles(rig.stirring.cycles if cycles is None else cycles)
+    except ValueError as err:
+        raise InputError(str(err), where="--cycles", fix="give a whole number of them") from err
+    stir = tuple(strokes(rig, count))
     plan = StirPlan(insert(rig), stir, retract(rig, stir[-1].pose[-1, :3]))
     joints = None
     for path in plan.paths:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from ..rig import MAX_CYCLES, Rig
+from ..rig import Rig, checked_cycles
 from .patterns import circle, star_vertices, travelled
 
 TURN_RATE = np.radians(30.0)  # rad/s, of the tool between two orientations
@@ -118,13 +118,9 @@ def strokes(rig: Rig, cycles: int | None = None) -> list[PosePath]:
     circle never rests on its way: its cycles are its strokes.
 
     Raises:
-        ValueError: `cycles` is below 1 or above `MAX_CYCLES`.
+        ValueError: `cycles` is below 1 or too large, see `checked_cycles`.
     """
-    count = rig.stirring.cycles if cycles is None else cycles
-    if count < 1:
-        raise ValueError(f"cycles must be at least 1, got {count}")
-    if count > MAX_CYCLES:
-        raise ValueError(f"cycles must be at most {MAX_CYCLES}, got {count}")
+    count = checked_cycles(rig.stirring.cycles if cycles is None else cycles)
     if rig.stirring.pattern == "circle":
         return [_circle(rig)] * count
     plan = rig.stirring

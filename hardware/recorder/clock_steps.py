@@ -4,6 +4,8 @@ The marker on the gripper tells a camera's clock within a millisecond from a few
 A clock that is the same in each stretch of it has not been stepped.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..rig import View
@@ -20,7 +22,19 @@ MAX_STEP_ERRORS = 6.0  # standard errors by which a step must differ from none
 MIN_UNEVENNESS = 0.25  # of a marker's motion that no uniform one explains: only that tells a time
 
 
-def without_steps(raw: Raw, where: str) -> Raw:
+class Unstepped(NamedTuple):
+    """What was recorded before the first step of each camera's clock.
+
+    Attributes:
+        raw: Without the frames after it.
+        clocks: Of the cameras that have no step, and were looked at.
+    """
+
+    raw: Raw
+    clocks: dict[View, Clock]
+
+
+def without_steps(raw: Raw, where: str) -> Unstepped:
     """What was recorded before the first step of each camera's clock.
 
     Args:
@@ -32,17 +46,19 @@ def without_steps(raw: Raw, where: str) -> Raw:
     """
     span = stirred(raw.samples, where)
     if span.last - span.first < 2.0 * STRETCH:
-        return raw
-    frames, stamps = dict(raw.frames), dict(raw.stamps)
+        return Unstepped(raw, {})
+    frames, stamps, clocks = dict(raw.frames), dict(raw.stamps), {}
     for view in VIEWS:
-        if (step := _first_step(raw, view, span)) is None:
+        whole = view_clock(raw, view, span)
+        if (step := _first_step(raw, view, span, whole)) is None:
+            clocks[view] = whole
             continue
         at, size = step
         columns = raw.frames[view]
         before = columns["stamp"] < at
         frames[view] = {name: values[before] for name, values in columns.items()}
         stamps[view] = _judged(raw, view, before, size)
-    return raw._replace(frames=frames, stamps=stamps)
+    return Unstepped(raw._replace(frames=frames, stamps=stamps), clocks)
 
 
 def _judged(raw: Raw, view: View, before: np.ndarray, size: float) -> JudgedStamps:
@@ -59,9 +75,9 @@ def _judged(raw: Raw, view: View, before: np.ndarray, size: float) -> JudgedStam
     return JudgedStamps(good, fault)
 
 
-def _first_step(raw: Raw, view: View, span: Span) -> tuple[float, float] | None:
+def _first_step(raw: Raw, view: View, span: Span, whole: Clock) -> tuple[float, float] | None:
     """Stamp from which a step may have happened [s], and its size [s]; None without a step."""
-    series, whole = frame_series(raw.frames[view]), view_clock(raw, view, span)
+    series = frame_series(raw.frames[view])
     edges = whole.to_camera(np.array([span.first, span.last]))
     starts = np.arange(edges[0], edges[1], STRETCH)
     clocks = [(start, _clock_in(raw, view, _part(series, start), whole)) for start in starts]

@@ -1,8 +1,10 @@
 """The directory of a recording: made before the arm moves, and complete without the rig's file."""
 
+import errno
 import hashlib
 import json
 import shutil
+from contextlib import suppress
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -13,8 +15,11 @@ from pydantic import ValidationError
 from ..board import host_time
 from ..errors import RigError
 from ..rig import Rig, View
+from ..rig_numbers import RECORDED
 from ..vision.camera_model import CameraModel, as_fields, from_fields
-from .events import drop_reserve, make_reserve
+from .events import EVENTS, drop_reserve, make_reserve, read_events
+from .names import frames_file, truth_file, video_file
+from .sample import SAMPLES
 from .views import camera_model
 
 RIG = "rig.json"
@@ -22,6 +27,7 @@ VIEWS: tuple[View, View] = ("xz", "yz")
 BYTES_PER_PIXEL = 0.3  # of a noisy picture as MJPEG
 SAMPLE_BYTES = 320  # of a row of samples.csv
 WAY_TIME = 30.0  # [s] from and to where the arm waits, at the most
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # how a disk says that there is no room
 SPARE_SPACE = 2.0  # times the need
 
 
@@ -87,12 +93,36 @@ def start_directory(
         _write_first(directory / RIG, json.dumps(written, indent=1) + "\n")
         _reserve(directory)
     except OSError as err:
+        full = err.errno in FULL
         raise RigError(
             err.strerror or str(err),
             where=str(directory),
-            fix="give a directory that can be made and written to",
+            fix="make room, or give a directory on another disk"
+            if full
+            else "give a directory that can be made and written to",
         ) from err
     return directory
+
+
+def discard_directory(directory: Path) -> None:
+    """Remove what a session has left that has ended before any motion.
+
+    Nothing is done where the arm has moved, or where something cannot be removed; what is not of a
+    session stays, and its directory with it.
+
+    Args:
+        directory: Which the session itself has made or found empty.
+    """
+    if any(event["kind"] == "began" for event in read_events(directory)):
+        return
+    with suppress(OSError):
+        drop_reserve(directory)
+        names = [RIG, EVENTS, SAMPLES]
+        for view in VIEWS:
+            names += [frames_file(view), video_file(view), truth_file(view)]
+        for name in names:
+            (directory / name).unlink(missing_ok=True)
+        directory.rmdir()
 
 
 def rig_hash(rig: Rig) -> str:
@@ -118,7 +148,8 @@ def read_provenance(directory: Path) -> Provenance:
     try:
         written = json.loads(path.read_text(encoding="utf-8"))
         return Provenance(
-            rig=Rig.model_validate(written["rig"]),
+            # a recording stays readable whatever ends an arm's numbers have since
+            rig=Rig.model_validate(written["rig"], context=RECORDED),
             hash=written["hash"],
             cameras={view: from_fields(written["cameras"][view]) for view in VIEWS},
             version=written["version"],
@@ -150,10 +181,15 @@ def _check_empty(directory: Path) -> None:
 def _write_first(path: Path, text: str) -> None:
     """Write a file that nobody else has begun: of two sessions that start together one goes on."""
     try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
+        file = path.open("x", encoding="utf-8")
     except FileExistsError:
         _check_empty(path.parent)
+        raise
+    try:
+        with file:
+            file.write(text)
+    except OSError:  # leave nothing in the way of the next try
+        path.unlink()
         raise
 
 

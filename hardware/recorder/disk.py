@@ -30,7 +30,7 @@ class Disk:
             act()
         except OSError as err:
             self.trouble = Trouble.WRITE_FAILED
-            self.tell("write_failed", file=name, reason=str(err))
+            self.tell("write_failed", file=name, reason=f"{name}: {err.strerror or err}")
         self.slowest = max(self.slowest, host_time() - start)
 
     def tell(self, kind: str, **fields: Any) -> None:

@@ -43,8 +43,8 @@ def finalise(directory: str | Path) -> Path:
         OSError: The file cannot be written.
     """
     directory = Path(directory)
-    raw = without_steps(read_raw(directory), str(directory))
-    stir = extract_stir(raw, str(directory))
+    raw, clocks = without_steps(read_raw(directory), str(directory))
+    stir = extract_stir(raw, str(directory), clocks=clocks)
     drop_reserve(directory)  # room for the recording, where the disk is full
     dataset = _as_dataset(stir, _attributes(directory, raw, stir))
     return _write_whole(dataset, directory / RECORDING)

@@ -11,3 +11,8 @@ def frames_file(view: View) -> str:
 def video_file(view: View) -> str:
     """Name of a view's video."""
     return f"{view}.mkv"
+
+
+def truth_file(view: View) -> str:
+    """Name of the table of what a view's rendered frames truly showed."""
+    return f"truth_{view}.csv"

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 CONTROL = "control"  # the source whose word counts
-BAD_STAMPS = "bad_stamps"
-TROUBLES = ("refused", "write_failed", "source_lost", "same_picture", BAD_STAMPS, "failed")
+BAD_STAMPS, WRITE_FAILED = "bad_stamps", "write_failed"
+TROUBLES = ("refused", WRITE_FAILED, "source_lost", "same_picture", BAD_STAMPS, "failed")
 SILENT = "the session ended without a word: it was killed, or power was lost"
 
 Events = Sequence[dict[str, Any]]
@@ -28,9 +28,10 @@ def outcome(events: Events, cut: str = "") -> Outcome:
     told = [event for event in events if event["kind"] == "stopped"]
     told += [event for event in events if event["kind"] in TROUBLES]
     if told:
-        # control tells only that a camera's stamps are bad, the camera from which frame on
-        stamps = [_reason(event) for event in told[1:] if event["kind"] == BAD_STAMPS]
-        return Outcome("aborted", "; ".join([_reason(told[0]), *stamps[:1]]))
+        # control tells only that stamps are bad or that a file is not written; who has it, which
+        known = (event for event in told[1:] if event["kind"] in (BAD_STAMPS, WRITE_FAILED))
+        details = [_reason(event) for event in known]
+        return Outcome("aborted", "; ".join([_reason(told[0]), *details[:1]]))
     if not _carried_out(events):
         return Outcome("aborted", f"{SILENT} ({cut})" if cut else SILENT)
     return Outcome("aborted", cut) if cut else Outcome("complete", "the plan was carried out")

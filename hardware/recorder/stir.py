@@ -1,5 +1,6 @@
 """The stir in a session's raw data: one table of gripper and stick on the robot's clock."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -55,13 +56,16 @@ class Span(NamedTuple):
     cut: str = ""
 
 
-def extract_stir(raw: Raw, where: str, until: float = np.inf) -> Stir:
+def extract_stir(
+    raw: Raw, where: str, until: float = np.inf, *, clocks: Mapping[View, Clock] | None = None
+) -> Stir:
     """Cut out the stir, bring the cameras to the robot's clock, and join both views.
 
     Args:
         raw: Of a session.
         where: Its directory, for a refusal.
         until: Take nothing after this time of the robot's clock [s].
+        clocks: Of cameras that are known already, by `view_clock` of the same data.
 
     Raises:
         RigError: There is no stir, it is too short, or a camera's clock cannot be found.
@@ -69,13 +73,16 @@ def extract_stir(raw: Raw, where: str, until: float = np.inf) -> Stir:
     span = stirred(raw.samples, where, until)
     _check_length(span, where)
     series = {view: frame_series(raw.frames[view]) for view in VIEWS}
-    clocks: dict[View, Clock] = {view: view_clock(raw, view, span) for view in VIEWS}
+    known = {} if clocks is None else clocks
+    fitted: dict[View, Clock] = {
+        view: known.get(view) or view_clock(raw, view, span) for view in VIEWS
+    }
     for view in VIEWS:
-        span = _seen(span, series[view], clocks[view], f"view {view}", raw.stamps[view].fault)
+        span = _seen(span, series[view], fitted[view], f"view {view}", raw.stamps[view].fault)
     _check_length(span, where)
     time = np.arange(np.floor((span.last - span.first) * TABLE_RATE + 1e-6) + 1) / TABLE_RATE
     times = span.first + time
-    xz, yz = (JoinedView(series[v], clocks[v], raw.provenance.cameras[v]) for v in VIEWS)
+    xz, yz = (JoinedView(series[v], fitted[v], raw.provenance.cameras[v]) for v in VIEWS)
     joined = join(xz, yz, times)
     position = [np.interp(times, raw.samples["time"], raw.samples[axis]) for axis in "xyz"]
     unknown = _in_gap(raw.samples["time"], times)
@@ -86,7 +93,7 @@ def extract_stir(raw: Raw, where: str, until: float = np.inf) -> Stir:
         error=joined.error,
         flags=joined.flags,
         origin=span.first,
-        clocks=clocks,
+        clocks=fitted,
         cut=span.cut,
     )
 

@@ -2,6 +2,7 @@
 
 import errno
 import io
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from fractions import Fraction
@@ -75,9 +76,11 @@ class VideoWriter:
                 f"a picture has shape {image.shape} and type {image.dtype}, the video "
                 f"{self._shape} and uint8; set the camera's width and height in rig.toml"
             )
-        self._first = stamp if self._first is None else self._first
-        # a clock that stands or goes back must not spoil the file
-        self._last = max(self._last + 1, round((stamp - self._first) / _TICK))
+        # a clock that stands or goes back, or a stamp that is no number, must not spoil the file
+        self._last += 1
+        if math.isfinite(stamp):
+            self._first = stamp if self._first is None else self._first
+            self._last = max(self._last, round((stamp - self._first) / _TICK))
         _fill(self._picture.planes[0], image)
         self._picture.pts, self._picture.time_base = self._last, _TICK
         with _os_errors():

@@ -15,6 +15,7 @@ from ..emulator.process import EmulatorProcess
 from ..errors import RigError
 from ..motion.cup_frame import cup_frame
 from ..motion.kinematics import inverse
+from ..recorder.names import truth_file
 from ..recorder.views import camera_model
 from ..rig import Rig, View
 from ..safety.limits import Tool, workspace
@@ -138,7 +139,7 @@ class RenderedView(NamedTuple):
         place = CupPlace(rig.cup.position, float(np.radians(rig.cup.yaw_deg)))
         # webcams start when they like
         timing = Timing(rate=camera.rate, offset=1000.0 * _SEEDS[self.view], seed=seed)
-        truth = None if self.truth is None else self.truth / f"truth_{self.view}.csv"
+        truth = None if self.truth is None else self.truth / truth_file(self.view)
         return RenderedCamera(stage, StreamedWorld(self.address, place), timing, truth=truth)
 
 

@@ -13,8 +13,9 @@ from ..board import Board, Who, check_can_start
 from ..errors import MotionRejected, RigError
 from ..motion.cup_frame import cup_frame
 from ..motion.stir_paths import PosePath
-from ..recorder.directory import start_directory
+from ..recorder.directory import discard_directory, start_directory
 from ..recorder.events import EventLog, drop_reserve
+from ..rig_file import checked_rig
 from ..robot.orders import Ask, Follow, Leave, Stop, Stopped
 from ..safety.limits import check_path
 from ..safety.preflight import Check, failures
@@ -103,6 +104,7 @@ class Session:
                 self._processes.start(self.setup.assignment(), self.setup.make_cameras)
         except BaseException:
             self.close()
+            self.discard_unless_moved()
             raise
         self._progress.started = True
         self._processes.supervise()
@@ -112,9 +114,8 @@ class Session:
         setup.take_confirmation()
         extra = {"source": setup.source, "tool": setup.tool, "rehearsal": setup.rehearsal}
         videos = bool(setup.make_cameras)
-        start_directory(
-            self.directory, setup.recorded_rig(), extra, duration=setup.duration, videos=videos
-        )
+        rig = checked_rig(setup.rig)  # not the guards', whose limits a rehearsal widens
+        start_directory(self.directory, rig, extra, duration=setup.duration, videos=videos)
         log = EventLog(self.directory, "main")
         plan = "" if setup.confirmation is None else setup.confirmation.plan
         log.write("session", armed=setup.armed, address=setup.controller, plan=plan)
@@ -228,6 +229,15 @@ class Session:
         with ignored_interrupts():
             self._end_all()
 
+    def discard_unless_moved(self) -> None:
+        """Remove the directory of a session that is closed and in which no motion has begun.
+
+        What failed before the first motion must not be in the way of the next try. A dry run, which
+        never moves, calls this only if what it recorded is of no use.
+        """
+        if self.phase is Phase.CLOSED and self._log is not None and not self._progress.began:
+            discard_directory(self.directory)
+
     def _end_all(self) -> None:
         if self._processes is not None:
             last = Stop("closed during a motion") if self._progress.busy else Leave()
@@ -241,7 +251,8 @@ class Session:
     def _stop_error(self) -> SessionStopped:
         stopped = self._progress.stopped
         reason = "the session has ended" if stopped is None else stopped.reason
-        return SessionStopped(f"{reason}; look at {self.directory}, then start a new session")
+        look = f"look at {self.directory}, then " if self._progress.began else ""
+        return SessionStopped(f"{reason}; {look}start a new session")
 
 
 def _end_by_signal(number: int, _: object) -> None:

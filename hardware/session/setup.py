@@ -11,7 +11,7 @@ from ..errors import RigError
 from ..motion.cup_frame import cup_frame
 from ..motion.stir_paths import PosePath
 from ..rig import Rig, View
-from ..rig_geometry import check_geometry
+from ..rig_file import checked_rig
 from ..robot.orders import Assignment
 from ..safety.limits import Tool
 from .confirmation import Confirmation
@@ -66,17 +66,13 @@ class SessionSetup:
         """Of the plan [s]."""
         return sum(path.duration for path in self.plan)
 
-    def recorded_rig(self) -> Rig:
-        """The rig, validated: copies of a rig may hold numbers that its file may not.
+    def guarded_rig(self) -> Rig:
+        """The rig by whose limits the arm is guarded; wider ones in a rehearsal.
 
         Raises:
-            ValueError: A number is not allowed, or they contradict each other.
+            RigError: A number of the rig is not allowed, or they contradict each other.
         """
-        return check_geometry(Rig.model_validate(self.rig.model_dump()))
-
-    def guarded_rig(self) -> Rig:
-        """The rig by whose limits the arm is guarded; wider ones in a rehearsal."""
-        rig = self.recorded_rig()
+        rig = checked_rig(self.rig)
         return patient(rig) if self.rehearsal else rig
 
     def assignment(self) -> Assignment:

@@ -8,7 +8,12 @@ import pytest
 
 import bolfi_liquids as bl
 from bolfi_liquids.inputs.bundled import RECORDED_LIQUIDS, bundled_recording
-from bolfi_liquids.inputs.table_import import import_table, outline, write_template
+from bolfi_liquids.inputs.table_import import (
+    at_camera_times,
+    import_table,
+    outline,
+    write_template,
+)
 from bolfi_liquids.inputs.table_map import open_table_map
 
 TRUTH = files("bolfi_liquids.data") / "water_v10.nc"
@@ -92,6 +97,77 @@ def test_cells_without_a_number_are_missing_samples(tmp_path, written, truth):
     missing = [list(np.flatnonzero(np.isnan(angle))) for angle in found.inclination.T]
     assert missing == [[39, 40, 41], [49]]
     assert "seen in" in outline(found)
+
+
+def merged(truth, *, robot, share=1.0, blind=slice(0, 0)):
+    """Changes a table into a robot's log and a camera's, merged by their times."""
+
+    def change(rows):
+        camera = [row[:1] + ["", "", ""] + row[4:] for row in rows[1:]]
+        for row in camera[blind]:
+            row[4:6] = ["", ""]
+        times = np.arange(truth.time[0], share * truth.time[-1], 1.0 / robot)
+        way = [np.interp(times, truth.time, axis) for axis in truth.gripper.position.T]
+        columns = (1e3 * times, 1e3 * way[0], -1e3 * way[1], 1e3 * way[2] + OFFSET)
+        of_robot = [
+            [f"{value:.9g}".replace(".", ",") for value in row] + ["", "", ""]
+            for row in zip(*columns, strict=True)
+        ]
+        taken = {row[0] for row in of_robot}
+        both = of_robot + [row for row in camera if row[0] not in taken]
+        seen = {row[0]: row for row in camera}
+        for row in of_robot:
+            row[4:] = seen.get(row[0], row)[4:]
+        rows[1:] = sorted(both, key=lambda row: float(row[0].replace(",", ".")))
+
+    return change
+
+
+@pytest.mark.parametrize("robot", [125.0, 500.0])
+def test_a_robot_s_fast_log_is_interpolated_to_the_cameras_and_named(
+    tmp_path, written, truth, caplog, robot
+):
+    caplog.set_level("INFO")
+    table = table_of(tmp_path / "merged.csv", truth, merged(truth, robot=robot))
+    found = import_table(table, written[1], tmp_path / "merged.nc")
+    count = len(found.time)  # the robot's log ends a little before the cameras'
+    assert len(truth.time) - 2 <= count <= len(truth.time)
+    np.testing.assert_allclose(found.time, truth.time[:count], atol=1e-8)
+    np.testing.assert_allclose(found.inclination, truth.inclination[:count], atol=1e-8)
+    seen = np.isfinite(found.gripper.position).all(axis=1)
+    assert seen[:-3].all()
+    apart = found.gripper.position[seen] - truth.gripper.position[:count][seen]
+    assert np.abs(apart).max() < 5e-4  # 0.1 m/s for 4 ms
+    for said in (caplog.text, found.attrs["history"]):
+        assert "x, y, z were interpolated" in said and "inclination_xz" in said
+
+
+def test_a_stick_that_is_out_of_sight_is_not_taken_for_a_slow_camera(tmp_path, written, truth):
+    def blind(rows):
+        for row in rows[len(rows) // 3 :]:
+            row[4] = row[5] = ""
+
+    table = table_of(tmp_path / "blind.csv", truth, blind)
+    with pytest.raises(ValueError, match="must be seen"):
+        import_table(table, written[1], tmp_path / "blind.nc")
+    values = {"time": np.arange(90) / 30.0} | {name: np.zeros(90) for name in "xyz"}
+    angle = np.full(90, np.nan)
+    angle[np.r_[0:10, 40:50, 80:90]] = 0.1
+    same, told = at_camera_times(values | {"inclination_xz": angle, "inclination_yz": angle})
+    assert told == "" and len(same["time"]) == 90
+
+
+def test_the_robot_s_own_gap_is_not_filled():
+    time = np.arange(0.0, 6.0, 0.008)
+    seen = np.arange(len(time)) % 4 == 2
+    known = ~seen & ~((time > 2.0) & (time < 3.0))
+    angle, place = np.where(seen, 0.1, np.nan), np.where(known, time, np.nan)
+    values = {"time": time, "inclination_xz": angle, "inclination_yz": angle}
+    made, told = at_camera_times(values | dict.fromkeys("xyz", place))
+    inside = (made["time"] > 2.01) & (made["time"] < 2.99)
+    outside = (made["time"] < 1.98) | (made["time"] > 3.02)
+    assert told and np.isnan(made["x"][inside]).all()
+    np.testing.assert_allclose(made["x"][outside][:-1], made["time"][outside][:-1])
 
 
 @pytest.mark.parametrize(

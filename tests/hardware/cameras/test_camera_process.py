@@ -322,6 +322,29 @@ def test_a_file_that_may_not_grow_is_told_and_the_camera_goes_on(start, tmp_path
     assert len(frames(tmp_path)["index"]) >= 10
 
 
+@pytest.mark.parametrize("file", ["frames_xz.csv", "xz.mkv"])
+def test_a_full_disk_is_told_and_the_camera_goes_on(start, tmp_path, file):
+    (tmp_path / file).symlink_to("/dev/full")  # each write fails as on a full disk (ENOSPC)
+    running = start(rendered())
+    row = running.wait(lambda row: row.trouble and row.beat)
+    assert row.trouble == Trouble.WRITE_FAILED
+    later = running.wait(lambda later: later.count > row.count + 5)
+    assert later.beat > row.beat
+    running.end()
+    failed, left = read_events(tmp_path)
+    assert (failed["kind"], left["kind"]) == ("write_failed", "left")
+    assert failed["reason"] == f"{file}: No space left on device"
+
+
+def test_a_stamp_that_is_no_number_costs_no_video(tmp_path):
+    stamps = [np.nan, 5.0, 5.1, np.inf, 5.2]
+    video = VideoWriter(tmp_path / "xz.mkv", size=(640, 480), rate=30.0)
+    for k, stamp in enumerate(stamps):
+        video.write(np.full((480, 640), 40 * k, np.uint8), stamp)
+    video.close()
+    assert len(pictures(tmp_path)) == len(stamps)
+
+
 def test_lost_and_repeated_pictures_are_counted():
     tally = Tally(no_rate(0.0))
     for k, index in enumerate([0, 1, 2, 5, 6, 10]):

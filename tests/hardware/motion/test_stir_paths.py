@@ -92,7 +92,7 @@ def test_strokes_continue_each_other_and_join_to_the_whole(rig):
     for before, after in zip(parts, parts[1:], strict=False):
         assert after.pose[0] == pytest.approx(before.pose[-1], abs=1e-12)
     assert joined(parts).pose == pytest.approx(stir(rig, 3).pose)
-    with pytest.raises(ValueError, match="cycles must be at least 1, got 0"):
+    with pytest.raises(ValueError, match="0 is not from 1 to"):
         stir(rig, 0)
 
 

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
-from bolfi_liquids.hardware.recorder.clock_steps import MIN_UNEVENNESS, unevenness
+from bolfi_liquids.hardware.recorder.clock_steps import MIN_UNEVENNESS, unevenness, without_steps
 from bolfi_liquids.hardware.recorder.finalise import finalise
+from bolfi_liquids.hardware.recorder.raw import read_raw
+from bolfi_liquids.hardware.recorder.stir import extract_stir
 from closed_form_session import WAY, inclination
 
 import bolfi_liquids as bl
@@ -60,6 +62,25 @@ def test_odd_stamps_are_left_out_and_counted(session):
     assert recording.attrs["camera_yz_bad_stamps"] == 0
     apart = recording.inclination - inclination(WAY + recording.time)
     assert np.degrees(np.nanmax(np.abs(apart))) < 0.2
+
+
+@pytest.mark.parametrize("stamp", [1e9, 0.0, float("nan")])
+def test_a_wrong_first_stamp_costs_its_own_frame_only(session, stamp):
+    def wrong(_, frames):
+        frames["xz"][0] = frames["xz"][0]._replace(stamp=stamp)
+
+    recording = bl.open_recording(finalise(session(change=wrong)))
+    assert recording.attrs["status"] == "complete"
+    assert recording.attrs["camera_xz_bad_stamps"] == 1
+
+
+def test_a_clock_without_a_step_is_fitted_once(session):
+    raw = read_raw(session())
+    same, clocks = without_steps(raw, "here")
+    assert same.frames == raw.frames and set(clocks) == {"xz", "yz"}
+    for view, clock in extract_stir(raw, "here").clocks.items():
+        assert clocks[view] == clock
+    assert extract_stir(raw, "here", clocks=clocks).clocks == clocks
 
 
 @pytest.mark.parametrize(

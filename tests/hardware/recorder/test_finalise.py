@@ -1,3 +1,7 @@
+import errno
+import json
+import subprocess
+import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -8,6 +12,7 @@ import pytest
 import xarray
 from bolfi_liquids.hardware.errors import RigError
 from bolfi_liquids.hardware.recorder.directory import (
+    discard_directory,
     read_provenance,
     rig_hash,
     start_directory,
@@ -267,6 +272,15 @@ def test_the_stir_so_far_is_the_beginning_of_the_whole(session):
             "aborted",
             "camera xz gives no times; camera_xz: bad stamps: from frame 812 on",
         ),
+        (
+            (
+                {"source": "control", "kind": "stopped", "reason": "recorder cannot write"},
+                {"source": "recorder", "kind": "write_failed", "reason": "samples.csv: full"},
+            ),
+            "",
+            "aborted",
+            "recorder cannot write; recorder: write failed: samples.csv: full",
+        ),
     ],
 )
 def test_only_control_s_word_makes_a_recording_complete(events, cut, status, reason):
@@ -302,6 +316,66 @@ def test_a_damaged_rig_file_is_refused(tmp_path):
     (tmp_path / "rig.json").write_text('{"rig": ')
     with pytest.raises(RigError, match=r"rig\.json: cannot be used"):
         finalise(tmp_path)
+
+
+def test_a_recording_of_a_rig_that_may_not_move_any_more_is_read(session, tmp_path):
+    """Ends of a rig's numbers keep an arm from harm; a recording moves nothing."""
+    directory = session()
+    known = json.loads((directory / "rig.json").read_text())
+    known["rig"]["limits"] |= {"force": 100.0, "frame_age": 0.5, "acceleration": 2.0}
+    known["rig"]["stirring"] |= {"acceleration": 2.0, "cycles": 500}
+    known["rig"]["robot"]["start"][0] += 0.5
+    known["rig"]["pouring"]["receiver"] = known["rig"]["cup"]["position"]
+    (directory / "rig.json").write_text(json.dumps(known))
+    assert bl.open_recording(finalise(directory)).attrs["status"] == "complete"
+    assert partial(directory).origin > 0.0
+    out = tmp_path / "cut.nc"
+    done = CliRunner().invoke(app, ["trim", str(directory), "--out", str(out)])
+    assert done.exit_code == 0, done.stderr
+
+
+def test_a_disk_that_is_full_at_the_start_leaves_nothing_in_the_way(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("os.posix_fallocate", full)
+        with pytest.raises(RigError, match="No space left on device; make room"):
+            start_directory(tmp_path / "a", RIG)
+    start_directory(tmp_path / "a", RIG)
+
+
+LIMITED = """
+import resource, sys
+from bolfi_liquids.hardware.recorder.directory import start_directory
+from bolfi_liquids.hardware.rig_file import bundled_rig
+resource.setrlimit(resource.RLIMIT_FSIZE, (100, resource.RLIM_INFINITY))
+start_directory(sys.argv[1], bundled_rig())
+"""
+
+
+def test_a_rig_file_that_is_not_written_whole_is_not_left(tmp_path):
+    command = [sys.executable, "-c", LIMITED, str(tmp_path / "a")]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert "File too large; make room" in done.stderr
+    start_directory(tmp_path / "a", RIG)
+
+
+def test_only_what_a_session_left_before_any_motion_is_discarded(session, tmp_path):
+    moved = session()
+    held = sorted(moved.iterdir())
+    discard_directory(moved)
+    assert sorted(moved.iterdir()) == held
+    rested = start_directory(tmp_path / "rested", RIG)
+    for name in ("events.jsonl", "samples.csv", "frames_xz.csv", "xz.mkv", "truth_yz.csv"):
+        (rested / name).write_text("")
+    discard_directory(rested)
+    assert not rested.exists()
+    other = start_directory(tmp_path / "other", RIG)
+    (other / "notes.txt").write_text("mine")
+    discard_directory(other)
+    assert [path.name for path in other.iterdir()] == ["notes.txt"]
+    discard_directory(tmp_path / "nothing")
 
 
 def test_of_two_sessions_that_start_together_one_gets_the_directory(tmp_path):

@@ -253,6 +253,24 @@ def test_a_file_that_may_not_grow_is_told_and_samples_are_drained(recorder, tmp_
     assert kept.tolist() == list(range(len(kept)))
 
 
+def test_a_table_that_cannot_be_begun_on_a_full_disk_is_told(tmp_path):
+    (tmp_path / SAMPLES).symlink_to("/dev/full")  # each write fails as on a full disk (ENOSPC)
+    running = Running(tmp_path)
+    try:
+        running.send(0, 500)
+        assert running.wait(lambda row: row.trouble).trouble == Trouble.WRITE_FAILED
+        running.wait(lambda row: row.count == 500)  # never blocks its sender
+        running.samples.close()
+        running.main.close()
+        running.process.join(20)
+    finally:
+        running.process.kill()
+        running.process.join()
+    failed, *_, left = read_events(tmp_path)
+    assert (failed["kind"], left["kind"]) == ("write_failed", "left")
+    assert failed["reason"] == f"{SAMPLES}: No space left on device"
+
+
 @pytest.fixture
 def small_disk(tmp_path):
     place = tmp_path / "small"

@@ -94,10 +94,58 @@ def test_a_watch_concludes_once_and_for_all(rng):
         watch.take(*row)
     fault = watch.fault
     assert fault is not None
-    assert not watch.take(400, stamp[400], host[400])
-    assert watch.fault == fault
+    watch.take(400, stamp[400], host[400])
+    assert watch.fault == fault and 400 in watch.left_out
 
 
 def test_no_frames_have_no_fault():
     nothing = np.empty(0)
     assert judged_stamps(nothing, nothing, nothing).fault == ""
+
+
+WRONG_FIRST = {
+    "far ahead": lambda stamp: stamp + 1e9,
+    "zero": lambda stamp: 0.0 * stamp,
+    "behind": lambda stamp: stamp - 3.0,
+    "ahead": lambda stamp: stamp + 3.0,
+    "a little ahead": lambda stamp: stamp + 0.4,
+    "nan": lambda stamp: np.nan * stamp,
+    "another unit": lambda stamp: 1e3 * stamp,
+    "garbage": lambda stamp: np.random.default_rng(7).uniform(-1e6, 1e6, len(stamp)),
+}
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+@pytest.mark.parametrize("kind", WRONG_FIRST)
+def test_wrong_first_stamps_cost_their_own_frames_only(rng, kind, count):
+    index, stamp, host = arrivals(rng)
+    stamp[:count] = WRONG_FIRST[kind](stamp[:count])
+    judged = judged_stamps(index, stamp, host)
+    assert judged.fault == ""
+    assert np.flatnonzero(~judged.good).tolist() == list(range(count))
+
+
+@pytest.mark.parametrize("at", [0, 1, 3, 20, 400])
+@pytest.mark.parametrize("ahead", [0.1, 0.2, 0.45])  # of one frame alone either may be wrong
+def test_a_stamp_that_is_a_little_ahead_condemns_none_of_those_that_it_overtakes(rng, at, ahead):
+    index, stamp, host = arrivals(rng)
+    stamp[at] += ahead
+    judged = judged_stamps(index, stamp, host)
+    assert (np.flatnonzero(~judged.good).tolist(), judged.fault) == ([at], "")
+
+
+@pytest.mark.parametrize("kind", ["unit", "stand", "back", "zero", "nan"])
+@pytest.mark.parametrize("start", [1, 4, 15])
+def test_a_clock_that_is_lost_at_its_start_is_lost(rng, kind, start):
+    index, stamp, host = arrivals(rng)
+    elapsed = stamp - stamp[start]
+    lost = {
+        "unit": 1e3 * stamp,
+        "stand": np.full(len(stamp), stamp[start - 1]),
+        "back": stamp[start - 1] - elapsed,
+        "zero": np.zeros(len(stamp)),
+        "nan": np.full(len(stamp), np.nan),
+    }[kind]
+    stamp[start:] = lost[start:]
+    judged = judged_stamps(index, stamp, host)
+    assert judged.fault and not judged.good[start + MAX_BAD_STAMPS :].any()

@@ -1,0 +1,100 @@
+"""A rig whose joints and numbers disagree about the cup's place by more than is safe is refused."""
+
+import numpy as np
+import pytest
+from bolfi_liquids.hardware.errors import RigError
+from bolfi_liquids.hardware.motion.cup_frame import cup_frame
+from bolfi_liquids.hardware.motion.kinematics import inverse
+from bolfi_liquids.hardware.motion.stir_paths import (
+    above_cup,
+    approach,
+    insert,
+    placed,
+    retract,
+    stir,
+)
+from bolfi_liquids.hardware.rig import Rig
+from bolfi_liquids.hardware.rig_file import bundled_rig, checked_rig
+from bolfi_liquids.hardware.rig_geometry import MAX_START_AWAY, clearance
+from bolfi_liquids.hardware.safety.limits import workspace
+
+BUNDLED = bundled_rig()
+CONTROLLERS = ("cb3", "e-series")
+SIDES = np.array([[1, 0, 0], [0, -1, 0], [-0.6, 0.8, 0], [0, 0, 1], [0, 0, -1]], float)
+
+
+def changed(rig: Rig, **sections) -> Rig:
+    parts = {name: getattr(rig, name).model_copy(update=of) for name, of in sections.items()}
+    return rig.model_copy(update=parts)
+
+
+def started(rig: Rig, shift=(0.0, 0.0, 0.0)) -> Rig:
+    """The rig with `start` read off where the pivot is, by `shift` [m], not above the cup."""
+    space, place = workspace(rig, "stirring"), above_cup(rig)
+    place[:3] += shift
+    found = inverse(space.arm, cup_frame(rig.cup).to_base(place), space.start, tcp=space.tcp)
+    assert found.status == "ok"
+    return changed(rig, robot={"start": tuple(np.round(found.joints, 5).tolist())})
+
+
+def rig_of(controller: str) -> Rig:
+    return started(changed(BUNDLED, robot={"controller": controller}))
+
+
+def met(rig: Rig, shift) -> bool:
+    """Whether the stick of the planned motions meets a cup that stands where `start` says."""
+    beside = placed(above_cup(rig), x=0.05, y=0.05)
+    for path in (approach(rig, beside), insert(rig), stir(rig), retract(rig)):
+        x, y, z = (path.pose[:, :3] - shift).T
+        tip, away = z - rig.stick.length, np.hypot(x, y)
+        wall = (tip <= rig.cup.height) & (away + rig.stick.radius >= rig.cup.radius)
+        if wall.any() or (tip <= 0.0).any():
+            return True
+    return False
+
+
+def refused(rig: Rig) -> bool:
+    try:
+        checked_rig(rig)
+    except RigError as err:
+        assert err.where == "rig: robot.start"
+        return True
+    return False
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_no_start_that_is_accepted_lets_the_stick_meet_the_cup(controller):
+    rig, accepted, harmful = rig_of(controller), 0, 0
+    for side in SIDES:
+        for size in (0.0, 0.003, 0.009, 0.0115, 0.0145, 0.016, 0.026, 0.039):
+            shift = size * side
+            touches = met(rig, shift)
+            harmful += touches
+            if not refused(started(rig, shift)):
+                accepted += 1
+                assert not touches, shift
+    assert accepted > 10 and harmful > 10
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS)
+@pytest.mark.parametrize("side", SIDES)
+def test_a_start_is_accepted_up_to_the_rig_s_own_clearance(controller, side):
+    rig = rig_of(controller)
+    most = clearance(rig).along if side[2] else clearance(rig).aside
+    assert not refused(started(rig, 0.95 * most * side))
+    assert refused(started(rig, 1.05 * most * side))
+
+
+def test_a_narrow_rig_needs_a_nearer_start_and_a_wide_one_none_further_than_a_cup():
+    narrow = started(changed(BUNDLED, stirring={"radius": 0.0345}), (0.003, 0.0, 0.0))
+    assert clearance(narrow).aside == pytest.approx(0.001)
+    assert refused(narrow) and not refused(started(narrow))
+    wide = changed(BUNDLED, cup={"radius": 0.12})
+    assert clearance(wide).aside > MAX_START_AWAY
+    assert not refused(started(wide, (0.035, 0.0, 0.0)))
+    assert refused(started(wide, (0.045, 0.0, 0.0)))
+
+
+def test_the_bundled_start_is_that_of_its_controller():
+    assert not refused(BUNDLED)
+    assert refused(changed(BUNDLED, robot={"controller": "e-series"}))
