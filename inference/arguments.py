@@ -4,6 +4,8 @@ Loads nothing but NumPy, for workers import it.
 """
 
 import math
+from collections.abc import Callable, Mapping
+from numbers import Real
 from operator import index
 from typing import Any
 
@@ -27,7 +29,8 @@ class Unusable(ValueError):
 
 
 def float64(value: object) -> np.ndarray:
-    """`value` as a float64 array of its own; what is masked is NaN, and so is None within it.
+    """`value` as a float64 array of its own; what is masked is NaN, and so are None and pandas.NA
+    within it.
 
     Booleans and integers are numbers; a number that float64 cannot hold becomes infinite.
 
@@ -37,7 +40,7 @@ def float64(value: object) -> np.ndarray:
     """
     try:
         with np.errstate(all="ignore"):  # a user may have made NumPy raise
-            array = np.ma.asarray(value)
+            array = np.ma.asarray(_unmasked(value))
             if array.dtype.kind == "O" and value is not None:
                 return _of_objects(array)
             if array.dtype.kind in NUMBERS and array.dtype.names is None:
@@ -48,6 +51,23 @@ def float64(value: object) -> np.ndarray:
     raise Unusable(described(value))
 
 
+def _unmasked(value: object) -> object:
+    """Sequences of masked arrays, at any depth, without masks: NumPy would drop those of inner
+    lists, and take what they hide for numbers."""
+    if not isinstance(value, list | tuple):
+        return _computed(value)
+    inner = map(_unmasked, value)
+    return [float64(one) if isinstance(one, np.ma.MaskedArray) else one for one in inner]
+
+
+def _computed(value: Any) -> object:
+    """Chunks of Dask in memory, also those that xarray labels: NumPy would drop their masks."""
+    library = type(value).__module__.partition(".")[0]
+    held = getattr(value, "data", value) if library == "xarray" else value
+    lazy = type(held).__module__.startswith("dask.") and hasattr(held, "compute")
+    return held.compute() if lazy else value
+
+
 def _of_objects(array: np.ma.MaskedArray) -> np.ndarray:
     hidden = np.ma.getmaskarray(array).ravel()
     items = np.ma.getdata(array).ravel()
@@ -56,7 +76,7 @@ def _of_objects(array: np.ma.MaskedArray) -> np.ndarray:
 
 
 def _number(item: Any) -> float:
-    if item is None or item is np.ma.masked:
+    if item is None or item is np.ma.masked or type(item).__name__ == "NAType":  # of pandas
         return np.nan
     if isinstance(item, str | bytes) or np.iscomplexobj(item) or np.ndim(item):
         raise TypeError("not a real number")
@@ -81,20 +101,20 @@ def described(value: object) -> str:
     return f"an object of type {kind}"
 
 
-def checked_integer(name: str, value: object, least: int = 1) -> int:
+def checked_integer(name: str, value: object, least: int = 1, most: int = LARGEST_INTEGER) -> int:
     """`value`, an integer of any library, as Python's own.
 
     Raises:
-        ValueError: not an integer, or not from `least` to `LARGEST_INTEGER`.
+        ValueError: not an integer, or not from `least` to `most`.
     """
-    refusal = f"{name} must be an integer from {least} to {LARGEST_INTEGER}, got {value!r:.100}"
+    refusal = f"{name} must be an integer from {least} to {most}, got {value!r:.100}"
     if isinstance(value, bool):
         raise ValueError(refusal)
     try:
         number = index(value)  # pyright: ignore[reportArgumentType]  or TypeError
     except TypeError as error:
         raise ValueError(refusal) from error
-    if not least <= number <= LARGEST_INTEGER:
+    if not least <= number <= most:
         raise ValueError(refusal)
     return number
 
@@ -123,6 +143,53 @@ def check_progress(progress: object) -> None:
     if not (isinstance(progress, bool) or callable(progress)):
         raise ValueError(
             f"progress must be True, False or a function of a count, got {progress!r:.100}"
+        )
+
+
+def check_flag(name: str, value: object) -> None:
+    """Raise ValueError unless `value` is True or False."""
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(f"{name} must be True or False, got {value!r:.100}")
+
+
+def checked_number(name: str, value: object, fits: Callable[[float], bool], due: str) -> float:
+    """`value`, a real number of any library that fits, as Python's own.
+
+    Args:
+        name: The argument's.
+        value: As a user gives it.
+        fits: Whether a number is in range; NaN never is.
+        due: What is in range, in words.
+
+    Raises:
+        ValueError: no number, or out of range.
+    """
+    number = isinstance(value, Real) and not isinstance(value, bool | np.bool_)
+    if not number or math.isnan(value) or not fits(float(value)):
+        raise ValueError(f"{name} must be {due}, got {value!r:.100}")
+    return float(value)
+
+
+def checked_mapping(name: str, value: object, due: str) -> dict[str, Any]:
+    """`value`, a mapping of names or None, as a dictionary.
+
+    Raises:
+        ValueError: not a mapping of text.
+    """
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
+        raise ValueError(f"{name} must map names to {due}, or be None, got {value!r:.100}")
+    return dict(value)
+
+
+def check_kind(name: str, value: object, kind: Any) -> None:
+    """Raise ValueError unless `value` is of a kind, or of one of a union of kinds."""
+    if not isinstance(value, kind):
+        due = getattr(kind, "__name__", str(kind))
+        raise ValueError(
+            f"{name} must be of the type {due}, got {value!r:.100} of the type "
+            f"{type(value).__name__}"
         )
 
 

@@ -3,16 +3,16 @@
 import time
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any, cast
+from typing import Any
 
 import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ._float64 import in_float64
-from .acquisition import rules as acquisitions
+from .acquisition.given import chosen, resolve_acquisition
 from .acquisition.replicates import next_replicate
-from .arguments import Unusable, checked_array, checked_integer
+from .arguments import Unusable, check_flag, checked_array, checked_integer, checked_mapping
 from .describe import describe
 from .gp.process import padded_rows
 from .history import (
@@ -20,17 +20,21 @@ from .history import (
     History,
     explain,
     init,
+    laid_out,
     remember_asked,
     remember_told,
+    told_errors,
+    told_seeds,
 )
 from .notebook_display import as_html, as_text
-from .prior import Prior
+from .prior import Prior, check_prior
 from .result import Fit
-from .simulations.failures import unusable
+from .simulations.failures import Failure, incomparable, kind, unusable
+from .simulations.job import BATCH
 from .simulations.returned import told_signals
 from .sobol import sobol, start_size
 from .surrogates.base import Acquisition
-from .surrogates.families import Family, Learnable, resolve
+from .surrogates.families import Family, Learnable, Measured, resolve
 from .surrogates.feasibility import feasibility
 from .surrogates.outliers import sane
 from .surrogates.warnings import EmulatorWarning
@@ -78,11 +82,7 @@ class Bolfi:
         capacity: int = 256,
         **options: Any,
     ):
-        if not isinstance(prior, Prior):
-            raise ValueError(
-                f"prior must be a Prior, got {type(prior).__name__}; "
-                "make one of name -> distribution by inference.Prior({...})"
-            )
+        check_prior(prior)
         self.prior = prior
         self.observed = checked_array("observed", observed)
         if np.isinf(self.observed).any():
@@ -94,7 +94,7 @@ class Bolfi:
         self.capacity = checked_integer("capacity", capacity)
         self.family = resolve(surrogate, options)
         self._learner = self.family.learner(self.observed)
-        self._acquire = _resolve(acquisition, self.family)
+        self._acquire = resolve_acquisition(acquisition, self.family.name, self.family.acquisition)
         # a user's own function may compare unlike shapes
         self._any_shape = self._learner.any_shape
         self.settings: dict[str, object] = {
@@ -149,14 +149,13 @@ class Bolfi:
 
     @property
     def signal_shape(self) -> tuple[int, ...]:
-        """Shape of one simulated signal: that of `observed`, or of the signals told so far."""
+        """Shape of one simulated signal: that of `observed`, or of most signals told so far."""
         return self._state.history.signals.shape[1:]
 
     @property
     def expected_shape(self) -> tuple[int, ...] | None:
-        """`signal_shape`; None while a user's discrepancy leaves it to the first signals."""
-        free = self._any_shape and np.isnan(self._state.history.signals).all()
-        return None if free else self.signal_shape
+        """`signal_shape`; None where a user's discrepancy or summary takes signals of any shape."""
+        return None if self._any_shape else self.signal_shape
 
     def ask(self, n: int = 1) -> dict[str, np.ndarray]:
         """The next n different points to simulate, name -> [n].
@@ -200,7 +199,8 @@ class Bolfi:
             runs = feasibility(history.u, history.succeeded & sane(history.discrepancy), rows)
             key = jax.random.fold_in(jax.random.key(self.seed), self._state.asked)
             believing = self._learned.believe(self.prior.to_unit(self.prior.to_dict(pending)))
-            u = np.asarray(in_float64(self._acquire)(key, believing, n - len(parts), runs))
+            shape = n - len(parts), len(self.prior)
+            u = chosen(in_float64(self._acquire)(key, believing, shape[0], runs), shape)
             # coarser than rounding errors, so that arrays of another size ask the same
             u = np.clip(np.round(u, ASKED_DIGITS), ASKED_EDGE, 1.0 - ASKED_EDGE)
             parts.append(self.prior.to_array(self.prior.from_unit(u)))
@@ -226,43 +226,72 @@ class Bolfi:
         """Give the engine finished simulations: any number, any order, asked for or not.
 
         A row of NaN reports a failed run. It counts as told, but nothing is learned from it. So
-        does whatever is no signal among a list or tuple of signals.
+        does whatever is no signal among a list or tuple of signals, and a signal on which the
+        user's own discrepancy or summary fails.
 
         Args:
             theta: Name -> [n], in the prior's support.
-            signals: [n, *signal_shape], or a list of n signals.
+            signals: [n, *signal_shape], or a list of n signals; these may be of any shapes where
+                a discrepancy or summary of the user's own compares them.
             seeds: Seeds of the runs [n], to be kept with the results. Of runs with equal theta
                 and seed one is learned from.
             errors: Why a run failed [n], to be kept for rows of NaN; "" elsewhere.
 
         Raises:
-            ValueError: shapes disagree, or theta lies outside the prior's support.
+            ValueError: shapes disagree, theta lies outside the prior's support, or the user's
+                discrepancy or summary has failed on each of the first four signals.
         """
         started = time.perf_counter()
         natural = np.atleast_2d(self.prior.to_array(theta))
         rows = self.prior.to_dict(natural)
-        signals, faults = self._signals(len(natural), signals)
+        told_rows, faults = self._signals(len(natural), signals)
         outside = np.flatnonzero(~self.prior.contains(rows))
         if outside.size:
             first = {name: float(column[outside[0]]) for name, column in rows.items()}
             raise ValueError(f"theta must lie in the support of the prior, got {first}")
-        given_errors = _errors(errors, len(natural))
-        features, discrepancy = self._learner.measure(signals)
+        given_errors, given_seeds = (
+            told_errors(errors, len(natural)),
+            told_seeds(seeds, len(natural)),
+        )
+        measured = _located(self._learner.measure(told_rows), rows, given_seeds)
+        self._check_compared(measured)
+        found = np.where(faults == "", np.array(measured.errors, str), faults)
+        why = np.where(found == "", given_errors, found)
+        kept, unlike = laid_out(told_rows, self.signal_shape)
         told = History(
             theta=natural,
             u=self.prior.to_unit(rows),
-            signals=signals,
-            features=features,
-            discrepancy=discrepancy,
-            seeds=_seeds(seeds, len(natural)),
+            signals=kept,
+            features=measured.features,
+            discrepancy=measured.discrepancy,
+            seeds=given_seeds,
             rounds=np.full(len(natural), UNKNOWN),
-            errors=explain(signals, discrepancy, np.where(faults == "", given_errors, faults)),
+            errors=explain(told_rows, measured.discrepancy, why),
+            unlike=unlike,
         )
         self._state = remember_told(self._state, told)
         self._seconds += time.perf_counter() - started
 
-    def _signals(self, n: int, signals: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Signals [n, *signal_shape] as told, and what was told in the place of each, str [n]."""
+    def _check_compared(self, measured: Measured) -> None:
+        """Raise ValueError if the user's own function failed on all of the first signals.
+
+        One on which it fails is a failed run; where none of the first can be compared, all would
+        fail in the same way.
+        """
+        if self.succeeded or np.isfinite(measured.discrepancy).any():
+            return
+        failed = [
+            error
+            for error in (*self.errors, *measured.errors)
+            if error and kind(error) is Failure.INCOMPARABLE
+        ]
+        if len(failed) >= BATCH:
+            raise ValueError(failed[-1].removeprefix(incomparable("")))
+
+    def _signals(
+        self, n: int, signals: ArrayLike
+    ) -> tuple[Sequence[np.ndarray | None], np.ndarray]:
+        """The n signals told, None where something else was, and what that was, str [n]."""
         shape = self.expected_shape
         try:
             rows, faults = told_signals(signals, n, shape)
@@ -275,9 +304,8 @@ class Bolfi:
             raise ValueError(
                 f"signals must have shape {due}, one row per theta, got {error.shape}"
             ) from error
-        told = [
-            fault and unusable(f"{fault} was told, {rows.shape[1:]} is due") for fault in faults
-        ]
+        due = "an array of numbers" if shape is None else shape
+        told = [fault and unusable(f"{fault} was told, {due} is due") for fault in faults]
         return rows, np.array(told, str)
 
     def fit(
@@ -295,16 +323,20 @@ class Bolfi:
             stacklevel: Of the warnings; 2 blames the line that calls this.
 
         Raises:
-            ValueError: fewer than three simulations succeeded.
+            ValueError: bad argument; fewer than three simulations succeeded.
 
         Warns:
             EmulatorWarning: for each of the surrogate's complaints, unless warn=False; they are
                 in `Fit.warnings` in any case.
         """
+        measured = checked_mapping("seconds", seconds, "times [s]")
+        check_flag("warn", warn)
+        stacklevel = checked_integer("stacklevel", stacklevel)
         if self.succeeded < MIN_LEARN:
+            last = f"; the last error: {self.errors[-1]}" if self.errors else ""
             raise ValueError(
                 f"a fit needs {MIN_LEARN} successful simulations, got {self.succeeded} of "
-                f"{self.told} told; tell more"
+                f"{self.told} told; tell more{last}"
             )
         started = time.perf_counter()
         known, history = self._known(), self._state.history
@@ -319,53 +351,19 @@ class Bolfi:
             learned=fitted,
             learned_from=learned_from,
             settings=self.settings,
-            seconds={"simulator": 0.0, **(seconds or {}), "engine": spent},
+            seconds={"simulator": 0.0, **measured, "engine": spent},
         )
         for complaint in made.warnings if warn else []:
             warnings.warn(complaint, EmulatorWarning, stacklevel=stacklevel)
         return made
 
 
-def _resolve(given: str | Acquisition | None, family: Family) -> Acquisition:
-    acquisition: Any = family.acquisition if given is None else given
-    if isinstance(acquisition, str):
-        if acquisition not in acquisitions.RULES:
-            raise ValueError(
-                f"acquisition must be one of {tuple(acquisitions.RULES)}, an object or None, "
-                f"got {acquisition!r}"
-            )
-        acquisition = acquisitions.RULES[acquisition]()
-    if not callable(acquisition) or isinstance(acquisition, type):
-        raise ValueError(
-            f"acquisition must be a name or an object to be called, got {acquisition!r:.100}"
-        )
-    bound = isinstance(acquisition, acquisitions.LowerConfidenceBound)
-    if bound and family.name != "discrepancy":
-        raise ValueError(
-            f"the acquisition 'lcb' needs surrogate='discrepancy', got {family.name!r}; use one "
-            f"of {tuple(name for name in acquisitions.RULES if name != 'lcb')}"
-        )
-    return cast(Acquisition, acquisition)
+def _located(measured: Measured, theta: Mapping[str, np.ndarray], seeds: np.ndarray) -> Measured:
+    """The same, each error naming its run: theta (name -> [n]) and seeds [n]."""
 
+    def run(i: int) -> str:
+        point = {name: float(column[i]) for name, column in theta.items()}
+        return f"{point}" if seeds[i] == UNKNOWN else f"{point}, seed {seeds[i]}"
 
-def _seeds(seeds: ArrayLike | None, n: int) -> np.ndarray:
-    if seeds is None:
-        return np.full(n, UNKNOWN)
-    refusal = f"seeds must be integers below 2^63, got {seeds!r:.100}"
-    try:
-        array = np.asarray(seeds)
-    except (TypeError, ValueError) as error:
-        raise ValueError(refusal) from error
-    if array.shape != (n,):
-        raise ValueError(f"seeds must have shape ({n},), one per theta, got {array.shape}")
-    # a float would lose its fraction, or as a large number its last digits
-    if array.dtype.kind not in "iu" or (array > np.iinfo(np.int64).max).any():
-        raise ValueError(refusal)
-    return array.astype(np.int64)
-
-
-def _errors(errors: Sequence[str] | None, n: int) -> np.ndarray:
-    array = np.full(n, "") if errors is None else np.asarray(errors, str)
-    if array.shape != (n,):
-        raise ValueError(f"errors must have shape ({n},), one per theta, got {array.shape}")
-    return array
+    errors = [error and f"{error} of {run(i)}" for i, error in enumerate(measured.errors)]
+    return measured._replace(errors=errors)

@@ -15,6 +15,15 @@ MAX_PANELS = 6  # channels of a signal that are drawn
 PREDICTIVE_QUANTILES = 0.05, 0.5, 0.95  # quantiles of the predictive distribution
 
 
+def check_axes(axes: object, name: str = "axes") -> None:
+    """Raise ValueError unless these are axes of Matplotlib, one or many, or None."""
+    from matplotlib.axes import Axes
+
+    given = [] if axes is None else np.atleast_1d(np.asarray(axes, object)).ravel()
+    if not all(isinstance(one, Axes) for one in given):
+        raise ValueError(f"{name} must be of Matplotlib, as of plt.subplots(), got {axes!r:.100}")
+
+
 def plot_search(rounds: np.ndarray, discrepancy: np.ndarray, ax: "Axes | None") -> "Axes":
     """Discrepancies by round, and the least so far.
 

@@ -1,10 +1,13 @@
 """The value that ask and tell pass on: all that a run has asked and was told."""
 
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .simulations.failures import count, not_finite
+from .simulations.returned import commonest
 
 UNKNOWN = -1  # seed or round of a simulation made elsewhere
 
@@ -14,12 +17,17 @@ class History(NamedTuple):
 
     theta: np.ndarray  # [n, d], natural units
     u: np.ndarray  # [n, d], prior quantiles
-    signals: np.ndarray  # [n, *signal_shape]
+    signals: np.ndarray  # [n, *signal_shape], the commonest shape; NaN where there is none
     features: np.ndarray  # [n, m], what the surrogate learns of the signals besides
     discrepancy: np.ndarray  # [n], NaN where failed
     seeds: np.ndarray  # int64 [n]
     rounds: np.ndarray  # int64 [n]
     errors: np.ndarray  # str [n], why a run failed; "" where it succeeded
+    unlike: Mapping[int, np.ndarray]  # row -> its signal, if that has another shape
+
+    def signal(self, row: int) -> np.ndarray:
+        """The signal of one run, of whatever shape."""
+        return self.unlike.get(row, self.signals[row, ...])
 
     @property
     def succeeded(self) -> np.ndarray:
@@ -37,7 +45,7 @@ class History(NamedTuple):
 
     @property
     def failures(self) -> dict[str, int]:
-        """Failed runs by kind: "raised", "not finite", "timeout", "unusable"."""
+        """Failed runs by kind: "raised", "not finite", "timeout", "unusable", "incomparable"."""
         return count(self.errors)
 
 
@@ -62,6 +70,7 @@ def init(dimension: int, signal_shape: tuple[int, ...], features: int) -> State:
         seeds=none,
         rounds=none,
         errors=np.zeros(0, str),
+        unlike={},
     )
     return State(history, rows, none, designed=0, asked=0, rounds=0)
 
@@ -92,15 +101,90 @@ def remember_told(state: State, told: History) -> State:
             rounds[row] = pending_rounds[matches[0]]
             pending = np.delete(pending, matches[0], axis=0)
             pending_rounds = np.delete(pending_rounds, matches[0])
-    old, new = state.history, told._replace(rounds=rounds)
-    if np.isnan(old.signals).all():  # only failed runs so far: the first signals fix the shape
-        old = old._replace(signals=np.full((len(old.theta), *new.signals.shape[1:]), np.nan))
-    merged = History(*(np.concatenate(pair) for pair in zip(old, new, strict=True)))
+    merged = _merged(state.history, told._replace(rounds=rounds))
     return state._replace(history=merged, pending=pending, pending_rounds=pending_rounds)
 
 
-def explain(signals: np.ndarray, discrepancy: np.ndarray, errors: np.ndarray) -> np.ndarray:
+def _merged(old: History, new: History) -> History:
+    of_each = set(History._fields) - {"signals", "unlike"}
+    columns = {name: np.concatenate([getattr(old, name), getattr(new, name)]) for name in of_each}
+    if old.signals.shape[1:] == new.signals.shape[1:] and not (old.unlike or new.unlike):
+        signals, unlike = np.concatenate([old.signals, new.signals]), {}
+    else:
+        rows = [of.signal(row) for of in (old, new) for row in range(len(of.theta))]
+        signals, unlike = laid_out(rows, old.signals.shape[1:])
+    return History(**columns, signals=signals, unlike=unlike)
+
+
+def laid_out(
+    signals: Sequence[np.ndarray | None], shape: tuple[int, ...]
+) -> tuple[np.ndarray, dict[int, np.ndarray]]:
+    """Signals as one array of the commonest shape, and those of others.
+
+    A user's discrepancy may compare unlike shapes. What is concluded must not depend on which of
+    them came first, so no shape is condemned here.
+
+    Args:
+        signals: n of any shapes; None, or NaN throughout, is a failed run, which has no shape.
+        shape: Of the array where every run failed.
+
+    Returns:
+        float64 [n, *shape], NaN where a run failed or its signal has another shape; and these
+        signals by row.
+    """
+    made = {i: s for i, s in enumerate(signals) if s is not None and not np.isnan(s).all()}
+    found = commonest([signal.shape for signal in made.values()])
+    rows = np.full((len(signals), *(shape if found is None else found)), np.nan)
+    for i, signal in made.items():
+        if signal.shape == found:
+            rows[i] = signal
+    return rows, {i: signal for i, signal in made.items() if signal.shape != found}
+
+
+def explain(
+    signals: Sequence[np.ndarray | None], discrepancy: np.ndarray, errors: np.ndarray
+) -> np.ndarray:
     """Why each run failed, str [n]: `errors` [n] where it says so, else what is not finite."""
-    finite = np.isfinite(signals.reshape(len(signals), -1)).all(1)
+    finite = np.array([one is not None and bool(np.isfinite(one).all()) for one in signals], bool)
     found = np.where(finite, not_finite("the discrepancy"), not_finite("the signal"))
     return np.where(np.isfinite(discrepancy), "", np.where(errors == "", found, errors))
+
+
+def told_seeds(seeds: ArrayLike | None, n: int) -> np.ndarray:
+    """Seeds of n runs that a user tells, int64 [n]; UNKNOWN where there are none.
+
+    Raises:
+        ValueError: not n integers below 2^63.
+    """
+    if seeds is None:
+        return np.full(n, UNKNOWN)
+    refusal = f"seeds must be integers below 2^63, got {seeds!r:.100}"
+    try:
+        array = np.ma.asarray(seeds)
+        array = array.astype(np.int64) if array.size == 0 else array  # those of [] are floats
+    except (TypeError, ValueError) as error:
+        raise ValueError(refusal) from error
+    if array.shape != (n,):
+        raise ValueError(
+            f"seeds must have shape ({n},), one per theta, got {array.shape}: {seeds!r:.100}"
+        )
+    if np.ma.is_masked(array):
+        raise ValueError(f"seeds must not be masked, got {seeds!r:.100}; leave those runs out")
+    # a float would lose its fraction, or as a large number its last digits
+    if array.dtype.kind not in "iu" or (array > np.iinfo(np.int64).max).any():
+        raise ValueError(refusal)
+    return np.ma.getdata(array).astype(np.int64)
+
+
+def told_errors(errors: Sequence[str] | None, n: int) -> np.ndarray:
+    """Why n runs failed as a user tells it, str [n]; "" where nothing is told.
+
+    Raises:
+        ValueError: not n texts.
+    """
+    array = np.full(n, "") if errors is None else np.asarray(errors, str)
+    if array.shape != (n,):
+        raise ValueError(
+            f"errors must have shape ({n},), one per theta, got {array.shape}: {errors!r:.100}"
+        )
+    return array

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arguments import (
+    check_flag,
     check_function,
     check_progress,
     check_text,
@@ -22,8 +23,8 @@ from .bolfi import MIN_LEARN, Bolfi
 from .prior import Prior
 from .progress import progress_bar
 from .result import Fit
-from .simulations.bank import Simulation, SimulationBank
-from .simulations.executors import Workers, open_executor
+from .simulations.bank import Simulation, SimulationBank, check_bank
+from .simulations.executors import Workers, check_executor, open_executor
 from .simulations.job import (
     BATCH,
     Job,
@@ -32,7 +33,6 @@ from .simulations.job import (
     jobs,
     of_one_shape,
     simulation_seed,
-    stacked,
 )
 from .simulations.runner import Keep, Runner
 from .sobol import start_size
@@ -133,6 +133,10 @@ def fit(  # noqa: PLR0913  the one call that most users make
     check_timeout(timeout)
     check_progress(progress)
     check_text("identity", identity)
+    for name, flag in {"vectorised": vectorised, "in_rounds": in_rounds, "warn": warn}.items():
+        check_flag(name, flag)
+    check_bank(bank)
+    check_executor(executor)
     if budget:
         check_function("simulate", simulate)
     told = _length(earlier)
@@ -214,9 +218,12 @@ def _tell(engine: Bolfi, asked: list[Job], results: list[Simulation]) -> list[Si
         RuntimeError: the start design is over, and nothing succeeded.
     """
     theta, seeds = columns(asked)
-    results = of_one_shape(results, asked, engine.expected_shape)
+    if engine.expected_shape is not None:
+        results = of_one_shape(results, asked, engine.expected_shape)
     errors = [result.error or "" for result in results]
-    engine.tell(theta, stacked(results, engine.signal_shape), seeds, errors)
+    failed = np.full(engine.signal_shape, np.nan)
+    signals = [failed if result.signal is None else result.signal for result in results]
+    engine.tell(theta, signals, seeds, errors)  # pyright: ignore[reportArgumentType]
     if engine.told >= engine.initial and engine.succeeded == 0:
         raise RuntimeError(
             f"all {engine.told} simulations of the start design failed; the last error: "

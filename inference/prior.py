@@ -9,7 +9,7 @@ import numpyro.distributions as dist
 from scipy.special import ndtri
 
 from ._float64 import in_float64
-from .arguments import checked_array
+from .arguments import checked_array, checked_integer
 from .distributions import Univariate, describe
 from .types import Theta
 
@@ -101,7 +101,16 @@ class Prior:
         return stacked
 
     def to_dict(self, array: np.ndarray) -> dict[str, np.ndarray]:
-        """Split [..., d] into name -> [...]; inverse of `to_array`."""
+        """Split [..., d] into name -> [...]; inverse of `to_array`.
+
+        Raises:
+            ValueError: of another shape.
+        """
+        if np.shape(array)[-1:] != (len(self),):
+            raise ValueError(
+                f"array must have shape [..., {len(self)}], one column for each of the parameters "
+                f"{self.names}, got {array!r:.100}"
+            )
         return {name: array[..., j] for j, name in enumerate(self.names)}
 
     @in_float64
@@ -161,8 +170,27 @@ class Prior:
 
     @in_float64
     def sample(self, key: jax.Array, n: int) -> dict[str, np.ndarray]:
-        """Draw n parameters, name -> [n]."""
+        """Draw n parameters, name -> [n].
+
+        Args:
+            key: Of JAX, such as jax.random.key(0).
+            n: How many.
+
+        Raises:
+            ValueError: no key, or n < 1.
+        """
+        n = checked_integer("n", n)
+        check_key(key)
         return self.from_unit(np.asarray(jax.random.uniform(key, (n, len(self)))))
+
+
+def check_prior(prior: object) -> None:
+    """Raise ValueError unless `prior` is a `Prior`."""
+    if not isinstance(prior, Prior):
+        raise ValueError(
+            f"prior must be a Prior, got {prior!r:.100} of type {type(prior).__name__}; "
+            "make one of name -> distribution by inference.Prior({...})"
+        )
 
 
 def _rather_normal(univariate: Univariate) -> bool:
@@ -183,6 +211,14 @@ def _quantile(univariate: Univariate, u: np.ndarray) -> np.ndarray:
         if np.isfinite(bound) and np.isfinite(univariate.log_prob(np.asarray(bound))):
             value = np.where(there, bound, value)
     return value
+
+
+def check_key(key: object) -> None:
+    """Raise ValueError unless `key` is one key of JAX, new or old."""
+    new = isinstance(key, jax.Array) and jax.numpy.issubdtype(key.dtype, jax.dtypes.prng_key)
+    old = getattr(key, "dtype", None) == np.uint32 and np.shape(key) == (2,)  # pyright: ignore
+    if not (old or (new and key.shape == ())):  # pyright: ignore
+        raise ValueError(f"key must be one key of JAX, such as jax.random.key(0), got {key!r:.100}")
 
 
 @in_float64

@@ -6,10 +6,10 @@ from numpy.typing import ArrayLike
 from ._float64 import in_float64
 from .arguments import checked_array
 from .gp.process import padded_rows
-from .prior import Prior
+from .prior import Prior, check_prior
 from .result import SurrogateView
 from .surrogates.discrepancy import DiscrepancySurrogate, learn
-from .surrogates.transform import Transform
+from .surrogates.transform import TRANSFORMS, Transform
 from .types import Theta
 
 MIN_VALUES = 3  # finite values from which a process can be learned
@@ -50,6 +50,11 @@ def regress(
         ValueError: shapes disagree, fewer than three finite values, theta outside the support,
             or a transform that is undefined at some value.
     """
+    check_prior(prior)
+    if transform is not None and transform not in tuple(TRANSFORMS):
+        raise ValueError(
+            f"transform must be one of {tuple(TRANSFORMS)} or None, got {transform!r:.100}"
+        )
     rows = prior.to_dict(np.atleast_2d(prior.to_array(theta)))
     known = checked_array("values", values)
     n = len(next(iter(rows.values())))

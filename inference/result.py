@@ -11,6 +11,7 @@ import jax
 import numpy as np
 
 from ._float64 import in_float64
+from .arguments import check_flag, checked_integer
 from .history import History
 from .notebook_display import as_html, as_text
 from .prior import Prior
@@ -23,6 +24,10 @@ from .types import Theta
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+
+
+MAX_FAILED_SHARE = 0.5  # of the simulations, beyond which a fit warns
+MOST_CHAINS, MOST_DRAWS = 1000, 1_000_000  # of one call: more would take days, or all memory
 
 
 class Closest(NamedTuple):
@@ -113,11 +118,21 @@ class Fit:
 
     @cached_property
     def warnings(self) -> list[str]:
-        """What the surrogate's own checks complain of, and that most simulations failed."""
-        failed = int((~self.history.succeeded).sum())
-        told = len(self.history.succeeded)
-        few = [f"{failed} of {told} simulations failed: the fit rests on {told - failed}"]
-        return self.learned.warnings() + (few if failed > told / 2 else [])
+        """What the surrogate's own checks complain of; that more than half of the simulations
+        failed; and that fewer were learned from than the 2 d + 2 that d parameters need: a level
+        and a slope and a curvature along each parameter, and one more that could contradict."""
+        said = self.learned.warnings()
+        failed, told = int((~self.history.succeeded).sum()), len(self.history.succeeded)
+        if failed > MAX_FAILED_SHARE * told:
+            said.append(f"{failed} of {told} simulations failed: the fit rests on {told - failed}")
+        learned, needed = int(self.learned_from.sum()), 2 * len(self.prior) + 2
+        if learned < needed:
+            said.append(
+                f"the surrogate is learned from {learned} simulations, fewer than the {needed} "
+                f"that {len(self.prior)} parameters need: simulate more; until then the posterior "
+                "may be far off"
+            )
+        return said
 
     @property
     def surrogate(self) -> SurrogateView:
@@ -133,19 +148,21 @@ class Fit:
         """The simulated hypothesis of least discrepancy."""
         i = int(np.nanargmin(self.history.discrepancy))
         theta = {n: float(v) for n, v in self.prior.to_dict(self.history.theta[i]).items()}
-        return Closest(theta, self.history.signals[i], float(self.history.discrepancy[i]))
+        return Closest(theta, self.history.signal(i), float(self.history.discrepancy[i]))
 
     @property
     def simulations(self) -> "xr.Dataset":
         """Every simulation in the order told: theta, seed, round, discrepancy, failed, error,
-        signal."""
+        signal. Where a discrepancy compares unlike shapes, `signal` holds those of the commonest
+        and NaN elsewhere; `history.signal(row)` is any of them."""
         from .arviz_tree import simulations_dataset
 
         return simulations_dataset(self.prior, self.history)
 
     @property
     def failures(self) -> dict[str, int]:
-        """How many simulations failed, by kind: "raised", "not finite", "timeout"."""
+        """How many simulations failed, by kind: "raised", "not finite", "timeout", "unusable" (no
+        signal) or "incomparable" (your own discrepancy or summary failed on the signal)."""
         return self.history.failures
 
     @property
@@ -197,8 +214,8 @@ class Fit:
 
         Args:
             sampler: "nuts", "emcee" or "quadrature".
-            chains: Independent chains, at least 2, for R-hat needs them.
-            draws: Kept per chain, at least 4.
+            chains: Independent chains, at least 2, for R-hat needs them, and at most 1000.
+            draws: Kept per chain, at least 4 and at most a million.
             warmup: Discarded steps per chain that adapt the sampler.
             seed: Fixes the draws.
             extend: Largest multiple of `draws` to make; 1 never goes on.
@@ -211,19 +228,20 @@ class Fit:
             attributes. Opens in ArviZ 0.23 and 1.x, also from `to_netcdf`.
 
         Raises:
-            ValueError: unknown sampler, a length too small, quadrature of more than two
+            ValueError: unknown sampler, a length out of range, quadrature of more than two
                 parameters, or a log likelihood that is finite nowhere.
 
         Warns:
             SamplingWarning: the draws are not to be trusted; see `status`.
         """
-        if sampler not in SAMPLERS:
-            raise ValueError(f"sampler must be one of {tuple(SAMPLERS)}, got {sampler!r}")
-        if chains < 2 or draws < 4 or warmup < 1 or extend < 1:
-            raise ValueError(
-                "sampling needs chains >= 2, draws >= 4, warmup >= 1 and extend >= 1, "
-                f"got chains={chains}, draws={draws}, warmup={warmup}, extend={extend}"
-            )
+        if sampler not in tuple(SAMPLERS):
+            raise ValueError(f"sampler must be one of {tuple(SAMPLERS)}, got {sampler!r:.100}")
+        chains = checked_integer("chains", chains, 2, MOST_CHAINS)
+        draws = checked_integer("draws", draws, 4, MOST_DRAWS)
+        warmup = checked_integer("warmup", warmup, 1, MOST_DRAWS)
+        extend = checked_integer("extend", extend)
+        seed = checked_integer("seed", seed, 0)
+        check_flag("warn", warn)
         from .arviz_tree import add_surrogate, finished, results_tree
 
         started = time.perf_counter()
@@ -250,8 +268,13 @@ class Fit:
 
         Args:
             ax: To draw on; None makes a figure.
+
+        Raises:
+            ValueError: `ax` is no axes of Matplotlib.
         """
-        from .figures import plot_search
+        from .figures import check_axes, plot_search
+
+        check_axes(ax, "ax")
 
         return plot_search(self.history.rounds, self.history.discrepancy, ax)
 
@@ -266,9 +289,19 @@ class Fit:
         Args:
             sampled: What `sample` returned; None samples here.
             axes: One for each of the output's channels; None makes a figure.
-        """
-        from .figures import plot_predictive
 
+        Raises:
+            ValueError: `sampled` is no tree, or `axes` are no axes of Matplotlib, or too few.
+        """
+        from xarray import DataTree
+
+        from .figures import check_axes, plot_predictive
+
+        if sampled is not None and not isinstance(sampled, DataTree):
+            raise ValueError(
+                f"sampled must be what `sample` returned or None, got {sampled!r:.100}"
+            )
+        check_axes(axes)
         tree = self.sample(draws=250, warmup=250, warn=False) if sampled is None else sampled
         groups = tree["posterior_predictive"] if "posterior_predictive" in tree.children else {}
         predicted = None

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from .._float64 import in_float64
+from ..arguments import checked_number
 from ..gp.optimise import minimise_in_box
 from ..gp.process import (
     GP,
@@ -77,8 +78,7 @@ class LowerConfidenceBound:
     jitter: float = 0.05
 
     def __post_init__(self) -> None:
-        if not self.jitter > 0:
-            raise ValueError(f"jitter must be positive, got {self.jitter}")
+        checked_number("jitter", self.jitter, lambda sd: 0.0 < sd < np.inf, "positive")
 
     @in_float64
     def __call__(
@@ -236,8 +236,7 @@ class PosteriorDraws:
     share: float = 0.5
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.share <= 1.0:
-            raise ValueError(f"share must be from 0 to 1, got {self.share}")
+        checked_number("share", self.share, lambda share: 0.0 <= share <= 1.0, "from 0 to 1")
 
     def __call__(
         self, key: jax.Array, surrogate: Surrogate, n: int, feasibility: Feasibility

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from ..arguments import check_function, checked_array, checked_mapping
 from ..prior import Prior
 from .one_replicate import Replicate, as_theta
 from .ranks import quantiles
@@ -80,13 +81,14 @@ class Replicates:
             ValueError: nothing finished; a name that is taken; a value that is no number or
                 of the wrong shape.
         """
+        given = checked_quantities(quantities)
         if not self.finished:
             first = next(iter(self.errors.values()), "none was run")
             raise ValueError(f"no replicate finished, so nothing can be checked: {first}")
         truth, draws = self.truth, self.draws
         names = self.prior.names
         found = {name: (truth[:, j], draws[..., j]) for j, name in enumerate(names)}
-        for name, quantity in (quantities or {}).items():
+        for name, quantity in given.items():
             if name in (*names, LOG_DENSITY):
                 raise ValueError(f"quantity {name!r} has the name of another; choose a new one")
             found[name] = _split(
@@ -150,6 +152,18 @@ class Replicates:
         return xr.Dataset(variables, {"replicate": self.index}, attributes)
 
 
+def checked_quantities(quantities: Mapping[str, Quantity] | None) -> dict[str, Quantity]:
+    """Quantities as a dictionary.
+
+    Raises:
+        ValueError: they do not map names to functions.
+    """
+    given = checked_mapping("quantities", quantities, "functions")
+    for name, quantity in given.items():
+        check_function(f"quantities[{name!r}]", quantity)
+    return given
+
+
 def _padded(rows: np.ndarray, length: int) -> np.ndarray:
     full = np.full((length, *rows.shape[1:]), np.nan)
     full[: len(rows)] = rows
@@ -166,7 +180,8 @@ def _evaluated(
 ) -> np.ndarray:
     """A quantity at the truth and then the draws of one replicate."""
     rows = np.concatenate([replicate.truth[None], replicate.draws])
-    values = np.asarray(quantity(as_theta(rows, names), replicate.observed), np.float64)
+    returned = quantity(as_theta(rows, names), replicate.observed.copy())
+    values = checked_array(f"what quantity {name!r} returns", returned)
     if values.shape != (len(rows),) or np.isnan(values).any():
         raise ValueError(
             f"quantity {name!r} must return one number for each of {len(rows)} theta, "

@@ -8,10 +8,11 @@ import numpy as np
 import xarray as xr
 from scipy.stats import beta, binom
 
+from ..arguments import checked_array
 from ..prior import Prior
 from ..types import Simulator
-from .finished_replicates import Quantity, Replicates
-from .many_replicates import made_or_given
+from .finished_replicates import Quantity, Replicates, checked_quantities
+from .many_replicates import check_level, made_or_given
 from .one_replicate import Pipeline
 from .table import table
 
@@ -143,10 +144,12 @@ def coverage(
     Raises:
         ValueError: as `replicates`; none finished; a level outside (0, 1).
     """
-    nominal = np.array(levels, np.float64)
+    nominal = checked_array("levels", levels)
     if nominal.ndim != 1 or nominal.size == 0 or not ((nominal > 0) & (nominal < 1)).all():
         raise ValueError(f"levels must lie between 0 and 1, got {levels}")
     conservative = bool(run.pop("conservative", False))
+    check_level(alpha)
+    checked_quantities(quantities)
     made = made_or_given(of, simulate, prior, run)
     values = made.values(quantities)
     quantiles = made.quantiles(values)

@@ -10,15 +10,18 @@ import numpy as np
 
 from ..arguments import (
     check_callable,
+    check_flag,
     check_function,
     check_progress,
+    check_text,
     check_timeout,
     checked_integer,
+    checked_number,
 )
 from ..describe import describe
-from ..prior import Prior
+from ..prior import Prior, check_prior
 from ..progress import progress_bar
-from ..simulations.executors import Workers, open_executor
+from ..simulations.executors import Workers, check_executor, open_executor
 from ..simulations.failures import Failure, kind, unusable
 from ..simulations.job import BATCH
 from ..types import Simulator
@@ -87,8 +90,11 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
     check_callable("observe", observe)
     check_timeout(timeout)
     check_progress(progress)
-    if not isinstance(prior, Prior):
-        raise ValueError(f"prior must be a Prior, got {type(prior).__name__}")
+    check_prior(prior)
+    check_text("identity", identity)
+    check_flag("independent", independent)
+    check_flag("retry", retry)
+    check_executor(executor)
     n, seed = checked_integer("n", n), checked_integer("seed", seed, 0)
     draws = checked_integer("draws", draws)
     plan = Plan(pipeline, simulator, observe, prior.names, seed, draws, independent, timeout)
@@ -126,6 +132,8 @@ def made_or_given(
         ValueError: replicates together with what would make them.
     """
     if not isinstance(of, Replicates):
+        if not callable(of):
+            raise ValueError(f"of must be Replicates or a pipeline to be called, got {of!r:.100}")
         return replicates(of, simulate, prior, **run)
     if simulate is not None or prior is not None or run:
         raise ValueError(
@@ -133,6 +141,11 @@ def made_or_given(
             f"got {[*run] or 'simulate or prior'}"
         )
     return of
+
+
+def check_level(alpha: object) -> None:
+    """Raise ValueError unless `alpha` is a rate of false alarms."""
+    checked_number("alpha", alpha, lambda a: 0.0 < a < 1.0, "a number between 0 and 1")
 
 
 def _settings(plan: Plan, prior: Prior) -> dict[str, str]:

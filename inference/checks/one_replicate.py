@@ -123,7 +123,8 @@ def run_replicate(plan: Plan, number: int, truth: np.ndarray) -> Replicate:
 
 
 def _simulated(plan: Plan, number: int, truth: np.ndarray) -> np.ndarray:
-    theta = {name: truth[j : j + 1] for j, name in enumerate(plan.names)}
+    # copies: a simulator may write into what it is given
+    theta = {name: truth[j : j + 1].copy() for j, name in enumerate(plan.names)}
     seeds = np.array([_data_seed(plan, number)], np.int64)
     return within(
         plan.timeout,

@@ -10,14 +10,21 @@ from typing import Any, cast
 import numpy as np
 import xarray as xr
 
-from ..arguments import check_function, check_progress, checked_integer
+from ..arguments import (
+    check_flag,
+    check_function,
+    check_progress,
+    check_text,
+    checked_integer,
+    checked_mapping,
+)
 from ..bolfi import MIN_LEARN, Bolfi
 from ..loop import fit
-from ..prior import Prior
+from ..prior import Prior, check_prior
 from ..progress import progress_bar
 from ..result import Fit
-from ..simulations.bank import SimulationBank
-from ..simulations.executors import Workers, open_executor
+from ..simulations.bank import SimulationBank, check_bank
+from ..simulations.executors import Workers, check_executor, open_executor
 from ..simulations.job import BATCH, OneByOne, jobs, simulation_seed, stacked
 from ..simulations.runner import Keep, check_keep, run_missing
 from ..sobol import sobol
@@ -32,6 +39,8 @@ OF_PIPELINE = {"simulate", "prior", "observed", "budget", "seed"}  # what a pipe
 
 def _check_options(function: Callable[..., object], options: Options, sampling: Options) -> None:
     """Raise ValueError for options that `function`, `fit` or `Bolfi`, or `Fit.sample` refuses."""
+    options = checked_mapping("options", options, "values")
+    sampling = checked_mapping("sampling", sampling, "values")
     known = signature(function).parameters
     of_family = {name: value for name, value in options.items() if name not in known}
     resolve(options.get("surrogate"), of_family)
@@ -50,7 +59,8 @@ def _batched(
     simulate: Simulator | SingleSimulator, options: Options
 ) -> tuple[Simulator, dict[str, Any]]:
     """A simulator of batches, and the options without `vectorised`, which says what was given."""
-    others = dict(options)
+    others = checked_mapping("options", options, "values")
+    check_flag("options['vectorised']", others.get("vectorised", True))
     if others.pop("vectorised", True):
         return cast(Simulator, simulate), others
     return OneByOne(cast(SingleSimulator, simulate)), others
@@ -81,7 +91,9 @@ class FitPipeline:
 
     def __post_init__(self) -> None:
         check_function("simulate", self.simulate)
+        check_prior(self.prior)
         checked_integer("budget", self.budget, MIN_LEARN)
+        check_flag("warn", self.warn)
         _check_options(fit, self.options, self.sampling)
         simulate, options = _batched(self.simulate, self.options)
         object.__setattr__(self, "simulate", simulate)
@@ -170,6 +182,11 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
     n, seed = checked_integer("n", n, MIN_LEARN), checked_integer("seed", seed, 0)
     check_keep(checked_integer("batch", batch), timeout)
     check_progress(progress)
+    check_prior(prior)
+    check_text("identity", identity)
+    check_flag("warn", warn)
+    check_bank(bank)
+    check_executor(executor)
     batched, options = _batched(simulate, options or {})
     _check_options(Bolfi, options, sampling or {})
     theta = prior.from_unit(sobol(seed, 0, n, len(prior)))

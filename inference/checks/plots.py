@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.ticker import PercentFormatter
 from scipy.stats import binom
 
-from ..figures import COLOURS, GREY, INK, bare
+from ..figures import COLOURS, GREY, INK, bare, check_axes
 from . import bands
 from .ranks import bin_count
 
@@ -67,6 +67,7 @@ def plot_histograms(
     names: Sequence[str], ranks: np.ndarray, draws: int, axes: Any, level: float
 ) -> "list[Axes]":
     """Histograms of ranks [R, q], each from 0 to `draws`; one axes per quantity."""
+    check_axes(axes)
     n, q = ranks.shape
     if axes is None:
         size = (max(2.6 * q, 3.2), 2.6)
@@ -155,6 +156,7 @@ def plot_tarp(curve: Curve, replicates: int, draws: int, ax: "Axes | None") -> "
 
 
 def _axes(ax: "Axes | None", size: tuple[float, float] = SIZE) -> "Axes":
+    check_axes(ax, "ax")
     return plt.subplots(figsize=size, layout="constrained")[1] if ax is None else ax
 
 

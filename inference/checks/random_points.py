@@ -11,7 +11,7 @@ from ..prior import Prior
 from ..types import Simulator
 from . import bands
 from .finished_replicates import Replicates
-from .many_replicates import made_or_given
+from .many_replicates import check_level, made_or_given
 from .one_replicate import Pipeline
 from .ranks import quantiles, to_ranks
 from .table import table
@@ -131,6 +131,7 @@ def tarp(
     Raises:
         ValueError: as `replicates`; or none finished.
     """
+    check_level(alpha)
     made = made_or_given(of, simulate, prior, run)
     truth, draws = (_distances(made, rows) for rows in _stacked(made))
     u = quantiles(truth[:, 0], draws, made.random("tarp"))

@@ -11,8 +11,8 @@ from scipy.stats import chisquare
 from ..prior import Prior
 from ..types import Simulator
 from . import bands
-from .finished_replicates import LOG_DENSITY, Quantity, Replicates
-from .many_replicates import made_or_given
+from .finished_replicates import LOG_DENSITY, Quantity, Replicates, checked_quantities
+from .many_replicates import check_level, made_or_given
 from .one_replicate import Pipeline
 from .ranks import bin_count, to_ranks
 from .table import table
@@ -141,6 +141,8 @@ def sbc(
     Raises:
         ValueError: as `replicates`; or none finished.
     """
+    check_level(alpha)
+    checked_quantities(quantities)
     made = made_or_given(of, simulate, prior, run)
     values = made.values(quantities) | made.log_density()
     ranks = to_ranks(made.quantiles(values), made.most)

@@ -21,7 +21,13 @@ def own_residual(
     """
     with keeping.opened(experiment.identity) as keep:
         laboratory = Laboratory(
-            experiment.simulate, prior, extensions, keep, keeping.seed, keeping.report
+            simulate=experiment.simulate,
+            prior=prior,
+            extensions=extensions,
+            keep=keep,
+            seed=keeping.seed,
+            report=keeping.report,
+            shape=experiment.shape,
         )
         study = Study(laboratory, experiment.observed, experiment.noise, plan)
         best = fit_base(study, None)[0].best

@@ -1,14 +1,16 @@
 """Find where a calibrated simulator and data disagree, and which effect explains it."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
+from ..arguments import check_kind, checked_number
 from ..notebook_display import as_html, as_text
-from ..prior import Prior
+from ..prior import Prior, check_prior
 from .experiment import Experiment, Proposal
 from .held_out import Gap, gap, holds, predict
 from .hypothesis import Hypothesis, samples
@@ -19,7 +21,7 @@ from .next_experiment import Suggestion, suggest
 from .posterior import Interval, Weighted, weighted_posterior
 from .search import Base, Plan, Study, examine, explain
 from .signatures import confusion
-from .simulate import Keeping, Laboratory
+from .simulate import AllRunsFailed, Keeping, Laboratory
 from .usual_residual import without_usual
 from .verdict import REJECTION_LEVEL, Candidate, Verdict, VerdictKind, conclude, tied
 
@@ -39,8 +41,8 @@ class Criticism:
         before, after: Where the data disagree with the base and with the extended model.
         gaps: On held-out data, for each explanation that came so far: names -> gaps.
         suggestions: Experiments that would separate explanations, best first.
-        untested: Effects whose simulations failed, or that were not refitted though they might
-            explain the difference.
+        untested: Effects whose simulations failed, or that were not refitted, or could not be
+            simulated for the held-out data, though they might explain the difference.
         noise: The experiment's.
         units: Of the effects' coefficients.
         tied: Names of each explanation that remains, best first.
@@ -84,6 +86,7 @@ class Criticism:
             ("accepted", ", ".join(self.accepted) or "none"),
             *sizes,
             ("explanations tested", str(len(self.candidates))),
+            *(("not tested", ", ".join(self.untested)) for _ in self.untested[:1]),
             *(("suggested experiment", one) for one in suggested),
             ("simulations", str(self.simulations)),
         ]
@@ -173,7 +176,13 @@ def criticise(  # noqa: PLR0913  the one call that most users make
             effect that could not be simulated at all is in `Criticism.untested` instead.
         ImportError, ConnectionError: Dask is not installed, or does not answer.
     """
+    check_prior(prior)
     check_extensions(prior, extensions)
+    _check_experiments(experiment, held_out, proposals)
+    checked_number("level", level, lambda p: 0.0 < p < 1.0, "a number between 0 and 1")
+    check_kind("plan", plan, Plan | None)
+    check_kind("keeping", keeping, Keeping | None)
+    _check_earlier(earlier)
     _check_held_out(experiment, held_out)
     _check_accept(accept, extensions)
     _check_told_apart(held_out)
@@ -186,10 +195,12 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         kept.report(phase, finished)
 
     with kept.opened(experiment.identity) as keep:
-        laboratory = Laboratory(experiment.simulate, prior, extensions, keep, kept.seed, counted)
+        laboratory = Laboratory(
+            experiment.simulate, prior, extensions, keep, kept.seed, counted, experiment.shape
+        )
         study = Study(laboratory, experiment.observed, experiment.noise, plan or Plan())
         base, untested = examine(study, None if earlier is None else laboratory.table(*earlier))
-        tried = Tried([], [], {})
+        tried = Tried([], [], {}, ())
         if accept is not None or base.check.p_value < level:
             tried = _try(study, base, accept, held_out)
         verdict = conclude(base.check, tried.members, level)
@@ -212,7 +223,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         after=tuple(left),
         gaps=tried.gaps,
         suggestions=tuple(suggestions),
-        untested=(*untested, *_left_out(tried.candidates)),
+        untested=(*untested, *_left_out(tried.candidates), *tried.unpredicted),
         noise=experiment.noise,
         units={name: one.unit for name, one in extensions.items()},
         tied=tuple(one.names for one in tied(tried.members)),
@@ -227,11 +238,13 @@ class Tried(NamedTuple):
         candidates: All of them.
         members: Those that passed, their gains with those on the held-out data.
         gaps: On held-out data, names -> gaps.
+        unpredicted: Effects of explanations that could not be simulated for the held-out data.
     """
 
     candidates: list[Candidate]
     members: list[Candidate]
     gaps: dict[tuple[str, ...], tuple[Gap, ...]]
+    unpredicted: tuple[str, ...]
 
 
 def _try(
@@ -241,8 +254,13 @@ def _try(
     candidates, members = explain(study, base, accept)
     chosen = {c.names: c for c in [*members, _among(candidates, accept)] if c}
     gaps = _gaps(study, base, list(chosen.values()), held_out)
-    judged = [replace(c, held=holds(gaps.get(c.names, ()))) for c in candidates]
-    return Tried(judged, [_judged(member, gaps) for member in members], gaps)
+    # what cannot be simulated there is not borne out there
+    failed = [names for names in chosen if held_out and names not in gaps]
+    judged = [
+        replace(c, held=c.names not in failed and holds(gaps.get(c.names, ()))) for c in candidates
+    ]
+    borne = [_judged(member, gaps) for member in members if member.names not in failed]
+    return Tried(judged, borne, gaps, tuple(dict.fromkeys(sum(failed, ()))))
 
 
 def _rivals(verdict: Verdict, tried: Tried) -> list[Candidate]:
@@ -271,6 +289,7 @@ def _among(candidates: Sequence[Candidate], names: Sequence[str] | None) -> Cand
 def _gaps(
     study: Study, base: Base, chosen: Sequence[Candidate], held_out: Sequence[Experiment]
 ) -> dict[tuple[str, ...], tuple[Gap, ...]]:
+    """Names -> gaps, of those that can be simulated for the held-out data."""
     count, laboratory, seed = study.plan.held_out, study.laboratory, study.seed
     if not held_out or not chosen:
         return {}
@@ -280,10 +299,11 @@ def _gaps(
     for candidate in chosen:
         theta = weighted_posterior(candidate.hypothesis, seed).draw(seed, count)
         phase = f"held out, {' '.join(candidate.names)}"
-        gaps[candidate.names] = tuple(
-            gap(one, before, predict(laboratory, one, phase, theta), seed)
-            for one, before in zip(held_out, usual, strict=True)
-        )
+        with suppress(AllRunsFailed):
+            gaps[candidate.names] = tuple(
+                gap(one, before, predict(laboratory, one, phase, theta), seed)
+                for one, before in zip(held_out, usual, strict=True)
+            )
     return gaps
 
 
@@ -292,6 +312,28 @@ def _judged(candidate: Candidate, gaps: Mapping[tuple[str, ...], tuple[Gap, ...]
     found = gaps.get(candidate.names, ())
     gain = candidate.gain + sum(one.lpd_gain for one in found)
     return replace(candidate, gain=gain, held=holds(found))
+
+
+def _check_experiments(
+    experiment: Experiment, held_out: Sequence[Experiment], proposals: Sequence[Proposal]
+) -> None:
+    check_kind("experiment", experiment, Experiment)
+    for name, given, kind in (
+        ("held_out", held_out, Experiment),
+        ("proposals", proposals, Proposal),
+    ):
+        check_kind(name, given, list | tuple)
+        for one in given:
+            check_kind(f"each of {name}", one, kind)
+
+
+def _check_earlier(earlier: object) -> None:
+    three = isinstance(earlier, tuple | list) and len(earlier) == 3
+    if earlier is not None and not (three and isinstance(earlier[0], Mapping)):
+        raise ValueError(
+            "earlier must be (theta, signals, seeds), theta a mapping of names to values, or None, "
+            f"got {earlier!r:.100}"
+        )
 
 
 def _check_held_out(experiment: Experiment, held_out: Sequence[Experiment]) -> None:
@@ -304,7 +346,8 @@ def _check_held_out(experiment: Experiment, held_out: Sequence[Experiment]) -> N
 
 
 def _check_accept(accept: Sequence[str] | None, extensions: Extensions) -> None:
-    unknown = [name for name in accept or () if name not in extensions]
+    check_kind("accept", accept, list | tuple | None)
+    unknown = [name for name in accept or () if name not in tuple(extensions)]
     if unknown:
         raise ValueError(
             f"cannot accept {', '.join(map(repr, unknown))}; there are {', '.join(extensions)}"

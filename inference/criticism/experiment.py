@@ -47,6 +47,11 @@ class Experiment:
                 )
         object.__setattr__(self, "observed", observed)
 
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the output."""
+        return self.observed.shape
+
 
 @dataclass(frozen=True)
 class Proposal:

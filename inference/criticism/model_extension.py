@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpyro.distributions as dist
 
+from ..arguments import check_text, checked_number
 from ..prior import Prior
 
 
@@ -30,8 +31,9 @@ class Extension:
     text: str = ""
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.neutral):
-            raise ValueError(f"an extension's neutral must be finite, got {self.neutral!r}")
+        checked_number("an extension's neutral", self.neutral, math.isfinite, "finite")
+        check_text("unit", self.unit)
+        check_text("text", self.text)
         inside = Prior({"coefficient": self.prior}).contains(
             {"coefficient": np.asarray(self.neutral)}
         )

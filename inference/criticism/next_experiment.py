@@ -1,6 +1,7 @@
 """Which further experiment would tell explanations apart."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import combinations
 from typing import NamedTuple
 
@@ -11,7 +12,7 @@ from .experiment import Proposal
 from .hypothesis import samples
 from .misfit import MODES_PER_CHANNEL, orthonormal, slow_modes
 from .run_noise import errors_of, smooth_covariance
-from .simulate import Laboratory
+from .simulate import AllRunsFailed, Laboratory
 from .verdict import Candidate
 
 RUNS_EACH = 3  # of each explanation in each proposed experiment
@@ -34,10 +35,16 @@ class Suggestion(NamedTuple):
 def suggest(
     laboratory: Laboratory, proposals: Sequence[Proposal], rivals: Sequence[Candidate]
 ) -> list[Suggestion]:
-    """Proposals by how well they separate the worst separated rivals, best first."""
+    """Proposals by how well they separate the worst separated rivals, best first.
+
+    One that cannot be simulated for each of the rivals is left out.
+    """
     if len(rivals) < 2:
         return []
-    made = [_separation(laboratory, proposal, rivals) for proposal in proposals]
+    made = []
+    for proposal in proposals:
+        with suppress(AllRunsFailed):
+            made.append(_separation(laboratory, proposal, rivals))
     return sorted(made, key=lambda suggestion: -suggestion.snr)
 
 

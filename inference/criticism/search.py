@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arguments import checked_integer
+from ..bolfi import MIN_LEARN
 from .clean_scores import scored_on_clean
 from .hypothesis import Hypothesis, hypothesise
 from .measurement_noise import Noise
@@ -49,6 +51,10 @@ class Plan:
     refits: int = 3
     held_out: int = 8
     most: int = 400
+
+    def __post_init__(self) -> None:
+        for name, count in vars(self).items():
+            checked_integer(name, count, 0 if name in ("refits", "most") else 1)
 
 
 class Study(NamedTuple):
@@ -114,7 +120,7 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
     """Fit the base model, learn every effect's signature, and test the model.
 
     Returns:
-        What was found, and the effects of which every simulation failed.
+        What was found, and the effects of which too few simulations succeeded to learn from.
     """
     laboratory, plan = study.laboratory, study.plan
     base, runs, box = fit_base(study, earlier)
@@ -125,6 +131,8 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
         try:
             made = study.run(f"effect {name}", wide, (name,), plan.extension)
         except AllRunsFailed:
+            made = runs.rows(np.zeros(len(runs), bool))
+        if len(made) < MIN_LEARN:
             untested.append(name)
             continue
         parts.append(made)
@@ -149,8 +157,18 @@ def explain(
 
     Returns:
         All explanations, and the accepted ones.
+
+    Raises:
+        AllRunsFailed: an effect to be accepted cannot be simulated.
     """
     plan, runs = study.plan, base.runs
+    forced = tuple(accept or ())
+    unknown = [name for name in forced if name not in base.singles]
+    if unknown:
+        raise AllRunsFailed(
+            f"{', '.join(unknown)} cannot be accepted: of its {plan.extension} simulations fewer "
+            f"than {MIN_LEARN} succeeded; mend the simulator, or accept another effect"
+        )
     first = [study.candidate(base, single) for single in base.singles.values()]
     found = {candidate.names: candidate for candidate in first}
     for one in near_best(first, plan.refits):
@@ -160,7 +178,6 @@ def explain(
         found |= {pair.names: pair for pair in pairs}
     accepted = [one for one in found.values() if one.accepted]
     singles = [one for one in accepted if len(one.names) == 1]
-    forced = tuple(accept or ())
     if forced and not (forced in found and found[forced].refitted):
         unrefined = study.candidate(base, study.hypothesis(forced, runs))
         found[forced], _ = _refit(study, base, unrefined, runs, most=None)
@@ -172,8 +189,9 @@ def _refit(
 ) -> tuple[Candidate, Runs]:
     """Simulate a candidate near its optimum and fit it again.
 
-    That ends when the optimum lies in the box of the latest runs, after REFIT_PASSES passes, or
-    where more than `most` runs would be made.
+    That ends when the optimum lies in the box of the latest runs, after REFIT_PASSES passes,
+    where more than `most` runs would be made, or where none can be made: the candidate is then
+    what it was, and without a first pass not refitted.
     """
     names = candidate.names
     for attempt in range(REFIT_PASSES):
@@ -181,7 +199,11 @@ def _refit(
             break
         box = around(candidate.hypothesis.u, candidate.hypothesis.sd, LATER_HALF_WIDTH)
         phase = f"refit {' '.join(names)} {attempt}"
-        runs = joined([runs, study.run(phase, box, names, study.plan.refit)])
+        try:
+            made = study.run(phase, box, names, study.plan.refit)
+        except AllRunsFailed:
+            break
+        runs = joined([runs, made])
         candidate = study.candidate(base, study.hypothesis(names, runs), refitted=True)
         if box.holds(candidate.hypothesis.u):
             break

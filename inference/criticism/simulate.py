@@ -11,6 +11,7 @@ from ..arguments import check_function, checked_integer
 from ..prior import Prior
 from ..simulations.bank import SimulationBank
 from ..simulations.executors import Workers, open_executor
+from ..simulations.failures import NoSignals
 from ..simulations.job import BATCH, jobs, succeeded
 from ..simulations.runner import Keep, check_keep, run_missing
 from ..types import Simulator
@@ -83,6 +84,7 @@ class Laboratory:
         prior: Of the base parameters.
         extensions: All that may act.
         keep: Where runs are made and kept.
+        shape: Of one signal, that of what was observed; None takes the commonest of a phase.
         seed: All seeds derive from it.
         report: Called with the phase and the number of simulations finished in it.
     """
@@ -93,11 +95,13 @@ class Laboratory:
     keep: Keep
     seed: int = 0
     report: Report = silent
+    shape: tuple[int, ...] | None = None
 
     def of(self, experiment: Experiment | Proposal) -> "Laboratory":
         """The same for the simulator of another experiment."""
         keep = self.keep._replace(identity=experiment.identity)
-        return replace(self, simulate=experiment.simulate, keep=keep)
+        shape = experiment.shape
+        return replace(self, simulate=experiment.simulate, keep=keep, shape=shape)
 
     def run(self, phase: str, theta: Mapping[str, np.ndarray]) -> Runs:
         """Simulate at theta, name -> [n]; runs that fail are left out.
@@ -111,7 +115,13 @@ class Laboratory:
         """
         seeds = phase_seeds(self.seed, phase, len(next(iter(theta.values()))))
         asked = jobs(theta, seeds)
-        results = run_missing(self.simulate, asked, self.keep, advance=partial(self.report, phase))
+        advance = partial(self.report, phase)
+        try:
+            results = run_missing(self.simulate, asked, self.keep, self.shape, advance=advance)
+        except NoSignals as error:
+            raise AllRunsFailed(
+                f"no simulation of the phase {phase!r} returned a signal: {error}"
+            ) from error
         good = succeeded(results)
         if not good:
             raise AllRunsFailed(

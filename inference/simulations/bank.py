@@ -1,6 +1,7 @@
 """Every finished simulation, kept on disk and reused."""
 
 import json
+import os
 import sqlite3
 import threading
 import time
@@ -11,10 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arguments import check_text, checked_integer
 from ..notebook_display import as_html, as_text
 from .database import disk_errors, opened_database
 from .simulation_locks import Claims
 
+LARGEST_SEED = 2**63 - 1  # that SQLite can hold
 MARK = 0x424C4651  # "BLFQ"
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS simulation (
@@ -111,7 +114,7 @@ class SimulationBank:
             row = self._connection.execute(
                 "SELECT signal, dtype, shape, error, seconds FROM simulation "
                 "WHERE identity = ? AND theta = ? AND seed = ?",
-                (identity, theta_key(theta), int(seed)),
+                _key(identity, theta, seed),
             ).fetchone()
         if row is None:
             return None
@@ -131,12 +134,14 @@ class SimulationBank:
         Raises:
             OSError: the disk is full or fails; what is in the bank is kept.
         """
+        if not isinstance(simulation, Simulation):
+            raise ValueError(f"simulation must be a Simulation, got {simulation!r:.100}")
         blob, dtype, shape = None, None, None
         if simulation.signal is not None:
             signal = np.ascontiguousarray(simulation.signal)
             blob, dtype, shape = signal.tobytes(), signal.dtype.str, json.dumps(signal.shape)
         row = (
-            *(identity, theta_key(theta), int(seed), blob, dtype, shape),
+            *(*_key(identity, theta, seed), blob, dtype, shape),
             *(simulation.error, simulation.seconds, time.time()),
         )
         with self._lock, disk_errors(self.path):
@@ -157,6 +162,7 @@ class SimulationBank:
         Raises:
             ValueError: there are none, or their signals or parameters are not alike.
         """
+        check_text("identity", identity)
         with self._lock:
             rows = self._connection.execute(
                 "SELECT theta, seed, signal, dtype, shape FROM simulation "
@@ -205,9 +211,33 @@ class SimulationBank:
         self.close()
 
 
+def check_bank(bank: object) -> None:
+    """Raise ValueError unless `bank` is a bank, or a path to one."""
+    if not isinstance(bank, SimulationBank | str | os.PathLike) or not str(bank):
+        raise ValueError(f"bank must be the path of a file or a SimulationBank, got {bank!r:.100}")
+
+
 def theta_key(theta: Mapping[str, float]) -> str:
-    """Canonical text of theta; `repr` of a float64 round-trips exactly."""
-    return json.dumps({name: float(theta[name]) for name in sorted(theta)})
+    """Canonical text of theta; `repr` of a float64 round-trips exactly.
+
+    Raises:
+        ValueError: not names and numbers.
+    """
+    try:
+        return json.dumps({name: float(theta[name]) for name in sorted(theta)})
+    except (TypeError, ValueError, KeyError) as error:
+        raise ValueError(f"theta must map names to numbers, got {theta!r:.100}") from error
+
+
+def _key(identity: str, theta: Mapping[str, float], seed: int) -> tuple[str, str, int]:
+    """What a row is found by.
+
+    Raises:
+        ValueError: no text, no names and numbers, or no integer.
+    """
+    check_text("identity", identity)
+    whole = checked_integer("seed", seed, -LARGEST_SEED - 1, LARGEST_SEED)
+    return identity, theta_key(theta), whole
 
 
 def _signal(blob: bytes, dtype: str, shape: str) -> np.ndarray:
@@ -215,4 +245,4 @@ def _signal(blob: bytes, dtype: str, shape: str) -> np.ndarray:
 
 
 def _claim_key(identity: str, theta: Mapping[str, float], seed: int) -> str:
-    return json.dumps([identity, theta_key(theta), int(seed)])
+    return json.dumps(_key(identity, theta, seed))

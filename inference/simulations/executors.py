@@ -4,7 +4,7 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, cast, runtime_checkable
 
 
 @runtime_checkable
@@ -55,17 +55,25 @@ def _opened(executor: Workers | None) -> Iterator[Executor | None]:
     if isinstance(executor, DaskClient) and not isinstance(executor, Executor | type):
         yield executor.get_executor(pure=False)
         return
-    if executor is not None and not isinstance(executor, Executor):
+    check_executor(executor)
+    yield cast(Executor | None, executor)
+
+
+def check_executor(executor: object) -> None:
+    """Raise ValueError unless simulations can run there; whether a scheduler answers is not
+    asked."""
+    if executor is None or (isinstance(executor, DaskClient) and not isinstance(executor, type)):
+        return
+    if not isinstance(executor, Executor | str):
         raise ValueError(
             "executor must be a concurrent.futures.Executor, a Dask client, the address of a Dask "
-            f"scheduler or None, got {type(executor).__name__}"
+            f"scheduler or None, got {executor!r:.100} of type {type(executor).__name__}"
         )
     if isinstance(executor, ProcessPoolExecutor) and _forks(executor):
         raise ValueError(
             "executor starts its workers by fork, which JAX's threads do not survive; give "
             "ProcessPoolExecutor(n, mp_context=multiprocessing.get_context('spawn'))"
         )
-    yield executor
 
 
 def _check_one_thread(executor: Executor | None) -> None:

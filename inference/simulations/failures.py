@@ -15,6 +15,11 @@ class Failure(StrEnum):
     NOT_FINITE = "not finite"  # the simulator returned NaN or infinity
     TIMEOUT = "timeout"
     UNUSABLE = "unusable"  # the simulator returned something else than a signal
+    INCOMPARABLE = "incomparable"  # the user's discrepancy or summary failed on the signal
+
+
+class NoSignals(ValueError):
+    """None of the first runs gave a signal, and so none would; the message says what came."""
 
 
 _ENGINE = f"{Path(__file__).parents[1]}{os.sep}"
@@ -47,11 +52,14 @@ def unusable(what: str) -> str:
     return f"{Failure.UNUSABLE}: {what}"
 
 
+def incomparable(what: str) -> str:
+    return f"{Failure.INCOMPARABLE}: {what}"
+
+
 def kind(error: str) -> Failure:
     """The kind of a failure of which a sentence is kept."""
     prefix = error.partition(":")[0]
-    told = Failure.NOT_FINITE, Failure.TIMEOUT, Failure.UNUSABLE
-    return next((one for one in told if one == prefix), Failure.RAISED)
+    return next((one for one in Failure if one == prefix), Failure.RAISED)
 
 
 def count(errors: Iterable[str]) -> dict[str, int]:

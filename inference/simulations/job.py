@@ -176,7 +176,7 @@ def run_batch(
                 # no run is right alone either: tell of the call that the user's code got
                 told = misshapen(simulate, batch, shape, error)
                 return [one._replace(error=told) for one in made]
-            return of_one_shape(made, batch, shape)
+            return made
         if isinstance(error, Overdue) and timeout is not None:
             return [Simulation(None, timed_out(timeout), timeout)]
         bad = isinstance(error, Unusable)

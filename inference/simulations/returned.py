@@ -3,6 +3,8 @@
 Loads nothing but NumPy, for workers import it.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..arguments import Unusable, float64
@@ -25,16 +27,16 @@ def signals_of(returned: object, n: int, shape: tuple[int, ...] | None) -> np.nd
 
 def told_signals(
     given: object, n: int, shape: tuple[int, ...] | None
-) -> tuple[np.ndarray, list[str]]:
+) -> tuple[Sequence[np.ndarray | None], list[str]]:
     """Signals that a user hands over, and what is wrong with each.
 
     Args:
-        given: An array, or a sequence of n signals; a bad one among good ones is a row of NaN.
+        given: An array, or a sequence of n signals, of which some may be bad.
         n: Signals that are due.
-        shape: Of one signal; None takes the commonest.
+        shape: Of one signal; None accepts any, also one of each.
 
     Returns:
-        float64 [n, *shape]; and for each row what came in place of a signal, "" if one came.
+        n signals of float64, None where something else came; and what came there, "" elsewhere.
 
     Raises:
         Unusable: not n signals, or none of them can be used.
@@ -42,18 +44,17 @@ def told_signals(
     try:
         return signals_of(given, n, shape), [""] * n
     except Unusable:
-        if not isinstance(given, list | tuple) or len(given) != n:
+        objects = isinstance(given, np.ndarray) and given.dtype == object and given.ndim == 1
+        if not (objects or isinstance(given, list | tuple)) or len(given) != n:
             raise
-        rows = [_float64_or_why(row) for row in given]
-        shapes = [row.shape for row in rows if not isinstance(row, str)]
-        due = commonest(shapes) if shape is None else shape
-        faults = [_fault(row, due) for row in rows]
-        if due is None or all(faults):
+        tried = [_float64_or_why(row) for row in given]
+        faults = [_fault(row, shape) for row in tried]
+        if n and all(faults):
             raise
-    missing = np.full(due, np.nan)
-    return np.stack(
-        [missing if why else row for row, why in zip(rows, faults, strict=True)]
-    ), faults
+    return [
+        row if isinstance(row, np.ndarray) and not why else None
+        for row, why in zip(tried, faults, strict=True)
+    ], faults
 
 
 def _float64_or_why(row: object) -> np.ndarray | str:
@@ -66,7 +67,7 @@ def _float64_or_why(row: object) -> np.ndarray | str:
 def _fault(row: np.ndarray | str, due: tuple[int, ...] | None) -> str:
     if isinstance(row, str):
         return row
-    return "" if row.shape == due else str(row.shape)
+    return "" if due in (None, row.shape) else str(row.shape)
 
 
 def commonest(shapes: list[tuple[int, ...]]) -> tuple[int, ...] | None:

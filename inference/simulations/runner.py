@@ -10,7 +10,7 @@ from ..arguments import check_timeout, checked_integer
 from ..types import Simulator
 from .bank import Simulation, SimulationBank
 from .executors import killed_its_worker
-from .failures import Failure, kind, raised, unusable
+from .failures import Failure, NoSignals, kind, raised, unusable
 from .job import BATCH, Job, OneByOne, is_unusable, of_one_shape, run_batch
 
 POLL_SECONDS = 0.2  # seconds between looks at what somebody else is simulating
@@ -96,7 +96,7 @@ class Runner:
         """Results of all jobs, in order, once all are finished.
 
         Raises:
-            ValueError: none of the first runs gave a signal of this shape.
+            NoSignals: none of the first runs gave a signal of this shape.
             RuntimeError: the executor lost a simulation.
         """
         return [self.result(outcome) for outcome in self.start(batch, shape)]
@@ -133,7 +133,7 @@ class Runner:
             return
         self._misshapen += 1
         if self._misshapen == self._misshapen_until:
-            raise ValueError(str(made.error).removeprefix(unusable("")))
+            raise NoSignals(str(made.error).removeprefix(unusable("")))
 
     def _begin(self) -> None:
         """Take from the bank or simulate whatever nobody else is simulating."""
@@ -183,7 +183,7 @@ class Runner:
         try:
             future = executor.submit(work)
         except Exception as error:
-            self._fail(order, self._explained(error))
+            self._fail(order, self._refused(error))
             return
         self._submitted.add(future)
         future.add_done_callback(partial(self._receive, order))
@@ -217,6 +217,18 @@ class Runner:
         job = self._mine.pop(outcome, None)
         if job is not None:
             self.bank.release(self.identity, *job)
+
+    def _refused(self, error: Exception) -> BaseException:
+        """What to tell the user of an executor that takes no simulation."""
+        told = self._explained(error)
+        if told is not error or not isinstance(error, RuntimeError):
+            return told
+        told = RuntimeError(
+            f"executor takes no simulation ({error}); give one that is open, which nobody has shut "
+            f"down. {self.bank.where}"
+        )
+        told.__cause__ = error
+        return told
 
     def _explained(self, error: BaseException) -> BaseException:
         """What to tell the user of an executor's own error."""
@@ -294,7 +306,7 @@ def run_missing(
         advance: Called with 1 for each result, in order; those of a batch come together.
 
     Raises:
-        ValueError: the simulator returned something else than signals for all of the first runs.
+        NoSignals: the simulator returned something else than signals for all of the first runs.
     """
     at_once = len(jobs) if keep.batch is None or keep.executor is not None else keep.batch
     results = []

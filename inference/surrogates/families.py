@@ -1,12 +1,13 @@
 """The families of surrogates: what a user may choose of each, and how it learns."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_callable, checked_integer
+from ..arguments import check_callable, checked_array, checked_integer, checked_number
 from ..types import Discrepancy
 from .base import Surrogate
 from .discrepancy import DiscrepancySurrogate, learn, marginalised, with_threshold
@@ -14,9 +15,9 @@ from .emulator import PREDICTED_SHARE, Limits, emulate
 from .given_noise import GivenNoise, given_noise
 from .held_back import held_back
 from .outliers import sane
-from .output_vectors import Output, Summary, describe
+from .output_vectors import Output, Summary, describe, summarise
 from .signal import SignalSurrogate, observe
-from .squared_difference import evaluate, squared_difference
+from .squared_difference import evaluate, failed_on, squared_difference
 from .threshold import Threshold, check_rule
 from .transform import TRANSFORMS
 
@@ -30,6 +31,14 @@ class Learnable(NamedTuple):
     features: np.ndarray  # [n, m]
     discrepancy: np.ndarray  # [n]
     normal: np.ndarray  # bool [d], see `Prior.normal`
+
+
+class Measured(NamedTuple):
+    """n simulations in view of what was observed."""
+
+    features: np.ndarray  # [n, m]
+    discrepancy: np.ndarray  # [n], NaN where a run failed
+    errors: list[str]  # [n], why the user's own function could not compare a signal; "" elsewhere
 
 
 @dataclass(frozen=True)
@@ -83,9 +92,11 @@ class DiscrepancyLearner:
         """Whether signals may have another shape than what was observed."""
         return self.family.discrepancy is not None
 
-    def measure(self, signals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Features [n, 0] and discrepancies [n] of signals [n, ...]; NaN where failed."""
-        return np.zeros((len(signals), 0)), evaluate(self.distance, self.observed, signals)
+    def measure(self, signals: Sequence[np.ndarray | None]) -> Measured:
+        """Features [n, 0] and discrepancies of n signals, None where a run failed."""
+        return Measured(
+            np.zeros((len(signals), 0)), *evaluate(self.distance, self.observed, signals)
+        )
 
     def learnable(self, discrepancy: np.ndarray) -> np.ndarray:
         """Which of the successful simulations are learned from, bool [n]: all."""
@@ -141,8 +152,11 @@ class SignalFamily:
         check_callable("summary", self.summary)
         check_callable("discrepancy", self.discrepancy)
         checked_integer("components", self.components)
-        if self.predicted is not None and not 0.0 <= self.predicted < 1.0:
-            raise ValueError(f"predicted must be None or from 0 to below 1, got {self.predicted}")
+        if self.noise is not None:  # its shape is looked at beside the output's
+            checked_array("noise", self.noise)
+        if self.predicted is not None:
+            due = "None or from 0 to below 1"
+            checked_number("predicted", self.predicted, lambda share: 0.0 <= share < 1.0, due)
 
     def learner(self, observed: np.ndarray) -> "SignalLearner":
         output = describe(observed, self.summary)
@@ -172,14 +186,20 @@ class SignalLearner:
         """Whether signals may have another shape than what was observed."""
         return self.family.summary is not None
 
-    def measure(self, signals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Features [n, m] and discrepancies [n] of signals [n, ...]; NaN where failed."""
-        discrepancy = evaluate(self.distance, self.observed, signals)
+    def measure(self, signals: Sequence[np.ndarray | None]) -> Measured:
+        """Features [n, m] and discrepancies of n signals, None where a run failed."""
+        named = "summary" if self.family.discrepancy is None else "discrepancy"
+        discrepancy, errors = evaluate(self.distance, self.observed, signals, named)
         features = np.full((len(signals), len(self.values)), np.nan)
-        for i in np.flatnonzero(np.isfinite(discrepancy)):
-            features[i] = self.output.values(signals[i])
+        for i, signal in enumerate(signals):
+            if signal is None or not np.isfinite(discrepancy[i]):
+                continue
+            try:
+                features[i] = self.output.values(signal)
+            except Exception as error:  # of the user's summary
+                errors[i] = failed_on("summary", signal, self.observed, error)
         failed = ~np.isfinite(features).all(1)
-        return features, np.where(failed, np.nan, discrepancy)
+        return Measured(features, np.where(failed, np.nan, discrepancy), errors)
 
     def learnable(self, discrepancy: np.ndarray) -> np.ndarray:
         """Which of the successful simulations are learned from, bool [n]: what blew up is not."""
@@ -262,10 +282,11 @@ def _of_summaries(summary: Summary | None) -> Discrepancy:
     """Sum of squared differences of (summarised) outputs, missing samples left out."""
 
     def distance(observed: np.ndarray, simulated: np.ndarray) -> float:
-        a, b = (np.asarray(x if summary is None else summary(x)) for x in (observed, simulated))
+        a, b = (summarise(summary, output) for output in (observed, simulated))
         if a.shape != b.shape:
             raise ValueError(f"expected an output of shape {a.shape}, as observed, got {b.shape}")
         there = np.isfinite(a)
-        return float(np.sum((a[there] - b[there]) ** 2))
+        with np.errstate(all="ignore"):  # of a run that blew up
+            return float(np.sum((a[there] - b[there]) ** 2))
 
     return distance

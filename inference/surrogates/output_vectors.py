@@ -78,8 +78,8 @@ class Output:
 
 
 def summarise(summary: Summary | None, output: np.ndarray) -> np.ndarray:
-    """float64, at least one-dimensional."""
-    raw = output if summary is None else summary(output)
+    """float64, at least one-dimensional; a summary may write into the copy that it is given."""
+    raw = output if summary is None else summary(output.copy())
     name = "an output" if summary is None else "what summary returns"
     return np.atleast_1d(checked_array(name, raw))
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import checked_array
+from ..simulations.failures import incomparable, raised
 from ..types import Discrepancy
 
 
@@ -26,7 +27,7 @@ def squared_difference(time: ArrayLike | None = None) -> Discrepancy:
         ValueError: `time` is not strictly increasing; on call, shapes differ or no channel
             has two observed samples.
     """
-    grid = None if time is None else np.asarray(time, np.float64)
+    grid = None if time is None else checked_array("time", time)
     if grid is not None and (grid.ndim != 1 or not (np.diff(grid) > 0).all()):
         raise ValueError(f"time must be strictly increasing with shape [t], got {grid.shape}")
 
@@ -37,7 +38,8 @@ def squared_difference(time: ArrayLike | None = None) -> Discrepancy:
             raise ValueError(f"expected a signal of {observed.shape}, got {simulated.shape}")
         weights = trapezoid_weights(np.isfinite(observed), grid)
         used = weights > 0
-        return float(np.sum(weights[used] * (observed[used] - simulated[used]) ** 2))
+        with np.errstate(all="ignore"):  # of a run that blew up
+            return float(np.sum(weights[used] * (observed[used] - simulated[used]) ** 2))
 
     return distance
 
@@ -77,22 +79,47 @@ def _weights(time: np.ndarray) -> np.ndarray:
 
 
 def evaluate(
-    discrepancy: Discrepancy, observed: np.ndarray, signals: Sequence[np.ndarray] | np.ndarray
-) -> np.ndarray:
-    """Discrepancy of each signal, float64 [n]; NaN marks a failed simulation.
+    compare: Discrepancy,
+    observed: np.ndarray,
+    signals: Sequence[np.ndarray | None],
+    named: str = "discrepancy",
+) -> tuple[np.ndarray, list[str]]:
+    """Discrepancy of each signal, and why there is none.
 
-    Raises:
-        ValueError: `discrepancy` returned something other than a scalar.
+    Args:
+        compare: The discrepancy; it may write into what it is given.
+        observed: What was measured.
+        signals: Of any shapes; None, or NaN throughout, is the mark of a failed run, on which a
+            user's function may stumble.
+        named: What `compare` is to the user.
+
+    Returns:
+        float64 [n], NaN where a run failed or has no finite discrepancy; and for each signal why
+        it cannot be compared, "" elsewhere.
     """
-    values = np.full(len(signals), np.nan)
+    values, errors = np.full(len(signals), np.nan), [""] * len(signals)
     for i, signal in enumerate(signals):
-        if np.isnan(signal).all():
-            continue  # the mark of a failed run, on which a user's function may stumble
-        returned = discrepancy(observed, signal)
-        if returned is None:
+        if signal is None or np.isnan(signal).all():
             continue
-        value = checked_array("what discrepancy returns", returned)
-        if value.shape != ():
-            raise ValueError(f"discrepancy must return one number, got shape {value.shape}")
-        values[i] = value if np.isfinite(value) else np.nan
-    return values
+        try:
+            values[i] = _number(named, compare(observed.copy(), signal.copy()))
+        except Exception as error:  # whatever the user's code raises costs this run only
+            errors[i] = failed_on(named, signal, observed, error)
+    return values, errors
+
+
+def failed_on(named: str, signal: np.ndarray, observed: np.ndarray, error: Exception) -> str:
+    """What is kept of an error of the user's function that was given this signal."""
+    return incomparable(
+        f"the {named} failed on a signal of shape {signal.shape}, observed being of shape "
+        f"{observed.shape} ({raised(error)})"
+    )
+
+
+def _number(named: str, returned: object) -> float:
+    if returned is None:
+        return np.nan
+    value = checked_array(f"what {named} returns", returned)
+    if value.shape != ():
+        raise ValueError(f"{named} must return one number, got shape {value.shape}")
+    return float(value) if np.isfinite(value) else np.nan

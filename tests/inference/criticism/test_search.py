@@ -11,7 +11,7 @@ import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference.criticism.next_experiment import suggest
-from bolfi_liquids.inference.criticism.simulate import Laboratory
+from bolfi_liquids.inference.criticism.simulate import Laboratory, phase_seeds
 
 from bolfi_liquids import inference
 
@@ -215,6 +215,63 @@ def test_with_no_effect_that_can_be_simulated_nothing_is_known(criticised):
     assert found.confusion.shape == (0, 0)
 
 
+ODD = {
+    "silent": lambda signals, seeds: None,
+    "short": lambda signals, seeds: signals[:, :59],
+    "seldom": lambda signals, seeds: np.where(np.isin(seeds, SELDOM)[:, None], signals, np.nan),
+}
+SELDOM = phase_seeds(0, "effect seldom", PLAN.extension)[3:5]
+
+
+def oddly(theta, seeds):
+    """Effects that do nothing, and of which few or no runs return a signal."""
+    known = {name: column for name, column in theta.items() if name not in ODD}
+    signals = oscillate(known, seeds)
+    for name in theta.keys() & ODD.keys():
+        signals = ODD[name](signals, seeds)
+    return signals
+
+
+def test_effects_whose_runs_return_no_signal_are_untested_and_stop_nothing(criticised):
+    fitted = replace(experiment(drift=0.06), simulate=oddly)
+    odd = dict.fromkeys(ODD, criticism.Extension(dist.HalfNormal(1.0)))
+    found = criticised(fitted, {**odd, "drift": EXTENSIONS["drift"]})
+    assert found.verdict.effects == ("drift",) == found.accepted
+    assert found.untested == tuple(ODD) and list(found.singles) == ["drift"]
+    assert all(name in repr(found) for name in ODD)
+    with pytest.raises(RuntimeError, match="silent cannot be accepted"):
+        criticised(fitted, {**odd, "drift": EXTENSIONS["drift"]}, accept=["silent"])
+
+
+def test_an_effect_that_fails_where_it_would_be_refitted_is_untested_and_stops_nothing(criticised):
+    refits = [phase_seeds(0, f"refit drift {k}", PLAN.refit) for k in range(2)]
+
+    def fragile(theta, seeds):
+        if np.isin(seeds, refits).any():
+            return None
+        return oscillate(theta, seeds)
+
+    fitted = replace(experiment(drift=0.06), simulate=fragile, identity="fragile")
+    found = criticised(fitted, {name: EXTENSIONS[name] for name in ("offset", "drift")})
+    assert "drift" in found.untested and not found.singles["drift"].refitted
+    assert "drift" not in found.accepted
+
+
+def test_an_explanation_that_cannot_be_simulated_for_held_out_data_is_not_borne_out(criticised):
+    def partly(theta, seeds):
+        if "drift" in theta:
+            raise ArithmeticError
+        return oscillate(theta, seeds, speed=1.3)
+
+    unseen = replace(held_out(drift=0.06), simulate=partly, identity="partly")
+    found = criticised(experiment(drift=0.06), held_out=[unseen])
+    assert found.accepted == () and "drift" in found.untested
+    assert not found.singles["drift"].held and ("drift",) not in found.gaps
+
+
+# Which experiment next?
+
+
 # Which experiment next?
 
 
@@ -260,3 +317,9 @@ def test_an_experiment_is_as_good_as_the_pair_that_it_separates_least(laboratory
 
 def test_one_explanation_needs_no_further_experiment(laboratory):
     assert suggest(laboratory, [proposal(1.0)], [rival(delay=0.1)]) == []
+
+
+def test_an_experiment_that_cannot_be_simulated_is_not_suggested(laboratory):
+    dead = criticism.Proposal(lambda theta, seeds: None, NOISE, (60,), "dead", "dead")
+    found = suggest(laboratory, [dead, proposal(2.0)], [rival(delay=0.1), rival(phase=0.3)])
+    assert [one.label for one in found] == ["speed 2.0"]

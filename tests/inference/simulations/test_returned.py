@@ -9,6 +9,7 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from decimal import Decimal
 
+import dask.array
 import numpy as np
 import pandas as pd
 import pytest
@@ -33,6 +34,31 @@ NUMBERS = {
     "masked integers": (np.ma.masked_array([1, 7], [False, True]), [1.0, np.nan]),
     "a list of masked rows": ([MASKED, MASKED], [[1.0, np.nan]] * 2),
     "the constant": ([1.0, np.ma.masked], [1.0, np.nan]),
+    "lists of masked rows": ([[MASKED, MASKED]] * 2, [[[1.0, np.nan]] * 2] * 2),
+    "tuples of masked rows, and others": (
+        ([(MASKED,)], [[[3, 4]]]),
+        [[[[1.0, np.nan]]], [[[3, 4]]]],
+    ),
+    "the constant in a row": ([[1.0, np.ma.masked], [2.0, 3.0]], [[1.0, np.nan], [2.0, 3.0]]),
+    "masked numbers": ([[np.ma.masked_array(7.0, True)]], [[np.nan]]),
+    "nothing in a row": ([[1.0, None], [2.0, 3.0]], [[1.0, np.nan], [2.0, 3.0]]),
+    "pandas.NA": ([[1.0, pd.NA], [2.0, 3.0]], [[1.0, np.nan], [2.0, 3.0]]),
+    "a nullable column": (pd.Series([1, None], dtype="Int64"), [1.0, np.nan]),
+    "nullable columns": (pd.DataFrame({"x": [1.5, None]}, dtype="Float64"), [[1.5], [np.nan]]),
+    "labelled and masked": (xr.DataArray(MASKED, dims="time"), [1.0, np.nan]),
+    "a list of labelled": ([xr.DataArray([1.0, np.nan], dims="time")], [[1.0, np.nan]]),
+    "labelled chunks that are masked": (
+        xr.DataArray(dask.array.ma.masked_array([1.0, 1e36], [False, True])),
+        [1.0, np.nan],
+    ),
+    "a list of chunks that are masked": (
+        [dask.array.ma.masked_array([1.0, 1e36], [False, True])],
+        [[1.0, np.nan]],
+    ),
+    "chunks that are masked": (
+        dask.array.ma.masked_array([1.0, 1e36], [False, True]),
+        [1.0, np.nan],
+    ),
     "labelled": (xr.DataArray([1.0, 2.0], dims="time"), [1.0, 2.0]),
     "a table": (pd.DataFrame({"x": [1, 2], "y": [3, 4]}), [[1.0, 3.0], [2.0, 4.0]]),
     "a row of lists": ([[1, 2], [3, 4]], [[1.0, 2.0], [3.0, 4.0]]),
@@ -64,6 +90,8 @@ OTHERS = {
     "a mapping": {"x": [1.0, 2.0]},
     "a set": {1.0, 2.0},
     "a generator": (value for value in (1.0, 2.0)),
+    "masked complex numbers in a list": [[np.ma.masked_array([1j, 2.0], [True, False])]],
+    "times that are missing": np.array([1.0, pd.NaT], object),
     "rows of objects": np.array([np.zeros(2), np.zeros(1)], object),
 }
 
