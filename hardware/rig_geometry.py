@@ -110,8 +110,9 @@ def _check_start(rig: Rig, space: Workspace, where: str) -> None:
         raise RigError(
             f"these joints put the stick's pivot {1e3 * aside:.1f} mm aside of its place above the "
             f"cup (cup.position, stirring.clear_height), {1e3 * along:.1f} mm from its height and "
-            f"{np.degrees(tilt):.0f} deg from its direction; this stick may be {1e3 * wall:.1f} mm "
-            f"aside and {1e3 * floor:.1f} mm from its height before it meets the cup",
+            f"{np.degrees(tilt):.0f} deg from its direction, where this stick may be "
+            f"{1e3 * wall:.1f} mm, {1e3 * floor:.1f} mm and "
+            f"{np.degrees(MAX_TILT['stirring']):.0f} deg",
             where=f"{where}: robot.start",
             fix="move the pivot there by hand and write down the joints, or correct "
             "cup.position, robot.stirring_tcp or robot.controller",

@@ -16,13 +16,21 @@ RECORDED = {"recorded": True}
 """Context of a validation that asks for the right fields and types, and for no ends."""
 
 
-class Section(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
-    """Part of a file that a person writes: no unknown fields, no change after reading."""
-
-
 def is_recorded(info: ValidationInfo) -> bool:
     """Whether a rig is read back that was recorded."""
     return info.context is not None and info.context == RECORDED
+
+
+class Section(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+    """Part of a file that a person writes: no unknown fields, no change after reading."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known(cls, written: Any, info: ValidationInfo) -> Any:
+        """Of a recording without the fields that another version has had."""
+        if is_recorded(info) and isinstance(written, dict):
+            return {name: value for name, value in written.items() if name in cls.model_fields}
+        return written
 
 
 def unless_recorded(check: Callable[[Any], Any]) -> AfterValidator:

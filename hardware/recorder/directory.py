@@ -1,6 +1,5 @@
 """The directory of a recording: made before the arm moves, and complete without the rig's file."""
 
-import errno
 import hashlib
 import json
 import shutil
@@ -17,6 +16,7 @@ from ..errors import RigError
 from ..rig import Rig, View
 from ..rig_numbers import RECORDED
 from ..vision.camera_model import CameraModel, as_fields, from_fields
+from .disk import FULL
 from .events import EVENTS, drop_reserve, make_reserve, read_events
 from .names import frames_file, truth_file, video_file
 from .sample import SAMPLES
@@ -27,7 +27,6 @@ VIEWS: tuple[View, View] = ("xz", "yz")
 BYTES_PER_PIXEL = 0.3  # of a noisy picture as MJPEG
 SAMPLE_BYTES = 320  # of a row of samples.csv
 WAY_TIME = 30.0  # [s] from and to where the arm waits, at the most
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # how a disk says that there is no room
 SPARE_SPACE = 2.0  # times the need
 
 

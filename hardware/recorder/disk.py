@@ -1,11 +1,14 @@
 """A process's dealings with a disk that may get full: it stops writing and goes on living."""
 
+import errno
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
 from ..board import Trouble, host_time
 from .events import EventLog
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # how a disk says that there is no room
 
 
 class Disk:
@@ -30,7 +33,9 @@ class Disk:
             act()
         except OSError as err:
             self.trouble = Trouble.WRITE_FAILED
-            self.tell("write_failed", file=name, reason=f"{name}: {err.strerror or err}")
+            cure = " (make room)" if err.errno in FULL else ""
+            reason = f"{name}: {err.strerror or err}{cure}"
+            self.tell("write_failed", file=name, reason=reason)
         self.slowest = max(self.slowest, host_time() - start)
 
     def tell(self, kind: str, **fields: Any) -> None:

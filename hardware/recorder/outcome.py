@@ -28,13 +28,20 @@ def outcome(events: Events, cut: str = "") -> Outcome:
     told = [event for event in events if event["kind"] == "stopped"]
     told += [event for event in events if event["kind"] in TROUBLES]
     if told:
-        # control tells only that stamps are bad or that a file is not written; who has it, which
-        known = (event for event in told[1:] if event["kind"] in (BAD_STAMPS, WRITE_FAILED))
-        details = [_reason(event) for event in known]
-        return Outcome("aborted", "; ".join([_reason(told[0]), *details[:1]]))
+        return Outcome("aborted", detailed(_reason(told[0]), told[1:]))
     if not _carried_out(events):
         return Outcome("aborted", f"{SILENT} ({cut})" if cut else SILENT)
     return Outcome("aborted", cut) if cut else Outcome("complete", "the plan was carried out")
+
+
+def detailed(reason: str, events: Events) -> str:
+    """Why a session ended, with what control does not know.
+
+    Control tells only that stamps are bad or that something is not written; the process that has
+    complained of it says from which frame on, or which file and why.
+    """
+    known = (event for event in events if event["kind"] in (BAD_STAMPS, WRITE_FAILED))
+    return "; ".join([reason, *[_reason(event) for event in known][:1]])
 
 
 def _carried_out(events: Events) -> bool:

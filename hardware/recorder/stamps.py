@@ -47,7 +47,7 @@ class _Seen(NamedTuple):
     """A frame: its place among all that were taken, its index, its stamp and its arrival [s]."""
 
     row: int
-    index: int
+    frame: int
     stamp: float
     host: float
 
@@ -104,7 +104,7 @@ class StampWatch:
             self._trust(agreeing)
         elif len(self._bad) > MAX_BAD_STAMPS:
             first = self._bad[0]
-            self.fault = StampFault(first.index, first.host - self._first, self._told())
+            self.fault = StampFault(first.frame, first.host - self._first, self._told())
 
     def _is_good(self, seen: _Seen) -> bool:
         if not math.isfinite(seen.stamp) or (self._latest and seen.stamp <= self._latest[-1].stamp):

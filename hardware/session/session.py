@@ -14,7 +14,8 @@ from ..errors import MotionRejected, RigError
 from ..motion.cup_frame import cup_frame
 from ..motion.stir_paths import PosePath
 from ..recorder.directory import discard_directory, start_directory
-from ..recorder.events import EventLog, drop_reserve
+from ..recorder.events import EventLog, drop_reserve, read_events
+from ..recorder.outcome import detailed
 from ..rig_file import checked_rig
 from ..robot.orders import Ask, Follow, Leave, Stop, Stopped
 from ..safety.limits import check_path
@@ -250,7 +251,9 @@ class Session:
 
     def _stop_error(self) -> SessionStopped:
         stopped = self._progress.stopped
-        reason = "the session has ended" if stopped is None else stopped.reason
+        reason = "the session has ended"
+        if stopped is not None:
+            reason = detailed(stopped.reason, read_events(self.directory))
         look = f"look at {self.directory}, then " if self._progress.began else ""
         return SessionStopped(f"{reason}; {look}start a new session")
 

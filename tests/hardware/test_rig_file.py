@@ -133,6 +133,7 @@ def test_the_rig_of_a_recording_is_read_whatever_ends_there_are_now():
     written["pouring"]["receiver"] = written["cup"]["position"]
     written["robot"]["stirring_tcp"][2] = -5.0
     written["stick"]["mass"] = 31.0
+    written["robot"]["brand"] = "of another version"
     with pytest.raises(ValidationError):
         Rig.model_validate(written)
     rig = Rig.model_validate(written, context=RECORDED)

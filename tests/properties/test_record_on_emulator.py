@@ -4,6 +4,8 @@ The recording is the one that the guide makes, by its own words.
 """
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -89,6 +91,31 @@ def test_the_recording_is_complete_and_says_how_it_was_made(recorded):
     assert "emulated" in attrs["source"]
     assert attrs["loop_late_p99_ms"] < 50.0
     assert recorded["time"].to_numpy()[-1] == pytest.approx(10.7, abs=0.2)
+
+
+FULL = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_FSIZE, (9_000_000, resource.RLIM_INFINITY))
+sys.argv = ["bolfi-liquids", "record", "--emulator", "--out", sys.argv[1]]
+from bolfi_liquids.cli.app import main
+if __name__ == "__main__":
+    main()
+"""
+
+
+@pytest.mark.slow
+def test_a_disk_without_room_ends_the_recording_and_is_named_with_its_file(tmp_path):
+    """A limit on the size of files stands for a full disk; processes inherit it."""
+    script, out = tmp_path / "full.py", tmp_path / "stir"
+    script.write_text(FULL)
+    done = subprocess.run(
+        [sys.executable, str(script), str(out)], capture_output=True, text=True, timeout=300.0
+    )
+    assert done.returncode == 3, done.stderr
+    (line,) = (one for one in done.stderr.splitlines() if one.startswith("error: "))
+    assert re.search(r"[xy]z\.mkv: File too large \(make room\)", line), line
+    attrs = bl.open_recording(out / "recording.nc").attrs
+    assert attrs["status"] == "aborted" and "make room" in attrs["reason"]
 
 
 # `test_online` has the same with a recording that is there, this module the recording

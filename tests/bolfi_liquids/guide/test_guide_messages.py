@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
+from bolfi_liquids.hardware.vision.opencv import opencv
 from typer.testing import CliRunner
 
 from bolfi_liquids.calibration.posterior_file import write_tree
@@ -253,6 +254,7 @@ def test_cups_in_millimetres(told, run, tmp_path):
 
 
 def test_missing_extra(told, monkeypatch):
+    opencv.cache_clear()  # an earlier test of this process may have imported it
     monkeypatch.setitem(sys.modules, "cv2", None)
     assert told("rig calibrate-cameras --print-board board.png") in QUOTED
 

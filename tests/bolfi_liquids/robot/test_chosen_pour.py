@@ -85,6 +85,24 @@ def test_files_that_contradict_each_other_are_refused(poured_run, field, value):
         bl.execute_pour(poured_run, ask=refused)
 
 
+def test_a_receiver_that_overlaps_the_stirred_cup_is_refused_with_its_own_radius(poured_run):
+    """rig.toml does not say how wide the receiver is; the cups of the pour do."""
+    rig, receiver = bundled_rig(), chosen_pour(poured_run).cups.receiver
+    apart = rig.cup.radius + receiver.radius
+
+    def beside(gap):
+        x, y, z = rig.cup.position
+        place = {"receiver": (x - apart - gap, y, z)}
+        return rig.model_copy(update={"pouring": rig.pouring.model_copy(update=place)})
+
+    with pytest.raises(InputError, match="stands in the stirred cup"):
+        plan_pour(poured_run, beside(-0.001))
+    try:
+        plan_pour(poured_run, beside(0.001))
+    except RigError as err:  # so near a pour leaves its box
+        assert "stands in the stirred cup" not in str(err)
+
+
 def test_a_summary_without_the_pour_is_refused(poured_run):
     path = poured_run / "summary.json"
     summary = json.loads(path.read_text(encoding="utf-8"))

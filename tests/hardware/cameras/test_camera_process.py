@@ -333,7 +333,7 @@ def test_a_full_disk_is_told_and_the_camera_goes_on(start, tmp_path, file):
     running.end()
     failed, left = read_events(tmp_path)
     assert (failed["kind"], left["kind"]) == ("write_failed", "left")
-    assert failed["reason"] == f"{file}: No space left on device"
+    assert failed["reason"] == f"{file}: No space left on device (make room)"
 
 
 def test_a_stamp_that_is_no_number_costs_no_video(tmp_path):

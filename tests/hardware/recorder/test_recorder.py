@@ -268,7 +268,7 @@ def test_a_table_that_cannot_be_begun_on_a_full_disk_is_told(tmp_path):
         running.process.join()
     failed, *_, left = read_events(tmp_path)
     assert (failed["kind"], left["kind"]) == ("write_failed", "left")
-    assert failed["reason"] == f"{SAMPLES}: No space left on device"
+    assert failed["reason"] == f"{SAMPLES}: No space left on device (make room)"
 
 
 @pytest.fixture
