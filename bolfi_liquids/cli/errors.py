@@ -2,10 +2,11 @@
 
 import errno
 import os
-import shlex
 import sqlite3
 import sys
 import traceback
+from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -14,6 +15,8 @@ from typer.exceptions import TyperException
 
 from ..errors import InputError
 from ..files import disk_errno
+from ..run.directory import RUN_TOML
+from ..wording import command
 
 FAILED = 1
 USAGE_ERROR = 2
@@ -112,6 +115,22 @@ def _say(line: str) -> None:
 
 
 def _how_to_go_on(arguments: list[str]) -> str:
-    needs_flag = "calibrate" in arguments and "--resume" not in arguments
-    command = shlex.join(["bolfi-liquids", *arguments, *(["--resume"] if needs_flag else [])])
-    return f"interrupted: what has finished is kept; go on with: {command}"
+    again, begun = command(*arguments), True
+    if "calibrate" in arguments and "--resume" not in arguments:
+        out = _value_of("--out", arguments)
+        begun = bool(out) and (Path(out) / RUN_TOML).exists()
+        again += " --resume" if begun else ""
+    if not begun:
+        return f"interrupted before anything was kept; begin again with: {again}"
+    return f"interrupted: what has finished is kept; go on with: {again}"
+
+
+def _value_of(option: str, arguments: list[str]) -> str:
+    """The last value that an option was given; "" if none."""
+    found = ""
+    for before, argument in pairwise(["", *arguments]):
+        if before == option:
+            found = argument
+        elif argument.startswith(f"{option}="):
+            found = argument.removeprefix(f"{option}=")
+    return found
