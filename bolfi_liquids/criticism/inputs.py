@@ -56,6 +56,11 @@ class Inputs:
     settings: CriticismSettings
 
     @property
+    def compared(self) -> tuple[Recording, ...]:
+        """What is given beside the recordings that were calibrated on."""
+        return (*self.held_out, *self.baseline)
+
+    @property
     def level(self) -> float:
         """p-value below which a source is rejected, so that all of them share one error rate."""
         return FALSE_ALARM_RATE if self.table is None else FALSE_ALARM_RATE / 2.0
