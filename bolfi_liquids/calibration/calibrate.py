@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import Argument, InputError
 from ..files import given_path
 from ..inputs.frame import frame_warnings
 from ..inputs.open import Source, open_recordings
@@ -112,7 +112,9 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     check_prior(prior)
     stirring = stirring_of(opened, settings.particles)
     check_names(stirring.recordings)
-    run = Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, "--out")
+    run = (
+        Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, Argument("out"))
+    )
     record = run_record(settings, prior, stirring)
     with (
         open_workers(executor, timeout) as workers,

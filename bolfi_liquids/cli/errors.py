@@ -67,8 +67,22 @@ class OneLineErrors(TyperGroup):
         except (ValueError, OSError, RuntimeError, ImportError, sqlite3.Error) as err:
             if ctx.params.get("debug"):
                 traceback.print_exc()
-            _say(f"error: {_explained(err)}")
+            told = (
+                err.as_typed(self._options(ctx)) if isinstance(err, InputError) else _explained(err)
+            )
+            _say(f"error: {_one_line(told)}")
             raise typer.Exit(_status(err)) from None
+
+    def _options(self, ctx: Any) -> dict[str, str]:
+        """Options of the command that was typed, by the names of Python's arguments."""
+        command: Any = self
+        for word in ctx.meta[GIVEN]:
+            command = getattr(command, "commands", {}).get(word, command)
+        return {
+            parameter.name: parameter.opts[0]
+            for parameter in command.params
+            if parameter.opts[0].startswith("--")
+        }
 
 
 def _status(err: Exception) -> int:

@@ -168,6 +168,8 @@ class SbcOptions:
     budget: Annotated[int, typer.Option(help="Simulations that each replicate learns from.")] = (
         SbcSettings.budget
     )
-    noise: Annotated[float, typer.Option(help="Of the cameras [deg].")] = SbcSettings.noise_deg
+    noise_deg: Annotated[float, typer.Option("--noise", help="Of the cameras [deg].")] = (
+        SbcSettings.noise_deg
+    )
     particles: ParticlesOption = SbcSettings.particles
     seed: SeedOption = SbcSettings.seed

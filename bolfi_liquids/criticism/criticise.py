@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ..calibration.posterior_file import write_tree
 from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, stirring_of
-from ..errors import InputError
+from ..errors import Argument, InputError
 from ..inputs.frame import frame_warnings
 from ..inputs.open import Source
 from ..inputs.pour_table import PourTable
@@ -193,8 +193,8 @@ def _pours(
     if not extensions:
         raise InputError(
             f"all effects that act in pours ({', '.join(acting)}) are part of the stirs' model",
-            where="--effects",
-            fix="give further effects to look for in the pours, or no --pours",
+            where=Argument("effects"),
+            fix="give further effects to look for in the pours, or no `pours`",
         )
     taught = as_prior(stirs.posterior.theta, stirs.posterior.weights, known.fit.prior)
     names = (*calibration.prior.names, *poured_too)

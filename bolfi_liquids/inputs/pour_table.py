@@ -206,7 +206,7 @@ def _of_liquid(table: Table, liquid: str | None) -> tuple[Table, str]:
         raise InputError(
             f"holds pours of {', '.join(names)}" + (f", not of {liquid}" if liquid else ""),
             where=str(table.path),
-            fix="say whose to take: --liquid NAME",
+            fix="say whose to take by `liquid`",
         )
     return replace(table, lines=table.lines[of == liquid], cells=table.cells[of == liquid]), liquid
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import Argument
 from ..files import given_path
 from ..inputs.recording import Recording
 from ..inputs.rigs import rig_of
@@ -76,7 +77,7 @@ def record_online(
 
     check_one(ask, emulate, "record")
     rig, hidden = rig_of(rig), hidden_liquid(emulate)
-    plan, out = plan_stir(rig, online.cycles), given_path(out, "--out")
+    plan, out = plan_stir(rig, online.cycles), given_path(out, Argument("out"))
     with OnlineCalibration.start(
         _simulated(plan),
         rig_attributes(rig),

@@ -4,7 +4,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..errors import InputError
+from ..errors import Argument, InputError
 from .armed_session import (
     Ask,
     Emulation,
@@ -58,7 +58,7 @@ def plan_stir(rig: "Rig", cycles: int | None = None) -> StirPlan:
     cycles = rig.stirring.cycles if cycles is None else cycles
     if not 1 <= cycles <= MAX_CYCLES:
         fix = f"give a whole number from 1 to {MAX_CYCLES}"
-        raise InputError(f"{cycles}", where="--cycles", fix=fix)
+        raise InputError(f"{cycles}", where=Argument("cycles"), fix=fix)
     stir = tuple(strokes(rig, cycles))
     plan = StirPlan(insert(rig), stir, retract(rig, stir[-1].pose[-1, :3]))
     joints = None

@@ -51,10 +51,10 @@ def test_a_changed_copy_is_refused(calibration, tmp_path):
         ({"effects": ["magic"]}, "there is no effect magic"),
         ({"pours": "nowhere.csv"}, "nowhere.csv: no such file"),
         ({"held_out": "nowhere.nc"}, "nowhere.nc: no such file"),
-        ({"seed": -1}, "--seed: -1"),
-        ({"cups": "cups.toml"}, "--cups: "),
+        ({"seed": -1}, "seed: -1"),
+        ({"cups": "cups.toml"}, "cups: "),
         ({"effects": "camera_dealy"}, "there is no effect camera_dealy"),
-        ({"accept": "foo"}, "--accept: 'foo' is none of the effects"),
+        ({"accept": "foo"}, "accept: 'foo' is none of the effects"),
         ({"effects": "camera_delay", "accept": ["camera_tilt"]}, "choose from camera_delay"),
     ],
 )

@@ -40,7 +40,7 @@ def test_one_liquid_needs_no_name(tmp_path):
 @pytest.mark.parametrize(
     ("rows", "header", "liquid", "said"),
     [
-        (ROWS, HEADER, None, "holds pours of oil, water; say whose to take: --liquid NAME"),
+        (ROWS, HEADER, None, "holds pours of oil, water; say whose to take by `liquid`"),
         (ROWS, HEADER, "gel", "not of gel"),
         (ROWS, HEADER, "oil", "too few pours: 1; give at least 3"),
         (ROWS, HEADER.replace("retained", "kept"), None, "has no column retained"),
