@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .errors import InputError
+from .errors import Argument, InputError
 from .files import existing_file, given_path, new_netcdf, write_netcdf
 from .inputs.described_liquid import number_of
 from .inputs.fields import check_fields
@@ -49,7 +49,7 @@ def trim(
         InputError: The recording cannot be read, it holds no such times, what stays cannot be
             simulated, or `out` cannot be written. Nothing was written.
     """
-    path, out = existing_file(recording), given_path(out, "--out")
+    path, out = existing_file(recording), given_path(out, Argument("out"))
     if out.exists():
         raise InputError("exists already", where=str(out), fix="choose another name")
     new_netcdf(out)
@@ -83,17 +83,17 @@ def proposed_cut(
     if stop is None:
         stop = _last_seen(recording)
     else:
-        stop = number_of(stop, "--stop")
+        stop = number_of(stop, Argument("stop"))
     if start is None:
         start = first_rest(recording)
         if start is None:
             raise InputError(
                 "there is no time at which gripper and stick rest in the liquid before a stir",
                 where=where,
-                fix="record from rest, or give --start",
+                fix="record from rest, or give `start`",
             )
     else:
-        start = number_of(start, "--start")
+        start = number_of(start, Argument("start"))
     if not time[0] <= stop or not start <= time[-1] or not start < stop:
         raise InputError(
             f"nothing lies from {start:g} to {stop:g} s; it lasts from {time[0]:.10g} to "

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from .calibration.calibrate import calibrate
 from .criticism.criticise import criticise
+from .errors import Argument
 from .files import given_path
 from .pouring.choose import choose_pour
 from .reporting.report import report
@@ -28,7 +29,7 @@ def run_demo(out: Path, *, executor: "Workers | None" = None, timeout: float | N
     Returns:
         The report.
     """
-    out = given_path(out, "--out")
+    out = given_path(out, Argument("out"))
     where: dict[str, Any] = {"executor": executor, "timeout": timeout}
     data = files("bolfi_liquids.data")
     with as_file(data / RECORDING) as recording, as_file(data / CLEAN) as clean:

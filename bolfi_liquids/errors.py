@@ -1,6 +1,7 @@
 """The one error that a person's input can cause, always a single line."""
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -9,12 +10,24 @@ if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 
+class Argument(str):
+    """The place of a fault: an argument by its name in Python, perhaps with more after a blank.
+
+    The command line writes the option in the place of the name.
+    """
+
+    def as_typed(self, options: Mapping[str, str]) -> str:
+        """With the option in the place of the name, where there is one; `options` are by name."""
+        name, blank, rest = self.partition(" ")
+        return f"{options.get(name, name)}{blank}{rest}"
+
+
 class InputError(ValueError):
     """Something a person gave cannot be used.
 
     Args:
         what: What is wrong, with the field and the value received.
-        where: The file, field or option it is wrong in.
+        where: The file or field it is wrong in, or the `Argument`.
         fix: What to do about it.
     """
 
@@ -23,6 +36,17 @@ class InputError(ValueError):
         self.what = what
         self.where = where
         self.fix = fix
+
+    def as_typed(self, options: Mapping[str, str]) -> str:
+        """The same in one line for a person who has typed a command.
+
+        Args:
+            options: Of the command, by the names of Python's arguments, which `fix` has in
+                backticks.
+        """
+        where = self.where.as_typed(options) if isinstance(self.where, Argument) else self.where
+        fix = re.sub(r"`(\w+)`", lambda name: options.get(name[1], name[0]), self.fix)
+        return " ".join(f"{where}: {self.what}; {fix}".split())
 
     @classmethod
     def from_validation(

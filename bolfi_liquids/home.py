@@ -1,26 +1,47 @@
-"""A home directory for the libraries that need one."""
+"""Directories for the libraries that keep files of their own, where a user has none for them."""
 
 import contextlib
 import os
+import pwd
 import tempfile
 
 
 def ensure_home() -> None:
-    """Set HOME, for this process and those that it starts, unless it is there and can be written.
+    """See that libraries find a directory to write to, in this process and those that it starts.
 
-    In a container a user may have none, nor an entry in passwd. Matplotlib and ArviZ then fail when
-    they are imported, and Taichi aborts the process; where it cannot write, it crashes at the end.
+    In a container a user may have no home, nor an entry in passwd. Matplotlib and ArviZ then fail
+    when they are imported, and Taichi aborts the process: HOME is set. A home that cannot be
+    written is left alone, for people read from it and no result may go elsewhere than they said;
+    only the libraries' caches are moved, without which Taichi crashes at the end.
     """
-    if _usable(os.environ.get("HOME", "")):
-        return
-    of_passwd = os.path.expanduser("~")
     with contextlib.suppress(OSError):  # no directory for temporary files either
-        os.environ["HOME"] = of_passwd if _usable(of_passwd) else _made_temporary()
+        home = os.environ.get("HOME", "")
+        if not os.path.isabs(home):
+            home = os.environ["HOME"] = _of_passwd() or _made_temporary()
+        if not _usable(home):
+            elsewhere = _made_temporary()
+            for name, place in (("XDG_CACHE_HOME", ".cache"), ("MPLCONFIGDIR", ".matplotlib")):
+                if not _usable(os.environ.get(name, "")):
+                    os.environ[name] = os.path.join(elsewhere, place)
+                    os.makedirs(os.environ[name], exist_ok=True)
+
+
+def is_temporary(path: str) -> bool:
+    """Whether a directory is among those that were made for a user without a home."""
+    return os.path.commonpath([temporary_home(), os.path.abspath(path)]) == temporary_home()
 
 
 def temporary_home() -> str:
     """The directory that serves a user without a home."""
     return os.path.join(tempfile.gettempdir(), f"bolfi-liquids-{os.getuid()}")
+
+
+def _of_passwd() -> str:
+    """The home that the computer knows for this user, if it can be written; else ""."""
+    with contextlib.suppress(KeyError):
+        home = pwd.getpwuid(os.getuid()).pw_dir
+        return home if _usable(home) else ""
+    return ""
 
 
 def _made_temporary() -> str:

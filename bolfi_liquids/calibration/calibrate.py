@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import Argument, InputError
 from ..files import given_path
 from ..inputs.frame import frame_warnings
 from ..inputs.open import Source, open_recordings
@@ -30,7 +30,7 @@ from ..run.entering import entered
 from ..run.execution import Execution
 from ..run.provenance import LIBRARIES, versions
 from ..run.recordings import check_names, keep_recordings
-from ..run.simulations import warn_of_timeouts
+from ..run.simulations import warn_of_failures
 from ..run.workers import open_workers
 from .draws import pick_draws
 from .result import Calibration, is_calibrated
@@ -112,7 +112,9 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     check_prior(prior)
     stirring = stirring_of(opened, settings.particles)
     check_names(stirring.recordings)
-    run = Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, "--out")
+    run = (
+        Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, Argument("out"))
+    )
     record = run_record(settings, prior, stirring)
     with (
         open_workers(executor, timeout) as workers,
@@ -126,7 +128,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
             logger.warning(notice)
         if not is_calibrated(run):
             _calibrate(run, stirring, prior, settings, Execution(workers, timeout, progress))
-    return Calibration.open(run)
+        return Calibration.open(run)
 
 
 def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring) -> dict[str, Any]:
@@ -162,7 +164,7 @@ def _calibrate(
         advance = after_first(kept, stack.enter_context(bar))
         keep = execution.keep(bank, stirring.identity, settings.batch)
         fit = fit_recordings(stirring, stirring.observed, prior, keep, settings, progress=advance)
-        warn_of_timeouts(fit.history.errors.tolist(), execution.timeout)
+        warn_of_failures(fit.history.errors.tolist(), execution.timeout)
         sampled = fit.sample(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
         )

@@ -1,6 +1,5 @@
 """What stirring taught: the posterior of a run and what came with it."""
 
-import shlex
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ from ..inputs.prior import read_prior
 from ..inputs.settings import CalibrationSettings
 from ..run.directory import POSTERIOR, read_run
 from ..run.summary import read_summary
-from ..wording import html_table, with_unit
+from ..wording import command, html_table, with_unit
 from .bad_fit import bad_fit
 from .draws import pick_draws
 from .summary import CalibrationSummary
@@ -81,8 +80,11 @@ class Calibration:
             raise InputError(
                 "the calibration in it is not finished",
                 where=str(run),
-                fix="go on with it: bolfi-liquids calibrate RECORDING... --out "
-                + f"{shlex.quote(str(run))} --resume{_given_options(record)}",
+                fix="go on with it: "
+                + command(
+                    *("calibrate", "RECORDING...", "--out", run, "--resume"),
+                    *_given_options(record),
+                ),
             )
         loaded = read_tree(
             run / POSTERIOR, fix="delete it and go on with --resume: no simulation is lost"
@@ -191,11 +193,12 @@ def _unpickled(values: dict[str, Any]) -> Calibration:
     return Calibration(**{**values, "record": MappingProxyType(values["record"])})
 
 
-def _given_options(record: Mapping[str, Any]) -> str:
+def _given_options(record: Mapping[str, Any]) -> list[str]:
     """Options of `calibrate` with which a run was started, where they are not the default."""
     settings, usual = record.get("settings", {}), asdict(CalibrationSettings())
     given = {name: settings.get(name, usual[name]) for name in RESUMED_OPTIONS}
-    return "".join(f" --{name} {value}" for name, value in given.items() if value != usual[name])
+    changed = {name: value for name, value in given.items() if value != usual[name]}
+    return [word for name, value in changed.items() for word in (f"--{name}", str(value))]
 
 
 def is_calibrated(run: Path) -> bool:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 import numpy as np
 from pydantic import computed_field
 
-from ..inputs.frame import frame_faults
+from ..inputs.frame import named_faults
 from ..run.summary import Number, Section
 from .check import Check
 from .noise import irreducible_rms, rms
@@ -161,11 +161,7 @@ class CalibrationSummary(Section):
             seconds=Seconds(**{name: float(value) for name, value in spent.items()}),
             seed=int(tree.attrs["seed"]),
             version=version("bolfi-liquids"),
-            frame_faults=tuple(
-                f"{one.path.name}: {fault}"
-                for one in stirring.recordings
-                for fault in frame_faults(one)
-            ),
+            frame_faults=named_faults(stirring.recordings),
         )
 
     def of_posterior(

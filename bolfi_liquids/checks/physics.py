@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..errors import InputError
+from ..errors import Argument, InputError
 from ..files import given_path, write_text
 from ..inputs.settings import checked_seed
 from ..progress import fraction_bar, progress_bar
@@ -94,7 +94,7 @@ def check_physics(
     registry = all_cases()
     chosen = _chosen(names, registry)
     seed = checked_seed(seed)
-    out = given_path(out, "--out")
+    out = given_path(out, Argument("out"))
     if out.exists() and not out.is_dir():
         raise InputError("not a directory", where=str(out), fix="choose another --out")
     (out / CASES).mkdir(parents=True, exist_ok=True)
@@ -167,7 +167,9 @@ def _chosen(names: Iterable[str], registry: "Mapping[str, Case]") -> "list[Case]
     for name in wanted:
         if name not in registry:
             raise InputError(
-                f"no case {name!r}", where="--case", fix=f"choose from {', '.join(registry)}"
+                f"no case {name!r}",
+                where=Argument("names"),
+                fix=f"choose from {', '.join(registry)}",
             )
     return [registry[name] for name in wanted or registry]
 

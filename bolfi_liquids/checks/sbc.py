@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.stir_simulator import Stirring, stirring_of
+from ..errors import Argument
 from ..files import given_path
 from ..inputs.bundled import bundled_recording
 from ..inputs.open import open_recordings
@@ -82,7 +83,7 @@ def check_sbc(
     settings = settings or SbcSettings()
     given = bundled_recording("water") if recording is None else recording
     stirring = stirring_of(open_recordings(given), settings.particles)
-    prior, out = default_prior(), given_path(out, "--out")
+    prior, out = default_prior(), given_path(out, Argument("out"))
     record = _record(settings, prior, stirring)
     found = {}
     with open_workers(executor, timeout) as workers, working_in(out):

@@ -173,7 +173,7 @@ def pour(
                 "--execute carries out the pour that RUN has chosen already; --cups, --iterations, "
                 "--risk and --force belong to the choice, which is made without --execute"
             )
-        cli_record.execute(run, execution.rig, arm=execution.arm, emulator=execution.emulator)
+        cli_record.execute(run, execution)
         return
     from ..pouring.choose import choose_pour
 

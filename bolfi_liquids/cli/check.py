@@ -23,9 +23,11 @@ def physics(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Directory of the results.")] = Path(
         "runs/physics"
     ),
-    case: Annotated[
+    names: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME", help="Run this case; may be repeated. Without it, all."),
+        typer.Option(
+            "--case", metavar="NAME", help="Run this case; may be repeated. Without it, all."
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the initial packings.")] = 0,
 ) -> None:
@@ -41,7 +43,7 @@ def physics(
 
     with compute.executor() as executor:
         check = check_physics(
-            out, case or (), seed=seed, executor=executor, timeout=compute.timeout
+            out, names or (), seed=seed, executor=executor, timeout=compute.timeout
         )
     print_physics(check.records, Console())
     typer.echo(f"results: {check.results}")
@@ -72,8 +74,7 @@ def sbc(
     """
     from ..checks.sbc import check_sbc
 
-    given = asdict(options)
-    settings = SbcSettings(noise_deg=given.pop("noise"), **given)
+    settings = SbcSettings(**asdict(options))
     with compute.executor() as executor:
         found = check_sbc(
             out, recording, settings=settings, executor=executor, timeout=compute.timeout

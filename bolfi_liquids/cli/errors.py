@@ -2,10 +2,11 @@
 
 import errno
 import os
-import shlex
 import sqlite3
 import sys
 import traceback
+from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -14,6 +15,8 @@ from typer.exceptions import TyperException
 
 from ..errors import InputError
 from ..files import disk_errno
+from ..run.directory import RUN_TOML
+from ..wording import command
 
 FAILED = 1
 USAGE_ERROR = 2
@@ -64,8 +67,22 @@ class OneLineErrors(TyperGroup):
         except (ValueError, OSError, RuntimeError, ImportError, sqlite3.Error) as err:
             if ctx.params.get("debug"):
                 traceback.print_exc()
-            _say(f"error: {_explained(err)}")
+            told = (
+                err.as_typed(self._options(ctx)) if isinstance(err, InputError) else _explained(err)
+            )
+            _say(f"error: {_one_line(told)}")
             raise typer.Exit(_status(err)) from None
+
+    def _options(self, ctx: Any) -> dict[str, str]:
+        """Options of the command that was typed, by the names of Python's arguments."""
+        command: Any = self
+        for word in ctx.meta[GIVEN]:
+            command = getattr(command, "commands", {}).get(word, command)
+        return {
+            parameter.name: parameter.opts[0]
+            for parameter in command.params
+            if parameter.opts[0].startswith("--")
+        }
 
 
 def _status(err: Exception) -> int:
@@ -112,6 +129,22 @@ def _say(line: str) -> None:
 
 
 def _how_to_go_on(arguments: list[str]) -> str:
-    needs_flag = "calibrate" in arguments and "--resume" not in arguments
-    command = shlex.join(["bolfi-liquids", *arguments, *(["--resume"] if needs_flag else [])])
-    return f"interrupted: what has finished is kept; go on with: {command}"
+    again, begun = command(*arguments), True
+    if "calibrate" in arguments and "--resume" not in arguments:
+        out = _value_of("--out", arguments)
+        begun = bool(out) and (Path(out) / RUN_TOML).exists()
+        again += " --resume" if begun else ""
+    if not begun:
+        return f"interrupted before anything was kept; begin again with: {again}"
+    return f"interrupted: what has finished is kept; go on with: {again}"
+
+
+def _value_of(option: str, arguments: list[str]) -> str:
+    """The last value that an option was given; "" if none."""
+    found = ""
+    for before, argument in pairwise(["", *arguments]):
+        if before == option:
+            found = argument
+        elif argument.startswith(f"{option}="):
+            found = argument.removeprefix(f"{option}=")
+    return found

@@ -138,13 +138,18 @@ class ExecutionOptions:
     emulator: Annotated[
         bool, typer.Option("--emulator", help="With --execute: move an emulated arm.")
     ] = False
+    despite_bad_fit: Annotated[
+        bool,
+        typer.Option("--despite-bad-fit", help="With --arm: though it was chosen over a bad fit."),
+    ] = False
 
     def __post_init__(self) -> None:
         if self.execute:
             return
-        for name in ("arm", "emulator", "rig"):
+        for name in ("arm", "emulator", "rig", "despite_bad_fit"):
             if getattr(self, name):
-                raise typer.BadParameter(f"--{name} needs --execute, which is missing")
+                option = name.replace("_", "-")
+                raise typer.BadParameter(f"--{option} needs --execute, which is missing")
 
 
 @dataclass(frozen=True)
@@ -163,6 +168,8 @@ class SbcOptions:
     budget: Annotated[int, typer.Option(help="Simulations that each replicate learns from.")] = (
         SbcSettings.budget
     )
-    noise: Annotated[float, typer.Option(help="Of the cameras [deg].")] = SbcSettings.noise_deg
+    noise_deg: Annotated[float, typer.Option("--noise", help="Of the cameras [deg].")] = (
+        SbcSettings.noise_deg
+    )
     particles: ParticlesOption = SbcSettings.particles
     seed: SeedOption = SbcSettings.seed

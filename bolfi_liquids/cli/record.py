@@ -16,7 +16,7 @@ from ..wording import command
 from .errors import FAILED, INTERRUPTED, Aborted
 from .examples import examples
 from .grouped import grouped
-from .options import RigOption
+from .options import ExecutionOptions, RigOption
 
 if TYPE_CHECKING:
     from ..hardware import Check, HiddenLiquid, Rig
@@ -162,18 +162,24 @@ def aborted_is_told() -> Iterator[None]:
         raise Aborted(str(err)) from err
 
 
-def execute(run: Path, rig: Path | None, *, arm: bool, emulator: bool) -> None:
+def execute(run: Path, how: ExecutionOptions) -> None:
     """`pour --execute`: a dry run unless armed."""
     from ..inputs.rigs import rig_of
     from ..robot.pour import execute_pour
 
-    _one_of(arm, emulator)
-    opened = rig_of(rig)
-    if not (arm or emulator):
+    _one_of(how.arm, how.emulator)
+    opened = rig_of(how.rig)
+    if not (how.arm or how.emulator):
         _dry_pour(run, opened)
         return
     with aborted_is_told():
-        done = execute_pour(run, opened, ask=typed_sentence if arm else None, emulate=emulator)
+        done = execute_pour(
+            run,
+            opened,
+            ask=typed_sentence if how.arm else None,
+            emulate=how.emulator,
+            despite_bad_fit=how.despite_bad_fit,
+        )
     typer.echo(f"poured; what the arm did is in {done}")
 
 

@@ -1,11 +1,11 @@
 """The command `trim`: the part of a recording that can be simulated."""
 
-import shlex
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from ..wording import command
 from .examples import examples
 
 EPILOG = examples("trim stir.nc", "trim stir.nc --start 4.2 --stop 11 --out cut.nc")
@@ -48,9 +48,9 @@ def trim(
     of = f"of {recording}, which lasts from {whole.time[0]:.3f} to {whole.time[-1]:.3f} s"
     if out is None:
         typer.echo(f"would keep {kept} {of}")
-        options = f"--start {cut.start:.3f} --stop {cut.stop:.3f} --out FILE.nc"
-        typer.echo(f"next: bolfi-liquids trim {shlex.quote(str(recording))} {options}")
+        ends = ("--start", f"{cut.start:.3f}", "--stop", f"{cut.stop:.3f}")
+        typer.echo(f"next: {command('trim', recording, *ends, '--out', 'FILE.nc')}")
         return
     made = run_trim(recording, start=start, stop=stop, out=out)
     typer.echo(f"{made.path}: {kept} {of}")
-    typer.echo(f"next: bolfi-liquids calibrate {shlex.quote(str(made.path))} --out RUN")
+    typer.echo(f"next: {command('calibrate', made.path, '--out', 'RUN')}")

@@ -1,5 +1,6 @@
 """From a calibration to the effect that its simulator lacks."""
 
+import logging
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,13 +10,15 @@ from typing import TYPE_CHECKING
 from ..calibration.posterior_file import write_tree
 from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, stirring_of
-from ..errors import InputError
+from ..errors import Argument, InputError
+from ..inputs.frame import frame_warnings
 from ..inputs.open import Source
 from ..inputs.pour_table import PourTable
-from ..inputs.recording import Recording
+from ..inputs.recording import Recording, aborted_recordings
 from ..inputs.settings import CriticismSettings
 from ..progress import phases
 from ..run.directory import CRITICISM, Run, open_bank, run_path
+from ..run.entering import working_in_run
 from ..run.workers import open_workers
 from .baseline import (
     Clean,
@@ -41,6 +44,8 @@ if TYPE_CHECKING:
     from .. import inference
     from ..inference.simulations import Workers
     from ..models import Cups
+
+logger = logging.getLogger(__name__)
 
 
 def criticise(  # noqa: PLR0913  the one call that most users make
@@ -80,14 +85,12 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         progress: Whether to show phases on stderr.
 
     Raises:
-        InputError, ValueError: Something given cannot be used.
+        InputError, ValueError: Something given cannot be used, or another command works in the run.
         ImportError, ConnectionError: `executor` cannot be used.
         RuntimeError: Simulations failed; the message says how.
     """
     from ..inference.criticism import Keeping
 
-    if not isinstance(calibration, Calibration):
-        calibration = Calibration.open(run_path(calibration))
     started = time.perf_counter()
     settings = CriticismSettings(
         effects=_names(effects),
@@ -95,21 +98,26 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         seed=seed,
     )
     given = Given(held_out, baseline, pours, held_out_pours, cups)
-    inputs = open_inputs(calibration, settings, given)
-    run = calibration.path
-    if finished := finished_criticism(run, inputs.made_from):
-        return finished
-    with (
-        open_workers(executor, timeout) as workers,
-        open_bank(run) as bank,
-        phases(shown=progress) as report,
-    ):
-        keeping = Keeping(bank, settings.batch, settings.seed, report, workers, timeout)
-        findings = _find(calibration, inputs, keeping)
-        tree = criticism_tree(findings)
-    write_tree(tree, run / CRITICISM)
-    CriticismSummary.from_findings(findings, tree, time.perf_counter() - started).write(run)
-    return Criticism.open(run)
+    run = run_path(calibration)
+    with working_in_run(run):
+        if not isinstance(calibration, Calibration):
+            calibration = Calibration.open(run)
+        inputs = open_inputs(calibration, settings, given)
+        for notice in [*aborted_recordings(inputs.compared), *frame_warnings(inputs.compared)]:
+            logger.warning(notice)
+        if finished := finished_criticism(run, inputs.made_from):
+            return finished
+        with (
+            open_workers(executor, timeout) as workers,
+            open_bank(run) as bank,
+            phases(shown=progress) as report,
+        ):
+            keeping = Keeping(bank, settings.batch, settings.seed, report, workers, timeout)
+            findings = _find(calibration, inputs, keeping)
+            tree = criticism_tree(findings)
+        write_tree(tree, run / CRITICISM)
+        CriticismSummary.from_findings(findings, tree, time.perf_counter() - started).write(run)
+        return Criticism.open(run)
 
 
 def _names(given: str | Sequence[str] | None) -> tuple[str, ...] | None:
@@ -185,8 +193,8 @@ def _pours(
     if not extensions:
         raise InputError(
             f"all effects that act in pours ({', '.join(acting)}) are part of the stirs' model",
-            where="--effects",
-            fix="give further effects to look for in the pours, or no --pours",
+            where=Argument("effects"),
+            fix="give further effects to look for in the pours, or no `pours`",
         )
     taught = as_prior(stirs.posterior.theta, stirs.posterior.weights, known.fit.prior)
     names = (*calibration.prior.names, *poured_too)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, same_liquid, stirring_of
-from ..errors import InputError
+from ..errors import Argument, InputError
 from ..inputs.cups import cups_of
 from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import PourTable, check_scene, open_pours
@@ -54,6 +54,11 @@ class Inputs:
     held_out_table: PourTable | None
     cups: "Cups"
     settings: CriticismSettings
+
+    @property
+    def compared(self) -> tuple[Recording, ...]:
+        """What is given beside the recordings that were calibrated on."""
+        return (*self.held_out, *self.baseline)
 
     @property
     def level(self) -> float:
@@ -105,16 +110,18 @@ def open_inputs(calibration: Calibration, settings: CriticismSettings, given: Gi
     stirring = stirring_of(
         kept_recordings(calibration.path, record), int(record["settings"]["particles"])
     )
-    kept_back = open_recordings(given.held_out, "--held-out")
+    kept_back = open_recordings(given.held_out, Argument("held_out"))
     _check_held_out(stirring, kept_back)
-    believed = open_recordings(given.baseline, "--baseline")
+    believed = open_recordings(given.baseline, Argument("baseline"))
     others = _others(believed, [*stirring.recordings, *kept_back])
     _check_baseline(stirring, others)
-    table = _opened(given.pours, "--pours")
-    held_out_table = _opened(given.held_out_pours, "--held-out-pours")
+    table = _opened(given.pours, Argument("pours"))
+    held_out_table = _opened(given.held_out_pours, Argument("held_out_pours"))
     _check_pours(table, held_out_table, settings)
     if given.cups is not None and table is None:
-        raise InputError("there are no pours from them", where="--cups", fix="give --pours, too")
+        raise InputError(
+            "there are no pours from them", where=Argument("cups"), fix="give `pours`, too"
+        )
     cups = cups_of(given.cups)
     for one in filter(None, (table, held_out_table)):
         check_scene(one, cups)
@@ -158,14 +165,14 @@ def _check_held_out(stirring: Stirring, held_out: Sequence[Recording]) -> None:
         if {recording.hash, recording.path.name} & seen:
             raise InputError(
                 "is held out twice, or has the name of another",
-                where=f"--held-out {recording.path}",
+                where=Argument(f"held_out {recording.path}"),
                 fix="give each recording once, and each a name of its own",
             )
         seen |= {recording.hash, recording.path.name}
         if recording.hash in fitted:
             raise InputError(
                 "is what the run was calibrated on",
-                where=f"--held-out {recording.path}",
+                where=Argument(f"held_out {recording.path}"),
                 fix="hold out another recording: nothing can be proved on data that were fitted",
             )
         if not same_liquid(recording, stirring.recordings[0]):
@@ -173,7 +180,7 @@ def _check_held_out(stirring: Stirring, held_out: Sequence[Recording]) -> None:
             raise InputError(
                 f"liquid_density is {recording.number('liquid_density'):g} kg/m3, but "
                 f"{density:g} in the run",
-                where=f"--held-out {recording.path}",
+                where=Argument(f"held_out {recording.path}"),
                 fix="hold out a recording of the same liquid",
             )
 
@@ -183,14 +190,14 @@ def _check_effects(settings: CriticismSettings) -> None:
     if not effects_of("stir", settings.effects):
         raise InputError(
             "none of the effects acts in a stir",
-            where="--effects",
+            where=Argument("effects"),
             fix=f"choose from {', '.join(effects_of('stir'))}",
         )
     for name in settings.accept or ():
         if name not in considered:
             raise InputError(
                 f"{name!r} is none of the effects that are considered",
-                where="--accept",
+                where=Argument("accept"),
                 fix=f"choose from {', '.join(considered)}",
             )
 
@@ -203,14 +210,14 @@ def _check_baseline(stirring: Stirring, baseline: Sequence[Recording]) -> None:
             if abs(there - here) > SIZE_TOLERANCE * abs(here):
                 raise InputError(
                     f"{name} is {there:g}, but {here:g} in the run",
-                    where=f"--baseline {recording.path}",
+                    where=Argument(f"baseline {recording.path}"),
                     fix="give recordings of the same rig",
                 )
         if not same_rate(recording, first):
             there, here = (1.0 / frame_interval(r) for r in (recording, first))
             raise InputError(
                 f"has {there:.3g} samples a second, but the run's recording {here:.3g}",
-                where=f"--baseline {recording.path}",
+                where=Argument(f"baseline {recording.path}"),
                 fix="give recordings of the same frame rate",
             )
 
@@ -222,19 +229,19 @@ def _check_pours(
         if held_out is not None:
             raise InputError(
                 "there are no pours to learn from",
-                where=f"--held-out-pours {held_out.path}",
-                fix="give some with --pours",
+                where=Argument(f"held_out_pours {held_out.path}"),
+                fix="give some with `pours`",
             )
         return
     if held_out is not None and held_out.hash == table.hash:
         raise InputError(
             "holds the pours that are fitted",
-            where=f"--held-out-pours {held_out.path}",
+            where=Argument(f"held_out_pours {held_out.path}"),
             fix="hold out other pours: nothing can be proved on data that were fitted",
         )
     if not effects_of("pour", settings.effects):
         raise InputError(
             "none of the effects acts in a pour",
-            where="--effects",
-            fix=f"choose from {', '.join(effects_of('pour'))}, or give no --pours",
+            where=Argument("effects"),
+            fix=f"choose from {', '.join(effects_of('pour'))}, or give no `pours`",
         )

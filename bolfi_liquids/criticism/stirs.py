@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..calibration.stir_simulator import Stirring
-from ..errors import InputError
+from ..errors import Argument, InputError
 from ..inputs.recording import Recording
 from ..inputs.strokes import resting
 from .stir_windows import windows
@@ -104,7 +104,7 @@ def effects_of(scene: str, names: Sequence[str] | None = None) -> dict[str, "Ext
     if unknown:
         raise InputError(
             f"there is no effect {', '.join(map(str, unknown))}",
-            where="--effects",
+            where=Argument("effects"),
             fix=f"choose from {', '.join(EFFECTS)}",
         )
     return {

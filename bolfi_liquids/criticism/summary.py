@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from ..calibration.summary import ParameterSummary
+from ..inputs.frame import named_faults
 from ..run.summary import Number, Section
 from .source_summary import (
     Gap,
@@ -101,6 +102,8 @@ class CriticismSummary(Section):
         noise: Of the cameras.
         seconds: That it took [s].
         made_from: Version, format, settings and hashes of the files.
+        frame_faults: Held-out and clean recordings whose inclination and positions are not told in
+            one frame, and how it is mended; see `inputs.frame`.
     """
 
     SECTION: ClassVar[str] = "criticise"
@@ -129,6 +132,7 @@ class CriticismSummary(Section):
     noise: CameraNoise
     seconds: Number
     made_from: Mapping[str, Any]
+    frame_faults: tuple[str, ...] = ()
 
     @classmethod
     def from_findings(cls, findings: "Findings", tree: "DataTree", seconds: float) -> Self:
@@ -166,6 +170,7 @@ class CriticismSummary(Section):
             noise=CameraNoise.of(findings.cameras),
             seconds=seconds,
             made_from=findings.inputs.made_from,
+            frame_faults=named_faults(findings.inputs.compared),
         )
 
     def to_json(self) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError
+from ..errors import Argument, InputError
 from .toml_file import read_toml
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def cups_of(given: "Cups | str | Path | None") -> "Cups":
     if not isinstance(given, Cups):
         raise InputError(
             f"{given!r:.80} is no pair of cups",
-            where="--cups",
+            where=Argument("cups"),
             fix="give the path of a TOML file, or models.Cups",
         )
     return given

@@ -106,6 +106,11 @@ def frame_warnings(recordings: Iterable[Recording]) -> list[str]:
     return [f"{one.path}: {text}" for one in recordings for text in frame_faults(one)]
 
 
+def named_faults(recordings: Iterable[Recording]) -> tuple[str, ...]:
+    """The same with the names of the files alone, as a run keeps it."""
+    return tuple(f"{one.path.name}: {text}" for one in recordings for text in frame_faults(one))
+
+
 def frame_faults(recording: Recording) -> Iterator[str]:
     """What is wrong with the frame of a recording; nothing where none is found."""
     turn = found_turn(recording)

@@ -2,6 +2,7 @@
 
 import hashlib
 import logging
+import re
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -23,6 +24,7 @@ AMOUNTS = ("spilled", "received", "retained")
 ACTION_RANGES = (1.0, 1000.0), (-20.0, 50.0)  # of the actions, in their units
 LIQUID = "liquid"
 MIN_POURS = 3  # from which anything can be learned
+WORDS_FOR_A_NUMBER = ("id", "no", "nr", "num", "number", "index", "idx", "code", "label", "type")
 FIX_LINE = "mend or remove the line"
 MAX_TIMES_BEYOND = 4.0  # that a pour may be faster or slower than the cups' range
 MIN_DISTANCE_SHARE = 0.02  # of the cups' longest; a table whose distances all are shorter is in m
@@ -164,20 +166,30 @@ def _check_liquid_named(table: Table) -> None:
     """Refuse a table whose column of liquids would be taken for a remark."""
     if table.has(LIQUID):
         return
-    known = {*ACTIONS, *AMOUNTS}
-    strange = {
-        name.casefold(): name
+    others = table.others({*ACTIONS, *AMOUNTS})
+    near = [
+        name
         for name, cells in zip(table.header, table.cells.T, strict=True)
-        if name in table.others(known) and not all(map(is_number, filter(None, cells)))
-    }
-    near = [name for name in strange if LIQUID in name]
-    near += get_close_matches(LIQUID, strange, n=1, cutoff=0.7)
+        if name in others and any(cells) and _tells_liquids(name, cells)
+    ]
     if near:
         raise InputError(
-            f"column {strange[near[0]]!r} is not known; is it {LIQUID!r}?",
+            f"column {near[0]!r} is not known; is it {LIQUID!r}?",
             where=f"{table.path}: header",
             fix=f"name it {LIQUID!r} where it says of which liquid a pour is, else otherwise",
         )
+
+
+def _tells_liquids(name: str, cells: NDArray) -> bool:
+    """Whether a column looks like that of the liquids, which may be named or numbered.
+
+    With numbers, `liquid_mass_g` is a remark, while `liquids`, `liquid_id` and `Fluid No.` are not.
+    """
+    words = [word for word in re.split(r"[\W\d_]+", name.casefold()) if word]
+    named = [word for word in words if LIQUID in word or get_close_matches(LIQUID, [word], 1, 0.7)]
+    if not all(map(is_number, filter(None, cells))):
+        return bool(named)
+    return bool(named) and all(word in named or word in WORDS_FOR_A_NUMBER for word in words)
 
 
 def _of_liquid(table: Table, liquid: str | None) -> tuple[Table, str]:
@@ -194,7 +206,7 @@ def _of_liquid(table: Table, liquid: str | None) -> tuple[Table, str]:
         raise InputError(
             f"holds pours of {', '.join(names)}" + (f", not of {liquid}" if liquid else ""),
             where=str(table.path),
-            fix="say whose to take: --liquid NAME",
+            fix="say whose to take by `liquid`",
         )
     return replace(table, lines=table.lines[of == liquid], cells=table.cells[of == liquid]), liquid
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, dataclass_transform
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic.dataclasses import dataclass as validated_dataclass
 
-from ..errors import InputError
+from ..errors import Argument, InputError
 
 if TYPE_CHECKING:
     from ..inference.criticism import Plan
@@ -61,12 +61,12 @@ T = TypeVar("T")
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(Field,))
-def checked(where: str = "--{}", **fields: str) -> Callable[[type[T]], type[T]]:
+def checked(where: str = "") -> Callable[[type[T]], type[T]]:
     """Make a frozen dataclass whose values are checked by their annotations.
 
     Args:
-        where: How a refusal names a field; the braces stand for its name.
-        fields: Names that differ from that, by field.
+        where: How a refusal names a field; the braces stand for its name. Nothing stands for
+            fields that are arguments of a function.
 
     Returns:
         A class decorator. The class raises `InputError` at the first value that breaks a rule.
@@ -85,7 +85,7 @@ def checked(where: str = "--{}", **fields: str) -> Callable[[type[T]], type[T]]:
                 raise InputError.from_validation(err, where=place) from None
 
         def place(name: str) -> str:
-            return fields.get(name) or where.format(name)
+            return where.format(name) if where else Argument(name)
 
         made.__init__ = init
         return made
@@ -134,7 +134,7 @@ class CalibrationSettings:
     draws: Annotated[Integer, Field(ge=4)] = 1000
 
 
-@checked(noise_deg="--noise")
+@checked()
 class SbcSettings:
     """What decides a check of calibrations besides the recording that gives path and rig.
 
@@ -161,8 +161,8 @@ class SbcSettings:
             raise InputError(
                 f"{self.budget} simulations each, but {RUNS_PER_POINT} of {self.design} points "
                 "are shared",
-                where="--design",
-                fix=f"give {-(-self.budget // RUNS_PER_POINT)} at least, or a smaller --budget",
+                where=Argument("design"),
+                fix=f"give {-(-self.budget // RUNS_PER_POINT)} at least, or a smaller `budget`",
             )
 
     @property

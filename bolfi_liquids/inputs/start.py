@@ -4,13 +4,13 @@ A stir that is cut out of a longer one starts in motion. A simulation from rest 
 for a reason that is not the liquid, and the liquid is taken for a thinner or a thicker one.
 """
 
-import shlex
 from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..wording import command
 from .fields import PLANE_NAMES
 from .recording import Recording
 
@@ -172,7 +172,5 @@ def _candidates(recording: Recording, fast: float, still: float) -> Iterator[int
 def _cure(recording: Recording) -> str:
     if (rest := first_rest(recording)) is None:
         return "record from rest: it holds no rest before a stir that it could be cut to"
-    path = shlex.quote(str(recording.path))
-    return (
-        f"record from rest, or cut it: bolfi-liquids trim {path} --start {rest:.3f} --out FILE.nc"
-    )
+    cut = command("trim", recording.path, "--start", f"{rest:.3f}", "--out", "FILE.nc")
+    return f"record from rest, or cut it: {cut}"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import Argument, InputError
 from ..files import given_path, new_netcdf, write_netcdf, write_text
 from .checks import MAX_GRIPPER_GAP, MIN_SEEN, check_hangs, check_values
 from .fields import (
@@ -47,7 +47,7 @@ def write_template(path: str | Path) -> Path:
     Raises:
         InputError: There is a file of that name.
     """
-    path = given_path(path, "--template")
+    path = given_path(path, Argument("path"))
     if path.exists():
         raise InputError("exists already", where=str(path), fix=OTHER_NAME)
     return write_text(path, (files("bolfi_liquids.data") / TEMPLATE).read_text(encoding="utf-8"))
@@ -66,7 +66,7 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
         InputError: The table or the map cannot be used; the message names line, column and value.
             Or `out` is something else that is there already. Nothing was written.
     """
-    out = given_path(out, "--out")
+    out = given_path(out, Argument("out"))
     meaning = columns if isinstance(columns, TableMap) else open_table_map(columns)
     read = read_table(
         table, delimiter=meaning.delimiter, decimal=meaning.decimal, skip=meaning.skip

@@ -7,13 +7,16 @@ Delta(t) = int_0^t (y - y~)^2 dt, and no array changes its shape: nothing is com
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibration.noise import rms, sensor_noise
 from ..calibration.stir_simulator import Stirring
+from ..calibration.summary import BAD_FIT_RATIO, MIN_NOISE_DEG
+from ..inputs.frame import frame_faults
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from ..pouring.map import SpillageMap
 from ..seeds import Phase, generator, simulation_seeds
@@ -52,6 +55,9 @@ class OnlineEstimate(NamedTuple):
         delay: Of the arm behind its plan [s].
         apart: Greatest distance of the arm from its plan [m].
         complaints: Of the engine's own checks.
+        fit_to_noise: Difference between data and closest simulation, in units of the noise, see
+            `fit_to_noise`.
+        frame_faults: What is wrong with the frame of the data; see `inputs.frame`.
     """
 
     strokes: int
@@ -65,6 +71,13 @@ class OnlineEstimate(NamedTuple):
     delay: float
     apart: float
     complaints: tuple[str, ...]
+    fit_to_noise: float = 0.0
+    frame_faults: tuple[str, ...] = ()
+
+    @property
+    def fits(self) -> bool:
+        """Whether the data so far are near enough to a simulation, as `calibrate` asks it."""
+        return self.fit_to_noise < BAD_FIT_RATIO and not self.frame_faults
 
 
 class Made(NamedTuple):
@@ -160,12 +173,13 @@ def estimate(
 
     engine = _told(problem, made, followed.observed, problem.settings.seed)
     fit = engine.fit(warn=False)  # warnings are among the estimate's complaints
-    seed = problem.settings.seed
+    seed, (plan,) = problem.settings.seed, problem.stirring.recordings
     tree = fit.sample("quadrature", chains=2, draws=DRAWS_EACH, seed=seed, warn=False)
     posterior = tree["posterior"]
     status = str(posterior.attrs["status"])
     draws = {name: posterior[name].to_numpy().ravel() for name in problem.prior.names}
     pour = spillage.best(draws)
+    good = np.isfinite(fit.history.signals).all(axis=(1, 2))
     return OnlineEstimate(
         strokes=followed.strokes,
         covered=followed.covered,
@@ -178,11 +192,35 @@ def estimate(
         delay=followed.delay,
         apart=followed.apart,
         complaints=(*fit.warnings, *([] if status == Status.CONVERGED else [status])),
+        fit_to_noise=fit_to_noise(followed.observed, fit.history.signals[good]),
+        frame_faults=tuple(frame_faults(replace(plan, inclination=followed.observed))),
     )
 
 
+def fit_to_noise(observed: NDArray, signals: NDArray) -> float:
+    """How far the closest simulation is from the data, in units of the noise.
+
+    No simulation is repeated with another seed while the robot stirs. In place of their noise, the
+    closest simulation's distance from its nearest neighbour is taken, which is no smaller: where
+    few simulations were made, a bad fit is not told from an unfinished search yet.
+
+    Args:
+        observed: Inclination [rad], shape (T, 2), NaN where missing.
+        signals: Simulations [rad], shape (n, T, 2), n > 1.
+    """
+    misfits = [rms(observed - one) for one in signals]
+    closest = int(np.argmin(misfits))
+    seen = np.isfinite(observed)
+    others = np.delete(signals, closest, axis=0)
+    apart = min(rms((one - signals[closest])[seen]) for one in others)
+    noise = float(np.hypot(sensor_noise(observed), apart))
+    return misfits[closest] / max(noise, float(np.radians(MIN_NOISE_DEG)))
+
+
 def enough(estimate: OnlineEstimate, settings: OnlineSettings) -> bool:
-    """Whether the pour is known well enough for stirring to end."""
+    """Whether the pour is known well enough for stirring to end; never by a bad fit."""
+    if not estimate.fits:
+        return False
     bound = settings.stop == "bound"
     spillage = estimate.spillage_q95 if bound else estimate.expected_spillage
     return estimate.strokes >= settings.least_strokes and spillage < settings.target

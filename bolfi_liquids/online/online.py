@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.calibrate import calibrate
-from ..errors import InputError
+from ..errors import Argument, InputError
 from ..files import given_path
 from ..inputs.cups import bundled_cups
 from ..inputs.open import Source, open_recording
@@ -103,7 +103,10 @@ class OnlineCalibration:
         prior = default_prior() if choice.prior is None else choice.prior
         check_prior(prior)
         cups = bundled_cups() if choice.cups is None else choice.cups
-        plan, out = planned(path.time, path.position, attrs), given_path(choice.run, "--calibrate")
+        plan, out = (
+            planned(path.time, path.position, attrs),
+            given_path(choice.run, Argument("run")),
+        )
         bank = out / BANK if choice.bank is None else Path(choice.bank)
         density = plan.number("liquid_density")
         with ExitStack() as alone:

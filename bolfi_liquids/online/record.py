@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import Argument
 from ..files import given_path
 from ..inputs.recording import Recording
 from ..inputs.rigs import rig_of
@@ -29,6 +30,10 @@ if TYPE_CHECKING:
     from ..hardware.motion import PosePath, Trajectory
     from .estimate import OnlineEstimate
 
+BAD_FIT = (
+    "no simulation comes near the data so far, or they are not told in one frame: do not rely on "
+    "this estimate; stirring does not end by it"
+)
 PLAN_RATE = 30.0  # Hz, of the simulated plan; the cameras'
 FOLLOWED_AFTER = (
     0.2  # s, after which arm, cameras and files have followed a stroke's last set-point
@@ -72,7 +77,7 @@ def record_online(
 
     check_one(ask, emulate, "record")
     rig, hidden = rig_of(rig), hidden_liquid(emulate)
-    plan, out = plan_stir(rig, online.cycles), given_path(out, "--out")
+    plan, out = plan_stir(rig, online.cycles), given_path(out, Argument("out"))
     with OnlineCalibration.start(
         _simulated(plan),
         rig_attributes(rig),
@@ -148,6 +153,10 @@ class _Stirring:
             self._view.warn(f"calibration {status.phase}: {status.detail}")
         if estimate is not None:
             self._enough = self._calibration.enough(estimate)
+            if not estimate.fits:
+                self._view.warn(BAD_FIT)
+                for fault in estimate.frame_faults:
+                    self._view.warn(fault)
             self._view.say(sentence(estimate))
             if self._told is not None:
                 self._told(estimate)
@@ -165,7 +174,7 @@ def sentence(estimate: "OnlineEstimate") -> str:
         f"stroke {estimate.strokes}: {parameters}; best pour {turn:.0f} deg/s at "
         f"{100 * estimate.action['distance']:.1f} cm spills {estimate.expected_spillage:.1%}, "
         f"95 % below {estimate.spillage_q95:.1%} ({estimate.simulations} simulations, "
-        f"{estimate.lag:.1f} s late)"
+        f"{estimate.lag:.1f} s late)" + ("" if estimate.fits else f"; {BAD_FIT}")
     )
 
 

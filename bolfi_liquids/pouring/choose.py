@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 from ..calibration.bad_fit import refuse_bad_fit
 from ..calibration.posterior_file import write_tree
 from ..calibration.result import Calibration
+from ..calibration.summary import FitStatus
 from ..criticism.result import latest_calibration
 from ..errors import InputError
 from ..inputs.cups import cups_of
 from ..inputs.settings import PourSettings
 from ..progress import Advance, progress_bar
-from ..run.directory import POUR, Run, open_bank
+from ..run.directory import POUR, Run, open_bank, run_path
+from ..run.entering import working_in_run
+from ..run.execution import Execution
 from ..run.workers import open_workers
 from ..seeds import Phase, simulation_seeds
 from .pour_file import pour_tree
@@ -91,28 +94,41 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         progress: Whether to show a bar on stderr.
 
     Raises:
-        InputError: A setting, `timeout` or the file of the cups cannot be used; or the fit is bad.
+        InputError: A setting, `timeout` or the file of the cups cannot be used; the fit is bad; or
+            another command works in the run.
         ValueError, ImportError, ConnectionError: `executor` cannot be used.
         RuntimeError: Pours failed at every angular velocity, or at all of the promising ones.
     """
-    from ..inference.simulations import Keep
-
-    calibration = latest_calibration(calibration)
-    if not force:
-        refuse_bad_fit(calibration.summary, calibration.path)
     settings = PourSettings(iterations=iterations, draws=draws, risk=risk, seed=seed)
-    cups, actions = cups_of(cups), 2 * settings.iterations + N_FINALISTS + 3
-    drawn = strata(calibration, settings.draws, settings.seed)
+    with working_in_run(run_path(calibration)):
+        latest = latest_calibration(calibration)
+        if not force:
+            refuse_bad_fit(latest.summary, latest.path)
+        drawn = strata(latest, settings.draws, settings.seed)
+        cups = cups_of(cups)
+        with open_workers(executor, timeout) as workers:
+            execution = Execution(workers, timeout, progress)
+            return _chosen(latest, cups, settings, drawn, execution)
+
+
+def _chosen(
+    calibration: Calibration,
+    cups: "Cups",
+    settings: PourSettings,
+    drawn: "Drawn",
+    execution: Execution,
+) -> Pour:
+    """Search, judge, and write what was found into the run."""
+    actions = 2 * settings.iterations + N_FINALISTS + 3
     with (
-        open_workers(executor, timeout) as workers,
         open_bank(calibration.path) as bank,
-        progress_bar("trying actions", actions, shown=progress) as advance,
+        progress_bar("trying actions", actions, shown=execution.progress) as advance,
     ):
-        keep = Keep(bank, executor=workers, timeout=timeout)
+        keep = execution.keep(bank)
         pours = _Pours(cups, calibration.liquid_density, settings, keep, advance)
         choice = _search(pours, drawn, calibration.best)
         pour = _judge(pours, choice, drawn.judge, calibration.path)
-    _keep(pour, choice, drawn, pours)
+    _keep(pour, choice, drawn, pours, calibration.summary.fit_status)
     return pour
 
 
@@ -187,7 +203,9 @@ def _judge(pours: "_Pours", choice: _Choice, liquids: Mapping[str, NDArray], pat
     return Pour(path, chosen, plug_in)
 
 
-def _keep(pour: Pour, choice: _Choice, drawn: Drawn, pours: "_Pours") -> None:
+def _keep(
+    pour: Pour, choice: _Choice, drawn: Drawn, pours: "_Pours", fit_status: FitStatus
+) -> None:
     """Write pour.nc and the section "pour" of summary.json."""
     cups, settings = pours.cups, pours.settings
     tried = {
@@ -203,11 +221,16 @@ def _keep(pour: Pour, choice: _Choice, drawn: Drawn, pours: "_Pours") -> None:
         cups=json.dumps(cups.settings()),
         least_viscosity=least,
         landing_sd=landing_sd(cups),
+        fit_status=str(fit_status),  # a bad fit was poured by force
     )
     write_tree(tree, pour.path / POUR)
     judged = 2 * JUDGE_DRAWS_FACTOR * settings.draws
     PourSummary.from_pour(
-        pour, settings, n_simulations=choice.n_pours + judged, least_viscosity=least
+        pour,
+        settings,
+        n_simulations=choice.n_pours + judged,
+        least_viscosity=least,
+        fit_status=fit_status,
     ).write(pour.path)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.posterior_file import read_tree
+from ..calibration.summary import FitStatus
 from ..errors import InputError
 from ..inputs.settings import PourSettings
 from ..run.directory import POUR
@@ -182,6 +183,8 @@ class PourSummary(ActionSummary, Section):
         risk: "mean" or "cvar".
         seed: Of all random draws.
         plug_in: The action that would be best if theta* were the truth.
+        fit_status: Of the calibration whose posterior it was chosen over; a bad fit's was chosen by
+            force. None where an older version chose.
     """
 
     SECTION: ClassVar[str] = "pour"
@@ -191,19 +194,17 @@ class PourSummary(ActionSummary, Section):
     risk: str
     seed: int
     plug_in: ActionSummary
+    fit_status: FitStatus | None = None
 
     @classmethod
-    def from_pour(
-        cls, pour: Pour, settings: PourSettings, *, n_simulations: int, least_viscosity: float
-    ) -> Self:
-        """From a pour, its settings, the number of simulations and the least viscosity [Pa s]."""
+    def from_pour(cls, pour: Pour, settings: PourSettings, **more) -> Self:
+        """From a pour and its settings; `more` are the fields that neither has."""
         return cls.of(
             pour.chosen,
-            least_viscosity=least_viscosity,
-            n_simulations=n_simulations,
             risk=settings.risk,
             seed=settings.seed,
             plug_in=ActionSummary.of(pour.plug_in),
+            **more,
         )
 
 

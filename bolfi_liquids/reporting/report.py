@@ -16,10 +16,11 @@ from ..hover_labels import script_json
 from ..inputs.prior import Described
 from ..pouring.result import PourSummary
 from ..run.directory import REPORT, Run, run_path
+from ..run.entering import working_in_run
 from ..wording import LIQUID_UNITS, sentence
 from . import sentences
 from .criticism_chapter import criticism_context
-from .warnings import results_of, warnings_of
+from .warnings import Results, results_of, warnings_of
 
 if TYPE_CHECKING:
     from xarray import DataTree
@@ -48,15 +49,28 @@ def report(
         progress: Whether to show a bar on stderr while they are.
 
     Raises:
-        InputError: The directory holds no finished calibration.
+        InputError: The directory holds no finished calibration, or another command works in it.
         RuntimeError: A simulation took longer than `timeout`.
     """
+    how = {"executor": executor, "timeout": timeout, "progress": progress}
+    with working_in_run(run_path(run)):
+        calibration = Calibration.open(run_path(run))
+        # before anything is simulated: a damaged file is refused
+        results, criticism = results_of(calibration), criticism_context(calibration)
+        pictures = _moving(calibration, how) if moving else None
+        page = _page(calibration, results, criticism, pictures)
+        return write_text(calibration.path / REPORT, page)
+
+
+def _page(
+    calibration: Calibration,
+    results: Results,
+    criticism: dict[str, Any] | None,
+    pictures: dict[str, Any] | None,
+) -> str:
+    """The page of a run, with moving pictures if there are any."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    calibration = Calibration.open(run_path(run))
-    results, criticism = results_of(calibration), criticism_context(calibration)
-    how = {"executor": executor, "timeout": timeout, "progress": progress}
-    pictures = _moving(calibration, how) if moving else None
     environment = Environment(
         loader=PackageLoader("bolfi_liquids", "data"),
         autoescape=True,
@@ -64,7 +78,7 @@ def report(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    page = environment.get_template(PAGE_TEMPLATE).render(
+    return environment.get_template(PAGE_TEMPLATE).render(
         calibration=_calibration_context(calibration),
         criticism=criticism,
         pour=_pour_context(results.poured, results.pour),
@@ -76,7 +90,6 @@ def report(
         record=calibration.record,
         run=calibration.path,
     )
-    return write_text(calibration.path / REPORT, page)
 
 
 def _calibration_context(calibration: Calibration) -> dict[str, Any]:

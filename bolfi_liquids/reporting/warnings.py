@@ -133,6 +133,8 @@ def _of_the_model(
             return [sentence("warning.misfit_not_criticised")]
         return [sentence("warning.not_criticised")]
     found = []
+    if criticised.frame_faults:
+        found.append(sentence("warning.compared_in_a_wrong_frame", faults=criticised.frame_faults))
     if criticised.verdict != Verdict.NONE and not criticised.accepted:
         found.append(verdict_sentence(criticised))
     if not criticised.baseline:

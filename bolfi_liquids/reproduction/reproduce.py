@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 
-from ..errors import InputError
+from ..errors import Argument, InputError
 from ..files import given_path
 from ..inference.simulations import Workers
 from ..run.directory import open_bank
@@ -68,7 +68,7 @@ def reproduce(
         InputError: There is no figure of that name.
     """
     with open_workers(executor, timeout) as pool:
-        out = given_path(out, "--out")
+        out = given_path(out, Argument("out"))
         return dict(draw_figures(names, out, scale, Execution(pool, timeout, progress)))
 
 

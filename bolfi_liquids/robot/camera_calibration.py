@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import Argument, InputError
 from ..inputs.rigs import rig_of
 
 if TYPE_CHECKING:
@@ -72,11 +72,13 @@ def calibrate_view(
     from ..hardware.vision import Board
 
     if view not in VIEWS:
-        raise InputError(f"{view!r}", where="--view", fix="give xz or yz")
+        raise InputError(f"{view!r}", where=Argument("view"), fix="give xz or yz")
     square, boards, plumb = pictures
     if not 0.002 <= square <= 0.2:
         raise InputError(
-            f"{100 * square:g} cm", where="--square", fix="give the side of a printed square in cm"
+            f"{100 * square:g} cm",
+            where=Argument("square"),
+            fix="give the side of a printed square in cm",
         )
     camera = rig_of(rig).camera("xz" if view == "xz" else "yz")
     board = Board(square=square, marker=square * Board().marker / Board().square)

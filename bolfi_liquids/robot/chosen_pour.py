@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..calibration.bad_fit import bad_fit
 from ..calibration.result import Calibration
+from ..calibration.summary import FitStatus
 from ..errors import InputError
 from ..inputs.cups import kept_cups
 from ..pouring.result import ActionSummary, Judged, PourSummary, check_poured, judged
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 ROUNDING = 1e-9  # relative, of an action that was written and read again
 GROUPS = ("actions", "chosen", "plug_in", "liquids")
 """Of pour.nc, from which plan and warnings are made."""
+BAD_FIT = "it was chosen over a bad fit: an arm carries it out with --despite-bad-fit only"
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,7 @@ class ChosenPour:
         judged: The action and what it spills, as pour.nc has them.
         cups: For which it was chosen.
         stale: That it was chosen over another posterior than the latest; empty if it was not.
+        fit_is_bad: Whether the fit was, or is, so bad that the pour could only be chosen by force.
         worries: The report's other warnings.
     """
 
@@ -43,6 +47,7 @@ class ChosenPour:
     judged: Judged
     cups: "Cups"
     stale: tuple[Sentence, ...]
+    fit_is_bad: bool
     worries: tuple[Sentence, ...]
 
     def check_fresh(self) -> None:
@@ -58,12 +63,30 @@ class ChosenPour:
                 fix=_again(self.run),
             )
 
+    def check_fit(self, *, despite_bad_fit: bool) -> None:
+        """Refuse a pour that was chosen over a posterior whose fit is bad.
+
+        Args:
+            despite_bad_fit: Whether a person has allowed it nevertheless.
+
+        Raises:
+            InputError: It is one, and nobody has.
+        """
+        if self.fit_is_bad and not despite_bad_fit:
+            raise InputError(
+                "its pour was chosen over a bad fit, which nobody should trust an arm with",
+                where=str(self.run),
+                fix="correct the recording, calibrate and choose again, or pour nevertheless: "
+                "--despite-bad-fit (despite_bad_fit=True)",
+            )
+
     def __str__(self) -> str:
         """As a person reads it before the motion, what is wrong first."""
         chosen = self.judged
         return "\n".join(
             [
                 *map(str, self.stale),
+                *([BAD_FIT] if self.fit_is_bad else []),
                 f"the pour that {self.run} has chosen: "
                 f"{np.degrees(chosen.angular_velocity):.1f} deg/s, the lip "
                 f"{100 * chosen.distance:.2f} cm from the receiver's axis",
@@ -98,7 +121,10 @@ def chosen_pour(run: Path) -> ChosenPour:
     _check_ranges(run, chosen, cups)
     stale = stale_sentences(results)
     worries = [one for one in warnings_of(results) if one not in stale]
-    return ChosenPour(run, chosen, cups, tuple(stale), tuple(worries))
+    # older versions wrote no status; the pour is of the latest fit, or stale anyway
+    was_bad = results.pour.attrs.get("fit_status") == FitStatus.BAD
+    is_bad = was_bad or bad_fit(results.latest) is not None
+    return ChosenPour(run, chosen, cups, tuple(stale), is_bad, tuple(worries))
 
 
 def _kept(run: Path, tree: "DataTree") -> "tuple[Judged, Cups]":

@@ -10,6 +10,7 @@ from ..errors import InputError
 from ..inputs.rigs import rig_of
 from ..pouring.result import Pour
 from ..run.directory import Run, run_path
+from ..run.entering import working_in_run
 from .armed_session import (
     Ask,
     Emulation,
@@ -93,6 +94,7 @@ def execute_pour(
     *,
     ask: Ask | None = None,
     emulate: "HiddenLiquid | bool" = False,
+    despite_bad_fit: bool = False,
     progress: bool = True,
 ) -> Path:
     """Carry out the pour that a run has chosen.
@@ -104,6 +106,7 @@ def execute_pour(
         rig: Where source and receiver are, or its file; None is the bundled one.
         ask: Shows a person the plan, returns what the person typed.
         emulate: Use an emulator instead, as in `record`; a pour shows nothing of the liquid.
+        despite_bad_fit: Whether a real arm may carry out what was chosen over a bad fit, by force.
         progress: Whether to show a live view on stderr.
 
     Returns:
@@ -111,25 +114,36 @@ def execute_pour(
 
     Raises:
         InputError: The run has chosen no pour, its files contradict each other, its cups forbid
-            the pour, or neither or both of `ask` and `emulate` are given. For a real arm also:
-            the pour was chosen over another posterior than the latest.
+            the pour, another command works in it, or neither or both of `ask` and `emulate` are
+            given. For a real arm also: the pour was chosen over another posterior than the latest,
+            or over a bad fit without `despite_bad_fit`.
         ValueError: Another pour was chosen in the run than the one given.
         MotionRejected: The motion breaks one of the rig's limits.
         SessionStopped: The arm was stopped.
     """
+    check_one(ask, emulate, "execute_pour")
+    rig = rig_of(rig)
+    with working_in_run(run_path(run)):
+        plan = plan_pour(run_path(run), rig)
+        if isinstance(run, Pour):
+            run.check_current()
+        if ask is not None:
+            plan.chosen.check_fresh()
+            plan.chosen.check_fit(despite_bad_fit=despite_bad_fit)
+        for sentence in plan.chosen.stale:
+            logger.warning(str(sentence))
+        return _carried_out(plan, rig, ask, emulate, progress)
+
+
+def _carried_out(
+    plan: PourPlan, rig: "Rig", ask: Ask | None, emulate: object, progress: bool
+) -> Path:
+    """The directory of what an arm, or its emulator, did."""
     from ..hardware import SessionInterrupted, emulated
     from ..hardware.motion import approach_pour
 
-    check_one(ask, emulate, "execute_pour")
-    given, run, rig = run, run_path(run), rig_of(rig)
-    plan = plan_pour(run, rig)
-    if isinstance(given, Pour):
-        given.check_current()  # after the plan was read, so that nothing came between
-    if ask is not None:
-        plan.chosen.check_fresh()
-    for sentence in plan.chosen.stale:
-        logger.warning(str(sentence))
-    task = Task(rig, "pouring", [plan.path], _next_directory(run), about=str(plan.chosen))
+    out = _next_directory(plan.chosen.run)
+    task = Task(rig, "pouring", [plan.path], out, about=str(plan.chosen))
     emulation = None
     if emulate:
         start = emulated(rig, plan.ready, tool="pouring")

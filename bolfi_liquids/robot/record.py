@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import InputError
+from ..errors import Argument, InputError
 from ..files import disk_errno, given_path
 from ..inputs.open import check_recording, read_recording
 from ..inputs.recording import Recording
@@ -53,7 +53,7 @@ def record(
     """
     check_one(ask, emulate, "record")
     opened, hidden = rig_of(rig), hidden_liquid(emulate)
-    plan, out = plan_stir(opened, cycles), given_path(out, "--out")
+    plan, out = plan_stir(opened, cycles), given_path(out, Argument("out"))
     title = "stirring" if hidden is None else "stirring, emulated"
     with (
         kept(out),

@@ -4,7 +4,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..errors import InputError
+from ..errors import Argument, InputError
 from .armed_session import (
     Ask,
     Emulation,
@@ -58,7 +58,8 @@ def plan_stir(rig: "Rig", cycles: int | None = None) -> StirPlan:
     try:
         count = checked_cycles(rig.stirring.cycles if cycles is None else cycles)
     except ValueError as err:
-        raise InputError(str(err), where="--cycles", fix="give a whole number of them") from err
+        fix = "give a whole number of them"
+        raise InputError(str(err), where=Argument("cycles"), fix=fix) from err
     stir = tuple(strokes(rig, count))
     plan = StirPlan(insert(rig), stir, retract(rig, stir[-1].pose[-1, :3]))
     joints = None

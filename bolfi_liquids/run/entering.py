@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import platform
+import stat
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -13,12 +14,12 @@ from typing import Any
 
 from ..errors import InputError
 from ..files import disk_errno
-from .directory import RUN_TOML, SIMULATIONS, enter_run, open_bank
+from .directory import RUN_TOML, SIMULATIONS, enter_run, open_bank, read_run
 from .recordings import RECORDINGS_FOLDER
 
 try:
     import fcntl
-except ModuleNotFoundError:  # Windows: there run.toml alone, which is made once, keeps others out
+except ModuleNotFoundError:  # Windows: only new runs are protected, by run.toml, made once
     fcntl = None
 
 LOCK = "run.lock"
@@ -53,11 +54,25 @@ def entered(
 
 
 @contextmanager
+def working_in_run(run: Path) -> Iterator[None]:
+    """Keep other commands out of a run that is there, while its files are read and written.
+
+    Raises:
+        InputError: There is no run, or another command works in it.
+    """
+    read_run(run)  # first, for `working_in` makes the directory of a mistyped name
+    with working_in(run):
+        yield
+
+
+@contextmanager
 def working_in(directory: Path) -> Iterator[None]:
     """Keep other commands out of a directory, which is made if it is missing.
 
-    The lock belongs to the process and ends with it, however it ends. A directory that was made
-    here and is still empty afterwards is removed.
+    The lock belongs to the process and ends with it, however it ends. Who holds it may not take it
+    again: one command calls another before or after, in no case within. A directory that was made
+    here and is still empty afterwards is removed. On a disk without locks, and on Windows, only a
+    new run is protected: its run.toml is made once.
 
     Raises:
         InputError: Another command works in it, here or on another computer that shares the disk;
@@ -84,9 +99,11 @@ def _locked(directory: Path) -> int | None:
     for _ in range(LOCK_TRIES):
         try:
             directory.mkdir(parents=True, exist_ok=True)
-        except (FileExistsError, NotADirectoryError) as err:
-            fix = "choose another --out"
-            raise InputError("not a directory", where=str(directory), fix=fix) from err
+        except (FileExistsError, FileNotFoundError, NotADirectoryError) as err:
+            if any(map(_is_in_the_way, (directory, *directory.parents))):
+                fix = "choose another --out"
+                raise InputError("not a directory", where=str(directory), fix=fix) from err
+            continue  # whoever made it, or its parent, has just removed it
         try:
             lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         except FileNotFoundError:
@@ -97,12 +114,25 @@ def _locked(directory: Path) -> int | None:
             return None
         try:
             if _taken(lock, path):
+                _sign(lock, path)
                 return lock
         except BaseException:
             os.close(lock)
             raise
         os.close(lock)
-    raise InputError("others keep coming and going", where=str(path), fix="repeat the command")
+    raise InputError(
+        "others keep coming and going, or no file can be made there",
+        where=str(path),
+        fix="repeat the command, or choose another directory",
+    )
+
+
+def _is_in_the_way(path: Path) -> bool:
+    """Whether something else than a directory, such as a link to nothing, has this name."""
+    try:
+        return not stat.S_ISDIR(path.stat().st_mode)
+    except OSError:
+        return path.is_symlink()
 
 
 def _taken(lock: int, path: Path) -> bool:
@@ -117,18 +147,31 @@ def _taken(lock: int, path: Path) -> bool:
         except BlockingIOError:
             raise _occupied(path) from None
         except OSError:
-            pass  # a disk without locks: run.toml, which is made once, keeps others out
+            pass  # a disk without locks: only new runs are protected, by run.toml, made once
     try:
         there = os.stat(path)
     except FileNotFoundError:
         return False
-    if not os.path.samestat(there, os.fstat(lock)):
-        return False
+    return os.path.samestat(there, os.fstat(lock))
+
+
+def _sign(lock: int, path: Path) -> None:
+    """Write into the lock who holds it.
+
+    Raises:
+        OSError: The disk is full; the lock is removed, and its file is named.
+    """
     who = {"process": os.getpid(), "host": platform.node() or "an unnamed host"}
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    os.ftruncate(lock, 0)
-    os.pwrite(lock, json.dumps({**who, "since": now}).encode(), 0)
-    return True
+    with suppress(PermissionError):  # it is another user's, left by a command that was killed
+        os.fchmod(lock, 0o666)  # others of the group may work here next, whatever the umask
+    try:
+        os.ftruncate(lock, 0)
+        os.pwrite(lock, json.dumps({**who, "since": now}).encode(), 0)
+    except OSError as err:
+        with suppress(OSError):
+            path.unlink()
+        raise OSError(err.errno, err.strerror, str(path)) from err
 
 
 def _occupied(path: Path) -> InputError:
@@ -145,8 +188,8 @@ def _occupied(path: Path) -> InputError:
     return InputError(
         who,
         where=str(path.parent),
-        fix="wait until it has ended, or choose another directory; where it was stopped, go on "
-        "from there with --resume",
+        fix="wait until it has ended, or choose another directory; a calibration that was stopped "
+        "goes on with --resume",
     )
 
 

@@ -6,7 +6,7 @@ import warnings
 
 from platformdirs import user_cache_path
 
-from ..home import temporary_home
+from ..home import is_temporary
 
 
 def keep_compilations() -> None:
@@ -20,7 +20,8 @@ def keep_compilations() -> None:
     if "JAX_COMPILATION_CACHE_DIR" in os.environ:
         return
     # compiled for this computer's processor, and a home directory may be shared
-    if os.environ.get("HOME") == temporary_home():
+    home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("HOME", "")
+    if is_temporary(home):
         return
     try:
         place = user_cache_path("bolfi-liquids") / "jax" / (platform.node() or "here")

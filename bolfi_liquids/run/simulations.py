@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..inference.simulations import Keep, jobs, run_missing, stacked, succeeded
-from ..inference.simulations.failures import Failure, kind
+from ..inference.simulations.failures import Failure, kind, not_finite
 from ..progress import Advance, Simulate, silent
 
 logger = logging.getLogger(__name__)
@@ -56,29 +56,36 @@ def simulate_kept(
     asked = jobs(theta, seeds)
     results = run_missing(simulate, asked, keep, advance=advance)
     good = succeeded(results)
-    errors = [result.error or "" for result in results]
+    errors = [
+        "" if place in good else result.error or not_finite("it diverged")
+        for place, result in enumerate(results)
+    ]
     if not good:
-        failure = kind(errors[0]) if errors[0] else Failure.NOT_FINITE
+        failure = kind(errors[0])
         raise RuntimeError(
             f"all {len(seeds)} simulations failed, the first at {asked[0].theta}"
-            f" ({errors[0] or 'it diverged'}); {CURES[failure]}"
+            f" ({errors[0]}); {CURES[failure]}"
         )
-    warn_of_timeouts(errors, keep.timeout)
+    warn_of_failures(errors, keep.timeout)
     seconds = sum(result.seconds for result in results)
     return Kept(np.stack(list(good.values())), np.array(list(good)), seconds)
 
 
-def warn_of_timeouts(errors: Sequence[str], timeout: float | None) -> None:
-    """Log how many simulations were given up; they count as failed.
+def warn_of_failures(errors: Sequence[str], timeout: float | None) -> None:
+    """Log how many simulations were given up or failed otherwise, which bars count as done.
 
     Args:
         errors: Why each failed; "" where it did not.
-        timeout: The limit [s] that they exceeded.
+        timeout: The limit [s] that some exceeded.
     """
-    overdue = sum(kind(error) is Failure.TIMEOUT for error in errors if error)
-    if overdue:
+    failed = [error for error in errors if error]
+    others = [error for error in failed if kind(error) is not Failure.TIMEOUT]
+    if overdue := len(failed) - len(others):
         what = "%d of %d simulations took longer than %s s and count as failed"
         logger.warning(what, overdue, len(errors), timeout)
+    if others:
+        what = "%d of %d simulations failed and are left out; the first: %s"
+        logger.warning(what, len(others), len(errors), " ".join(others[0].split()))
 
 
 def keeping(simulate: Simulate, shape: tuple[int, ...], keep: Keep) -> Simulate:

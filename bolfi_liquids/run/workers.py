@@ -13,7 +13,7 @@ from multiprocessing.process import BaseProcess
 from threading import Thread
 from typing import TYPE_CHECKING
 
-from ..errors import InputError
+from ..errors import Argument, InputError
 from .jax_cache import ignore_torn_entries
 
 if TYPE_CHECKING:
@@ -77,7 +77,9 @@ def _check_timeout(timeout: float | None) -> None:
         check_timeout(timeout)
     except ValueError as refused:
         raise InputError(
-            f"{timeout!r:.80}", where="--timeout", fix="give a positive number of seconds, or none"
+            f"{timeout!r:.80}",
+            where=Argument("timeout"),
+            fix="give a positive number of seconds, or none",
         ) from refused
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import Argument, InputError
 from ..files import given_path, new_file, new_netcdf
 from ..inputs.fields import PLANES
 from ..inputs.recording import Recording, along_path, recording_dataset
@@ -51,8 +51,8 @@ def check_targets(movie: str | Path | None, out: str | Path | None) -> Targets:
         InputError, ImportError: Where and why.
     """
     targets = Targets(
-        None if movie is None else given_path(movie, "--movie"),
-        None if out is None else given_path(out, "--out"),
+        None if movie is None else given_path(movie, Argument("movie")),
+        None if out is None else given_path(out, Argument("out")),
     )
     if targets.movie is not None:
         check_movie(targets.movie)

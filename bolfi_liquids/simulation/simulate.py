@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..calibration.stir_simulator import Stirring
-from ..errors import InputError
+from ..errors import Argument, InputError
 from ..files import write_netcdf
 from ..inputs.bundled import bundled_recording
 from ..inputs.cups import cups_of
@@ -126,7 +126,7 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
 
 
 def _density(value: Any) -> float:
-    return number_of(value, "--density")
+    return number_of(value, Argument("density"))
 
 
 def _with_rig(attrs: Mapping[str, float | str], rig: Mapping[str, float]) -> dict[str, float | str]:
@@ -253,8 +253,8 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     _check_action(angular_velocity, distance)
     cups, density = cups_of(cups), _density(density)
     liquid = {"viscosity": viscosity, "cohesion": cohesion, "density": density}
-    check_distance(distance, cups, "--distance")
-    check_rate(angular_velocity, cups, "--angular-velocity")
+    check_distance(distance, cups, Argument("distance"))
+    check_rate(angular_velocity, cups, Argument("angular_velocity"))
     batch = batch_of(liquid, check_effects(effects or {}, "pour"), particles, seed)
     targets.check_single(batch.single)
     simulator = PourSimulator(angular_velocity, cups, density, batch.one.particles)
@@ -274,17 +274,17 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
 def _check_action(angular_velocity: float, distance: float) -> None:
     from ..models.pouring import FASTEST, SLOWEST
 
-    angular_velocity = number_of(angular_velocity, "--angular-velocity")
-    distance = number_of(distance, "--distance")
+    angular_velocity = number_of(angular_velocity, Argument("angular_velocity"))
+    distance = number_of(distance, Argument("distance"))
     low, high = DISTANCE_LIMITS
     if not low <= distance <= high:
         raise InputError(
-            f"{100 * distance:g}", where="--distance", fix="give it in cm; in Python, in m"
+            f"{100 * distance:g}", where=Argument("distance"), fix="give it in cm; in Python, in m"
         )
     if not SLOWEST <= angular_velocity <= FASTEST:
         slowest, fastest = np.degrees([SLOWEST, FASTEST])
         raise InputError(
             f"{np.degrees(angular_velocity):g}",
-            where="--angular-velocity",
+            where=Argument("angular_velocity"),
             fix=f"give {slowest:.2g} to {fastest:.4g} deg/s; in Python, in rad/s",
         )

@@ -285,9 +285,9 @@ def test_a_killed_check_goes_on(tmp_path):
 
 
 def test_bad_arguments_are_named(tmp_path, registry):
-    with pytest.raises(InputError, match="--case.*'none'.*good, bad"):
+    with pytest.raises(InputError, match="^names: .*'none'.*good, bad"):
         run(tmp_path / "out", registry, ["none"])
-    with pytest.raises(InputError, match="--seed: -1"):
+    with pytest.raises(InputError, match="^seed: -1"):
         run(tmp_path / "out", registry, seed=-1)
     assert not (tmp_path / "out").exists()
     (tmp_path / "file").touch()

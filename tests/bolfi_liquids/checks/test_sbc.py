@@ -41,7 +41,7 @@ def test_each_run_is_given_once_and_the_nearest_first():
 def test_a_set_that_is_used_up_is_said():
     with pytest.raises(RuntimeError, match="every run of the shared set was told"):
         list(_nearest(np.zeros((2, 1)), np.zeros((1, 1)), np.array([[True]])))
-    with pytest.raises(ValueError, match="--design: 20 simulations each, but 2 of 8 points"):
+    with pytest.raises(ValueError, match="^design: 20 simulations each, but 2 of 8 points"):
         SbcSettings(design=8, budget=20)
     SbcSettings(design=8, budget=20, runs=0)  # where none is shared
 

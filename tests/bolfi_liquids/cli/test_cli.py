@@ -219,6 +219,7 @@ def test_interruption_says_how_to_go_on(monkeypatch, tmp_path):
 
     recording = tmp_path / "stir me.nc"
     recording.write_bytes((files("bolfi_liquids.data") / "glycerin_v10.nc").read_bytes())
+    (tmp_path / "run.toml").touch()  # as soon as it is there, a run has begun
     command = ["calibrate", str(recording), "--out", str(tmp_path)]
     monkeypatch.setattr("bolfi_liquids.calibration.calibrate.calibrate", interrupt)
     monkeypatch.setattr(sys, "argv", ["bolfi-liquids", *command])
@@ -242,6 +243,8 @@ main()
 
 
 def test_a_command_that_is_terminated_says_how_to_go_on(short_recording, tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "run.toml").touch()
     command = ["calibrate", str(short_recording), "--out", str(tmp_path / "run")]
     done = subprocess.run([sys.executable, "-c", STOPPED, *command], capture_output=True, text=True)
     assert done.returncode == 130

@@ -1,11 +1,15 @@
 """Criticism of a run: what it is given, and the whole way on few simulations."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import bolfi_liquids as bl
 from bolfi_liquids.criticism.pours import as_prior
 from bolfi_liquids.errors import InputError
+from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.run.recordings import kept_recordings
 
@@ -47,10 +51,10 @@ def test_a_changed_copy_is_refused(calibration, tmp_path):
         ({"effects": ["magic"]}, "there is no effect magic"),
         ({"pours": "nowhere.csv"}, "nowhere.csv: no such file"),
         ({"held_out": "nowhere.nc"}, "nowhere.nc: no such file"),
-        ({"seed": -1}, "--seed: -1"),
-        ({"cups": "cups.toml"}, "--cups: "),
+        ({"seed": -1}, "seed: -1"),
+        ({"cups": "cups.toml"}, "cups: "),
         ({"effects": "camera_dealy"}, "there is no effect camera_dealy"),
-        ({"accept": "foo"}, "--accept: 'foo' is none of the effects"),
+        ({"accept": "foo"}, "accept: 'foo' is none of the effects"),
         ({"effects": "camera_delay", "accept": ["camera_tilt"]}, "choose from camera_delay"),
     ],
 )
@@ -58,6 +62,34 @@ def test_what_cannot_be_used_is_refused_before_anything_is_simulated(calibration
     with pytest.raises(InputError) as refused:
         bl.criticise(calibration, progress=False, **options)
     assert said in str(refused.value)
+
+
+def test_what_is_held_out_or_clean_in_a_wrong_frame_is_told(calibration, caplog):
+    right = bundled_recording("glycerin")
+    xz, yz = right.inclination.T
+    given = {
+        "held_out": replace(
+            right,
+            path=Path("turned.nc"),
+            hash="a",
+            inclination=np.column_stack([xz - yz, xz + yz]) / np.sqrt(2.0),
+        ),
+        "baseline": replace(
+            right, path=Path("mirrored.nc"), hash="b", inclination=np.column_stack([xz, -yz])
+        ),
+    }
+    for name, recording in given.items():
+        caplog.clear()
+        # the limit of time is looked at last, before anything is simulated
+        with pytest.raises(InputError, match="timeout"):
+            bl.criticise(calibration, progress=False, timeout=-1.0, **{name: recording})
+        (notice,) = [one.getMessage() for one in caplog.records]
+        assert notice.startswith(f"{recording.path}: ")
+        caplog.clear()
+        with pytest.raises(InputError, match="timeout"):
+            good = replace(recording, inclination=right.inclination)
+            bl.criticise(calibration, progress=False, timeout=-1.0, **{name: good})
+        assert caplog.records == []
 
 
 def test_data_that_were_fitted_prove_nothing(calibration):

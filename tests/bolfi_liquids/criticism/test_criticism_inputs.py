@@ -96,9 +96,9 @@ def test_what_is_no_file_is_refused_by_its_option(calibration, other, table):
     for option in ("held_out", "baseline"):
         for wrong in (3, [other("a.nc"), None]):
             refused("is no recording", calibration, **{option: wrong})
-    refused("--baseline", calibration, baseline=3)
+    refused("baseline: ", calibration, baseline=3)
     refused("3 is no table of pours", calibration, pours=3)
-    refused("--held-out-pours", calibration, pours=table("p.csv"), held_out_pours=[1])
+    refused("held_out_pours: ", calibration, pours=table("p.csv"), held_out_pours=[1])
 
 
 def test_cups_are_given_by_their_file_and_with_pours(calibration, table, tmp_path):
@@ -111,7 +111,7 @@ def test_cups_are_given_by_their_file_and_with_pours(calibration, table, tmp_pat
     refused("is no pair of cups", calibration, pours=table("p.csv"), cups=3)
     with pytest.raises(InputError) as error:
         given(calibration, cups=path)
-    assert error.value.where == "--cups"
+    assert error.value.where == "cups"
 
 
 def test_columns_that_nobody_reads_are_logged(calibration, tmp_path, caplog):

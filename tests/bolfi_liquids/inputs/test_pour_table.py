@@ -40,7 +40,7 @@ def test_one_liquid_needs_no_name(tmp_path):
 @pytest.mark.parametrize(
     ("rows", "header", "liquid", "said"),
     [
-        (ROWS, HEADER, None, "holds pours of oil, water; say whose to take: --liquid NAME"),
+        (ROWS, HEADER, None, "holds pours of oil, water; say whose to take by `liquid`"),
         (ROWS, HEADER, "gel", "not of gel"),
         (ROWS, HEADER, "oil", "too few pours: 1; give at least 3"),
         (ROWS, HEADER.replace("retained", "kept"), None, "has no column retained"),
@@ -97,10 +97,26 @@ def test_a_column_that_may_name_the_liquids_is_not_passed_over(tmp_path, name):
         open_pours(written(tmp_path, ROWS, HEADER.replace("liquid", name)), "water")
 
 
-def test_a_measurement_of_the_liquid_does_not_name_it(tmp_path):
+@pytest.mark.parametrize(
+    "name", ["liquids", "liquid_id", "Liquid No.", "LiquidID", "liqiud", "fluid", "Fluid number"]
+)
+def test_liquids_that_are_numbered_are_not_passed_over(tmp_path, name):
+    """Pours of several liquids would be judged as those of one."""
+    rows = [row.replace("water", "1").replace("oil", "2") for row in ROWS]
+    path = written(tmp_path, rows, HEADER.replace("liquid", name))
+    with pytest.raises(InputError, match="'liquid'"):
+        open_pours(path)
+    numbered = written(tmp_path, rows)
+    assert open_pours(numbered, "1").liquid == "1"
+    with pytest.raises(InputError, match="holds pours of 1, 2"):
+        open_pours(numbered)
+
+
+@pytest.mark.parametrize("name", ["liquid_temperature", "liquid_mass_g", "Liquid density"])
+def test_a_measurement_of_the_liquid_does_not_name_it(tmp_path, name):
     rows = [row.replace("water", "21.5") for row in ROWS[:3]]
-    path = written(tmp_path, rows, HEADER.replace("liquid", "liquid_temperature"))
-    assert open_pours(path).unused == ("liquid_temperature",)
+    path = written(tmp_path, rows, HEADER.replace("liquid", name))
+    assert open_pours(path).unused == (name,)
 
 
 def test_columns_that_nobody_reads_are_told(tmp_path, caplog):

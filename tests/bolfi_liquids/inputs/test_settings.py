@@ -20,15 +20,15 @@ from bolfi_liquids.online.settings import OnlineSettings
 @pytest.mark.parametrize(
     ("kind", "where", "name", "value"),
     [
-        (CalibrationSettings, "--budget", "budget", MIN_SIMULATIONS - 1),
-        (CalibrationSettings, "--seed", "seed", 1.5),
-        (CalibrationSettings, "--seed", "seed", True),
-        (CalibrationSettings, "--chains", "chains", 1),
-        (CalibrationSettings, "--sampler", "sampler", "gibbs"),
-        (PourSettings, "--risk", "risk", "worst"),
-        (PourSettings, "--draws", "draws", "16"),
-        (CriticismSettings, "--seed", "seed", -1),
-        (SbcSettings, "--noise", "noise_deg", float("nan")),
+        (CalibrationSettings, "budget", "budget", MIN_SIMULATIONS - 1),
+        (CalibrationSettings, "seed", "seed", 1.5),
+        (CalibrationSettings, "seed", "seed", True),
+        (CalibrationSettings, "chains", "chains", 1),
+        (CalibrationSettings, "sampler", "sampler", "gibbs"),
+        (PourSettings, "risk", "risk", "worst"),
+        (PourSettings, "draws", "draws", "16"),
+        (CriticismSettings, "seed", "seed", -1),
+        (SbcSettings, "noise_deg", "noise_deg", float("nan")),
         (OnlineSettings, "online setting target", "target", 1.0),
         (OnlineSettings, "online setting least_strokes", "least_strokes", 0),
     ],
@@ -68,7 +68,7 @@ def test_the_limit_itself_is_allowed():
 
 
 def test_an_unknown_setting_is_refused():
-    with pytest.raises(InputError, match="--budgett"):
+    with pytest.raises(InputError, match="^budgett: "):
         CalibrationSettings(**{"budgett": 20})
 
 
@@ -76,5 +76,5 @@ def test_settings_are_plain_values():
     settings = CalibrationSettings(seed=4)
     assert asdict(settings)["seed"] == 4
     assert pickle.loads(pickle.dumps(settings)) == settings
-    with pytest.raises(InputError, match="--seed"):
+    with pytest.raises(InputError, match="^seed: "):
         replace(settings, seed=-1)

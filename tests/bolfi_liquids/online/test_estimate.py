@@ -9,6 +9,8 @@ from bolfi_liquids.inference.simulations import Simulation
 import bolfi_liquids as bl
 from bolfi_liquids import models
 from bolfi_liquids.calibration.stir_simulator import stirring_of
+from bolfi_liquids.calibration.summary import BAD_FIT_RATIO
+from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.online.estimate import (
     Made,
@@ -17,6 +19,7 @@ from bolfi_liquids.online.estimate import (
     design,
     enough,
     estimate,
+    fit_to_noise,
     proposals,
     with_results,
 )
@@ -26,6 +29,7 @@ from bolfi_liquids.online.plan import (
     planned,
     stroke_ends,
 )
+from bolfi_liquids.online.record import BAD_FIT, sentence
 from bolfi_liquids.online.settings import OnlineSettings
 from bolfi_liquids.pouring.map import Expected
 
@@ -53,10 +57,10 @@ class NoMap:
         return Expected(1.0, 0.02, float(liquids["cohesion"].mean()), 0.9)
 
 
-def signals(theta, seeds):
+def signals(theta, seeds, time=PLAN.time):
     """The more viscous, the wider the stick swings, in (B, T, 2); NOISE between seeds."""
     size = 0.05 + 0.02 * np.log10(theta["viscosity"] / 3e-3)
-    wave = np.stack([np.sin(PLAN.time), np.cos(PLAN.time)], axis=1)
+    wave = np.stack([np.sin(time), np.cos(time)], axis=1)
     noise = [np.random.default_rng(seed).normal(0.0, NOISE, wave.shape) for seed in seeds]
     return size[:, None, None] * wave + noise
 
@@ -66,11 +70,11 @@ def problem(surrogate="discrepancy", **settings):
     return Problem(default_prior(), stirring, OnlineSettings(surrogate=surrogate, **settings))
 
 
-def made(of):
+def made(of, time=PLAN.time):
     jobs = design(of)
     theta = {name: np.array([job.theta[name] for job in jobs]) for name in of.prior.names}
     seeds = np.array([job.seed for job in jobs])
-    return Made(theta, signals(theta, seeds), seeds)
+    return Made(theta, signals(theta, seeds, time), seeds)
 
 
 def followed(strokes, seed=1234):
@@ -171,6 +175,48 @@ def test_failed_simulations_are_kept_as_such_and_teach_nothing():
 def test_it_is_enough_when_what_was_asked_for_is_under_the_target(stop, target, strokes, ends):
     found = OnlineEstimate(strokes, 1.0, {}, {}, 0.01, 0.03, 16, 0.1, 0.0, 0.0, ())
     assert enough(found, OnlineSettings(stop=stop, target=target)) is ends
+
+
+def test_an_estimate_that_fits_nothing_says_so_and_ends_nothing():
+    of = problem()
+    known, good = made(of), followed(len(ENDS))
+    found = estimate(of, known, good, NoMap(), 0.0)
+    assert found.fits and 0.5 < found.fit_to_noise < BAD_FIT_RATIO
+    settings = OnlineSettings(target=0.99)
+    assert enough(found, settings)
+    wrong = good._replace(observed=good.observed + 0.2)  # the zero of a camera is elsewhere
+    lost = estimate(of, known, wrong, NoMap(), 0.0)
+    assert lost.fit_to_noise > BAD_FIT_RATIO and not lost.fits
+    assert not enough(lost, settings)
+    assert BAD_FIT in sentence(lost) and BAD_FIT not in sentence(found)
+
+
+def test_the_noise_of_a_fit_is_that_of_cameras_and_between_simulations(rng):
+    truth = np.stack([np.sin(PLAN.time), np.cos(PLAN.time)], axis=1)
+    spread = rng.normal(0.0, 0.02, (5, *truth.shape))
+    observed = truth + rng.normal(0.0, 0.02, truth.shape)
+    observed[len(truth) // 2 :] = np.nan
+    # sqrt(2) of one noise between two signals; sqrt(1 + 2) with the cameras' own
+    assert fit_to_noise(observed, truth + spread) == pytest.approx(np.sqrt(2.0 / 3.0), rel=0.1)
+    # without noise, a camera's is taken
+    still = np.repeat(truth[None], 3, axis=0)
+    assert fit_to_noise(truth + np.radians(0.5), still) == pytest.approx(5.0, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_an_online_estimate_names_a_wrong_frame():
+    """A stick that leans ahead of the gripper: the sign of a plane is wrong."""
+    recording = bundled_recording("glycerin")
+    plan = planned(recording.time, recording.gripper.position, recording.attrs)
+    of = Problem(default_prior(), stirring_of([plan], 200), OnlineSettings(design=8))
+    ends = stroke_ends(plan)
+    for sign, faults in ((1.0, 0), (-1.0, 1)):
+        seen = recording.inclination * [1.0, sign]
+        data = SoFar(recording.time, recording.gripper.position, seen, 0.0)
+        known = made(of, recording.time)
+        found = estimate(of, known, follow(plan, ends, data), NoMap(), 0.0)
+        assert len(found.frame_faults) == faults
+        assert not (faults and found.fits)
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.pouring import spillage
 from bolfi_liquids.pouring.choose import LANDINGS_PER_POUR
-from bolfi_liquids.pouring.result import PourSummary
+from bolfi_liquids.pouring.result import PourSummary, read_pour
 from bolfi_liquids.run.directory import SIMULATIONS
 
 
@@ -55,6 +55,8 @@ def test_a_person_may_insist(far_off, pour, pour_settings):
     again = bl.choose_pour(far_off, **pour_settings, force=True, progress=False)
     assert again.chosen.action == pour.chosen.action
     assert rows(far_off) == rows(pour.path)
+    for run, status in ((far_off, "bad"), (pour.path, "acceptable")):
+        assert PourSummary.read(run).fit_status == read_pour(run).attrs["fit_status"] == status
 
 
 def test_fractions_add_up_and_the_action_is_allowed(pour):

@@ -81,6 +81,12 @@ def test_nothing_is_said_where_nothing_is_wrong(fine):
         ),
         ("criticised", None, "warning.not_criticised", {}),
         ("criticised", {"baseline": 0}, "criticism.no_baseline", {}),
+        (
+            "criticised",
+            {"frame_faults": ("other.nc: turned",)},
+            "warning.compared_in_a_wrong_frame",
+            {"faults": ("other.nc: turned",)},
+        ),
         ("criticised", {"verdict": Verdict.UNKNOWN}, "criticism.unexplained", {}),
         ("poured", {"expected_spillage": 0.12}, "warning.much_spilled", {"share": 0.12}),
     ],

@@ -172,6 +172,50 @@ def test_a_stale_pour_is_never_asked_about(poured_run):
     assert str(chosen).startswith(stale) and str(chosen).count(stale) == 1
 
 
+def with_status(run, status):
+    rewritten(run / "pour.nc", lambda tree: tree.attrs.update(fit_status=status))
+
+
+def with_a_bad_fit(run):
+    replace(bl.Calibration.open(run).summary, fit_rms_deg=2.1, noise_deg=0.24).write(run)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [lambda run: with_status(run, "bad"), with_a_bad_fit],
+    ids=["as written", "as the fit is now, of an older version"],
+)
+def test_a_pour_over_a_bad_fit_needs_its_own_word(poured_run, make):
+    assert not chosen_pour(poured_run).fit_is_bad
+    make(poured_run)
+    assert chosen_pour(poured_run).fit_is_bad
+    with pytest.raises(InputError, match="--despite-bad-fit"):
+        bl.execute_pour(poured_run, ask=refused)
+    plans = []
+
+    def ask(plan):
+        plans.append(plan)
+        return "no"
+
+    with pytest.raises(RigError, match="confirmation"):
+        bl.execute_pour(poured_run, ask=ask, despite_bad_fit=True)
+    assert "--despite-bad-fit" in plans[0].splitlines()[0]  # before the pour itself
+
+
+def test_an_arm_refuses_a_pour_over_a_bad_fit_on_the_command_line(poured_run):
+    with_status(poured_run, "bad")
+    execute = ["pour", str(poured_run), "--execute", "--arm"]
+    result = CliRunner().invoke(app, execute)
+    assert result.exit_code == 2
+    (line,) = result.stderr.strip().splitlines()
+    assert "--despite-bad-fit" in line
+    result = CliRunner().invoke(app, [*execute, "--despite-bad-fit"])
+    assert result.exit_code == 2
+    assert "no terminal" in result.stderr  # it has come as far as the question
+    result = CliRunner().invoke(app, ["pour", str(poured_run), "--despite-bad-fit"])
+    assert result.exit_code == 2 and "--execute" in result.stderr
+
+
 def test_a_person_reads_the_pour_and_the_worries_before_the_question(poured_run):
     read = []
 
@@ -215,7 +259,7 @@ def test_what_belongs_to_the_choice_is_not_taken_with_execute(poured_run, option
 
 @pytest.mark.parametrize("cycles", [0, -1, 101, 10**12])
 def test_cycles_have_two_ends(cycles):
-    with pytest.raises(InputError, match=f"--cycles: {cycles}"):
+    with pytest.raises(InputError, match=f"^cycles: {cycles}"):
         plan_stir(bundled_rig(), cycles)
 
 

@@ -34,6 +34,11 @@ from bolfi_liquids.run.entering import LOCK, entered, working_in
 
 RECORD = {"settings": {"budget": 20, "seed": 0}, "inputs": {"sha256": ["ab"]}}
 
+
+def bundled(name):
+    return Path(str(files("bolfi_liquids.data"))) / name
+
+
 TWINS = """
 import json, os, sys
 from multiprocessing import get_context
@@ -153,6 +158,48 @@ def test_one_process_keeps_itself_out_too(tmp_path):
     assert not (tmp_path / "out").exists()  # which it made, and left empty
 
 
+@pytest.mark.parametrize("removed_by", ["mkdir of its parent", "a look whether it is there"])
+def test_a_directory_that_vanishes_while_it_is_made_is_made_again(
+    tmp_path, monkeypatch, removed_by
+):
+    """As `Path.mkdir` fails where another command removes what it has just made or found."""
+    errors = [FileNotFoundError if removed_by.startswith("mkdir") else FileExistsError]
+    made = Path.mkdir
+
+    def mkdir(self, *given, **named):
+        if errors:
+            raise errors.pop()("removed meanwhile")
+        made(self, *given, **named)
+
+    monkeypatch.setattr(Path, "mkdir", mkdir)
+    with working_in(tmp_path / "a" / "b"):
+        assert (tmp_path / "a" / "b" / LOCK).exists()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_no_directory_is_refused_at_once(tmp_path):
+    (tmp_path / "file").touch()
+    (tmp_path / "dangling").symlink_to(tmp_path / "nowhere")
+    for out in ("file", "file/below", "dangling", "dangling/below"):
+        with pytest.raises(InputError, match="not a directory"):
+            with working_in(tmp_path / out):
+                raise AssertionError("it was entered")
+    assert {path.name for path in tmp_path.iterdir()} == {"file", "dangling"}
+    (tmp_path / "there").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "there")
+    with working_in(tmp_path / "link" / "run"):
+        assert (tmp_path / "there" / "run" / LOCK).exists()
+
+
+def test_others_of_the_group_may_lock_whatever_the_umask(tmp_path):
+    before = os.umask(0o077)
+    try:
+        with working_in(tmp_path / "run"):
+            assert (tmp_path / "run" / LOCK).stat().st_mode & 0o666 == 0o666
+    finally:
+        os.umask(before)
+
+
 @pytest.mark.parametrize("error", [InputError("no", where="there", fix="do"), OSError("no worker")])
 def test_a_refusal_before_the_first_simulation_leaves_nothing(tmp_path, error):
     run = tmp_path / "runs" / "mine"
@@ -256,10 +303,6 @@ def given_nothing(out):
         "import --template": lambda: table_import.write_template(out),
         "rig template": lambda: rigs.write_template(out),
     }
-
-
-def bundled(name):
-    return Path(str(files("bolfi_liquids.data"))) / name
 
 
 @pytest.mark.parametrize("function", given_nothing(""))

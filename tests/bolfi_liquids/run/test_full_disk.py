@@ -26,6 +26,12 @@ def limit(size):
 folder = Path(sys.argv[1])
 """
 WRITES = {
+    "run.lock": """
+from bolfi_liquids.run.entering import working_in
+limit(0)
+with working_in(folder):
+    print("entered")
+""",
     "summary.json": """
 from bolfi_liquids.run.summary import write_section
 limit(1000)

@@ -40,6 +40,23 @@ def without_home(home, folder, code, *arguments):
     )
 
 
+WHERE = """
+import os
+from pathlib import Path
+import bolfi_liquids
+print(Path.home(), os.environ["XDG_CACHE_HOME"], sep="\\n")
+"""
+
+
+@as_unknown
+def test_a_home_that_cannot_be_written_stays_home_for_all_but_caches(tmp_path):
+    """People read from it; and what they write there must fail, not go elsewhere."""
+    done = without_home("not writable", tmp_path, WHERE)
+    home, cache = done.stdout.splitlines()
+    assert home == HOMES["not writable"](tmp_path)["HOME"]
+    assert cache.startswith(str(tmp_path))
+
+
 DRAW = """
 from pathlib import Path
 import arviz_stats

@@ -76,6 +76,24 @@ def test_simulations_that_took_too_long_are_counted(caplog):
     assert notice.args == (2, 3, 0.2)
 
 
+def test_simulations_that_failed_are_counted_with_the_first_reason(caplog):
+    """A bar counts them as done."""
+
+    def simulate(theta, seeds):
+        if theta["a"][0] > 2.0:
+            raise OSError("the disk\nis full")
+        return np.where(theta["a"] > 1.0, np.nan, theta["a"])[:, None]
+
+    with SimulationBank() as bank:
+        for repeated in range(2):  # what the bank holds is told again
+            caplog.clear()
+            theta = {"a": np.array([0.0, 2.0, 3.0, 1.0])}
+            simulate_kept(simulate, theta, [1, 2, 3, 4], Keep(bank, "", 1))
+            (notice,) = caplog.records
+            assert notice.args[:2] == (2, 4), repeated
+            assert "\n" not in notice.getMessage()
+
+
 def test_a_simulator_that_keeps_repeats_nothing_that_was_finished():
     asked = []
 

@@ -19,7 +19,11 @@ WRITTEN = {
     path.stem: json.loads(path.read_text(encoding="utf-8"))
     for path in sorted((Path(__file__).parent / "summaries_of_format_3").glob("*.json"))
 }
-ADDED_SINCE = {"calibrate": {"fit_to_noise", "fit_status", "frame_faults"}}
+ADDED_SINCE = {
+    "calibrate": {"fit_to_noise", "fit_status", "frame_faults"},
+    "criticise": {"frame_faults"},
+    "pour": {"fit_status"},
+}
 SECTIONS = [(name, section) for name, written in WRITTEN.items() for section in written]
 
 

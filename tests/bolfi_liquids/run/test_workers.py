@@ -149,5 +149,5 @@ def test_every_call_that_simulates_refuses_it(calibration, given):
             call()
         if "timeout" in given:
             assert isinstance(refused.value, InputError)
-            assert refused.value.where == "--timeout"
+            assert refused.value.where == "timeout"
     assert sorted(calibration.path.iterdir()) == before

@@ -1,0 +1,105 @@
+"""Whatever writes into a run keeps others out of it, so that nothing of either is lost."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import bolfi_liquids as bl
+from bolfi_liquids.cli.app import app
+from bolfi_liquids.errors import InputError
+from bolfi_liquids.run.directory import RUN_TOML, enter_run
+from bolfi_liquids.run.entering import LOCK, working_in
+from bolfi_liquids.run.summary import read_summary
+
+RECORD = {"settings": {"budget": 20, "seed": 0}, "inputs": {"sha256": ["ab"]}}
+
+
+def commands_in(run):
+    """Every call that writes into a run, and what is typed for it."""
+    stir = Path(str(files("bolfi_liquids.data"))) / "glycerin_v10.nc"
+    return {
+        "calibrate": (
+            lambda: bl.calibrate(stir, out=run, resume=True, progress=False),
+            ["calibrate", str(stir), "--out", str(run), "--resume"],
+        ),
+        "criticise": (lambda: bl.criticise(run, progress=False), ["criticise", str(run)]),
+        "pour": (lambda: bl.choose_pour(run, progress=False), ["pour", str(run)]),
+        "report": (lambda: bl.report(run, progress=False), ["report", str(run)]),
+        "execute": (
+            lambda: bl.execute_pour(run, emulate=True, progress=False),
+            ["pour", str(run), "--execute", "--emulator"],
+        ),
+    }
+
+
+def contents(run):
+    return {path.name: path.read_bytes() for path in run.iterdir() if path.is_file()}
+
+
+@pytest.mark.parametrize("command", commands_in(Path()))
+def test_what_writes_into_a_run_keeps_out_while_another_command_works_there(tmp_path, command):
+    run = tmp_path / "run"
+    enter_run(run, RECORD, resume=False)
+    call, typed = commands_in(run)[command]
+    with working_in(run):
+        before = contents(run)
+        with pytest.raises(InputError, match=f"process {os.getpid()} on ") as refused:
+            call()
+        assert refused.value.where == str(run)
+        result = CliRunner().invoke(app, typed)
+        assert result.exit_code == 2
+        (line,) = result.stderr.strip().splitlines()
+        assert f"process {os.getpid()} on " in line
+        assert contents(run) == before
+    assert contents(run).keys() == {RUN_TOML}
+
+
+@pytest.mark.parametrize("command", [one for one in commands_in(Path()) if one != "calibrate"])
+def test_a_mistyped_run_is_not_made(tmp_path, command):
+    call, _ = commands_in(tmp_path / "runs" / "mien")[command]
+    with pytest.raises(InputError, match="mien"):
+        call()
+    assert list(tmp_path.iterdir()) == []
+
+
+POUR = """
+import json, sys
+import bolfi_liquids as bl
+bl.choose_pour(sys.argv[1], force=True, **json.loads(sys.argv[2]))
+"""
+
+
+@pytest.mark.slow
+def test_of_two_commands_at_once_one_is_refused_and_nothing_is_lost(
+    calibration, pour_settings, tmp_path
+):
+    """A pour is stopped in the middle of its work; while it holds the run, all others try."""
+    run = shutil.copytree(calibration.path, tmp_path / "run")
+    pour = [sys.executable, "-c", POUR, str(run), json.dumps(pour_settings)]
+    with subprocess.Popen(pour, stderr=subprocess.DEVNULL) as first:
+        while not (run / LOCK).exists():
+            assert first.poll() is None
+            time.sleep(0.01)
+        first.send_signal(signal.SIGSTOP)
+        try:
+            for call, typed in commands_in(run).values():
+                with pytest.raises(InputError, match=f"process {first.pid} on "):
+                    call()
+                assert CliRunner().invoke(app, typed).exit_code == 2
+        finally:
+            first.send_signal(signal.SIGCONT)
+        assert first.wait() == 0
+    bl.report(run, moving=False, progress=False)
+    summary = read_summary(run)
+    assert {"calibrate", "pour"} <= set(summary)
+    assert summary["calibrate"] == read_summary(calibration.path)["calibrate"]
+    assert bl.Pour.open(run).chosen.action and not (run / LOCK).exists()
