@@ -27,7 +27,7 @@ from .history import (
     told_seeds,
 )
 from .notebook_display import as_html, as_text
-from .prior import Prior, check_prior
+from .prior import Prior, checked_prior
 from .result import Fit
 from .simulations.failures import Failure, incomparable, kind, unusable
 from .simulations.job import BATCH
@@ -82,7 +82,7 @@ class Bolfi:
         capacity: int = 256,
         **options: Any,
     ):
-        check_prior(prior)
+        checked_prior(prior)
         self.prior = prior
         self.observed = checked_array("observed", observed)
         if np.isinf(self.observed).any():

@@ -20,7 +20,7 @@ from ..arguments import (
 )
 from ..bolfi import MIN_LEARN, Bolfi
 from ..loop import fit
-from ..prior import Prior, check_prior
+from ..prior import Prior, checked_prior
 from ..progress import progress_bar
 from ..result import Fit
 from ..simulations.bank import SimulationBank, check_bank
@@ -91,7 +91,7 @@ class FitPipeline:
 
     def __post_init__(self) -> None:
         check_function("simulate", self.simulate)
-        check_prior(self.prior)
+        checked_prior(self.prior)
         checked_integer("budget", self.budget, MIN_LEARN)
         check_flag("warn", self.warn)
         _check_options(fit, self.options, self.sampling)
@@ -182,7 +182,7 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
     n, seed = checked_integer("n", n, MIN_LEARN), checked_integer("seed", seed, 0)
     check_keep(checked_integer("batch", batch), timeout)
     check_progress(progress)
-    check_prior(prior)
+    checked_prior(prior)
     check_text("identity", identity)
     check_flag("warn", warn)
     check_bank(bank)

@@ -5,6 +5,7 @@ a new argument that takes anything. Nothing is simulated before an argument is r
 """
 
 import inspect
+import re
 from concurrent.futures import ProcessPoolExecutor
 
 import jax
@@ -152,7 +153,7 @@ def test_an_argument_that_makes_no_sense_is_refused_by_its_name(cases, name, arg
     with pytest.raises((ValueError, TypeError)) as refused:
         call(**good, **{"nonsense": Wrong()}) if more else call(**good | {argument: Wrong()})
     told = str(refused.value)
-    assert ("nonsense" if more else argument) in told
+    assert re.search(rf"\b{'nonsense' if more else argument}\b", told)
     assert more or "<Wrong>" in told
     assert not CALLS
 
@@ -241,6 +242,6 @@ VALUES = {
 def test_a_value_that_makes_no_sense_is_refused_by_its_argument(cases, name, argument, value):
     call, good = cases[name]
     CALLS.clear()
-    with pytest.raises((ValueError, TypeError), match=argument):
+    with pytest.raises((ValueError, TypeError), match=rf"\b{argument}\b"):
         call(**good | {argument: value})
     assert not CALLS
