@@ -252,6 +252,11 @@ def _checked(name: str, distribution: object) -> Univariate:
             f"prior of {name!r} needs cdf and icdf, which {type(distribution).__name__} lacks; "
             "use for example Uniform, LogUniform, Normal, LogNormal, TruncatedNormal, Gamma or Beta"
         ) from error
+    except (TypeError, ValueError) as error:
+        raise ValueError(
+            f"prior of {name!r} must have real numbers as arguments, got a "
+            f"{type(distribution).__name__} of which {error}"
+        ) from error
     low, high = univariate.bounds
     if low >= high:
         raise ValueError(
