@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 from numbers import Real
 from operator import index
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -164,10 +164,11 @@ def checked_number(name: str, value: object, fits: Callable[[float], bool], due:
     Raises:
         ValueError: no number, or out of range.
     """
-    number = isinstance(value, Real) and not isinstance(value, bool | np.bool_)
-    if not number or math.isnan(value) or not fits(float(value)):
+    real = isinstance(value, Real) and not isinstance(value, bool | np.bool_)
+    number = float(cast(Real, value)) if real else math.nan
+    if math.isnan(number) or not fits(number):
         raise ValueError(f"{name} must be {due}, got {value!r:.100}")
-    return float(value)
+    return number
 
 
 def checked_mapping(name: str, value: object, due: str) -> dict[str, Any]:

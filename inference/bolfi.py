@@ -27,7 +27,7 @@ from .history import (
     told_seeds,
 )
 from .notebook_display import as_html, as_text
-from .prior import Prior, check_prior
+from .prior import Prior, checked_prior
 from .result import Fit
 from .simulations.failures import Failure, incomparable, kind, unusable
 from .simulations.job import BATCH
@@ -42,6 +42,7 @@ from .types import Theta
 
 ASKED_DIGITS, ASKED_EDGE = 7, 1e-7  # of the prior quantiles that are asked, and how near the bounds
 MIN_LEARN = 3  # successful simulations before the surrogate may choose
+MOST_SIMULATIONS = 8192  # of one run: the processes hold matrices of as many rows and columns
 
 
 class Bolfi:
@@ -82,16 +83,19 @@ class Bolfi:
         capacity: int = 256,
         **options: Any,
     ):
-        check_prior(prior)
+        checked_prior(prior)
         self.prior = prior
         self.observed = checked_array("observed", observed)
         if np.isinf(self.observed).any():
             raise ValueError("observed must not be infinite; NaN is a missing sample")
         self.seed = checked_integer("seed", seed, 0)
         self.initial = checked_integer(
-            "initial", start_size(len(prior)) if initial is None else initial, MIN_LEARN
+            "initial",
+            start_size(len(prior)) if initial is None else initial,
+            MIN_LEARN,
+            MOST_SIMULATIONS,
         )
-        self.capacity = checked_integer("capacity", capacity)
+        self.capacity = checked_integer("capacity", capacity, 1, MOST_SIMULATIONS)
         self.family = resolve(surrogate, options)
         self._learner = self.family.learner(self.observed)
         self._acquire = resolve_acquisition(acquisition, self.family.name, self.family.acquisition)
@@ -166,7 +170,7 @@ class Bolfi:
         Raises:
             ValueError: n < 1.
         """
-        n = checked_integer("n", n)
+        n = checked_integer("n", n, 1, MOST_SIMULATIONS)
         started = time.perf_counter()
         designed = self._designed_now(n)
         start = self._state.designed
@@ -243,6 +247,7 @@ class Bolfi:
         """
         started = time.perf_counter()
         natural = np.atleast_2d(self.prior.to_array(theta))
+        self._check_number(len(natural))
         rows = self.prior.to_dict(natural)
         told_rows, faults = self._signals(len(natural), signals)
         outside = np.flatnonzero(~self.prior.contains(rows))
@@ -271,6 +276,14 @@ class Bolfi:
         )
         self._state = remember_told(self._state, told)
         self._seconds += time.perf_counter() - started
+
+    def _check_number(self, n: int) -> None:
+        """Raise ValueError if n more simulations are more than one run may have."""
+        if self.told + n > MOST_SIMULATIONS:
+            raise ValueError(
+                f"theta holds {n} simulations beside the {self.told} told before; a run may have "
+                f"{MOST_SIMULATIONS} in all: leave the least useful out"
+            )
 
     def _check_compared(self, measured: Measured) -> None:
         """Raise ValueError if the user's own function failed on all of the first signals.

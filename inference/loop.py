@@ -19,7 +19,7 @@ from .arguments import (
     checked_array,
     checked_integer,
 )
-from .bolfi import MIN_LEARN, Bolfi
+from .bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi
 from .prior import Prior
 from .progress import progress_bar
 from .result import Fit
@@ -84,7 +84,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
             that run only, see `Fit.failures`; a masked value is NaN.
         prior: The parameters and their priors.
         observed: The measured signal [*signal_shape], time first; NaN is a missing sample.
-        budget: Simulations in all, failed ones and those found in the bank included.
+        budget: Simulations in all, failed ones and those found in the bank included; at most 8192,
+            earlier ones counted.
         batch: Points per round, or in flight: as many as the executor has workers.
         seed: Fixes the whole run.
         surrogate, acquisition: See `Bolfi`.
@@ -128,8 +129,9 @@ def fit(  # noqa: PLR0913  the one call that most users make
     Warns:
         EmulatorWarning: for each of the surrogate's complaints, unless warn=False.
     """
-    batch = checked_integer("batch", batch)
-    budget = checked_integer("budget", budget, MIN_LEARN if earlier is None else 0)
+    batch = checked_integer("batch", batch, 1, MOST_SIMULATIONS)
+    least = MIN_LEARN if earlier is None else 0
+    budget = checked_integer("budget", budget, least, MOST_SIMULATIONS)
     check_timeout(timeout)
     check_progress(progress)
     check_text("identity", identity)
@@ -140,6 +142,11 @@ def fit(  # noqa: PLR0913  the one call that most users make
     if budget:
         check_function("simulate", simulate)
     told = _length(earlier)
+    if budget + told > MOST_SIMULATIONS:
+        raise ValueError(
+            f"earlier holds {told} simulations, which with budget={budget} is more than the "
+            f"{MOST_SIMULATIONS} that a run may have; leave the least useful out"
+        )
     if initial is None and isinstance(prior, Prior):  # `Bolfi` refuses what is none
         initial = max(MIN_LEARN, min(start_size(len(prior)), budget + told))
     engine = Bolfi(
@@ -149,7 +156,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
         acquisition=acquisition,
         seed=seed,
         initial=initial,
-        capacity=max(1, told + -(-budget // batch) * batch),  # whole rounds are asked
+        # whole rounds are asked
+        capacity=min(max(1, told + -(-budget // batch) * batch), MOST_SIMULATIONS),
         **options,
     )
     if earlier is not None:

@@ -184,13 +184,18 @@ class Prior:
         return self.from_unit(np.asarray(jax.random.uniform(key, (n, len(self)))))
 
 
-def check_prior(prior: object) -> None:
-    """Raise ValueError unless `prior` is a `Prior`."""
+def checked_prior(prior: object) -> Prior:
+    """`prior`.
+
+    Raises:
+        ValueError: it is no `Prior`.
+    """
     if not isinstance(prior, Prior):
         raise ValueError(
             f"prior must be a Prior, got {prior!r:.100} of type {type(prior).__name__}; "
             "make one of name -> distribution by inference.Prior({...})"
         )
+    return prior
 
 
 def _rather_normal(univariate: Univariate) -> bool:
@@ -246,6 +251,11 @@ def _checked(name: str, distribution: object) -> Univariate:
         raise ValueError(
             f"prior of {name!r} needs cdf and icdf, which {type(distribution).__name__} lacks; "
             "use for example Uniform, LogUniform, Normal, LogNormal, TruncatedNormal, Gamma or Beta"
+        ) from error
+    except (TypeError, ValueError) as error:
+        raise ValueError(
+            f"prior of {name!r} must have real numbers as arguments, got a "
+            f"{type(distribution).__name__} of which {error}"
         ) from error
     low, high = univariate.bounds
     if low >= high:

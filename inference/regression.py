@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from ._float64 import in_float64
 from .arguments import checked_array
 from .gp.process import padded_rows
-from .prior import Prior, check_prior
+from .prior import Prior, checked_prior
 from .result import SurrogateView
 from .surrogates.discrepancy import DiscrepancySurrogate, learn
 from .surrogates.transform import TRANSFORMS, Transform
@@ -50,7 +50,7 @@ def regress(
         ValueError: shapes disagree, fewer than three finite values, theta outside the support,
             or a transform that is undefined at some value.
     """
-    check_prior(prior)
+    checked_prior(prior)
     if transform is not None and transform not in tuple(TRANSFORMS):
         raise ValueError(
             f"transform must be one of {tuple(TRANSFORMS)} or None, got {transform!r:.100}"

@@ -19,7 +19,7 @@ from ..arguments import (
     checked_number,
 )
 from ..describe import describe
-from ..prior import Prior, check_prior
+from ..prior import Prior, checked_prior
 from ..progress import progress_bar
 from ..simulations.executors import Workers, check_executor, open_executor
 from ..simulations.failures import Failure, kind, unusable
@@ -85,12 +85,11 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
     """
     check_function("pipeline", pipeline)
     simulator = _own(pipeline, "simulate", simulate)
-    prior = _own(pipeline, "prior", prior)
+    prior = checked_prior(_own(pipeline, "prior", prior))
     check_function("simulate", simulator)
     check_callable("observe", observe)
     check_timeout(timeout)
     check_progress(progress)
-    check_prior(prior)
     check_text("identity", identity)
     check_flag("independent", independent)
     check_flag("retry", retry)
@@ -133,7 +132,10 @@ def made_or_given(
     """
     if not isinstance(of, Replicates):
         if not callable(of):
-            raise ValueError(f"of must be Replicates or a pipeline to be called, got {of!r:.100}")
+            raise ValueError(
+                "of must be Replicates or a pipeline, and a pipeline must be a function, "
+                f"got {of!r:.100}"
+            )
         return replicates(of, simulate, prior, **run)
     if simulate is not None or prior is not None or run:
         raise ValueError(

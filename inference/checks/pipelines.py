@@ -18,9 +18,9 @@ from ..arguments import (
     checked_integer,
     checked_mapping,
 )
-from ..bolfi import MIN_LEARN, Bolfi
+from ..bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi
 from ..loop import fit
-from ..prior import Prior, check_prior
+from ..prior import Prior, checked_prior
 from ..progress import progress_bar
 from ..result import Fit
 from ..simulations.bank import SimulationBank, check_bank
@@ -91,8 +91,8 @@ class FitPipeline:
 
     def __post_init__(self) -> None:
         check_function("simulate", self.simulate)
-        check_prior(self.prior)
-        checked_integer("budget", self.budget, MIN_LEARN)
+        checked_prior(self.prior)
+        checked_integer("budget", self.budget, MIN_LEARN, MOST_SIMULATIONS)
         check_flag("warn", self.warn)
         _check_options(fit, self.options, self.sampling)
         simulate, options = _batched(self.simulate, self.options)
@@ -179,10 +179,11 @@ def shared_design(  # noqa: PLR0913  one flat place for what defines a design
         ImportError, ConnectionError: Dask is not installed, or does not answer.
     """
     check_function("simulate", simulate)
-    n, seed = checked_integer("n", n, MIN_LEARN), checked_integer("seed", seed, 0)
+    n = checked_integer("n", n, MIN_LEARN, MOST_SIMULATIONS)
+    seed = checked_integer("seed", seed, 0)
     check_keep(checked_integer("batch", batch), timeout)
     check_progress(progress)
-    check_prior(prior)
+    checked_prior(prior)
     check_text("identity", identity)
     check_flag("warn", warn)
     check_bank(bank)

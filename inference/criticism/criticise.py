@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..arguments import check_kind, checked_number
 from ..notebook_display import as_html, as_text
-from ..prior import Prior, check_prior
+from ..prior import Prior, checked_prior
 from .experiment import Experiment, Proposal
 from .held_out import Gap, gap, holds, predict
 from .hypothesis import Hypothesis, samples
@@ -176,7 +176,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
             effect that could not be simulated at all is in `Criticism.untested` instead.
         ImportError, ConnectionError: Dask is not installed, or does not answer.
     """
-    check_prior(prior)
+    checked_prior(prior)
     check_extensions(prior, extensions)
     _check_experiments(experiment, held_out, proposals)
     checked_number("level", level, lambda p: 0.0 < p < 1.0, "a number between 0 and 1")
@@ -327,7 +327,7 @@ def _check_experiments(
             check_kind(f"each of {name}", one, kind)
 
 
-def _check_earlier(earlier: object) -> None:
+def _check_earlier(earlier: Any) -> None:
     three = isinstance(earlier, tuple | list) and len(earlier) == 3
     if earlier is not None and not (three and isinstance(earlier[0], Mapping)):
         raise ValueError(

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arguments import check_function, checked_array
+from ..arguments import check_function, check_kind, check_text, checked_array
 from ..types import Simulator
 from .measurement_noise import Noise
 from .misfit import Window
@@ -39,7 +39,15 @@ class Experiment:
         observed = checked_array("observed", self.observed)
         if not np.isfinite(observed).any():
             raise ValueError(f"{self.label}: observed must have a finite value, got none")
+        check_text("identity", self.identity)
+        if not (hasattr(self.noise, "covariance") and hasattr(self.noise, "draw")):
+            raise ValueError(
+                f"{self.label}: noise must be a Noise, such as KnownNoise(0.01), got "
+                f"{self.noise!r:.100}"
+            )
+        check_kind("windows", self.windows, list | tuple)
         for window in self.windows:
+            check_kind("each of windows", window, Window)
             if window.samples.shape != observed.shape:
                 raise ValueError(
                     f"{self.label}: the window {dict(window.label)} has the shape "

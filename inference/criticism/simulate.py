@@ -7,10 +7,10 @@ from functools import partial
 
 import numpy as np
 
-from ..arguments import check_function, checked_integer
+from ..arguments import check_function, check_kind, checked_integer
 from ..prior import Prior
 from ..simulations.bank import SimulationBank
-from ..simulations.executors import Workers, open_executor
+from ..simulations.executors import Workers, check_executor, open_executor
 from ..simulations.failures import NoSignals
 from ..simulations.job import BATCH, jobs, succeeded
 from ..simulations.runner import Keep, check_keep, run_missing
@@ -60,6 +60,9 @@ class Keeping:
         check_keep(checked_integer("batch", self.batch), self.timeout)
         checked_integer("seed", self.seed, 0)
         check_function("report", self.report)
+        if self.bank is not None:
+            check_kind("bank", self.bank, SimulationBank)
+        check_executor(self.executor)
 
     @contextmanager
     def opened(self, identity: str) -> Iterator[Keep]:

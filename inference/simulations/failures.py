@@ -28,7 +28,11 @@ _INSTALLED = f"{os.sep}lib{os.sep}python"  # of Python's own modules and of pack
 
 def raised(error: BaseException) -> str:
     """What is kept of an exception: its type's name, its text, and the user's line, if any."""
-    text = f"{type(error).__name__}: {error}{_line(error)}"
+    try:
+        said = str(error)
+    except Exception:  # an exception may fail at its own text
+        said = "no text"
+    text = f"{type(error).__name__}: {said}{_line(error)}"
     return text.encode(errors="backslashreplace").decode()  # file names may hold half characters
 
 

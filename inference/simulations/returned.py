@@ -42,10 +42,12 @@ def told_signals(
         Unusable: not n signals, or none of them can be used.
     """
     try:
-        return signals_of(given, n, shape), [""] * n
+        rows = signals_of(given, n, shape)
+        return [rows[i, ...] for i in range(n)], [""] * n
     except Unusable:
-        objects = isinstance(given, np.ndarray) and given.dtype == object and given.ndim == 1
-        if not (objects or isinstance(given, list | tuple)) or len(given) != n:
+        if isinstance(given, np.ndarray) and given.dtype == object and given.ndim == 1:
+            given = given.tolist()
+        if not isinstance(given, list | tuple) or len(given) != n:
             raise
         tried = [_float64_or_why(row) for row in given]
         faults = [_fault(row, shape) for row in tried]

@@ -238,7 +238,11 @@ def marginalised(
 
 def _standardise(transform: Transform, values: np.ndarray) -> Scale:
     transformed = transform(values)
-    spread, rounding = float(transformed.std()), 1e-12 * float(np.abs(transformed).max())
+    size = float(np.abs(transformed).max())
+    with np.errstate(over="ignore"):
+        spread, rounding = float(transformed.std()), 1e-12 * size
+    if not np.isfinite(spread):  # the squares of large numbers overflow
+        spread = size * float((transformed / size).std())
     # all equal: nothing to standardise
     return Scale(transform, float(transformed.mean()), spread if spread > rounding else 1.0)
 

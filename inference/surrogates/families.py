@@ -196,7 +196,7 @@ class SignalLearner:
                 continue
             try:
                 features[i] = self.output.values(signal)
-            except Exception as error:  # of the user's summary
+            except (Exception, SystemExit) as error:  # of the user's summary
                 errors[i] = failed_on("summary", signal, self.observed, error)
         failed = ~np.isfinite(features).all(1)
         return Measured(features, np.where(failed, np.nan, discrepancy), errors)

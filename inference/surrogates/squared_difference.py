@@ -103,12 +103,12 @@ def evaluate(
             continue
         try:
             values[i] = _number(named, compare(observed.copy(), signal.copy()))
-        except Exception as error:  # whatever the user's code raises costs this run only
+        except (Exception, SystemExit) as error:  # whatever the user's code raises costs this run
             errors[i] = failed_on(named, signal, observed, error)
     return values, errors
 
 
-def failed_on(named: str, signal: np.ndarray, observed: np.ndarray, error: Exception) -> str:
+def failed_on(named: str, signal: np.ndarray, observed: np.ndarray, error: BaseException) -> str:
     """What is kept of an error of the user's function that was given this signal."""
     return incomparable(
         f"the {named} failed on a signal of shape {signal.shape}, observed being of shape "

@@ -1,6 +1,7 @@
 """Simulations that fail: what a loop makes of them."""
 
 import re
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -107,3 +108,112 @@ def test_signals_of_wrong_shape_are_refused_and_not_stored(prior, observed, simu
         assert len(bank) == 0
         # and nothing is claimed any more, for which this call would wait
         assert inference.fit(simulate, prior, observed, budget=7, bank=bank).failures == {}
+
+
+@pytest.mark.parametrize(("failing", "warned"), [(3, False), (4, True)])
+def test_a_fit_of_fewer_runs_than_the_surrogate_needs_warns(
+    prior, observed, simulate, failing, warned
+):
+    """Two parameters need 2 d + 2 = 6: level, slopes, curvatures, and one that could contradict."""
+
+    def fragile(theta, seed):
+        made.append(seed)
+        if len(made) <= failing:
+            raise ArithmeticError
+        return simulate({name: np.array([value]) for name, value in theta.items()}, [seed])[0]
+
+    made = []
+    fit = inference.fit(fragile, prior, observed, budget=9, vectorised=False, warn=False)
+    few = [said for said in fit.warnings if f"learned from {9 - failing} simulations" in said]
+    assert bool(few) is warned
+    assert all(said in repr(fit) for said in few)
+    engine = inference.Bolfi(prior, observed)
+    engine.tell(prior.to_dict(fit.history.theta), fit.history.signals, fit.history.seeds)
+    if warned:
+        with pytest.warns(inference.EmulatorWarning, match="fewer than the 6"):
+            engine.fit()
+    else:
+        engine.fit()
+
+
+def test_telling_nothing_changes_nothing(prior, observed):
+    engine = inference.Bolfi(prior, observed)
+    engine.tell({"slope": [], "offset": []}, [], [], [])
+    engine.tell({"slope": [], "offset": []}, np.zeros((0, 30)))
+    assert engine.told == 0 and engine.errors == []
+
+
+def test_an_executor_that_was_shut_down_is_named(prior, observed, simulate):
+    with ThreadPoolExecutor(1) as pool:
+        pass
+    with pytest.raises(RuntimeError, match="executor takes no simulation .*shut"):
+        inference.fit(simulate, prior, observed, budget=9, executor=pool)
+
+
+def test_a_simulator_may_write_into_what_it_is_given(prior, observed, simulate):
+    """Neither the next run nor what is kept of this one changes."""
+
+    def greedy(theta, seeds):
+        signals = simulate(theta, seeds)
+        for column in (*theta.values(), seeds):
+            column[:] = 0
+        return signals
+
+    def alone(theta, seed):
+        signal = simulate({name: np.array([value]) for name, value in theta.items()}, [seed])[0]
+        theta.clear()
+        return signal
+
+    plain = inference.fit(simulate, prior, observed, budget=9)
+    for fit in (
+        inference.fit(greedy, prior, observed, budget=9),
+        inference.fit(alone, prior, observed, budget=9, vectorised=False),
+    ):
+        np.testing.assert_array_equal(fit.history.theta, plain.history.theta)
+        np.testing.assert_array_equal(fit.history.seeds, plain.history.seeds)
+        np.testing.assert_array_equal(fit.history.signals, plain.history.signals)
+
+    def draws(observed, seed):
+        return {name: np.random.default_rng(seed).random(15) for name in prior.names}
+
+    options = {"draws": 7, "independent": True, "progress": False}
+    made = inference.replicates(draws, greedy, prior, 4, **options)
+    np.testing.assert_array_equal(
+        made.truth, inference.replicates(draws, simulate, prior, 4, **options).truth
+    )
+
+
+@pytest.mark.parametrize(
+    ("returned", "message"),
+    [
+        (lambda n: np.full((n, 3), 0.5), r"u of shape \(1, 2\)"),
+        (lambda n: np.full((n, 2), np.nan), "from 0 to 1"),
+        (lambda n: np.full((n, 2), 1.5), "from 0 to 1"),
+        (lambda n: None, "what acquisition returns"),
+    ],
+)
+def test_what_an_acquisition_returns_is_checked(prior, observed, simulate, returned, message):
+    engine = inference.Bolfi(
+        prior, observed, initial=4, acquisition=lambda key, surrogate, n, runs: returned(n)
+    )
+    theta = engine.ask(4)
+    engine.tell(theta, simulate(theta, range(4)))
+    with pytest.raises(ValueError, match=message):
+        engine.ask(2)
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e150, 1e160])
+@pytest.mark.parametrize("surrogate", ["signal", "discrepancy"])
+def test_outputs_of_any_size_are_learned_from_or_told(prior, observed, simulate, surrogate, scale):
+    """Also where the user has made NumPy raise."""
+    engine = inference.Bolfi(prior, scale * observed, surrogate=surrogate)
+    theta = engine.ask(10)
+    with np.errstate(all="raise"):
+        engine.tell(theta, scale * simulate(theta, range(10)))
+        assert engine.told == 10
+        if engine.succeeded < 3:
+            with pytest.raises(ValueError, match="not finite"):
+                engine.fit()
+        else:
+            fit = engine.fit(warn=False)
+            assert np.isfinite(fit.log_prob({"slope": 0.3, "offset": 0.6}))

@@ -5,6 +5,7 @@ a new argument that takes anything. Nothing is simulated before an argument is r
 """
 
 import inspect
+import re
 from concurrent.futures import ProcessPoolExecutor
 
 import jax
@@ -152,7 +153,7 @@ def test_an_argument_that_makes_no_sense_is_refused_by_its_name(cases, name, arg
     with pytest.raises((ValueError, TypeError)) as refused:
         call(**good, **{"nonsense": Wrong()}) if more else call(**good | {argument: Wrong()})
     told = str(refused.value)
-    assert ("nonsense" if more else argument) in told
+    assert re.search(rf"\b{'nonsense' if more else argument}\b", told)
     assert more or "<Wrong>" in told
     assert not CALLS
 
@@ -176,6 +177,10 @@ VALUES = {
         {"budget": 0},
         {"budget": 10.0},
         {"budget": True},
+        {"budget": 10**8},
+        {"batch": 10**9},
+        {"initial": 10**9},
+        {"earlier": ({"a": np.full(9000, 0.5)}, np.zeros((9000, 30)))},
         {"batch": -4},
         {"seed": 2**31},
         {"seed": -1},
@@ -221,8 +226,12 @@ VALUES = {
         {"distributions": [dist.Uniform(0.0, 1.0)]},
         {"distributions": dist.Uniform(0.0, 1.0)},
         {"units": {"b": "m"}},
+        {"units": ["m"]},
         {"units": "m"},
     ],
+    "Bolfi": [{"capacity": 10**6}, {"initial": 10**6}],
+    "Bolfi.ask": [{"n": 10**6}, {"n": -1}],
+    "shared_design": [{"n": 10**6}, {"n": 2}, {"prior": 3}],
     "Prior.sample": [{"key": 0}, {"key": jax.random.split(jax.random.key(0))}, {"n": 0}],
     "Fit.plot_search": [{"ax": 3}],
     "Fit.plot_predictive": [{"sampled": 3}, {"axes": 3}, {"axes": [None]}],
@@ -241,6 +250,6 @@ VALUES = {
 def test_a_value_that_makes_no_sense_is_refused_by_its_argument(cases, name, argument, value):
     call, good = cases[name]
     CALLS.clear()
-    with pytest.raises((ValueError, TypeError), match=argument):
+    with pytest.raises((ValueError, TypeError), match=rf"\b{argument}\b"):
         call(**good | {argument: value})
     assert not CALLS

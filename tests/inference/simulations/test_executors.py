@@ -249,7 +249,8 @@ def test_after_an_error_the_bank_is_free_for_the_next_call(prior, observed, simu
                 inference.fit(misshapen, prior, observed, bank=bank, **options(pool))
             finish.set()
         assert 1 <= len(bank) <= 2  # the other worker may have begun another
-        fit = inference.fit(simulate, prior, observed, budget=5, initial=5, bank=bank)
+        five = {"budget": 5, "initial": 5, "warn": False}
+        fit = inference.fit(simulate, prior, observed, bank=bank, **five)
     assert fit.failures == {}
 
 

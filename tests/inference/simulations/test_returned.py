@@ -9,7 +9,7 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from decimal import Decimal
 
-import dask.array
+import dask.array as chunked
 import numpy as np
 import pandas as pd
 import pytest
@@ -48,15 +48,15 @@ NUMBERS = {
     "labelled and masked": (xr.DataArray(MASKED, dims="time"), [1.0, np.nan]),
     "a list of labelled": ([xr.DataArray([1.0, np.nan], dims="time")], [[1.0, np.nan]]),
     "labelled chunks that are masked": (
-        xr.DataArray(dask.array.ma.masked_array([1.0, 1e36], [False, True])),
+        xr.DataArray(chunked.ma.masked_array([1.0, 1e36], [False, True])),
         [1.0, np.nan],
     ),
     "a list of chunks that are masked": (
-        [dask.array.ma.masked_array([1.0, 1e36], [False, True])],
+        [chunked.ma.masked_array([1.0, 1e36], [False, True])],
         [[1.0, np.nan]],
     ),
     "chunks that are masked": (
-        dask.array.ma.masked_array([1.0, 1e36], [False, True]),
+        chunked.ma.masked_array([1.0, 1e36], [False, True]),
         [1.0, np.nan],
     ),
     "labelled": (xr.DataArray([1.0, 2.0], dims="time"), [1.0, 2.0]),

@@ -179,7 +179,7 @@ def test_a_discrepancy_that_is_not_finite_says_so(prior, observed, simulate):
     def picky(observed, simulated):
         return np.inf if simulated[0] > 0.7 else float(np.sum((observed - simulated) ** 2))
 
-    fit = inference.fit(simulate, prior, observed, budget=7, discrepancy=picky)
+    fit = inference.fit(simulate, prior, observed, budget=7, discrepancy=picky, warn=False)
     failed = fit.history.signals[:, 0] > 0.7
     assert failed.any()
     assert fit.failures == {"not finite": failed.sum()}
