@@ -177,7 +177,7 @@ def _calibrate(
         raise InputError(
             f"another call has made its budget {now} meanwhile",
             where=str(run),
-            fix="nothing was written; go on with that budget and --resume",
+            fix="nothing was written; go on with that budget and `resume`",
         )
     write_tree(tree, run / POSTERIOR)
     CalibrationSummary.from_fit(tree, fit, stirring, check).write(run)

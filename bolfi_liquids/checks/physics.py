@@ -96,7 +96,7 @@ def check_physics(
     seed = checked_seed(seed)
     out = given_path(out, Argument("out"))
     if out.exists() and not out.is_dir():
-        raise InputError("not a directory", where=str(out), fix="choose another --out")
+        raise InputError("not a directory", where=str(out), fix="choose another `out`")
     (out / CASES).mkdir(parents=True, exist_ok=True)
 
     held = {case.name: read_record(out, case.name) for case in chosen}

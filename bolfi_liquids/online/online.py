@@ -112,7 +112,9 @@ class OnlineCalibration:
         with ExitStack() as alone:
             alone.enter_context(working_in(out))
             if (out / RUN_TOML).exists():
-                raise InputError("holds a run already", where=str(out), fix="choose another --out")
+                raise InputError(
+                    "holds a run already", where=str(out), fix="choose another directory"
+                )
             (out / LOG).unlink(missing_ok=True)
             with SimulationBank(bank) as kept:
                 make_pours(

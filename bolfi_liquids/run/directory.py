@@ -81,7 +81,7 @@ def enter_run(
     """
     path = run / RUN_TOML
     if run.exists() and not run.is_dir():
-        raise InputError("not a directory", where=str(run), fix="choose another --out")
+        raise InputError("not a directory", where=str(run), fix="choose another `out`")
     if path.exists():
         if not resume:
             raise _held(run)
@@ -96,7 +96,7 @@ def enter_run(
         raise InputError(
             f"holds {SIMULATIONS} without {RUN_TOML}",
             where=str(run),
-            fix="choose another --out; nothing was overwritten",
+            fix="choose another `out`; nothing was overwritten",
         )
     run.mkdir(parents=True, exist_ok=True)
     try:
@@ -110,7 +110,7 @@ def _held(run: Path) -> InputError:
     return InputError(
         "holds a run already",
         where=str(run),
-        fix="give --resume to go on with it, or another --out",
+        fix="give `resume` to go on with it, or another `out`",
     )
 
 
@@ -210,16 +210,16 @@ def _refused(
     field, (held, wanted) = next(iter(differing.items()))
     if field.startswith("inputs."):
         what = "is of other recordings"
-        fix = f"give those that {RUN_TOML} names under files, unchanged, or choose another --out"
+        fix = f"give those that {RUN_TOML} names under files, unchanged, or choose another `out`"
         return InputError(what, where=str(run), fix=fix)
     if field.startswith(("engine.", "simulator.")):  # settings and recordings are the same
         version = record.get("versions", {}).get(PROGRAM, "of the program")
         what = f"{field} was {held!r} and is {wanted!r} now"
-        fix = f"go on with version {version}, which made the run, or choose another --out"
+        fix = f"go on with version {version}, which made the run, or choose another `out`"
     else:
         what = f"{field} is {held!r} in the run, but {wanted!r} was asked"
         own = "the run's own value" + (" or a larger one" if field == growing else "")
-        fix = f"resume with {own}, or choose another --out"
+        fix = f"resume with {own}, or choose another `out`"
     return InputError(what, where=f"{run / RUN_TOML}", fix=fix)
 
 

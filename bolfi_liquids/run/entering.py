@@ -101,7 +101,7 @@ def _locked(directory: Path) -> int | None:
             directory.mkdir(parents=True, exist_ok=True)
         except (FileExistsError, FileNotFoundError, NotADirectoryError) as err:
             if any(map(_is_in_the_way, (directory, *directory.parents))):
-                fix = "choose another --out"
+                fix = "choose another `out`"
                 raise InputError("not a directory", where=str(directory), fix=fix) from err
             continue  # whoever made it, or its parent, has just removed it
         try:

@@ -217,11 +217,15 @@ def given_up(timeout, call, limit=None):
 
 def test_without_a_directory_a_run_is_among_the_temporary_files(short_recording, monkeypatch):
     found = []
-    monkeypatch.setattr(calibrating, "_calibrate", lambda run, *_: found.append(run))
+
+    def begun(run, *_):
+        found.append((run, (run / "run.toml").is_file()))
+
+    monkeypatch.setattr(calibrating, "_calibrate", begun)
     with pytest.raises(ValueError, match="not finished"):
         bl.calibrate(short_recording, progress=False)
-    (run,) = found
-    assert (run / "run.toml").is_file()
+    ((run, has_begun),) = found
+    assert has_begun
     assert str(run).startswith(tempfile.gettempdir())
     shutil.rmtree(run)
 

@@ -34,7 +34,7 @@ def test_a_run_is_not_overwritten(tmp_path):
     run = tmp_path / "a" / "run"
     enter_run(run, RECORD, resume=False)
     before = (run / RUN_TOML).read_bytes()
-    with pytest.raises(InputError, match="holds a run already.*--resume"):
+    with pytest.raises(InputError, match="holds a run already.*`resume`"):
         enter_run(run, RECORD, resume=False)
     assert (run / RUN_TOML).read_bytes() == before
 

@@ -112,7 +112,7 @@ def test_of_two_commands_that_start_together_exactly_one_enters(tmp_path, how, c
         if how != "resumed":
             assert read_run(run) == {"settings": {"seed": winner}}
         refusal = one or two
-        assert str(run) in refusal and "--resume" in refusal
+        assert str(run) in refusal and "resume" in refusal
         if how != "without locks":
             assert f"process {pid} on " in refusal and " since 20" in refusal
 
@@ -140,7 +140,7 @@ def test_what_a_killed_command_leaves_can_be_gone_on_with(tmp_path):
         os.kill(holder.pid, signal.SIGKILL)
         holder.wait()
     assert (run / LOCK).exists()  # it says who, and locks nobody out
-    with pytest.raises(InputError, match=r"holds a run already.*--resume"):
+    with pytest.raises(InputError, match=r"holds a run already.*`resume`"):
         with entered(run, record, resume=False):
             raise AssertionError("it was begun anew")
     with entered(run, record, resume=True) as removed:
