@@ -9,7 +9,6 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from decimal import Decimal
 
-import dask.array as chunked
 import numpy as np
 import pandas as pd
 import pytest
@@ -18,6 +17,7 @@ from bolfi_liquids.inference.arguments import Unusable, checked_integer, float64
 from bolfi_liquids.inference.simulations import Job, Keep, OneByOne, Simulation, jobs, run_missing
 from bolfi_liquids.inference.simulations.failures import Failure, kind
 from bolfi_liquids.inference.simulations.job import BATCH
+from dask.array.ma import masked_array as masked_chunks
 from distributed import LocalCluster
 
 from bolfi_liquids import inference
@@ -48,15 +48,15 @@ NUMBERS = {
     "labelled and masked": (xr.DataArray(MASKED, dims="time"), [1.0, np.nan]),
     "a list of labelled": ([xr.DataArray([1.0, np.nan], dims="time")], [[1.0, np.nan]]),
     "labelled chunks that are masked": (
-        xr.DataArray(chunked.ma.masked_array([1.0, 1e36], [False, True])),
+        xr.DataArray(masked_chunks([1.0, 1e36], [False, True])),
         [1.0, np.nan],
     ),
     "a list of chunks that are masked": (
-        [chunked.ma.masked_array([1.0, 1e36], [False, True])],
+        [masked_chunks([1.0, 1e36], [False, True])],
         [[1.0, np.nan]],
     ),
     "chunks that are masked": (
-        chunked.ma.masked_array([1.0, 1e36], [False, True]),
+        masked_chunks([1.0, 1e36], [False, True]),
         [1.0, np.nan],
     ),
     "labelled": (xr.DataArray([1.0, 2.0], dims="time"), [1.0, 2.0]),
