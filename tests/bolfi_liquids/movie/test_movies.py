@@ -269,7 +269,7 @@ def test_effects_are_read():
 def test_bad_liquids_are_named(field, value):
     fine = {"viscosity": 1.0, "cohesion": 0.2, "density": 1000.0, "particles": 300, "seed": 0}
     Described(**fine)
-    with pytest.raises(InputError, match=f"--{field}"):
+    with pytest.raises(InputError, match=f"^{field}"):
         Described(**{**fine, field: value})
 
 

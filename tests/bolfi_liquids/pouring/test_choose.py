@@ -187,7 +187,7 @@ def test_more_draws_than_there_are_is_said_in_the_setting_s_terms(calibration):
     ("setting", "value"), [("iterations", 2), ("draws", 0), ("risk", "median"), ("seed", -1)]
 )
 def test_bad_setting_is_named(calibration, setting, value):
-    with pytest.raises(ValueError, match=f"--{setting}: {value!r}"):
+    with pytest.raises(ValueError, match=f"^{setting}: {value!r}"):
         bl.choose_pour(calibration, progress=False, **{setting: value})
 
 
