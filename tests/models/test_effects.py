@@ -61,8 +61,7 @@ def pour(cups):
     return run
 
 
-# an effect in the liquid compiles a scene; the next test has one of all together, so that one of
-# each hook alone is enough for continuous integration
+# an effect in the liquid compiles a scene: one of each hook is enough for continuous integration
 IN_CI = ("adhesion", "shear_thinning")
 
 

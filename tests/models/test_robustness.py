@@ -26,13 +26,6 @@ FASTEST = {"stir": 2.0, "pour": 4.0}  # m/s; a fall over the cup's depth gains 1
 STEEPEST = np.radians(60.0)
 
 STARTS = range(0, POINTS, BATCH)
-# one batch in continuous integration: 25 points, which find with 72 % a fault of one point in
-# twenty; the long tests take all points, one in a hundred
-IN_CI = 0
-BATCHES = [
-    pytest.param(start, marks=pytest.mark.slow if start == IN_CI else pytest.mark.minutes)
-    for start in STARTS
-]
 
 
 class Points(NamedTuple):
@@ -204,7 +197,8 @@ def pour_faults(drawn, cups, ends):
         yield from ((k, what) for what, fine in checks.items() if not fine)
 
 
-@pytest.mark.parametrize("start", BATCHES)
+@pytest.mark.minutes
+@pytest.mark.parametrize("start", STARTS)
 def test_no_point_of_the_prior_box_goes_wrong(start, violent, cups, ends):
     drawn = points(start, cups)
     found = [("stir", *fault) for fault in stir_faults(drawn, violent, ends)]

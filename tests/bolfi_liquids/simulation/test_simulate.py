@@ -78,6 +78,7 @@ def test_a_simulated_stir_is_a_recording(tmp_path):
     assert read.number("liquid_density") == bundled_recording("glycerin").number("liquid_density")
 
 
+@pytest.mark.minutes
 def test_patterns_have_names_and_a_rig_may_be_another():
     star = bl.simulate_stir(path="star", particles=100, progress=False)
     expected = hardware.motion.star(
@@ -139,7 +140,7 @@ def test_a_stick_that_is_weighed_anew_replaces_what_the_recording_says(dataset, 
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"viscosity": -1.0}, "--viscosity: -1"),
+        ({"viscosity": -1.0}, "^viscosity: -1"),
         ({"density": [1000.0, 1200.0]}, "^density: "),
         ({"density": "1000"}, "^density: "),
         ({"rig": {"cup_raduis": 0.02}}, "rig: 'cup_raduis'.*cup_radius"),

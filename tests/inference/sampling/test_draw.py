@@ -316,9 +316,9 @@ def test_the_global_precision_stays(line_fit):
     ("options", "message"),
     [
         ({"sampler": "gibbs"}, "sampler must be one of"),
-        ({"chains": 1}, "chains >= 2"),
-        ({"draws": 1}, "draws >= 4"),
-        ({"extend": 0}, "extend >= 1"),
+        ({"chains": 1}, "chains must be an integer from 2"),
+        ({"draws": 1}, "draws must be an integer from 4"),
+        ({"extend": 0}, "extend must be an integer from 1"),
     ],
 )
 def test_bad_options_are_refused(line_fit, options, message):

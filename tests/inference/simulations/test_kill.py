@@ -130,23 +130,14 @@ def kill_in_the_middle(server, files, pool, finished, delay):
     assert server.wait() in (signal.SIGKILL, 0)  # 0 if this process was not given the time
 
 
-FEW = (13,)  # with processes, in the middle
-
-
-@pytest.mark.parametrize(
-    "moments",
-    [
-        pytest.param(FEW, id="few", marks=pytest.mark.slow),
-        pytest.param(range(BUDGET), id="all", marks=pytest.mark.minutes),
-    ],
-)
-def test_killed_at_any_moment(tmp_path, server, undisturbed, moments):
+@pytest.mark.minutes
+def test_killed_at_any_moment(tmp_path, server, undisturbed):
     """At a random moment after so many of 20 simulations; with threads and with processes.
 
     What was running, at most one per worker, is simulated again; nothing else is.
     """
     chance = np.random.default_rng()
-    for finished in moments:
+    for finished in range(BUDGET):
         pool = POOLS[finished % 2]
         delay = chance.uniform(0.0, 0.1 if finished else 1.0)
         case = f"{pool}, {finished} finished, {delay:.4f} s"

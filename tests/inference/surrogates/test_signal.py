@@ -39,8 +39,8 @@ def outputs(u, seeds=None):
 
 def learned(u, signals, observed, **options):
     learner = SignalFamily(**options).learner(observed)
-    features, discrepancy = learner.measure(signals)
-    return learner.learn(Learnable(u, features, discrepancy, NEITHER), ROWS, None)
+    measured = learner.measure(signals)
+    return learner.learn(Learnable(u, measured.features, measured.discrepancy, NEITHER), ROWS, None)
 
 
 def posterior(surrogate):
