@@ -5,9 +5,8 @@ Loads nothing but NumPy, for workers import it.
 
 import math
 from collections.abc import Callable, Mapping
-from numbers import Real
 from operator import index
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -164,8 +163,11 @@ def checked_number(name: str, value: object, fits: Callable[[float], bool], due:
     Raises:
         ValueError: no number, or out of range.
     """
-    real = isinstance(value, Real) and not isinstance(value, bool | np.bool_)
-    number = float(cast(Real, value)) if real else math.nan
+    try:
+        array = float64(math.nan if isinstance(value, bool | np.bool_) else value)
+    except Unusable:
+        array = np.array(math.nan)
+    number = float(array) if array.shape == () else math.nan
     if math.isnan(number) or not fits(number):
         raise ValueError(f"{name} must be {due}, got {value!r:.100}")
     return number

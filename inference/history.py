@@ -132,7 +132,9 @@ def laid_out(
         float64 [n, *shape], NaN where a run failed or its signal has another shape; and these
         signals by row.
     """
-    made = {i: s for i, s in enumerate(signals) if s is not None and not np.isnan(s).all()}
+    made = {
+        i: s for i, s in enumerate(signals) if s is not None and not (s.size and np.isnan(s).all())
+    }
     found = commonest([signal.shape for signal in made.values()])
     rows = np.full((len(signals), *(shape if found is None else found)), np.nan)
     for i, signal in made.items():

@@ -74,7 +74,7 @@ class ChosenPour:
         """
         if self.fit_is_bad and not despite_bad_fit:
             raise InputError(
-                "its pour was chosen over a bad fit, which nobody should trust an arm with",
+                "its pour was chosen over a bad fit, and an arm refuses it",
                 where=str(self.run),
                 fix="correct the recording, calibrate and choose again, or pour nevertheless: "
                 "--despite-bad-fit (despite_bad_fit=True)",

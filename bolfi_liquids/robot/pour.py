@@ -84,7 +84,7 @@ def _check_receiver(chosen: ChosenPour, rig: "Rig") -> None:
         check_receiver(rig, chosen.cups.receiver.radius)
     except ValueError as err:
         raise InputError(
-            str(err), where="rig.toml", fix="move the receiver away, and correct pouring.receiver"
+            str(err), where="pouring.receiver", fix="move the receiver away, and correct the rig"
         ) from err
 
 

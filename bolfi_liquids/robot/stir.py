@@ -53,13 +53,13 @@ def plan_stir(rig: "Rig", cycles: int | None = None) -> StirPlan:
     """
     from ..hardware import check_path
     from ..hardware.motion import insert, retract, strokes
-    from ..hardware.rig import checked_cycles
+    from ..hardware.rig import MAX_CYCLES, checked_cycles
 
     try:
         count = checked_cycles(rig.stirring.cycles if cycles is None else cycles)
     except ValueError as err:
-        fix = "give a whole number of them"
-        raise InputError(str(err), where=Argument("cycles"), fix=fix) from err
+        fix = f"give a whole number from 1 to {MAX_CYCLES}"
+        raise InputError(f"{cycles}", where=Argument("cycles"), fix=fix) from err
     stir = tuple(strokes(rig, count))
     plan = StirPlan(insert(rig), stir, retract(rig, stir[-1].pose[-1, :3]))
     joints = None

@@ -23,6 +23,8 @@ except ModuleNotFoundError:  # Windows: only new runs are protected, by run.toml
     fcntl = None
 
 LOCK = "run.lock"
+# no link is followed: what it leads to may be a file of somebody else
+LOCK_FLAGS = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
 LOCK_TRIES = 100  # each lost to a command that ended at this very moment
 NAME_SECONDS = 5.0  # that a command may take to write its name into the lock that it holds
 
@@ -69,8 +71,8 @@ def working_in_run(run: Path) -> Iterator[None]:
 def working_in(directory: Path) -> Iterator[None]:
     """Keep other commands out of a directory, which is made if it is missing.
 
-    The lock belongs to the process and ends with it, however it ends. Who holds it may not take it
-    again: one command calls another before or after, in no case within. A directory that was made
+    The lock belongs to the process and ends with it, however it ends. It is not re-entrant: one
+    command calls another before or after its own work, never within. A directory that was made
     here and is still empty afterwards is removed. On a disk without locks, and on Windows, only a
     new run is protected: its run.toml is made once.
 
@@ -101,15 +103,16 @@ def _locked(directory: Path) -> int | None:
             directory.mkdir(parents=True, exist_ok=True)
         except (FileExistsError, FileNotFoundError, NotADirectoryError) as err:
             if any(map(_is_in_the_way, (directory, *directory.parents))):
-                fix = "choose another `out`"
+                fix = "choose another directory"
                 raise InputError("not a directory", where=str(directory), fix=fix) from err
             continue  # whoever made it, or its parent, has just removed it
         try:
-            lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+            lock = os.open(path, LOCK_FLAGS, 0o666)
         except FileNotFoundError:
             continue  # whoever made the directory has just removed it
         except OSError as err:
-            if not isinstance(err, PermissionError) and err.errno != errno.EROFS:
+            refused = isinstance(err, PermissionError) or err.errno == errno.EROFS
+            if not refused or os.access(directory, os.W_OK):  # then the lock is another user's
                 raise
             return None
         try:
@@ -163,7 +166,8 @@ def _sign(lock: int, path: Path) -> None:
     """
     who = {"process": os.getpid(), "host": platform.node() or "an unnamed host"}
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    with suppress(PermissionError):  # it is another user's, left by a command that was killed
+    # it is another user's, left by a command that was killed; or disk or system have no modes
+    with suppress(OSError, AttributeError):
         os.fchmod(lock, 0o666)  # others of the group may work here next, whatever the umask
     try:
         os.ftruncate(lock, 0)

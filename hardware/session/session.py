@@ -231,12 +231,12 @@ class Session:
             self._end_all()
 
     def discard_unless_moved(self) -> None:
-        """Remove the directory of a session that is closed and in which no motion has begun.
+        """Remove the directory of a session that is closed and in which no motion was ordered.
 
         What failed before the first motion must not be in the way of the next try. A dry run, which
         never moves, calls this only if what it recorded is of no use.
         """
-        if self.phase is Phase.CLOSED and self._log is not None and not self._progress.began:
+        if self.phase is Phase.CLOSED and self._log is not None and not self._progress.ordered:
             discard_directory(self.directory)
 
     def _end_all(self) -> None:

@@ -9,6 +9,8 @@ from ..arguments import checked_array
 from ..surrogates.base import Acquisition
 from .rules import RULES, LowerConfidenceBound
 
+ROUNDING = 1e-7  # by which prior quantiles may exceed 0 to 1; they are clipped
+
 
 def resolve_acquisition(given: str | Acquisition | None, family: str, best: str) -> Acquisition:
     """The acquisition that a user means.
@@ -68,6 +70,6 @@ def chosen(u: object, shape: tuple[int, int]) -> np.ndarray:
             f"acquisition must return u of shape {shape}, prior quantiles of {shape[0]} points, "
             f"got {points.shape}"
         )
-    if not ((points >= 0.0) & (points <= 1.0)).all():  # NaN is neither
+    if not ((points >= -ROUNDING) & (points <= 1.0 + ROUNDING)).all():  # NaN is neither
         raise ValueError(f"acquisition must return prior quantiles from 0 to 1, got {points}")
     return points

@@ -223,7 +223,9 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         after=tuple(left),
         gaps=tried.gaps,
         suggestions=tuple(suggestions),
-        untested=(*untested, *_left_out(tried.candidates), *tried.unpredicted),
+        untested=tuple(
+            dict.fromkeys((*untested, *_left_out(tried.candidates), *tried.unpredicted))
+        ),
         noise=experiment.noise,
         units={name: one.unit for name, one in extensions.items()},
         tied=tuple(one.names for one in tied(tried.members)),

@@ -99,7 +99,7 @@ def evaluate(
     """
     values, errors = np.full(len(signals), np.nan), [""] * len(signals)
     for i, signal in enumerate(signals):
-        if signal is None or np.isnan(signal).all():
+        if signal is None or (signal.size and np.isnan(signal).all()):
             continue
         try:
             values[i] = _number(named, compare(observed.copy(), signal.copy()))

@@ -39,7 +39,7 @@ TYPED = {
     "check sbc": (["--noise", "-1", "--out", "r"], "--noise: -1.0;"),
     "check physics": (["--case", "none", "--out", "r"], "--case: no case"),
     "pour": (["r", "--iterations", "1"], "--iterations: 1;"),
-    "record": (["--cycles", "0", "--out", "r"], "--cycles: 0 "),
+    "record": (["--cycles", "0", "--out", "r"], "--cycles: 0;"),
 }
 
 

@@ -1,13 +1,14 @@
 """What may be poured by an arm, and what a person reads before it is."""
 
 import json
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
-from bolfi_liquids.hardware import RigError, bundled_rig
+from bolfi_liquids.hardware import MotionRejected, RigError, bundled_rig
 from typer.testing import CliRunner
 
 import bolfi_liquids as bl
@@ -97,10 +98,8 @@ def test_a_receiver_that_overlaps_the_stirred_cup_is_refused_with_its_own_radius
 
     with pytest.raises(InputError, match="stands in the stirred cup"):
         plan_pour(poured_run, beside(-0.001))
-    try:
+    with suppress(MotionRejected):  # so near, a pour leaves its box
         plan_pour(poured_run, beside(0.001))
-    except RigError as err:  # so near a pour leaves its box
-        assert "stands in the stirred cup" not in str(err)
 
 
 def test_a_summary_without_the_pour_is_refused(poured_run):

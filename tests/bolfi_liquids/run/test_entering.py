@@ -323,3 +323,14 @@ def test_seeds_are_those_that_every_generator_takes(settings):
     for seed in (-1, 2**31, 2**80, np.uint64(2**63), 1.0, "7", True, None):
         with pytest.raises(InputError, match="seed"):
             settings(seed=seed)
+
+
+def test_a_lock_that_is_a_link_is_not_followed(tmp_path):
+    other = tmp_path / "somebody's"
+    other.write_text("kept", encoding="utf-8")
+    run = tmp_path / "run"
+    run.mkdir()
+    (run / LOCK).symlink_to(other)
+    with pytest.raises(OSError, match="run.lock"), working_in(run):
+        pass
+    assert other.read_text(encoding="utf-8") == "kept"
