@@ -40,7 +40,6 @@ from .surrogates.outliers import sane
 from .surrogates.warnings import EmulatorWarning
 from .types import Theta
 
-ASKED_DIGITS, ASKED_EDGE = 7, 1e-7  # of the prior quantiles that are asked, and how near the bounds
 MIN_LEARN = 3  # successful simulations before the surrogate may choose
 MOST_SIMULATIONS = 8192  # of one run: the processes hold matrices of as many rows and columns
 
@@ -205,8 +204,6 @@ class Bolfi:
             believing = self._learned.believe(self.prior.to_unit(self.prior.to_dict(pending)))
             shape = n - len(parts), len(self.prior)
             u = chosen(in_float64(self._acquire)(key, believing, shape[0], runs), shape)
-            # coarser than rounding errors, so that arrays of another size ask the same
-            u = np.clip(np.round(u, ASKED_DIGITS), ASKED_EDGE, 1.0 - ASKED_EDGE)
             parts.append(self.prior.to_array(self.prior.from_unit(u)))
         return np.concatenate(parts)
 

@@ -179,7 +179,7 @@ def told_seeds(seeds: ArrayLike | None, n: int) -> np.ndarray:
 
 
 def told_errors(errors: Sequence[str] | None, n: int) -> np.ndarray:
-    """Why n runs failed as a user tells it, str [n]; "" where nothing is told.
+    """The errors of n runs that a user tells, str [n]; "" for each if none are told.
 
     Raises:
         ValueError: not n texts.

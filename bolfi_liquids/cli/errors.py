@@ -75,12 +75,12 @@ class OneLineErrors(TyperGroup):
 
     def _options(self, ctx: Any) -> dict[str, str]:
         """Options of the command that was typed, by the names of Python's arguments."""
-        command: Any = self
+        typed: Any = self
         for word in ctx.meta[GIVEN]:
-            command = getattr(command, "commands", {}).get(word, command)
+            typed = getattr(typed, "commands", {}).get(word, typed)
         return {
             parameter.name: parameter.opts[0]
-            for parameter in command.params
+            for parameter in typed.params
             if parameter.opts[0].startswith("--")
         }
 

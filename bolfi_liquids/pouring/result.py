@@ -197,14 +197,24 @@ class PourSummary(ActionSummary, Section):
     fit_status: FitStatus | None = None
 
     @classmethod
-    def from_pour(cls, pour: Pour, settings: PourSettings, **more) -> Self:
-        """From a pour and its settings; `more` are the fields that neither has."""
+    def from_pour(
+        cls,
+        pour: Pour,
+        settings: PourSettings,
+        *,
+        n_simulations: int,
+        least_viscosity: float,
+        fit_status: FitStatus,
+    ) -> Self:
+        """From a pour, its settings, and the fields that neither has."""
         return cls.of(
             pour.chosen,
             risk=settings.risk,
             seed=settings.seed,
             plug_in=ActionSummary.of(pour.plug_in),
-            **more,
+            n_simulations=n_simulations,
+            least_viscosity=least_viscosity,
+            fit_status=fit_status,
         )
 
 

@@ -9,7 +9,7 @@ from ..arguments import checked_array
 from ..surrogates.base import Acquisition
 from .rules import RULES, LowerConfidenceBound
 
-ROUNDING = 1e-7  # by which prior quantiles may exceed 0 to 1; they are clipped
+DIGITS, EDGE = 7, 1e-7  # of the prior quantiles that are asked, and how near the bounds
 
 
 def resolve_acquisition(given: str | Acquisition | None, family: str, best: str) -> Acquisition:
@@ -59,7 +59,9 @@ def _check_called(acquisition: Any) -> None:
 
 
 def chosen(u: object, shape: tuple[int, int]) -> np.ndarray:
-    """What an acquisition returned, as float64 [n, d].
+    """The points to ask for, prior quantiles float64 [n, d], from what an acquisition returned.
+
+    They are coarser than rounding errors, so that arrays of another size ask the same.
 
     Raises:
         ValueError: of another shape, or not prior quantiles.
@@ -70,6 +72,6 @@ def chosen(u: object, shape: tuple[int, int]) -> np.ndarray:
             f"acquisition must return u of shape {shape}, prior quantiles of {shape[0]} points, "
             f"got {points.shape}"
         )
-    if not ((points >= -ROUNDING) & (points <= 1.0 + ROUNDING)).all():  # NaN is neither
+    if not ((points >= -EDGE) & (points <= 1.0 + EDGE)).all():  # NaN is neither
         raise ValueError(f"acquisition must return prior quantiles from 0 to 1, got {points}")
-    return points
+    return np.clip(np.round(points, DIGITS), EDGE, 1.0 - EDGE)

@@ -9,6 +9,7 @@ from bolfi_liquids.inference.simulations.job import BATCH, simulation_seed
 from bolfi_liquids import inference
 
 BUDGET = 9
+SMALL = {"budget": BUDGET, "batch": 3, "vectorised": False}
 
 
 def spoilt(simulate, indices, how=lambda signal: signal[:29]):
@@ -39,9 +40,7 @@ def test_a_signal_of_another_shape_condemns_no_other(prior, observed, simulate, 
         spoilt(simulate, [first]),
         prior,
         observed,
-        budget=BUDGET,
-        batch=3,
-        vectorised=False,
+        **SMALL,
         in_rounds=in_rounds,
         discrepancy=of_means,
     )
@@ -74,9 +73,7 @@ def test_a_run_on_which_the_discrepancy_fails_costs_itself_and_is_named(
             spoilt(simulate, [0], how),
             prior,
             observed,
-            budget=BUDGET,
-            batch=3,
-            vectorised=False,
+            **SMALL,
             in_rounds=in_rounds,
             executor=pool if executor else None,
             discrepancy=lambda a, b: (

@@ -304,6 +304,18 @@ def test_a_camera_that_never_answers_does_not_keep_its_process(start, tmp_path):
     assert left["reason"] == "the camera does not answer"
 
 
+def write_that_failed(running, directory):
+    """The event of it, of a camera that goes on until it is ended."""
+    row = running.wait(lambda row: row.trouble and row.beat)
+    assert row.trouble == Trouble.WRITE_FAILED
+    later = running.wait(lambda later: later.count > row.count + 5)
+    assert later.beat > row.beat
+    running.end()
+    failed, left = read_events(directory)
+    assert (failed["kind"], left["kind"]) == ("write_failed", "left")
+    return failed
+
+
 @pytest.mark.parametrize("file", ["frames_xz.csv", "xz.mkv"])
 def test_a_file_that_may_not_grow_is_told_and_the_camera_goes_on(start, tmp_path, file):
     running = start(rendered())
@@ -311,13 +323,7 @@ def test_a_file_that_may_not_grow_is_told_and_the_camera_goes_on(start, tmp_path
     size = (tmp_path / file).stat().st_size + 50
     # the table's limit stops the video too, whichever of them is written first
     resource.prlimit(running.process.pid, resource.RLIMIT_FSIZE, (size, size))
-    row = running.wait(lambda row: row.trouble)
-    assert row.trouble == Trouble.WRITE_FAILED
-    later = running.wait(lambda later: later.count > row.count + 5)
-    assert later.beat > row.beat
-    running.end()
-    failed, left = read_events(tmp_path)
-    assert (failed["kind"], left["kind"]) == ("write_failed", "left")
+    failed = write_that_failed(running, tmp_path)
     assert failed["file"] in ("frames_xz.csv", "xz.mkv")
     assert len(frames(tmp_path)["index"]) >= 10
 
@@ -326,13 +332,7 @@ def test_a_file_that_may_not_grow_is_told_and_the_camera_goes_on(start, tmp_path
 def test_a_full_disk_is_told_and_the_camera_goes_on(start, tmp_path, file):
     (tmp_path / file).symlink_to("/dev/full")  # each write fails as on a full disk (ENOSPC)
     running = start(rendered())
-    row = running.wait(lambda row: row.trouble and row.beat)
-    assert row.trouble == Trouble.WRITE_FAILED
-    later = running.wait(lambda later: later.count > row.count + 5)
-    assert later.beat > row.beat
-    running.end()
-    failed, left = read_events(tmp_path)
-    assert (failed["kind"], left["kind"]) == ("write_failed", "left")
+    failed = write_that_failed(running, tmp_path)
     assert failed["reason"] == f"{file}: No space left on device (make room)"
 
 

@@ -272,9 +272,6 @@ def test_an_explanation_that_cannot_be_simulated_for_held_out_data_is_not_borne_
 # Which experiment next?
 
 
-# Which experiment next?
-
-
 def proposal(speed):
     return criticism.Proposal(
         partial(oscillate, speed=speed), NOISE, (60,), f"speed {speed}", f"speed {speed}"
