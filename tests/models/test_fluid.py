@@ -15,7 +15,7 @@ DENSITY = 1000.0
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("viscosity", [0.1, 1.0])
+@pytest.mark.parametrize("viscosity", [pytest.param(0.1, marks=pytest.mark.minutes), 1.0])
 def test_viscosity_damps_a_shear_wave_as_its_number_says(viscosity):
     """u_x = cos(k y) decays at the rate ν k², in a block that repeats along x and y.
 

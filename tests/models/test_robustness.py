@@ -252,8 +252,8 @@ ABSURD = {
     "explosion": (0.1, 0.0, {"hurls": 1.0}, faults.RUNAWAY),
     "implosion": (0.1, 0.0, {"heaps": 1.0}, faults.COLLAPSED),
 }
-# what compiles scenes of its own is slow; these three take longest
-LONG = ("explosion", "implosion", "rock")
+# what compiles scenes of its own is slow; these two take longest
+LONG = ("explosion", "rock")
 CASES = [
     pytest.param(
         n, marks=pytest.mark.minutes if n in LONG else [pytest.mark.slow] if ABSURD[n][2] else []

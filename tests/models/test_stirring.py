@@ -115,7 +115,7 @@ def test_a_submerged_stick_is_buoyed_as_archimedes_says(glycerin, numerics, tole
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("speed", [0.1, 0.8])
+@pytest.mark.parametrize("speed", [pytest.param(0.1, marks=pytest.mark.minutes), 0.8])
 def test_no_particle_is_ever_outside_the_cup(water, speed, monkeypatch):
     """Looked at after every other substep of the first strokes, also of a violent stir."""
     monkeypatch.setattr(runtime, "CHUNK", 2)

@@ -6,12 +6,9 @@ import pytest
 
 from bolfi_liquids.checks.physics import all_cases, check_physics
 
-# the cheapest that compare with a truth, about 10 s of processor time each, seed 0;
+# the cheapest that compares with a truth, about 10 s of processor time, seed 0;
 # `make test-long` runs the others, and `check physics` all
-IN_CI = (
-    "pendulum_in_air",
-    "recorded_stirs",
-)
+IN_CI = ("pendulum_in_air",)
 WORSE = 1.25  # times the error below that a missed comparison may have, on another computer
 
 RUB = "particles pass each other with friction, the more weight they bear"
