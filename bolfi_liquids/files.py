@@ -13,13 +13,26 @@ if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
 
+def as_path(given: object, where: str) -> Path:
+    """A path that a person gave.
+
+    Raises:
+        InputError: It is something else.
+    """
+    if not isinstance(given, str | os.PathLike):
+        raise InputError(
+            f"{given!r:.80} is no path", where=where, fix="give text or a pathlib.Path"
+        )
+    return Path(given)
+
+
 def existing_file(path: str | Path) -> Path:
     """`path`, which a person gave to be read.
 
     Raises:
         InputError: There is no such file, or it is a directory.
     """
-    path = Path(path)
+    path = as_path(path, "file")
     if not path.is_file():
         what = "a directory, not a file" if path.is_dir() else "no such file"
         raise InputError(what, where=str(path), fix="check the path")
@@ -34,12 +47,13 @@ def given_path(path: str | Path, where: str) -> Path:
         where: The option or argument.
 
     Raises:
-        InputError: It is empty, as a shell leaves a variable that is not set; "." says the
-            current directory.
+        InputError: It is no path, or empty, as a shell leaves a variable that is not set; "."
+            says the current directory.
     """
-    if not str(path).strip():
+    path, given = as_path(path, where), path
+    if not str(given).strip():
         raise InputError("is empty", where=where, fix="give a path; was a variable not set?")
-    return Path(path)
+    return path
 
 
 def new_netcdf(path: str | Path) -> Path:

@@ -51,8 +51,10 @@ def check_geometry(rig: Rig, where: str = "rig") -> Rig:
         where: Its file, for messages.
 
     Raises:
-        RigError: A tool points where it cannot, or the cup is not where `start` leads to.
+        RigError: A tool points where it cannot, the cup is not where `start` leads to, or the
+            stick may meet the cup before the tracking guard stops the arm.
     """
+    _check_tracking(rig, where)
     _check_stirring_tool(workspace(rig, "stirring"), where)
     _check_source_cup(rig, workspace(rig, "pouring"), where)
     _check_start(rig, workspace(rig, "stirring"), where)
@@ -68,6 +70,17 @@ def _check_stirring_tool(space: Workspace, where: str) -> None:
                 where=f"{where}: robot.stirring_orientation",
                 fix="correct it or the turn in robot.stirring_tcp: the stick hangs from it",
             )
+
+
+def _check_tracking(rig: Rig, where: str) -> None:
+    free = min(clearance(rig))
+    if rig.limits.tracking_error >= free:
+        raise RigError(
+            f"{1e3 * rig.limits.tracking_error:.1f} mm, and the stick has {1e3 * free:.1f} mm to "
+            "the cup (cup, stick and stirring)",
+            where=f"{where}: limits.tracking_error",
+            fix="give less, or stir farther from wall, floor and rim",
+        )
 
 
 def _check_source_cup(rig: Rig, space: Workspace, where: str) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..inputs.prior import read_prior
 from ..inputs.settings import CalibrationSettings
-from ..run.directory import POSTERIOR, read_run
+from ..run.directory import POSTERIOR, read_run, run_path
 from ..run.summary import read_summary
 from ..wording import command, html_table, with_unit
 from .bad_fit import bad_fit
@@ -74,7 +74,7 @@ class Calibration:
         """
         from .posterior_file import read_tree
 
-        run = Path(run)
+        run = run_path(run)
         record = read_run(run)
         if not is_calibrated(run):
             raise InputError(

@@ -2,7 +2,7 @@
 
 import logging
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -121,8 +121,18 @@ def criticise(  # noqa: PLR0913  the one call that most users make
 
 
 def _names(given: str | Sequence[str] | None) -> tuple[str, ...] | None:
-    """One name or several."""
-    return (given,) if isinstance(given, str) else None if given is None else tuple(given)
+    """One name or several.
+
+    Raises:
+        InputError: Something else was given.
+    """
+    if given is None or isinstance(given, str):
+        return None if given is None else (given,)
+    if not isinstance(given, Iterable) or not all(isinstance(one, str) for one in given):
+        raise InputError(
+            f"{given!r:.80}", where=Argument("effects"), fix="give names of effects, or none"
+        )
+    return tuple(given)
 
 
 def _find(

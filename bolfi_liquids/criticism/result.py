@@ -65,7 +65,7 @@ class Criticism:
         Raises:
             InputError: There is none in the directory, or not one whole of this version's form.
         """
-        run = Path(run)
+        run = run_path(run)
         if not is_criticised(run):
             raise InputError(
                 "the calibration in it was not criticised",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from ..errors import InputError
+from ..errors import Argument, InputError
 from ..numerals import parse_number
 from .settings import Particles, Seed, checked
 
@@ -122,15 +122,20 @@ def check_effects(effects: Mapping[str, float], scene: str) -> dict[str, float]:
     """Coefficients that can act in a scene, "stir" or "pour".
 
     Raises:
-        InputError: One is unknown, out of its range, or acts in the other scene only.
+        InputError: They are no numbers by name, or one is unknown, out of its range, or acts in
+            the other scene only.
     """
     from ..models import EFFECTS
 
+    if not isinstance(effects, Mapping):
+        raise InputError(
+            f"{effects!r:.80}", where=Argument("effects"), fix="give coefficients by name"
+        )
     for name, value in effects.items():
-        where = f"--effect {name}={value:g}"
+        where = f"--effect {name}={value}"
         if name not in EFFECTS:
             raise _unknown(where)
-        effect = EFFECTS[name]
+        value, effect = number_of(value, where), EFFECTS[name]
         if not effect.lowest <= value <= effect.highest:
             raise _out_of_range(name, value, where)
         if scene not in effect.scenes:

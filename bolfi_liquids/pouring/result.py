@@ -12,7 +12,7 @@ from ..calibration.posterior_file import read_tree
 from ..calibration.summary import FitStatus
 from ..errors import InputError
 from ..inputs.settings import PourSettings
-from ..run.directory import POUR
+from ..run.directory import POUR, run_path
 from ..run.summary import Number, Section
 from ..wording import command, html_table, percent
 from .spillage import ACTION, FRACTIONS
@@ -95,7 +95,7 @@ class Pour:
         Raises:
             InputError: There is none in the directory, or its file is damaged.
         """
-        run = Path(run)
+        run = run_path(run)
         check_poured(run)
         tree = read_pour(run)
         return cls(run, *(judged(tree, name) for name in ("chosen", "plug_in")))

@@ -61,7 +61,7 @@ def plan_pour(run: str | Path, rig: "Rig") -> PourPlan:
     from ..hardware import check_path
     from ..hardware.motion import pour_path, ready_to_pour
 
-    chosen = chosen_pour(Path(run))
+    chosen = chosen_pour(run_path(run))
     _check_receiver(chosen, rig)
     action, turn = chosen.judged, chosen.cups.pour
     place = {"distance": action.distance, "lip_height": turn.lip_height}

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import tomli_w
 
-from ..errors import InputError
-from ..files import write_new_text, write_text
+from ..errors import Argument, InputError
+from ..files import as_path, write_new_text, write_text
 from .formats import upgraded
 from .summary import SUMMARY_FILE as SUMMARY
 
@@ -43,8 +43,12 @@ Run = str | Path | HasRun
 
 
 def run_path(run: Run) -> Path:
-    """The directory itself."""
-    return Path(run) if isinstance(run, str | Path) else run.path
+    """The directory itself.
+
+    Raises:
+        InputError: It is neither a directory's path nor a result.
+    """
+    return as_path(getattr(run, "path", run), Argument("run"))
 
 
 MUST_AGREE = ("settings", "inputs", "simulator", "engine")

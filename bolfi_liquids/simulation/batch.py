@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError
+from ..errors import Argument, InputError
+from ..inference.arguments import checked_array
 from ..inputs.described_liquid import Described
 from ..progress import Simulate
 from ..run.time_limit import TimeLimited
@@ -68,7 +69,7 @@ def batch_of(
     Raises:
         InputError: A value cannot be used, or arrays differ in length.
     """
-    values = {**liquid, "seed": seed}
+    values = {name: _numbers(name, value) for name, value in liquid.items()} | {"seed": seed}
     try:
         columns = dict(zip(values, np.broadcast_arrays(*values.values()), strict=True))
     except ValueError as err:
@@ -94,6 +95,18 @@ def batch_of(
     if not liquids:
         raise InputError("no simulation", where="simulate", fix="give at least one value")
     return Batch(liquids, columns["seed"].ndim == 0)
+
+
+def _numbers(name: str, value: ArrayLike) -> NDArray:
+    """Raises:
+    InputError: They are complex, text, or of no one shape.
+    """
+    try:
+        return checked_array(name, value)
+    except ValueError as err:
+        raise InputError(
+            f"{value!r:.80}", where=Argument(name), fix="give a number, or an array of them"
+        ) from err
 
 
 @dataclass(frozen=True)

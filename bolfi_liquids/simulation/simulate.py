@@ -133,9 +133,11 @@ def _with_rig(attrs: Mapping[str, float | str], rig: Mapping[str, float]) -> dic
     """A recording's attributes with those of a rig in their place.
 
     Raises:
-        InputError: A name is none of `RIG_SIZES`, a value is no positive number, or the stick's
-            mass and density are both given.
+        InputError: They are no sizes by name, a name is none of `RIG_SIZES`, a value is no positive
+            number, or the stick's mass and density are both given.
     """
+    if not isinstance(rig, Mapping):
+        raise InputError(f"{rig!r:.80}", where=Argument("rig"), fix="give sizes by name")
     for name, value in rig.items():
         if name not in RIG_SIZES:
             fix = f"give some of {', '.join(RIG_SIZES)}"
@@ -156,14 +158,16 @@ def _planned(recording: Recording, path: str | TimedPath | None) -> Recording:
     if path is None:
         return recording
     patterns = {"star": star, "circle": circle}
-    if not isinstance(path, str):
-        name, timed = "path", path
-    elif path in patterns:
+    if isinstance(path, str) and path in patterns:
         height = float(recording.gripper.position[0, 2])
         name, timed = path, patterns[path](speed=PATTERN_SPEED, height=height)
+    elif hasattr(path, "time") and hasattr(path, "position"):
+        name, timed = "path", path
     else:
         raise InputError(
-            f"{path!r}", where="path", fix="give star, circle, or what hardware.motion.star returns"
+            f"{path!r:.80}",
+            where=Argument("path"),
+            fix="give star, circle, or what hardware.motion.star returns",
         )
     gripper = Trajectory(np.asarray(timed.time, np.float64), np.asarray(timed.position, np.float64))
     unseen = np.full((len(gripper.time), 2), np.nan)

@@ -16,8 +16,7 @@ from ..errors import RigError
 from ..rig import Rig, View
 from ..rig_numbers import RECORDED
 from ..vision.camera_model import CameraModel, as_fields, from_fields
-from .disk import FULL
-from .events import EVENTS, drop_reserve, make_reserve, read_events
+from .events import EVENTS, FULL, drop_reserve, make_reserve, read_events
 from .names import frames_file, truth_file, video_file
 from .sample import SAMPLES
 from .views import camera_model

@@ -1,14 +1,11 @@
 """A process's dealings with a disk that may get full: it stops writing and goes on living."""
 
-import errno
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
 from ..board import Trouble, host_time
-from .events import EventLog
-
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # how a disk says that there is no room
+from .events import FULL, EventLog
 
 
 class Disk:

@@ -12,7 +12,7 @@ EVENTS = "events.jsonl"
 RESERVE = ".reserve"  # given up when the disk is full, so that the reason can still be written
 RESERVE_FILES = 16  # one for each event: what is free, the other writers take at once
 RESERVE_BYTES = 16_384  # of each
-_NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # how a disk says that there is no room
 
 
 class EventLog:
@@ -40,7 +40,7 @@ class EventLog:
                 if os.write(self._file, line) == len(line):
                     return
             except OSError as err:
-                if err.errno not in _NO_SPACE or not _give_up_reserve(self._directory):
+                if err.errno not in FULL or not _give_up_reserve(self._directory):
                     raise
             else:  # the disk got full within the line: end it, and write it again
                 line = b"\n" + line.removeprefix(b"\n")

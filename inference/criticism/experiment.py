@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arguments import check_function, check_kind, check_text, checked_array
+from ..arguments import check_function, check_kind, check_text, checked_array, checked_integer
 from ..types import Simulator
 from .measurement_noise import Noise
 from .misfit import Window
@@ -40,11 +40,7 @@ class Experiment:
         if not np.isfinite(observed).any():
             raise ValueError(f"{self.label}: observed must have a finite value, got none")
         check_text("identity", self.identity)
-        if not (hasattr(self.noise, "covariance") and hasattr(self.noise, "draw")):
-            raise ValueError(
-                f"{self.label}: noise must be a Noise, such as KnownNoise(0.01), got "
-                f"{self.noise!r:.100}"
-            )
+        _check_noise(self.label, self.noise)
         check_kind("windows", self.windows, list | tuple)
         for window in self.windows:
             check_kind("each of windows", window, Window)
@@ -69,6 +65,9 @@ class Proposal:
         simulate, noise, identity: As of an `Experiment`.
         shape: Of its output.
         label: What to do, for a person.
+
+    Raises:
+        ValueError: a field is of another kind.
     """
 
     simulate: Simulator
@@ -76,3 +75,17 @@ class Proposal:
     shape: tuple[int, ...]
     identity: str = ""
     label: str = "experiment"
+
+    def __post_init__(self) -> None:
+        check_function("simulate", self.simulate)
+        _check_noise(self.label, self.noise)
+        check_kind("shape", self.shape, tuple)
+        for length in self.shape:
+            checked_integer("each of shape", length)
+
+
+def _check_noise(label: str, noise: object) -> None:
+    if not (hasattr(noise, "covariance") and hasattr(noise, "draw")):
+        raise ValueError(
+            f"{label}: noise must be a Noise, such as KnownNoise(0.01), got {noise!r:.100}"
+        )

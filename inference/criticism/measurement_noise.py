@@ -5,6 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
+from ..arguments import checked_array
 from ..surrogates.measurement_noise import Layout, Nodes, correlated
 
 CORRELATIONS = np.linspace(0.0, 0.97, 40)  # of neighbouring samples
@@ -29,9 +30,17 @@ class KnownNoise:
 
     Attributes:
         sd: In the output's unit: a number, or one for each sample.
+
+    Raises:
+        ValueError: `sd` is not finite, or negative.
     """
 
     sd: float | np.ndarray
+
+    def __post_init__(self) -> None:
+        sd = checked_array("sd", self.sd)
+        if not (np.isfinite(sd).all() and (sd >= 0.0).all()):
+            raise ValueError(f"sd must be finite and not negative, got {self.sd!r:.100}")
 
     def covariance(self, at: Layout) -> np.ndarray:
         return np.diag(np.broadcast_to(np.asarray(self.sd, float) ** 2, at.channel.shape))

@@ -86,8 +86,9 @@ def test_a_start_is_accepted_up_to_the_rig_s_own_clearance(controller, side):
 
 
 def test_a_narrow_rig_needs_a_nearer_start_and_a_wide_one_none_further_than_a_cup():
-    narrow = started(changed(BUNDLED, stirring={"radius": 0.0345}), (0.003, 0.0, 0.0))
-    assert clearance(narrow).aside == pytest.approx(0.001)
+    close = changed(BUNDLED, stirring={"radius": 0.034}, limits={"tracking_error": 0.001})
+    narrow = started(close, (0.003, 0.0, 0.0))
+    assert clearance(narrow).aside == pytest.approx(0.0015)
     assert refused(narrow) and not refused(started(narrow))
     wide = changed(BUNDLED, cup={"radius": 0.12})
     assert clearance(wide).aside > MAX_START_AWAY
@@ -98,3 +99,16 @@ def test_a_narrow_rig_needs_a_nearer_start_and_a_wide_one_none_further_than_a_cu
 def test_the_bundled_start_is_that_of_its_controller():
     assert not refused(BUNDLED)
     assert refused(changed(BUNDLED, robot={"controller": "e-series"}))
+
+
+@pytest.mark.parametrize("part", [0.95, 1.05])
+def test_tracking_is_guarded_within_the_clearance(part):
+    """Before an arm that is held, or lags, lets the stick meet the cup, it must stop."""
+    limit = part * min(clearance(BUNDLED))
+    rig = changed(BUNDLED, limits={"tracking_error": limit})
+    if part < 1.0:
+        assert checked_rig(rig).limits.tracking_error == limit
+    else:
+        with pytest.raises(RigError) as told:
+            checked_rig(rig)
+        assert told.value.where == "rig: limits.tracking_error"

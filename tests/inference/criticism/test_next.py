@@ -33,3 +33,20 @@ def test_the_ratio_is_found_whatever_part_of_the_noise_the_runs_have(ratio, own)
 
 def test_explanations_that_are_the_same_are_not_told_apart():
     assert np.median(found(0.0, 0.6)) < 3.0
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda: criticism.KnownNoise("x"),
+        lambda: criticism.KnownNoise(-0.1),
+        lambda: criticism.KnownNoise(np.array([0.1, np.nan])),
+        lambda: criticism.Proposal(3, criticism.KnownNoise(0.1), (3,)),
+        lambda: criticism.Proposal(len, 3, (3,)),
+        lambda: criticism.Proposal(len, criticism.KnownNoise(0.1), 3),
+        lambda: criticism.Proposal(len, criticism.KnownNoise(0.1), (0,)),
+    ],
+)
+def test_what_is_no_proposal_is_refused(wrong):
+    with pytest.raises(ValueError):
+        wrong()
