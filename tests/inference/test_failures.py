@@ -110,6 +110,7 @@ def test_signals_of_wrong_shape_are_refused_and_not_stored(prior, observed, simu
         assert inference.fit(simulate, prior, observed, budget=7, bank=bank).failures == {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("failing", "warned"), [(3, False), (4, True)])
 def test_a_fit_of_fewer_runs_than_the_surrogate_needs_warns(
     prior, observed, simulate, failing, warned
@@ -202,6 +203,7 @@ def test_what_an_acquisition_returns_is_checked(prior, observed, simulate, retur
         engine.ask(2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1e-300, 1e150, 1e160])
 @pytest.mark.parametrize("surrogate", ["signal", "discrepancy"])
 def test_outputs_of_any_size_are_learned_from_or_told(prior, observed, simulate, surrogate, scale):

@@ -112,6 +112,7 @@ def test_a_discrepancy_that_fails_on_all_of_the_first_runs_ends_the_fit(
         )
 
 
+@pytest.mark.slow
 def test_a_summary_may_take_any_shape_and_fail_on_one_run(prior, observed, simulate):
     def summary(signal):
         if len(signal) == 3:
@@ -148,6 +149,7 @@ def test_what_is_learned_does_not_depend_on_the_order_of_shapes(prior, observed,
         np.testing.assert_array_equal(engine.fit().history.signal(i), signals[i])
 
 
+@pytest.mark.slow
 def test_a_user_s_function_may_write_into_what_it_is_given(prior, observed, simulate):
     def greedy(observed, simulated):
         simulated -= observed

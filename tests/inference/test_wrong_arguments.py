@@ -17,10 +17,13 @@ from bolfi_liquids.inference.simulations import Simulation
 
 from bolfi_liquids import inference
 
-pytestmark = pytest.mark.filterwarnings(
-    "ignore::bolfi_liquids.inference.EmulatorWarning",
-    "ignore::bolfi_liquids.inference.SamplingWarning",
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.filterwarnings(
+        "ignore::bolfi_liquids.inference.EmulatorWarning",
+        "ignore::bolfi_liquids.inference.SamplingWarning",
+    ),
+]
 matplotlib.use("agg")
 
 MADE_BY_THE_ENGINE = {"Fit", "Regression"}  # whose constructors are not for users

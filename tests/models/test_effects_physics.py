@@ -90,6 +90,7 @@ def test_mass_matters_only_against_the_liquids(setup, short):
     np.testing.assert_allclose(one, other, atol=1e-4 * np.abs(one).max())
 
 
+@pytest.mark.slow
 def test_a_scaled_gripper_runs_the_scaled_path(setup, short):
     scaled = SimpleNamespace(time=short.time, position=short.position * [0.5, 0.5, 1.0])
     liquid = models.Liquid(0.1, 0.3, 1000.0)

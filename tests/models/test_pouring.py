@@ -65,6 +65,7 @@ def test_a_tilt_short_of_the_surface_spills_nothing(cups):
     assert result.retained == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_walls_hold_a_viscous_liquid_back(cups):
     """Free slip lets it go; walls that rub keep a film (the paper's glycerin). What is much
     thicker slips: the gel's plug leaves the cup, as it does in the other solver."""

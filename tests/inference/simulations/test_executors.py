@@ -151,6 +151,7 @@ def test_in_flight_no_executor_has_the_bits_of_one(prior, observed, simulate, by
     assert_same(inference.fit(simulate, prior, observed, **options(None)), by_hand)
 
 
+@pytest.mark.slow
 def test_progress_is_told_of_every_simulation(prior, observed, simulate):
     told = []
     inference.fit(simulate, prior, observed, budget=7, initial=5, batch=2, progress=told.append)
@@ -179,6 +180,7 @@ def test_keeps_batch_in_flight_and_no_more(prior, observed, simulate):
     assert most[0] == 3
 
 
+@pytest.mark.slow
 def test_a_dead_worker_is_explained_and_the_rest_is_kept(
     tmp_path, prior, observed, by_hand, worker_side
 ):
