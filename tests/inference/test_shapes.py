@@ -131,6 +131,7 @@ def test_a_summary_may_take_any_shape_and_fail_on_one_run(prior, observed, simul
     assert "too short" in str(fit.simulations["error"][0].item())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [1, -1])
 def test_what_is_learned_does_not_depend_on_the_order_of_shapes(prior, observed, simulate, order):
     engine = inference.Bolfi(prior, observed, discrepancy=of_means)

@@ -149,6 +149,7 @@ def dies(progress, seed):
     os._exit(1)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("importable")
 def test_cases_that_an_executor_runs_are_recorded_alike(tmp_path):
     registry = {"good": fake("good", fine), "bad": fake("bad", off)}

@@ -60,6 +60,7 @@ def test_its_search_is_that_of_the_base(extended):
     assert extended.plot_search(figure.subplots(3, 1, squeeze=False)).shape == (3, 1)
 
 
+@pytest.mark.slow
 def test_an_effect_that_was_accepted_is_judged_by_the_fit_that_it_leaves(criticised):
     calibration = bl.Calibration.open(criticised)
     replace(calibration.summary, fit_rms_deg=2.0, noise_deg=0.2).write(criticised)

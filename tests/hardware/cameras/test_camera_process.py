@@ -157,6 +157,7 @@ def test_a_killed_camera_process_loses_less_than_a_second(start, tmp_path):
 
 
 @keeps_time
+@pytest.mark.slow
 def test_a_short_delay_loses_no_picture_and_a_long_one_is_counted(start, tmp_path):
     running = start(rendered())
     row = running.wait(lambda row: row.count >= 10)
@@ -211,6 +212,7 @@ def test_a_missing_encoder_names_its_extra(tmp_path, monkeypatch):
 
 
 @keeps_time
+@pytest.mark.slow
 def test_the_same_picture_again_looks_dead_and_is_recorded(start, tmp_path):
     stop = host_time() + 2.0
     time_ = np.arange(stop - 10.0, stop + 20.0, 0.01)
@@ -247,6 +249,7 @@ class StandingClock:
         self._camera.close()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("importable")
 def test_a_clock_that_stands_still_after_the_start_is_told(start, tmp_path):
     running = start(partial(StandingClock, rendered(), 30))
@@ -292,6 +295,7 @@ def test_pictures_of_another_size_are_told(start, tmp_path):
 
 
 @keeps_time
+@pytest.mark.slow
 def test_a_camera_that_never_answers_does_not_keep_its_process(start, tmp_path):
     running = start(rendered(timing=Timing(latency=100.0)))
     deadline = time.monotonic() + 10

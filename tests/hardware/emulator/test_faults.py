@@ -190,6 +190,7 @@ def test_impossible_motions_are_protective_stops(emulator, command):
         assert rests_within(emulator.admin, 5.0)
 
 
+@pytest.mark.slow
 @pytest.mark.punctual
 def test_receiver_sees_a_freeze_and_a_drop_as_the_client_s_source_says(emulator):
     rtde_receive = pytest.importorskip("rtde_receive")

@@ -74,6 +74,7 @@ def test_the_calibrated_lens_maps_the_picture_like_the_true_one(pictures):
     assert np.abs(apart).max() < 1.5
 
 
+@pytest.mark.slow
 def test_a_board_of_the_older_pattern_is_read_and_told():
     """Most boards that were printed before 2022, of an even number of rows."""
     older = dataclasses.replace(BOARD, legacy=True)
