@@ -161,7 +161,7 @@ def _planned(recording: Recording, path: str | TimedPath | None) -> Recording:
     if isinstance(path, str) and path in patterns:
         height = float(recording.gripper.position[0, 2])
         name, timed = path, patterns[path](speed=PATTERN_SPEED, height=height)
-    elif hasattr(path, "time") and hasattr(path, "position"):
+    elif not isinstance(path, str) and hasattr(path, "time") and hasattr(path, "position"):
         name, timed = "path", path
     else:
         raise InputError(
