@@ -14,11 +14,13 @@ from .motion.cup_frame import cup_frame
 from .motion.kinematics import forward, inverse
 from .motion.poses import rotation_matrix
 from .motion.stir_paths import above_cup
-from .rig import Rig
+from .rig import Camera, Rig
 from .safety.limits import MAX_TILT, Workspace, workspace
 
 LEVEL_TILT = np.radians(20.0)  # of a gripper that holds a source cup, from level
 LIP_AWAY = 0.005  # m, of a source's lip from the gripper's axis, above it and towards the receiver
+MAX_MARKER_AWAY = 0.15  # m, of a marker on the gripper from the stick's pivot
+MAX_VIEW = np.radians(45.0)  # from a picture's middle to its corner, where the lens is measured
 MAX_START_AWAY = 0.04  # m, of the pivot at `start` from its place above the cup; a cup is as wide
 
 
@@ -51,9 +53,11 @@ def check_geometry(rig: Rig, where: str = "rig") -> Rig:
         where: Its file, for messages.
 
     Raises:
-        RigError: A tool points where it cannot, the cup is not where `start` leads to, or the
-            stick may meet the cup before the tracking guard stops the arm.
+        RigError: A tool points where it cannot, the cup is not where `start` leads to, the stick
+            may meet the cup before the tracking guard stops the arm, or a camera does not see it.
     """
+    for number, camera in enumerate(rig.cameras):
+        _check_camera(rig, camera, f"{where}: cameras.{number}")
     _check_tracking(rig, where)
     _check_stirring_tool(workspace(rig, "stirring"), where)
     _check_source_cup(rig, workspace(rig, "pouring"), where)
@@ -80,6 +84,34 @@ def _check_tracking(rig: Rig, where: str) -> None:
             "the cup (cup, stick and stirring)",
             where=f"{where}: limits.tracking_error",
             fix="give less, or stir farther from wall, floor and rim",
+        )
+
+
+def _check_camera(rig: Rig, camera: Camera, where: str) -> None:
+    position, pivot = np.array(camera.position), np.array([0.0, 0.0, rig.stirring.height])
+    if np.hypot(*position[:2]) <= rig.cup.radius or position[2] <= 0.0:
+        raise RigError(
+            f"{list(camera.position)} m is above the cup or below its floor",
+            where=f"{where}.position",
+            fix="measure it again, in the cup's frame: from the centre of its floor, z upwards",
+        )
+    if (away := float(np.linalg.norm(camera.marker))) > MAX_MARKER_AWAY:
+        raise RigError(
+            f"{list(camera.marker)} m is {away:.2f} m from the stick's pivot",
+            where=f"{where}.marker",
+            fix=f"measure it again, from the pivot: {MAX_MARKER_AWAY} m at the most",
+        )
+    ahead, there = np.subtract(camera.target, position), pivot - position
+    angle = _angle(ahead / np.linalg.norm(ahead), there / np.linalg.norm(there))
+    view = MAX_VIEW
+    if camera.focal_length is not None:
+        view = float(np.arctan(np.hypot(camera.width, camera.height) / 2.0 / camera.focal_length))
+    if angle > view:
+        raise RigError(
+            f"the stick's pivot is {np.degrees(angle):.0f} deg from the middle of the picture, "
+            f"which reaches {np.degrees(view):.0f} deg",
+            where=f"{where}.target",
+            fix="correct it, position or stirring.height: the camera must see the stick",
         )
 
 

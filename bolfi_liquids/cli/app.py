@@ -31,6 +31,7 @@ from .options import (
     RunArgument,
 )
 from .printed import (
+    after_calibration,
     complaints_among_results,
     print_findings,
     print_next,
@@ -112,7 +113,7 @@ def calibrate(
         )
     print_section(out, "calibrate")
     print_warnings(out)
-    print_next(out, "criticise", "pour")
+    print_next(out, *after_calibration(out))
 
 
 @app.command(

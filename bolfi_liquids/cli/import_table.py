@@ -29,6 +29,7 @@ def import_table(
 
     First write a template; change it to say what stands where in your table; then import.
     """
+    from ..files import existing_file
     from ..inputs.table_import import import_table as run_import
     from ..inputs.table_import import outline, write_template
 
@@ -39,6 +40,7 @@ def import_table(
         return
     if table is None or columns is None:
         raise typer.BadParameter("give TABLE and --columns FILE, or --template FILE")
+    table = existing_file(table)
     recording = run_import(table, columns, table.with_suffix(".nc") if out is None else out)
     typer.echo(outline(recording))
     typer.echo(f"next: {command('calibrate', recording.path, '--out', 'RUN')}")

@@ -29,6 +29,15 @@ def print_next(run: Path, *commands: str) -> None:
     typer.echo("next: " + " or: ".join(command(one, run) for one in commands))
 
 
+def after_calibration(run: Path) -> tuple[str, ...]:
+    """The commands that may follow: `pour` refuses a bad fit."""
+    from ..calibration.result import Calibration
+    from ..calibration.summary import FitStatus
+
+    fit_is_bad = Calibration.open(run).summary.fit_status == FitStatus.BAD
+    return ("criticise", "report") if fit_is_bad else ("criticise", "pour")
+
+
 def print_section(run: Path, name: str) -> None:
     """Section "calibrate" or "pour" of a run's summary."""
     from rich.console import Console

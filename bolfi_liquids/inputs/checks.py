@@ -28,7 +28,7 @@ SIZE_LIMITS = {
 """Of cups and sticks that are stirred by hand or arm [m]; more looks like cm or mm."""
 MAX_MASS = 2.0  # of the stick [kg]; more looks like grams
 MAX_STICK_DENSITY = 25_000.0  # [kg/m3]; no stick is denser
-MAX_SPEED = 5.0  # of the gripper [m/s]; more looks like a time in other units
+MAX_SPEED = 1.0  # of the gripper [m/s]; more looks like a time in other units
 MIN_TRAVEL = 1e-3  # of the gripper [m]; a liquid that is not stirred shows nothing
 MIN_DENSITY, MAX_DENSITY = 50.0, 20_000.0  # [kg/m3]; less looks like g/cm3
 

@@ -119,20 +119,21 @@ def frame_faults(recording: Recording) -> Iterator[str]:
     xz, yz = PLANES
     quarters = round(turn.angle_deg / 90.0)
     quarter = quarters % 4 if abs(turn.angle_deg - 90.0 * quarters) <= MAX_TURN_DEG else None
-    ahead = "the stick leans ahead of the gripper; is its sign (`flip`) or that of"
+    ahead = "the stick leans ahead of the gripper: its sign (`flip`) is wrong, or that of"
     if not turn.mirrored and quarter == 2:
-        yield f"{xz}: {ahead} x right? The same holds for {yz} and y (or yaw_deg = 180)"
+        yield f"{xz}: {ahead} x; the same holds for {yz} and y (or add 180 to `yaw_deg`)"
     elif not turn.mirrored:
         yield (
-            f"the inclination is turned by {turn} against x and y: correct the axes, or give "
-            f"`yaw_deg = {_whole(turn.angle_deg)}` in the map of `bolfi-liquids import`"
+            f"the inclination is turned by {turn} against x and y: correct the axes, or add "
+            f"{_whole(turn.angle_deg)} to `yaw_deg` in the map of `bolfi-liquids import`, where "
+            "none is 0"
         )
     elif quarter == 0:
-        yield f"{yz}: {ahead} y right?"
+        yield f"{yz}: {ahead} y"
     elif quarter == 2:
-        yield f"{xz}: {ahead} x right?"
+        yield f"{xz}: {ahead} x"
     elif quarter is not None:
-        yield f"{xz}: the stick follows y more than x; are the planes exchanged?"
+        yield f"{xz}: the stick follows y more than x: the planes are exchanged"
     else:
         yield (
             "x and y, or the planes, form a mirrored frame, which is turned as well "

@@ -24,6 +24,10 @@ MAX_BEYOND_SHARE = 0.02
 """Of samples in which the stick may lean further than the cup lets it: mistakes of a camera."""
 RIM_MARGIN = np.radians(10.0)
 """Beyond the angle at which the stick lies on the cup's rim [rad]."""
+MIN_FAST = 0.03
+"""Speed of the gripper from which every stick leans visibly [m/s]."""
+MIN_LEAN = np.radians(0.3)
+"""That it leans then, at the least [rad]: the start of such a stroke alone inclines it by more."""
 UPWARD = np.radians([150.0, 210.0])
 """Inclination of a stick that hangs, counted from the upward vertical [rad]."""
 
@@ -36,6 +40,7 @@ def check_inclination_values(recording: Recording) -> None:
         _check_frozen(recording, values, where)
         _check_noise(values, where)
         _check_rim(recording, values, where)
+    _check_small(recording)
 
 
 def _check_unit(values: NDArray, where: str) -> None:
@@ -55,6 +60,24 @@ def _check_unit(values: NDArray, where: str) -> None:
             where=where,
             fix="convert the inclination to rad",
         )
+
+
+def _check_small(recording: Recording) -> None:
+    """Refuse a stick that stays upright behind a gripper that is fast."""
+    seen = recording.inclination[np.isfinite(recording.inclination).all(axis=1)]
+    known = np.isfinite(recording.gripper.position).all(axis=1)
+    way, time = recording.gripper.position[known], recording.time[known]
+    speed = np.linalg.norm(np.diff(way, axis=0), axis=1) / np.diff(time)
+    fast = float(np.quantile(speed, 0.9)) if len(speed) else 0.0
+    lean = float(np.quantile(np.abs(seen - np.median(seen, axis=0)), 0.99)) if len(seen) else 0.0
+    if fast < MIN_FAST or lean >= MIN_LEAN:
+        return
+    raise InputError(
+        f"{PLANES[0]} and {PLANES[1]} stay within {np.degrees(lean):.2g} deg while the gripper "
+        f"moves at {100.0 * fast:.0f} cm/s, which looks like radians that were taken for degrees",
+        where=str(recording.path),
+        fix="convert the inclination once only",
+    )
 
 
 def _check_frozen(recording: Recording, values: NDArray, where: str) -> None:

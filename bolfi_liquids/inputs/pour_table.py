@@ -27,6 +27,7 @@ MIN_POURS = 3  # from which anything can be learned
 WORDS_FOR_A_NUMBER = ("id", "no", "nr", "num", "number", "index", "idx", "code", "label", "type")
 FIX_LINE = "mend or remove the line"
 MAX_TIMES_BEYOND = 4.0  # that a pour may be faster or slower than the cups' range
+MAX_TIMES_TOTAL = 10.0  # that a pour may be more or less than the usual one of its table
 MIN_DISTANCE_SHARE = 0.02  # of the cups' longest; a table whose distances all are shorter is in m
 
 
@@ -73,9 +74,6 @@ def open_pours(path: str | Path, liquid: str | None = None, *, told: bool = True
     """
     table = read_table(path)
     needed = (*ACTIONS, *AMOUNTS)
-    if not table.header:
-        fix = "write a header and a line for each pour"
-        raise InputError("is empty", where=str(table.path), fix=fix)
     _check_liquid_named(table)
     if missing := [name for name in needed if not table.has(name)]:
         raise InputError(
@@ -100,6 +98,7 @@ def open_pours(path: str | Path, liquid: str | None = None, *, told: bool = True
             where=f"{table.path}: line {table.lines[int(np.argmin(total))]}",
             fix="weigh what was poured",
         )
+    _check_totals(table, total[:, 0])
     unused = table.others((*needed, LIQUID))
     if unused and told:
         logger.warning("%s: columns not used: %s", table.path, ", ".join(unused))
@@ -234,6 +233,20 @@ def _finite(table: Table, name: str) -> NDArray[np.float64]:
             fix=FIX_LINE,
         )
     return values
+
+
+def _check_totals(table: Table, total: NDArray) -> None:
+    """Refuse pours of quite another amount than the others: a slip of the pen or of the unit."""
+    usual = float(np.median(total))
+    wrong = (total > MAX_TIMES_TOTAL * usual) | (total * MAX_TIMES_TOTAL < usual)
+    if wrong.any():
+        at = int(np.flatnonzero(wrong)[0])
+        raise InputError(
+            f"spilled, received and retained are {total[at]:g} in all, where the pours of this "
+            f"table are usually {usual:g}",
+            where=f"{table.path}: line {table.lines[at]}",
+            fix="give all in one unit",
+        )
 
 
 def _amounts(table: Table, name: str) -> NDArray[np.float64]:

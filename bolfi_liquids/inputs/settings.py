@@ -25,6 +25,10 @@ FALSE_ALARM_RATE = 0.05
 """Of the comparison between simulation and data."""
 MIN_SIMULATIONS = 7
 """With fewer, the posterior over two parameters says next to nothing."""
+MAX_SIMULATIONS = 8192
+"""That a posterior is learned from; the engine's own limit."""
+MAX_PARTICLES = 1_000_000
+MAX_COUNT = 1_000_000
 LARGEST_SEED = 2**31 - 1
 """That every random number generator takes."""
 MIN_PARTICLES = 100
@@ -52,9 +56,9 @@ def _plain_integer(value: Any) -> Any:
 
 Integer = Annotated[int, BeforeValidator(_plain_integer)]
 Seed = Annotated[Integer, Field(ge=0, le=LARGEST_SEED)]
-Count = Annotated[Integer, Field(ge=1)]
-Simulations = Annotated[Integer, Field(ge=MIN_SIMULATIONS)]
-Particles = Annotated[Integer, Field(ge=MIN_PARTICLES)]
+Count = Annotated[Integer, Field(ge=1, le=MAX_COUNT)]
+Simulations = Annotated[Integer, Field(ge=MIN_SIMULATIONS, le=MAX_SIMULATIONS)]
+Particles = Annotated[Integer, Field(ge=MIN_PARTICLES, le=MAX_PARTICLES)]
 Surrogate = Annotated[str, one_of(SURROGATES)]
 
 T = TypeVar("T")
@@ -130,8 +134,8 @@ class CalibrationSettings:
     surrogate: Surrogate = "discrepancy"
     particles: Particles = 1000
     sampler: Annotated[str, one_of(SAMPLERS)] = "nuts"
-    chains: Annotated[Integer, Field(ge=2)] = 4
-    draws: Annotated[Integer, Field(ge=4)] = 1000
+    chains: Annotated[Integer, Field(ge=2, le=1000)] = 4
+    draws: Annotated[Integer, Field(ge=4, le=MAX_COUNT)] = 1000
 
 
 @checked()
@@ -148,8 +152,8 @@ class SbcSettings:
         seed: Seed of all random draws.
     """
 
-    runs: Annotated[Integer, Field(ge=0)] = 200
-    sequential: Annotated[Integer, Field(ge=0)] = 40
+    runs: Annotated[Integer, Field(ge=0, le=MAX_COUNT)] = 200
+    sequential: Annotated[Integer, Field(ge=0, le=MAX_COUNT)] = 40
     design: Simulations = 512
     budget: Simulations = 20
     noise_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = 0.1

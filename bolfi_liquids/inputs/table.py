@@ -131,6 +131,10 @@ def read_table(
     """
     path = existing_file(path)
     lines = _decoded(path).splitlines()[skip:]
+    if not any(map(str.strip, lines)):
+        raise InputError(
+            "is empty", where=str(path), fix="write a header and a line for each measurement"
+        )
     if lines and (told := TOLD_DELIMITER.fullmatch(lines[0].strip())):
         lines, skip, delimiter = lines[1:], skip + 1, delimiter or told[1]
     delimiter = delimiter or _delimiter(lines[0] if lines else "")

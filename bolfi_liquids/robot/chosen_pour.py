@@ -82,11 +82,15 @@ class ChosenPour:
 
     def __str__(self) -> str:
         """As a person reads it before the motion, what is wrong first."""
+        wrong = [*map(str, self.stale), *([BAD_FIT] if self.fit_is_bad else [])]
+        return "\n".join([*wrong, self.expected])
+
+    @property
+    def expected(self) -> str:
+        """The action, what it spills, and the report's warnings."""
         chosen = self.judged
         return "\n".join(
             [
-                *map(str, self.stale),
-                *([BAD_FIT] if self.fit_is_bad else []),
                 f"the pour that {self.run} has chosen: "
                 f"{np.degrees(chosen.angular_velocity):.1f} deg/s, the lip "
                 f"{100 * chosen.distance:.2f} cm from the receiver's axis",

@@ -18,7 +18,7 @@ from .armed_session import (
     armed_session,
     check_one,
 )
-from .chosen_pour import ChosenPour, chosen_pour
+from .chosen_pour import BAD_FIT, ChosenPour, chosen_pour
 from .live_view import SessionView
 
 if TYPE_CHECKING:
@@ -130,8 +130,12 @@ def execute_pour(
         if ask is not None:
             plan.chosen.check_fresh()
             plan.chosen.check_fit(despite_bad_fit=despite_bad_fit)
+        elif plan.chosen.fit_is_bad:
+            logger.warning(BAD_FIT)
         for sentence in plan.chosen.stale:
             logger.warning(str(sentence))
+        if ask is None:  # else a person has it before the question
+            logger.info(plan.chosen.expected)
         return _carried_out(plan, rig, ask, emulate, progress)
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import Argument, InputError
+from ..inputs.start import REST_TIME, SETTLING_TIME
 from .armed_session import (
     Ask,
     Emulation,
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from ..hardware.motion import PosePath
 
 
+MIN_REST = REST_TIME + SETTLING_TIME  # s, in which `check_start` sees a recording rest
 PATHS_AHEAD = 2  # paths ordered beyond the one that runs, so that the arm need not wait
 
 
@@ -48,7 +50,7 @@ def plan_stir(rig: "Rig", cycles: int | None = None) -> StirPlan:
         cycles: How often the pattern is repeated; None as in the rig's file.
 
     Raises:
-        InputError: `cycles` is below 1 or too large.
+        InputError: `cycles` is below 1 or too large, or a recording would not begin at rest.
         MotionRejected: The plan breaks one of the rig's limits.
     """
     from ..hardware import check_path
@@ -60,6 +62,12 @@ def plan_stir(rig: "Rig", cycles: int | None = None) -> StirPlan:
     except ValueError as err:
         fix = f"give a whole number from 1 to {MAX_CYCLES}"
         raise InputError(f"{cycles}", where=Argument("cycles"), fix=fix) from err
+    if rig.stirring.rest < MIN_REST:
+        raise InputError(
+            f"{rig.stirring.rest:g} s",
+            where="rig: stirring.rest",
+            fix=f"give {MIN_REST:g} s or more: a recording must begin at rest",
+        )
     stir = tuple(strokes(rig, count))
     plan = StirPlan(insert(rig), stir, retract(rig, stir[-1].pose[-1, :3]))
     joints = None

@@ -126,13 +126,20 @@ def check_resumable(run: Path) -> None:
     """
     if (run / RUN_TOML).exists():
         return
-    around = (*run.glob(f"*/{RUN_TOML}"), *run.parent.glob(f"*/{RUN_TOML}"), run.parent / RUN_TOML)
-    runs = {str(path.parent): path.parent for path in around if path.exists()}
-    near = get_close_matches(str(run), runs, n=1, cutoff=0.0)
-    fix = f"did you mean {near[0]}? To begin" if near else "to begin"
+    near = _run_near(run)
+    fix = f"did you mean {near}? To begin" if near else "to begin"
     raise InputError(
         "holds no run to resume", where=str(run), fix=f"{fix} a new run, leave --resume out"
     )
+
+
+def _run_near(run: Path) -> Path | None:
+    """A run that may have been meant: within the directory, around it, or of a name like it."""
+    around = (*sorted(run.glob(f"*/{RUN_TOML}")), run.parent / RUN_TOML)
+    if found := [path.parent for path in around if path.exists()]:
+        return found[0]
+    beside = {path.parent.name: path.parent for path in run.parent.glob(f"*/{RUN_TOML}")}
+    return next((beside[name] for name in get_close_matches(run.name, beside, n=1)), None)
 
 
 def note_timeout(run: Path, timeout: float | None) -> None:

@@ -124,9 +124,9 @@ def _locked(directory: Path) -> int | None:
             raise
         os.close(lock)
     raise InputError(
-        "others keep coming and going, or no file can be made there",
+        "no file can be made there, or other commands keep coming and going",
         where=str(path),
-        fix="repeat the command, or choose another directory",
+        fix="choose another directory, or repeat the command",
     )
 
 

@@ -244,7 +244,8 @@ def resolve(surrogate: str | Family | None, options: dict) -> Family:
     None is "signal", unless a discrepancy, or another option of that family alone, is given.
 
     Raises:
-        ValueError: unknown name, or an option that the family has not.
+        ValueError: unknown name, an option that the family has not, or without a name a
+            discrepancy and an option of "signal".
     """
     if isinstance(surrogate, DiscrepancyFamily | SignalFamily):
         if options:
@@ -253,8 +254,13 @@ def resolve(surrogate: str | Family | None, options: dict) -> Family:
     if surrogate is None:
         for_discrepancy = (_options("discrepancy") - _options("signal")) | {"discrepancy"}
         for_signal = _options("signal") - _options("discrepancy")
-        paper = bool(for_discrepancy & options.keys()) and not for_signal & options.keys()
-        surrogate = "discrepancy" if paper else "signal"
+        of_paper, of_signal = for_discrepancy & options.keys(), for_signal & options.keys()
+        if "discrepancy" in of_paper and of_signal:
+            raise ValueError(
+                f"discrepancy and {', '.join(sorted(of_signal))} belong to two surrogates: leave "
+                'one out, or say surrogate="signal", to which a discrepancy only ranks simulations'
+            )
+        surrogate = "discrepancy" if of_paper and not of_signal else "signal"
     if surrogate not in tuple(FAMILIES):
         raise ValueError(f"surrogate must be one of {tuple(FAMILIES)} or None, got {surrogate!r}")
     unknown = options.keys() - _options(surrogate)

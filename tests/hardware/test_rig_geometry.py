@@ -112,3 +112,27 @@ def test_tracking_is_guarded_within_the_clearance(part):
         with pytest.raises(RigError) as told:
             checked_rig(rig)
         assert told.value.where == "rig: limits.tracking_error"
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("target", (0.0, 0.0, 1.6)),
+        ("marker", (0.0, -2.0, 0.025)),
+        ("position", (0.0, -0.035, 0.1)),
+        ("position", (0.0, -0.5, -0.16)),
+    ],
+)
+def test_a_camera_that_cannot_see_the_stick_is_refused(field, value):
+    first, second = BUNDLED.cameras
+    wrong = first.model_copy(update={field: value})
+    with pytest.raises(RigError) as told:
+        checked_rig(BUNDLED.model_copy(update={"cameras": (wrong, second)}))
+    assert told.value.where == f"rig: cameras.0.{field}"
+
+
+def test_two_cameras_are_two_devices():
+    first, second = BUNDLED.cameras
+    same = second.model_copy(update={"source": first.source})
+    with pytest.raises(RigError, match="source"):
+        checked_rig(BUNDLED.model_copy(update={"cameras": (first, same)}))

@@ -15,7 +15,7 @@ import pytest
 from bolfi_liquids.inference.acquisition.rules import RULES
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates import base
-from bolfi_liquids.inference.surrogates.families import FAMILIES
+from bolfi_liquids.inference.surrogates.families import FAMILIES, resolve
 from bolfi_liquids.inference.surrogates.feasibility import feasibility
 from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 
@@ -76,6 +76,14 @@ def is_check(one):
 def test_every_exported_rule_and_family_has_a_name_that_users_give():
     assert set(exported(is_rule).values()) == set(RULES.values())
     assert set(exported(is_family).values()) == set(FAMILIES.values())
+
+
+def test_options_of_two_surrogates_are_not_guessed_between():
+    """A discrepancy would only rank the simulations of the signal surrogate."""
+    with pytest.raises(ValueError, match="discrepancy and noise"):
+        resolve(None, {"discrepancy": max, "noise": 0.1})
+    assert resolve(None, {"discrepancy": max}).name == "discrepancy"
+    assert resolve("signal", {"discrepancy": max, "noise": 0.1}).name == "signal"
 
 
 @pytest.fixture(scope="module")

@@ -217,7 +217,7 @@ def test_clean_recordings_of_the_same_path_say_where_it_errs(calibration):
 def test_pours_that_the_cups_could_not_make_are_refused(calibration, table, option):
     tables = {
         "pours": table("p.csv"),
-        option: table("q.csv", ["45,10,5,90,5", *ROWS, "60,50,1,1,1"]),
+        option: table("q.csv", ["45,10,5,90,5", *ROWS, "60,50,33,33,34"]),
     }
     with pytest.raises(InputError, match=r"q\.csv: distance_cm: 50 cm, which looks like mm"):
         given(calibration, **tables)

@@ -55,6 +55,12 @@ def test_one_liquid_needs_no_name(tmp_path):
         ([*ROWS[:2], "water,90,200,1,1,1"], HEADER, None, "200 is not between -20 and 50"),
         ([], "", None, "is empty"),
         ([*ROWS[:2], "water,90,1,0,0,0"], HEADER, None, "line 4: spilled, received and retained"),
+        (
+            [*ROWS[:2], "water,90,1,1e30,1,1"],
+            HEADER,
+            None,
+            "line 4: spilled, received and retained",
+        ),
     ],
 )
 def test_what_cannot_be_used_is_refused_by_name(tmp_path, rows, header, liquid, said):

@@ -96,6 +96,13 @@ BAD = {
         "moves less",
     ),
     "degrees": (with_values("inclination_xz", np.degrees), "inclination_xz", "looks like degrees"),
+    "radians twice": (
+        lambda d: with_values("inclination_xz", np.radians)(
+            with_values("inclination_yz", np.radians)(d)
+        ),
+        "inclination_yz",
+        "looks like radians that were taken for degrees",
+    ),
     "degrees by units": (with_units("inclination_yz", "degree"), "inclination_yz", "'degree'"),
     "gripper in mm": (with_values("y", lambda v: 1000 * v), "y", "looks like cm or mm"),
     "mm by units": (with_units("z", "mm"), "z", "'mm'"),

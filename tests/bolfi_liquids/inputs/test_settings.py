@@ -21,6 +21,9 @@ from bolfi_liquids.online.settings import OnlineSettings
     ("kind", "where", "name", "value"),
     [
         (CalibrationSettings, "budget", "budget", MIN_SIMULATIONS - 1),
+        (CalibrationSettings, "budget", "budget", 10**9),
+        (CalibrationSettings, "particles", "particles", 10**9),
+        (PourSettings, "iterations", "iterations", 10**9),
         (CalibrationSettings, "seed", "seed", 1.5),
         (CalibrationSettings, "seed", "seed", True),
         (CalibrationSettings, "chains", "chains", 1),

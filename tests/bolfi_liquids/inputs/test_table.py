@@ -102,9 +102,11 @@ def test_a_file_that_is_no_text_is_refused(tmp_path):
         read_table(path)
 
 
-def test_an_empty_file_has_no_columns(tmp_path):
-    (tmp_path / "table.csv").touch()
-    assert read_table(tmp_path / "table.csv").header == ()
+@pytest.mark.parametrize("content", ["", "\n \n"])
+def test_an_empty_file_is_refused(tmp_path, content):
+    (tmp_path / "table.csv").write_text(content)
+    with pytest.raises(InputError, match=r"table\.csv: is empty"):
+        read_table(tmp_path / "table.csv")
 
 
 def test_pandas_is_imported_when_a_table_is_read():

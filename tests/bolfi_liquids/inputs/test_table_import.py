@@ -177,7 +177,7 @@ def test_the_robot_s_own_gap_is_not_filled():
         (lambda rows: rows[0].__setitem__(4, "Angle"), "no column 'A' among"),
         (lambda rows: rows[0].__setitem__(6, "X"), "2 columns are named 'X'"),
         (lambda rows: rows.insert(20, rows[21]), "times must increase"),
-        (lambda rows: rows.clear(), "no column"),
+        (lambda rows: rows.clear(), "is empty"),
         (
             lambda rows: rows[7].__delitem__(slice(3, None)),
             "line 10: 3 cells, where the header has 7",
@@ -300,7 +300,7 @@ def test_a_turned_cup_frame_is_warned_of_and_yaw_turns_it_back(tmp_path, written
     table, columns = table_of(tmp_path / "turned.csv", truth, turn), written[1]
     found = import_table(table, columns, tmp_path / "turned.nc")
     (warning,) = [line for line in outline(found).splitlines() if line.startswith("warning")]
-    (yaw,) = re.findall(r"yaw_deg = (-?\d+)", warning)
+    (yaw,) = re.findall(r"add (-?\d+) to `yaw_deg`", warning)
     assert int(yaw) == pytest.approx(30, abs=6)  # water turns the stick by some degrees itself
     columns.write_text("yaw_deg = 30\n" + columns.read_text())
     mended = import_table(table, columns, tmp_path / "mended.nc")

@@ -14,10 +14,11 @@ from typer.testing import CliRunner
 import bolfi_liquids as bl
 from bolfi_liquids.calibration.posterior_file import write_tree
 from bolfi_liquids.cli.app import app
+from bolfi_liquids.cli.printed import after_calibration
 from bolfi_liquids.cli.record import next_commands
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.reporting.warnings import results_of, warnings_of
-from bolfi_liquids.robot.chosen_pour import chosen_pour
+from bolfi_liquids.robot.chosen_pour import BAD_FIT, chosen_pour
 from bolfi_liquids.robot.pour import plan_pour
 from bolfi_liquids.robot.stir import plan_stir
 from bolfi_liquids.wording import percent, sentence
@@ -201,6 +202,20 @@ def test_a_pour_over_a_bad_fit_needs_its_own_word(poured_run, make):
     assert "--despite-bad-fit" in plans[0].splitlines()[0]  # before the pour itself
 
 
+@pytest.mark.slow
+def test_an_emulated_pour_tells_the_plan_and_that_the_fit_is_bad(poured_run):
+    with_status(poured_run, "bad")
+    result = CliRunner().invoke(app, ["pour", str(poured_run), "--execute", "--emulator"])
+    assert result.exit_code == 0
+    assert BAD_FIT in result.stderr and "expected to spill" in result.stderr
+
+
+def test_what_follows_a_bad_fit_is_no_pour(poured_run):
+    assert "pour" in after_calibration(poured_run)
+    with_a_bad_fit(poured_run)
+    assert "pour" not in after_calibration(poured_run)
+
+
 def test_an_arm_refuses_a_pour_over_a_bad_fit_on_the_command_line(poured_run):
     with_status(poured_run, "bad")
     execute = ["pour", str(poured_run), "--execute", "--arm"]
@@ -260,6 +275,13 @@ def test_what_belongs_to_the_choice_is_not_taken_with_execute(poured_run, option
 def test_cycles_have_two_ends(cycles):
     with pytest.raises(InputError, match=f"^cycles: {cycles}"):
         plan_stir(bundled_rig(), cycles)
+
+
+def test_a_stir_whose_recording_nobody_could_use_is_not_planned():
+    rig = bundled_rig()
+    hasty = rig.model_copy(update={"stirring": rig.stirring.model_copy(update={"rest": 0.2})})
+    with pytest.raises(InputError, match=r"^rig: stirring\.rest: 0\.2 s"):
+        plan_stir(hasty)
 
 
 def test_what_comes_next_fits_what_was_done_and_any_path(tmp_path):

@@ -266,8 +266,9 @@ def test_resuming_where_no_run_is_names_the_nearest(tmp_path):
     with pytest.raises(InputError) as caught:
         check_resumable(tmp_path)  # the directory of all runs
     assert str(tmp_path) in caught.value.fix
-    with pytest.raises(InputError, match="to begin a new run"):
-        check_resumable(tmp_path / "mine" / "elsewhere" / "far")
+    for other in ("nothing_like_them", "mine/elsewhere/far"):
+        with pytest.raises(InputError, match="; to begin a new run"):
+            check_resumable(tmp_path / other)
     check_resumable(tmp_path / "mine")
 
 
