@@ -132,10 +132,11 @@ def check_effects(effects: Mapping[str, float], scene: str) -> dict[str, float]:
             f"{effects!r:.80}", where=Argument("effects"), fix="give coefficients by name"
         )
     for name, value in effects.items():
-        where = f"--effect {name}={value}"
+        value = number_of(value, f"--effect {name}")
+        where = f"--effect {name}={value:g}"
         if name not in EFFECTS:
             raise _unknown(where)
-        value, effect = number_of(value, where), EFFECTS[name]
+        effect = EFFECTS[name]
         if not effect.lowest <= value <= effect.highest:
             raise _out_of_range(name, value, where)
         if scene not in effect.scenes:
