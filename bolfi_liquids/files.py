@@ -32,7 +32,7 @@ def existing_file(path: str | Path) -> Path:
     Raises:
         InputError: There is no such file, or it is a directory.
     """
-    path = as_path(path, "file")
+    path = as_path(path, "path")
     if not path.is_file():
         what = "a directory, not a file" if path.is_dir() else "no such file"
         raise InputError(what, where=str(path), fix="check the path")

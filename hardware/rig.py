@@ -176,8 +176,7 @@ class Stirring(Section, frozen=True):
     clear_height: Length
     approach_speed: Speed = 0.05
     rest: Annotated[
-        Number,
-        within(0.1, 60.0, "s", "the cameras' noise is learned from some pictures"),
+        Number, within(0.1, 60.0, "s", "the cameras' noise is learned from some pictures")
     ] = 2.0
     cycles: Annotated[int, unless_recorded(checked_cycles)] = 1
 
@@ -270,6 +269,7 @@ class Rig(Section, frozen=True):
     def _fits_together(self, info: ValidationInfo) -> "Rig":
         _check_views(self.cameras)
         if not is_recorded(info):
+            _check_sources(self.cameras)
             _check_frame_age(self)
             _check_speeds(self)
             _check_stick(self)
@@ -305,6 +305,9 @@ def _check_views(cameras: tuple[Camera, Camera]) -> None:
     views = sorted(camera.view for camera in cameras)
     if views != ["xz", "yz"]:
         raise ValueError(f"cameras: one must see xz and one yz, got {' and '.join(views)}")
+
+
+def _check_sources(cameras: tuple[Camera, Camera]) -> None:
     first, second = (camera.source for camera in cameras)
     if first == second and cameras[0].is_device:
         raise ValueError(f"cameras: both have the source {first!r}; each needs its own")

@@ -20,7 +20,7 @@ from .safety.limits import MAX_TILT, Workspace, workspace
 LEVEL_TILT = np.radians(20.0)  # of a gripper that holds a source cup, from level
 LIP_AWAY = 0.005  # m, of a source's lip from the gripper's axis, above it and towards the receiver
 MAX_MARKER_AWAY = 0.15  # m, of a marker on the gripper from the stick's pivot
-MAX_VIEW = np.radians(45.0)  # from a picture's middle to its corner, where the lens is measured
+MAX_VIEW = np.radians(60.0)  # of a pivot from the middle of a picture; where the lens is measured
 MAX_START_AWAY = 0.04  # m, of the pivot at `start` from its place above the cup; a cup is as wide
 
 
@@ -77,21 +77,22 @@ def _check_stirring_tool(space: Workspace, where: str) -> None:
 
 
 def _check_tracking(rig: Rig, where: str) -> None:
-    free = min(clearance(rig))
-    if rig.limits.tracking_error >= free:
+    """An arm lags along its way, which is level while it stirs."""
+    aside = clearance(rig).aside
+    if rig.limits.tracking_error >= aside:
         raise RigError(
-            f"{1e3 * rig.limits.tracking_error:.1f} mm, and the stick has {1e3 * free:.1f} mm to "
-            "the cup (cup, stick and stirring)",
+            f"{1e3 * rig.limits.tracking_error:.1f} mm, and the stick comes within "
+            f"{1e3 * aside:.1f} mm of the cup's wall (cup.radius, stick.radius, stirring.radius)",
             where=f"{where}: limits.tracking_error",
-            fix="give less, or stir farther from wall, floor and rim",
+            fix="give less, 1 mm at least, or a smaller stirring.radius",
         )
 
 
 def _check_camera(rig: Rig, camera: Camera, where: str) -> None:
     position, pivot = np.array(camera.position), np.array([0.0, 0.0, rig.stirring.height])
-    if np.hypot(*position[:2]) <= rig.cup.radius or position[2] <= 0.0:
+    if np.hypot(*position[:2]) <= rig.cup.radius:
         raise RigError(
-            f"{list(camera.position)} m is above the cup or below its floor",
+            f"{list(camera.position)} m is on the cup's axis, or nearer to it than its wall",
             where=f"{where}.position",
             fix="measure it again, in the cup's frame: from the centre of its floor, z upwards",
         )
@@ -104,12 +105,12 @@ def _check_camera(rig: Rig, camera: Camera, where: str) -> None:
     ahead, there = np.subtract(camera.target, position), pivot - position
     angle = _angle(ahead / np.linalg.norm(ahead), there / np.linalg.norm(there))
     view = MAX_VIEW
-    if camera.focal_length is not None:
+    if camera.intrinsics is None and camera.focal_length is not None:
         view = float(np.arctan(np.hypot(camera.width, camera.height) / 2.0 / camera.focal_length))
     if angle > view:
         raise RigError(
-            f"the stick's pivot is {np.degrees(angle):.0f} deg from the middle of the picture, "
-            f"which reaches {np.degrees(view):.0f} deg",
+            f"the stick's pivot is {np.degrees(angle):.0f} deg from the middle of the picture, and "
+            f"may be {np.degrees(view):.0f} deg",
             where=f"{where}.target",
             fix="correct it, position or stirring.height: the camera must see the stick",
         )

@@ -16,8 +16,7 @@ from pydantic import (
 
 from .fluid.numerics import MODEL_VERSION, POUR_PARTICLES, Numerics
 
-MIN_LENGTH, MAX_RADIUS, MAX_HEIGHT = 1e-3, 0.25, 0.5  # [m] of cups that are poured by hand or arm
-MIN_RADIUS, MAX_LIP_HEIGHT = 5e-3, 1.0  # [m]
+MIN_LENGTH, MAX_RADIUS, MAX_HEIGHT = 1e-3, 0.25, 2.0  # [m] of cups that are poured by hand or arm
 MAX_DISTANCE = 0.5  # [m] from the lip to the receiver's axis
 
 
@@ -34,9 +33,8 @@ def _up_to(most: float) -> AfterValidator:
 
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Radius = Annotated[Number, Field(ge=MIN_RADIUS), _up_to(MAX_RADIUS)]
+Radius = Annotated[Number, Field(ge=MIN_LENGTH), _up_to(MAX_RADIUS)]
 Height = Annotated[Number, Field(ge=MIN_LENGTH), _up_to(MAX_HEIGHT)]
-LipHeight = Annotated[Number, Field(ge=MIN_LENGTH), _up_to(MAX_LIP_HEIGHT)]
 Distance = Annotated[Number, _up_to(MAX_DISTANCE)]
 Degrees = Annotated[Number, Field(gt=0, le=180)]
 DegreesPerSecond = Annotated[Number, Field(gt=0, le=3600)]
@@ -71,7 +69,7 @@ class Receiver(_Section, frozen=True):
 class PourPlan(_Section, frozen=True):
     """How the source turns, and the range of the decision, in the units that people type."""
 
-    lip_height: LipHeight
+    lip_height: Height
     final_angle_deg: Degrees
     hold: Seconds
     angular_velocity_deg_s: tuple[DegreesPerSecond, DegreesPerSecond]
@@ -104,17 +102,6 @@ class Cups(_Section, frozen=True):
             raise ValueError(
                 f"the lip ({self.pour.lip_height} m) is not above the receiver's rim "
                 f"({self.receiver.height} m)"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _turned_far_enough(self) -> "Cups":
-        source = self.source
-        least = np.degrees(np.arctan2(source.height - source.fill, source.radius))
-        if self.pour.final_angle_deg <= least:
-            raise ValueError(
-                f"pour.final_angle_deg {self.pour.final_angle_deg:g}: nothing flows over the lip "
-                f"up to {least:.0f} deg"
             )
         return self
 

@@ -31,10 +31,10 @@ from .options import (
     RunArgument,
 )
 from .printed import (
-    after_calibration,
     complaints_among_results,
     print_findings,
     print_next,
+    print_next_pour,
     print_section,
     print_warnings,
 )
@@ -113,7 +113,7 @@ def calibrate(
         )
     print_section(out, "calibrate")
     print_warnings(out)
-    print_next(out, *after_calibration(out))
+    print_next_pour(out, "criticise")
 
 
 @app.command(
@@ -153,7 +153,7 @@ def criticise(
             timeout=compute.timeout,
         )
     print_findings(criticism)
-    print_next(run, "pour")
+    print_next_pour(run)
 
 
 @app.command(

@@ -29,13 +29,13 @@ def print_next(run: Path, *commands: str) -> None:
     typer.echo("next: " + " or: ".join(command(one, run) for one in commands))
 
 
-def after_calibration(run: Path) -> tuple[str, ...]:
-    """The commands that may follow: `pour` refuses a bad fit."""
-    from ..calibration.result import Calibration
+def print_next_pour(run: Path, *others: str) -> None:
+    """The same where a pour may follow, unless it would refuse the latest fit."""
     from ..calibration.summary import FitStatus
+    from ..criticism.result import latest_calibration
 
-    fit_is_bad = Calibration.open(run).summary.fit_status == FitStatus.BAD
-    return ("criticise", "report") if fit_is_bad else ("criticise", "pour")
+    fit_is_bad = latest_calibration(run).summary.fit_status == FitStatus.BAD
+    print_next(run, *others, "report" if fit_is_bad else "pour")
 
 
 def print_section(run: Path, name: str) -> None:

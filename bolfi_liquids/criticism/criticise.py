@@ -93,8 +93,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
 
     started = time.perf_counter()
     settings = CriticismSettings(
-        effects=_names(effects),
-        accept=_names(accept),
+        effects=_names("effects", effects),
+        accept=_names("accept", accept),
         seed=seed,
     )
     given = Given(held_out, baseline, pours, held_out_pours, cups)
@@ -120,7 +120,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         return Criticism.open(run)
 
 
-def _names(given: str | Sequence[str] | None) -> tuple[str, ...] | None:
+def _names(argument: str, given: str | Sequence[str] | None) -> tuple[str, ...] | None:
     """One name or several.
 
     Raises:
@@ -128,11 +128,13 @@ def _names(given: str | Sequence[str] | None) -> tuple[str, ...] | None:
     """
     if given is None or isinstance(given, str):
         return None if given is None else (given,)
-    if not isinstance(given, Iterable) or not all(isinstance(one, str) for one in given):
+    listed = list(given) if isinstance(given, Iterable) else [given]
+    names = tuple(one for one in listed if isinstance(one, str))
+    if len(names) < len(listed):
         raise InputError(
-            f"{given!r:.80}", where=Argument("effects"), fix="give names of effects, or none"
+            f"{given!r:.80}", where=Argument(argument), fix="give names of effects, or none"
         )
-    return tuple(given)
+    return names
 
 
 def _find(

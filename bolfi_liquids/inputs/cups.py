@@ -5,6 +5,8 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..errors import Argument, InputError
 from .toml_file import read_toml
 
@@ -12,6 +14,7 @@ if TYPE_CHECKING:
     from ..models import Cups
 
 BUNDLED = "cups.toml"
+RADII, HEIGHTS, LIP_HEIGHTS = (5e-3, 0.25), (5e-3, 0.5), (5e-3, 1.0)  # [m] of what is poured by arm
 
 
 def bundled_cups() -> "Cups":
@@ -24,7 +27,7 @@ def cups_of(given: "Cups | str | Path | None") -> "Cups":
     """Cups as they are, those of a file, or the bundled ones for None.
 
     Raises:
-        InputError: The file cannot be used, or something else was given.
+        InputError: The file cannot be used, something else was given, or nobody pours with them.
     """
     from ..models import Cups
 
@@ -38,6 +41,7 @@ def cups_of(given: "Cups | str | Path | None") -> "Cups":
             where=Argument("cups"),
             fix="give the path of a TOML file, or models.Cups",
         )
+    _check_pourable(given, Argument("cups"))
     return given
 
 
@@ -56,4 +60,36 @@ def open_cups(path: str | Path) -> "Cups":
     """
     from ..models import Cups
 
-    return read_toml(path, Cups, fix="compare with the bundled cups.toml")
+    cups = read_toml(path, Cups, fix="compare with the bundled cups.toml")
+    _check_pourable(cups, str(path))
+    return cups
+
+
+def _check_pourable(cups: "Cups", where: str) -> None:
+    """Refuse cups that nobody pours with, which the files of older runs may hold.
+
+    Raises:
+        InputError: A size is a slip of the unit, or nothing flows over the lip.
+    """
+    sizes = {
+        "source.radius": (cups.source.radius, *RADII),
+        "receiver.radius": (cups.receiver.radius, *RADII),
+        "source.height": (cups.source.height, *HEIGHTS),
+        "receiver.height": (cups.receiver.height, *HEIGHTS),
+        "pour.lip_height": (cups.pour.lip_height, *LIP_HEIGHTS),
+    }
+    for name, (size, least, most) in sizes.items():
+        if not least <= size <= most:
+            raise InputError(
+                f"{name} = {size:g} m is not between {least:g} and {most:g} m",
+                where=where,
+                fix="measure it again, in m",
+            )
+    source, angle = cups.source, cups.pour.final_angle_deg
+    least = float(np.degrees(np.arctan2(source.height - source.fill, source.radius)))
+    if angle <= least:
+        raise InputError(
+            f"pour.final_angle_deg = {angle:g}: nothing flows over the lip up to {least:.0f} deg",
+            where=where,
+            fix="turn the source further",
+        )

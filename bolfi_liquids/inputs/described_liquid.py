@@ -118,7 +118,7 @@ def read_effects(given: Iterable[str], scene: str) -> dict[str, float]:
     return read
 
 
-def check_effects(effects: Mapping[str, float], scene: str) -> dict[str, float]:
+def check_effects(effects: Mapping[str, float] | None, scene: str) -> dict[str, float]:
     """Coefficients that can act in a scene, "stir" or "pour".
 
     Raises:
@@ -127,6 +127,8 @@ def check_effects(effects: Mapping[str, float], scene: str) -> dict[str, float]:
     """
     from ..models import EFFECTS
 
+    if effects is None:
+        return {}
     if not isinstance(effects, Mapping):
         raise InputError(
             f"{effects!r:.80}", where=Argument("effects"), fix="give coefficients by name"

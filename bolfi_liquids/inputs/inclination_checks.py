@@ -24,10 +24,13 @@ MAX_BEYOND_SHARE = 0.02
 """Of samples in which the stick may lean further than the cup lets it: mistakes of a camera."""
 RIM_MARGIN = np.radians(10.0)
 """Beyond the angle at which the stick lies on the cup's rim [rad]."""
-MIN_FAST = 0.03
+SPEED_TIME = 0.1
+"""Time over which the gripper's speed is taken [s]."""
+MIN_FAST = 0.05
 """Speed of the gripper from which every stick leans visibly [m/s]."""
-MIN_LEAN = np.radians(0.3)
-"""That it leans then, at the least [rad]: the start of such a stroke alone inclines it by more."""
+MIN_LEAN = np.radians(0.2)
+"""That it leans then, at the least [rad]: the start of a stroke, or a circle of 7 cm, does as much
+by inertia alone."""
 UPWARD = np.radians([150.0, 210.0])
 """Inclination of a stick that hangs, counted from the upward vertical [rad]."""
 
@@ -64,12 +67,14 @@ def _check_unit(values: NDArray, where: str) -> None:
 
 def _check_small(recording: Recording) -> None:
     """Refuse a stick that stays upright behind a gripper that is fast."""
-    seen = recording.inclination[np.isfinite(recording.inclination).all(axis=1)]
     known = np.isfinite(recording.gripper.position).all(axis=1)
-    way, time = recording.gripper.position[known], recording.time[known]
-    speed = np.linalg.norm(np.diff(way, axis=0), axis=1) / np.diff(time)
+    time, position = recording.time[known], recording.gripper.position[known]
+    apart = np.searchsorted(time, time[0] + SPEED_TIME)  # samples; so far apart noise is no speed
+    way = np.linalg.norm(position[apart:] - position[:-apart], axis=1)
+    speed = way / (time[apart:] - time[:-apart])
     fast = float(np.quantile(speed, 0.9)) if len(speed) else 0.0
-    lean = float(np.quantile(np.abs(seen - np.median(seen, axis=0)), 0.99)) if len(seen) else 0.0
+    leans = [np.abs(plane - np.nanmedian(plane)) for plane in recording.inclination.T]
+    lean = max(float(np.nanquantile(one, 0.99)) for one in leans)
     if fast < MIN_FAST or lean >= MIN_LEAN:
         return
     raise InputError(

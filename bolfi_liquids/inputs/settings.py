@@ -28,7 +28,9 @@ MIN_SIMULATIONS = 7
 MAX_SIMULATIONS = 8192
 """That a posterior is learned from; the engine's own limit."""
 MAX_PARTICLES = 1_000_000
+"""More fit into no memory."""
 MAX_COUNT = 1_000_000
+"""Of draws, simulations at a time and the like: more is a slip of the pen."""
 LARGEST_SEED = 2**31 - 1
 """That every random number generator takes."""
 MIN_PARTICLES = 100

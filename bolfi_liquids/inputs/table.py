@@ -130,11 +130,12 @@ def read_table(
         InputError: The file is missing, is no text, or a line does not fit its header.
     """
     path = existing_file(path)
-    lines = _decoded(path).splitlines()[skip:]
+    lines = _decoded(path).splitlines()
     if not any(map(str.strip, lines)):
         raise InputError(
             "is empty", where=str(path), fix="write a header and a line for each measurement"
         )
+    lines = lines[skip:]
     if lines and (told := TOLD_DELIMITER.fullmatch(lines[0].strip())):
         lines, skip, delimiter = lines[1:], skip + 1, delimiter or told[1]
     delimiter = delimiter or _delimiter(lines[0] if lines else "")

@@ -122,7 +122,7 @@ def check_resumable(run: Path) -> None:
     """Refuse to go on where nothing has begun, as with a mistyped name.
 
     Raises:
-        InputError: There is no run; the message names the nearest one.
+        InputError: There is no run; the message names one that may have been meant.
     """
     if (run / RUN_TOML).exists():
         return

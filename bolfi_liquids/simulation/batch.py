@@ -69,7 +69,8 @@ def batch_of(
     Raises:
         InputError: A value cannot be used, or arrays differ in length.
     """
-    values = {name: _numbers(name, value) for name, value in liquid.items()} | {"seed": seed}
+    values = {name: _numbers(name, value) for name, value in liquid.items()}
+    values["seed"] = np.asarray(seed, dtype=object)  # `Described` looks at each
     try:
         columns = dict(zip(values, np.broadcast_arrays(*values.values()), strict=True))
     except ValueError as err:
@@ -88,7 +89,7 @@ def batch_of(
             **{name: float(columns[name].flat[at]) for name in liquid},
             effects=dict(effects or {}),
             particles=particles,
-            seed=columns["seed"].flat[at].item(),
+            seed=columns["seed"].flat[at],
         )
         for at in range(columns["seed"].size)
     )
@@ -98,8 +99,10 @@ def batch_of(
 
 
 def _numbers(name: str, value: ArrayLike) -> NDArray:
-    """Raises:
-    InputError: They are complex, text, or of no one shape.
+    """`value` as an array.
+
+    Raises:
+        InputError: It is complex, text, or of no one shape.
     """
     try:
         return checked_array(name, value)

@@ -111,9 +111,9 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
         )
     density = opened.number("liquid_density") if density is None else _density(density)
     liquid = {"viscosity": viscosity, "cohesion": cohesion, "density": density}
-    batch = batch_of(liquid, check_effects(effects or {}, "stir"), particles, seed)
+    batch = batch_of(liquid, check_effects(effects, "stir"), particles, seed)
     targets.check_single(batch.single)
-    of_another = _with_rig(opened.attrs, rig or {}) | {"liquid_density": density}
+    of_another = _with_rig(opened.attrs, rig) | {"liquid_density": density}
     plan = _planned(replace(opened, attrs=MappingProxyType(of_another)), path)
     setup = StirSetup.from_recording(plan, particles=batch.one.particles)
     angles = simulated(Stirring((plan,), (setup,)).simulate, batch, Where(executor, timeout))
@@ -129,13 +129,17 @@ def _density(value: Any) -> float:
     return number_of(value, Argument("density"))
 
 
-def _with_rig(attrs: Mapping[str, float | str], rig: Mapping[str, float]) -> dict[str, float | str]:
+def _with_rig(
+    attrs: Mapping[str, float | str], rig: Mapping[str, float] | None
+) -> dict[str, float | str]:
     """A recording's attributes with those of a rig in their place.
 
     Raises:
         InputError: They are no sizes by name, a name is none of `RIG_SIZES`, a value is no positive
             number, or the stick's mass and density are both given.
     """
+    if rig is None:
+        return dict(attrs)
     if not isinstance(rig, Mapping):
         raise InputError(f"{rig!r:.80}", where=Argument("rig"), fix="give sizes by name")
     for name, value in rig.items():
@@ -259,7 +263,7 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     liquid = {"viscosity": viscosity, "cohesion": cohesion, "density": density}
     check_distance(distance, cups, Argument("distance"))
     check_rate(angular_velocity, cups, Argument("angular_velocity"))
-    batch = batch_of(liquid, check_effects(effects or {}, "pour"), particles, seed)
+    batch = batch_of(liquid, check_effects(effects, "pour"), particles, seed)
     targets.check_single(batch.single)
     simulator = PourSimulator(angular_velocity, cups, density, batch.one.particles)
     where, retained = Where(executor, timeout), slice(0, 1)  # what has not landed is NaN

@@ -254,13 +254,15 @@ def resolve(surrogate: str | Family | None, options: dict) -> Family:
     if surrogate is None:
         for_discrepancy = (_options("discrepancy") - _options("signal")) | {"discrepancy"}
         for_signal = _options("signal") - _options("discrepancy")
-        of_paper, of_signal = for_discrepancy & options.keys(), for_signal & options.keys()
+        given = {name for name, value in options.items() if value is not None}
+        of_paper, of_signal = for_discrepancy & given, for_signal & given
         if "discrepancy" in of_paper and of_signal:
             raise ValueError(
                 f"discrepancy and {', '.join(sorted(of_signal))} belong to two surrogates: leave "
                 'one out, or say surrogate="signal", to which a discrepancy only ranks simulations'
             )
         surrogate = "discrepancy" if of_paper and not of_signal else "signal"
+        options = {n: v for n, v in options.items() if v is not None or n in _options(surrogate)}
     if surrogate not in tuple(FAMILIES):
         raise ValueError(f"surrogate must be one of {tuple(FAMILIES)} or None, got {surrogate!r}")
     unknown = options.keys() - _options(surrogate)

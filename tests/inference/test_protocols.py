@@ -84,6 +84,8 @@ def test_options_of_two_surrogates_are_not_guessed_between():
         resolve(None, {"discrepancy": max, "noise": 0.1})
     assert resolve(None, {"discrepancy": max}).name == "discrepancy"
     assert resolve("signal", {"discrepancy": max, "noise": 0.1}).name == "signal"
+    assert resolve(None, {"discrepancy": None, "noise": 0.1}).name == "signal"
+    assert resolve(None, {"discrepancy": max, "noise": None, "summary": None}).name == "discrepancy"
 
 
 @pytest.fixture(scope="module")

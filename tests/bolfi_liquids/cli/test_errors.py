@@ -72,6 +72,10 @@ def stir(tmp_path, monkeypatch):
         ("viscosity", lambda: bl.simulate_stir("1")),
         ("viscosity", lambda: bl.simulate_stir([[1.0, 2.0], [3.0]])),
         ("cohesion", lambda: bl.simulate_pour(1.0, None)),
+        ("seed", lambda: bl.simulate_stir(seed=[[1, 2], [3]])),
+        ("seed", lambda: bl.simulate_stir(seed=None)),
+        ("seed", lambda: bl.simulate_stir(seed=2**70)),
+        ("effects", lambda: bl.simulate_stir(effects="")),
         ("effects", lambda: bl.simulate_stir(effects="stick_mass=0.3")),
         ("effects", lambda: bl.simulate_pour(effects=["adhesion"])),
         ("rig", lambda: bl.simulate_stir(rig=0.04)),
@@ -84,6 +88,7 @@ def stir(tmp_path, monkeypatch):
         ("run", lambda: bl.Calibration.open(3)),
         ("effects", lambda: bl.criticise("r", effects=3)),
         ("effects", lambda: bl.criticise("r", effects=[3])),
+        ("accept", lambda: bl.criticise("r", accept=3)),
     ],
 )
 def test_python_is_told_the_argument_that_was_given(stir, name, call):

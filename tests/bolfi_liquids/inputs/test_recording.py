@@ -182,6 +182,15 @@ def test_bad_recording_is_refused_in_one_line(dataset, tmp_path, alter, field, v
     assert not (tmp_path / "run").exists()
 
 
+def test_planes_that_were_seen_in_turn_are_a_recording(dataset, tmp_path):
+    """As two cameras with a clock of their own each: no row holds both."""
+    seen = dataset.copy(deep=True)
+    seen["inclination_xz"][2::2] = np.nan
+    seen["inclination_yz"][1::2] = np.nan
+    seen.to_netcdf(tmp_path / "stir.nc")
+    bl.open_recording(tmp_path / "stir.nc")
+
+
 @pytest.mark.parametrize("content", [None, b"", b"time,x\n0,0\n"], ids=["none", "empty", "csv"])
 def test_what_is_no_recording_is_refused(tmp_path, content):
     path = tmp_path / "stir.nc"

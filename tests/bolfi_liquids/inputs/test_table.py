@@ -109,6 +109,11 @@ def test_an_empty_file_is_refused(tmp_path, content):
         read_table(tmp_path / "table.csv")
 
 
+def test_a_table_of_which_all_is_skipped_is_not_called_empty(tmp_path):
+    (tmp_path / "table.csv").write_text("a,b\n1,2\n")
+    assert read_table(tmp_path / "table.csv", skip=5).header == ()
+
+
 def test_pandas_is_imported_when_a_table_is_read():
     code = "import sys, bolfi_liquids.inputs.pour_table; sys.exit('pandas' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -8,6 +8,7 @@ import pytest
 
 import bolfi_liquids as bl
 from bolfi_liquids.inputs.bundled import RECORDED_LIQUIDS, bundled_recording
+from bolfi_liquids.inputs.frame import frame_warnings
 from bolfi_liquids.inputs.table_import import (
     at_camera_times,
     import_table,
@@ -177,7 +178,7 @@ def test_the_robot_s_own_gap_is_not_filled():
         (lambda rows: rows[0].__setitem__(4, "Angle"), "no column 'A' among"),
         (lambda rows: rows[0].__setitem__(6, "X"), "2 columns are named 'X'"),
         (lambda rows: rows.insert(20, rows[21]), "times must increase"),
-        (lambda rows: rows.clear(), "is empty"),
+        (lambda rows: rows.clear(), "no column"),
         (
             lambda rows: rows[7].__delitem__(slice(3, None)),
             "line 10: 3 cells, where the header has 7",
@@ -302,7 +303,12 @@ def test_a_turned_cup_frame_is_warned_of_and_yaw_turns_it_back(tmp_path, written
     (warning,) = [line for line in outline(found).splitlines() if line.startswith("warning")]
     (yaw,) = re.findall(r"add (-?\d+) to `yaw_deg`", warning)
     assert int(yaw) == pytest.approx(30, abs=6)  # water turns the stick by some degrees itself
-    columns.write_text("yaw_deg = 30\n" + columns.read_text())
+    text = columns.read_text()
+    columns.write_text("yaw_deg = -90\n" + text)  # the advice counts from what the map says
+    (warning,) = frame_warnings([import_table(table, columns, tmp_path / "worse.nc")])
+    (more,) = re.findall(r"add (-?\d+) to `yaw_deg`", warning)
+    assert int(more) - 90 == pytest.approx(30, abs=6)
+    columns.write_text("yaw_deg = 30\n" + text)
     mended = import_table(table, columns, tmp_path / "mended.nc")
     np.testing.assert_allclose(mended.gripper.position, truth.gripper.position, atol=1e-8)
     assert "warning" not in outline(mended)

@@ -1,0 +1,35 @@
+"""Cups that nobody pours with are refused when they are given, and read where a run holds them."""
+
+import pytest
+
+import bolfi_liquids as bl
+from bolfi_liquids.errors import InputError
+from bolfi_liquids.inputs.cups import bundled_cups, cups_of, kept_cups
+
+ODD = {
+    "pour.final_angle_deg": 13.5,  # the surface does not reach the lip
+    "pour.lip_height": 2.0,
+    "source.height": 0.6,
+    "receiver.radius": 0.0035,
+}
+
+
+def with_value(name, value):
+    part, field = name.split(".")
+    settings = bundled_cups().model_dump()
+    settings[part][field] = value
+    if name == "source.height":
+        settings["pour"]["lip_height"] = 0.9
+    return bl.Cups.model_validate(settings)
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_cups_that_nobody_pours_with_are_refused(name):
+    cups = with_value(name, ODD[name])
+    with pytest.raises(InputError, match=rf"^cups: {name} = {ODD[name]:g}"):
+        cups_of(cups)
+    assert kept_cups(cups.settings()) == cups  # a finished pour over them can be read
+
+
+def test_the_bundled_cups_can_be_poured_with():
+    assert cups_of(bundled_cups()) == cups_of(None)
