@@ -76,7 +76,7 @@ def _check_pourable(cups: "Cups", where: str) -> None:
         "receiver.radius": (cups.receiver.radius, *RADII),
         "source.height": (cups.source.height, *HEIGHTS),
         "receiver.height": (cups.receiver.height, *HEIGHTS),
-        "pour.lip_height": (cups.pour.lip_height, *LIP_HEIGHTS),
+        "lip_height": (cups.pour.lip_height, *LIP_HEIGHTS),
     }
     for name, (size, least, most) in sizes.items():
         if not least <= size <= most:

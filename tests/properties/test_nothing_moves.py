@@ -9,6 +9,7 @@ import sys
 import time
 import tomllib
 from importlib.resources import files
+from itertools import count
 from pathlib import Path
 
 import cv2
@@ -220,7 +221,9 @@ def test_armed_without_the_sentence_moves_nothing(
 ):
     before = emulator.admin.motions()
     # a real arm asks for real cameras, which nobody opens before the sentence is there
-    rig_file.write_text(re.sub(r'source = ".*"', "source = 0", rig_file.read_text()))
+    devices = count()
+    text = re.sub(r'source = ".*"', lambda _: f"source = {next(devices)}", rig_file.read_text())
+    rig_file.write_text(text)
     extra = {"record": ["--out", tmp_path / "out"], "pour": [poured_run, "--execute"]}[words]
     status, said = in_a_terminal(words, *extra, "--rig", rig_file, "--arm", typed=typed)
     assert status == REFUSED, said

@@ -26,7 +26,8 @@ def with_value(name, value):
 @pytest.mark.parametrize("name", ODD)
 def test_cups_that_nobody_pours_with_are_refused(name):
     cups = with_value(name, ODD[name])
-    with pytest.raises(InputError, match=rf"^cups: {name} = {ODD[name]:g}"):
+    field = name.rpartition(".")[2]
+    with pytest.raises(InputError, match=rf"^cups: (\w+\.)?{field} = {ODD[name]:g}"):
         cups_of(cups)
     assert kept_cups(cups.settings()) == cups  # a finished pour over them can be read
 
