@@ -24,6 +24,7 @@ from bolfi_liquids.hardware.session.session import Session, SessionStopped
 from bolfi_liquids.hardware.session.setup import SessionSetup
 
 IMAGE_SIZE = (160, 120)  # px
+FOCAL_LENGTH = 200.0  # px; they show what larger ones do
 
 
 class NoiseCamera:
@@ -65,7 +66,13 @@ def small_rig() -> Rig:
     """The bundled rig with small pictures and short rests."""
     rig = bundled_rig()
     cameras = tuple(
-        camera.model_copy(update={"width": IMAGE_SIZE[0], "height": IMAGE_SIZE[1]})
+        camera.model_copy(
+            update={
+                "width": IMAGE_SIZE[0],
+                "height": IMAGE_SIZE[1],
+                "focal_length": FOCAL_LENGTH,
+            }
+        )
         for camera in rig.cameras
     )
     stirring = rig.stirring.model_copy(update={"rest": 0.2})
