@@ -50,10 +50,10 @@ def given_path(path: str | Path, where: str) -> Path:
         InputError: It is no path, or empty, as a shell leaves a variable that is not set; "."
             says the current directory.
     """
-    path, given = as_path(path, where), path
-    if not str(given).strip():
+    given = as_path(path, where)
+    if not str(path).strip():  # Path("") is the current directory
         raise InputError("is empty", where=where, fix="give a path; was a variable not set?")
-    return path
+    return given
 
 
 def new_netcdf(path: str | Path) -> Path:

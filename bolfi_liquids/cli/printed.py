@@ -30,7 +30,7 @@ def print_next(run: Path, *commands: str) -> None:
 
 
 def print_next_pour(run: Path, *others: str) -> None:
-    """The same where a pour may follow, unless it would refuse the latest fit."""
+    """The same, and `pour`, or `report` where `pour` would refuse the latest fit."""
     from ..calibration.summary import FitStatus
     from ..criticism.result import latest_calibration
 

@@ -126,9 +126,10 @@ def _names(argument: str, given: str | Sequence[str] | None) -> tuple[str, ...] 
     Raises:
         InputError: Something else was given.
     """
-    if given is None or isinstance(given, str):
-        return None if given is None else (given,)
-    listed = list(given) if isinstance(given, Iterable) else [given]
+    if given is None:
+        return None
+    several = isinstance(given, Iterable) and not isinstance(given, str)
+    listed = list(given) if several else [given]
     names = tuple(one for one in listed if isinstance(one, str))
     if len(names) < len(listed):
         raise InputError(

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import Argument, InputError
+from .checks import SIZE_LIMITS
 from .toml_file import read_toml
 
 if TYPE_CHECKING:
     from ..models import Cups
 
 BUNDLED = "cups.toml"
-RADII, HEIGHTS, LIP_HEIGHTS = (5e-3, 0.25), (5e-3, 0.5), (5e-3, 1.0)  # [m] of what is poured by arm
+LIP_HEIGHTS = 5e-3, 1.0  # [m] of what an arm pours
 
 
 def bundled_cups() -> "Cups":
@@ -71,11 +72,12 @@ def _check_pourable(cups: "Cups", where: str) -> None:
     Raises:
         InputError: A size is a slip of the unit, or nothing flows over the lip.
     """
+    radii, heights = SIZE_LIMITS["cup_radius"], SIZE_LIMITS["cup_height"]
     sizes = {
-        "source.radius": (cups.source.radius, *RADII),
-        "receiver.radius": (cups.receiver.radius, *RADII),
-        "source.height": (cups.source.height, *HEIGHTS),
-        "receiver.height": (cups.receiver.height, *HEIGHTS),
+        "source.radius": (cups.source.radius, *radii),
+        "receiver.radius": (cups.receiver.radius, *radii),
+        "source.height": (cups.source.height, *heights),
+        "receiver.height": (cups.receiver.height, *heights),
         "lip_height": (cups.pour.lip_height, *LIP_HEIGHTS),
     }
     for name, (size, least, most) in sizes.items():

@@ -77,7 +77,7 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
         check_values(made)
         check_hangs(made)
     except InputError as err:
-        if "looks like" not in err.what and "convert" not in err.fix:
+        if "convert" not in err.fix:
             raise
         raise InputError(
             err.what, where=err.where, fix=f"{err.fix} (or the unit, in the map)"

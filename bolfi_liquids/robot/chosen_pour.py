@@ -82,8 +82,12 @@ class ChosenPour:
 
     def __str__(self) -> str:
         """As a person reads it before the motion, what is wrong first."""
-        wrong = [*map(str, self.stale), *([BAD_FIT] if self.fit_is_bad else [])]
-        return "\n".join([*wrong, self.expected])
+        return "\n".join([*self.wrong, self.expected])
+
+    @property
+    def wrong(self) -> list[str]:
+        """Why an arm refuses it; nothing if it does not."""
+        return [*map(str, self.stale), *([BAD_FIT] if self.fit_is_bad else [])]
 
     @property
     def expected(self) -> str:

@@ -18,7 +18,7 @@ from .armed_session import (
     armed_session,
     check_one,
 )
-from .chosen_pour import BAD_FIT, ChosenPour, chosen_pour
+from .chosen_pour import ChosenPour, chosen_pour
 from .live_view import SessionView
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class PourPlan(NamedTuple):
         return {"distance": self.chosen.judged.distance, "lip_height": lip_height}
 
 
-def plan_pour(run: str | Path, rig: "Rig") -> PourPlan:
+def plan_pour(run: Run, rig: "Rig") -> PourPlan:
     """The motion of the pour that a run has chosen.
 
     Raises:
@@ -124,17 +124,15 @@ def execute_pour(
     check_one(ask, emulate, "execute_pour")
     rig = rig_of(rig)
     with working_in_run(run_path(run)):
-        plan = plan_pour(run_path(run), rig)
+        plan = plan_pour(run, rig)
         if isinstance(run, Pour):
             run.check_current()
         if ask is not None:
             plan.chosen.check_fresh()
             plan.chosen.check_fit(despite_bad_fit=despite_bad_fit)
-        elif plan.chosen.fit_is_bad:
-            logger.warning(BAD_FIT)
-        for sentence in plan.chosen.stale:
-            logger.warning(str(sentence))
-        if ask is None:  # else a person has it before the question
+        else:  # nobody is asked, who would read it first
+            for sentence in plan.chosen.wrong:
+                logger.warning(sentence)
             logger.info(plan.chosen.expected)
         return _carried_out(plan, rig, ask, emulate, progress)
 

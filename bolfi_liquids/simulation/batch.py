@@ -54,7 +54,7 @@ class Where(NamedTuple):
 
 def batch_of(
     liquid: Mapping[str, ArrayLike],
-    effects: Mapping[str, float] | None,
+    effects: Mapping[str, float],
     particles: int,
     seed: ArrayLike,
 ) -> Batch:
@@ -87,7 +87,7 @@ def batch_of(
     liquids = tuple(
         Described(
             **{name: float(columns[name].flat[at]) for name in liquid},
-            effects=dict(effects or {}),
+            effects=effects,
             particles=particles,
             seed=columns["seed"].flat[at],
         )

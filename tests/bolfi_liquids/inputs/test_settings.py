@@ -5,9 +5,11 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+from bolfi_liquids.inference.bolfi import MOST_SIMULATIONS
 
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.settings import (
+    MAX_SIMULATIONS,
     MIN_SIMULATIONS,
     CalibrationSettings,
     CriticismSettings,
@@ -41,6 +43,10 @@ def test_a_value_that_breaks_a_rule_is_named(kind, where, name, value):
         kind(**{name: value})
     assert (refused.value.where, refused.value.what) == (where, repr(value))
     assert refused.value.fix
+
+
+def test_a_budget_ends_where_the_engine_does():
+    assert MAX_SIMULATIONS == MOST_SIMULATIONS
 
 
 @pytest.mark.parametrize("kind", [np.int64, np.uint8, np.int32])
