@@ -5,9 +5,10 @@ from .effect import Effect
 from .effects import EFFECTS, register
 from .fluid.faults import FailedSimulation
 from .fluid.liquid import Liquid
-from .fluid.numerics import MODEL_VERSION, PUBLISHED_DRAG, Numerics
+from .fluid.numerics import MODEL_VERSION, PUBLISHED_DRAG, ParticleNumerics
 from .fluid.runtime import TimeLimitExceeded, time_limit
 from .frames import PourFrames, StirFrames, pour_frames, stir_frames
+from .numerics import Numerics, UntestedResolution
 from .pouring import Landings, PourAction, PourBatch, PourResult, landings, pour
 from .rig import Rig
 from .stir_setup import Cup, Stick, StirSetup
@@ -24,6 +25,7 @@ __all__ = [
     "Landings",
     "Liquid",
     "Numerics",
+    "ParticleNumerics",
     "PourAction",
     "PourBatch",
     "PourFrames",
@@ -33,6 +35,7 @@ __all__ = [
     "StirFrames",
     "StirSetup",
     "TimeLimitExceeded",
+    "UntestedResolution",
     "landings",
     "pour",
     "pour_frames",

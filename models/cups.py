@@ -14,7 +14,7 @@ from pydantic import (
     model_validator,
 )
 
-from .fluid.numerics import MODEL_VERSION, POUR_PARTICLES, Numerics
+from .fluid.numerics import MODEL_VERSION, POUR_PARTICLES, ParticleNumerics
 
 MIN_LENGTH, MAX_RADIUS, MAX_HEIGHT = 1e-3, 0.25, 2.0  # [m] of cups that are poured by hand or arm
 MAX_DISTANCE = 0.5  # [m] from the lip to the receiver's axis
@@ -144,9 +144,9 @@ class Cups(_Section, frozen=True):
 
     def least_viscosity(self, density: float, angular_velocity: float) -> float:
         """Viscosity [Pa s] below which pours cannot distinguish liquids of `density` [kg/m³]; see
-        `Numerics.least_viscosity`. The source's floor turns about the lip at the flow's speed."""
+        `ParticleNumerics.least_viscosity`. The source's floor turns about the lip at the flow's speed."""
         speed = angular_velocity * self.source.height
-        return Numerics().least_viscosity(self.spacing(), density, speed)
+        return ParticleNumerics().least_viscosity(self.spacing(), density, speed)
 
     def settings(self, particles: int = POUR_PARTICLES) -> dict[str, Any]:
         """Everything that fixes the simulator, as plain numbers, with the model's version."""
@@ -154,7 +154,7 @@ class Cups(_Section, frozen=True):
             "model": MODEL_VERSION,
             "scene": "pour",
             "particles": particles,
-            "numerics": asdict(Numerics()),
+            "numerics": asdict(ParticleNumerics()),
             **self.model_dump(),
         }
 

@@ -112,7 +112,12 @@ class Effect:
 
     @property
     def scenes(self) -> tuple[str, ...]:
-        """Scenes in which it acts: "stir", "pour"; elsewhere its coefficient changes nothing."""
+        """Scenes in which it acts: "stir", "pour"; elsewhere its coefficient changes nothing.
+
+        Forces on the liquid are of surfaces, and stirs have none that pull.
+        """
+        if self.acts_in == "liquid" and self.make_rheology is None:
+            return ("pour",)
         return SCENES[self.acts_in]
 
     @cached_property

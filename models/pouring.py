@@ -19,7 +19,7 @@ from .fluid import runtime
 from .fluid.checks import check_numbers
 from .fluid.faults import faulty
 from .fluid.liquid import Liquid
-from .fluid.numerics import POUR_PARTICLES, Numerics
+from .fluid.numerics import POUR_PARTICLES, ParticleNumerics
 from .fluid.packing import checked_seeds, pack_cylinder
 from .fluid.runtime import Watch
 from .fluid.settled import Packing, SettledPackings
@@ -197,7 +197,7 @@ def _scene(cups: Cups, particles: int, effects: tuple[Effect, ...] = ()):
     from .pouring_kernel import PouringScene
 
     return PouringScene(
-        runtime.SLOTS, particles, cups.spacing(particles), Numerics(), cups, effects
+        runtime.SLOTS, particles, cups.spacing(particles), ParticleNumerics(), cups, effects
     )
 
 

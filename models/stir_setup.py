@@ -7,10 +7,13 @@ from typing import Any, Protocol
 import numpy as np
 
 from .fluid.checks import check_numbers
-from .fluid.numerics import MODEL_VERSION, Numerics
+from .fluid.numerics import MODEL_VERSION, STIR_PARTICLES, ParticleNumerics
+from .numerics import Numerics, check_resolution
 from .trajectory import Trajectory, mean_speed
 
 MAX_FILL_RATIO = 1.5  # times the setup's fill is the largest
+MAX_TILT = 1.5  # rad
+FIRST_SECONDS, FIRST_SAMPLES = 0.15, 5  # of a recording, which show how the stick starts
 
 
 class HasRig(Protocol):
@@ -66,20 +69,27 @@ class StirSetup:
         cup: The cup.
         stick: The stick.
         submerged: Depth of the stick's tip below the surface at rest [m].
-        particles: Number of particles.
-        numerics: Constants of the discretisation.
+        particles: Number of particles, which decides the cells; None: cells follow the stick.
+        numerics: Constants of the discretisation; `ParticleNumerics` chooses the former fluid.
+        tilt: Of the stick at the start, in the xz and yz planes [rad]; the former fluid's hangs
+            straight down.
     """
 
     cup: Cup
     stick: Stick
     submerged: float
-    particles: int = 1000
-    numerics: Numerics = field(default_factory=Numerics)
+    particles: int | None = None
+    numerics: Numerics | ParticleNumerics = field(default_factory=Numerics)
+    tilt: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        check_numbers("setup", submerged=self.submerged, particles=self.particles)
-        if self.particles != int(self.particles):
-            raise ValueError(f"setup: particles must be a whole number, got {self.particles}")
+        check_numbers("setup", submerged=self.submerged)
+        if self.particles is not None:
+            check_numbers("setup", particles=self.particles)
+            if self.particles != int(self.particles):
+                raise ValueError(f"setup: particles must be a whole number, got {self.particles}")
+        if not all(abs(angle) < MAX_TILT for angle in self.tilt):
+            raise ValueError(f"setup: tilt must be less than {MAX_TILT} rad, got {self.tilt}")
         if self.stick.radius >= self.cup.radius:
             raise ValueError(
                 f"setup: the stick, of radius {self.stick.radius} m, does not fit into the cup, of "
@@ -88,13 +98,21 @@ class StirSetup:
 
     @classmethod
     def from_recording(
-        cls, recording: HasRig, particles: int = 1000, numerics: Numerics | None = None
+        cls,
+        recording: HasRig,
+        particles: int | None = None,
+        numerics: Numerics | ParticleNumerics | None = None,
     ) -> "StirSetup":
         """The setup that a recording's attributes describe (the first pivot position too).
+
+        The stick starts as inclined as the cameras saw it at first; without `inclination` it hangs
+        straight down.
 
         Raises:
             ValueError: an attribute is missing or makes no sense, or the stick does not reach the
                 liquid.
+        Warns:
+            UntestedResolution: `particles` make cells that no reference was compared with.
         """
         attrs = recording.attrs
         wanted = ("cup_radius", "cup_height", "fill", "stick_radius", "stick_length")
@@ -116,23 +134,41 @@ class StirSetup:
                 f"the stick's tip starts {-submerged:.4f} m above the liquid; check fill={fill}, "
                 f"stick_length={length} and the gripper's z={start[2]:.4f}"
             )
-        return cls(
+        setup = cls(
             cup=Cup(cup_radius, height, fill),
             stick=Stick(radius, length, mass),
             submerged=min(submerged, fill),
             particles=particles,
             numerics=numerics or Numerics(),
+            tilt=_first_tilt(recording),
         )
+        if isinstance(setup.numerics, Numerics):
+            check_resolution(radius, setup.cell)
+        return setup
+
+    @property
+    def per_cell(self) -> int:
+        """Particles in a full cell; the former fluid has as many cells as particles."""
+        return self.numerics.per_cell if isinstance(self.numerics, Numerics) else 1
+
+    @property
+    def cell(self) -> float:
+        """Edge of a cell [m]."""
+        if self.particles is None and isinstance(self.numerics, Numerics):
+            return self.numerics.cell * self.stick.radius
+        count = self.particles or STIR_PARTICLES
+        return float((self.per_cell * self.liquid_volume(self.cup.fill) / count) ** (1.0 / 3.0))
 
     @property
     def spacing(self) -> float:
         """Particle spacing [m], the cube root of the liquid's volume per particle."""
-        return float((self.liquid_volume(self.cup.fill) / self.particles) ** (1.0 / 3.0))
+        return self.cell / self.per_cell ** (1.0 / 3.0)
 
     @property
-    def rate(self) -> float:
-        """Substeps per second [Hz]."""
-        return self.numerics.substep_rate(self.spacing)
+    def hanging(self) -> np.ndarray:
+        """Unit vector from the pivot to the stick's tip at the start, shape [3]."""
+        down = np.array([*np.tan(self.tilt), -1.0])
+        return down / np.linalg.norm(down)
 
     @property
     def deepest(self) -> float:
@@ -150,10 +186,22 @@ class StirSetup:
         return np.pi * (self.cup.radius**2 * fill - self.stick.radius**2 * wet)
 
     def count(self, fill: float | np.ndarray) -> np.ndarray:
-        """Particles, of the setup's size, that fill the cup to the depth `fill` [m]."""
-        share = self.liquid_volume(fill) / self.liquid_volume(self.cup.fill)
-        return np.rint(self.particles * share).astype(int)
+        """Particles of the setup's size that fill the cup to the depth `fill` [m]."""
+        return np.rint(self.liquid_volume(fill) / self.spacing**3).astype(int)
 
     def settings(self) -> dict[str, Any]:
         """Everything that fixes the simulator, as plain numbers, with the model's version."""
         return {"model": MODEL_VERSION, "scene": "stir", **asdict(self)}
+
+
+def _first_tilt(recording: HasRig) -> tuple[float, float]:
+    """Mean inclination of the first samples [rad], 0 where there is none."""
+    seen = getattr(recording, "inclination", None)
+    if seen is None:
+        return 0.0, 0.0
+    time = np.asarray(recording.gripper.time)
+    first = max(FIRST_SAMPLES, int(np.sum(time - time[0] < FIRST_SECONDS)))
+    start = np.asarray(seen, float)[:first]
+    if not np.isfinite(start).any(axis=0).all():
+        return 0.0, 0.0
+    return tuple(np.nanmean(start, axis=0).tolist())

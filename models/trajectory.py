@@ -21,13 +21,13 @@ def substep_path(gripper: Trajectory, rate: float) -> np.ndarray:
         ValueError: fewer than two finite samples, times that do not rise, positions of another
             shape.
     """
-    time, (seen, position) = np.asarray(gripper.time), _finite(gripper)
+    time, (seen, position) = np.asarray(gripper.time), finite_samples(gripper)
     substeps = int(np.ceil((time[-1] - time[0]) * rate))
     grid = time[0] + np.arange(substeps + 1) / rate
     return np.stack([np.interp(grid, seen, position[:, axis]) for axis in range(3)], axis=1)
 
 
-def _finite(gripper: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+def finite_samples(gripper: Trajectory) -> tuple[np.ndarray, np.ndarray]:
     """Times [n] and positions [n, 3] of the finite samples, two at least."""
     time, position = np.asarray(gripper.time), np.asarray(gripper.position)
     if position.shape != (len(time), 3):
@@ -49,7 +49,7 @@ def mean_speed(gripper: Trajectory) -> float:
     Raises:
         ValueError: fewer than two finite samples.
     """
-    time, position = _finite(gripper)
+    time, position = finite_samples(gripper)
     interval = np.diff(time)
     stretch = np.sum(np.diff(position, axis=0) ** 2, axis=1) / interval
     return float(np.sqrt(stretch.sum() / interval.sum()))

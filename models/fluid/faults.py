@@ -5,10 +5,11 @@ import warnings
 import numpy as np
 
 LARGEST = 1e30  # squared speed [m²/s²] that single precision can still work with
-SOUND, COLLAPSED, RUNAWAY, UNSOLVED = 0, 1, 2, 3
+SOUND, COLLAPSED, RUNAWAY, UNSOLVED, DRIFTED = range(5)
 REASONS = {
     COLLAPSED: "the liquid collapsed: its particles have too many neighbours",
     UNSOLVED: "its viscosity is too large to compute with; up to 100 Pa s it is safe",
+    DRIFTED: "its level moved by more than 2 %: take smaller cells or shorter steps",
     RUNAWAY: "a particle ran away: its velocity is not finite or beyond any liquid's",
 }
 

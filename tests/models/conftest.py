@@ -45,7 +45,7 @@ def weightless():
     @ti.data_oriented
     class Weightless(Fluid):
         def __init__(self, slots, particles, spacing, extent, effects=()):
-            super().__init__(slots, particles, spacing, models.Numerics(), extent)
+            super().__init__(slots, particles, spacing, models.ParticleNumerics(), extent)
             self.bring(effects)
 
         @ti.func

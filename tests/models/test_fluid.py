@@ -51,7 +51,7 @@ def test_viscosity_damps_a_shear_wave_as_its_number_says(viscosity):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "numerics",
-    [models.Numerics(), pytest.param(models.PUBLISHED_DRAG, marks=pytest.mark.minutes)],
+    [models.ParticleNumerics(), pytest.param(models.PUBLISHED_DRAG, marks=pytest.mark.minutes)],
 )
 def test_stick_and_liquid_exchange_angular_momentum(glycerin, numerics):
     """About the pivot, in one substep out of reach of the cup, gravity's share taken off.

@@ -37,8 +37,8 @@ def test_what_cannot_be_is_named(cup, stick, particles, message):
 )
 def test_numerics_are_positive_and_finite(name, value):
     with pytest.raises(ValueError, match=f"numerics: {name} must be"):
-        models.Numerics(**{name: value})
-    assert models.Numerics(stick_thinner=0.0).stick_core(0.005, 0.006) == 0.005
+        models.ParticleNumerics(**{name: value})
+    assert models.ParticleNumerics(stick_thinner=0.0).stick_core(0.005, 0.006) == 0.005
 
 
 @pytest.mark.parametrize(

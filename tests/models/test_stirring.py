@@ -79,7 +79,7 @@ def test_without_liquid_the_stick_is_the_driven_spherical_pendulum(glycerin):
 @pytest.mark.parametrize(
     ("numerics", "tolerance"),
     [
-        pytest.param(models.Numerics(), 0.2, marks=pytest.mark.minutes),
+        pytest.param(models.ParticleNumerics(), 0.2, marks=pytest.mark.minutes),
         pytest.param(models.PUBLISHED_DRAG, 0.1, marks=pytest.mark.minutes),
     ],
 )

@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...fluid.numerics import PUBLISHED_DRAG, Numerics
+from ...fluid.numerics import PUBLISHED_DRAG, ParticleNumerics
 from ...stir_setup import Stick
 from ..truths.pendulum import Rod
 
-STICKS = {"": Numerics(), ", drag as published": PUBLISHED_DRAG}
+STICKS = {"": ParticleNumerics(), ", drag as published": PUBLISHED_DRAG}
 KICK = 2  # samples that a kick lasts
 
 

@@ -6,7 +6,7 @@ from ... import stirring
 from ...fluid import runtime
 from ...fluid.fluid import DAMPING
 from ...fluid.liquid import Liquid
-from ...fluid.numerics import Numerics
+from ...fluid.numerics import ParticleNumerics
 from ...stir_setup import Cup, Stick, StirSetup
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from ..truths.pendulum import Rod, archimedes_torque
@@ -23,7 +23,7 @@ PACKINGS = 8
 TOLERANCE = 0.05
 
 
-def torque(numerics: Numerics, tilt: float, seed: int) -> tuple[np.ndarray, float]:
+def torque(numerics: ParticleNumerics, tilt: float, seed: int) -> tuple[np.ndarray, float]:
     """Of the liquid on each stick about its pivot, towards the surface, and of Archimedes [N m]."""
     setup = StirSetup(CUP, STICK, SUBMERGED, numerics=numerics)
     # the wet part near the axis

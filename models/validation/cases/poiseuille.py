@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.optimize import root_scalar
 
-from ...fluid.numerics import Numerics
+from ...fluid.numerics import ParticleNumerics
 from ..analysis.profiles import binned_profile, fit_poiseuille
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from ..scenes.channel import Profiles
@@ -64,7 +64,7 @@ def run(progress: Progress, seed: int) -> CaseResult:
         name = f"{viscosity:g} Pa s"
         notes[f"slip at {name} [m/s]"] = [round(slip, 4) for slip in fit.slip]
         if viscosity == THIN:
-            floor = Numerics().least_viscosity(CHANNEL.spacing, DENSITY, SPEED)
+            floor = ParticleNumerics().least_viscosity(CHANNEL.spacing, DENSITY, SPEED)
             rows.append(
                 Row.relative(f"least that {name} flows with [Pa s]", floor, flux, FLOOR_TOLERANCE)
             )
@@ -85,7 +85,7 @@ CASE = Case(
     name="poiseuille",
     title="Flow between plates, driven by a force",
     truth="a parabola as high as the viscosity asked for makes it; at 1 mPa s, the least there is",
-    source="Batchelor 1967, section 4.2; for the least viscosity, `Numerics.least_viscosity`",
+    source="Batchelor 1967, section 4.2; for the least viscosity, `ParticleNumerics.least_viscosity`",
     unit="relative",
     tolerance=TOLERANCE,
     settings={

@@ -15,7 +15,7 @@ from ...fluid.fluid import (
     Fluid,
     vec3,
 )
-from ...fluid.numerics import Numerics
+from ...fluid.numerics import ParticleNumerics
 from ...fluid.runtime import CHUNK
 
 JITTER = 0.1  # sd of where particles start, in spacings
@@ -46,7 +46,7 @@ class Box:
     slippery: bool = False
     rod: float = 0.0
     sponge: float = 0.0
-    numerics: Numerics = Numerics()
+    numerics: ParticleNumerics = ParticleNumerics()
 
 
 @ti.data_oriented

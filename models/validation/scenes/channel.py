@@ -10,7 +10,7 @@ import numpy as np
 from ...effects import EFFECTS
 from ...fluid import runtime
 from ...fluid.liquid import Liquid
-from ...fluid.numerics import COARSE, Numerics
+from ...fluid.numerics import COARSE, ParticleNumerics
 from .box import Box, box_scene, lattice
 
 ROOM = 0.03  # of the gap beyond the particles' volume: what is squeezed in flows like sand
@@ -33,7 +33,7 @@ class Channel:
     spacing: float = COARSE
     layers: int = 12
     around: int = 8
-    numerics: Numerics = Numerics()
+    numerics: ParticleNumerics = ParticleNumerics()
 
     @property
     def gap(self) -> float:

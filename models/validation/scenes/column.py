@@ -7,7 +7,7 @@ import numpy as np
 
 from ...fluid import runtime
 from ...fluid.liquid import Liquid
-from ...fluid.numerics import Numerics
+from ...fluid.numerics import ParticleNumerics
 from .box import Box, box_scene, lattice
 
 AROUND = 8  # spacings along a side that repeats
@@ -28,7 +28,7 @@ class Column:
     width: float
     height: float
     layers: int
-    numerics: Numerics = Numerics()
+    numerics: ParticleNumerics = ParticleNumerics()
 
     @property
     def spacing(self) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from ...fluid import runtime
 from ...fluid.fluid import GRAVITY
 from ...fluid.liquid import Liquid
-from ...fluid.numerics import COARSE, Numerics
+from ...fluid.numerics import COARSE, ParticleNumerics
 from .box import Box, box_scene, lattice
 
 AROUND = 8  # particles along the sides, which repeat
@@ -29,7 +29,7 @@ class Film:
     layers: int = 10
     spacing: float = COARSE
     gravity: float = GRAVITY
-    numerics: Numerics = Numerics()
+    numerics: ParticleNumerics = ParticleNumerics()
 
     @property
     def depth(self) -> float:

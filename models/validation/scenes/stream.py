@@ -9,7 +9,7 @@ import numpy as np
 from ...fluid import runtime
 from ...fluid.fluid import GRAVITY
 from ...fluid.liquid import Liquid
-from ...fluid.numerics import COARSE, Numerics
+from ...fluid.numerics import COARSE, ParticleNumerics
 from .box import Box, box_scene, lattice
 
 SPONGE = 0.15  # of the length: where the wake that comes round is smoothed away
@@ -31,7 +31,7 @@ class Stream:
     diameters: float = 20.0
     layers: int = 8
     spacing: float = COARSE
-    numerics: Numerics = Numerics()
+    numerics: ParticleNumerics = ParticleNumerics()
 
     @property
     def around(self) -> int:

@@ -1,0 +1,1 @@
+"""The liquid: particles carry it, a staggered grid solves pressure and viscosity."""

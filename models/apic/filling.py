@@ -1,0 +1,35 @@
+"""Where the particles of a filled vessel start."""
+
+import numpy as np
+
+from .grid import Grid
+
+POINTS = {
+    1: [(0.5, 0.5, 0.5)],
+    2: [(0.25, 0.25, 0.25), (0.75, 0.75, 0.75)],
+    4: [(0.25, 0.25, 0.25), (0.75, 0.75, 0.25), (0.25, 0.75, 0.75), (0.75, 0.25, 0.75)],
+}
+"""Of a cell, in cells, by how many there are: lattices whose deposit fills each cell alike."""
+
+JITTER = 0.1  # of the distance of particles, to either side
+OFF_WALL = 0.02  # cells that a particle keeps from a wall
+
+
+def fill_cup(grid: Grid, radius: float, fill: float, per_cell: int, seed: int) -> np.ndarray:
+    """Particles of an upright cup of liquid [m], shape (n, 3); the floor is z = 0.
+
+    Layers are stretched so that whole and half ones fill the cup exactly.
+    """
+    corners = grid.points((0.0, 0.0, 0.0))[grid.inner()]
+    points = np.concatenate([corners + grid.cell * np.array(at) for at in POINTS[per_cell]])
+    layers = round(2.0 * fill / grid.cell) / 2.0 * grid.cell
+    points[:, 2] *= fill / layers
+    across = np.hypot(points[:, 0], points[:, 1])
+    inside = (across < radius) & (points[:, 2] > 0.0) & (points[:, 2] < fill - 1e-6)
+    spacing = grid.cell / per_cell ** (1.0 / 3.0)
+    rng = np.random.default_rng(seed)
+    points = points[inside] + JITTER * spacing * rng.uniform(-1.0, 1.0, (inside.sum(), 3))
+    across = np.hypot(points[:, 0], points[:, 1])
+    points[:, :2] *= np.minimum(1.0, (radius - OFF_WALL * grid.cell) / across)[:, None]
+    points[:, 2] = np.maximum(points[:, 2], OFF_WALL * grid.cell)
+    return points

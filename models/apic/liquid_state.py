@@ -1,0 +1,161 @@
+# type: ignore  (Taichi compiles this source and gives these names their types)
+"""Fields of groups of liquids that march together."""
+
+import numpy as np
+import taichi as ti
+
+from .lanes import LANES, lanes, mat3, vec3
+from .transfer import GRAVITY, clear
+
+
+@ti.data_oriented
+class LiquidState:
+    """Particles and grid of `groups` times `LANES` liquids in vessels of one shape.
+
+    Room is allocated once. The sizes of a scene are numbers in fields, so kernels that were
+    compiled for one scene serve all.
+
+    Attributes:
+        velocity, mass: Of faces, in m/s and full cells.
+        volume: Deposited in a cell, in full cells.
+        fraction: Of the cell's capacity.
+        liquid: 1 in cells that have pressure.
+        pressure: Times step over density and cell [m/s].
+        status: How a lane fares, a code of `faults`.
+    """
+
+    def __init__(self, groups, cells, particles, effects=()):
+        """
+        Args:
+            groups: Groups of lanes.
+            cells, particles: Room for so many in each.
+            effects: Liquid `Effect`s that act in all lanes, in this order.
+        """
+        self.groups, self.cells, self.particles = groups, cells, particles
+
+        def of_cells():
+            return ti.Vector.field(LANES, ti.f32, (groups, cells))
+
+        def of_faces():
+            return ti.Vector.field(LANES, ti.f32, (groups, 3, cells))
+
+        self.velocity, self.mass, self.inverse = of_faces(), of_faces(), of_faces()
+        self.rest, self.search, self.product = of_faces(), of_faces(), of_faces()
+        self.friction, self.coupling = of_faces(), of_faces()
+        self.normal, self.shear, self.shear_weight = of_faces(), of_faces(), of_faces()
+        self.volume, self.fraction, self.liquid = (of_cells() for _ in range(3))
+        self.pressure, self.rise, self.source, self.diagonal = (of_cells() for _ in range(4))
+        self.cell_rest, self.cell_search, self.cell_product = (of_cells() for _ in range(3))
+        self.normal_weight = of_cells()
+
+        # of the vessel
+        self.usable, self.open_volume, self.capacity = (ti.field(ti.f32, cells) for _ in range(3))
+        self.area, self.carries, self.shut, self.rub, self.solid = (
+            ti.field(ti.f32, (3, cells)) for _ in range(5)
+        )
+        self.shape = ti.Vector.field(3, ti.i32, ())
+        self.origin = ti.Vector.field(3, ti.f32, ())
+        self.cell, self.dt = ti.field(ti.f32, ()), ti.field(ti.f32, ())
+
+        # cells within one and two cells of a particle, and those of liquid
+        self.mark, self.spread = (ti.field(ti.i32, (groups, cells)) for _ in range(2))
+        self.near, self.around, self.wet = (ti.field(ti.i32, (groups, cells)) for _ in range(3))
+        self.nears, self.arounds, self.wets = (ti.field(ti.i32, groups) for _ in range(3))
+
+        self.position, self.speed = (
+            ti.Vector.field(3, ti.f32, (groups, LANES, particles)) for _ in range(2)
+        )
+        self.slope = ti.Matrix.field(3, 3, ti.f32, (groups, LANES, particles))
+        self.count, self.status = (ti.field(ti.i32, (groups, LANES)) for _ in range(2))
+        self.particle, self.viscosity, self.density, self.fill = (
+            ti.Vector.field(LANES, ti.f32, groups) for _ in range(4)
+        )
+        self.lack = ti.Vector.field(LANES, ti.f32, groups)  # of density, where the level is high
+        self.iterations = ti.Vector.field(LANES, ti.f32, (groups, 2))
+
+        self.rheologies = [effect.make_rheology() for effect in effects]
+        if self.rheologies:
+            self.thickness = of_cells()  # viscosity of a cell [m²/s]
+            self.coefficient = ti.Vector.field(LANES, ti.f32, (len(effects), groups))
+
+    def enter_vessel(self, grid, geometry, dt):
+        """Take a vessel's `Grid` and `Geometry`, and a step [s]."""
+        g = geometry
+        self._enter_vessel(
+            np.array(grid.shape, np.int32),
+            np.array([*grid.origin, grid.cell, dt], np.float32),
+            np.stack([g.usable, g.volume, g.capacity]),
+            np.stack([g.area, g.carries, g.shut, g.friction, g.solid]),
+        )
+
+    @ti.kernel
+    def _enter_vessel(
+        self,
+        shape: ti.types.ndarray(ti.i32, 1),
+        lengths: ti.types.ndarray(ti.f32, 1),
+        of_cells: ti.types.ndarray(ti.f32, 2),
+        of_faces: ti.types.ndarray(ti.f32, 3),
+    ):
+        for _ in range(1):
+            for a in ti.static(range(3)):
+                self.shape[None][a] = shape[a]
+                self.origin[None][a] = lengths[a]
+            self.cell[None] = lengths[3]
+            self.dt[None] = lengths[4]
+        for m in range(of_cells.shape[1]):
+            self.usable[m] = of_cells[0, m]
+            self.open_volume[m] = of_cells[1, m]
+            self.capacity[m] = of_cells[2, m]
+            for a in range(3):
+                self.area[a, m] = of_faces[0, a, m]
+                self.carries[a, m] = of_faces[1, a, m]
+                self.shut[a, m] = of_faces[2, a, m]
+                self.rub[a, m] = of_faces[3, a, m]
+                self.solid[a, m] = of_faces[4, a, m]
+
+    @ti.kernel
+    def fill_in(
+        self,
+        position: ti.types.ndarray(ti.f32, 4),
+        count: ti.types.ndarray(ti.i32, 2),
+        liquid: ti.types.ndarray(ti.f32, 3),
+    ):
+        """Liquid at rest, in equilibrium.
+
+        Args:
+            position: Of the particles [m], shape [groups, LANES, n, 3].
+            count: Of particles, shape [groups, LANES]; an empty lane takes no time.
+            liquid: Volume of a particle [full cells], kinematic viscosity [m²/s], density [kg/m³]
+                and depth [m], shape [4, groups, LANES].
+        """
+        for g in range(position.shape[0]):
+            clear(self, g)
+            self.arounds[g], self.nears[g], self.wets[g] = 0, 0, 0
+            self.lack[g] = lanes(0.0)
+            for k in ti.static(range(2)):
+                self.iterations[g, k] = lanes(0.0)
+            for l in range(LANES):
+                self.count[g, l] = count[g, l]
+                self.status[g, l] = 0
+                self.particle[g][l] = liquid[0, g, l]
+                self.viscosity[g][l] = liquid[1, g, l]
+                self.density[g][l] = liquid[2, g, l]
+                self.fill[g][l] = liquid[3, g, l]
+                for n in range(count[g, l]):
+                    for a in ti.static(range(3)):
+                        self.position[g, l, n][a] = position[g, l, n, a]
+                    self.speed[g, l, n] = vec3(0.0)
+                    self.slope[g, l, n] = mat3(0.0)
+            cell = self.cell[None]
+            layer = self.shape[None][0] * self.shape[None][1]
+            for m in range(layer * self.shape[None][2]):
+                z = self.origin[None][2] + (m // layer + 0.5) * cell
+                weight = self.usable[m] * GRAVITY * self.dt[None] / cell
+                for l in range(LANES):
+                    self.pressure[g, m][l] = weight * ti.max(self.fill[g][l] - z, 0.0)
+
+    def set_coefficients(self, coefficients):
+        """Of the effects, shape [effects, groups, LANES]."""
+        for effect, of_groups in enumerate(coefficients):
+            for g, values in enumerate(of_groups):
+                self.coefficient[effect, g] = values

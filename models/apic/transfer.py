@@ -1,0 +1,197 @@
+# type: ignore  (Taichi compiles this source and gives these names their types)
+"""From particles to the grid and back: the affine particle-in-cell method.
+
+Jiang, Schroeder, Selle, Teran and Stomakhin (2015), "The affine particle-in-cell method".
+"""
+
+import taichi as ti
+
+from ..fluid.faults import DRIFTED, LARGEST, RUNAWAY, SOUND
+from .lanes import LANES, lanes, mat3, vec3
+
+GRAVITY = 9.81
+OFF_WALL = 0.02  # cells that particles keep from walls
+LEVEL_GAIN = 4.0
+"""A liquid whose mean height is too low by a share x asks for a density less by 4 x: particles that
+crowd in cut cells and sink otherwise."""
+MOST_DRIFT = 0.02  # of the fill, by which the level moves at most
+TOP_SPEED = 20.0  # m/s, ten times what falls from a cup
+STEEPEST = 0.5  # cells a step over a cell: a steeper slope would hold a lone particle in the air
+
+
+@ti.func
+def strides(s):
+    return ti.Vector([1, s.shape[None][0], s.shape[None][0] * s.shape[None][1]])
+
+
+@ti.func
+def place(s, x):
+    """The cell that a point (in cells) lies in, and where in it."""
+    base = ti.floor(x)
+    i = ti.cast(base, ti.i32)
+    return i.dot(strides(s)), x - base
+
+
+@ti.func
+def share(corner: ti.template(), part):
+    """Trilinear weight of a corner."""
+    w = 1.0
+    for a in ti.static(range(3)):
+        w *= part[a] if ti.static(corner >> a & 1) else 1.0 - part[a]
+    return w
+
+
+@ti.func
+def step_to(corner, S):
+    o = 0
+    for a in range(3):
+        o += (corner >> a & 1) * S[a]
+    return o
+
+
+@ti.func
+def clear(s, g):
+    """Empty what the last step has filled."""
+    zero = lanes(0.0)
+    for n in range(s.arounds[g]):
+        m = s.around[g, n]
+        s.mark[g, m] = 0
+        s.volume[g, m] = zero
+        s.fraction[g, m] = zero
+        s.liquid[g, m] = zero
+        s.rise[g, m] = zero
+        s.cell_search[g, m] = zero
+        s.normal_weight[g, m] = zero
+        for a in range(3):
+            s.velocity[g, a, m] = zero
+            s.mass[g, a, m] = zero
+            s.search[g, a, m] = zero
+            s.shear_weight[g, a, m] = zero
+
+
+@ti.func
+def deposit(s, g):
+    """Volumes and momenta of the particles, after gravity has acted on them."""
+    S = strides(s)
+    per_cell = 1.0 / s.cell[None]
+    fall = vec3(0.0, 0.0, -GRAVITY * s.dt[None])
+    for l in range(LANES):
+        volume = s.particle[g][l]
+        for n in range(s.count[g, l]):
+            x = (s.position[g, l, n] - s.origin[None]) * per_cell
+            v = s.speed[g, l, n] + fall
+            slope = s.slope[g, l, n]
+            for a in range(3):
+                at = x - 0.5
+                at[a] += 0.5
+                m, part = place(s, at)
+                for corner in ti.static(range(8)):
+                    o = m + step_to(corner, S)
+                    w = volume * share(corner, part)
+                    u = v[a]
+                    for b in ti.static(range(3)):
+                        u += slope[a, b] * ((corner >> b & 1) - part[b])
+                    # not +=, which is atomic and ten times slower
+                    s.mass[g, a, o][l] = s.mass[g, a, o][l] + w
+                    s.velocity[g, a, o][l] = s.velocity[g, a, o][l] + w * u
+            m, part = place(s, x - 0.5)
+            for corner in ti.static(range(8)):
+                o = m + step_to(corner, S)
+                s.volume[g, o][l] = s.volume[g, o][l] + volume * share(corner, part)
+            s.mark[g, place(s, x)[0]] = 1
+
+
+@ti.func
+def list_cells(s, g):
+    """Cells within one and within two cells of a particle of any lane, in their order."""
+    S, shape = strides(s), s.shape[None]
+    size = shape[2] * S[2]
+    for m in range(size):
+        s.spread[g, m] = 0
+        s.near[g, m] = 0
+    for m in range(2, size - 2):  # bit 0: within one cell, bit 1: within two
+        b = s.mark[g, m] | s.mark[g, m - 1] | s.mark[g, m + 1]
+        s.spread[g, m] = b | ((b | s.mark[g, m - 2] | s.mark[g, m + 2]) << 1)
+    for m in range(2 * S[1], size - 2 * S[1]):
+        b = s.spread[g, m] | s.spread[g, m - S[1]] | s.spread[g, m + S[1]]
+        far = s.spread[g, m - 2 * S[1]] | s.spread[g, m + 2 * S[1]]
+        s.near[g, m] = (b & 1) | ((b | far) & 2)
+    for m in range(size):
+        b, far = s.near[g, m], 0
+        if S[2] <= m and m < size - S[2]:
+            b |= s.near[g, m - S[2]] | s.near[g, m + S[2]]
+        if 2 * S[2] <= m and m < size - 2 * S[2]:
+            far = s.near[g, m - 2 * S[2]] | s.near[g, m + 2 * S[2]]
+        s.spread[g, m] = (b & 1) | ((b | far) & 2)
+    nears, arounds = 0, 0
+    for m in range(size):
+        b = s.spread[g, m]
+        if b > 0:
+            s.around[g, arounds] = m
+            arounds += 1
+            if b & 1 and S[2] <= m and m < size - S[2]:
+                s.near[g, nears] = m
+                nears += 1
+    s.nears[g] = nears
+    s.arounds[g] = arounds
+
+
+@ti.func
+def interpolate(s, g, a, l, x):
+    """Value and slope (per cell) of a grid field at a point, in cells of its own lattice."""
+    S = strides(s)
+    m, part = place(s, x)
+    a0, a1 = s.velocity[g, a, m][l], s.velocity[g, a, m + S[1]][l]
+    a2, a3 = s.velocity[g, a, m + S[2]][l], s.velocity[g, a, m + S[1] + S[2]][l]
+    d0, d1 = s.velocity[g, a, m + 1][l] - a0, s.velocity[g, a, m + 1 + S[1]][l] - a1
+    d2, d3 = s.velocity[g, a, m + 1 + S[2]][l] - a2, s.velocity[g, a, m + 1 + S[1] + S[2]][l] - a3
+    a0 += part[0] * d0
+    a1 += part[0] * d1
+    a2 += part[0] * d2
+    a3 += part[0] * d3
+    low, high = a0 + part[1] * (a1 - a0), a2 + part[1] * (a3 - a2)
+    d_low, d_high = d0 + part[1] * (d1 - d0), d2 + part[1] * (d3 - d2)
+    slope = vec3(
+        d_low + part[2] * (d_high - d_low),
+        (a1 - a0) + part[2] * ((a3 - a2) - (a1 - a0)),
+        high - low,
+    )
+    return low + part[2] * (high - low), slope
+
+
+@ti.func
+def move(s, g):
+    """Velocities and slopes back to the particles, which move, to second order, within the cup.
+
+    A lane that went wrong gets its status and loses its particles.
+    """
+    per_cell, dt = 1.0 / s.cell[None], s.dt[None]
+    steepest = STEEPEST / (dt * per_cell)
+    for l in range(LANES):
+        height, energy, fastest = 0.0, 0.0, 0.0
+        for n in range(s.count[g, l]):
+            x = (s.position[g, l, n] - s.origin[None]) * per_cell
+            v = vec3(0.0)
+            slope = mat3(0.0)
+            for a in ti.static(range(3)):
+                at = x - 0.5
+                at[a] += 0.5
+                value, gradient = interpolate(s, g, a, l, at)
+                v[a] = value
+                for b in ti.static(range(3)):
+                    slope[a, b] = ti.math.clamp(gradient[b], -steepest, steepest)
+            s.slope[g, l, n] = slope
+            moved = s.position[g, l, n] + dt * (v + 0.5 * dt * per_cell * (slope @ v))
+            s.position[g, l, n], s.speed[g, l, n] = s.keep_inside(moved, v)
+            height += s.position[g, l, n][2]
+            energy += v.dot(v)  # not a number where any is, which a maximum passes over
+            fastest = ti.max(fastest, v.dot(v))
+        drift = 1.0 - 2.0 * height / (ti.max(s.count[g, l], 1) * s.fill[g][l])
+        s.lack[g][l] = LEVEL_GAIN * drift
+        if s.count[g, l] > 0:
+            if not (energy < LARGEST and fastest < TOP_SPEED**2):
+                s.status[g, l] = RUNAWAY
+            elif ti.abs(drift) > MOST_DRIFT:
+                s.status[g, l] = DRIFTED
+            if s.status[g, l] != SOUND:
+                s.count[g, l] = 0

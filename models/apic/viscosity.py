@@ -1,0 +1,176 @@
+# type: ignore  (Taichi compiles this source and gives these names their types)
+"""Implicit viscosity with a traction-free surface (Batty and Bridson 2008), and friction of walls."""
+
+import taichi as ti
+
+from .lanes import chosen, lanes, positive, ratio
+from .rheology import find_thickness, thickness_of
+from .transfer import strides
+
+TOLERANCE = 3e-3  # of the speed
+LEAST_ENERGY = 1e-3
+MOST_ITERATIONS = 200
+LEAST_MASS = 1e-4  # of a face, in full cells, that has a velocity
+
+
+@ti.func
+def has_mass(s, g, a, m):
+    return positive(s.mass[g, a, m] - LEAST_MASS)
+
+
+@ti.func
+def weigh_stresses(s, g, time):
+    """Weights of the stresses: viscosity at a time [s], by how full their cells are.
+
+    A stress that a face without mass would take part in is 0: its velocity means nothing.
+    """
+    S = strides(s)
+    scale = s.dt[None] / s.cell[None] ** 2
+    for n in range(s.arounds[g]):
+        m = s.around[g, n]
+        for a in range(3):
+            s.normal[g, a, m] = lanes(0.0)
+            s.shear[g, a, m] = lanes(0.0)
+    find_thickness(s, g, time)
+    for n in range(s.nears[g]):
+        m = s.near[g, n]
+        known = lanes(1.0)
+        for a in range(3):
+            o = m + S[a]
+            known *= positive(s.mass[g, a, m] + s.shut[a, m] - LEAST_MASS)
+            known *= positive(s.mass[g, a, o] + s.shut[a, o] - LEAST_MASS)
+        nu = scale * thickness_of(s, g, m)
+        s.normal_weight[g, m] = nu * ti.min(s.volume[g, m], 1.0) * known
+        for c in range(3):  # edges along c
+            a, b = (c + 1) % 3, (c + 2) % 3
+            full, thick = lanes(0.0), lanes(0.0)
+            for k in range(4):
+                o = m - (k & 1) * S[a] - (k >> 1) * S[b]
+                full += s.volume[g, o]
+                thick += s.volume[g, o] * thickness_of(s, g, o)
+            known_a = has_mass(s, g, a, m) * has_mass(s, g, a, m - S[b])
+            known_b = has_mass(s, g, b, m) * has_mass(s, g, b, m - S[a])
+            at_most = ti.min(1.0, 4.0 / ti.max(full, 1e-6))
+            s.shear_weight[g, c, m] = 0.25 * scale * thick * at_most * known_a * known_b
+
+
+@ti.func
+def stress(s, g, u: ti.template()):
+    """Of velocities `u` on the faces."""
+    S = strides(s)
+    for n in range(s.nears[g]):
+        m = s.near[g, n]
+        for a in range(3):
+            s.normal[g, a, m] = 2.0 * s.normal_weight[g, m] * (u[g, a, m + S[a]] - u[g, a, m])
+        for c in range(3):
+            a, b = (c + 1) % 3, (c + 2) % 3
+            slip = u[g, a, m] - u[g, a, m - S[b]] + u[g, b, m] - u[g, b, m - S[a]]
+            s.shear[g, c, m] = s.shear_weight[g, c, m] * slip
+
+
+@ti.func
+def force(s, g, a, m, S):
+    """Divergence of the stress on a face."""
+    f = s.normal[g, a, m] - s.normal[g, a, m - S[a]]
+    for c in range(3):
+        if c != a:
+            b = 3 - a - c
+            f += s.shear[g, c, m + S[b]] - s.shear[g, c, m]
+    return f
+
+
+@ti.func
+def stiffness(s, g, a, m, S):
+    """Diagonal of minus `force`."""
+    d = 2.0 * (s.normal_weight[g, m] + s.normal_weight[g, m - S[a]])
+    for c in range(3):
+        if c != a:
+            b = 3 - a - c
+            d += s.shear_weight[g, c, m] + s.shear_weight[g, c, m + S[b]]
+    return d
+
+
+@ti.func
+def solve_viscosity(s, g):
+    """Velocities after viscosity, by conjugate gradients, each lane until it has converged."""
+    S = strides(s)
+    zero = lanes(0.0)
+    scale = s.dt[None] / s.cell[None] ** 2
+    stress(s, g, s.velocity)
+    rz, energy = zero, zero
+    for n in range(s.nears[g]):
+        m = s.near[g, n]
+        for a in range(3):
+            known, u, mass = has_mass(s, g, a, m), s.velocity[g, a, m], s.mass[g, a, m]
+            nu = 0.5 * (thickness_of(s, g, m) + thickness_of(s, g, m - S[a]))
+            rub = s.rub[a, m] * scale * nu
+            r = known * (force(s, g, a, m, S) - rub * u)
+            inverse = ratio(known, mass + rub + stiffness(s, g, a, m, S))
+            s.friction[g, a, m] = mass + rub
+            s.inverse[g, a, m] = inverse
+            s.rest[g, a, m] = r
+            s.search[g, a, m] = inverse * r
+            rz += inverse * r * r
+            energy += mass * u * u
+    goal = TOLERANCE**2 * (energy + LEAST_ENERGY)
+    iteration, runs = 0, positive(rz - goal)
+    while iteration < MOST_ITERATIONS and runs.max() > 0.0:
+        stress(s, g, s.search)
+        dq = zero
+        for n in range(s.nears[g]):
+            m = s.near[g, n]
+            for a in range(3):
+                d = s.search[g, a, m]
+                q = s.friction[g, a, m] * d - force(s, g, a, m, S)
+                q *= positive(s.inverse[g, a, m])
+                s.product[g, a, m] = q
+                dq += d * q
+        alpha = runs * ratio(rz, dq)
+        new = zero
+        for n in range(s.nears[g]):
+            m = s.near[g, n]
+            for a in range(3):
+                s.velocity[g, a, m] = s.velocity[g, a, m] + alpha * s.search[g, a, m]
+                r = s.rest[g, a, m] - alpha * s.product[g, a, m]
+                s.rest[g, a, m] = r
+                new += r * r * s.inverse[g, a, m]
+        beta = runs * ratio(new, rz)
+        rz = chosen(runs, new, rz)
+        for n in range(s.nears[g]):
+            m = s.near[g, n]
+            for a in range(3):
+                z = s.inverse[g, a, m] * s.rest[g, a, m]
+                s.search[g, a, m] = z + beta * s.search[g, a, m]
+        iteration += 1
+        s.iterations[g, 1] = s.iterations[g, 1] + runs
+        runs = positive(rz - goal)
+
+
+@ti.func
+def extend(s, g):
+    """Faces without mass and in walls take the mean of their neighbours: particles slip freely."""
+    S = strides(s)
+    zero = lanes(0.0)
+    for n in range(s.arounds[g]):
+        m = s.around[g, n]
+        for a in range(3):
+            s.inverse[g, a, m] = zero
+    for n in range(s.nears[g]):
+        m = s.near[g, n]
+        for a in range(3):
+            s.inverse[g, a, m] = positive(s.mass[g, a, m])
+    for n in range(s.nears[g]):
+        m = s.near[g, n]
+        for a in range(3):
+            total, known = zero, zero
+            for b in range(3):
+                for o in range(2):
+                    there = s.inverse[g, a, m + (2 * o - 1) * S[b]]
+                    total += there * s.velocity[g, a, m + (2 * o - 1) * S[b]]
+                    known += there
+            empty = positive(known) * (1.0 - s.inverse[g, a, m])
+            s.product[g, a, m] = chosen(empty, ratio(total, known), s.velocity[g, a, m])
+    for n in range(s.nears[g]):
+        m = s.near[g, n]
+        for a in range(3):
+            s.velocity[g, a, m] = s.product[g, a, m]

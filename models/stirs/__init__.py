@@ -1,0 +1,1 @@
+"""Stirs of many liquids, each with a stick that hangs in it."""

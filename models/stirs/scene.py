@@ -1,0 +1,140 @@
+# type: ignore  (Taichi compiles this source and gives these names their types)
+"""Groups of stirs in cups and with sticks of one shape."""
+
+import taichi as ti
+
+from ..apic.lanes import LANES, STRIDE, vec3
+from ..apic.liquid_state import LiquidState
+from ..apic.pressure import add_rise, push, solve_pressure
+from ..apic.surface import find_liquid, set_up_pressure
+from ..apic.transfer import OFF_WALL, clear, deposit, list_cells, move
+from ..apic.viscosity import extend, solve_viscosity, weigh_stresses
+from .stick_line import StickLine, slip_line, start_line
+
+
+@ti.data_oriented
+class StirringScene(LiquidState):
+    """Liquids in upright cups, stirred by sticks.
+
+    All velocities are those at the middle of a step, positions and directions those at its start.
+    Five kernels make a step, as each is compiled for itself, in parallel.
+    """
+
+    def __init__(self, groups, cells, particles, line, effects=()):
+        """
+        Args:
+            groups, cells, particles, effects: As for `LiquidState`.
+            line: Nodes of a stick, and cells of a kernel's width, at most.
+        """
+        super().__init__(groups, cells, particles, effects)
+        self.sticks = StickLine(groups, *line)
+
+    @ti.func
+    def keep_inside(self, x, v):
+        """A particle within the cup, and its velocity without what leads out."""
+        off = OFF_WALL * self.cell[None]
+        most = self.sticks.cup_radius[None] - off
+        out = ti.sqrt(x[0] ** 2 + x[1] ** 2)
+        if out > most:
+            n = vec3(x[0], x[1], 0.0) / out
+            x -= (out - most) * n
+            v -= ti.max(v.dot(n), 0.0) * n
+        if x[2] < off:
+            x[2] = off
+            v[2] = ti.max(v[2], 0.0)
+        top = self.origin[None][2] + (self.shape[None][2] - 1.02) * self.cell[None]
+        if x[2] > top:
+            x[2] = top
+            v[2] = ti.min(v[2], 0.0)
+        return x, v
+
+    @ti.kernel
+    def transfer_in(self, groups: ti.i32):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                g = n // STRIDE
+                clear(self, g)
+                deposit(self, g)
+                list_cells(self, g)
+
+    @ti.kernel
+    def prepare(self, groups: ti.i32, step: ti.i32, path: ti.types.ndarray(vec3, 3)):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                g = n // STRIDE
+                find_liquid(self, g)
+                set_up_pressure(self, g)
+                for l in range(LANES):
+                    if self.count[g, l] > 0:
+                        jolt = self.jolt(path, g, l, step)
+                        start_line(self, self.sticks, g, l, path[g, l, step + 1], jolt)
+                push(self, g, self.pressure)
+                weigh_stresses(self, g, (step + 0.5) * self.dt[None])
+
+    @ti.kernel
+    def flow(
+        self,
+        groups: ti.i32,
+        step: ti.i32,
+        path: ti.types.ndarray(vec3, 3),
+        directions: ti.types.ndarray(vec3, 3),
+    ):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                g = n // STRIDE
+                solve_viscosity(self, g)
+                for l in range(LANES):
+                    if self.count[g, l] > 0:
+                        pivot = path[g, l, step + 1]
+                        velocity = (path[g, l, step + 2] - pivot) / self.dt[None]
+                        jolt, time = self.jolt(path, g, l, step), (step + 0.5) * self.dt[None]
+                        slip_line(self, self.sticks, g, l, pivot, velocity, jolt, time)
+                    directions[g, l, step + 1] = self.sticks.direction[g, l]
+
+    @ti.func
+    def jolt(self, path: ti.template(), g, l, step):
+        """Mean acceleration of a pivot around the start of a step [m/s²]."""
+        change = path[g, l, step + 2] - 2.0 * path[g, l, step + 1] + path[g, l, step]
+        return change / self.dt[None] ** 2
+
+    @ti.kernel
+    def project(self, groups: ti.i32):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                g = n // STRIDE
+                solve_pressure(self, g)
+                push(self, g, self.rise)
+                add_rise(self, g)
+                extend(self, g)
+
+    @ti.kernel
+    def transfer_out(self, groups: ti.i32):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                move(self, n // STRIDE)
+
+    def begin(self, path, directions):
+        """Take what the steps read and fill in.
+
+        Args:
+            path: Pivots [m], float32 of shape [groups, LANES, steps + 2, 3], from one step before
+                the start on.
+            directions: Of the sticks at the steps' ends, float32 of shape
+                [groups, LANES, steps + 1, 3].
+        """
+        self.path, self.directions = path, directions
+
+    def march(self, start, stop):
+        """Steps start..stop-1."""
+        groups = len(self.path)
+        for step in range(start, stop):
+            self.transfer_in(groups)
+            self.prepare(groups, step, self.path)
+            self.flow(groups, step, self.path, self.directions)
+            self.project(groups)
+            self.transfer_out(groups)
+
+    def view(self, step):
+        """The first stir at a step's start: particles [n, 3], pivot [3] and direction [3]."""
+        position = self.position.to_numpy()[0, 0, : self.count[0, 0]]
+        return position, self.path[0, 0, step + 1], self.directions[0, 0, step]

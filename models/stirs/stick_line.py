@@ -1,0 +1,271 @@
+# type: ignore  (Taichi compiles this source and gives these names their types)
+"""The stick in the liquid: nodes on its axis that slip through it by a law of drag.
+
+A node sees the liquid through a kernel about as wide as the stick, and pushes it through the same
+kernel; the boundary layer, thinner than a cell, is in the law of slip. The stick is a spherical
+pendulum that takes the opposite forces.
+"""
+
+import math
+
+import taichi as ti
+
+from ..apic.lanes import LANES, vec3
+from ..apic.rheology import kinematic
+from ..apic.transfer import GRAVITY, strides
+from .slip_law import HELD_RADIUS, IMPULSE, LEAST_SEEN, PIVOT_DAMPING, QUADRATIC, TIP, line_of
+
+
+@ti.func
+def peskin4(q):
+    r = ti.abs(q)
+    o = 0.0
+    if r < 1.0:
+        o = (3.0 - 2.0 * r + ti.sqrt(1.0 + 4.0 * r - 4.0 * r * r)) / 8.0
+    elif r < 2.0:
+        o = (5.0 - 2.0 * r - ti.sqrt(ti.max(-7.0 + 12.0 * r - 4.0 * r * r, 0.0))) / 8.0
+    return o
+
+
+@ti.data_oriented
+class StickLine:
+    """The sticks of a `LiquidState`: where they point, how they turn, and their nodes.
+
+    Attributes:
+        direction: Unit vector from pivot to tip, shape [groups, LANES].
+        swing, turning: Angular velocity [rad/s] and acceleration [rad/s²].
+        carried: Acceleration that a node gives the liquid in its volume [m/s²].
+        wet_share: Of a node's length, 0 above the surface.
+        seen: What a node's kernels see of each component, in full cells.
+    """
+
+    def __init__(self, groups, nodes, width):
+        """Room for lines of at most `nodes`, with kernels of at most `width` cells."""
+        lane, node = (groups, LANES), (groups, LANES, nodes)
+        self.direction, self.swing, self.turning = (
+            ti.Vector.field(3, ti.f32, lane) for _ in range(3)
+        )
+        self.mass, self.dry = (ti.field(ti.f32, lane) for _ in range(2))
+        self.length, self.radius, self.stretch, self.node_volume, self.cup_radius = (
+            ti.field(ti.f32, ()) for _ in range(5)
+        )
+        self.half, self.tall, self.nodes = (ti.field(ti.i32, ()) for _ in range(3))
+        self.weight = ti.field(ti.f32, (*node, 3, 3, width))
+        self.base = ti.Vector.field(3, ti.i32, (*node, 3))
+        self.seen, self.carried = (ti.Vector.field(3, ti.f32, node) for _ in range(2))
+        self.wet_share = ti.field(ti.f32, node)
+
+    def fit(self, stick, cup_radius, cell, depth):
+        """Take a `Stick` in a cup with liquid of at most `depth` [m], in cells of `cell` [m]."""
+        line = line_of(stick.radius, cell, depth)
+        self.length[None], self.radius[None] = stick.length, stick.radius
+        self.cup_radius[None] = cup_radius
+        self.stretch[None], self.half[None] = line.stretch, line.half_width
+        self.tall[None], self.node_volume[None] = 4, line.node_volume
+        self.nodes[None] = line.nodes
+
+    @ti.kernel
+    def hang(self, sticks: ti.types.ndarray(ti.f32, 3)):
+        """Sticks at rest: direction, mass [kg] and dry friction [N m], shape [5, groups, LANES]."""
+        for g, l in ti.ndrange(sticks.shape[1], LANES):
+            for a in ti.static(range(3)):
+                self.direction[g, l][a] = sticks[a, g, l]
+            self.mass[g, l], self.dry[g, l] = sticks[3, g, l], sticks[4, g, l]
+            self.swing[g, l], self.turning[g, l] = vec3(0.0), vec3(0.0)
+            for n in range(self.nodes[None]):
+                self.carried[g, l, n] = vec3(0.0)
+
+
+@ti.func
+def rows(t):
+    """Of cells along x in the three kernels of a node; a bound that is not known while compiling
+    keeps the loops small."""
+    return 3 * t.tall[None] * 2 * t.half[None]
+
+
+@ti.func
+def row(s, t, g, l, n, r):
+    """Component, first cell and weight of a row."""
+    wide = 2 * t.half[None]
+    a, j, k = r // (wide * t.tall[None]), r % wide, r // wide % t.tall[None]
+    first = t.base[g, l, n, a].dot(strides(s)) + j * strides(s)[1] + k * strides(s)[2]
+    return a, first, t.weight[g, l, n, a, 1, j] * t.weight[g, l, n, a, 2, k]
+
+
+@ti.func
+def place_node(s, t, g, l, n, x):
+    """Weights of a node at x [m] on the faces around it, one-dimensional and of sum 1."""
+    for a in range(3):
+        for b in range(3):
+            at = (x[b] - s.origin[None][b]) / s.cell[None]
+            if a != b:
+                at -= 0.5
+            stretch, half = t.stretch[None], t.half[None]
+            if b == 2:
+                stretch, half = 1.0, t.tall[None] // 2
+            low = ti.cast(ti.floor(at), ti.i32) - (half - 1)
+            low = ti.max(0, ti.min(low, s.shape[None][b] - 2 * half))
+            total = 0.0
+            for i in range(2 * half):
+                w = peskin4((low + i - at) / stretch)
+                t.weight[g, l, n, a, b, i] = w
+                total += w
+            for i in range(2 * half):
+                w = t.weight[g, l, n, a, b, i] / ti.max(total, 1e-6)
+                t.weight[g, l, n, a, b, i] = w
+            t.base[g, l, n, a][b] = low
+
+
+@ti.func
+def liquid_at(s, t, g, l, n):
+    """What a node sees of each component: full cells of liquid or wall."""
+    seen = vec3(0.0)
+    for r in range(rows(t)):
+        a, first, w = row(s, t, g, l, n, r)
+        for i in range(2 * t.half[None]):
+            m = first + i
+            seen[a] += w * t.weight[g, l, n, a, 0, i] * (s.mass[g, a, m][l] + s.solid[a, m])
+    return ti.max(seen, LEAST_SEEN)
+
+
+@ti.func
+def velocity_at(s, t, g, l, n):
+    """Of the liquid, as a node sees it [m/s]; walls are liquid at rest."""
+    u = vec3(0.0)
+    for r in range(rows(t)):
+        a, first, w = row(s, t, g, l, n, r)
+        for i in range(2 * t.half[None]):
+            m = first + i
+            momentum = s.mass[g, a, m][l] * s.velocity[g, a, m][l]
+            u[a] += w * t.weight[g, l, n, a, 0, i] * momentum
+    return u / t.seen[g, l, n]
+
+
+@ti.func
+def push_liquid(s, t, g, l, n, change):
+    """Give the liquid a node's `change` of velocity times the node's volume: what is in the air or
+    in a wall takes none, so that the liquid gets what the stick loses."""
+    scaled = t.node_volume[None] * change / t.seen[g, l, n]
+    for r in range(rows(t)):
+        a, first, w = row(s, t, g, l, n, r)
+        w *= scaled[a]
+        for i in range(2 * t.half[None]):
+            m = first + i
+            if s.mass[g, a, m][l] > 0.0:
+                u = s.velocity[g, a, m][l] + w * t.weight[g, l, n, a, 0, i]
+                s.velocity[g, a, m][l] = u
+
+
+@ti.func
+def arm_of(s, t, g, l, n):
+    """From the pivot to a node [m]."""
+    return (t.length[None] - (TIP + n + 0.5) * s.cell[None]) * t.direction[g, l]
+
+
+@ti.func
+def start_line(s, t, g, l, pivot, jolt):
+    """Place the nodes; the carried force, and the impulse of the displaced mass, onto the liquid.
+
+    Args:
+        pivot: Where it is [m].
+        jolt: Its mean acceleration in this step [m/s²].
+    """
+    dx, dt = s.cell[None], s.dt[None]
+    u, w = t.direction[g, l], t.swing[g, l]
+    section = math.pi * t.radius[None] ** 2 / (t.node_volume[None] * dx**2)
+    for n in range(t.nodes[None]):
+        arm = arm_of(s, t, g, l, n)
+        x = pivot + arm
+        wet = ti.math.clamp((s.fill[g][l] - x[2]) / dx + 0.5, 0.0, 1.0)
+        t.wet_share[g, l, n] = wet
+        if wet > 0.0:
+            place_node(s, t, g, l, n, x)
+            t.seen[g, l, n] = liquid_at(s, t, g, l, n)
+            turned = t.turning[g, l].cross(arm) + w.cross(w.cross(arm))
+            across = jolt + turned
+            across -= across.dot(u) * u
+            push_liquid(s, t, g, l, n, dt * (t.carried[g, l, n] + IMPULSE * section * wet * across))
+        else:
+            t.carried[g, l, n] = vec3(0.0)
+
+
+@ti.func
+def slip_line(s, t, g, l, pivot, velocity, jolt, time):
+    """Slip: the carried forces become those of the law, implicitly in each node's own response;
+    then the stick turns.
+
+    Args:
+        pivot: Where it is [m].
+        velocity: The pivot's, half a step later [m/s], as the liquid's.
+        jolt: Its mean acceleration in this step [m/s²].
+        time: Of the step's middle [s].
+    """
+    dx, dt, radius = s.cell[None], s.dt[None], t.radius[None]
+    area, volume, density = math.pi * radius**2, t.node_volume[None] * dx**3, s.density[g][l]
+    stokes = 4.0 * math.pi / ti.log(HELD_RADIUS * t.stretch[None] * dx / radius)
+    u, w = t.direction[g, l], t.swing[g, l]
+    ahead = w + dt * t.turning[g, l]
+    torque, added = vec3(0.0), 0.0
+    jolt_across = jolt - jolt.dot(u) * u
+    for n in range(t.nodes[None]):
+        wet = t.wet_share[g, l, n]
+        if wet > 0.0:
+            arm = arm_of(s, t, g, l, n)
+            slip = velocity + ahead.cross(arm) - velocity_at(s, t, g, l, n)
+            speed = ti.max(slip.norm(), 1e-6)
+            nu = kinematic(s, g, l, speed / radius, time)
+            k = (QUADRATIC * radius * speed + stokes * nu) * dx / volume
+            f = t.carried[g, l, n]
+            change = (k * wet * slip - f) / (k + 1.0 / dt)
+            f += change / dt
+            t.carried[g, l, n] = f
+            push_liquid(s, t, g, l, n, change)
+            displaced = IMPULSE * density * area * dx * wet
+            torque -= arm.cross(density * volume * f + displaced * jolt_across)
+            added += displaced * arm.dot(arm)
+    turn_stick(s, t, g, l, pivot, velocity, jolt, torque, added)
+
+
+@ti.func
+def turn_stick(s, t, g, l, pivot, velocity, jolt, torque, added):
+    """The pendulum's step: weight, lift, the pivot's acceleration, and the liquid's torque [N m] and
+    added inertia [kg m²]; then its end stops at the wall and the floor."""
+    dt, length, radius = s.dt[None], t.length[None], t.radius[None]
+    density, mass = s.density[g][l], t.mass[g, l]
+    per_length = density * math.pi * radius**2
+    u, w = t.direction[g, l], t.swing[g, l]
+    dry = ti.math.clamp((pivot[2] - s.fill[g][l]) / ti.max(-u[2], 0.2), 0.0, length)
+    displaced = per_length * (length**3 - dry**3) / 3.0
+    lever = 0.5 * (length**2 - dry**2) * per_length
+    up = vec3(0.0, 0.0, 1.0)
+    torque += (0.5 * length * mass * u).cross(-GRAVITY * up - jolt)
+    torque += (lever * u).cross(jolt + GRAVITY * up)
+    torque -= PIVOT_DAMPING * w
+    torque -= torque.dot(u) * u
+    inertia = mass * (length**2 / 3.0 + radius**2 / 4.0) - displaced + added
+    turning = torque / inertia
+    w += dt * turning
+    loss = dt * t.dry[g, l] / inertia
+    if loss > 0.0:
+        w *= ti.max(1.0 - loss / ti.max(w.norm(), 1e-12), 0.0)
+    end = pivot + length * u
+    out = ti.sqrt(end[0] ** 2 + end[1] ** 2)
+    if out + radius > t.cup_radius[None]:
+        w = stopped(w, u, velocity, length, vec3(end[0], end[1], 0.0) / ti.max(out, 1e-9))
+    if end[2] < 0.0:
+        w = stopped(w, u, velocity, length, -up)
+    w -= w.dot(u) * u
+    t.turning[g, l] = turning
+    t.swing[g, l] = w
+    t.direction[g, l] = (u + dt * w.cross(u)).normalized()
+
+
+@ti.func
+def stopped(w, u, velocity, length, outward):
+    """The swing after which the stick's end no longer moves into a wall."""
+    into = (velocity + w.cross(length * u)).dot(outward)
+    lever = u.cross(outward)
+    r = w
+    if into > 0.0:
+        r -= into / (length * lever.dot(lever) + 1e-12) * lever
+    return r
