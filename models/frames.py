@@ -82,11 +82,9 @@ def stir_frames(
     start, seen = float(np.asarray(gripper.time)[0]), list[StirFrames]()
 
     def look(scene: Any, step: int) -> None:
-        pivot = scene.pivot.to_numpy()[0].astype(np.float64)
-        tip = pivot + setup.stick.length * scene.direction.to_numpy()[0].astype(np.float64)
-        time = start + step / scene.rate
-        position = scene.position.to_numpy()[0, : scene.alive.to_numpy()[0]]
-        seen.append(StirFrames(np.array(time), position, pivot, tip))
+        position, pivot, direction = scene.view(step)
+        tip = pivot + setup.stick.length * direction.astype(np.float64)
+        seen.append(StirFrames(np.array(start + step / scene.rate), position, pivot, tip))
 
     angles = watched_stir(liquid, gripper, setup, [seed], effects, Watch(rate, look))
     frames = _joined(seen)

@@ -19,13 +19,17 @@ class Numerics:
     """Cells, steps and particles of a stir; fixed before inference and kept with every result.
 
     Attributes:
-        cell: Edge of a cell, in radii of the stick.
+        cell: Edge of a cell [m], unless the stick asks for another.
+        narrowest, widest: Radius of the stick in cells; cells shrink for a narrower one and grow
+            for a wider one.
         longest_step: Step of slow stirs, for cells of 5 mm [s]; in proportion for others.
         courant: Cells that the gripper goes in a step, at most.
         per_cell: Particles in a full cell: 1, 2 or 4.
     """
 
-    cell: float = 1.0 / 0.9
+    cell: float = 0.005
+    narrowest: float = 0.9
+    widest: float = 1.4
     longest_step: float = 0.012
     courant: float = 0.4
     per_cell: int = 2
@@ -34,12 +38,21 @@ class Numerics:
         """Refuse what makes no sense.
 
         Raises:
-            ValueError: a number is not finite and positive, or there is no lattice of so many
-                particles a cell.
+            ValueError: a number is not finite and positive, the narrowest stick is wider than the
+                widest, or there is no lattice of so many particles a cell.
         """
         check_numbers("numerics", **asdict(self))
+        if self.narrowest > self.widest:
+            raise ValueError(
+                f"numerics: narrowest must be at most widest, {self.widest}, got {self.narrowest}"
+            )
         if self.per_cell not in (1, 2, 4):
             raise ValueError(f"numerics: per_cell must be 1, 2 or 4, got {self.per_cell}")
+
+    def cell_for(self, stick_radius: float) -> float:
+        """Edge of a cell [m] for a stick [m]."""
+        smallest, largest = stick_radius / self.widest, stick_radius / self.narrowest
+        return min(max(self.cell, smallest), largest)
 
     def step(self, cell: float, speed: float) -> float:
         """Step [s] for cells [m] and the gripper's largest speed [m/s]."""

@@ -196,6 +196,11 @@ class StirringScene(HangingStick):
                         for i in range(self.alive[b]):
                             self.velocity[b, i] = damping * self.velocity[b, i]
 
+    def view(self, step):
+        """The first stir now: particles [n, 3], pivot [3] and direction [3]."""
+        position = self.position.to_numpy()[0, : self.alive.to_numpy()[0]]
+        return position, self.pivot.to_numpy()[0].astype(np.float64), self.direction.to_numpy()[0]
+
     def settle(self, active, steps, damping):
         """Let the packings relax around the sticks, by the kernel that stirs: building another
         would double the time to the first result."""

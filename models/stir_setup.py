@@ -69,7 +69,8 @@ class StirSetup:
         cup: The cup.
         stick: The stick.
         submerged: Depth of the stick's tip below the surface at rest [m].
-        particles: Number of particles, which decides the cells; None: cells follow the stick.
+        particles: Number of particles, which decides the cells; 0: as many as the cells make that
+            `numerics` chooses for the stick.
         numerics: Constants of the discretisation; `ParticleNumerics` chooses the former fluid.
         tilt: Of the stick at the start, in the xz and yz planes [rad]; the former fluid's hangs
             straight down.
@@ -78,16 +79,15 @@ class StirSetup:
     cup: Cup
     stick: Stick
     submerged: float
-    particles: int | None = None
+    particles: int = 0
     numerics: Numerics | ParticleNumerics = field(default_factory=Numerics)
     tilt: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         check_numbers("setup", submerged=self.submerged)
-        if self.particles is not None:
-            check_numbers("setup", particles=self.particles)
-            if self.particles != int(self.particles):
-                raise ValueError(f"setup: particles must be a whole number, got {self.particles}")
+        check_numbers("setup", zero=True, particles=self.particles)
+        if self.particles != int(self.particles):
+            raise ValueError(f"setup: particles must be a whole number, got {self.particles}")
         if not all(abs(angle) < MAX_TILT for angle in self.tilt):
             raise ValueError(f"setup: tilt must be less than {MAX_TILT} rad, got {self.tilt}")
         if self.stick.radius >= self.cup.radius:
@@ -95,6 +95,8 @@ class StirSetup:
                 f"setup: the stick, of radius {self.stick.radius} m, does not fit into the cup, of "
                 f"radius {self.cup.radius} m"
             )
+        if self.particles == 0:
+            object.__setattr__(self, "particles", self._usual_particles())
 
     @classmethod
     def from_recording(
@@ -138,7 +140,7 @@ class StirSetup:
             cup=Cup(cup_radius, height, fill),
             stick=Stick(radius, length, mass),
             submerged=min(submerged, fill),
-            particles=particles,
+            particles=particles or 0,
             numerics=numerics or Numerics(),
             tilt=_first_tilt(recording),
         )
@@ -154,10 +156,8 @@ class StirSetup:
     @property
     def cell(self) -> float:
         """Edge of a cell [m]."""
-        if self.particles is None and isinstance(self.numerics, Numerics):
-            return self.numerics.cell * self.stick.radius
-        count = self.particles or STIR_PARTICLES
-        return float((self.per_cell * self.liquid_volume(self.cup.fill) / count) ** (1.0 / 3.0))
+        volume = self.per_cell * self.liquid_volume(self.cup.fill)
+        return float((volume / self.particles) ** (1.0 / 3.0))
 
     @property
     def spacing(self) -> float:
@@ -179,6 +179,12 @@ class StirSetup:
         """Viscosity [Pa s] below which this path of the gripper cannot distinguish liquids of
         `density` [kg/m³]; see `Numerics.least_viscosity`."""
         return self.numerics.least_viscosity(self.spacing, density, mean_speed(gripper))
+
+    def _usual_particles(self) -> int:
+        if isinstance(self.numerics, ParticleNumerics):
+            return STIR_PARTICLES
+        cell = self.numerics.cell_for(self.stick.radius)
+        return max(round(self.per_cell * self.liquid_volume(self.cup.fill) / cell**3), 1)
 
     def liquid_volume(self, fill: float | np.ndarray) -> Any:
         """Liquid [m³] whose surface is at the depth `fill` [m] around the stick."""

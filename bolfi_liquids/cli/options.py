@@ -25,6 +25,10 @@ CupsOption = Annotated[
     typer.Option("--cups", metavar="FILE", help="cups.toml; without it, the bundled one."),
 ]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random numbers.")]
+StirParticlesOption = Annotated[
+    int | None,
+    typer.Option("--particles", help="Number of particles; else cells follow the stick."),
+]
 ParticlesOption = Annotated[
     int, typer.Option("--particles", help="Number of particles of the simulated liquid.")
 ]
@@ -44,7 +48,7 @@ class CalibrationOptions:
         str, typer.Option(metavar="|".join(SAMPLERS), help="Sampler of the posterior.")
     ] = CalibrationSettings.sampler
     seed: SeedOption = CalibrationSettings.seed
-    particles: ParticlesOption = CalibrationSettings.particles
+    particles: StirParticlesOption = CalibrationSettings.particles
     batch: Annotated[int, typer.Option(help="Simulations run at the same time.")] = (
         CalibrationSettings.batch
     )
@@ -171,5 +175,5 @@ class SbcOptions:
     noise_deg: Annotated[float, typer.Option("--noise", help="Of the cameras [deg].")] = (
         SbcSettings.noise_deg
     )
-    particles: ParticlesOption = SbcSettings.particles
+    particles: StirParticlesOption = SbcSettings.particles
     seed: SeedOption = SbcSettings.seed

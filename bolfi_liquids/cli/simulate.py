@@ -10,13 +10,12 @@ from ..inputs.described_liquid import (
     COHESION,
     DENSITY,
     POUR_PARTICLES,
-    STIR_PARTICLES,
     VISCOSITY,
 )
 from .compute import Compute
 from .examples import examples
 from .grouped import grouped
-from .options import CupsOption, ParticlesOption
+from .options import CupsOption, ParticlesOption, StirParticlesOption
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -99,7 +98,7 @@ def stir(
     density: Annotated[
         float | None, typer.Option(help="Of the liquid, in kg/m³; else the recording's.")
     ] = None,
-    particles: ParticlesOption = STIR_PARTICLES,
+    particles: StirParticlesOption = None,
     recording: Annotated[
         Path | None,
         typer.Option(metavar="NC", help="Whose path and rig are used; else a bundled one."),

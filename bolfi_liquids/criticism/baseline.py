@@ -35,7 +35,7 @@ class Clean:
 
 def clean_residuals(
     recordings: Sequence[Recording],
-    particles: int,
+    particles: int | None,
     prior: "Prior",
     extensions: "dict[str, Extension]",
     *,

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 VISCOSITY, COHESION, DENSITY = 1.0, 0.2, 1260.0  # Pa s, 1, kg/m3: the bundled glycerin
 MAX_VISCOSITY, MAX_DENSITY = 1e6, 20_000.0  # Pa s, kg/m3: pitch by far, and mercury
-STIR_PARTICLES, POUR_PARTICLES = 1000, 664
-"""Numbers of particles that a stir and a pour are simulated with, unless others are given."""
+POUR_PARTICLES = 664
+"""Number of particles that a pour is simulated with, unless another is given."""
 
 
 @checked()
@@ -42,7 +42,7 @@ class Described:
     cohesion: Annotated[float, Field(ge=0.0, le=1.0)]
     density: Annotated[float, Field(gt=0.0, le=MAX_DENSITY)]
     effects: Mapping[str, float] = Field(default_factory=dict)
-    particles: Particles = STIR_PARTICLES
+    particles: Particles
     seed: Seed = 0
 
     def liquid(self) -> "Liquid":

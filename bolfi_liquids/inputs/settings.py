@@ -124,7 +124,7 @@ class CalibrationSettings:
         batch: Simulations run at the same time.
         seed: Seed of all random draws.
         surrogate: "discrepancy", the paper's, or "signal", which emulates the inclination itself.
-        particles: Number of particles of the simulated liquid.
+        particles: Number of particles of the simulated liquid; None: cells follow the stick.
         sampler: "nuts" or "emcee".
         chains: Number of chains; R-hat needs at least two.
         draws: Draws kept of each chain.
@@ -134,7 +134,7 @@ class CalibrationSettings:
     batch: Count = 4
     seed: Seed = 0
     surrogate: Surrogate = "discrepancy"
-    particles: Particles = 1000
+    particles: Particles | None = None
     sampler: Annotated[str, one_of(SAMPLERS)] = "nuts"
     chains: Annotated[Integer, Field(ge=2, le=1000)] = 4
     draws: Annotated[Integer, Field(ge=4, le=MAX_COUNT)] = 1000
@@ -150,7 +150,7 @@ class SbcSettings:
         design: Points that the former share, each stirred twice.
         budget: Simulations that each learns from.
         noise_deg: Standard deviation of the cameras' noise, added to each simulated sample [deg].
-        particles: Number of particles of the simulated liquid.
+        particles: Number of particles of the simulated liquid; None: cells follow the stick.
         seed: Seed of all random draws.
     """
 
@@ -159,7 +159,7 @@ class SbcSettings:
     design: Simulations = 512
     budget: Simulations = 20
     noise_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = 0.1
-    particles: Particles = 1000
+    particles: Particles | None = None
     seed: Seed = 0
 
     def __post_init__(self):

@@ -20,7 +20,8 @@ class Scale:
         rates: Angular velocities among which pours after a recording are chosen.
         surrogates: Surrogates that recordings are calibrated with.
         lips: Heights of the lip that are compared [m].
-        particles: Of the stirs by which bundled recordings are calibrated.
+        particles: Of the stirs by which bundled recordings are calibrated; None: cells follow the
+            stick.
         drawn_particles: Of the stirs of drawn truths, and of those by which they are calibrated.
         grid: Of the pours by which actions are chosen.
         seed: Seed of all random draws.
@@ -36,8 +37,8 @@ class Scale:
     rates: int = 15
     surrogates: tuple[str, ...] = ("discrepancy", "signal")
     lips: tuple[float, ...] = (0.10, 0.14, 0.20, 0.26)
-    particles: int = 1000
-    drawn_particles: int = 1000
+    particles: int | None = None
+    drawn_particles: int | None = None
     grid: GridSize = FINE_GRID
     seed: int = 0
 
@@ -53,6 +54,5 @@ QUICK = Scale(
     rates=9,
     surrogates=("discrepancy",),
     lips=(0.14, 0.20),
-    drawn_particles=500,
     grid=GridSize(viscosities=16, cohesions=2, rates=12),
 )

@@ -134,25 +134,25 @@ class LiquidState:
             self.lack[g] = lanes(0.0)
             for k in ti.static(range(2)):
                 self.iterations[g, k] = lanes(0.0)
-            for l in range(LANES):
-                self.count[g, l] = count[g, l]
-                self.status[g, l] = 0
-                self.particle[g][l] = liquid[0, g, l]
-                self.viscosity[g][l] = liquid[1, g, l]
-                self.density[g][l] = liquid[2, g, l]
-                self.fill[g][l] = liquid[3, g, l]
-                for n in range(count[g, l]):
+            for lane in range(LANES):
+                self.count[g, lane] = count[g, lane]
+                self.status[g, lane] = 0
+                self.particle[g][lane] = liquid[0, g, lane]
+                self.viscosity[g][lane] = liquid[1, g, lane]
+                self.density[g][lane] = liquid[2, g, lane]
+                self.fill[g][lane] = liquid[3, g, lane]
+                for n in range(count[g, lane]):
                     for a in ti.static(range(3)):
-                        self.position[g, l, n][a] = position[g, l, n, a]
-                    self.speed[g, l, n] = vec3(0.0)
-                    self.slope[g, l, n] = mat3(0.0)
+                        self.position[g, lane, n][a] = position[g, lane, n, a]
+                    self.speed[g, lane, n] = vec3(0.0)
+                    self.slope[g, lane, n] = mat3(0.0)
             cell = self.cell[None]
             layer = self.shape[None][0] * self.shape[None][1]
             for m in range(layer * self.shape[None][2]):
                 z = self.origin[None][2] + (m // layer + 0.5) * cell
                 weight = self.usable[m] * GRAVITY * self.dt[None] / cell
-                for l in range(LANES):
-                    self.pressure[g, m][l] = weight * ti.max(self.fill[g][l] - z, 0.0)
+                for lane in range(LANES):
+                    self.pressure[g, m][lane] = weight * ti.max(self.fill[g][lane] - z, 0.0)
 
     def set_coefficients(self, coefficients):
         """Of the effects, shape [effects, groups, LANES]."""

@@ -11,14 +11,14 @@ from .transfer import strides
 
 
 @ti.func
-def kinematic(s, g, l, rate, time):
+def kinematic(s, g, lane, rate, time):
     """Viscosity of a lane's liquid [m²/s] at a shear rate [1/s] and time [s]."""
-    nu = s.viscosity[g][l]
+    nu = s.viscosity[g][lane]
     if ti.static(len(s.rheologies) > 0):
-        mu = nu * s.density[g][l]
+        mu = nu * s.density[g][lane]
         for k in ti.static(range(len(s.rheologies))):
-            mu = s.rheologies[k](mu, rate, time, s.coefficient[k, g][l])
-        nu = mu / s.density[g][l]
+            mu = s.rheologies[k](mu, rate, time, s.coefficient[k, g][lane])
+        nu = mu / s.density[g][lane]
     return nu
 
 
@@ -29,8 +29,8 @@ def find_thickness(s, g, time):
         for n in range(s.nears[g]):
             m = s.near[g, n]
             rate = shear_rate(s, g, m)
-            for l in range(LANES):
-                s.thickness[g, m][l] = kinematic(s, g, l, rate[l], time)
+            for lane in range(LANES):
+                s.thickness[g, m][lane] = kinematic(s, g, lane, rate[lane], time)
 
 
 @ti.func

@@ -75,12 +75,12 @@ def deposit(s, g):
     S = strides(s)
     per_cell = 1.0 / s.cell[None]
     fall = vec3(0.0, 0.0, -GRAVITY * s.dt[None])
-    for l in range(LANES):
-        volume = s.particle[g][l]
-        for n in range(s.count[g, l]):
-            x = (s.position[g, l, n] - s.origin[None]) * per_cell
-            v = s.speed[g, l, n] + fall
-            slope = s.slope[g, l, n]
+    for lane in range(LANES):
+        volume = s.particle[g][lane]
+        for n in range(s.count[g, lane]):
+            x = (s.position[g, lane, n] - s.origin[None]) * per_cell
+            v = s.speed[g, lane, n] + fall
+            slope = s.slope[g, lane, n]
             for a in range(3):
                 at = x - 0.5
                 at[a] += 0.5
@@ -92,12 +92,12 @@ def deposit(s, g):
                     for b in ti.static(range(3)):
                         u += slope[a, b] * ((corner >> b & 1) - part[b])
                     # not +=, which is atomic and ten times slower
-                    s.mass[g, a, o][l] = s.mass[g, a, o][l] + w
-                    s.velocity[g, a, o][l] = s.velocity[g, a, o][l] + w * u
+                    s.mass[g, a, o][lane] = s.mass[g, a, o][lane] + w
+                    s.velocity[g, a, o][lane] = s.velocity[g, a, o][lane] + w * u
             m, part = place(s, x - 0.5)
             for corner in ti.static(range(8)):
                 o = m + step_to(corner, S)
-                s.volume[g, o][l] = s.volume[g, o][l] + volume * share(corner, part)
+                s.volume[g, o][lane] = s.volume[g, o][lane] + volume * share(corner, part)
             s.mark[g, place(s, x)[0]] = 1
 
 
@@ -137,14 +137,17 @@ def list_cells(s, g):
 
 
 @ti.func
-def interpolate(s, g, a, l, x):
+def interpolate(s, g, a, lane, x):
     """Value and slope (per cell) of a grid field at a point, in cells of its own lattice."""
     S = strides(s)
     m, part = place(s, x)
-    a0, a1 = s.velocity[g, a, m][l], s.velocity[g, a, m + S[1]][l]
-    a2, a3 = s.velocity[g, a, m + S[2]][l], s.velocity[g, a, m + S[1] + S[2]][l]
-    d0, d1 = s.velocity[g, a, m + 1][l] - a0, s.velocity[g, a, m + 1 + S[1]][l] - a1
-    d2, d3 = s.velocity[g, a, m + 1 + S[2]][l] - a2, s.velocity[g, a, m + 1 + S[1] + S[2]][l] - a3
+    a0, a1 = s.velocity[g, a, m][lane], s.velocity[g, a, m + S[1]][lane]
+    a2, a3 = s.velocity[g, a, m + S[2]][lane], s.velocity[g, a, m + S[1] + S[2]][lane]
+    d0, d1 = s.velocity[g, a, m + 1][lane] - a0, s.velocity[g, a, m + 1 + S[1]][lane] - a1
+    d2, d3 = (
+        s.velocity[g, a, m + 1 + S[2]][lane] - a2,
+        s.velocity[g, a, m + 1 + S[1] + S[2]][lane] - a3,
+    )
     a0 += part[0] * d0
     a1 += part[0] * d1
     a2 += part[0] * d2
@@ -167,31 +170,31 @@ def move(s, g):
     """
     per_cell, dt = 1.0 / s.cell[None], s.dt[None]
     steepest = STEEPEST / (dt * per_cell)
-    for l in range(LANES):
+    for lane in range(LANES):
         height, energy, fastest = 0.0, 0.0, 0.0
-        for n in range(s.count[g, l]):
-            x = (s.position[g, l, n] - s.origin[None]) * per_cell
+        for n in range(s.count[g, lane]):
+            x = (s.position[g, lane, n] - s.origin[None]) * per_cell
             v = vec3(0.0)
             slope = mat3(0.0)
             for a in ti.static(range(3)):
                 at = x - 0.5
                 at[a] += 0.5
-                value, gradient = interpolate(s, g, a, l, at)
+                value, gradient = interpolate(s, g, a, lane, at)
                 v[a] = value
                 for b in ti.static(range(3)):
                     slope[a, b] = ti.math.clamp(gradient[b], -steepest, steepest)
-            s.slope[g, l, n] = slope
-            moved = s.position[g, l, n] + dt * (v + 0.5 * dt * per_cell * (slope @ v))
-            s.position[g, l, n], s.speed[g, l, n] = s.keep_inside(moved, v)
-            height += s.position[g, l, n][2]
+            s.slope[g, lane, n] = slope
+            moved = s.position[g, lane, n] + dt * (v + 0.5 * dt * per_cell * (slope @ v))
+            s.position[g, lane, n], s.speed[g, lane, n] = s.keep_inside(moved, v)
+            height += s.position[g, lane, n][2]
             energy += v.dot(v)  # not a number where any is, which a maximum passes over
             fastest = ti.max(fastest, v.dot(v))
-        drift = 1.0 - 2.0 * height / (ti.max(s.count[g, l], 1) * s.fill[g][l])
-        s.lack[g][l] = LEVEL_GAIN * drift
-        if s.count[g, l] > 0:
+        drift = 1.0 - 2.0 * height / (ti.max(s.count[g, lane], 1) * s.fill[g][lane])
+        s.lack[g][lane] = LEVEL_GAIN * drift
+        if s.count[g, lane] > 0:
             if not (energy < LARGEST and fastest < TOP_SPEED**2):
-                s.status[g, l] = RUNAWAY
+                s.status[g, lane] = RUNAWAY
             elif ti.abs(drift) > MOST_DRIFT:
-                s.status[g, l] = DRIFTED
-            if s.status[g, l] != SOUND:
-                s.count[g, l] = 0
+                s.status[g, lane] = DRIFTED
+            if s.status[g, lane] != SOUND:
+                s.count[g, lane] = 0

@@ -1,5 +1,5 @@
 # type: ignore  (Taichi compiles this source and gives these names their types)
-"""Implicit viscosity with a traction-free surface (Batty and Bridson 2008), and friction of walls."""
+"""Implicit viscosity with a free surface (Batty and Bridson 2008), and friction of walls."""
 
 import taichi as ti
 

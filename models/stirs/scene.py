@@ -1,6 +1,7 @@
 # type: ignore  (Taichi compiles this source and gives these names their types)
 """Groups of stirs in cups and with sticks of one shape."""
 
+import numpy as np
 import taichi as ti
 
 from ..apic.lanes import LANES, STRIDE, vec3
@@ -9,7 +10,7 @@ from ..apic.pressure import add_rise, push, solve_pressure
 from ..apic.surface import find_liquid, set_up_pressure
 from ..apic.transfer import OFF_WALL, clear, deposit, list_cells, move
 from ..apic.viscosity import extend, solve_viscosity, weigh_stresses
-from .stick_line import StickLine, slip_line, start_line
+from .stick_line import StickLine, hold_stick, slip_line, start_line
 
 
 @ti.data_oriented
@@ -64,38 +65,24 @@ class StirringScene(LiquidState):
                 g = n // STRIDE
                 find_liquid(self, g)
                 set_up_pressure(self, g)
-                for l in range(LANES):
-                    if self.count[g, l] > 0:
-                        jolt = self.jolt(path, g, l, step)
-                        start_line(self, self.sticks, g, l, path[g, l, step + 1], jolt)
+                for lane in range(LANES):
+                    if self.count[g, lane] > 0:
+                        before, now = path[g, lane, step], path[g, lane, step + 1]
+                        hold_stick(self, self.sticks, g, lane, before, now, path[g, lane, step + 2])
+                        start_line(self, self.sticks, g, lane)
                 push(self, g, self.pressure)
                 weigh_stresses(self, g, (step + 0.5) * self.dt[None])
 
     @ti.kernel
-    def flow(
-        self,
-        groups: ti.i32,
-        step: ti.i32,
-        path: ti.types.ndarray(vec3, 3),
-        directions: ti.types.ndarray(vec3, 3),
-    ):
+    def flow(self, groups: ti.i32, step: ti.i32, directions: ti.types.ndarray(vec3, 3)):
         for n in range(groups * STRIDE):
             if n % STRIDE == 0:
                 g = n // STRIDE
                 solve_viscosity(self, g)
-                for l in range(LANES):
-                    if self.count[g, l] > 0:
-                        pivot = path[g, l, step + 1]
-                        velocity = (path[g, l, step + 2] - pivot) / self.dt[None]
-                        jolt, time = self.jolt(path, g, l, step), (step + 0.5) * self.dt[None]
-                        slip_line(self, self.sticks, g, l, pivot, velocity, jolt, time)
-                    directions[g, l, step + 1] = self.sticks.direction[g, l]
-
-    @ti.func
-    def jolt(self, path: ti.template(), g, l, step):
-        """Mean acceleration of a pivot around the start of a step [m/s²]."""
-        change = path[g, l, step + 2] - 2.0 * path[g, l, step + 1] + path[g, l, step]
-        return change / self.dt[None] ** 2
+                for lane in range(LANES):
+                    if self.count[g, lane] > 0:
+                        slip_line(self, self.sticks, g, lane, (step + 0.5) * self.dt[None])
+                    directions[g, lane, step + 1] = self.sticks.direction[g, lane]
 
     @ti.kernel
     def project(self, groups: ti.i32):
@@ -130,11 +117,12 @@ class StirringScene(LiquidState):
         for step in range(start, stop):
             self.transfer_in(groups)
             self.prepare(groups, step, self.path)
-            self.flow(groups, step, self.path, self.directions)
+            self.flow(groups, step, self.directions)
             self.project(groups)
             self.transfer_out(groups)
 
     def view(self, step):
         """The first stir at a step's start: particles [n, 3], pivot [3] and direction [3]."""
         position = self.position.to_numpy()[0, 0, : self.count[0, 0]]
-        return position, self.path[0, 0, step + 1], self.directions[0, 0, step]
+        pivot = self.path[0, 0, step + 1].astype(np.float64)
+        return position, pivot, self.directions[0, 0, step]

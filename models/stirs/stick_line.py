@@ -34,6 +34,8 @@ class StickLine:
     Attributes:
         direction: Unit vector from pivot to tip, shape [groups, LANES].
         swing, turning: Angular velocity [rad/s] and acceleration [rad/s²].
+        pivot, velocity, jolt: Of the pivot: place at the step's start [m], velocity at its middle
+            [m/s] and mean acceleration around its start [m/s²].
         carried: Acceleration that a node gives the liquid in its volume [m/s²].
         wet_share: Of a node's length, 0 above the surface.
         seen: What a node's kernels see of each component, in full cells.
@@ -41,11 +43,14 @@ class StickLine:
 
     def __init__(self, groups, nodes, width):
         """Room for lines of at most `nodes`, with kernels of at most `width` cells."""
-        lane, node = (groups, LANES), (groups, LANES, nodes)
+        of_lane, node = (groups, LANES), (groups, LANES, nodes)
         self.direction, self.swing, self.turning = (
-            ti.Vector.field(3, ti.f32, lane) for _ in range(3)
+            ti.Vector.field(3, ti.f32, of_lane) for _ in range(3)
         )
-        self.mass, self.dry = (ti.field(ti.f32, lane) for _ in range(2))
+        self.pivot, self.velocity, self.jolt = (
+            ti.Vector.field(3, ti.f32, of_lane) for _ in range(3)
+        )
+        self.mass, self.dry = (ti.field(ti.f32, of_lane) for _ in range(2))
         self.length, self.radius, self.stretch, self.node_volume, self.cup_radius = (
             ti.field(ti.f32, ()) for _ in range(5)
         )
@@ -67,13 +72,13 @@ class StickLine:
     @ti.kernel
     def hang(self, sticks: ti.types.ndarray(ti.f32, 3)):
         """Sticks at rest: direction, mass [kg] and dry friction [N m], shape [5, groups, LANES]."""
-        for g, l in ti.ndrange(sticks.shape[1], LANES):
+        for g, lane in ti.ndrange(sticks.shape[1], LANES):
             for a in ti.static(range(3)):
-                self.direction[g, l][a] = sticks[a, g, l]
-            self.mass[g, l], self.dry[g, l] = sticks[3, g, l], sticks[4, g, l]
-            self.swing[g, l], self.turning[g, l] = vec3(0.0), vec3(0.0)
+                self.direction[g, lane][a] = sticks[a, g, lane]
+            self.mass[g, lane], self.dry[g, lane] = sticks[3, g, lane], sticks[4, g, lane]
+            self.swing[g, lane], self.turning[g, lane] = vec3(0.0), vec3(0.0)
             for n in range(self.nodes[None]):
-                self.carried[g, l, n] = vec3(0.0)
+                self.carried[g, lane, n] = vec3(0.0)
 
 
 @ti.func
@@ -84,16 +89,16 @@ def rows(t):
 
 
 @ti.func
-def row(s, t, g, l, n, r):
+def row(s, t, g, lane, n, r):
     """Component, first cell and weight of a row."""
     wide = 2 * t.half[None]
     a, j, k = r // (wide * t.tall[None]), r % wide, r // wide % t.tall[None]
-    first = t.base[g, l, n, a].dot(strides(s)) + j * strides(s)[1] + k * strides(s)[2]
-    return a, first, t.weight[g, l, n, a, 1, j] * t.weight[g, l, n, a, 2, k]
+    first = t.base[g, lane, n, a].dot(strides(s)) + j * strides(s)[1] + k * strides(s)[2]
+    return a, first, t.weight[g, lane, n, a, 1, j] * t.weight[g, lane, n, a, 2, k]
 
 
 @ti.func
-def place_node(s, t, g, l, n, x):
+def place_node(s, t, g, lane, n, x):
     """Weights of a node at x [m] on the faces around it, one-dimensional and of sum 1."""
     for a in range(3):
         for b in range(3):
@@ -108,156 +113,145 @@ def place_node(s, t, g, l, n, x):
             total = 0.0
             for i in range(2 * half):
                 w = peskin4((low + i - at) / stretch)
-                t.weight[g, l, n, a, b, i] = w
+                t.weight[g, lane, n, a, b, i] = w
                 total += w
             for i in range(2 * half):
-                w = t.weight[g, l, n, a, b, i] / ti.max(total, 1e-6)
-                t.weight[g, l, n, a, b, i] = w
-            t.base[g, l, n, a][b] = low
+                w = t.weight[g, lane, n, a, b, i] / ti.max(total, 1e-6)
+                t.weight[g, lane, n, a, b, i] = w
+            t.base[g, lane, n, a][b] = low
 
 
 @ti.func
-def liquid_at(s, t, g, l, n):
+def liquid_at(s, t, g, lane, n):
     """What a node sees of each component: full cells of liquid or wall."""
     seen = vec3(0.0)
     for r in range(rows(t)):
-        a, first, w = row(s, t, g, l, n, r)
+        a, first, w = row(s, t, g, lane, n, r)
         for i in range(2 * t.half[None]):
             m = first + i
-            seen[a] += w * t.weight[g, l, n, a, 0, i] * (s.mass[g, a, m][l] + s.solid[a, m])
+            seen[a] += w * t.weight[g, lane, n, a, 0, i] * (s.mass[g, a, m][lane] + s.solid[a, m])
     return ti.max(seen, LEAST_SEEN)
 
 
 @ti.func
-def velocity_at(s, t, g, l, n):
+def velocity_at(s, t, g, lane, n):
     """Of the liquid, as a node sees it [m/s]; walls are liquid at rest."""
     u = vec3(0.0)
     for r in range(rows(t)):
-        a, first, w = row(s, t, g, l, n, r)
+        a, first, w = row(s, t, g, lane, n, r)
         for i in range(2 * t.half[None]):
             m = first + i
-            momentum = s.mass[g, a, m][l] * s.velocity[g, a, m][l]
-            u[a] += w * t.weight[g, l, n, a, 0, i] * momentum
-    return u / t.seen[g, l, n]
+            momentum = s.mass[g, a, m][lane] * s.velocity[g, a, m][lane]
+            u[a] += w * t.weight[g, lane, n, a, 0, i] * momentum
+    return u / t.seen[g, lane, n]
 
 
 @ti.func
-def push_liquid(s, t, g, l, n, change):
+def push_liquid(s, t, g, lane, n, change):
     """Give the liquid a node's `change` of velocity times the node's volume: what is in the air or
     in a wall takes none, so that the liquid gets what the stick loses."""
-    scaled = t.node_volume[None] * change / t.seen[g, l, n]
+    scaled = t.node_volume[None] * change / t.seen[g, lane, n]
     for r in range(rows(t)):
-        a, first, w = row(s, t, g, l, n, r)
+        a, first, w = row(s, t, g, lane, n, r)
         w *= scaled[a]
         for i in range(2 * t.half[None]):
             m = first + i
-            if s.mass[g, a, m][l] > 0.0:
-                u = s.velocity[g, a, m][l] + w * t.weight[g, l, n, a, 0, i]
-                s.velocity[g, a, m][l] = u
+            if s.mass[g, a, m][lane] > 0.0:
+                u = s.velocity[g, a, m][lane] + w * t.weight[g, lane, n, a, 0, i]
+                s.velocity[g, a, m][lane] = u
 
 
 @ti.func
-def arm_of(s, t, g, l, n):
+def arm_of(s, t, g, lane, n):
     """From the pivot to a node [m]."""
-    return (t.length[None] - (TIP + n + 0.5) * s.cell[None]) * t.direction[g, l]
+    return (t.length[None] - (TIP + n + 0.5) * s.cell[None]) * t.direction[g, lane]
 
 
 @ti.func
-def start_line(s, t, g, l, pivot, jolt):
-    """Place the nodes; the carried force, and the impulse of the displaced mass, onto the liquid.
-
-    Args:
-        pivot: Where it is [m].
-        jolt: Its mean acceleration in this step [m/s²].
-    """
+def start_line(s, t, g, lane):
+    """Place the nodes; give the liquid the carried force and the displaced mass's impulse."""
     dx, dt = s.cell[None], s.dt[None]
-    u, w = t.direction[g, l], t.swing[g, l]
+    u, w = t.direction[g, lane], t.swing[g, lane]
     section = math.pi * t.radius[None] ** 2 / (t.node_volume[None] * dx**2)
     for n in range(t.nodes[None]):
-        arm = arm_of(s, t, g, l, n)
-        x = pivot + arm
-        wet = ti.math.clamp((s.fill[g][l] - x[2]) / dx + 0.5, 0.0, 1.0)
-        t.wet_share[g, l, n] = wet
+        arm = arm_of(s, t, g, lane, n)
+        x = t.pivot[g, lane] + arm
+        wet = ti.math.clamp((s.fill[g][lane] - x[2]) / dx + 0.5, 0.0, 1.0)
+        t.wet_share[g, lane, n] = wet
         if wet > 0.0:
-            place_node(s, t, g, l, n, x)
-            t.seen[g, l, n] = liquid_at(s, t, g, l, n)
-            turned = t.turning[g, l].cross(arm) + w.cross(w.cross(arm))
-            across = jolt + turned
+            place_node(s, t, g, lane, n, x)
+            t.seen[g, lane, n] = liquid_at(s, t, g, lane, n)
+            turned = t.turning[g, lane].cross(arm) + w.cross(w.cross(arm))
+            across = t.jolt[g, lane] + turned
             across -= across.dot(u) * u
-            push_liquid(s, t, g, l, n, dt * (t.carried[g, l, n] + IMPULSE * section * wet * across))
+            impulse = t.carried[g, lane, n] + IMPULSE * section * wet * across
+            push_liquid(s, t, g, lane, n, dt * impulse)
         else:
-            t.carried[g, l, n] = vec3(0.0)
+            t.carried[g, lane, n] = vec3(0.0)
 
 
 @ti.func
-def slip_line(s, t, g, l, pivot, velocity, jolt, time):
+def slip_line(s, t, g, lane, time):
     """Slip: the carried forces become those of the law, implicitly in each node's own response;
-    then the stick turns.
-
-    Args:
-        pivot: Where it is [m].
-        velocity: The pivot's, half a step later [m/s], as the liquid's.
-        jolt: Its mean acceleration in this step [m/s²].
-        time: Of the step's middle [s].
-    """
+    then the stick turns. `time` is that of the step's middle [s]."""
     dx, dt, radius = s.cell[None], s.dt[None], t.radius[None]
-    area, volume, density = math.pi * radius**2, t.node_volume[None] * dx**3, s.density[g][l]
+    area, volume, density = math.pi * radius**2, t.node_volume[None] * dx**3, s.density[g][lane]
     stokes = 4.0 * math.pi / ti.log(HELD_RADIUS * t.stretch[None] * dx / radius)
-    u, w = t.direction[g, l], t.swing[g, l]
-    ahead = w + dt * t.turning[g, l]
+    u, jolt = t.direction[g, lane], t.jolt[g, lane]
+    ahead = t.swing[g, lane] + dt * t.turning[g, lane]
     torque, added = vec3(0.0), 0.0
     jolt_across = jolt - jolt.dot(u) * u
     for n in range(t.nodes[None]):
-        wet = t.wet_share[g, l, n]
+        wet = t.wet_share[g, lane, n]
         if wet > 0.0:
-            arm = arm_of(s, t, g, l, n)
-            slip = velocity + ahead.cross(arm) - velocity_at(s, t, g, l, n)
+            arm = arm_of(s, t, g, lane, n)
+            slip = t.velocity[g, lane] + ahead.cross(arm) - velocity_at(s, t, g, lane, n)
             speed = ti.max(slip.norm(), 1e-6)
-            nu = kinematic(s, g, l, speed / radius, time)
+            nu = kinematic(s, g, lane, speed / radius, time)
             k = (QUADRATIC * radius * speed + stokes * nu) * dx / volume
-            f = t.carried[g, l, n]
+            f = t.carried[g, lane, n]
             change = (k * wet * slip - f) / (k + 1.0 / dt)
             f += change / dt
-            t.carried[g, l, n] = f
-            push_liquid(s, t, g, l, n, change)
+            t.carried[g, lane, n] = f
+            push_liquid(s, t, g, lane, n, change)
             displaced = IMPULSE * density * area * dx * wet
             torque -= arm.cross(density * volume * f + displaced * jolt_across)
             added += displaced * arm.dot(arm)
-    turn_stick(s, t, g, l, pivot, velocity, jolt, torque, added)
+    turn_stick(s, t, g, lane, torque, added)
 
 
 @ti.func
-def turn_stick(s, t, g, l, pivot, velocity, jolt, torque, added):
-    """The pendulum's step: weight, lift, the pivot's acceleration, and the liquid's torque [N m] and
-    added inertia [kg m²]; then its end stops at the wall and the floor."""
+def turn_stick(s, t, g, lane, torque, added):
+    """A step of the pendulum, by weight, lift and the pivot's acceleration, and by the liquid's
+    torque [N m] and added inertia [kg m²]; then its end stops at the wall and the floor."""
     dt, length, radius = s.dt[None], t.length[None], t.radius[None]
-    density, mass = s.density[g][l], t.mass[g, l]
-    per_length = density * math.pi * radius**2
-    u, w = t.direction[g, l], t.swing[g, l]
-    dry = ti.math.clamp((pivot[2] - s.fill[g][l]) / ti.max(-u[2], 0.2), 0.0, length)
+    mass, per_length = t.mass[g, lane], s.density[g][lane] * math.pi * radius**2
+    pivot, jolt = t.pivot[g, lane], t.jolt[g, lane]
+    u, w = t.direction[g, lane], t.swing[g, lane]
+    dry = ti.math.clamp((pivot[2] - s.fill[g][lane]) / ti.max(-u[2], 0.2), 0.0, length)
     displaced = per_length * (length**3 - dry**3) / 3.0
     lever = 0.5 * (length**2 - dry**2) * per_length
     up = vec3(0.0, 0.0, 1.0)
-    torque += (0.5 * length * mass * u).cross(-GRAVITY * up - jolt)
-    torque += (lever * u).cross(jolt + GRAVITY * up)
+    torque += ((lever - 0.5 * length * mass) * u).cross(GRAVITY * up + jolt)
     torque -= PIVOT_DAMPING * w
     torque -= torque.dot(u) * u
     inertia = mass * (length**2 / 3.0 + radius**2 / 4.0) - displaced + added
     turning = torque / inertia
     w += dt * turning
-    loss = dt * t.dry[g, l] / inertia
+    loss = dt * t.dry[g, lane] / inertia
     if loss > 0.0:
         w *= ti.max(1.0 - loss / ti.max(w.norm(), 1e-12), 0.0)
     end = pivot + length * u
     out = ti.sqrt(end[0] ** 2 + end[1] ** 2)
     if out + radius > t.cup_radius[None]:
-        w = stopped(w, u, velocity, length, vec3(end[0], end[1], 0.0) / ti.max(out, 1e-9))
+        outward = vec3(end[0], end[1], 0.0) / ti.max(out, 1e-9)
+        w = stopped(w, u, t.velocity[g, lane], length, outward)
     if end[2] < 0.0:
-        w = stopped(w, u, velocity, length, -up)
+        w = stopped(w, u, t.velocity[g, lane], length, -up)
     w -= w.dot(u) * u
-    t.turning[g, l] = turning
-    t.swing[g, l] = w
-    t.direction[g, l] = (u + dt * w.cross(u)).normalized()
+    t.turning[g, lane] = turning
+    t.swing[g, lane] = w
+    t.direction[g, lane] = (u + dt * w.cross(u)).normalized()
 
 
 @ti.func

@@ -12,7 +12,7 @@ import bolfi_liquids as bl
 from bolfi_liquids import hardware, models
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.cups import bundled_cups
-from bolfi_liquids.inputs.described_liquid import DENSITY, POUR_PARTICLES, STIR_PARTICLES
+from bolfi_liquids.inputs.described_liquid import DENSITY, POUR_PARTICLES
 from bolfi_liquids.inputs.recording import Trajectory
 
 pytestmark = pytest.mark.slow  # kernels compile for ten seconds and more
@@ -181,5 +181,4 @@ def test_settings_may_be_integers_of_numpy():
 def test_defaults_are_those_of_the_simulator():
     assert POUR_PARTICLES == models.fluid.numerics.POUR_PARTICLES
     recording = bundled_recording("glycerin")
-    assert models.StirSetup.from_recording(recording).particles == STIR_PARTICLES
     assert recording.number("liquid_density") == DENSITY
