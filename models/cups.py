@@ -144,7 +144,7 @@ class Cups(_Section, frozen=True):
 
     def least_viscosity(self, density: float, angular_velocity: float) -> float:
         """Viscosity [Pa s] below which pours cannot distinguish liquids of `density` [kg/m³]; see
-        `ParticleNumerics.least_viscosity`. The source's floor turns about the lip at the flow's speed."""
+        `ParticleNumerics`. The source's floor turns about the lip at the flow's speed."""
         speed = angular_velocity * self.source.height
         return ParticleNumerics().least_viscosity(self.spacing(), density, speed)
 

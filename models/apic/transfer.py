@@ -144,10 +144,8 @@ def interpolate(s, g, a, lane, x):
     a0, a1 = s.velocity[g, a, m][lane], s.velocity[g, a, m + S[1]][lane]
     a2, a3 = s.velocity[g, a, m + S[2]][lane], s.velocity[g, a, m + S[1] + S[2]][lane]
     d0, d1 = s.velocity[g, a, m + 1][lane] - a0, s.velocity[g, a, m + 1 + S[1]][lane] - a1
-    d2, d3 = (
-        s.velocity[g, a, m + 1 + S[2]][lane] - a2,
-        s.velocity[g, a, m + 1 + S[1] + S[2]][lane] - a3,
-    )
+    d2 = s.velocity[g, a, m + 1 + S[2]][lane] - a2
+    d3 = s.velocity[g, a, m + 1 + S[1] + S[2]][lane] - a3
     a0 += part[0] * d0
     a1 += part[0] * d1
     a2 += part[0] * d2

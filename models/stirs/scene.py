@@ -10,7 +10,7 @@ from ..apic.pressure import add_rise, push, solve_pressure
 from ..apic.surface import find_liquid, set_up_pressure
 from ..apic.transfer import OFF_WALL, clear, deposit, list_cells, move
 from ..apic.viscosity import extend, solve_viscosity, weigh_stresses
-from .stick_line import StickLine, hold_stick, slip_line, start_line
+from .stick_line import StickLine, slip_line, start_line
 
 
 @ti.data_oriented
@@ -49,6 +49,15 @@ class StirringScene(LiquidState):
             v[2] = ti.min(v[2], 0.0)
         return x, v
 
+    @ti.func
+    def hold(self, path: ti.template(), g, lane, step):
+        """Take the pivot's place and motion in a step."""
+        before, now, after = path[g, lane, step], path[g, lane, step + 1], path[g, lane, step + 2]
+        dt = self.dt[None]
+        self.sticks.pivot[g, lane] = now
+        self.sticks.velocity[g, lane] = (after - now) / dt
+        self.sticks.jolt[g, lane] = (after - 2.0 * now + before) / dt**2
+
     @ti.kernel
     def transfer_in(self, groups: ti.i32):
         for n in range(groups * STRIDE):
@@ -67,8 +76,7 @@ class StirringScene(LiquidState):
                 set_up_pressure(self, g)
                 for lane in range(LANES):
                     if self.count[g, lane] > 0:
-                        before, now = path[g, lane, step], path[g, lane, step + 1]
-                        hold_stick(self, self.sticks, g, lane, before, now, path[g, lane, step + 2])
+                        self.hold(path, g, lane, step)
                         start_line(self, self.sticks, g, lane)
                 push(self, g, self.pressure)
                 weigh_stresses(self, g, (step + 0.5) * self.dt[None])
