@@ -2,12 +2,12 @@
 """A stick hung from the gripper: a spherical pendulum, part of which the particles do not see.
 
 The stick is about one particle wide. Particles keep off it by a part of their spacing, so at its
-own radius it drags like a thicker one; to them it is thinner (`ParticleNumerics.stick_thinner`,
-validation case `cylinder_drag`). What it displaces beyond that core acts on it by closed forms: Archimedes'
-lift, whose reaction all liquid bears like that of a risen surface, and the added mass of a
-cylinder in potential flow, which is what it displaces (Lamb 1932, "Hydrodynamics", art. 68), as
-in liquid that does not itself accelerate. So vertical momentum balances between stick and liquid,
-but the angular one only up to these two.
+own radius it drags like a thicker one. To them it is thinner, see `stick_thinner` of
+`ParticleNumerics` and the validation case `cylinder_drag`. What it displaces beyond that core acts
+on it by closed forms: Archimedes' lift, whose reaction all liquid bears like that of a risen
+surface, and the added mass of a cylinder in potential flow, which is what it displaces (Lamb 1932,
+"Hydrodynamics", art. 68), as in liquid that does not itself accelerate. So vertical momentum
+balances between stick and liquid, but the angular one only up to these two.
 """
 
 import numpy as np

@@ -7,6 +7,7 @@ from .fluid.checks import check_numbers
 
 TESTED_RATIO = (0.7, 1.4)  # radii of a stick in cells, for which references were compared
 STEP_CELL = 0.005  # m, the cell that `longest_step` is for
+LARGEST_STEP = 4 / 3  # times `longest_step`, for larger cells
 LEAST_VISCOSITY = 3e-6  # m²/s
 
 
@@ -56,7 +57,8 @@ class Numerics:
 
     def step(self, cell: float, speed: float) -> float:
         """Step [s] for cells [m] and the gripper's largest speed [m/s]."""
-        return min(self.longest_step * cell / STEP_CELL, self.courant * cell / max(speed, 1e-9))
+        slow = self.longest_step * min(cell / STEP_CELL, LARGEST_STEP)
+        return min(slow, self.courant * cell / max(speed, 1e-9))
 
     def least_viscosity(self, spacing: float, density: float, speed: float = 0.1) -> float:
         """Viscosity [Pa s] below which stirs in liquids of `density` [kg/m³] look alike.

@@ -22,6 +22,9 @@ class LiquidState:
         liquid: 1 in cells that have pressure.
         pressure: Times step over density and cell [m/s].
         status: How a lane fares, a code of `faults`.
+
+    A scene is a subclass with two functions: `acceleration` of a particle, by what acts on all
+    liquid, and `keep_inside`, the place and velocity of a particle that a wall stops.
     """
 
     def __init__(self, groups, cells, particles, effects=()):

@@ -71,15 +71,14 @@ def clear(s, g):
 
 @ti.func
 def deposit(s, g):
-    """Volumes and momenta of the particles, after gravity has acted on them."""
+    """Volumes and momenta of the particles, after the scene's force has acted on them."""
     S = strides(s)
     per_cell = 1.0 / s.cell[None]
-    fall = vec3(0.0, 0.0, -GRAVITY * s.dt[None])
     for lane in range(LANES):
         volume = s.particle[g][lane]
         for n in range(s.count[g, lane]):
             x = (s.position[g, lane, n] - s.origin[None]) * per_cell
-            v = s.speed[g, lane, n] + fall
+            v = s.speed[g, lane, n] + s.dt[None] * s.acceleration(g, lane, s.position[g, lane, n])
             slope = s.slope[g, lane, n]
             for a in range(3):
                 at = x - 0.5

@@ -8,7 +8,7 @@ from ..apic.lanes import LANES, STRIDE, vec3
 from ..apic.liquid_state import LiquidState
 from ..apic.pressure import add_rise, push, solve_pressure
 from ..apic.surface import find_liquid, set_up_pressure
-from ..apic.transfer import OFF_WALL, clear, deposit, list_cells, move
+from ..apic.transfer import GRAVITY, OFF_WALL, clear, deposit, list_cells, move
 from ..apic.viscosity import extend, solve_viscosity, weigh_stresses
 from .stick_line import StickLine, slip_line, start_line
 
@@ -29,6 +29,11 @@ class StirringScene(LiquidState):
         """
         super().__init__(groups, cells, particles, effects)
         self.sticks = StickLine(groups, *line)
+
+    @ti.func
+    def acceleration(self, g, lane, x):
+        """Of a particle at x [m], by what acts on all liquid [m/s²]."""
+        return vec3(0.0, 0.0, -GRAVITY)
 
     @ti.func
     def keep_inside(self, x, v):
