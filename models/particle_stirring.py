@@ -11,7 +11,6 @@ from .effect_coefficients import Acting, liquid_sets
 from .fluid import runtime
 from .fluid.faults import faulty
 from .fluid.liquid import Liquid
-from .fluid.numerics import ParticleNumerics
 from .fluid.packing import pack_cylinder
 from .fluid.runtime import Watch
 from .fluid.settled import Packing, SettledPackings
@@ -20,12 +19,6 @@ from .stir_setup import StirSetup
 
 SETTLING_TIME = 1.0  # s that a packing relaxes around the held stick
 _packings = SettledPackings()
-
-
-def rate_of(setup: StirSetup) -> float:
-    """Substeps per second [Hz]."""
-    assert isinstance(setup.numerics, ParticleNumerics)
-    return setup.numerics.substep_rate(setup.spacing)
 
 
 def stir_particles(

@@ -9,6 +9,7 @@ import numpy as np
 from .fluid.checks import check_numbers
 from .fluid.numerics import MODEL_VERSION, STIR_PARTICLES, ParticleNumerics
 from .numerics import Numerics, check_resolution
+from .stirs.path import top_speed
 from .trajectory import Trajectory, mean_speed
 
 MAX_FILL_RATIO = 1.5  # times the setup's fill is the largest
@@ -102,7 +103,7 @@ class StirSetup:
     def from_recording(
         cls,
         recording: HasRig,
-        particles: int | None = None,
+        particles: int = 0,
         numerics: Numerics | ParticleNumerics | None = None,
     ) -> "StirSetup":
         """The setup that a recording's attributes describe (the first pivot position too).
@@ -140,7 +141,7 @@ class StirSetup:
             cup=Cup(cup_radius, height, fill),
             stick=Stick(radius, length, mass),
             submerged=min(submerged, fill),
-            particles=particles or 0,
+            particles=particles,
             numerics=numerics or Numerics(),
             tilt=_first_tilt(recording),
         )
@@ -169,6 +170,13 @@ class StirSetup:
         """Unit vector from the pivot to the stick's tip at the start, shape [3]."""
         down = np.array([*np.tan(self.tilt), -1.0])
         return down / np.linalg.norm(down)
+
+    def step(self, gripper: Trajectory) -> float:
+        """Step of time [s] for a path of the gripper."""
+        if isinstance(self.numerics, ParticleNumerics):
+            return 1.0 / self.numerics.substep_rate(self.spacing)
+        longest = self.numerics.step(self.cell, 0.0)
+        return self.numerics.step(self.cell, top_speed(gripper, longest))
 
     @property
     def deepest(self) -> float:

@@ -11,11 +11,11 @@ from .fluid.liquid import Liquid
 from .fluid.packing import checked_seeds
 from .fluid.runtime import Watch
 from .numerics import Numerics
-from .particle_stirring import rate_of, stir_particles
+from .particle_stirring import stir_particles
 from .rig import Rig, check_rig
 from .stir_setup import StirSetup
 from .stirs.march import Stirs, march
-from .stirs.path import step_path, top_speed
+from .stirs.path import step_path
 from .trajectory import Trajectory, substep_path
 
 
@@ -63,7 +63,8 @@ def watched_stir(
     size = len(seeds)
     acting = acting_in("stir", with_adhesion(liquid, effects, size), size)
     liquid = liquid.batch(size)
-    step, path = _steps(gripper, setup)
+    step = setup.step(gripper)
+    path = _pivots(gripper, setup, step)
     written = Rig(
         stick_mass=np.full(size, setup.stick.mass),
         pivot_friction=np.zeros(size),
@@ -104,11 +105,8 @@ def inclination(directions: np.ndarray, time: np.ndarray, step: float) -> np.nda
     )
 
 
-def _steps(gripper: Trajectory, setup: StirSetup) -> tuple[float, np.ndarray]:
-    """Step of the simulation [s], and the pivot at the start and end of each [m]."""
+def _pivots(gripper: Trajectory, setup: StirSetup, step: float) -> np.ndarray:
+    """The pivot at the start and at the end of each step [m]."""
     if isinstance(setup.numerics, Numerics):
-        longest = setup.numerics.step(setup.cell, 0.0)
-        step = setup.numerics.step(setup.cell, top_speed(gripper, longest))
-        return step, step_path(gripper, step)
-    rate = rate_of(setup)
-    return 1.0 / rate, substep_path(gripper, rate)
+        return step_path(gripper, step)
+    return substep_path(gripper, 1.0 / step)

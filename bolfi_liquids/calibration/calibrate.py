@@ -53,7 +53,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     seed: int = 0,
     surrogate: str = "discrepancy",
     batch: int = 4,
-    particles: int | None = None,
+    particles: int = 0,
     sampler: str = "nuts",
     chains: int = 4,
     draws: int = 1000,
@@ -79,7 +79,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         seed: Seed of all random draws.
         surrogate: "discrepancy", the paper's, or "signal", which emulates the inclination itself.
         batch: Simulations that are asked, and run, at the same time.
-        particles: Number of particles of the simulated liquid; None: cells follow the stick.
+        particles: Number of particles of the simulated liquid; 0: cells follow the stick.
         sampler: "nuts" or "emcee".
         chains: Number of the sampler's chains.
         draws: Number of draws that each chain keeps.

@@ -114,7 +114,7 @@ def same_liquid(one: Recording, other: Recording) -> bool:
     return abs(one.number("liquid_density") - density) <= SAME_DENSITY * density
 
 
-def stirring_of(recordings: list[Recording], particles: int | None) -> Stirring:
+def stirring_of(recordings: list[Recording], particles: int) -> Stirring:
     """Set up the simulators of recordings of one liquid.
 
     Raises:

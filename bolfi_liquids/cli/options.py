@@ -26,8 +26,7 @@ CupsOption = Annotated[
 ]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random numbers.")]
 StirParticlesOption = Annotated[
-    int | None,
-    typer.Option("--particles", help="Number of particles; else cells follow the stick."),
+    int, typer.Option("--particles", help="Number of particles; 0: cells follow the stick.")
 ]
 ParticlesOption = Annotated[
     int, typer.Option("--particles", help="Number of particles of the simulated liquid.")

@@ -98,7 +98,7 @@ def stir(
     density: Annotated[
         float | None, typer.Option(help="Of the liquid, in kg/m³; else the recording's.")
     ] = None,
-    particles: StirParticlesOption = None,
+    particles: StirParticlesOption = 0,
     recording: Annotated[
         Path | None,
         typer.Option(metavar="NC", help="Whose path and rig are used; else a bundled one."),

@@ -35,7 +35,7 @@ class Clean:
 
 def clean_residuals(
     recordings: Sequence[Recording],
-    particles: int | None,
+    particles: int,
     prior: "Prior",
     extensions: "dict[str, Extension]",
     *,

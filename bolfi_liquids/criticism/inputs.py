@@ -108,7 +108,7 @@ def open_inputs(calibration: Calibration, settings: CriticismSettings, given: Gi
     _check_effects(settings)
     record = dict(calibration.record)
     stirring = stirring_of(
-        kept_recordings(calibration.path, record), record["settings"]["particles"]
+        kept_recordings(calibration.path, record), int(record["settings"]["particles"])
     )
     kept_back = open_recordings(given.held_out, Argument("held_out"))
     _check_held_out(stirring, kept_back)

@@ -42,7 +42,7 @@ class Described:
     cohesion: Annotated[float, Field(ge=0.0, le=1.0)]
     density: Annotated[float, Field(gt=0.0, le=MAX_DENSITY)]
     effects: Mapping[str, float] = Field(default_factory=dict)
-    particles: Particles
+    particles: Particles = POUR_PARTICLES
     seed: Seed = 0
 
     def liquid(self) -> "Liquid":

@@ -48,6 +48,12 @@ def one_of(choices: tuple[str, ...]) -> AfterValidator:
     return AfterValidator(check)
 
 
+def _as_many(value: int) -> int:
+    if 0 < value < MIN_PARTICLES:
+        raise ValueError(f"Input should be 0 or at least {MIN_PARTICLES}")
+    return value
+
+
 def _plain_integer(value: Any) -> Any:
     """Integers of other libraries as Python's own; anything else as it is."""
     try:
@@ -61,6 +67,8 @@ Seed = Annotated[Integer, Field(ge=0, le=LARGEST_SEED)]
 Count = Annotated[Integer, Field(ge=1, le=MAX_COUNT)]
 Simulations = Annotated[Integer, Field(ge=MIN_SIMULATIONS, le=MAX_SIMULATIONS)]
 Particles = Annotated[Integer, Field(ge=MIN_PARTICLES, le=MAX_PARTICLES)]
+StirParticles = Annotated[Integer, Field(ge=0, le=MAX_PARTICLES), AfterValidator(_as_many)]
+"""0: cells follow the stick."""
 Surrogate = Annotated[str, one_of(SURROGATES)]
 
 T = TypeVar("T")
@@ -124,7 +132,7 @@ class CalibrationSettings:
         batch: Simulations run at the same time.
         seed: Seed of all random draws.
         surrogate: "discrepancy", the paper's, or "signal", which emulates the inclination itself.
-        particles: Number of particles of the simulated liquid; None: cells follow the stick.
+        particles: Number of particles of the simulated liquid; 0: cells follow the stick.
         sampler: "nuts" or "emcee".
         chains: Number of chains; R-hat needs at least two.
         draws: Draws kept of each chain.
@@ -134,7 +142,7 @@ class CalibrationSettings:
     batch: Count = 4
     seed: Seed = 0
     surrogate: Surrogate = "discrepancy"
-    particles: Particles | None = None
+    particles: StirParticles = 0
     sampler: Annotated[str, one_of(SAMPLERS)] = "nuts"
     chains: Annotated[Integer, Field(ge=2, le=1000)] = 4
     draws: Annotated[Integer, Field(ge=4, le=MAX_COUNT)] = 1000
@@ -150,7 +158,7 @@ class SbcSettings:
         design: Points that the former share, each stirred twice.
         budget: Simulations that each learns from.
         noise_deg: Standard deviation of the cameras' noise, added to each simulated sample [deg].
-        particles: Number of particles of the simulated liquid; None: cells follow the stick.
+        particles: Number of particles of the simulated liquid; 0: cells follow the stick.
         seed: Seed of all random draws.
     """
 
@@ -159,7 +167,7 @@ class SbcSettings:
     design: Simulations = 512
     budget: Simulations = 20
     noise_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = 0.1
-    particles: Particles | None = None
+    particles: StirParticles = 0
     seed: Seed = 0
 
     def __post_init__(self):

@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from ..errors import InputError
-from ..inputs.settings import Count, Particles, Seed, Simulations, Surrogate, checked, one_of
+from ..inputs.settings import Count, StirParticles, Seed, Simulations, Surrogate, checked, one_of
 from ..pouring.map import DEFAULT_POURS, MIN_POURS
 
 STOPS = ("bound", "mean")
@@ -26,7 +26,7 @@ class OnlineSettings:
         budget: Simulations in all.
         in_flight: Simulations made together while the robot stirs; each occupies a core.
         surrogate: "discrepancy", the paper's, or "signal", which emulates the inclination itself.
-        particles: Number of particles of the simulated liquid; None: cells follow the stick.
+        particles: Number of particles of the simulated liquid; 0: cells follow the stick.
         pours: Number of pours of the spillage map.
         seed: Seed of all random draws.
     """
@@ -38,7 +38,7 @@ class OnlineSettings:
     budget: int = 48
     in_flight: Count = 1
     surrogate: Surrogate = "discrepancy"
-    particles: Particles | None = None
+    particles: StirParticles = 0
     pours: Annotated[int, Field(ge=MIN_POURS)] = DEFAULT_POURS
     seed: Seed = 0
 

@@ -106,7 +106,7 @@ def _scenes(
 ) -> _Scenes:
     from ..calibration.stir_simulator import stirring_of
 
-    particles = calibration.record["settings"]["particles"]
+    particles = int(calibration.record["settings"]["particles"])
     stir = StirScene(stirring_of([recording], particles), timeout)
     if pour is None:
         return _Scenes(stir, None)

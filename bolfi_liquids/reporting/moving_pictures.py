@@ -79,7 +79,7 @@ def _stir_scene(calibration: Calibration, frames: "Dataset") -> dict[str, Any]:
     from ..models import StirSetup
 
     recording = kept_recordings(calibration.path, dict(calibration.record))[0]
-    particles = calibration.record["settings"]["particles"]
+    particles = int(calibration.record["settings"]["particles"])
     setup = StirSetup.from_recording(recording, particles=particles)
     radius, top = setup.cup.radius, float(frames["pivot"][..., 2].max())
     return {

@@ -60,7 +60,7 @@ def draw_sticky(repetition: int, seed: int) -> Sticky:
     return Sticky(theta, int(rng.integers(2**31)))
 
 
-def recipe(cups: "Cups", particles: int | None, seed: int) -> str:
+def recipe(cups: "Cups", particles: int, seed: int) -> str:
     """Short hash of what determines the drawn liquid and its pours.
 
     Runs of another model are kept elsewhere.
@@ -78,7 +78,7 @@ def recipe(cups: "Cups", particles: int | None, seed: int) -> str:
     return sha256(text.encode()).hexdigest()[:8]
 
 
-def stirred(truth: Sticky, particles: int | None, path: Path) -> Recording:
+def stirred(truth: Sticky, particles: int, path: Path) -> Recording:
     """A recording of it, of so many particles, written to `path` unless it is there."""
     if not path.exists():
         dataset = _dataset(bundled_recording(STICKY_LIQUID), truth, particles)
@@ -95,7 +95,7 @@ def poured(truth: Sticky, density: float, cups: "Cups", path: Path) -> Path:
     return path
 
 
-def _dataset(like: Recording, truth: Sticky, particles: int | None) -> "Dataset":
+def _dataset(like: Recording, truth: Sticky, particles: int) -> "Dataset":
     from .. import models
 
     setup = models.StirSetup.from_recording(like, particles=particles)

@@ -20,7 +20,7 @@ class Scale:
         rates: Angular velocities among which pours after a recording are chosen.
         surrogates: Surrogates that recordings are calibrated with.
         lips: Heights of the lip that are compared [m].
-        particles: Of the stirs by which bundled recordings are calibrated; None: cells follow the
+        particles: Of the stirs by which bundled recordings are calibrated; 0: cells follow the
             stick.
         drawn_particles: Of the stirs of drawn truths, and of those by which they are calibrated.
         grid: Of the pours by which actions are chosen.
@@ -37,8 +37,8 @@ class Scale:
     rates: int = 15
     surrogates: tuple[str, ...] = ("discrepancy", "signal")
     lips: tuple[float, ...] = (0.10, 0.14, 0.20, 0.26)
-    particles: int | None = None
-    drawn_particles: int | None = None
+    particles: int = 0
+    drawn_particles: int = 0
     grid: GridSize = FINE_GRID
     seed: int = 0
 

@@ -61,7 +61,7 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
     path: str | TimedPath | None = None,
     rig: Mapping[str, float] | None = None,
     recording: Source | None = None,
-    particles: int | None = None,
+    particles: int = 0,
     seed: ArrayLike = 0,
     executor: "Workers | None" = None,
     timeout: float | None = None,
@@ -83,7 +83,7 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
         rig: Sizes of cup and stick [m], and `stick_mass` [kg] or `stick_density` [kg/m3], by the
             names of a recording's attributes, in place of the recording's.
         recording: Whose path and rig are used, or its file; None is a bundled stir of glycerin.
-        particles: Number of particles of the simulated liquid; None: cells follow the stick.
+        particles: Number of particles of the simulated liquid; 0: cells follow the stick.
         seed: Seed of the packing; an integer or shape (B,).
         executor: Where simulations run, see `calibrate`; the result has the same bits.
         timeout: Seconds that one simulation may take; None sets no limit.
@@ -112,7 +112,7 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
     liquid = {"viscosity": viscosity, "cohesion": cohesion, "density": density}
     of_another = _with_rig(opened.attrs, rig) | {"liquid_density": density}
     plan = _planned(replace(opened, attrs=MappingProxyType(of_another)), path)
-    count = StirSetup.from_recording(plan).particles if particles is None else particles
+    count = particles or StirSetup.from_recording(plan).particles
     batch = batch_of(liquid, check_effects(effects, "stir"), count, seed)
     targets.check_single(batch.single)
     setup = StirSetup.from_recording(plan, particles=batch.one.particles)

@@ -124,5 +124,5 @@ def start() -> None:
 
     # the banner is a bare print that no log level silences
     with contextlib.redirect_stdout(io.StringIO()):
-        ti.init(arch=ti.cpu, default_fp=ti.f32, log_level=ti.ERROR)
+        ti.init(arch=ti.cpu, default_fp=ti.f32, fast_math=False, log_level=ti.ERROR)
     LOCK.own()

@@ -20,9 +20,9 @@ POSITION = np.tile([0.0, 0.0, 0.235], (5, 1))
         ({"radius": np.nan}, {}, 100, "cup: radius must be a number, finite and positive, got nan"),
         ({}, {"mass": 0.0}, 100, "stick: mass must be a number, finite and positive, got 0.0"),
         ({}, {"radius": 0.05}, 100, r"of radius 0\.05 m, does not fit into the cup"),
-        ({}, {}, 0, "setup: particles must be a number, finite and positive, got 0"),
+        ({}, {}, -1, "setup: particles must be a number, finite and not negative, got -1"),
         ({}, {}, 100.5, "particles must be a whole number, got 100.5"),
-        ({}, {}, "many", "particles must be a number, finite and positive, got 'many'"),
+        ({}, {}, "many", "particles must be a number, finite and not negative, got 'many'"),
     ],
 )
 def test_what_cannot_be_is_named(cup, stick, particles, message):
