@@ -63,8 +63,8 @@ def _recordings(records: Iterable[Mapping[str, Any]]) -> Table:
 def _pairs(pairs: "Iterable[Neighbours]") -> Table:
     table = _number_table("neighbours", "Pa s", "reference [deg]", "ours [deg]", "ratio", "bar")
     for pair in pairs:
-        names = f"{pair.thinner}, {pair.thicker}"
-        viscosities = "{:g}, {:g}".format(*pair.viscosity)
+        names = f"{pair.thinner},\n{pair.thicker}"
+        viscosities = "{:g},\n{:g}".format(*pair.viscosity)
         differences = _fixed(pair.reference), _fixed(pair.simulated)
         table.add_row(*map(Text, (names, viscosities, *differences, *_judged(pair))))
     return table
@@ -79,7 +79,7 @@ def _judged(pair: "Neighbours") -> tuple[str, str, str]:
 
 def _number_table(label: str, *numbers: str) -> Table:
     return Table(
-        Column(label, overflow="fold"),  # a name that is cut off names nothing
+        Column(label, no_wrap=True),  # headings give way, names are whole
         # as text: a unit's brackets are no markup
         *(Column(Text(name), justify="right") for name in numbers),
         Column("result", no_wrap=True),
