@@ -1,4 +1,4 @@
-"""What `check physics` keeps: a file for each case, and one with all results.
+"""What `check physics` keeps of its cases: a record of each, and all results in one file.
 
 OUT/cases/NAME.json is written whole when its case has finished, so that a killed check repeats
 no finished case, and two checks may run different cases side by side. OUT/physics.json is made
@@ -16,9 +16,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError
 from ..files import write_text
-from ..numerals import load_json
 from ..run.provenance import versions
 
 if TYPE_CHECKING:
@@ -103,32 +101,6 @@ def failed_record(case: "Case", error: str, seed: int, seconds: float) -> dict[s
     return _about(case, seed) | outcome | {"rows": [], "notes": {}, "panels": []}
 
 
-def write_record(out: Path, record: Mapping[str, Any]) -> None:
-    """Keep a case's record."""
-    text = json.dumps(record, indent=1, allow_nan=False)
-    write_text(out / CASES / f"{record['name']}.json", text + "\n")
-
-
-def read_record(out: Path, name: str) -> dict[str, Any] | None:
-    """A case's record; None where there is none.
-
-    Raises:
-        InputError: the file is damaged.
-    """
-    path = out / CASES / f"{name}.json"
-    if not path.exists():
-        return None
-    try:
-        record = load_json(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as err:
-        raise InputError(
-            f"not JSON ({err})", where=str(path), fix="delete it to run it again"
-        ) from err
-    if not isinstance(record, dict) or record.get("name") != name:
-        raise InputError("not a case's record", where=str(path), fix="delete it to run it again")
-    return record
-
-
 def is_finished(record: Mapping[str, Any], identity: Mapping[str, Any]) -> bool:
     """Whether the record is of a case that ran to its end and has the same identity."""
     return record.get("error") is None and has_identity(record, identity)
@@ -136,22 +108,31 @@ def is_finished(record: Mapping[str, Any], identity: Mapping[str, Any]) -> bool:
 
 def write_results(out: Path, records: Iterable[Mapping[str, Any]], seed: int) -> Path:
     """All records in one file, without the points of their plots; its path."""
-    from ..models import MODEL_VERSION
+    cases = without_panels(records)
+    passed = all(record["passed"] for record in cases.values())
+    results = {**made_with(seed), "passed": passed, "cases": cases}
+    return write_text(out / RESULTS, json.dumps(results, indent=2, allow_nan=False) + "\n")
 
-    cases = {
+
+def without_panels(records: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Records by name, without the points of their plots."""
+    return {
         record["name"]: {key: value for key, value in record.items() if key != "panels"}
         for record in records
     }
-    results = {
+
+
+def made_with(seed: int) -> dict[str, Any]:
+    """When, and by which versions and seed, results were made."""
+    from ..models import MODEL_VERSION
+
+    return {
         "created": _now(),
         "version": versions(LIBRARIES)["bolfi-liquids"],
         "model": MODEL_VERSION,
         "seed": seed,
         "versions": versions(LIBRARIES),
-        "passed": all(record["passed"] for record in cases.values()),
-        "cases": cases,
     }
-    return write_text(out / RESULTS, json.dumps(results, indent=2, allow_nan=False) + "\n")
 
 
 def _about(case: "Case", seed: int) -> dict[str, Any]:

@@ -16,7 +16,13 @@ from .options import SbcOptions
 app = typer.Typer(help="Long validation runs; a killed one goes on.", no_args_is_help=True)
 
 
-@app.command(epilog=examples("check physics --case couette", "check physics --out runs/physics"))
+@app.command(
+    epilog=examples(
+        "check physics --case couette",
+        "check physics --out runs/physics",
+        "check physics --against recordings --out runs/physics",
+    )
+)
 @grouped
 def physics(
     compute: Compute,
@@ -26,26 +32,49 @@ def physics(
     names: Annotated[
         list[str] | None,
         typer.Option(
-            "--case", metavar="NAME", help="Run this case; may be repeated. Without it, all."
+            "--case",
+            metavar="NAME",
+            help="Run this case, with --against this recording; may be repeated. Without it, all.",
+        ),
+    ] = None,
+    against: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Repeat a reference solver's recordings, whose liquids DIR/truths.csv holds, "
+            "in place of the cases.",
         ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the initial packings.")] = 0,
 ) -> None:
-    """Compare the fluid with analytic solutions and measurements.
+    """Compare the fluid with analytic solutions and measurements, or with another solver.
 
-    The exit status is 1 when a case is out of its tolerance or failed. What has finished in DIR
-    before, with the same seed, simulator and case, is not run again. --timeout limits each case.
+    The exit status is 1 when a case is out of its tolerance or failed. What has finished in the
+    directory of results before, with the same seed, simulator and case, is not run again.
+    --timeout limits each case. `bolfi-liquids guide accuracy` has the bars of --against.
     """
     from rich.console import Console
 
-    from ..checks.physics import check_physics
-    from .physics_table import print_physics
+    from .physics_table import print_against, print_physics
 
-    with compute.executor() as executor:
-        check = check_physics(
-            out, names or (), seed=seed, executor=executor, timeout=compute.timeout
-        )
-    print_physics(check.records, Console())
+    if against is None:
+        from ..checks.physics import check_physics
+
+        with compute.executor() as executor:
+            check = check_physics(
+                out, names or (), seed=seed, executor=executor, timeout=compute.timeout
+            )
+        print_physics(check.records, Console())
+    else:
+        from ..checks.against import Replays, check_against
+        from ..checks.reference_stirs import open_reference
+
+        replays = Replays(open_reference(against), tuple(names or ()))
+        with compute.executor() as executor:
+            check = check_against(
+                out, replays, seed=seed, executor=executor, timeout=compute.timeout
+            )
+        print_against(check, Console())
     typer.echo(f"results: {check.results}")
     if not check.passed:
         raise typer.Exit(FAILED)

@@ -167,6 +167,7 @@ def test_resuming_where_no_run_is_is_refused(short_recording, tmp_path):
         ["reproduce", "--quick", "--out", ""],
         ["check", "sbc", "--out", ""],
         ["check", "physics", "--out", ""],
+        ["check", "physics", "--against", ""],
         ["demo", "--out", ""],
         ["import", "stir.csv", "--columns", "columns.toml", "--out", ""],
         ["import", "--template", ""],

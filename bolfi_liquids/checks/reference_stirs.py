@@ -1,0 +1,179 @@
+"""Recordings of a reference solver, and the table of the liquids that it stirred."""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+from ..errors import Argument, InputError
+from ..files import as_path
+from ..inputs.open import open_recording
+from ..inputs.recording import Recording
+from ..inputs.start import above_liquid
+from ..inputs.table import MISSING, Table, read_table
+
+TRUTHS = "truths.csv"
+FILE, VISCOSITY, FILL, HIDDEN = "file", "viscosity_Pa_s", "true_fill_m", "hidden"
+UNITS = {VISCOSITY: "Pa s", FILL: "m"}
+FIX_HEADER = f"give a column for each of {FILE}, {VISCOSITY}, {FILL} and {HIDDEN}"
+NAME = re.compile(r"[a-z][a-z0-9_]*")  # of a case, too: its record's and its plot's file
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceStir:
+    """A stir of the reference solver in a liquid that is known.
+
+    Attributes:
+        name: Of the recording's file, without its ending.
+        recording: What cameras would have recorded of it.
+        viscosity: Given to the solver [Pa s].
+        fill: Depth of the liquid in the solver [m]; the recording's own is nominal.
+    """
+
+    name: str
+    recording: Recording
+    viscosity: float
+    fill: float
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A directory of recordings with their truths.
+
+    Attributes:
+        path: The directory.
+        stirs: Those without a hidden effect, from the thinnest liquid to the thickest.
+        left_out: Name -> hidden effect of the others.
+        hash: SHA-256 of the table's bytes, in hexadecimal.
+    """
+
+    path: Path
+    stirs: tuple[ReferenceStir, ...]
+    left_out: Mapping[str, str]
+    hash: str
+
+    def chosen(self, names: Iterable[str]) -> tuple[ReferenceStir, ...]:
+        """Stirs by the names of their files, with or without the ending; all for no names.
+
+        Raises:
+            InputError: One is no recording here, or holds an effect.
+        """
+        wanted = [name.removesuffix(".nc") for name in names]
+        known = [stir.name for stir in self.stirs]
+        for name in wanted:
+            if name not in known:
+                effect = self.left_out.get(name)
+                what = f"no recording {name!r} in {self.path}"
+                if effect:
+                    what = f"recording {name!r} holds the hidden effect {effect}"
+                fix = f"choose from {', '.join(known)}, or leave `against` out to run other cases"
+                raise InputError(what, where=Argument("names"), fix=fix)
+        return tuple(stir for stir in self.stirs if stir.name in (wanted or known))
+
+
+def open_reference(path: str | Path) -> Reference:
+    """Read all recordings of a directory and their truths, so that nothing is found wrong later.
+
+    Args:
+        path: The directory: NetCDF files, and truths.csv with a row for each. Its columns are
+            `file`, `viscosity_Pa_s`, `true_fill_m`, and `hidden`, an effect that is in the data,
+            empty where there is none. Other columns are not read.
+
+    Raises:
+        InputError: The directory, the table or a recording cannot be used; the message names
+            file, line, column and value.
+    """
+    folder = as_path(path, Argument("against"))
+    if not folder.is_dir():
+        what = "a file, not a directory" if folder.exists() else "no such directory"
+        raise InputError(what, where=str(folder), fix="give that of the reference's recordings")
+    if not (folder / TRUTHS).is_file():
+        raise InputError(
+            f"holds no {TRUTHS}",
+            where=str(folder),
+            fix=f"write a row for each recording, and {FIX_HEADER}",
+        )
+    table = read_table(folder / TRUTHS)
+    _check_files(folder, table)
+    hidden = [_effect(cell) for cell in table.column(HIDDEN, FIX_HEADER)]
+    viscosity, fill = _positive(table, VISCOSITY), _positive(table, FILL)
+    stirs, left_out = [], {}
+    for row, file in enumerate(table.column(FILE)):
+        if hidden[row]:
+            left_out[Path(file).stem] = hidden[row]
+            continue
+        stir = ReferenceStir(
+            _name(table, row), open_recording(folder / file), viscosity[row], fill[row]
+        )
+        _check_fill(stir, table.where(table.lines[row], FILL))
+        stirs.append(stir)
+    if not stirs:
+        raise InputError(
+            "every recording holds a hidden effect",
+            where=f"{table.path}: column {HIDDEN}",
+            fix="add a recording without one; the cell is then empty",
+        )
+    stirs.sort(key=lambda stir: (stir.viscosity, stir.name))
+    return Reference(folder, tuple(stirs), left_out, sha256(table.path.read_bytes()).hexdigest())
+
+
+def _check_files(folder: Path, table: Table) -> None:
+    """Refuse rows and recordings that are not in pairs."""
+    there = {path.name for path in folder.glob("*.nc") if not path.name.startswith(".")}
+    lines: dict[str, int] = {}
+    for file, line in zip(table.column(FILE, FIX_HEADER), table.lines, strict=True):
+        where = table.where(line, FILE)
+        if file in lines:
+            fix = "leave one of the two rows"
+            raise InputError(f"{file!r} is in line {lines[file]}, too", where=where, fix=fix)
+        if file not in there:
+            fix = f"put the recording into {folder}, correct its name or remove the row"
+            raise InputError(f"no recording {file!r}", where=where, fix=fix)
+        lines[file] = int(line)
+    if without := sorted(there - set(lines)):
+        raise InputError(
+            f"no row for {', '.join(without)}",
+            where=str(table.path),
+            fix="add the liquid of each recording, or move the recording elsewhere",
+        )
+    if not lines:
+        raise InputError("holds no recording", where=str(folder), fix="add one, and its row")
+
+
+def _effect(cell: str) -> str:
+    return "" if cell.lower() in MISSING else cell
+
+
+def _positive(table: Table, name: str) -> list[float]:
+    """Numbers of a column, all of them positive."""
+    values = table.numbers(name, FIX_HEADER)
+    for value, cell, line in zip(values, table.column(name), table.lines, strict=True):
+        if not value > 0.0:
+            fix = f"give a positive number in {UNITS[name]}"
+            raise InputError(f"got {cell!r}", where=table.where(line, name), fix=fix)
+    return values.tolist()
+
+
+def _name(table: Table, row: int) -> str:
+    name = Path(table.column(FILE)[row]).stem
+    if not NAME.fullmatch(name):
+        raise InputError(
+            f"{name!r} cannot name results",
+            where=table.where(table.lines[row], FILE),
+            fix="rename the recording: lower case letters, digits and _, a letter first",
+        )
+    return name
+
+
+def _check_fill(stir: ReferenceStir, where: str) -> None:
+    """Refuse a depth that the cup does not hold, or that the stick does not reach."""
+    recording, most = stir.recording, stir.recording.number("cup_height")
+    tip = recording.number("fill") + above_liquid(recording)  # above the floor, at the start
+    if not tip < stir.fill <= most:
+        raise InputError(
+            f"{stir.fill:g} m is not between the stick's tip, {tip:g} m above the floor, and the "
+            f"cup's rim, {most:g} m",
+            where=where,
+            fix="give the depth of the liquid in m",
+        )
