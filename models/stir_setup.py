@@ -9,8 +9,7 @@ import numpy as np
 from .fluid.checks import check_numbers
 from .fluid.numerics import MODEL_VERSION, STIR_PARTICLES, ParticleNumerics
 from .numerics import Numerics, check_resolution
-from .stirs.path import top_speed
-from .trajectory import Trajectory, mean_speed
+from .trajectory import Trajectory, mean_speed, top_speed
 
 MAX_FILL_RATIO = 1.5  # times the setup's fill is the largest
 MAX_TILT = 1.5  # rad

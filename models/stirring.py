@@ -15,8 +15,7 @@ from .particle_stirring import stir_particles
 from .rig import Rig, check_rig
 from .stir_setup import StirSetup
 from .stirs.march import Stirs, march
-from .stirs.path import step_path
-from .trajectory import Trajectory, substep_path
+from .trajectory import Trajectory, step_path, substep_path
 
 
 def stir(

@@ -1,8 +1,9 @@
-"""A gripper's measured path."""
+"""A gripper's measured path, and where it is at the steps of a simulation."""
 
 from typing import Protocol
 
 import numpy as np
+from scipy.interpolate import Akima1DInterpolator
 
 
 class Trajectory(Protocol):
@@ -25,6 +26,32 @@ def substep_path(gripper: Trajectory, rate: float) -> np.ndarray:
     substeps = int(np.ceil((time[-1] - time[0]) * rate))
     grid = time[0] + np.arange(substeps + 1) / rate
     return np.stack([np.interp(grid, seen, position[:, axis]) for axis in range(3)], axis=1)
+
+
+def step_path(gripper: Trajectory, step: float) -> np.ndarray:
+    """Pivot at the start and at the end of each step [m], shape [steps + 1, 3].
+
+    Each is the mean, over one step, of a smooth curve through the samples. So slow recordings are
+    interpolated, and the noise of fast ones does not become acceleration.
+
+    Raises:
+        ValueError: fewer than two finite samples, times that do not rise, positions of another
+            shape.
+    """
+    time, (seen, position) = np.asarray(gripper.time), finite_samples(gripper)
+    steps = int(np.ceil((time[-1] - time[0]) / step - 1e-9))
+    edges = time[0] + (np.arange(steps + 2) - 0.5) * step
+    travelled = Akima1DInterpolator(seen, position, method="makima").antiderivative()
+    inside = np.clip(edges, seen[0], seen[-1])
+    before, after = edges - inside, position[[0, -1]]
+    held = np.where((before < 0.0)[:, None], after[0], after[1]) * before[:, None]
+    return np.diff(travelled(inside) + held, axis=0) / step
+
+
+def top_speed(gripper: Trajectory, step: float) -> float:
+    """Of the pivot [m/s], over intervals of a step [s] or a sample, whichever is longer."""
+    path = step_path(gripper, step)
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).max(initial=0.0) / step)
 
 
 def finite_samples(gripper: Trajectory) -> tuple[np.ndarray, np.ndarray]:

@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from ..errors import InputError
-from ..inputs.settings import Count, StirParticles, Seed, Simulations, Surrogate, checked, one_of
+from ..inputs.settings import Count, Seed, Simulations, StirParticles, Surrogate, checked, one_of
 from ..pouring.map import DEFAULT_POURS, MIN_POURS
 
 STOPS = ("bound", "mean")

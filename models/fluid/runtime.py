@@ -122,7 +122,8 @@ def start() -> None:
     """
     import taichi as ti
 
-    # the banner is a bare print that no log level silences
+    # Fast arithmetic would let the compiler split sums as it likes, and a simulation's bits depend
+    # on its company. The banner is a bare print that no log level silences.
     with contextlib.redirect_stdout(io.StringIO()):
         ti.init(arch=ti.cpu, default_fp=ti.f32, fast_math=False, log_level=ti.ERROR)
     LOCK.own()

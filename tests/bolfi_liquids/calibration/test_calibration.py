@@ -47,12 +47,9 @@ def test_summary_says_below_which_viscosity_liquids_look_alike(
 ):
     recording = bl.open_recording(short_recording)
     setup = models.StirSetup.from_recording(recording, settings["particles"])
-    moving = np.linalg.norm(np.diff(recording.gripper.position, axis=0), axis=1).sum()
-    mean = moving / np.ptp(recording.time)  # below the root mean square, above rest
     density = recording.number("liquid_density")
     floor = calibration.summary.least_viscosity
-    assert setup.numerics.least_viscosity(setup.spacing, density, mean) <= floor
-    assert floor < setup.numerics.least_viscosity(setup.spacing, density, 2.0 * mean)
+    assert floor == pytest.approx(setup.least_viscosity(density, recording.gripper))
     assert calibration.tree.attrs["least_viscosity"] == floor
     draws = calibration.posterior["viscosity"].to_numpy()
     assert calibration.summary.below_least_viscosity == pytest.approx((draws < floor).mean())
@@ -74,7 +71,7 @@ def test_run_toml_says_how_it_was_made(calibration, short_recording, settings):
     assert record["settings"]["particles"] == settings["particles"]
     assert record["inputs"]["sha256"] == [bl.open_recording(short_recording).hash]
     assert record["versions"]["bolfi-liquids"] == bl.__version__
-    assert record["simulator"]["recording_1"]["particles"] == settings["particles"]
+    assert record["simulator"]["recording_1"]["particles"] > 1000  # as cells follow the stick
 
 
 def test_several_recordings_add_up(short_recording, dataset, tmp_path, rng, settings):
