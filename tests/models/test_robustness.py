@@ -4,13 +4,16 @@ import subprocess
 import sys
 import warnings
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
 import pytest
-from bolfi_liquids.models import pouring, stirring
+from bolfi_liquids.models import pouring
 from bolfi_liquids.models.fluid import faults, runtime
+from bolfi_liquids.models.fluid.runtime import Watch
+from bolfi_liquids.models.stirring import watched_stir
 from jax import random
 
 from bolfi_liquids import models
@@ -18,7 +21,7 @@ from bolfi_liquids import models
 INSIDE = 0  # the code of `pouring_kernel`, which loads Taichi
 POINTS, BATCH = 500, 25
 SOME_EFFECTS = 125  # of the points have a subset of the effects, one for each batch
-PARTICLES = {"stir": 400, "pour": 300}
+PARTICLES = {"pour": 300}
 FIRST, LAST = 0.5, 4.5  # s of the recording: from rest into strokes at 10 cm/s,
 HASTE = 2.0  # times as fast
 LOOK = 20  # substeps between two looks at the particles' speeds
@@ -87,10 +90,6 @@ class Watched:
     def __getattr__(self, name):
         return getattr(self.scene, name)
 
-    def stir(self, *how):
-        self.scene.stir(*how)
-        self._look()
-
     def pour(self, *how):
         self.scene.pour(*how)
         self._look()
@@ -130,8 +129,7 @@ def ends(monkeypatch):
 
         return noted
 
-    for module in (stirring, pouring):
-        monkeypatch.setattr(module, "_run", noting(module._run))
+    monkeypatch.setattr(pouring, "_run", noting(pouring._run))
     monkeypatch.setattr(runtime, "CHUNK", LOOK)
     return seen
 
@@ -142,7 +140,7 @@ def violent(glycerin):
     gripper = glycerin.gripper
     part = (gripper.time >= FIRST) & (gripper.time <= LAST)
     path = SimpleNamespace(time=gripper.time[part] / HASTE, position=gripper.position[part])
-    return models.StirSetup.from_recording(glycerin, PARTICLES["stir"]), path
+    return models.StirSetup.from_recording(glycerin), path
 
 
 def told(run):
@@ -153,27 +151,33 @@ def told(run):
     return result, [str(warning.message) for warning in caught]
 
 
-def stir_faults(drawn, violent, ends):
-    """Point -> what was wrong with its stir."""
+def stir_faults(drawn, violent):
+    """Point -> what was wrong with its stir; 0 for what no single one can be told of."""
     setup, path = violent
+    fastest, places = [0.0], []
+
+    def look(scene, step):
+        held = scene.count.to_numpy()[..., None] > np.arange(scene.particles)
+        fastest.append(np.linalg.norm(scene.speed.to_numpy()[held], axis=-1).max(initial=0.0))
+        places[:] = [scene.position.to_numpy()[held]]
+
+    watch = Watch(1.0 / (LOOK * setup.step(path)), look)
     signal, reasons = told(
-        lambda: models.stir(drawn.liquid, path, setup, drawn.seeds, drawn.effects)
+        lambda: watched_stir(drawn.liquid, path, setup, drawn.seeds, drawn.effects, watch)
     )
-    fill = setup.cup.fill + drawn.effects.get("fill_level", np.zeros(BATCH))
-    for k, wanted in enumerate(setup.count(fill)):
-        position, fastest, _ = ends[int(drawn.seeds[k])]
-        reach, height = np.hypot(*position[:, :2].T), position[:, 2]
-        checks = {
-            f"not finite: {reasons}": np.isfinite(signal[k]).all(),
-            f"tilt {np.degrees(np.abs(signal[k]).max()):.0f} deg": np.abs(signal[k]).max()
-            < STEEPEST,
-            f"{len(position)} of {wanted} particles": len(position) == wanted,
-            f"{reach.max():.4f} m from the axis": reach.max() <= setup.cup.radius,
-            f"height {height.min():.4f} to {height.max():.4f} m": 0.0 <= height.min()
-            and height.max() <= setup.cup.height,
-            f"{fastest:.2f} m/s": fastest < FASTEST["stir"],
-        }
-        yield from ((k, what) for what, fine in checks.items() if not fine)
+    for k, angles in enumerate(signal):
+        if not np.isfinite(angles).all():
+            yield k, f"not finite: {reasons}"
+        elif np.abs(angles).max() > STEEPEST:
+            yield k, f"tilt {np.degrees(np.abs(angles).max()):.0f} deg"
+    reach, height = np.hypot(*places[0][:, :2].T), places[0][:, 2]
+    checks = {
+        f"{reach.max():.4f} m from the axis": reach.max() <= setup.cup.radius,
+        f"height {height.min():.4f} to {height.max():.4f} m": 0.0 <= height.min()
+        and height.max() <= setup.cup.height,
+        f"{max(fastest):.2f} m/s": max(fastest) < FASTEST["stir"],
+    }
+    yield from ((0, what) for what, fine in checks.items() if not fine)
 
 
 def pour_faults(drawn, cups, ends):
@@ -201,7 +205,7 @@ def pour_faults(drawn, cups, ends):
 @pytest.mark.parametrize("start", STARTS)
 def test_no_point_of_the_prior_box_goes_wrong(start, violent, cups, ends):
     drawn = points(start, cups)
-    found = [("stir", *fault) for fault in stir_faults(drawn, violent, ends)]
+    found = [("stir", *fault) for fault in stir_faults(drawn, violent)]
     found += [("pour", *fault) for fault in pour_faults(drawn, cups, ends)]
     told_apart = [f"{scene}: {what}: {drawn.text(k)}" for scene, k, what in found]
     assert not found, "\n".join(told_apart)
@@ -264,36 +268,54 @@ CASES = [
 
 def test_every_fault_is_provoked():
     """Also by the cases of continuous integration alone."""
-    assert {ABSURD[n][3] for n in ABSURD if n not in LONG} == set(faults.REASONS)
+    provoked = {ABSURD[n][3] for n in ABSURD if n not in LONG} | {fault for *_, fault in WRONG}
+    assert provoked == set(faults.REASONS)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
-def test_what_goes_wrong_is_nan_with_a_reason(name, glycerin, violent, cups, register):
+def test_what_goes_wrong_is_nan_with_a_reason(name, cups, register):
     """And the other in its batch keeps its bits."""
     viscosity, cohesion, effects, fault = ABSURD[name]
     register(planted("heaps", heaps))
     register(planted("hurls", hurls))
-    setup, path = models.StirSetup.from_recording(glycerin, 150), violent[1]
-    seeds, size = np.array([1, 2]), setup.particles
-    action = models.PourAction(6.0, 0.03)
+    seeds, action = np.array([1, 2]), models.PourAction(6.0, 0.03)
 
     def simulate(part):
         liquid = models.Liquid(
             np.array([0.1, viscosity])[part], np.array([0.0, cohesion])[part], 1000.0
         )
         given = {n: np.array([models.EFFECTS[n].neutral, c])[part] for n, c in effects.items()}
-        poured = models.pour(liquid, action, cups, seeds[part], size, given)
-        shares = np.stack([poured.spilled, poured.received, poured.retained], axis=-1)
-        return models.stir(liquid, path, setup, seeds[part], given), shares
+        poured = models.pour(liquid, action, cups, seeds[part], 150, given)
+        return np.stack([poured.spilled, poured.received, poured.retained], axis=-1)
 
-    (angles, fractions), reasons = told(lambda: simulate(slice(0, 2)))
-    assert len(reasons) == 2
-    assert all(f"seed 2: {faults.REASONS[fault]}" in reason for reason in reasons)
-    assert np.isnan(angles[1, 1:]).all() and np.isnan(fractions[1]).all()
-    alone = simulate(slice(0, 1))
-    np.testing.assert_array_equal(angles[:1], alone[0])
-    np.testing.assert_array_equal(fractions[:1], alone[1])
+    fractions, reasons = told(lambda: simulate(slice(0, 2)))
+    assert len(reasons) == 1 and f"seed 2: {faults.REASONS[fault]}" in reasons[0]
+    assert np.isnan(fractions[1]).all()
+    np.testing.assert_array_equal(fractions[:1], simulate(slice(0, 1)))
+
+
+WRONG = [
+    # particles, viscosities of a stir that is fine and of one that is not [Pa s], how it ends
+    (0, 0.1, 1e30, faults.RUNAWAY),
+    (100, 0.1, 12.0, faults.DRIFTED),
+]
+
+
+@pytest.mark.parametrize("particles, fine, wrong, fault", WRONG)
+def test_a_stir_that_goes_wrong_is_nan_with_a_reason(violent, particles, fine, wrong, fault):
+    """And the other in its batch keeps its bits."""
+    usual, path = violent
+    setup = replace(usual, particles=particles)
+
+    def simulate(viscosity):
+        liquid = models.Liquid(np.array(viscosity), 0.2, 1000.0)
+        return models.stir(liquid, path, setup, [1, 2][: len(viscosity)])
+
+    angles, reasons = told(lambda: simulate([fine, wrong]))
+    assert len(reasons) == 1 and f"seed 2: {faults.REASONS[fault]}" in reasons[0]
+    assert np.isnan(angles[1, 1:]).all()
+    np.testing.assert_array_equal(angles[:1], simulate([fine]))
 
 
 @pytest.mark.slow
