@@ -1,1 +1,4 @@
-"""What is known: analytic solutions and published measurements, in NumPy and SciPy alone."""
+"""What is known: exact solutions, published measurements and a Navier-Stokes reference.
+
+In NumPy and SciPy alone.
+"""
