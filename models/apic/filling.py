@@ -20,9 +20,11 @@ def fill_cup(grid: Grid, radius: float, fill: float, per_cell: int, seed: int) -
 
     Layers are stretched so that whole and half ones fill the cup exactly.
     """
+    if fill <= 0.0:
+        return np.empty((0, 3))
     corners = grid.points((0.0, 0.0, 0.0))[grid.inner()]
     points = np.concatenate([corners + grid.cell * np.array(at) for at in POINTS[per_cell]])
-    layers = round(2.0 * fill / grid.cell) / 2.0 * grid.cell
+    layers = max(round(2.0 * fill / grid.cell), 1) / 2.0 * grid.cell
     points[:, 2] *= fill / layers
     across = np.hypot(points[:, 0], points[:, 1])
     inside = (across < radius) & (points[:, 2] > 0.0) & (points[:, 2] < fill - 1e-6)

@@ -4,6 +4,7 @@
 import numpy as np
 import taichi as ti
 
+from ..fluid.faults import ABSENT, SOUND
 from .lanes import LANES, lanes, mat3, vec3
 from .transfer import GRAVITY, clear
 
@@ -127,7 +128,8 @@ class LiquidState:
 
         Args:
             position: Of the particles [m], shape [groups, LANES, n, 3].
-            count: Of particles, shape [groups, LANES]; an empty lane takes no time.
+            count: Of particles, shape [groups, LANES]; -1 where a lane has no simulation, which
+                takes no time.
             liquid: Volume of a particle [full cells], kinematic viscosity [m²/s], density [kg/m³]
                 and depth [m], shape [4, groups, LANES].
         """
@@ -138,8 +140,8 @@ class LiquidState:
             for k in ti.static(range(2)):
                 self.iterations[g, k] = lanes(0.0)
             for lane in range(LANES):
-                self.count[g, lane] = count[g, lane]
-                self.status[g, lane] = 0
+                self.count[g, lane] = ti.max(count[g, lane], 0)
+                self.status[g, lane] = SOUND if count[g, lane] >= 0 else ABSENT
                 self.particle[g][lane] = liquid[0, g, lane]
                 self.viscosity[g][lane] = liquid[1, g, lane]
                 self.density[g][lane] = liquid[2, g, lane]

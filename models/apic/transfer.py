@@ -6,7 +6,7 @@ Jiang, Schroeder, Selle, Teran and Stomakhin (2015), "The affine particle-in-cel
 
 import taichi as ti
 
-from ..fluid.faults import DRIFTED, LARGEST, RUNAWAY, SOUND
+from ..fluid.faults import DRIFTED, LARGEST, RUNAWAY, SOUND, UNSOLVED
 from .lanes import LANES, lanes, mat3, vec3
 
 GRAVITY = 9.81
@@ -16,6 +16,7 @@ LEVEL_GAIN = 4.0
 crowd in cut cells and sink otherwise."""
 MOST_DRIFT = 0.02  # of the fill, by which the level moves at most
 TOP_SPEED = 20.0  # m/s, ten times what falls from a cup
+THICKEST = 1e7  # viscosity that single precision works with, in squared cells a step
 STEEPEST = 0.5  # cells a step over a cell: a steeper slope would hold a lone particle in the air
 
 
@@ -186,11 +187,12 @@ def move(s, g):
             height += s.position[g, lane, n][2]
             energy += v.dot(v)  # not a number where any is, which a maximum passes over
             fastest = ti.max(fastest, v.dot(v))
-        drift = 1.0 - 2.0 * height / (ti.max(s.count[g, lane], 1) * s.fill[g][lane])
+        drift = 1.0 - 2.0 * height / ti.max(s.count[g, lane] * s.fill[g][lane], 1e-6)
         s.lack[g][lane] = LEVEL_GAIN * drift
         if s.count[g, lane] > 0:
             if not (energy < LARGEST and fastest < TOP_SPEED**2):
-                s.status[g, lane] = RUNAWAY
+                thick = s.viscosity[g][lane] * dt * per_cell**2 > THICKEST
+                s.status[g, lane] = UNSOLVED if thick else RUNAWAY
             elif ti.abs(drift) > MOST_DRIFT:
                 s.status[g, lane] = DRIFTED
             if s.status[g, lane] != SOUND:

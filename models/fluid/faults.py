@@ -6,6 +6,7 @@ import numpy as np
 
 LARGEST = 1e30  # squared speed [m²/s²] that single precision can still work with
 SOUND, COLLAPSED, RUNAWAY, UNSOLVED, DRIFTED = range(5)
+ABSENT = -1  # of a place among simulations that march together
 REASONS = {
     COLLAPSED: "the liquid collapsed: its particles have too many neighbours",
     UNSOLVED: "its viscosity is too large to compute with; up to 100 Pa s it is safe",

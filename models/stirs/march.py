@@ -113,7 +113,7 @@ def _together(setup, stirs: Stirs, step, effects, watch) -> np.ndarray:
     path = lanes(np.concatenate([path[:, :1], path, ahead], axis=1))
     directions = np.empty((groups, LANES, path.shape[2] - 2, 3), np.float32)
     directions[:, :, 0] = setup.hanging
-    scene.begin(path, directions)
+    scene.begin(path, directions, int(counts[0]))
     runtime.run_chunks(scene, directions.shape[2] - 1, scene.march, watch)
     found = directions.reshape(groups * LANES, -1, 3)[:size].astype(np.float64)
     status = scene.status.to_numpy().reshape(-1)[:size]
@@ -128,7 +128,7 @@ def _filled(setup, grid: Grid, stirs: Stirs, slots: int) -> tuple[np.ndarray, np
         fill_cup(grid, radius, float(fill), per_cell, int(seed))
         for fill, seed in zip(stirs.rig.fill, stirs.seeds, strict=True)
     ]
-    counts = np.zeros(slots, np.int32)
+    counts = np.full(slots, -1, np.int32)
     counts[: len(points)] = [len(one) for one in points]
     positions = np.zeros((slots, max(counts.max(), 1), 3), np.float32)
     for slot, one in enumerate(points):

@@ -10,6 +10,7 @@ from ..apic.pressure import add_rise, push, solve_pressure
 from ..apic.surface import find_liquid, set_up_pressure
 from ..apic.transfer import GRAVITY, OFF_WALL, clear, deposit, list_cells, move
 from ..apic.viscosity import extend, solve_viscosity, weigh_stresses
+from ..fluid.faults import SOUND
 from .stick_line import StickLine, slip_line, start_line
 
 
@@ -80,7 +81,7 @@ class StirringScene(LiquidState):
                 find_liquid(self, g)
                 set_up_pressure(self, g)
                 for lane in range(LANES):
-                    if self.count[g, lane] > 0:
+                    if self.status[g, lane] == SOUND:
                         self.hold(path, g, lane, step)
                         start_line(self, self.sticks, g, lane)
                 push(self, g, self.pressure)
@@ -93,7 +94,7 @@ class StirringScene(LiquidState):
                 g = n // STRIDE
                 solve_viscosity(self, g)
                 for lane in range(LANES):
-                    if self.count[g, lane] > 0:
+                    if self.status[g, lane] == SOUND:
                         slip_line(self, self.sticks, g, lane, (step + 0.5) * self.dt[None])
                     directions[g, lane, step + 1] = self.sticks.direction[g, lane]
 
@@ -113,7 +114,7 @@ class StirringScene(LiquidState):
             if n % STRIDE == 0:
                 move(self, n // STRIDE)
 
-    def begin(self, path, directions):
+    def begin(self, path, directions, count):
         """Take what the steps read and fill in.
 
         Args:
@@ -121,8 +122,9 @@ class StirringScene(LiquidState):
                 the start on.
             directions: Of the sticks at the steps' ends, float32 of shape
                 [groups, LANES, steps + 1, 3].
+            count: Of the first stir's particles, of which a fault leaves none.
         """
-        self.path, self.directions = path, directions
+        self.path, self.directions, self.shown = path, directions, count
 
     def march(self, start, stop):
         """Steps start..stop-1."""
@@ -136,6 +138,6 @@ class StirringScene(LiquidState):
 
     def view(self, step):
         """The first stir at a step's start: particles [n, 3], pivot [3] and direction [3]."""
-        position = self.position.to_numpy()[0, 0, : self.count[0, 0]]
+        position = self.position.to_numpy()[0, 0, : self.shown]
         pivot = self.path[0, 0, step + 1].astype(np.float64)
         return position, pivot, self.directions[0, 0, step]

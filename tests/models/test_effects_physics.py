@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bolfi_liquids.models.stirs.slip_law import PIVOT_DAMPING
 from scipy.signal import find_peaks
 
 from bolfi_liquids import models
@@ -81,13 +82,14 @@ def test_mass_matters_only_against_the_liquids(setup, short):
     seeds = [1, 2]
     heavy = models.stir(models.Liquid(0.2, 0.3, 2000.0), short, setup, seeds, {"stick_mass": 2.0})
     plain = models.stir(models.Liquid(0.1, 0.3, 1000.0), short, setup, seeds)
-    np.testing.assert_array_equal(heavy, plain)  # doubling is exact in binary
+    # but for the pivot's own damping
+    np.testing.assert_allclose(heavy, plain, atol=0.01 * np.abs(plain).max())
     light = models.stir(models.Liquid(0.1, 0.3, 1000.0), short, setup, seeds, {"stick_mass": 2.0})
     assert np.abs(light - plain).max() > 1e-3
 
     empty = {"fill_level": -setup.cup.fill, "stick_mass": [1.0, 1.3]}
     one, other = models.stir(models.Liquid(0.1, 0.3, 1000.0), short, setup, seeds, empty)
-    np.testing.assert_allclose(one, other, atol=1e-4 * np.abs(one).max())
+    np.testing.assert_allclose(one, other, atol=0.02 * np.abs(one).max())
 
 
 @pytest.mark.slow
@@ -96,7 +98,7 @@ def test_a_scaled_gripper_runs_the_scaled_path(setup, short):
     liquid = models.Liquid(0.1, 0.3, 1000.0)
     expected = models.stir(liquid, scaled, setup, [1])
     seen = models.stir(liquid, short, setup, [1], {"gripper_scale": 0.5})
-    np.testing.assert_array_equal(seen, expected)  # the path starts at 0, and halving is exact
+    np.testing.assert_allclose(seen, expected, atol=1e-4 * np.abs(seen).max())
 
     path = np.random.default_rng(0).standard_normal((2, 9, 3))
     rig = models.Rig(np.ones(2), np.zeros(2), np.ones(2), path)
@@ -118,23 +120,19 @@ def test_a_fill_is_a_number_of_particles_of_the_same_size(glycerin):
 
 @pytest.mark.slow
 def test_more_liquid_stands_higher(setup, short):
-    """Settled particles' mean height is half the depth, whatever scene they are in."""
+    """The particles' mean height is half the depth."""
     still = SimpleNamespace(time=short.time[:2], position=np.tile(short.position[0], (2, 1)))
     liquid = models.Liquid(0.05, 0.0, 1000.0)
-    heights = {}
-    for scene_of, levels in ((stirring._roomy_scene, [-0.015, 0.02]), (stirring._scene, [0.0])):
-        models.stir(liquid, still, setup, range(len(levels)), {"fill_level": levels})
-        scene = scene_of(setup, ())
-        alive, position = scene.alive.to_numpy(), scene.position.to_numpy()
-        for b, level in enumerate(levels):
-            heights[level] = position[b, : alive[b], 2].mean()
-    for level in (-0.015, 0.02):
-        assert heights[level] - heights[0.0] == pytest.approx(level / 2, rel=0.15)
+    for level in (-0.015, 0.0, 0.02):
+        effects = {"fill_level": level}
+        frames = models.stir_frames(liquid, still, setup, 0, effects=effects)
+        height = frames.position[-1, :, 2].mean()
+        assert height == pytest.approx((setup.cup.fill + level) / 2, rel=0.005)
 
 
 def kicked(setup):
     """A gripper that jerks by 2 cm and then stands still for 4 s, seen at every substep."""
-    time = np.arange(0.0, 4.0, 1.0 / setup.rate)
+    time = np.arange(0.0, 4.0, setup.numerics.step(setup.cell, 0.0))
     position = np.zeros((len(time), 3))
     position[:, 0] = 0.02 * np.clip(time / 0.1, 0.0, 1.0)
     position[:, 2] = setup.cup.fill - setup.submerged + setup.stick.length
@@ -143,7 +141,10 @@ def kicked(setup):
 
 @pytest.mark.slow
 def test_dry_friction_takes_the_same_angle_from_every_swing(setup):
-    """I θ'' + k θ = -τ sign(θ') swings about -τ/k and τ/k in turns: 4 τ/k is lost each cycle."""
+    """I θ'' + k θ = -τ sign(θ') swings about -τ/k and τ/k in turns: 4 τ/k is lost each cycle.
+
+    The pivot's viscous damping c takes besides exp(-c π / (2 I ω)) of each half of a swing.
+    """
     stiffness = setup.stick.mass * GRAVITY * setup.stick.length / 2
     torque, path = np.array([0.0, 2e-5, 4e-5, 8e-5]), kicked(setup)
     effects = {"fill_level": -setup.cup.fill, "pivot_friction": torque}
@@ -154,9 +155,10 @@ def test_dry_friction_takes_the_same_angle_from_every_swing(setup):
         peaks = free[find_peaks(free)[0]]
         peaks = peaks[peaks > 3.0 * tau / stiffness]  # those from which it swings on
         assert len(peaks) >= 5
-        # the scheme itself takes less than a thousandth of the first swing
-        own = 1e-3 * peaks[0]
-        np.testing.assert_allclose(-np.diff(peaks), 2 * tau / stiffness, rtol=0.01, atol=own)
+        rubbed = 2 * tau / stiffness
+        kept = np.exp(-PIVOT_DAMPING * np.pi / (2.0 * np.sqrt(stiffness * setup.stick.inertia)))
+        lost = rubbed + (1.0 - kept) * (peaks[:-1] - rubbed / 2)
+        np.testing.assert_allclose(-np.diff(peaks), lost, rtol=0.02, atol=2e-3 * peaks[0])
 
 
 @pytest.mark.slow
