@@ -33,17 +33,16 @@ def split_parameters(theta: Mapping[str, V]) -> tuple[dict[str, V], dict[str, V]
 
 
 def default_prior() -> "Prior":
-    """Every liquid that the simulator can tell from another, before any stirring.
+    """Every liquid from thinner than water to a stiff gel, before any stirring.
 
-    `viscosity` [Pa s] is log-uniform from 3e-3 to a stiff gel's 20. Below, the dissipation of
-    the particle fluid itself rules: 1e-3 and 3e-3 differ by no more than two seeds of either do,
-    so water is whatever lies at this end. `cohesion` is uniform over its useful range, 0 to 1.
+    `viscosity` [Pa s] is log-uniform from 3e-4 to 20, so that water lies inside. `cohesion` is
+    uniform over its useful range, 0 to 1; stirs do not depend on it.
     """
     import numpyro.distributions as dist
 
     from ..inference import Prior
 
-    return Prior({"viscosity": dist.LogUniform(3e-3, 20.0), "cohesion": dist.Uniform(0.0, 1.0)})
+    return Prior({"viscosity": dist.LogUniform(3e-4, 20.0), "cohesion": dist.Uniform(0.0, 1.0)})
 
 
 def describe_prior(prior: "Prior") -> dict[str, Described]:

@@ -1,4 +1,4 @@
-"""Speed of the fluid, and how well it repeats recorded stirs and pours, beside their bars.
+"""Speed of the fluid, and how well it repeats pours, beside their bars.
 
     .venv/bin/python tests/benchmarks/fluid.py --recordings FOLDER --only speed pours
 
@@ -22,7 +22,6 @@ from bars import (
     row,
     start_up,
     stirring_seconds,
-    stirs,
     throughput,
 )
 from machine import machine
@@ -35,7 +34,6 @@ PARTS: dict[str, Callable[[Path], Iterator[Line]]] = {
     "start": lambda _: start_up(TIMED),
     "peer": lambda _: against_peer(TIMED),
     "pours": pours,
-    "stirs": stirs,
 }
 
 

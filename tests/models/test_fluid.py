@@ -60,7 +60,7 @@ def test_stick_and_liquid_exchange_angular_momentum(glycerin, numerics):
     lift of what a thinner stick hides, and the weight that all liquid takes for it, are left out:
     they balance in sum, not in their torques.
     """
-    from bolfi_liquids.models.stirring_kernel import StirringScene
+    from bolfi_liquids.models.particle_stirring_kernel import StirringScene
 
     runtime.start()
     rng = np.random.default_rng(3)

@@ -4,7 +4,6 @@ from .line import HEAD, Line, row
 from .peer import against_peer
 from .pours import pours
 from .speed import start_up, stirring_seconds, throughput
-from .stirs import stirs
 
 __all__ = [
     "HEAD",
@@ -14,6 +13,5 @@ __all__ = [
     "row",
     "start_up",
     "stirring_seconds",
-    "stirs",
     "throughput",
 ]
