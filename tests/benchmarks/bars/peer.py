@@ -15,7 +15,7 @@ from .speed import Trial
 
 HERE = Path(__file__).parents[1]
 PYTHON = HERE.parents[1] / ".venv-peers" / "pysplishsplash" / "bin" / "python"
-PARTICLES, SECONDS, FASTER = 2000, 3.0, 15.0
+SECONDS, FASTER = 3.0, 15.0
 LIQUIDS = ("water", "glycerin")
 
 
@@ -24,10 +24,10 @@ def against_peer(recording: Path, python: Path = PYTHON) -> Iterator[Line]:
     if not python.exists():
         return
     for liquid in LIQUIDS:
-        trial = Trial(recording, liquid, PARTICLES, SECONDS)
+        trial = Trial(recording, (LISTED[liquid][0],), seconds=SECONDS)
         trial.run()
-        theirs, ours = _theirs(trial, liquid, python), trial.cpu_seconds()
-        name = f"{trial.duration:.1f} s of {liquid}, N = {PARTICLES}"
+        theirs, ours = _theirs(trial, liquid, python), trial.seconds_each(SECONDS)
+        name = f"{SECONDS:g} s of {liquid}"
         yield Line(f"{name}, pysplishsplash 2.19 [CPU s]", theirs)
         yield Line(f"{name}, ours [CPU s]", ours)
         yield Line(f"{name}, times faster", theirs / ours, FASTER, least=True)
@@ -37,7 +37,7 @@ def _theirs(trial: Trial, liquid: str, python: Path) -> float:
     viscosity, density = LISTED[liquid]
     setup, path = trial.setup, trial.path
     job = {
-        "particles": PARTICLES,
+        "particles": trial.setup.particles,
         "particle_radius": 0.5 * setup.spacing,
         "cup_radius": setup.cup.radius,
         "cup_height": setup.cup.height,

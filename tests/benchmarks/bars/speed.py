@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,24 +14,40 @@ import numpy as np
 from bolfi_liquids import models, open_recording
 
 from .line import Line
-from .liquids import LISTED, listed
 
-SECONDS = 8.0  # of stirring that a time is scaled to
-MOST = {1000: 0.5, 2000: 1.2}  # particles -> CPU s
+Numerics, Viscosities = models.Numerics, tuple[float, ...]
+
+SECONDS = 7.3  # of stirring that a time is scaled to
+FULL = 8  # stirs that march together
+MOST = {"up to 0.2 Pa s": ((1e-3, 1e-2, 0.05, 0.2), 0.45), "above": ((0.5, 1.0, 6.0, 12.0), 0.6)}
 REPEATS = 3
 TRIALS = 6  # of each of the processes that run at once
 START = Path(__file__).parents[1] / "first_result.py"
 
 
 def stirring_seconds(recording: Path) -> Iterator[Line]:
-    """CPU s for 8 s of stirring on one core, by number of particles and liquid."""
-    for particles, most in MOST.items():
-        for name in LISTED:
-            trial = Trial(recording, name, particles)
-            trial.run()  # compiles, and lets the packing settle
-            spent = float(np.median([trial.cpu_seconds() for _ in range(REPEATS)]))
-            what = f"stirring {SECONDS:g} s, N = {particles}, like {name} [CPU s]"
-            yield Line(what, spent * SECONDS / trial.duration, most)
+    """CPU s of a stir in a full batch, and how they grow with batch, cells and steps."""
+    for name, (viscosities, most) in MOST.items():
+        usual = Trial(recording, viscosities * (FULL // 4))
+        usual.run()  # compiles
+        yield Line(f"stir of {SECONDS:g} s, {name} [CPU s]", usual.seconds_each(), most)
+    mixed = MOST["up to 0.2 Pa s"][0] * (FULL // 4)
+    one = Trial(recording, mixed).seconds_each()
+    many = Trial(recording, mixed * 8).seconds_each()
+    yield Line(f"a stir of {8 * FULL} beside one of {FULL}", many / one, 1.05)
+    fine = replace(models.Numerics(), cell=0.00321, longest_step=0.012 * 5.0 / 3.21)
+    coarse = replace(fine, cell=0.00642, narrowest=0.7, longest_step=0.012 * 5.0 / 6.42)
+    yield Line("8 times as many cells", _ratio(recording, mixed, fine, coarse))
+    long, short = (replace(models.Numerics(), longest_step=step) for step in (0.016, 0.002))
+    yield Line("8 times as many steps", _ratio(recording, mixed, short, long))
+
+
+def _ratio(recording: Path, viscosities: Viscosities, one: Numerics, other: Numerics) -> float:
+    trials = [Trial(recording, viscosities, numerics) for numerics in (one, other)]
+    for trial in trials:
+        trial.run()
+    dear, cheap = (trial.seconds_each() for trial in trials)
+    return dear / cheap
 
 
 class Trajectory(NamedTuple):
@@ -41,26 +58,32 @@ class Trajectory(NamedTuple):
 
 
 class Trial:
-    """One stir along the first `seconds` of a recorded path."""
+    """A batch of stirs along the first `seconds` of a recorded path."""
 
     def __init__(
-        self, recording: Path, liquid: str, particles: int = 1000, seconds: float = np.inf
+        self,
+        recording: Path,
+        viscosities: Viscosities,
+        numerics: Numerics | None = None,
+        seconds: float = np.inf,
     ):
         opened = open_recording(recording)
         part = opened.time <= opened.time[0] + seconds
-        self.liquid = listed(liquid)
+        self.liquid = models.Liquid(np.array(viscosities), 0.0, 1000.0)
+        self.seeds = np.arange(len(viscosities))
         self.path = Trajectory(*(column[part] for column in opened.gripper))
-        self.setup = models.StirSetup.from_recording(opened, particles)
-
-    @property
-    def duration(self) -> float:
-        """Of the stir [s]."""
-        return float(self.path.time[-1] - self.path.time[0])
+        self.setup = models.StirSetup.from_recording(opened, numerics=numerics)
 
     def run(self) -> None:
-        models.stir(self.liquid, self.path, self.setup, [0])
+        models.stir(self.liquid, self.path, self.setup, self.seeds)
 
-    def cpu_seconds(self) -> float:
+    def seconds_each(self, seconds: float = SECONDS) -> float:
+        """CPU s of one stir of so many seconds, the median of some."""
+        duration = self.path.time[-1] - self.path.time[0]
+        spent = float(np.median([self._cpu_seconds() for _ in range(REPEATS)]))
+        return spent / len(self.seeds) * seconds / duration
+
+    def _cpu_seconds(self) -> float:
         start = time.process_time()
         self.run()
         return time.process_time() - start
@@ -88,7 +111,7 @@ def _trials_a_second(recording: Path, processes: int) -> float:
 
 
 def _work(recording: Path, start, ends) -> None:
-    trial = Trial(recording, "oil")
+    trial = Trial(recording, (0.1,))
     trial.run()
     start.wait()
     began = time.perf_counter()
@@ -106,5 +129,5 @@ def start_up(recording: Path) -> Iterator[Line]:
     ]
     # the first warms the cache; the least of the others is least disturbed
     wall, cpu = np.array(runs[1:], dtype=float).min(axis=0)
-    yield Line("import to first result, warm cache [s]", float(wall), 2.0)
+    yield Line("import to first result, warm cache [s]", float(wall), 3.0)
     yield Line("the same [CPU s]", float(cpu))
