@@ -19,7 +19,15 @@ from ..rig import Rig
 from ..stir_setup import StirSetup
 from .slip_law import line_of
 
-GROUPS = max(2, os.cpu_count() or 1)  # that march at the same time, each on its own processor
+
+def processors() -> int:
+    """That this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+GROUPS = processors()  # that march at the same time, each on its own processor
 LEAST_CELLS, LEAST_PARTICLES, LEAST_NODES, LEAST_WIDTH = 16000, 6000, 40, 8
 GROWTH = 1.5  # of the room from one scene to the next
 
@@ -80,23 +88,23 @@ def _together(setup, stirs: Stirs, step, effects, watch) -> np.ndarray:
     """What `march` returns, of at most as many stirs as there are lanes."""
     from ..apic.lanes import LANES
 
-    cup, size = setup.cup, len(stirs.seeds)
+    cup, slots = setup.cup, slots_of(len(stirs.seeds), GROUPS, LANES)
+    groups = slots[-1] // LANES + 1
     grid, geometry = _vessel(setup.cell, cup.radius, setup.deepest)
     scene = _scene_for(setup, grid, effects)
     scene.enter_vessel(grid, geometry, step)
     scene.rate = 1.0 / step
     scene.sticks.fit(setup.stick, cup.radius, setup.cell, setup.deepest)
-    groups = math.ceil(size / LANES)
 
     def lanes(values: np.ndarray) -> np.ndarray:
         """[B, ...] as float32 [groups, LANES, ...]; lanes without a stir hold ones."""
         full = np.ones((groups * LANES, *values.shape[1:]), np.float32)
-        full[:size] = values
+        full[slots] = values
         return full.reshape(groups, LANES, *values.shape[1:])
 
-    positions, counts = _filled(setup, grid, stirs, groups * LANES)
+    positions, counts = _filled(setup, grid, stirs, slots, groups * LANES)
     liquid, fill = stirs.liquid, stirs.rig.fill
-    share = np.pi * cup.radius**2 * fill / np.maximum(counts[:size], 1) / grid.cell**3
+    share = np.pi * cup.radius**2 * fill / np.maximum(counts[slots], 1) / grid.cell**3
     nu = np.asarray(liquid.viscosity) / np.asarray(liquid.density)
     scene.fill_in(
         positions.reshape(groups, LANES, -1, 3),
@@ -104,7 +112,7 @@ def _together(setup, stirs: Stirs, step, effects, watch) -> np.ndarray:
         np.stack([lanes(row) for row in (share, nu, np.asarray(liquid.density), fill)]),
     )
     scene.set_coefficients(np.stack([lanes(row) for row in stirs.coefficients]) if effects else ())
-    down = np.broadcast_to(setup.hanging, (size, 3)).T
+    down = np.broadcast_to(setup.hanging, (len(slots), 3)).T
     masses = stirs.rig.stick_mass, stirs.rig.pivot_friction
     scene.sticks.hang(np.stack([lanes(row) for row in (*down, *masses)]))
 
@@ -115,23 +123,35 @@ def _together(setup, stirs: Stirs, step, effects, watch) -> np.ndarray:
     directions[:, :, 0] = setup.hanging
     scene.begin(path, directions, int(counts[0]))
     runtime.run_chunks(scene, directions.shape[2] - 1, scene.march, watch)
-    found = directions.reshape(groups * LANES, -1, 3)[:size].astype(np.float64)
-    status = scene.status.to_numpy().reshape(-1)[:size]
+    found = directions.reshape(groups * LANES, -1, 3)[slots].astype(np.float64)
+    status = scene.status.to_numpy().reshape(-1)[slots]
     found[faulty(status, stirs.seeds)] = np.nan
     return found
 
 
-def _filled(setup, grid: Grid, stirs: Stirs, slots: int) -> tuple[np.ndarray, np.ndarray]:
-    """Where the particles start [m], shape [slots, n, 3], and how many there are."""
+def slots_of(size: int, groups: int, lanes: int) -> np.ndarray:
+    """Places of so many stirs among the lanes of all groups, shape [size].
+
+    Groups share them evenly, so that few stirs keep all processors busy. Neighbours march together.
+    """
+    each = math.ceil(size / min(groups, size))
+    number = np.arange(size)
+    return number // each * lanes + number % each
+
+
+def _filled(
+    setup: StirSetup, grid: Grid, stirs: Stirs, slots: np.ndarray, room: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where the particles start [m], shape [room, n, 3], and how many there are."""
     per_cell, radius = setup.numerics.per_cell, setup.cup.radius
     points = [
         fill_cup(grid, radius, float(fill), per_cell, int(seed))
         for fill, seed in zip(stirs.rig.fill, stirs.seeds, strict=True)
     ]
-    counts = np.full(slots, -1, np.int32)
-    counts[: len(points)] = [len(one) for one in points]
-    positions = np.zeros((slots, max(counts.max(), 1), 3), np.float32)
-    for slot, one in enumerate(points):
+    counts = np.full(room, -1, np.int32)
+    counts[slots] = [len(one) for one in points]
+    positions = np.zeros((room, max(counts.max(), 1), 3), np.float32)
+    for slot, one in zip(slots, points, strict=True):
         positions[slot, : len(one)] = one
     return positions, counts
 
