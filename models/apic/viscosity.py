@@ -7,7 +7,7 @@ from .lanes import chosen, lanes, positive, ratio
 from .rheology import find_thickness, thickness_of
 from .transfer import strides
 
-TOLERANCE = 3e-3  # of the speed
+TOLERANCE = 1e-3  # of the speed
 LEAST_ENERGY = 1e-3
 MOST_ITERATIONS = 200
 LEAST_MASS = 1e-4  # of a face, in full cells, that has a velocity
