@@ -208,3 +208,33 @@ def test_a_swing_in_thin_liquid_is_that_of_potential_flow():
         ROD, 0.06, density=1000.0, viscosity=1e-9, outer_radius=0.02
     )
     assert cup.period > thin.period
+
+
+def test_a_wide_cup_is_no_cup():
+    radius, omega, kinematic = ROD.radius, 9.0, 1e-5
+    cup = oscillating_rod.stokes_reaction_in_cup(radius, 200 * radius, omega, kinematic)
+    np.testing.assert_allclose(
+        cup, oscillating_rod.stokes_reaction(radius, omega, kinematic), rtol=1e-4
+    )
+
+
+def test_thin_liquid_in_a_cup_has_the_added_mass_of_potential_flow():
+    """Apart from boundary layers, which take part of the gap at both walls."""
+    radius, cup, omega = 0.005, 0.02, 9.0
+    potential = pendulum.added_mass_coefficient(radius, cup)
+    for kinematic, tolerance in ((1e-8, 2e-2), (1e-12, 2e-4)):
+        reaction = oscillating_rod.stokes_reaction_in_cup(radius, cup, omega, kinematic)
+        assert reaction.added_mass == pytest.approx(potential, rel=tolerance)
+        assert 0.0 < reaction.damping < tolerance * potential
+
+
+def test_thick_liquid_in_a_cup_drags_as_if_it_were_steady():
+    """4 π μ U / (ln(R/r) - (R² - r²) / (R² + r²)), creeping flow between cylinders."""
+    radius, cup, omega = 0.0045, 0.04, 9.0
+    shape = np.log(cup / radius) - (cup**2 - radius**2) / (cup**2 + radius**2)
+    for kinematic in (0.1, 1.0, 10.0):
+        steady = 4.0 * kinematic / (shape * radius**2 * omega)
+        reaction = oscillating_rod.stokes_reaction_in_cup(radius, cup, omega, kinematic)
+        assert reaction.damping == pytest.approx(steady, rel=1e-5)
+    with pytest.raises(ValueError, match="cup"):
+        oscillating_rod.stokes_reaction_in_cup(cup, radius, omega, 1.0)
