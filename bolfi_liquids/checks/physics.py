@@ -43,10 +43,10 @@ class PhysicsCheck:
 
 def all_cases() -> "dict[str, Case]":
     """Every case, by name: those of the models, then those on recordings."""
-    from ..models.validation import cases, discover
+    from ..models.validation import cases, cup_cases, discover
     from . import cases as physics_cases
 
-    return discover(cases, physics_cases)
+    return discover(cases, cup_cases, physics_cases)
 
 
 def check_physics(
