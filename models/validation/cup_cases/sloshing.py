@@ -12,7 +12,7 @@ DEPTHS = (0.03, 0.05, 0.0525)  # m; the last surface lies in the middle of cells
 VISCOSITY = np.array([0.001, 0.01])  # Pa s
 SPEED, SLOW = 0.12, 0.06  # m/s at the surface: waves of 6 and 3 mm, of a cell and of half
 SECONDS = 2.5
-TOLERANCE = 0.04
+TOLERANCE, MIDDLE_TOLERANCE = 0.04, 0.06  # where the surface lies on faces, and in the middle
 
 
 def wave(depth: float, speed: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -31,10 +31,11 @@ def run(progress: Progress, seed: int) -> CaseResult:
     for number, depth in enumerate(DEPTHS):
         time, centre = wave(depth, SPEED, seed)
         expected = sloshing_period(RADIUS, depth)
+        allowed = MIDDLE_TOLERANCE if depth == DEPTHS[-1] else TOLERANCE
         for mu, x in zip(VISCOSITY, centre.T, strict=True):
             swing = oscillation(time, x)
             name = f"{1e3 * depth:g} mm deep, {mu:g} Pa s"
-            rows.append(Row.relative(f"period {name} [s]", expected, swing.period, TOLERANCE))
+            rows.append(Row.relative(f"period {name} [s]", expected, swing.period, allowed))
             notes[f"decay {name} [1/s]"] = swing.decay
             curves.append(Curve(name, time, 1e3 * x, series=len(curves)))
         time, centre = wave(depth, SLOW, seed)

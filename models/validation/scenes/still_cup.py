@@ -1,6 +1,5 @@
 """Liquids of several viscosities in cups of one shape, without a stick, side by side."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -43,6 +42,11 @@ class StillCup:
 
     def grid(self) -> Grid:
         return Grid.around_cup(self.cell, self.radius, self.depth)
+
+    def room(self) -> tuple[int, int]:
+        """Cells and particles that a scene has room for, the same for cups of about a size."""
+        particles = self.per_cell * np.pi * self.radius**2 * (self.depth + self.cell) / self.cell**3
+        return room_for(self.grid().cells, LEAST_CELLS), room_for(particles, LEAST_PARTICLES)
 
     def geometry(self) -> Geometry:
         """Of the cup; a slippery floor is so far below that nothing rubs at it, and shuts."""
@@ -96,7 +100,7 @@ def flow_in_cup(
     viscosity = np.atleast_1d(np.asarray(viscosity, float))
     steps, size = round(seconds / cup.dt), len(viscosity)
     with runtime.LOCK:
-        scene, groups = _filled(cup, viscosity, flow, seed)
+        scene, groups = _started(cup, viscosity, flow, seed)
         seen = []
         for _ in range(steps):
             scene.step(groups)
@@ -120,37 +124,42 @@ def swirl_of(points: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.n
     return out, (x * velocity[:, 1] - y * velocity[:, 0]) / out
 
 
-def _filled(cup: StillCup, viscosity: np.ndarray, flow: Flow, seed: int) -> tuple[Any, int]:
-    """A scene with its liquids before the first step, and groups of lanes in it."""
-    runtime.start()
-    from ...apic.lanes import LANES
-    from .still_cup_scene import RINGS
-
+def fill_scene(scene: Any, cup: StillCup, viscosity: np.ndarray, seed: int) -> np.ndarray:
+    """Fill the first lanes of a scene with liquids at rest [Pa s]; where their particles are [m],
+    shape (n, 3)."""
     grid = cup.grid()
     points = fill_cup(grid, cup.radius, cup.depth, cup.per_cell, seed)
-    groups = math.ceil(len(viscosity) / LANES)
-    scene = _scene(
-        groups, room_for(grid.cells, LEAST_CELLS), room_for(len(points), LEAST_PARTICLES)
-    )
     scene.enter_vessel(grid, cup.geometry(), cup.dt)
+    volume = np.pi * cup.radius**2 * cup.depth / len(points) / cup.cell**3
+    rows = [len(points), volume, viscosity / DENSITY, DENSITY, cup.depth]
+    lanes = np.stack([of_lanes(row, len(viscosity)) for row in rows])
+    counts, liquids = lanes[0].astype(np.int32), np.ascontiguousarray(lanes[1:])
+    scene.fill_in(_in_all(points, *counts.shape), counts, liquids)
+    return points
+
+
+def of_lanes(values: Any, size: int) -> np.ndarray:
+    """A scalar or (size,) as float32 [groups, LANES]; lanes without a liquid hold 0."""
+    from ...apic.lanes import LANES
+
+    full = np.zeros(-(-size // LANES) * LANES, np.float32)
+    full[:size] = values
+    return full.reshape(-1, LANES)
+
+
+def _started(cup: StillCup, viscosity: np.ndarray, flow: Flow, seed: int) -> tuple[Any, int]:
+    """A scene with its liquids before the first step, and groups of lanes in it."""
+    runtime.start()
+    from .still_cup_scene import RINGS
+
+    strength = of_lanes(flow.strength, len(viscosity))
+    scene = _scene(len(strength), *cup.room())
     scene.cup_radius[None] = cup.radius
     scene.turns.from_numpy(flow.swirl(np.linspace(0.0, cup.radius, RINGS + 1)).astype(np.float32))
-    lanes = np.zeros((6, groups * LANES))
-    volume = np.pi * cup.radius**2 * cup.depth / len(points) / cup.cell**3
-    lanes[:, : len(viscosity)] = np.stack(
-        np.broadcast_arrays(
-            len(points), volume, viscosity / DENSITY, DENSITY, cup.depth, flow.strength
-        )
-    )
-    lanes = lanes.reshape(6, groups, LANES).astype(np.float32)
-    scene.strength.from_numpy(lanes[5])
-    scene.fill_in(
-        _in_all(points, groups, LANES),
-        lanes[0].astype(np.int32),
-        np.ascontiguousarray(lanes[1:5]),
-    )
-    scene.give_speed(_in_all(flow.start(points), groups, LANES))
-    return scene, groups
+    scene.strength.from_numpy(strength)
+    points = fill_scene(scene, cup, viscosity, seed)
+    scene.give_speed(_in_all(flow.start(points), *strength.shape))
+    return scene, len(strength)
 
 
 def _in_all(rows: np.ndarray, groups: int, lanes: int) -> np.ndarray:

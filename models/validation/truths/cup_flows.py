@@ -41,8 +41,9 @@ def driven_swirl(
     """Steady speed around the axis [m/s] of liquid that is accelerated around it.
 
     From ν ((r u)' / r)' = -a with u = 0 at the wall R: r u = C r²/2 - ∫ r G dr / ν, where
-    G = ∫ a dr and C makes u(R) = 0. For a = A r that is A (R² r - r³) / 8 ν; a thin ring turns what is
-    within it rigidly, and drags the rest as between cylinders (Batchelor 1967, section 4.5).
+    G = ∫ a dr and C makes u(R) = 0. For a = A r that is A (R² r - r³) / 8 ν; a thin ring turns
+    what is within it rigidly, and drags the rest as between cylinders (Batchelor 1967, section
+    4.5).
 
     Args:
         r: Distances from the axis [m], shape [n].
