@@ -42,10 +42,10 @@ class PhysicsCheck:
 
 
 def all_cases() -> "dict[str, Case]":
-    """Every case, by name: those of the models, then those on recordings."""
-    from ..models.validation import cases, discover
+    """Every case, by name: those of the former fluid, then those of liquid in a cup."""
+    from ..models.validation import cases, cup_cases, discover
 
-    return discover(cases)
+    return discover(cases, cup_cases)
 
 
 def check_physics(

@@ -60,7 +60,7 @@ def _shared_code() -> bytes:
     shared = [
         path
         for path in sorted(folder.rglob("*.py"))
-        if path.parent.name != "cases" or path.name.startswith("_")
+        if not path.parent.name.endswith("cases") or path.name.startswith("_")
     ]
     return b"".join(path.read_bytes() for path in shared)
 

@@ -54,8 +54,8 @@ class LiquidState:
 
         # of the vessel
         self.usable, self.open_volume, self.capacity = (ti.field(ti.f32, cells) for _ in range(3))
-        self.area, self.carries, self.shut, self.rub, self.solid = (
-            ti.field(ti.f32, (3, cells)) for _ in range(5)
+        self.area, self.carries, self.shut, self.rub, self.solid, self.edge = (
+            ti.field(ti.f32, (3, cells)) for _ in range(6)
         )
         self.shape = ti.Vector.field(3, ti.i32, ())
         self.origin = ti.Vector.field(3, ti.f32, ())
@@ -89,7 +89,7 @@ class LiquidState:
             np.array(grid.shape, np.int32),
             np.array([*grid.origin, grid.cell, dt], np.float32),
             np.stack([g.usable, g.volume, g.capacity]),
-            np.stack([g.area, g.carries, g.shut, g.friction, g.solid]),
+            np.stack([g.area, g.carries, g.shut, g.friction, g.solid, g.edge]),
         )
 
     @ti.kernel
@@ -116,6 +116,7 @@ class LiquidState:
                 self.shut[a, m] = of_faces[2, a, m]
                 self.rub[a, m] = of_faces[3, a, m]
                 self.solid[a, m] = of_faces[4, a, m]
+                self.edge[a, m] = of_faces[5, a, m]
 
     @ti.kernel
     def fill_in(

@@ -7,7 +7,7 @@ from .lanes import chosen, lanes, positive, ratio
 from .rheology import find_thickness, thickness_of
 from .transfer import strides
 
-TOLERANCE = 3e-3  # of the speed
+TOLERANCE = 1e-3  # of the speed
 LEAST_ENERGY = 1e-3
 MOST_ITERATIONS = 200
 LEAST_MASS = 1e-4  # of a face, in full cells, that has a velocity
@@ -22,7 +22,9 @@ def has_mass(s, g, a, m):
 def weigh_stresses(s, g, time):
     """Weights of the stresses: viscosity at a time [s], by how full their cells are.
 
-    A stress that a face without mass would take part in is 0: its velocity means nothing.
+    Around an edge that is how full the liquid leaves what walls leave open: particles deposit into
+    walls too, so their volume alone would make full liquid thinner there. A stress that a face
+    without mass would take part in is 0: its velocity means nothing.
     """
     S = strides(s)
     scale = s.dt[None] / s.cell[None] ** 2
@@ -43,15 +45,16 @@ def weigh_stresses(s, g, time):
         s.normal_weight[g, m] = nu * ti.min(s.volume[g, m], 1.0) * known
         for c in range(3):  # edges along c
             a, b = (c + 1) % 3, (c + 2) % 3
-            full, thick = lanes(0.0), lanes(0.0)
+            full, thick, room = lanes(0.0), lanes(0.0), 1e-6
             for k in range(4):
                 o = m - (k & 1) * S[a] - (k >> 1) * S[b]
                 full += s.volume[g, o]
                 thick += s.volume[g, o] * thickness_of(s, g, o)
+                room += s.capacity[o]
             known_a = has_mass(s, g, a, m) * has_mass(s, g, a, m - S[b])
             known_b = has_mass(s, g, b, m) * has_mass(s, g, b, m - S[a])
-            at_most = ti.min(1.0, 4.0 / ti.max(full, 1e-6))
-            s.shear_weight[g, c, m] = 0.25 * scale * thick * at_most * known_a * known_b
+            share = s.edge[c, m] * ti.min(1.0 / room, 1.0 / ti.max(full, 1e-6))
+            s.shear_weight[g, c, m] = scale * thick * share * known_a * known_b
 
 
 @ti.func

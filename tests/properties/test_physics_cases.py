@@ -6,9 +6,16 @@ import pytest
 
 from bolfi_liquids.checks.physics import all_cases, check_physics
 
-# the cheapest that compares with a truth, about 10 s of processor time, seed 0;
-# `make test-long` runs the others, and `check physics` all
-IN_CI = ("pendulum_in_air",)
+# those that take less than half a minute of processor time, seed 0; `make test-long` runs the
+# others, and `check physics` all
+IN_CI = (
+    "column_at_rest",
+    "pendulum_in_air",
+    "ring_couette",
+    "sloshing",
+    "swirl_decay",
+    "swirl_poiseuille",
+)
 WORSE = 1.25  # times the error below that a missed comparison may have, on another computer
 
 RUB = "particles pass each other with friction, the more weight they bear"

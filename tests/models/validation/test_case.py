@@ -6,7 +6,16 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from bolfi_liquids.models.validation import Case, CaseResult, Curve, Panel, Row, cases, discover
+from bolfi_liquids.models.validation import (
+    Case,
+    CaseResult,
+    Curve,
+    Panel,
+    Row,
+    cases,
+    cup_cases,
+    discover,
+)
 
 
 def panel():
@@ -107,7 +116,7 @@ def test_names_are_unique_over_packages(importable):
 
 
 def test_every_case_of_the_models_says_what_it_is():
-    for name, found in discover(cases).items():
+    for name, found in discover(cases, cup_cases).items():
         assert name == found.name
         assert found.title and found.truth and found.source and found.unit
         assert not found.truth.endswith(".") and not found.title.endswith(".")
