@@ -71,7 +71,7 @@ def test_run_toml_says_how_it_was_made(calibration, short_recording, settings):
     assert record["settings"]["particles"] == settings["particles"]
     assert record["inputs"]["sha256"] == [bl.open_recording(short_recording).hash]
     assert record["versions"]["bolfi-liquids"] == bl.__version__
-    assert record["simulator"]["recording_1"]["particles"] > 1000  # as cells follow the stick
+    assert record["simulator"]["recording_1"]["particles"] == settings["particles"]
 
 
 def test_several_recordings_add_up(short_recording, dataset, tmp_path, rng, settings):
