@@ -13,7 +13,7 @@ from ..models import Liquid, StirSetup, stir
 from ..models.validation import Case, CaseResult, Curve, Panel, Progress, Row
 from .reference_stirs import ReferenceStir
 
-SEEDS = 4
+SEEDS = 8
 WARM_UP = 10  # samples of a stir that compiles what the timed one runs
 CAMERA_NOISE = 0.1
 """Standard deviation of what the reference adds to each angle [deg]."""

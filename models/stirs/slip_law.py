@@ -14,6 +14,7 @@ TIP = 0.2  # cells from the tip to the end of the line
 KERNEL = 0.85  # of the stick's radius, the kernel's unit
 HELD_RADIUS = 1.05  # of the kernel's unit: the cylinder that a line held by it is, in viscous flow
 PIVOT_DAMPING = 2e-5  # N m s
+LARGEST_RATIO = 1.25  # of the nodes' moment of inertia to the stick's, that needs no correction
 LEAST_SEEN = 0.1  # full cells that a node reckons with, at least
 
 NODES_ABOVE = 4  # the surface at rest, for waves and for a stick that is lifted

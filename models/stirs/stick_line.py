@@ -13,7 +13,16 @@ import taichi as ti
 from ..apic.lanes import LANES, vec3
 from ..apic.rheology import kinematic
 from ..apic.transfer import GRAVITY, strides
-from .slip_law import HELD_RADIUS, IMPULSE, LEAST_SEEN, PIVOT_DAMPING, QUADRATIC, TIP, line_of
+from .slip_law import (
+    HELD_RADIUS,
+    IMPULSE,
+    LARGEST_RATIO,
+    LEAST_SEEN,
+    PIVOT_DAMPING,
+    QUADRATIC,
+    TIP,
+    line_of,
+)
 
 
 @ti.func
@@ -191,6 +200,20 @@ def start_line(s, t, g, lane):
 
 
 @ti.func
+def recoil_of(s, t, g, lane):
+    """How much a push of all nodes alike changes the stick's velocity over the liquid's, beyond
+    what a step takes without overshooting: on coarse cells the nodes outweigh the stick."""
+    density, radius, length = s.density[g][lane], t.radius[None], t.length[None]
+    volume = t.node_volume[None] * s.cell[None] ** 3
+    moment = 0.0
+    for n in range(t.nodes[None]):
+        arm = arm_of(s, t, g, lane, n)
+        moment += t.wet_share[g, lane, n] * density * volume * arm.dot(arm)
+    ratio = moment / (t.mass[g, lane] * (length**2 / 3.0 + radius**2 / 4.0))
+    return ti.max(ratio - LARGEST_RATIO, 0.0)
+
+
+@ti.func
 def slip_line(s, t, g, lane, time):
     """Slip: the carried forces become those of the law, implicitly in each node's own response;
     then the stick turns. `time` is that of the step's middle [s]."""
@@ -201,6 +224,7 @@ def slip_line(s, t, g, lane, time):
     ahead = t.swing[g, lane] + dt * t.turning[g, lane]
     torque, added = vec3(0.0), 0.0
     jolt_across = jolt - jolt.dot(u) * u
+    recoil = recoil_of(s, t, g, lane)
     for n in range(t.nodes[None]):
         wet = t.wet_share[g, lane, n]
         if wet > 0.0:
@@ -210,7 +234,7 @@ def slip_line(s, t, g, lane, time):
             nu = kinematic(s, g, lane, speed / radius, time)
             k = (QUADRATIC * radius * speed + stokes * nu) * dx / volume
             f = t.carried[g, lane, n]
-            change = (k * wet * slip - f) / (k + 1.0 / dt)
+            change = (k * wet * slip - f) / (k * (1.0 + recoil) + 1.0 / dt)
             f += change / dt
             t.carried[g, lane, n] = f
             push_liquid(s, t, g, lane, n, change)

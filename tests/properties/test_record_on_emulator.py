@@ -126,7 +126,7 @@ def test_stirring_ends_when_the_pour_is_known_well_enough(tmp_path):
     from bolfi_liquids.online.settings import OnlineSettings
 
     # a coarse map, and a target that any estimate meets once enough strokes were made
-    settings = OnlineSettings(target=0.9, design=8, budget=12, pours=64, particles=1000)
+    settings = OnlineSettings(target=0.9, design=8, budget=12, pours=64, particles=300)
     told = []
     recording = record_online(
         hardware.bundled_rig(),

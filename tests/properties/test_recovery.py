@@ -14,7 +14,7 @@ from bolfi_liquids.inputs.prior import default_prior
 DATA = files("bolfi_liquids.data")
 CAMERA_NOISE = np.radians(0.1)
 FULL = {"budget": 20, "particles": 0}
-SMALL = {"budget": 10, "particles": 1000}  # for continuous integration
+SMALL = {"budget": 10, "particles": 500}  # for continuous integration
 
 
 def simulated_recording(path, theta, seed, particles):

@@ -12,7 +12,7 @@ from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.recording import along_path, recording_dataset
 from bolfi_liquids.reporting.warnings import results_of, warnings_of
 
-SETTINGS = {"budget": 12, "batch": 4, "particles": 1000, "chains": 2, "draws": 200, "seed": 3}
+SETTINGS = {"budget": 12, "batch": 4, "particles": 300, "chains": 2, "draws": 200, "seed": 3}
 TURN = np.exp(0.25j * np.pi)
 
 

@@ -21,7 +21,7 @@ from bolfi_liquids.checks.sbc_pipelines import (
 )
 from bolfi_liquids.inputs.settings import RUNS_PER_POINT, CalibrationSettings, SbcSettings
 
-SMALL = {"design": 8, "budget": 8, "particles": 1000, "seed": 3}
+SMALL = {"design": 8, "budget": 8, "particles": 200, "seed": 3}
 
 
 def rows(path, table):

@@ -203,7 +203,7 @@ def test_clean_recordings_of_the_same_path_say_where_it_errs(calibration):
     recording = recorded(calibration, rng)
     residual = 10.0 * SD * np.sin(np.linspace(0.0, 9.0, len(recording.time)))[:, None] * [1.0, 0.5]
     clean = [Clean(recording, residual, 1)]
-    stirring = stirring_of([recording], 1000)
+    stirring = stirring_of([recording], 200)
     same, elsewhere = usual_for(stirring, clean), usual_elsewhere(clean)
     assert len(same.shapes) == 1 and len(elsewhere.shapes) == 0
     cameras = camera_noise([recording])

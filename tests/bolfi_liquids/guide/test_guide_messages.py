@@ -201,7 +201,7 @@ def test_pours_far_from_their_cups(told, run, tmp_path):
 
 def test_runs_that_cannot_go_on(told, run, calibration):
     assert told("calibrate stir.nc --out runs/mine") in QUOTED
-    options = "--budget 7 --batch 2 --seed 3 --particles 1000 --resume"
+    options = "--budget 7 --batch 2 --seed 3 --particles 200 --resume"
     assert told(f"calibrate stir.nc --out runs/mine {options}") in QUOTED
     (run / "posterior.nc").write_bytes(b"cut off")
     assert told("report runs/mine") in QUOTED

@@ -66,7 +66,7 @@ def signals(theta, seeds, time=PLAN.time):
 
 
 def problem(surrogate="discrepancy", **settings):
-    stirring = stirring_of([PLAN], 1000)
+    stirring = stirring_of([PLAN], 200)
     return Problem(default_prior(), stirring, OnlineSettings(surrogate=surrogate, **settings))
 
 
@@ -111,7 +111,7 @@ def test_missing_samples_equal_a_shorter_recording():
     known, seen = made(of), followed(4)
     samples = int(np.isfinite(seen.observed).all(axis=1).sum())
     short = planned(PLAN.time[:samples], PATH.position[:samples], ATTRS)
-    stirring = stirring_of([short], 1000)
+    stirring = stirring_of([short], 200)
     engine = Bolfi(
         of.prior,
         seen.observed[:samples],
@@ -208,7 +208,7 @@ def test_an_online_estimate_names_a_wrong_frame():
     """A stick that leans ahead of the gripper: the sign of a plane is wrong."""
     recording = bundled_recording("glycerin")
     plan = planned(recording.time, recording.gripper.position, recording.attrs)
-    of = Problem(default_prior(), stirring_of([plan], 1000), OnlineSettings(design=8))
+    of = Problem(default_prior(), stirring_of([plan], 200), OnlineSettings(design=8))
     ends = stroke_ends(plan)
     for sign, faults in ((1.0, 0), (-1.0, 1)):
         seen = recording.inclination * [1.0, sign]

@@ -25,7 +25,7 @@ from bolfi_liquids.online.settings import OnlineSettings
 
 # the process that simulates gives way to others: beside another test it gets little
 PATIENCE_S = 600
-SMALL = OnlineSettings(particles=1000, pours=64, design=8, budget=24, target=1e-9)
+SMALL = OnlineSettings(particles=200, pours=64, design=8, budget=24, target=1e-9)
 
 
 def made_up(liquid, action, cups, seeds):
