@@ -10,7 +10,6 @@ from ...stir_setup import Stick
 from ..truths.pendulum import Rod
 
 STICKS = {"": ParticleNumerics(), ", drag as published": PUBLISHED_DRAG}
-KICK = 2  # samples that a kick lasts
 
 
 class Path(NamedTuple):
@@ -20,15 +19,10 @@ class Path(NamedTuple):
     position: np.ndarray
 
 
-def kicked(shift: float, height: float, seconds: float, rate: float) -> Path:
-    """A pivot `height` above the cup's floor that jumps by `shift` along x to the axis [m].
-
-    The stick's middle hardly follows, so it is left at rest and tilted, by about 1.5 shift /
-    length in air. Samples at `rate` [Hz]; the jump ends at sample `KICK`.
-    """
+def resting(height: float, seconds: float, rate: float) -> Path:
+    """A pivot at rest on the axis, `height` above the floor [m]; samples at `rate` [Hz]."""
     time = np.arange(round(seconds * rate) + 1) / rate
-    x = shift * (np.minimum(time * rate / KICK, 1.0) - 1.0)
-    return Path(time, np.column_stack([x, np.zeros_like(x), np.full_like(x, height)]))
+    return Path(time, np.tile([0.0, 0.0, height], (len(time), 1)))
 
 
 def rod(stick: Stick) -> Rod:

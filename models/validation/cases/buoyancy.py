@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from ... import stirring
 from ...fluid import runtime
 from ...fluid.fluid import DAMPING
 from ...fluid.liquid import Liquid
 from ...fluid.numerics import ParticleNumerics
+from ...particle_stirring import _pack, _scene
 from ...stir_setup import Cup, Stick, StirSetup
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from ..truths.pendulum import Rod, archimedes_torque
@@ -31,10 +31,10 @@ def torque(numerics: ParticleNumerics, tilt: float, seed: int) -> tuple[np.ndarr
     height = STICK.length - SUBMERGED + CUP.fill
     pivots = np.tile([-reach * np.sin(tilt), 0.0, height], (PACKINGS, 1))
     with runtime.LOCK:
-        scene = stirring._scene(setup, ())
+        scene = _scene(setup, ())
         seeds = seed * PACKINGS + np.arange(PACKINGS)
         upright = pivots * [0.0, 0.0, 1.0]
-        scene.place([stirring._pack(setup, setup.particles, int(s), upright[0]) for s in seeds])
+        scene.place([_pack(setup, setup.particles, int(s), upright[0]) for s in seeds])
         scene.fit_stick(np.full(PACKINGS, HEAVY * STICK.mass), np.zeros(PACKINGS))
         scene.place_stick(pivots)
         direction = np.zeros((scene.slots, 3), np.float32)

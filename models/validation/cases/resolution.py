@@ -3,6 +3,7 @@
 import numpy as np
 
 from ...fluid.liquid import Liquid
+from ...fluid.numerics import ParticleNumerics
 from ...stir_setup import StirSetup
 from ...stirring import stir
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
@@ -22,7 +23,13 @@ def run(progress: Progress, seed: int) -> CaseResult:
     for number, viscosity in enumerate(VISCOSITY):
         liquid, seen = Liquid(viscosity, 0.0, DENSITY), []
         for count in PARTICLES:
-            setup = StirSetup(seed_noise.CUP, seed_noise.STICK, seed_noise.SUBMERGED, count)
+            setup = StirSetup(
+                seed_noise.CUP,
+                seed_noise.STICK,
+                seed_noise.SUBMERGED,
+                count,
+                numerics=ParticleNumerics(),
+            )
             seen.append(np.degrees(stir(liquid, path, setup, seeds)[..., 0]))
             step = number * len(PARTICLES) + len(seen)
             progress(step / len(VISCOSITY) / len(PARTICLES))

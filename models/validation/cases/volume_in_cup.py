@@ -2,10 +2,12 @@
 
 import numpy as np
 
-from ... import stirring
 from ...fluid import runtime
 from ...fluid.liquid import Liquid
+from ...fluid.numerics import ParticleNumerics
+from ...particle_stirring import _scene
 from ...stir_setup import StirSetup
+from ...stirring import stir
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
 from . import seed_noise
 from ._stirring import Path
@@ -29,12 +31,14 @@ def strokes_and_rest() -> Path:
 
 def run(progress: Progress, seed: int) -> CaseResult:
     """Mean height of the particles at the end, against that of a full cup."""
-    setup = StirSetup(seed_noise.CUP, seed_noise.STICK, seed_noise.SUBMERGED)
+    setup = StirSetup(
+        seed_noise.CUP, seed_noise.STICK, seed_noise.SUBMERGED, numerics=ParticleNumerics()
+    )
     path = strokes_and_rest()
     mu, cohesion = (np.ravel(grid) for grid in np.meshgrid(VISCOSITY, COHESION))
-    stirring.stir(Liquid(mu, cohesion, DENSITY), path, setup, np.full(len(mu), seed))
+    stir(Liquid(mu, cohesion, DENSITY), path, setup, np.full(len(mu), seed))
     with runtime.LOCK:
-        height = stirring._scene(setup, ()).position.to_numpy()[: len(mu), :, 2].mean(axis=1)
+        height = _scene(setup, ()).position.to_numpy()[: len(mu), :, 2].mean(axis=1)
     progress(1.0)
     # of liquid around a stick that reaches to `tip` above the floor
     cup, stick = setup.cup, setup.stick
