@@ -14,6 +14,7 @@ from . import _stirring
 STICK = Stick(radius=0.005, length=0.15, mass=0.02)
 CUP = Cup(radius=0.1, height=0.1, fill=0.02)
 DIP = 0.003  # m
+EMPTY = {"fill_level": -CUP.fill}  # no particle is left
 STARTS = (6.0, 20.0, 35.0)  # deg
 SECONDS, RATE = 6.0, 240.0
 KEPT_TOLERANCE = 0.01
@@ -23,12 +24,12 @@ TOLERANCE = 0.002
 def run(progress: Progress, seed: int) -> CaseResult:
     """Period of each swing, and how much of its amplitude is left at the end."""
     path = _stirring.resting(STICK.length + CUP.fill - DIP, SECONDS, RATE)
-    nothing = Liquid(viscosity=0.0, cohesion=0.0, density=1e-3)
+    nothing = Liquid(viscosity=0.0, cohesion=0.0, density=1.0)
     rows, curves, swings = [], [], []
     loss = np.exp(-0.5 * PIVOT_DAMPING / STICK.inertia * SECONDS)
     for number, start in enumerate(STARTS):
         setup = StirSetup(CUP, STICK, DIP, tilt=(np.radians(start), 0.0))
-        time, angle = path.time, stir(nothing, path, setup, [seed])[0, :, 0]
+        time, angle = path.time, stir(nothing, path, setup, [seed], EMPTY)[0, :, 0]
         swing = oscillation(time, angle)
         kept = np.exp(-swing.decay * SECONDS)
         # the amplitude halfway, as the swing may die away

@@ -53,7 +53,7 @@ def slip_forces(
     with runtime.LOCK:
         runtime.start()
         scene = _scene_for(cup, radius, len(of_lanes(0.0, size)))
-        fill_scene(scene, cup, viscosity, seed)
+        points = fill_scene(scene, cup, viscosity, seed)
         scene.sticks.fit(Stick(radius, LENGTH, MASS), cup.radius, cup.cell, cup.depth)
         upright = [of_lanes(row, size) for row in (0.0, 0.0, -1.0, MASS, 0.0)]
         scene.sticks.hang(np.stack(upright))
@@ -63,7 +63,8 @@ def slip_forces(
         x = path(cup.dt * np.arange(-1, steps + 1))
         pivots = np.stack([of_lanes(at, size) for at in x.T], axis=2)
         pivots = np.stack([pivots, np.zeros_like(pivots), np.full_like(pivots, LENGTH)], axis=-1)
-        scene.begin(pivots, np.empty((*direction.shape[:2], steps + 1, 3), np.float32))
+        unseen = np.empty((*direction.shape[:2], steps + 1, 3), np.float32)
+        scene.begin(pivots, unseen, len(points))
         carried = [_held_step(scene, held, step, size) for step in range(steps)]
         status = scene.status.to_numpy().reshape(-1)[:size]
     line = line_of(radius, cup.cell, cup.depth)

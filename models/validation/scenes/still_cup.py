@@ -133,7 +133,9 @@ def fill_scene(scene: Any, cup: StillCup, viscosity: np.ndarray, seed: int) -> n
     volume = np.pi * cup.radius**2 * cup.depth / len(points) / cup.cell**3
     rows = [len(points), volume, viscosity / DENSITY, DENSITY, cup.depth]
     lanes = np.stack([of_lanes(row, len(viscosity)) for row in rows])
-    counts, liquids = lanes[0].astype(np.int32), np.ascontiguousarray(lanes[1:])
+    # -1 where a lane has no liquid
+    counts = np.where(lanes[0] > 0, lanes[0], -1).astype(np.int32)
+    liquids = np.ascontiguousarray(lanes[1:])
     scene.fill_in(_in_all(points, *counts.shape), counts, liquids)
     return points
 
