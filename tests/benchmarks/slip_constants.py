@@ -1,7 +1,7 @@
 """How the error of reference stirs depends on each constant of the stick's law of slip.
 
     .venv/bin/python tests/benchmarks/slip_constants.py tests/data/stirring_reference
-    .venv/bin/python tests/benchmarks/slip_constants.py DIR --constant QUADRATIC --factors 0.8 1 1.25
+    .venv/bin/python tests/benchmarks/slip_constants.py DIR --constant QUADRATIC --factors 0.8 1.25
 
 Each value runs in a process of its own, as constants are compiled in. The table holds the RMS
 difference to the recording [deg], camera noise removed, of one seed. QUADRATIC was found on liquids
