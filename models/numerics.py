@@ -8,7 +8,9 @@ from .fluid.checks import check_numbers
 TESTED_RATIO = (0.7, 1.4)  # radii of a stick in cells, for which references were compared
 STEP_CELL = 0.005  # m, the cell that `longest_step` is for
 LARGEST_STEP = 4 / 3  # times `longest_step`, for larger cells
-LEAST_VISCOSITY = 5e-6  # m²/s
+LEAST_VISCOSITY = 5e-6
+"""Kinematic viscosity below which stirs look alike [m²/s]: those of 1e-3 and 5e-3 Pa s at 10 cm/s
+differ by 0.36 degrees RMS, and each misses the reference by about 0.4."""
 
 
 class UntestedResolution(UserWarning):
@@ -59,15 +61,6 @@ class Numerics:
         """Step [s] for cells [m] and the gripper's largest speed [m/s]."""
         slow = self.longest_step * min(cell / STEP_CELL, LARGEST_STEP)
         return min(slow, self.courant * cell / max(speed, 1e-9))
-
-    def least_viscosity(self, spacing: float, density: float, speed: float = 0.1) -> float:
-        """Viscosity [Pa s] below which stirs in liquids of `density` [kg/m³] look alike.
-
-        Stirs of 1e-3 and 5e-3 Pa s at 10 cm/s differ by 0.36 degrees RMS, and each misses the
-        reference by about 0.4. Neither cells nor speed decide this as the liquid's own scales do.
-        """
-        del spacing, speed
-        return LEAST_VISCOSITY * density
 
 
 def check_resolution(stick_radius: float, cell: float) -> None:

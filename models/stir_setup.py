@@ -8,7 +8,7 @@ import numpy as np
 
 from .fluid.checks import check_numbers
 from .fluid.numerics import MODEL_VERSION, STIR_PARTICLES, ParticleNumerics
-from .numerics import Numerics, check_resolution
+from .numerics import LEAST_VISCOSITY, Numerics, check_resolution
 from .trajectory import Trajectory, mean_speed, top_speed
 
 MAX_FILL_RATIO = 1.5  # times the setup's fill is the largest
@@ -184,8 +184,10 @@ class StirSetup:
 
     def least_viscosity(self, density: float, gripper: Trajectory) -> float:
         """Viscosity [Pa s] below which this path of the gripper cannot distinguish liquids of
-        `density` [kg/m³]; see `Numerics.least_viscosity`."""
-        return self.numerics.least_viscosity(self.spacing, density, mean_speed(gripper))
+        `density` [kg/m³]."""
+        if isinstance(self.numerics, ParticleNumerics):
+            return self.numerics.least_viscosity(self.spacing, density, mean_speed(gripper))
+        return LEAST_VISCOSITY * density
 
     def _usual_particles(self) -> int:
         if isinstance(self.numerics, ParticleNumerics):
