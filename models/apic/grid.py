@@ -40,7 +40,7 @@ class Grid:
         """Distance of neighbours in the numbering, along x, y and z."""
         return 1, self.shape[0], self.shape[0] * self.shape[1]
 
-    def points(self, at: tuple[float, float, float]) -> np.ndarray:
+    def points(self, at: tuple[float, ...]) -> np.ndarray:
         """A point of each cell [m], shape (cells, 3); `at` is its place in the cell, in cells."""
         nx, ny, nz = self.shape
         k, j, i = np.meshgrid(range(nz), range(ny), range(nx), indexing="ij")

@@ -143,7 +143,7 @@ def _filled(
     setup: StirSetup, grid: Grid, stirs: Stirs, slots: np.ndarray, room: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where the particles start [m], shape [room, n, 3], and how many there are."""
-    per_cell, radius = setup.numerics.per_cell, setup.cup.radius
+    per_cell, radius = setup.per_cell, setup.cup.radius
     points = [
         fill_cup(grid, radius, float(fill), per_cell, int(seed))
         for fill, seed in zip(stirs.rig.fill, stirs.seeds, strict=True)
@@ -172,7 +172,7 @@ def _scene_for(setup: StirSetup, grid: Grid, effects: tuple[Effect, ...]) -> Any
     column = np.pi * setup.cup.radius**2 * (setup.deepest + setup.cell) / setup.cell**3
     return _scene(
         room_for(grid.cells, LEAST_CELLS),
-        room_for(1.1 * column * setup.numerics.per_cell, LEAST_PARTICLES),
+        room_for(1.1 * column * setup.per_cell, LEAST_PARTICLES),
         (room_for(line.nodes, LEAST_NODES), room_for(2 * line.half_width, LEAST_WIDTH)),
         effects,
     )

@@ -28,7 +28,7 @@ def swirl_over_time(
     def look(position: np.ndarray, velocity: np.ndarray) -> float:
         r, speed = swirl_of(position, velocity)
         mode = swirl_mode(r, cup.radius)
-        return speed @ mode / (mode @ mode)
+        return float(speed @ mode / (mode @ mode))
 
     return flow_in_cup(cup, viscosity, Flow(start), seconds, look, seed)
 

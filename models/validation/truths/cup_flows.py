@@ -54,7 +54,7 @@ def driven_swirl(
     at = np.linspace(0.0, radius, POINTS)
     moment = _integral(at, at * _integral(at, acceleration(at)))
     speed = (moment[-1] * (at / radius) ** 2 - moment) / np.maximum(at, at[1]) / kinematic
-    return np.interp(r, at, speed)
+    return np.interp(np.asarray(r, float), at, speed)
 
 
 def sloshing_period(radius: float, depth: float, gravity: float = GRAVITY) -> float:
