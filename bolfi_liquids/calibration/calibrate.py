@@ -15,13 +15,14 @@ from ..errors import Argument, InputError
 from ..files import given_path
 from ..inputs.frame import frame_warnings
 from ..inputs.open import Source, open_recordings
-from ..inputs.prior import check_prior, default_prior, describe_prior
+from ..inputs.prior import check_prior, default_prior, describe_prior, read_prior
 from ..inputs.recording import Recording, aborted_recordings
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
 from ..inputs.start import check_start
 from ..progress import after_first, progress_bar
 from ..run.directory import (
     POSTERIOR,
+    RUN_TOML,
     note_timeout,
     open_bank,
     read_run,
@@ -108,13 +109,14 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         draws=draws,
     )
     opened = _open_all(recordings)
-    prior = default_prior() if prior is None else prior
-    check_prior(prior)
+    if prior is not None:
+        check_prior(prior)
     stirring = stirring_of(opened, settings.particles)
     check_names(stirring.recordings)
     run = (
         Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, Argument("out"))
     )
+    prior = _usual_prior(run, resume) if prior is None else prior
     record = run_record(settings, prior, stirring)
     with (
         open_workers(executor, timeout) as workers,
@@ -243,6 +245,13 @@ def engine_options(stirring: Stirring, surrogate: str) -> dict[str, Any]:
         "discrepancy": stirring.discrepancy(),
         **(paper if surrogate == "discrepancy" else {}),
     }
+
+
+def _usual_prior(run: Path, resume: bool) -> "Prior":
+    """That of a run that goes on, which an earlier version may have begun with another default."""
+    if resume and (run / RUN_TOML).is_file():
+        return read_prior(read_run(run)["settings"]["prior"])
+    return default_prior()
 
 
 def _open_all(recordings: Source | Sequence[Source]) -> list[Recording]:

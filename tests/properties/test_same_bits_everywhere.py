@@ -12,7 +12,7 @@ import bolfi_liquids as bl
 from bolfi_liquids.cli.compute import open_executor_of
 from bolfi_liquids.inputs.bundled import bundled_recording
 
-SETTINGS = {"budget": 9, "batch": 3, "particles": 300, "chains": 2, "draws": 50, "seed": 5}
+SETTINGS = {"budget": 9, "batch": 3, "particles": 1000, "chains": 2, "draws": 50, "seed": 5}
 GROUPS = ("posterior", "simulations", "posterior_predictive", "replicates", "closest")
 
 

@@ -1,6 +1,7 @@
 """A recording in a wrong frame is warned of, fits badly, and leads to no pour by itself."""
 
 import logging
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,11 +9,11 @@ import pytest
 import bolfi_liquids as bl
 from bolfi_liquids.calibration.bad_fit import bad_fit
 from bolfi_liquids.errors import InputError
-from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.recording import along_path, recording_dataset
 from bolfi_liquids.reporting.warnings import results_of, warnings_of
 
-SETTINGS = {"budget": 12, "batch": 4, "particles": 300, "chains": 2, "draws": 200, "seed": 3}
+SETTINGS = {"budget": 12, "batch": 4, "chains": 2, "draws": 200, "seed": 3}
+REFERENCE = Path(__file__).parents[2] / "data/stirring_reference"
 TURN = np.exp(0.25j * np.pi)
 
 
@@ -23,7 +24,7 @@ TURN = np.exp(0.25j * np.pi)
     ids=["turned by 45 deg", "sign of yz", "right"],
 )
 def test_a_wrong_frame_is_never_passed_on(tmp_path, caplog, change, fault):
-    whole = bundled_recording("oil").first(240)
+    whole = bl.open_recording(REFERENCE / "oil_v10.nc")
     seen = change(whole.inclination[:, 0] + 1j * whole.inclination[:, 1])
     values = along_path(whole, np.column_stack([seen.real, seen.imag]))
     path = tmp_path / "stir.nc"

@@ -116,8 +116,8 @@ def test_a_prior_that_a_run_could_not_be_resumed_with_is_refused(short_recording
     assert not (tmp_path / "run").exists()
 
 
-def test_default_prior_covers_the_fluid_s_floor_to_gel():
-    theta = {"viscosity": np.array([1e-3, 4e-3, 12.0, 30.0]), "cohesion": np.full(4, 0.5)}
+def test_default_prior_covers_water_to_gel():
+    theta = {"viscosity": np.array([1e-4, 1e-3, 12.0, 30.0]), "cohesion": np.full(4, 0.5)}
     np.testing.assert_array_equal(default_prior().contains(theta), [False, True, True, False])
 
 

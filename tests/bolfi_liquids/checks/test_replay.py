@@ -16,12 +16,13 @@ def judged(reference, simulate, name="oil_v10", seed=0):
 
 
 def test_noise_is_taken_out_in_quadrature_and_seeds_are_told_apart(reference, shifted):
-    """Offset and sign of the seeds add in quadrature; the variance of -1, 1, -1, 1 is 4/3."""
+    """Offset and sign of the seeds add in quadrature; the variance of -1, 1, ... is n / (n - 1)."""
     result, rows = judged(reference, shifted(offset=0.3, spread=0.03))
     assert result.notes["rms_with_noise_deg"] == pytest.approx(np.hypot(0.3, 0.03))
     expected = np.sqrt(0.3**2 + 0.03**2 - 0.1**2)
     assert rows[replay.RMS].ours == pytest.approx(expected)
-    assert rows[replay.SPREAD].ours == pytest.approx(0.03 * np.sqrt(4.0 / 3.0))
+    variance = replay.SEEDS / (replay.SEEDS - 1)
+    assert rows[replay.SPREAD].ours == pytest.approx(0.03 * np.sqrt(variance))
     assert result.passed
 
 
@@ -56,7 +57,7 @@ def test_a_failed_simulation_fails(reference, shifted):
 
     result, rows = judged(reference, simulate, seed=2)
     assert not result.passed and np.isnan(rows[replay.RMS].ours)
-    assert result.notes["failed_seeds"].tolist() == [9]
+    assert result.notes["failed_seeds"].tolist() == [2 * replay.SEEDS + 1]
 
 
 def test_missed_samples_are_left_out():
@@ -83,7 +84,8 @@ def test_the_timed_stir_is_the_whole_one_after_a_short_one_with_other_seeds(refe
         return shifted()(stir, seeds)
 
     judged(reference, simulate, seed=1)
-    assert calls == [(10, [8, 9, 10, 11]), (60, [4, 5, 6, 7])]
+    first = [replay.SEEDS + k for k in range(replay.SEEDS)]
+    assert calls == [(10, [seed + replay.SEEDS for seed in first]), (60, first)]
 
 
 def test_the_true_liquid_is_stirred_in_the_true_depth(reference, monkeypatch):

@@ -45,7 +45,7 @@ def test_a_prior_survives_its_file(prior):
 def test_a_table_names_family_and_arguments():
     assert describe_prior(default_prior())["viscosity"] == {
         "family": "LogUniform",
-        "low": 3e-3,
+        "low": 3e-4,
         "high": 20.0,
     }
 
@@ -58,7 +58,7 @@ def test_a_person_may_write_any_function_of_numpyro():
 
 
 def test_the_text_of_version_0_1_is_the_same_prior():
-    viscosity, cohesion = "LogUniform(high=20.0, low=0.003)", "Uniform(high=1.0, low=0.0)"
+    viscosity, cohesion = "LogUniform(high=20.0, low=0.0003)", "Uniform(high=1.0, low=0.0)"
     text = {"viscosity": viscosity, "cohesion": cohesion}
     for name, values in default_prior().from_unit(U).items():
         np.testing.assert_array_equal(read_prior(text).from_unit(U)[name], values)

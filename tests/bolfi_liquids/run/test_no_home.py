@@ -90,7 +90,7 @@ def test_libraries_load_and_draw(tmp_path, home):
 @as_unknown
 def test_a_command_simulates(tmp_path, home):
     """Taichi, which compiles the fluid, would abort or end by a signal."""
-    stir = ["simulate", "stir", "--particles", "100", "--out", "stir.nc"]
+    stir = ["simulate", "stir", "--particles", "2000", "--out", "stir.nc"]
     done = without_home(home, tmp_path, COMMAND, *stir)
     assert done.returncode == 0, done.stderr
     assert done.stderr == "" and (tmp_path / "stir.nc").exists()

@@ -33,6 +33,7 @@ def test_a_stir_is_what_the_simulator_returns(pair):
     gripper = Trajectory(SHORT.time, SHORT.position)
     planned = replace(recording, gripper=gripper)
     setup = models.StirSetup.from_recording(planned, particles=FEW["particles"])
+    setup = replace(setup, tilt=(0.0, 0.0))  # nobody has seen a stir along this path
     liquid = models.Liquid(np.array([0.05, 2.0]), 0.3, 1100.0)
     expected = models.stir(liquid, SHORT, setup, [4, 5])
     for plane, name in enumerate(PLANES):
