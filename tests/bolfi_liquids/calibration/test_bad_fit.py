@@ -12,7 +12,7 @@ from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.recording import along_path, recording_dataset
 from bolfi_liquids.reporting.warnings import results_of, warnings_of
 
-SETTINGS = {"budget": 20, "batch": 4, "chains": 2, "draws": 200, "seed": 3}
+SETTINGS = {"budget": 20, "batch": 4, "chains": 2, "draws": 200, "seed": 3, "sampler": "emcee"}
 REFERENCE = Path(__file__).parents[2] / "data/stirring_reference"
 TURN = np.exp(0.25j * np.pi)
 
