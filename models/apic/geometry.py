@@ -44,6 +44,16 @@ class Geometry(NamedTuple):
     edge: np.ndarray
 
 
+def from_cup(radius: float, floor: bool = True) -> Distance:
+    """Distance from the wall of an upright cup of `radius` [m], and from its floor at z = 0."""
+
+    def distance(points: np.ndarray) -> np.ndarray:
+        side = radius - np.hypot(points[:, 0], points[:, 1])
+        return np.minimum(side, points[:, 2]) if floor else side
+
+    return distance
+
+
 def sample_geometry(grid: Grid, distance: Distance) -> Geometry:
     """The geometry of a vessel.
 

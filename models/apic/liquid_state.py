@@ -75,7 +75,6 @@ class LiquidState:
             ti.Vector.field(LANES, ti.f32, groups) for _ in range(4)
         )
         self.lack = ti.Vector.field(LANES, ti.f32, groups)  # of density, where the level is high
-        self.iterations = ti.Vector.field(LANES, ti.f32, (groups, 2))
 
         self.rheologies = [effect.make_rheology() for effect in effects]
         if self.rheologies:
@@ -138,8 +137,6 @@ class LiquidState:
             clear(self, g)
             self.arounds[g], self.nears[g], self.wets[g] = 0, 0, 0
             self.lack[g] = lanes(0.0)
-            for k in ti.static(range(2)):
-                self.iterations[g, k] = lanes(0.0)
             for lane in range(LANES):
                 self.count[g, lane] = ti.max(count[g, lane], 0)
                 self.status[g, lane] = SOUND if count[g, lane] >= 0 else ABSENT

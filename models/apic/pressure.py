@@ -74,7 +74,6 @@ def solve_pressure(s, g):
             z = s.cell_rest[g, m] / s.diagonal[g, m]
             s.cell_search[g, m] = z + beta * s.cell_search[g, m]
         iteration += 1
-        s.iterations[g, 0] = s.iterations[g, 0] + runs
         runs = positive(rz - goal)
 
 

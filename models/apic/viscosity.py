@@ -145,7 +145,6 @@ def solve_viscosity(s, g):
                 z = s.inverse[g, a, m] * s.rest[g, a, m]
                 s.search[g, a, m] = z + beta * s.search[g, a, m]
         iteration += 1
-        s.iterations[g, 1] = s.iterations[g, 1] + runs
         runs = positive(rz - goal)
 
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..apic.filling import fill_cup
-from ..apic.geometry import Geometry, sample_geometry
+from ..apic.geometry import Geometry, from_cup, sample_geometry
 from ..apic.grid import Grid
 from ..effect import Effect
 from ..fluid import runtime
@@ -94,7 +94,8 @@ def _together(setup, stirs: Stirs, step, effects, watch) -> np.ndarray:
     scene = _scene_for(setup, grid, effects)
     scene.enter_vessel(grid, geometry, step)
     scene.rate = 1.0 / step
-    scene.sticks.fit(setup.stick, cup.radius, setup.cell, setup.deepest)
+    scene.cup_radius[None] = cup.radius
+    scene.sticks.fit(setup.stick, setup.cell, setup.deepest)
 
     def lanes(values: np.ndarray) -> np.ndarray:
         """[B, ...] as float32 [groups, LANES, ...]; lanes without a stir hold ones."""
@@ -159,11 +160,7 @@ def _filled(
 @cache
 def _vessel(cell: float, radius: float, depth: float) -> tuple[Grid, Geometry]:
     grid = Grid.around_cup(cell, radius, depth)
-
-    def distance(points: np.ndarray) -> np.ndarray:
-        return np.minimum(radius - np.hypot(points[:, 0], points[:, 1]), points[:, 2])
-
-    return grid, sample_geometry(grid, distance)
+    return grid, sample_geometry(grid, from_cup(radius))
 
 
 def _scene_for(setup: StirSetup, grid: Grid, effects: tuple[Effect, ...]) -> Any:

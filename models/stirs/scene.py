@@ -5,17 +5,17 @@ import numpy as np
 import taichi as ti
 
 from ..apic.lanes import LANES, STRIDE, vec3
-from ..apic.liquid_state import LiquidState
-from ..apic.pressure import add_rise, push, solve_pressure
+from ..apic.pressure import push
 from ..apic.surface import find_liquid, set_up_pressure
-from ..apic.transfer import GRAVITY, OFF_WALL, clear, deposit, list_cells, move
-from ..apic.viscosity import extend, solve_viscosity, weigh_stresses
+from ..apic.transfer import GRAVITY
+from ..apic.upright_cup import UprightCups
+from ..apic.viscosity import solve_viscosity, weigh_stresses
 from ..fluid.faults import SOUND
 from .stick_line import StickLine, slip_line, start_line
 
 
 @ti.data_oriented
-class StirringScene(LiquidState):
+class StirringScene(UprightCups):
     """Liquids in upright cups, stirred by sticks.
 
     All velocities are those at the middle of a step, positions and directions those at its start.
@@ -37,25 +37,6 @@ class StirringScene(LiquidState):
         return vec3(0.0, 0.0, -GRAVITY)
 
     @ti.func
-    def keep_inside(self, x, v):
-        """A particle within the cup, and its velocity without what leads out."""
-        off = OFF_WALL * self.cell[None]
-        most = self.sticks.cup_radius[None] - off
-        out = ti.sqrt(x[0] ** 2 + x[1] ** 2)
-        if out > most:
-            n = vec3(x[0], x[1], 0.0) / out
-            x -= (out - most) * n
-            v -= ti.max(v.dot(n), 0.0) * n
-        if x[2] < off:
-            x[2] = off
-            v[2] = ti.max(v[2], 0.0)
-        top = self.origin[None][2] + (self.shape[None][2] - 1.02) * self.cell[None]
-        if x[2] > top:
-            x[2] = top
-            v[2] = ti.min(v[2], 0.0)
-        return x, v
-
-    @ti.func
     def hold(self, path: ti.template(), g, lane, step):
         """Take the pivot's place and motion in a step."""
         before, now, after = path[g, lane, step], path[g, lane, step + 1], path[g, lane, step + 2]
@@ -63,15 +44,6 @@ class StirringScene(LiquidState):
         self.sticks.pivot[g, lane] = now
         self.sticks.velocity[g, lane] = (after - now) / dt
         self.sticks.jolt[g, lane] = (after - 2.0 * now + before) / dt**2
-
-    @ti.kernel
-    def transfer_in(self, groups: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                g = n // STRIDE
-                clear(self, g)
-                deposit(self, g)
-                list_cells(self, g)
 
     @ti.kernel
     def prepare(self, groups: ti.i32, step: ti.i32, path: ti.types.ndarray(vec3, 3)):
@@ -97,22 +69,6 @@ class StirringScene(LiquidState):
                     if self.status[g, lane] == SOUND:
                         slip_line(self, self.sticks, g, lane, (step + 0.5) * self.dt[None])
                     directions[g, lane, step + 1] = self.sticks.direction[g, lane]
-
-    @ti.kernel
-    def project(self, groups: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                g = n // STRIDE
-                solve_pressure(self, g)
-                push(self, g, self.rise)
-                add_rise(self, g)
-                extend(self, g)
-
-    @ti.kernel
-    def transfer_out(self, groups: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                move(self, n // STRIDE)
 
     def begin(self, path, directions, count):
         """Take what the steps read and fill in.

@@ -60,7 +60,7 @@ class StickLine:
             ti.Vector.field(3, ti.f32, of_lane) for _ in range(3)
         )
         self.mass, self.dry = (ti.field(ti.f32, of_lane) for _ in range(2))
-        self.length, self.radius, self.stretch, self.node_volume, self.cup_radius = (
+        self.length, self.radius, self.stretch, self.node_volume, self.gyration = (
             ti.field(ti.f32, ()) for _ in range(5)
         )
         self.half, self.tall, self.nodes = (ti.field(ti.i32, ()) for _ in range(3))
@@ -69,11 +69,11 @@ class StickLine:
         self.seen, self.carried = (ti.Vector.field(3, ti.f32, node) for _ in range(2))
         self.wet_share = ti.field(ti.f32, node)
 
-    def fit(self, stick, cup_radius, cell, depth):
-        """Take a `Stick` in a cup with liquid of at most `depth` [m], in cells of `cell` [m]."""
+    def fit(self, stick, cell, depth):
+        """Take a `Stick` in liquid of at most `depth` [m], in cells of `cell` [m]."""
         line = line_of(stick.radius, cell, depth)
         self.length[None], self.radius[None] = stick.length, stick.radius
-        self.cup_radius[None] = cup_radius
+        self.gyration[None] = stick.gyration
         self.stretch[None], self.half[None] = line.stretch, line.half_width
         self.tall[None], self.node_volume[None] = 4, line.node_volume
         self.nodes[None] = line.nodes
@@ -203,14 +203,12 @@ def start_line(s, t, g, lane):
 def recoil_of(s, t, g, lane):
     """How much a push of all nodes alike changes the stick's velocity over the liquid's, beyond
     what a step takes without overshooting: on coarse cells the nodes outweigh the stick."""
-    density, radius, length = s.density[g][lane], t.radius[None], t.length[None]
-    volume = t.node_volume[None] * s.cell[None] ** 3
+    density, volume = s.density[g][lane], t.node_volume[None] * s.cell[None] ** 3
     moment = 0.0
     for n in range(t.nodes[None]):
         arm = arm_of(s, t, g, lane, n)
         moment += t.wet_share[g, lane, n] * density * volume * arm.dot(arm)
-    ratio = moment / (t.mass[g, lane] * (length**2 / 3.0 + radius**2 / 4.0))
-    return ti.max(ratio - LARGEST_RATIO, 0.0)
+    return ti.max(moment / (t.mass[g, lane] * t.gyration[None]) - LARGEST_RATIO, 0.0)
 
 
 @ti.func
@@ -259,7 +257,7 @@ def turn_stick(s, t, g, lane, torque, added):
     torque += ((lever - 0.5 * length * mass) * u).cross(GRAVITY * up + jolt)
     torque -= PIVOT_DAMPING * w
     torque -= torque.dot(u) * u
-    inertia = mass * (length**2 / 3.0 + radius**2 / 4.0) - displaced + added
+    inertia = mass * t.gyration[None] - displaced + added
     turning = torque / inertia
     w += dt * turning
     loss = dt * t.dry[g, lane] / inertia
@@ -267,7 +265,7 @@ def turn_stick(s, t, g, lane, torque, added):
         w *= ti.max(1.0 - loss / ti.max(w.norm(), 1e-12), 0.0)
     end = pivot + length * u
     out = ti.sqrt(end[0] ** 2 + end[1] ** 2)
-    if out + radius > t.cup_radius[None]:
+    if out + radius > s.cup_radius[None]:
         outward = vec3(end[0], end[1], 0.0) / ti.max(out, 1e-9)
         w = stopped(w, u, t.velocity[g, lane], length, outward)
     if end[2] < 0.0:

@@ -54,7 +54,8 @@ def slip_forces(
         runtime.start()
         scene = _scene_for(cup, radius, len(of_lanes(0.0, size)))
         points = fill_scene(scene, cup, viscosity, seed)
-        scene.sticks.fit(Stick(radius, LENGTH, MASS), cup.radius, cup.cell, cup.depth)
+        scene.cup_radius[None] = cup.radius
+        scene.sticks.fit(Stick(radius, LENGTH, MASS), cup.cell, cup.depth)
         upright = [of_lanes(row, size) for row in (0.0, 0.0, -1.0, MASS, 0.0)]
         scene.sticks.hang(np.stack(upright))
         direction = np.stack(upright[:3], axis=-1)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...apic.filling import fill_cup
-from ...apic.geometry import Geometry, sample_geometry
+from ...apic.geometry import Geometry, from_cup, sample_geometry
 from ...apic.grid import Grid
 from ...fluid import runtime
 from ...fluid.faults import faulty
@@ -50,10 +50,12 @@ class StillCup:
 
     def geometry(self) -> Geometry:
         """Of the cup; a slippery floor is so far below that nothing rubs at it, and shuts."""
-        upright = _sampled(self, floor=True)
+        grid = self.grid()
+        upright = sample_geometry(grid, from_cup(self.radius))
         if not self.slippery_floor:
             return upright
-        return upright._replace(friction=_sampled(self, floor=False).friction * upright.carries)
+        tube = sample_geometry(grid, from_cup(self.radius, floor=False))
+        return upright._replace(friction=tube.friction * upright.carries)
 
 
 @dataclass(frozen=True)
@@ -176,14 +178,6 @@ def _look(scene: Any, size: int, look: Callable[[np.ndarray, np.ndarray], Any]) 
     )
     most = count[:size].max()  # a liquid that went wrong has none
     return [look(position[k, :most], velocity[k, :most]) for k in range(size)]
-
-
-def _sampled(cup: StillCup, floor: bool) -> Geometry:
-    def distance(points: np.ndarray) -> np.ndarray:
-        side = cup.radius - np.hypot(points[:, 0], points[:, 1])
-        return np.minimum(side, points[:, 2]) if floor else side
-
-    return sample_geometry(cup.grid(), distance)
 
 
 @cache

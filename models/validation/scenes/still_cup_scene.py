@@ -4,28 +4,26 @@
 import taichi as ti
 
 from ...apic.lanes import LANES, STRIDE, vec3
-from ...apic.liquid_state import LiquidState
-from ...apic.pressure import add_rise, push, solve_pressure
+from ...apic.pressure import push
 from ...apic.surface import find_liquid, set_up_pressure
-from ...apic.transfer import GRAVITY, OFF_WALL, clear, deposit, list_cells, move
-from ...apic.viscosity import extend, solve_viscosity, weigh_stresses
+from ...apic.transfer import GRAVITY
+from ...apic.upright_cup import UprightCups
+from ...apic.viscosity import solve_viscosity, weigh_stresses
 
 RINGS = 128
 
 
 @ti.data_oriented
-class StillCupScene(LiquidState):
+class StillCupScene(UprightCups):
     """The liquid of stirs, step by step as they do it.
 
     Attributes:
-        cup_radius: Inside [m].
         turns: Azimuthal acceleration at distances from the axis from 0 to the cup's radius, even.
         strength: What multiplies it in each lane.
     """
 
     def __init__(self, groups, cells, particles):
         super().__init__(groups, cells, particles)
-        self.cup_radius = ti.field(ti.f32, ())
         self.turns = ti.field(ti.f32, RINGS + 1)
         self.strength = ti.field(ti.f32, (groups, LANES))
 
@@ -38,20 +36,6 @@ class StillCupScene(LiquidState):
         turn = self.turns[ring] + (at - ring) * (self.turns[ring + 1] - self.turns[ring])
         turn *= self.strength[g, lane] / out
         return vec3(-turn * x[1], turn * x[0], -GRAVITY)
-
-    @ti.func
-    def keep_inside(self, x, v):
-        """A particle within the cup, and its velocity without what leads out."""
-        off = OFF_WALL * self.cell[None]
-        most, out = self.cup_radius[None] - off, ti.sqrt(x[0] ** 2 + x[1] ** 2)
-        if out > most:
-            n = vec3(x[0], x[1], 0.0) / out
-            x -= (out - most) * n
-            v -= ti.max(v.dot(n), 0.0) * n
-        if x[2] < off:
-            x[2] = off
-            v[2] = ti.max(v[2], 0.0)
-        return x, v
 
     @ti.kernel
     def give_speed(self, velocity: ti.types.ndarray(ti.f32, 4)):
@@ -66,9 +50,6 @@ class StillCupScene(LiquidState):
         for n in range(groups * STRIDE):
             if n % STRIDE == 0:
                 g = n // STRIDE
-                clear(self, g)
-                deposit(self, g)
-                list_cells(self, g)
                 find_liquid(self, g)
                 set_up_pressure(self, g)
                 push(self, g, self.pressure)
@@ -78,20 +59,11 @@ class StillCupScene(LiquidState):
     def flow(self, groups: ti.i32):
         for n in range(groups * STRIDE):
             if n % STRIDE == 0:
-                g = n // STRIDE
-                solve_viscosity(self, g)
-                solve_pressure(self, g)
-                push(self, g, self.rise)
-                add_rise(self, g)
-
-    @ti.kernel
-    def transfer_out(self, groups: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                extend(self, n // STRIDE)
-                move(self, n // STRIDE)
+                solve_viscosity(self, n // STRIDE)
 
     def step(self, groups):
+        self.transfer_in(groups)
         self.prepare(groups)
         self.flow(groups)
+        self.project(groups)
         self.transfer_out(groups)

@@ -1,0 +1,68 @@
+# type: ignore  (Taichi compiles this source and gives these names their types)
+"""Liquids in upright cups: what each of their steps begins and ends with."""
+
+import taichi as ti
+
+from .lanes import STRIDE, vec3
+from .liquid_state import LiquidState
+from .pressure import add_rise, push, solve_pressure
+from .transfer import OFF_WALL, clear, deposit, list_cells, move
+from .viscosity import extend
+
+
+@ti.data_oriented
+class UprightCups(LiquidState):
+    """A step is `transfer_in`, what a scene does with the velocities, `project`, `transfer_out`.
+
+    Attributes:
+        cup_radius: Inside [m].
+    """
+
+    def __init__(self, groups, cells, particles, effects=()):
+        """The arguments are those of `LiquidState`."""
+        super().__init__(groups, cells, particles, effects)
+        self.cup_radius = ti.field(ti.f32, ())
+
+    @ti.func
+    def keep_inside(self, x, v):
+        """A particle within the cup, and its velocity without what leads out."""
+        off = OFF_WALL * self.cell[None]
+        most = self.cup_radius[None] - off
+        out = ti.sqrt(x[0] ** 2 + x[1] ** 2)
+        if out > most:
+            n = vec3(x[0], x[1], 0.0) / out
+            x -= (out - most) * n
+            v -= ti.max(v.dot(n), 0.0) * n
+        if x[2] < off:
+            x[2] = off
+            v[2] = ti.max(v[2], 0.0)
+        top = self.origin[None][2] + (self.shape[None][2] - 1.02) * self.cell[None]
+        if x[2] > top:
+            x[2] = top
+            v[2] = ti.min(v[2], 0.0)
+        return x, v
+
+    @ti.kernel
+    def transfer_in(self, groups: ti.i32):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                g = n // STRIDE
+                clear(self, g)
+                deposit(self, g)
+                list_cells(self, g)
+
+    @ti.kernel
+    def project(self, groups: ti.i32):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                g = n // STRIDE
+                solve_pressure(self, g)
+                push(self, g, self.rise)
+                add_rise(self, g)
+                extend(self, g)
+
+    @ti.kernel
+    def transfer_out(self, groups: ti.i32):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                move(self, n // STRIDE)
