@@ -249,9 +249,8 @@ def engine_options(stirring: Stirring, surrogate: str) -> dict[str, Any]:
 
 def _usual_prior(run: Path, resume: bool) -> "Prior":
     """That of a run that goes on, which an earlier version may have begun with another default."""
-    if resume and (run / RUN_TOML).is_file():
-        return read_prior(read_run(run)["settings"]["prior"])
-    return default_prior()
+    held = read_run(run).get("settings", {}) if resume and (run / RUN_TOML).is_file() else {}
+    return read_prior(held["prior"]) if "prior" in held else default_prior()
 
 
 def _open_all(recordings: Source | Sequence[Source]) -> list[Recording]:
