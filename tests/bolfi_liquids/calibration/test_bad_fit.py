@@ -24,7 +24,7 @@ TURN = np.exp(0.25j * np.pi)
     ids=["turned by 45 deg", "sign of yz", "right"],
 )
 def test_a_wrong_frame_is_never_passed_on(tmp_path, caplog, change, fault):
-    whole = bl.open_recording(REFERENCE / "oil_v10.nc")
+    whole = bl.open_recording(REFERENCE / "glycerin_v10.nc")
     seen = change(whole.inclination[:, 0] + 1j * whole.inclination[:, 1])
     values = along_path(whole, np.column_stack([seen.real, seen.imag]))
     path = tmp_path / "stir.nc"

@@ -200,7 +200,7 @@ def test_the_noise_of_a_fit_is_that_of_cameras_and_between_simulations(rng):
     assert fit_to_noise(observed, truth + spread) == pytest.approx(np.sqrt(2.0 / 3.0), rel=0.1)
     # without noise, a camera's is taken
     still = np.repeat(truth[None], 3, axis=0)
-    assert fit_to_noise(truth + np.radians(0.5), still) == pytest.approx(2.5, rel=1e-6)
+    assert fit_to_noise(truth + np.radians(0.5), still) == pytest.approx(5.0, rel=1e-6)
 
 
 @pytest.mark.slow
