@@ -1,21 +1,28 @@
 """What walls leave open of each cell and face, from samples of a signed distance."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from .grid import Grid
 
-Distance = Callable[[np.ndarray], np.ndarray]
-"""Distance of points (n, 3) from the nearest wall [m], negative within it."""
+Distance = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""Of points x, y and z from the nearest wall [m], arrays that broadcast; negative within it."""
+Kernel = Callable[[np.ndarray], np.ndarray]
+"""Weights of samples by their distance, in cells, from the point of a mean."""
 
 SLIVER = 0.1  # open share below which a cell is closed: liquid would drain into it
 LEAST_AREA = 0.02  # open share of a face that carries momentum
 LEAST_CAPACITY = 0.02
 ON_WALL = 1e-3  # cells from a wall within which a face lies in it
 NEAREST = 0.1  # cells from a wall at which friction is reckoned at least
-SAMPLES, WALL_SAMPLES = 8, 10  # along each edge
+SAMPLES = 8  # along each edge of a cell
+TOGETHER = 4  # layers of cells that are sampled at once
+
+CENTRE = (0.5, 0.5, 0.5)  # of a cell, in cells
+FACES = ((0.0, 0.5, 0.5), (0.5, 0.0, 0.5), (0.5, 0.5, 0.0))  # centres of its lower ones
+EDGES = ((0.5, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, 0.5))  # centres of its lowest ones
 
 
 class Geometry(NamedTuple):
@@ -47,9 +54,9 @@ class Geometry(NamedTuple):
 def from_cup(radius: float, floor: bool = True) -> Distance:
     """Distance from the wall of an upright cup of `radius` [m], and from its floor at z = 0."""
 
-    def distance(points: np.ndarray) -> np.ndarray:
-        side = radius - np.hypot(points[:, 0], points[:, 1])
-        return np.minimum(side, points[:, 2]) if floor else side
+    def distance(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        side = radius - np.hypot(x, y)
+        return np.minimum(side, z) if floor else side
 
     return distance
 
@@ -60,95 +67,124 @@ def sample_geometry(grid: Grid, distance: Distance) -> Geometry:
     Cells that are cut by walls follow Batty, Bertails and Bridson (2007), "A fast variational
     framework for accurate solid-fluid coupling"; here the shares are means over samples.
     """
-    inner, centres = grid.inner(), grid.centres
-    even = (np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5
-    wide = 2.0 * even
-    weights = 1.0 - np.abs(wide)
-    box = _offsets(even, even, even)
-    hat, hat_weights = _offsets(wide, wide, wide), _products(weights, weights, weights)
-
-    volume = _share(grid, distance, centres, box)
-    capacity = _share(grid, distance, centres, hat, hat_weights)
+    inner = grid.inner()
+    volume, capacity = np.zeros((2, grid.cells))
+    deposit, edge, rubbing = np.zeros((3, 3, grid.cells))
+    for cells, is_open, rubs in _samples(grid, distance):
+        volume[cells] = _means(is_open, _box, CENTRE)
+        capacity[cells] = _means(is_open, _hat, CENTRE)
+        for axis in range(3):
+            deposit[axis, cells] = _means(is_open, _hat, FACES[axis])
+            edge[axis, cells] = _means(is_open, _box, EDGES[axis])
+            rubbing[axis, cells] = _means(rubs[axis], _box, FACES[axis])
+    area = np.stack([_open_faces(grid, distance, axis) for axis in range(3)])
     sliver = inner & (volume <= SLIVER)
-    usable = inner & ~sliver
-    area, rubbing, solid, edge = (np.zeros((3, grid.cells)) for _ in range(4))
     for axis, stride in enumerate(grid.strides):
-        flat = [np.zeros(1) if a == axis else even for a in range(3)]
-        faces = grid.faces(axis)
-        open_face = _share(grid, distance, faces, _offsets(*flat), least=ON_WALL)
-        open_face[sliver] = 0.0
-        open_face[stride:][sliver[:-stride]] = 0.0
-        area[axis] = open_face
-        solid[axis] = 1.0 - _share(grid, distance, faces, hat, hat_weights)
-        rubbing[axis] = _wall_area(grid, distance, faces, axis)
-        at_edge = tuple(0.5 if axis == a else 0.0 for a in range(3))
-        edge[axis] = _share(grid, distance, grid.points(at_edge), box)
+        area[axis, sliver] = 0.0
+        area[axis, stride:][sliver[:-stride]] = 0.0
     carries = inner & (area > LEAST_AREA)
     friction = np.stack(
         [_friction(grid, distance, axis, rubbing[axis], carries[axis]) for axis in range(3)]
     )
     fields = (
-        usable,
+        inner & ~sliver,
         volume,
         np.maximum(capacity, LEAST_CAPACITY),
         area * inner,
         carries,
         inner & ~carries,
         friction,
-        solid,
+        1.0 - deposit,
         edge,
     )
     return Geometry(*(np.ascontiguousarray(field, np.float32) for field in fields))
 
 
-def _offsets(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """All triples, shape (n, 3)."""
-    return np.stack([one.ravel() for one in np.meshgrid(x, y, z, indexing="ij")], axis=1)
+def _samples(grid: Grid, distance: Distance) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
+    """Samples of a few layers of cells: the cells, which samples are open, shape (z, y, x), and how
+    much wall each stands for, in cells, times `_rub` of the wall's normal, shape (3, z, y, x)."""
+    x, y, z = (_along(grid, axis) for axis in range(3))
+    for low in range(0, grid.shape[2], TOGETHER):
+        high = min(low + TOGETHER, grid.shape[2])
+        layers = z[low * SAMPLES : (high + 2) * SAMPLES]
+        away = _distances(distance, x, y, layers) * (SAMPLES / grid.cell)
+        beside_wall = np.abs(away) < np.sqrt(3.0)
+        k, j, i = np.nonzero(beside_wall)
+        normal = _normal(grid, distance, np.stack([x[i], y[j], layers[k]]))
+        rubs = np.zeros((3, *away.shape), np.float32)
+        rubs[:, beside_wall] = SAMPLES * _wall_at(away[beside_wall], normal) * _rub(normal**2)
+        cells = slice(low * grid.strides[2], high * grid.strides[2])
+        yield cells, (away > 0.0).astype(np.float32), rubs
 
 
-def _products(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-    return _offsets(x, y, z).prod(axis=1)
+def _along(grid: Grid, axis: int) -> np.ndarray:
+    """Samples along an axis [m], from one cell before the box to one behind it."""
+    at = (np.arange((grid.shape[axis] + 2) * SAMPLES) + 0.5) / SAMPLES - 1.0
+    return grid.origin[axis] + grid.cell * at
 
 
-def _share(
-    grid: Grid,
-    distance: Distance,
-    points: np.ndarray,
-    offsets: np.ndarray,
-    weights: np.ndarray | None = None,
-    least: float = 0.0,
+def _distances(distance: Distance, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Of the points of a lattice, shape (z, y, x)."""
+    away = distance(x, y[:, None], z[:, None, None])
+    return np.broadcast_to(away, (len(z), len(y), len(x)))
+
+
+def _wall_at(away: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """A delta function of the distance from the wall, in samples.
+
+    A hat as wide as the sum of |n| is exact for flat walls (Engquist, Tornberg and Tsai 2005,
+    "Discretization of Dirac delta functions in level set methods").
+    """
+    width = np.maximum(np.abs(normal).sum(axis=0), 1e-20)
+    return np.maximum(1.0 - np.abs(away) / width, 0.0) / width
+
+
+def _box(off: np.ndarray) -> np.ndarray:
+    return np.abs(off) < 0.5
+
+
+def _hat(off: np.ndarray) -> np.ndarray:
+    """As particles deposit."""
+    return np.maximum(1.0 - np.abs(off), 0.0)
+
+
+def _means(samples: np.ndarray, kernel: Kernel, at: tuple[float, ...]) -> np.ndarray:
+    """Around a point of each cell, in the order of the cells; samples reach a cell further."""
+    for axis in (2, 1, 0):  # x at last: its samples are neighbours in memory
+        samples = _means_along(samples, kernel, at, axis)
+    return samples.ravel()
+
+
+def _means_along(
+    samples: np.ndarray, kernel: Kernel, at: tuple[float, ...], axis: int
 ) -> np.ndarray:
-    """Weighted share of the samples around each point that are open, `least` cells from a wall."""
-    reach = np.linalg.norm(offsets, axis=1).max() + least
-    at = distance(points) / grid.cell
-    share = np.where(at > least, 1.0, 0.0)
-    for near in _slices(np.flatnonzero(np.abs(at) < reach)):
-        samples = points[near, None, :] + grid.cell * offsets
-        is_open = distance(samples.reshape(-1, 3)) > least * grid.cell
-        is_open = is_open.reshape(len(near), -1)
-        share[near] = np.average(is_open, axis=1, weights=weights)
-    return share
+    along = np.moveaxis(samples, 2 - axis, 0)
+    cells = len(along) // SAMPLES - 2
+    weights = kernel((np.arange(2 * SAMPLES) + 0.5) / SAMPLES - 1.0) / np.float32(SAMPLES)
+    first = round(at[axis] * SAMPLES)
+    found = sum(
+        weight * along[first + n : first + n + cells * SAMPLES : SAMPLES]
+        for n, weight in enumerate(weights)
+        if weight > 0.0
+    )
+    return np.moveaxis(np.asarray(found), 0, 2 - axis)
 
 
-def _wall_area(grid: Grid, distance: Distance, faces: np.ndarray, axis: int) -> np.ndarray:
-    """Wall in the box around each face, in squares of a cell, times `_rub` of its normal."""
-    even = (np.arange(WALL_SAMPLES) + 0.5) / WALL_SAMPLES - 0.5
-    offsets = grid.cell * _offsets(even, even, even)
-    shell, step = 0.2, 0.02  # of a cell: samples so near to the wall stand for it
-    found = np.zeros(grid.cells)
-    for near in _slices(np.flatnonzero(np.abs(distance(faces)) < 1.2 * grid.cell)):
-        samples = (faces[near, None, :] + offsets).reshape(-1, 3)
-        away = distance(samples) / grid.cell
-        on_wall = np.flatnonzero((away > 0.0) & (away < shell))
-        beside = step * grid.cell * np.eye(3)
-        slope = np.stack(
-            [distance(samples[on_wall] + e) - distance(samples[on_wall] - e) for e in beside]
-        )
-        squared = slope[axis] ** 2 / np.maximum((slope**2).sum(axis=0), 1e-20)
-        rubs = np.zeros(len(samples))
-        rubs[on_wall] = _rub(squared)
-        found[near] = rubs.reshape(len(near), -1).mean(axis=1) / shell
-    return found
+def _open_faces(grid: Grid, distance: Distance, axis: int) -> np.ndarray:
+    """Open share of each cell's lower face along an axis, shape (cells,)."""
+    along = [_along(grid, a) for a in range(3)]
+    along[axis] = grid.origin[axis] + grid.cell * np.arange(grid.shape[axis])
+    share = (_distances(distance, *along) > ON_WALL * grid.cell).astype(np.float32)
+    for other in {0, 1, 2} - {axis}:
+        share = _means_along(share, _box, CENTRE, other)
+    return share.ravel()
+
+
+def _normal(grid: Grid, distance: Distance, points: np.ndarray) -> np.ndarray:
+    """Unit vectors away from the wall, at points (3, n); 0 halfway between walls."""
+    beside = 0.02 * grid.cell * np.eye(3)[:, :, None]
+    slope = np.stack([distance(*(points + e)) - distance(*(points - e)) for e in beside])
+    return slope / np.maximum(np.linalg.norm(slope, axis=0), 1e-20)
 
 
 def _rub(squared: np.ndarray) -> np.ndarray:
@@ -169,18 +205,12 @@ def _friction(
 
     What rubs at a face that carries no momentum rubs at its neighbours away from the wall instead.
     """
-    area, faces = np.where(carries, rubbing, 0.0), grid.faces(axis)
+    area, faces = np.where(carries, rubbing, 0.0), grid.faces(axis).T
     lost = np.flatnonzero((rubbing > 0.0) & ~carries)
-    beside = 0.02 * grid.cell * np.eye(3)
-    slope = np.stack([distance(faces[lost] + e) - distance(faces[lost] - e) for e in beside])
-    steps = np.array(grid.strides)[:, None] * np.sign(slope).astype(int)
+    normal = _normal(grid, distance, faces[:, lost])
+    steps = np.array(grid.strides)[:, None] * np.sign(normal).astype(int)
     inward = np.clip(lost + steps, 0, grid.cells - 1)
-    weight = slope**2 * carries[inward]
+    weight = normal**2 * carries[inward]
     weight /= np.maximum(weight.sum(axis=0), 1e-20)
     np.add.at(area, inward, weight * rubbing[lost])
-    return area / np.maximum(distance(faces) / grid.cell, NEAREST)
-
-
-def _slices(which: np.ndarray, most: int = 512) -> list[np.ndarray]:
-    """Parts of at most so many, so that samples stay in the cache."""
-    return [which[low : low + most] for low in range(0, len(which), most)]
+    return area / np.maximum(distance(*faces) / grid.cell, NEAREST)

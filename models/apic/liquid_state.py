@@ -46,7 +46,7 @@ class LiquidState:
         self.velocity, self.mass, self.inverse = of_faces(), of_faces(), of_faces()
         self.rest, self.search, self.product = of_faces(), of_faces(), of_faces()
         self.friction, self.coupling = of_faces(), of_faces()
-        self.normal, self.shear, self.shear_weight = of_faces(), of_faces(), of_faces()
+        self.shear, self.shear_weight = of_faces(), of_faces()
         self.volume, self.fraction, self.liquid = (of_cells() for _ in range(3))
         self.pressure, self.rise, self.source, self.diagonal = (of_cells() for _ in range(4))
         self.cell_rest, self.cell_search, self.cell_product = (of_cells() for _ in range(3))

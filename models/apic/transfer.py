@@ -34,12 +34,18 @@ def place(s, x):
 
 
 @ti.func
-def share(corner: ti.template(), part):
+def share(corner, part):
     """Trilinear weight of a corner."""
     w = 1.0
     for a in ti.static(range(3)):
-        w *= part[a] if ti.static(corner >> a & 1) else 1.0 - part[a]
+        w *= ti.select(corner >> a & 1, part[a], 1.0 - part[a])
     return w
+
+
+@ti.func
+def off_faces(a):
+    """From the cells' lowest corners to the lattice of faces along an axis, in cells."""
+    return ti.select(vec3(0.0, 1.0, 2.0) == vec3(a), vec3(0.0), vec3(0.5))
 
 
 @ti.func
@@ -79,23 +85,25 @@ def deposit(s, g):
         volume = s.particle[g][lane]
         for n in range(s.count[g, lane]):
             x = (s.position[g, lane, n] - s.origin[None]) * per_cell
-            v = s.speed[g, lane, n] + s.dt[None] * s.acceleration(g, lane, s.position[g, lane, n])
-            slope = s.slope[g, lane, n]
+            pull = s.dt[None] * s.acceleration(g, lane, s.position[g, lane, n])
+            s.speed[g, lane, n] = s.speed[g, lane, n] + pull
             for a in range(3):
-                at = x - 0.5
-                at[a] += 0.5
-                m, part = place(s, at)
-                for corner in ti.static(range(8)):
+                m, part = place(s, x - off_faces(a))
+                v = s.speed[g, lane, n][a]
+                slope = vec3(
+                    s.slope[g, lane, n][a, 0], s.slope[g, lane, n][a, 1], s.slope[g, lane, n][a, 2]
+                )
+                for corner in range(8):
                     o = m + step_to(corner, S)
                     w = volume * share(corner, part)
-                    u = v[a]
+                    u = v
                     for b in ti.static(range(3)):
-                        u += slope[a, b] * ((corner >> b & 1) - part[b])
+                        u += slope[b] * ((corner >> b & 1) - part[b])
                     # not +=, which is atomic and ten times slower
                     s.mass[g, a, o][lane] = s.mass[g, a, o][lane] + w
                     s.velocity[g, a, o][lane] = s.velocity[g, a, o][lane] + w * u
             m, part = place(s, x - 0.5)
-            for corner in ti.static(range(8)):
+            for corner in range(8):
                 o = m + step_to(corner, S)
                 s.volume[g, o][lane] = s.volume[g, o][lane] + volume * share(corner, part)
             s.mark[g, place(s, x)[0]] = 1

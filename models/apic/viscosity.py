@@ -30,9 +30,8 @@ def weigh_stresses(s, g, time):
     scale = s.dt[None] / s.cell[None] ** 2
     for n in range(s.arounds[g]):
         m = s.around[g, n]
-        for a in range(3):
-            s.normal[g, a, m] = lanes(0.0)
-            s.shear[g, a, m] = lanes(0.0)
+        for c in range(3):
+            s.shear[g, c, m] = lanes(0.0)
     find_thickness(s, g, time)
     for n in range(s.nears[g]):
         m = s.near[g, n]
@@ -58,13 +57,11 @@ def weigh_stresses(s, g, time):
 
 
 @ti.func
-def stress(s, g, u: ti.template()):
-    """Of velocities `u` on the faces."""
+def find_shear(s, g, u: ti.template()):
+    """Stress around the edges, of velocities `u` on the faces."""
     S = strides(s)
     for n in range(s.nears[g]):
         m = s.near[g, n]
-        for a in range(3):
-            s.normal[g, a, m] = 2.0 * s.normal_weight[g, m] * (u[g, a, m + S[a]] - u[g, a, m])
         for c in range(3):
             a, b = (c + 1) % 3, (c + 2) % 3
             slip = u[g, a, m] - u[g, a, m - S[b]] + u[g, b, m] - u[g, b, m - S[a]]
@@ -72,9 +69,11 @@ def stress(s, g, u: ti.template()):
 
 
 @ti.func
-def force(s, g, a, m, S):
-    """Divergence of the stress on a face."""
-    f = s.normal[g, a, m] - s.normal[g, a, m - S[a]]
+def force(s, g, u: ti.template(), a, m, S):
+    """Divergence of the stress on a face; needs `find_shear` of the same velocities."""
+    here = u[g, a, m]
+    f = 2.0 * s.normal_weight[g, m] * (u[g, a, m + S[a]] - here)
+    f -= 2.0 * s.normal_weight[g, m - S[a]] * (here - u[g, a, m - S[a]])
     for c in range(3):
         if c != a:
             b = 3 - a - c
@@ -95,11 +94,14 @@ def stiffness(s, g, a, m, S):
 
 @ti.func
 def solve_viscosity(s, g):
-    """Velocities after viscosity, by conjugate gradients, each lane until it has converged."""
+    """Velocities after viscosity, by conjugate gradients, each lane until it has converged.
+
+    `rest` is the residual over the diagonal: to read one field less counts, as memory is the limit.
+    """
     S = strides(s)
     zero = lanes(0.0)
     scale = s.dt[None] / s.cell[None] ** 2
-    stress(s, g, s.velocity)
+    find_shear(s, g, s.velocity)
     rz, energy = zero, zero
     for n in range(s.nears[g]):
         m = s.near[g, n]
@@ -107,25 +109,24 @@ def solve_viscosity(s, g):
             known, u, mass = has_mass(s, g, a, m), s.velocity[g, a, m], s.mass[g, a, m]
             nu = 0.5 * (thickness_of(s, g, m) + thickness_of(s, g, m - S[a]))
             rub = s.rub[a, m] * scale * nu
-            r = known * (force(s, g, a, m, S) - rub * u)
+            r = known * (force(s, g, s.velocity, a, m, S) - rub * u)
             inverse = ratio(known, mass + rub + stiffness(s, g, a, m, S))
             s.friction[g, a, m] = mass + rub
             s.inverse[g, a, m] = inverse
-            s.rest[g, a, m] = r
+            s.rest[g, a, m] = inverse * r
             s.search[g, a, m] = inverse * r
             rz += inverse * r * r
             energy += mass * u * u
     goal = TOLERANCE**2 * (energy + LEAST_ENERGY)
     iteration, runs = 0, positive(rz - goal)
     while iteration < MOST_ITERATIONS and runs.max() > 0.0:
-        stress(s, g, s.search)
+        find_shear(s, g, s.search)
         dq = zero
         for n in range(s.nears[g]):
             m = s.near[g, n]
             for a in range(3):
                 d = s.search[g, a, m]
-                q = s.friction[g, a, m] * d - force(s, g, a, m, S)
-                q *= positive(s.inverse[g, a, m])
+                q = s.friction[g, a, m] * d - force(s, g, s.search, a, m, S)
                 s.product[g, a, m] = q
                 dq += d * q
         alpha = runs * ratio(rz, dq)
@@ -133,17 +134,18 @@ def solve_viscosity(s, g):
         for n in range(s.nears[g]):
             m = s.near[g, n]
             for a in range(3):
-                s.velocity[g, a, m] = s.velocity[g, a, m] + alpha * s.search[g, a, m]
-                r = s.rest[g, a, m] - alpha * s.product[g, a, m]
-                s.rest[g, a, m] = r
-                new += r * r * s.inverse[g, a, m]
+                inverse = s.inverse[g, a, m]
+                z = s.rest[g, a, m] - alpha * inverse * s.product[g, a, m]
+                s.rest[g, a, m] = z
+                new += ti.select(inverse > 0.0, z * z / inverse, zero)
         beta = runs * ratio(new, rz)
         rz = chosen(runs, new, rz)
         for n in range(s.nears[g]):
             m = s.near[g, n]
             for a in range(3):
-                z = s.inverse[g, a, m] * s.rest[g, a, m]
-                s.search[g, a, m] = z + beta * s.search[g, a, m]
+                d = s.search[g, a, m]
+                s.velocity[g, a, m] = s.velocity[g, a, m] + alpha * d
+                s.search[g, a, m] = s.rest[g, a, m] + beta * d
         iteration += 1
         runs = positive(rz - goal)
 
@@ -152,27 +154,16 @@ def solve_viscosity(s, g):
 def extend(s, g):
     """Faces without mass and in walls take the mean of their neighbours: particles slip freely."""
     S = strides(s)
-    zero = lanes(0.0)
-    for n in range(s.arounds[g]):
-        m = s.around[g, n]
-        for a in range(3):
-            s.inverse[g, a, m] = zero
     for n in range(s.nears[g]):
         m = s.near[g, n]
         for a in range(3):
-            s.inverse[g, a, m] = positive(s.mass[g, a, m])
-    for n in range(s.nears[g]):
-        m = s.near[g, n]
-        for a in range(3):
-            total, known = zero, zero
-            for b in range(3):
-                for o in range(2):
-                    there = s.inverse[g, a, m + (2 * o - 1) * S[b]]
-                    total += there * s.velocity[g, a, m + (2 * o - 1) * S[b]]
-                    known += there
-            empty = positive(known) * (1.0 - s.inverse[g, a, m])
-            s.product[g, a, m] = chosen(empty, ratio(total, known), s.velocity[g, a, m])
-    for n in range(s.nears[g]):
-        m = s.near[g, n]
-        for a in range(3):
-            s.velocity[g, a, m] = s.product[g, a, m]
+            if s.mass[g, a, m].min() <= 0.0:
+                total, known = lanes(0.0), lanes(0.0)
+                for b in range(3):
+                    for o in range(2):
+                        there = m + (2 * o - 1) * S[b]
+                        has = positive(s.mass[g, a, there])
+                        total += has * s.velocity[g, a, there]
+                        known += has
+                empty = 1.0 - positive(s.mass[g, a, m])
+                s.velocity[g, a, m] = chosen(empty, ratio(total, known), s.velocity[g, a, m])
