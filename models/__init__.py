@@ -1,5 +1,6 @@
 """Particle fluid: stirring and pouring scenes. Taichi loads with the first simulation."""
 
+from .accuracy import stirring_error
 from .cups import Cups
 from .effect import Effect
 from .effects import EFFECTS, register
@@ -42,5 +43,6 @@ __all__ = [
     "register",
     "stir",
     "stir_frames",
+    "stirring_error",
     "time_limit",
 ]

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import computed_field
 
 from ..inputs.frame import named_faults
+from ..models import stirring_error
 from ..run.summary import Number, Section
 from .check import Check
 from .noise import irreducible_rms, rms
@@ -25,8 +26,8 @@ RHAT_MAX, ESS_MIN = 1.01, 400.0  # Vehtari et al. 2021
 DIVERGENT_SHARE_MAX = 0.01  # of the draws
 
 BAD_FIT_RATIO = 3.0
-"""Times the noise from which a fit is bad: wrong signs and turned axes leave 5 to 9 times, a stir
-that starts in motion 3 times. The bundled recordings leave 1 to 2.6 times."""
+"""Times the noise from which a fit is bad, the simulator's own error taken off: wrong signs and
+turned axes leave 5 to 9 times, a stir that starts in motion 3 times."""
 
 MIN_NOISE_DEG = 0.1
 """Noise [deg] below which no camera measures: simulated recordings without noise count as if they
@@ -185,9 +186,16 @@ class CalibrationSummary(Section):
 
     @computed_field
     @property
+    def simulator_error_deg(self) -> Number:
+        """RMS that the simulator errs by at most, at the viscosity of the closest simulation."""
+        return float(np.degrees(stirring_error(self.closest["viscosity"])))
+
+    @computed_field
+    @property
     def fit_to_noise(self) -> Number:
-        """`fit_rms_deg` in units of the noise."""
-        return self.fit_rms_deg / max(self.noise_deg, MIN_NOISE_DEG)
+        """What the simulator's own error leaves of `fit_rms_deg`, in units of the noise."""
+        left = unexplained(self.fit_rms_deg, self.simulator_error_deg)
+        return left / max(self.noise_deg, MIN_NOISE_DEG)
 
     @computed_field
     @property
@@ -210,6 +218,11 @@ class CalibrationSummary(Section):
         mixed = self.rhat_max <= RHAT_MAX and self.ess_min >= ESS_MIN  # neither holds for NaN
         good = mixed and self.divergent_share <= DIVERGENT_SHARE_MAX
         return SamplerStatus.CONVERGED if good else SamplerStatus.NOT_CONVERGED
+
+
+def unexplained(misfit: float, error: float) -> float:
+    """What an error that is independent of the rest leaves of an RMS difference; 0 where all."""
+    return float(np.sqrt(np.maximum(misfit**2 - error**2, 0.0)))
 
 
 def _below(posterior: "Dataset", viscosity: float) -> float:

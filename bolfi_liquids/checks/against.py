@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..files import write_text
 from ..inputs.settings import checked_seed
+from ..models.accuracy import LARGEST_ERRORS
 from . import replay
 from .case_files import CaseFiles, results_folder
 from .case_runner import Setting, run_unfinished
@@ -143,7 +144,7 @@ def _settings() -> dict[str, Any]:
             "seeds": replay.SEEDS,
             "noise_deg": replay.CAMERA_NOISE,
             "rms_bars": [
-                {"viscosity_below": limit, "max_deg": bar} for limit, bar in replay.RMS_BARS
+                {"viscosity_below": limit, "max_deg": bar} for limit, bar in LARGEST_ERRORS
             ],
             "max_spread_deg": replay.MAX_SPREAD,
             "max_ratio_difference": MAX_DIFFERENCE,

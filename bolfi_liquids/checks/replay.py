@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..inputs.fields import PLANE_NAMES
-from ..models import Liquid, StirSetup, stir
+from ..models import Liquid, StirSetup, stir, stirring_error
 from ..models.validation import Case, CaseResult, Curve, Panel, Progress, Row
 from .reference_stirs import ReferenceStir
 
@@ -17,8 +17,6 @@ SEEDS = 8
 WARM_UP = 10  # samples of a stir that compiles what the timed one runs
 CAMERA_NOISE = 0.1
 """Standard deviation of what the reference adds to each angle [deg]."""
-RMS_BARS = ((0.03, 0.6), (0.08, 0.55), (0.2, 0.36), (np.inf, 0.1))
-"""Viscosity below which each holds [Pa s], and the largest RMS difference [deg]."""
 MAX_SPREAD = 0.05
 """Largest standard deviation of the inclination over seeds, RMS over time [deg]."""
 RMS, SPREAD = "RMS difference [deg]", "spread over seeds [deg]"
@@ -93,7 +91,7 @@ class Replay:
 
 def rms_bar(viscosity: float) -> float:
     """Largest RMS difference [deg] that passes in a liquid of this viscosity [Pa s]."""
-    return next(bar for limit, bar in RMS_BARS if viscosity < limit)
+    return float(np.degrees(stirring_error(viscosity)))
 
 
 def rms(values: NDArray[np.float64]) -> float:

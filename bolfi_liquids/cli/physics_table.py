@@ -135,7 +135,7 @@ def _number(value: float | None) -> str:
 def _error(value: float | None, unit: str) -> str:
     if value is None:
         return "none"
-    return UNIT_FORMATS.get(unit, "{:+.2g} " + unit).format(value)
+    return UNIT_FORMATS.get(unit, f"{{:+.2g}} {unit}".rstrip()).format(value)
 
 
 def _fixed(value: float | None) -> str:

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from ..calibration.noise import rms, sensor_noise
 from ..calibration.stir_simulator import Stirring
-from ..calibration.summary import BAD_FIT_RATIO, MIN_NOISE_DEG
+from ..calibration.summary import BAD_FIT_RATIO, MIN_NOISE_DEG, unexplained
 from ..inputs.frame import frame_faults
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES
+from ..models import stirring_error
 from ..pouring.map import SpillageMap
 from ..seeds import Phase, generator, simulation_seeds
 from .plan import Followed
@@ -180,6 +181,7 @@ def estimate(
     draws = {name: posterior[name].to_numpy().ravel() for name in problem.prior.names}
     pour = spillage.best(draws)
     good = np.isfinite(fit.history.signals).all(axis=(1, 2))
+    viscosity = fit.history.theta[:, problem.prior.names.index("viscosity")]
     return OnlineEstimate(
         strokes=followed.strokes,
         covered=followed.covered,
@@ -192,13 +194,14 @@ def estimate(
         delay=followed.delay,
         apart=followed.apart,
         complaints=(*fit.warnings, *([] if status == Status.CONVERGED else [status])),
-        fit_to_noise=fit_to_noise(followed.observed, fit.history.signals[good]),
+        fit_to_noise=fit_to_noise(followed.observed, fit.history.signals[good], viscosity[good]),
         frame_faults=tuple(frame_faults(replace(plan, inclination=followed.observed))),
     )
 
 
-def fit_to_noise(observed: NDArray, signals: NDArray) -> float:
-    """How far the closest simulation is from the data, in units of the noise.
+def fit_to_noise(observed: NDArray, signals: NDArray, viscosity: NDArray) -> float:
+    """How far the closest simulation is from the data, in units of the noise, without what the
+    simulator itself errs by.
 
     No simulation is repeated with another seed while the robot stirs. In place of their noise, the
     closest simulation's distance from its nearest neighbour is taken, which is no smaller: where
@@ -207,6 +210,7 @@ def fit_to_noise(observed: NDArray, signals: NDArray) -> float:
     Args:
         observed: Inclination [rad], shape (T, 2), NaN where missing.
         signals: Simulations [rad], shape (n, T, 2), n > 1.
+        viscosity: Of the simulations [Pa s], shape (n,).
     """
     misfits = [rms(observed - one) for one in signals]
     closest = int(np.argmin(misfits))
@@ -214,7 +218,8 @@ def fit_to_noise(observed: NDArray, signals: NDArray) -> float:
     others = np.delete(signals, closest, axis=0)
     apart = min(rms((one - signals[closest])[seen]) for one in others)
     noise = float(np.hypot(sensor_noise(observed), apart))
-    return misfits[closest] / max(noise, float(np.radians(MIN_NOISE_DEG)))
+    left = unexplained(misfits[closest], stirring_error(viscosity[closest]))
+    return left / max(noise, float(np.radians(MIN_NOISE_DEG)))
 
 
 def enough(estimate: OnlineEstimate, settings: OnlineSettings) -> bool:

@@ -6,7 +6,12 @@ Their wording is in `data/calibration_sentences.jinja` and `data/pour_sentences.
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration.summary import CalibrationSummary, ParameterSummary, SamplerStatus
+from ..calibration.summary import (
+    CalibrationSummary,
+    ParameterSummary,
+    SamplerStatus,
+    unexplained,
+)
 from ..pouring.result import PourSummary
 from ..wording import Sentence, sentence
 
@@ -41,12 +46,14 @@ def parameter_sentence(name: str, values: ParameterSummary, prior: NDArray) -> S
 
 
 def fit_sentence(summary: CalibrationSummary) -> Sentence:
-    """How close the closest simulation is, compared with the noise."""
+    """How close the closest simulation is, compared with the noise and the simulator's error."""
     fit, noise = summary.fit_rms_deg, summary.noise_deg
     if fit <= FIT_AT_NOISE * noise:
         return sentence("calibration.fit_at_noise", summary=summary)
     if fit <= FIT_NEAR_NOISE * noise:
         return sentence("calibration.fit_near_noise", summary=summary, ratio=fit / noise)
+    if unexplained(fit, summary.simulator_error_deg) <= FIT_NEAR_NOISE * noise:
+        return sentence("calibration.fit_within_error", summary=summary)
     return sentence("calibration.fit_above_noise", summary=summary)
 
 

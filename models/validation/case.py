@@ -119,7 +119,7 @@ class Case:
         title: In a few words.
         truth: What is expected, in a sentence or less.
         source: Where that is known from.
-        unit: Of the errors: "relative", "deg", "fraction".
+        unit: Of the errors: "relative", "deg", "fraction"; "" where each quantity names its own.
         tolerance: Largest error of a row that sets no other.
         settings: What decides the outcome besides the seed, as plain numbers and text. A
             finished result is used again while these and the versions stay as they are.

@@ -30,7 +30,9 @@ def run(progress: Progress, seed: int) -> CaseResult:
             off = float(np.abs(level - 1.0).max())
             rows += [
                 Row.absolute(f"rms speed {name} [m/s]", 0.0, settled, TOLERANCE),
-                Row.absolute(f"largest error of the level {name}", 0.0, off, LEVEL_TOLERANCE),
+                Row.absolute(
+                    f"largest error of the level {name} [of the depth]", 0.0, off, LEVEL_TOLERANCE
+                ),
             ]
             label = name if k in (0, len(VISCOSITY) - 1) else ""
             curves.append(Curve(label, time, 1e3 * speed, series=number))
@@ -44,7 +46,7 @@ CASE = Case(
     title="Liquid at rest in a cup",
     truth="it stays at rest, at its level",
     source="hydrostatics",
-    unit="m/s, or of the depth",
+    unit="",
     tolerance=TOLERANCE,
     settings={"depths": DEPTHS, "viscosity": VISCOSITY.tolist(), "seconds": (SECONDS, SETTLED)},
     run=run,

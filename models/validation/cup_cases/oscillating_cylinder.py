@@ -68,7 +68,7 @@ def run(progress: Progress, seed: int) -> CaseResult:
             name = f"{mu:g} Pa s, {motion.frequency:g} Hz"
             rows += [
                 Row.relative(
-                    f"force at {name} [of the displaced mass's]",
+                    f"relative force at {name}, over the displaced mass's",
                     abs(truth[k]),
                     abs(ours[k]),
                     motion.amplitude_error[k],
@@ -97,7 +97,7 @@ CASE = Case(
     title="Stick that is moved to and fro",
     truth="added mass and drag of a cylinder that oscillates within another",
     source="Stokes 1851; Chen, Wambsganss & Jendrzejczyk 1976 for the outer cylinder",
-    unit="relative, or of a quarter period",
+    unit="",
     tolerance=max(MOTIONS[0].amplitude_error),
     settings={
         "viscosity": VISCOSITY.tolist(),

@@ -118,18 +118,22 @@ def test_the_terminal_warns_of_what_the_report_warns_of(calibration, tmp_path, c
 
 
 @pytest.mark.parametrize(
-    ("rms", "noise", "status"),
+    ("viscosity", "rms", "noise", "status"),
     [
-        (0.5, 0.2, "acceptable"),
-        (0.61, 0.2, "bad"),
-        (0.25, 0.01, "acceptable"),  # no camera measures so well: the search has not ended
-        (0.31, 0.01, "bad"),
-        (np.nan, 0.2, "bad"),
-        (0.2, np.nan, "bad"),
+        (1.0, 0.5, 0.2, "acceptable"),
+        (1.0, 0.61, 0.2, "bad"),
+        (1.0, 0.25, 0.01, "acceptable"),  # no camera measures so well: the search has not ended
+        (1.0, 0.32, 0.01, "bad"),
+        (1.0, np.nan, 0.2, "bad"),
+        (1.0, 0.2, np.nan, "bad"),
+        (1e-3, 0.55, 0.1, "acceptable"),  # the simulator errs by as much in water
+        (1e-3, 0.68, 0.1, "bad"),
+        (np.nan, 0.2, 0.1, "bad"),
     ],
 )
-def test_a_fit_is_bad_from_three_times_the_noise_on(calibration, rms, noise, status):
-    summary = replace(calibration.summary, fit_rms_deg=rms, noise_deg=noise)
+def test_a_fit_is_bad_from_three_times_the_noise_on(calibration, viscosity, rms, noise, status):
+    closest = {"viscosity": viscosity, "cohesion": 0.5}
+    summary = replace(calibration.summary, closest=closest, fit_rms_deg=rms, noise_deg=noise)
     assert summary.fit_status == status
     assert (bad_fit(summary) is None) == (status == "acceptable")
     section = summary.to_json()

@@ -197,10 +197,15 @@ def test_the_noise_of_a_fit_is_that_of_cameras_and_between_simulations(rng):
     observed = truth + rng.normal(0.0, 0.02, truth.shape)
     observed[len(truth) // 2 :] = np.nan
     # sqrt(2) of one noise between two signals; sqrt(1 + 2) with the cameras' own
-    assert fit_to_noise(observed, truth + spread) == pytest.approx(np.sqrt(2.0 / 3.0), rel=0.1)
+    ones = np.ones(5)
+    found = fit_to_noise(observed, truth + spread, ones)
+    assert found == pytest.approx(np.sqrt(2.0 / 3.0), rel=0.1)
     # without noise, a camera's is taken
     still = np.repeat(truth[None], 3, axis=0)
-    assert fit_to_noise(truth + np.radians(0.5), still) == pytest.approx(5.0, rel=1e-6)
+    found = fit_to_noise(truth + np.radians(0.5), still, ones[:3])
+    assert found == pytest.approx(np.sqrt(0.5**2 - 0.1**2) / 0.1, rel=1e-6)
+    # as much as the simulator errs by in a thin liquid is none of the fit's
+    assert fit_to_noise(truth + np.radians(0.5), still, 1e-3 * ones[:3]) == 0.0
 
 
 @pytest.mark.slow

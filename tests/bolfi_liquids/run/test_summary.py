@@ -20,7 +20,7 @@ WRITTEN = {
     for path in sorted((Path(__file__).parent / "summaries_of_format_3").glob("*.json"))
 }
 ADDED_SINCE = {
-    "calibrate": {"fit_to_noise", "fit_status", "frame_faults"},
+    "calibrate": {"simulator_error_deg", "fit_to_noise", "fit_status", "frame_faults"},
     "criticise": {"frame_faults"},
     "pour": {"fit_status"},
 }
