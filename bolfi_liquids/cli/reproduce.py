@@ -32,8 +32,8 @@ def reproduce(
     """Draw the paper's figures, and those of what it left open.
 
     - `inclination`: recorded stirs, and what the calibrated simulator predicts
-    - `posterior`: what stirring teaches, on recordings of another solver
-    - `recordings`: what is poured after each of them, and what that solver spilled
+    - `posterior`: what stirring teaches, on recordings of a reference solver
+    - `recordings`: what is poured after each of them, and what another solver spilled
     - `geometry`: over lip heights and receivers, where knowing the liquid matters
     - `spillage`: against the number of simulations, by stirring and by pouring
     - `liquids`: the same by liquid

@@ -1,4 +1,4 @@
-"""Recordings and pours of the independent solver that come with the package."""
+"""Recordings and pours of other solvers that come with the package."""
 
 from importlib.resources import as_file, files
 from typing import TYPE_CHECKING

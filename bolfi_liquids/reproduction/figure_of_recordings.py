@@ -1,4 +1,4 @@
-"""From recordings of the independent solver to what it spilled itself."""
+"""From recordings of stirs to what the chosen pours spill in another solver."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,7 +29,7 @@ OTHER_CHOICES = {
 
 
 def recordings(shared: SharedSimulations) -> Drawn:
-    """Chosen from a recording of stirring alone, spilled by the other solver."""
+    """Chosen from a recording of stirring alone, spilled in another solver."""
     data = _judged(shared)
     return Drawn(data, _figure(data), _says(data))
 

@@ -1,4 +1,4 @@
-"""The main job on truths that are known: the simulator's own, and an independent solver's."""
+"""The main job on truths that are known: the simulator's own, and a Navier-Stokes solver's."""
 
 from importlib.resources import files
 
@@ -63,10 +63,10 @@ def test_simulated_truth_is_found(tmp_path, truths, least, settings):
 @pytest.mark.minutes
 def test_an_independent_solver_s_liquids_are_told_apart(tmp_path):
     medians = {}
-    for name, closest_deg in (("water_v10", 1.0), ("glycerin_v10", 0.5)):
+    for name, closest_deg in (("water_v10", 0.6), ("glycerin_v10", 0.15)):
         calibration = bl.calibrate(DATA / f"{name}.nc", out=tmp_path / name, progress=False, **FULL)
         print(name, calibration.summary.fit_rms_deg, calibration.summary.parameters)
         assert calibration.summary.fit_rms_deg < closest_deg
         medians[name] = calibration.summary.parameters["viscosity"].q50
-    assert medians["water_v10"] < 0.03
-    assert 0.3 < medians["glycerin_v10"] < 10.0
+    assert medians["water_v10"] < 0.01
+    assert 0.8 < medians["glycerin_v10"] < 1.25
