@@ -48,7 +48,7 @@ def lines(path):
     return path.read_text().split() if path.exists() else []
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_killed_and_repeated_equals_undisturbed(tmp_path):
     """SIGKILL in the sixth simulation or later; only what was running is simulated again."""
     undisturbed = start(tmp_path, "whole", "0")

@@ -56,7 +56,7 @@ def _effect(name, **changes):
     return models.Effect(name=name, **{**fields, **changes})
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_hooks_from_outside_act(register):
     """A force equal to the scene's own, and a factor on the viscosity: the same flow."""
     for effect in (push(), thicken()):

@@ -14,8 +14,8 @@ from bolfi_liquids import models
 DENSITY = 1000.0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("viscosity", [pytest.param(0.1, marks=pytest.mark.minutes), 1.0])
+@pytest.mark.minutes
+@pytest.mark.parametrize("viscosity", [0.1, 1.0])
 def test_viscosity_damps_a_shear_wave_as_its_number_says(viscosity):
     """u_x = cos(k y) decays at the rate ν k², in a block that repeats along x and y.
 
@@ -48,11 +48,8 @@ def test_viscosity_damps_a_shear_wave_as_its_number_says(viscosity):
     assert measured / expected == pytest.approx(1.0, abs=1 / 6)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "numerics",
-    [models.ParticleNumerics(), pytest.param(models.PUBLISHED_DRAG, marks=pytest.mark.minutes)],
-)
+@pytest.mark.minutes
+@pytest.mark.parametrize("numerics", [models.ParticleNumerics(), models.PUBLISHED_DRAG])
 def test_stick_and_liquid_exchange_angular_momentum(glycerin, numerics):
     """About the pivot, in one substep out of reach of the cup, gravity's share taken off.
 

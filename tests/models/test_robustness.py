@@ -318,7 +318,7 @@ def test_a_liquid_whose_level_moves_is_a_fault(violent):
     assert reasons and faults.REASONS[faults.DRIFTED] in reasons[0] and np.isnan(angles).any()
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_a_thread_that_did_not_start_taichi_is_refused_and_does_no_harm(cups):
     def poured():
         liquid = models.Liquid(1.0, 0.2, 1260.0)

@@ -69,7 +69,7 @@ def frequency(swing, interval):
     return 2.0 * np.pi / (interval * (zeros[2] - zeros[0]))
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_cubes_become_balls(swinging_drops):
     roundness, _, _ = swinging_drops
     assert roundness.min() > 0.95

@@ -6,19 +6,17 @@ from pathlib import Path
 import pytest
 
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "notebooks").glob("*.ipynb"))
-IN_CI = {"your_simulator"}  # `make test-long` runs the others
 RECORDS = {"dry_run"}  # on the emulator, which must keep time
 LONGEST = 600  # s after which a cell hangs, on a slow computer that does something else as well
 
 
 def test_there_are_notebooks_and_they_are_small():
-    assert {path.stem for path in NOTEBOOKS} >= IN_CI | RECORDS
+    assert {path.stem for path in NOTEBOOKS} >= RECORDS
     assert all(path.stat().st_size < 500_000 for path in NOTEBOOKS)
 
 
 def marks(path):
-    when = pytest.mark.slow if path.stem in IN_CI else pytest.mark.minutes
-    return [when, pytest.mark.alone] if path.stem in RECORDS else [when]
+    return [pytest.mark.minutes, *([pytest.mark.alone] if path.stem in RECORDS else [])]
 
 
 @pytest.mark.parametrize(

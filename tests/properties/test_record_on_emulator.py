@@ -114,7 +114,8 @@ def test_a_disk_without_room_ends_the_recording_and_is_named_with_its_file(tmp_p
     assert done.returncode == 3, done.stderr
     (line,) = (one for one in done.stderr.splitlines() if one.startswith("error: "))
     assert re.search(r"[xy]z\.mkv: File too large \(make room\)", line), line
-    attrs = bl.open_recording(out / "recording.nc").attrs
+    # it may end before the gripper moves, and be no stir
+    attrs = xarray.load_dataset(out / "recording.nc", decode_times=False).attrs
     assert attrs["status"] == "aborted" and "make room" in attrs["reason"]
 
 

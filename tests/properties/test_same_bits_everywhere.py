@@ -51,7 +51,7 @@ def here(recording, tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("where", ["processes", "dask"])
+@pytest.mark.parametrize("where", ["processes", pytest.param("dask", marks=pytest.mark.minutes)])
 def test_a_calibration_is_the_same(here, recording, cluster, tmp_path, where):
     with executor_of(where, cluster) as options:
         there = bl.calibrate(recording, out=tmp_path / "run", **SETTINGS, **options)

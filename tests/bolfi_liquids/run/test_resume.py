@@ -137,7 +137,7 @@ def test_a_larger_budget_goes_on_from_a_smaller_one(
         bl.calibrate(short_recording, out=grown, resume=True, progress=False, **settings)
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_criticism_killed_and_repeated_equals_undisturbed(calibration, tmp_path):
     quiet, killed = tmp_path / "quiet", tmp_path / "killed"
     shutil.copytree(calibration.path, quiet)

@@ -215,7 +215,7 @@ def test_each_recording_has_its_truth_and_can_be_read():
         assert abs(recording.number("fill") - float(row["true_fill_m"])) < 1e-3
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_the_first_seconds_of_a_recording_are_repeated_in_coarse_cells():
     """Camera noise is 0.1 degrees, coarse cells add their error; the signal is 3 degrees."""
     recording = open_recording(RECORDINGS / "glycerin_v10.nc")
