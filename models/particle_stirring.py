@@ -1,6 +1,7 @@
 """Stirs of the former particle fluid."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -47,10 +48,11 @@ def _parts(
     Only a simulation's own fill and `effects` decide its scene, so its bits do not depend on
     its company.
     """
+    upright = replace(setup, tilt=(0.0, 0.0))  # this fluid's sticks start so
     usual = setup.count(fill[rows]) == setup.count(setup.cup.fill)
     for scene_of, todo in ((_scene, rows[usual]), (_roomy_scene, rows[~usual])):
         for low in range(0, len(todo), runtime.SLOTS):
-            yield scene_of(setup, effects), todo[low : low + runtime.SLOTS]
+            yield scene_of(upright, effects), todo[low : low + runtime.SLOTS]
 
 
 @cache

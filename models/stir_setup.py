@@ -90,6 +90,11 @@ class StirSetup:
             raise ValueError(f"setup: particles must be a whole number, got {self.particles}")
         if not all(abs(angle) < MAX_TILT for angle in self.tilt):
             raise ValueError(f"setup: tilt must be less than {MAX_TILT} rad, got {self.tilt}")
+        if self.submerged > self.stick.length:
+            raise ValueError(
+                "setup: submerged must be at most the stick's length, or its pivot is in the "
+                f"liquid: {self.stick.length:g} m, got {self.submerged:g}; raise the gripper"
+            )
         if self.stick.radius >= self.cup.radius:
             raise ValueError(
                 f"setup: the stick, of radius {self.stick.radius} m, does not fit into the cup, of "
@@ -164,12 +169,6 @@ class StirSetup:
         """Particle spacing [m], the cube root of the liquid's volume per particle."""
         return self.cell / self.per_cell ** (1.0 / 3.0)
 
-    @property
-    def hanging(self) -> np.ndarray:
-        """Unit vector from the pivot to the stick's tip at the start, shape [3]."""
-        down = np.array([*np.tan(self.tilt), -1.0])
-        return down / np.linalg.norm(down)
-
     def step(self, gripper: Trajectory) -> float:
         """Step of time [s] for a path of the gripper."""
         if isinstance(self.numerics, ParticleNumerics):
@@ -207,6 +206,13 @@ class StirSetup:
     def settings(self) -> dict[str, Any]:
         """Everything that fixes the simulator, as plain numbers, with the model's version."""
         return {"model": MODEL_VERSION, "scene": "stir", **asdict(self)}
+
+
+def hanging(tilt: np.ndarray) -> np.ndarray:
+    """Unit vectors [..., 3] from the pivot to the tip of sticks that lean by `tilt` [..., 2] in the
+    xz and yz planes [rad]."""
+    down = np.concatenate([np.tan(tilt), -np.ones_like(tilt[..., :1])], axis=-1)
+    return down / np.linalg.norm(down, axis=-1, keepdims=True)
 
 
 def _first_tilt(recording: HasRig) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from .fluid.runtime import Watch
 from .numerics import Numerics
 from .particle_stirring import stir_particles
 from .rig import Rig, check_rig
-from .stir_setup import StirSetup
+from .stir_setup import StirSetup, hanging
 from .stirs.march import Stirs, march
 from .trajectory import Trajectory, step_path, substep_path
 
@@ -75,8 +75,11 @@ def watched_stir(
     with runtime.LOCK:
         if isinstance(setup.numerics, Numerics):
             directions = np.empty((size, path.shape[0], 3))
+            # what tilted cameras add is no lean of the stick
+            upright = changed_signal(gripper.time, np.zeros((size, len(gripper.time), 2)), acting)
+            start = np.array(setup.tilt) - upright[:, 0]
             for kinds, rows, coefficients in liquid_sets(acting, size):
-                stirs = Stirs(liquid, rig, seeds, coefficients).rows(rows)
+                stirs = Stirs(liquid, rig, seeds, hanging(start), coefficients).rows(rows)
                 directions[rows] = march(setup, stirs, step, kinds, watch)
         else:
             directions = stir_particles(setup, liquid, rig, seeds, acting, watch)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..inputs.fields import PLANE_NAMES
 from ..models import Liquid, StirSetup, stir, stirring_error
+from ..models.accuracy import LARGEST_ERRORS
 from ..models.validation import Case, CaseResult, Curve, Panel, Progress, Row
 from .reference_stirs import ReferenceStir
 
@@ -91,7 +92,7 @@ class Replay:
 
 def rms_bar(viscosity: float) -> float:
     """Largest RMS difference [deg] that passes in a liquid of this viscosity [Pa s]."""
-    return float(np.degrees(stirring_error(viscosity)))
+    return float(np.degrees(stirring_error(viscosity, LARGEST_ERRORS)))
 
 
 def rms(values: NDArray[np.float64]) -> float:

@@ -6,8 +6,10 @@ A scene without such effects compiles nothing of it.
 
 import taichi as ti
 
-from .lanes import LANES, lanes
+from .lanes import LANES, lanes, positive, ratio
 from .transfer import strides
+
+LEAST_MASS = 1e-4  # of a face, in full cells, that has a velocity
 
 
 @ti.func
@@ -42,17 +44,32 @@ def thickness_of(s, g, m):
 
 
 @ti.func
+def has_velocity(s, g, a, m):
+    """1 for a face of liquid or in a wall, else 0."""
+    return positive(s.mass[g, a, m] + s.shut[a, m] - LEAST_MASS)
+
+
+@ti.func
 def shear_rate(s, g, m):
-    """Root of 2 D:D at a cell's centre [1/s], D being the symmetric part of the gradient."""
+    """Root of 2 D:D at a cell's centre [1/s], D being the symmetric part of the gradient.
+
+    Faces in the air have no velocity, and what they take part in tells nothing.
+    """
     S = strides(s)
     total = lanes(0.0)
     for a in range(3):
         b, c = (a + 1) % 3, (a + 2) % 3
-        stretch = s.velocity[g, a, m + S[a]] - s.velocity[g, a, m]
-        shear = lanes(0.0)  # around the cell's four edges along a
+        both = has_velocity(s, g, a, m) * has_velocity(s, g, a, m + S[a])
+        stretch = both * (s.velocity[g, a, m + S[a]] - s.velocity[g, a, m])
+        shear, known = lanes(0.0), lanes(0.0)  # around the cell's four edges along a
         for k in range(4):
             o = m + (k & 1) * S[b] + (k >> 1) * S[c]
-            shear += s.velocity[g, b, o] - s.velocity[g, b, o - S[c]]
-            shear += s.velocity[g, c, o] - s.velocity[g, c, o - S[b]]
-        total += 2.0 * stretch * stretch + 0.0625 * shear * shear
+            four = has_velocity(s, g, b, o) * has_velocity(s, g, b, o - S[c])
+            four *= has_velocity(s, g, c, o) * has_velocity(s, g, c, o - S[b])
+            slip = s.velocity[g, b, o] - s.velocity[g, b, o - S[c]]
+            slip += s.velocity[g, c, o] - s.velocity[g, c, o - S[b]]
+            shear += four * slip
+            known += four
+        mean = ratio(shear, known)
+        total += 2.0 * stretch * stretch + mean * mean
     return ti.sqrt(total) / s.cell[None]

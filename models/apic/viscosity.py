@@ -4,13 +4,12 @@
 import taichi as ti
 
 from .lanes import chosen, lanes, positive, ratio
-from .rheology import find_thickness, thickness_of
+from .rheology import LEAST_MASS, find_thickness, has_velocity, thickness_of
 from .transfer import strides
 
 TOLERANCE = 1e-3  # of the speed
 LEAST_ENERGY = 1e-3
 MOST_ITERATIONS = 200
-LEAST_MASS = 1e-4  # of a face, in full cells, that has a velocity
 
 
 @ti.func
@@ -37,9 +36,7 @@ def weigh_stresses(s, g, time):
         m = s.near[g, n]
         known = lanes(1.0)
         for a in range(3):
-            o = m + S[a]
-            known *= positive(s.mass[g, a, m] + s.shut[a, m] - LEAST_MASS)
-            known *= positive(s.mass[g, a, o] + s.shut[a, o] - LEAST_MASS)
+            known *= has_velocity(s, g, a, m) * has_velocity(s, g, a, m + S[a])
         nu = scale * thickness_of(s, g, m)
         s.normal_weight[g, m] = nu * ti.min(s.volume[g, m], 1.0) * known
         for c in range(3):  # edges along c

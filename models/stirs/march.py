@@ -39,17 +39,23 @@ class Stirs(NamedTuple):
         liquid: A batch of B.
         rig: B of them; paths from the start of the first step to the end of the last.
         seeds: Shape [B].
+        start: Unit vectors from pivot to tip at the start, shape [B, 3].
         coefficients: Of the effects in the liquid, shape [effects, B].
     """
 
     liquid: Liquid
     rig: Rig
     seeds: np.ndarray
+    start: np.ndarray
     coefficients: np.ndarray
 
     def rows(self, part: np.ndarray) -> "Stirs":
         return Stirs(
-            self.liquid[part], self.rig.rows(part), self.seeds[part], self.coefficients[:, part]
+            self.liquid[part],
+            self.rig.rows(part),
+            self.seeds[part],
+            self.start[part],
+            self.coefficients[:, part],
         )
 
 
@@ -113,15 +119,14 @@ def _together(setup, stirs: Stirs, step, effects, watch) -> np.ndarray:
         np.stack([lanes(row) for row in (share, nu, np.asarray(liquid.density), fill)]),
     )
     scene.set_coefficients(np.stack([lanes(row) for row in stirs.coefficients]) if effects else ())
-    down = np.broadcast_to(setup.hanging, (len(slots), 3)).T
     masses = stirs.rig.stick_mass, stirs.rig.pivot_friction
-    scene.sticks.hang(np.stack([lanes(row) for row in (*down, *masses)]))
+    scene.sticks.hang(np.stack([lanes(row) for row in (*stirs.start.T, *masses)]))
 
     path = stirs.rig.path
     ahead = 2.0 * path[:, -1:] - path[:, -2:-1]
     path = lanes(np.concatenate([path[:, :1], path, ahead], axis=1))
     directions = np.empty((groups, LANES, path.shape[2] - 2, 3), np.float32)
-    directions[:, :, 0] = setup.hanging
+    directions[:, :, 0] = lanes(stirs.start)
     scene.begin(path, directions, int(counts[0]))
     runtime.run_chunks(scene, directions.shape[2] - 1, scene.march, watch)
     found = directions.reshape(groups * LANES, -1, 3)[slots].astype(np.float64)

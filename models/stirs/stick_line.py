@@ -186,6 +186,8 @@ def start_line(s, t, g, lane):
         arm = arm_of(s, t, g, lane, n)
         x = t.pivot[g, lane] + arm
         wet = ti.math.clamp((s.fill[g][lane] - x[2]) / dx + 0.5, 0.0, 1.0)
+        if arm.dot(u) < 0.0:
+            wet = 0.0  # beyond the pivot
         t.wet_share[g, lane, n] = wet
         if wet > 0.0:
             place_node(s, t, g, lane, n, x)
@@ -268,12 +270,31 @@ def turn_stick(s, t, g, lane, torque, added):
     if out + radius > s.cup_radius[None]:
         outward = vec3(end[0], end[1], 0.0) / ti.max(out, 1e-9)
         w = stopped(w, u, t.velocity[g, lane], length, outward)
-    if end[2] < 0.0:
-        w = stopped(w, u, t.velocity[g, lane], length, -up)
     w -= w.dot(u) * u
     t.turning[g, lane] = turning
-    t.swing[g, lane] = w
-    t.direction[g, lane] = (u + dt * w.cross(u)).normalized()
+    height = ti.math.clamp((pivot[2] + dt * t.velocity[g, lane][2]) / length, 0.0, 1.0)
+    t.swing[g, lane], t.direction[g, lane] = above_floor(w, u, height, dt)
+
+
+@ti.func
+def above_floor(w, u, height, dt):
+    """The swing of a step and where it leads, the stick's end no lower than the floor.
+
+    A pivot that is lowered to `height` lengths above the floor turns a stick that stands there out
+    to that cosine, however upright it is: its end's speed alone would ask for any rate.
+    """
+    moved = (u + dt * w.cross(u)).normalized()
+    swing = w
+    if -moved[2] > height:
+        aside = vec3(moved[0], moved[1], 0.0)
+        if aside.norm() < 1e-6:
+            aside = vec3(1.0, 0.0, 0.0)
+        outward = aside.normalized()
+        moved = ti.sqrt(1.0 - height**2) * outward - vec3(0.0, 0.0, height)
+        axis = -outward.cross(vec3(0.0, 0.0, 1.0))
+        rate = (ti.acos(height) - ti.acos(ti.math.clamp(-u[2], 0.0, 1.0))) / dt
+        swing += ti.max(rate - w.dot(axis), 0.0) * axis
+    return swing, moved
 
 
 @ti.func

@@ -203,9 +203,9 @@ def test_the_noise_of_a_fit_is_that_of_cameras_and_between_simulations(rng):
     # without noise, a camera's is taken
     still = np.repeat(truth[None], 3, axis=0)
     found = fit_to_noise(truth + np.radians(0.5), still, ones[:3])
-    assert found == pytest.approx(np.sqrt(0.5**2 - 0.1**2) / 0.1, rel=1e-6)
+    assert found == pytest.approx(np.sqrt(0.5**2 - 0.05**2) / 0.1, rel=1e-6)
     # as much as the simulator errs by in a thin liquid is none of the fit's
-    assert fit_to_noise(truth + np.radians(0.5), still, 1e-3 * ones[:3]) == 0.0
+    assert fit_to_noise(truth + np.radians(0.5), still, 1e-3 * ones[:3]) < 1e-6
 
 
 @pytest.mark.slow

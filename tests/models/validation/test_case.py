@@ -118,5 +118,5 @@ def test_names_are_unique_over_packages(importable):
 def test_every_case_of_the_models_says_what_it_is():
     for name, found in discover(cases, cup_cases).items():
         assert name == found.name
-        assert found.title and found.truth and found.source and found.unit
+        assert found.title and found.truth and found.source
         assert not found.truth.endswith(".") and not found.title.endswith(".")
