@@ -51,7 +51,8 @@ class Effect:
         make_force: Returns a `ti.func` (scene, b, coefficient) that may change
             scene.velocity[b, i], scene.grip[b, i] and scene.pair_coupling[b, k] of simulation
             b, once a substep, after gravity and before pressure and viscosity. Annotate scene
-            as ti.template().
+            as ti.template(). It acts in pours and not in stirs: of an effect with both hooks,
+            stirs keep the rheology alone.
         lowest, highest: Coefficients outside are refused.
 
     Raises:

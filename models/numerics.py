@@ -3,6 +3,7 @@
 import warnings
 from dataclasses import asdict, dataclass
 
+from .apic.filling import POINTS
 from .fluid.checks import check_numbers
 
 TESTED_RATIO = (0.7, 1.4)  # radii of a stick in cells, for which references were compared
@@ -27,7 +28,7 @@ class Numerics:
             for a wider one.
         longest_step: Step of slow stirs, for cells of 5 mm [s]; in proportion for others.
         courant: Cells that the gripper goes in a step, at most.
-        per_cell: Particles in a full cell: 1, 2 or 4.
+        per_cell: Particles in a full cell: 2 or 4.
     """
 
     cell: float = 0.005
@@ -49,8 +50,9 @@ class Numerics:
             raise ValueError(
                 f"numerics: narrowest must be at most widest, {self.widest}, got {self.narrowest}"
             )
-        if self.per_cell not in (1, 2, 4):
-            raise ValueError(f"numerics: per_cell must be 1, 2 or 4, got {self.per_cell}")
+        if self.per_cell not in POINTS:
+            wanted = " or ".join(map(str, POINTS))
+            raise ValueError(f"numerics: per_cell must be {wanted}, got {self.per_cell}; take 2")
 
     def cell_for(self, stick_radius: float) -> float:
         """Edge of a cell [m] for a stick [m]."""

@@ -15,7 +15,7 @@ class Rig(NamedTuple):
         stick_mass: Mass of the uniform stick [kg], shape [B].
         pivot_friction: Dry friction torque of the pivot [N m], shape [B].
         fill: Depth of the liquid with the stick in it [m], shape [B].
-        path: Pivot at the start and at the end of each substep [m], shape [B, substeps + 1, 3].
+        path: Pivot at the start and at the end of each step [m], shape [B, steps + 1, 3].
     """
 
     stick_mass: np.ndarray

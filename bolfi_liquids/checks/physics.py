@@ -42,7 +42,8 @@ class PhysicsCheck:
 
 
 def all_cases() -> "dict[str, Case]":
-    """Every case, by name: those of the former fluid, then those of liquid in a cup."""
+    """Every case, by name: first `cases`, of the former fluid but for sticks that swing and for the
+    noise of seeds, then `cup_cases`, of the liquid of stirs."""
     from ..models.validation import cases, cup_cases, discover
 
     return discover(cases, cup_cases)

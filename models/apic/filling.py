@@ -5,20 +5,20 @@ import numpy as np
 from .grid import Grid
 
 POINTS = {
-    1: [(0.5, 0.5, 0.5)],
     2: [(0.25, 0.25, 0.25), (0.75, 0.75, 0.75)],
     4: [(0.25, 0.25, 0.25), (0.75, 0.75, 0.25), (0.25, 0.75, 0.75), (0.75, 0.25, 0.75)],
 }
-"""Of a cell, in cells, by how many there are: lattices whose deposit fills each cell alike."""
+"""Of a cell, in cells, by how many there are: lattices whose deposit fills each cell alike, and of
+which the lower half of a cell has half the points."""
 
 JITTER = 0.1  # of the distance of particles, to either side
-OFF_WALL = 0.02  # cells that a particle keeps from a wall
+OFF_WALL = 0.02  # cells that particles keep from walls, at the start and later
 
 
 def fill_cup(grid: Grid, radius: float, fill: float, per_cell: int, seed: int) -> np.ndarray:
     """Particles of an upright cup of liquid [m], shape (n, 3); the floor is z = 0.
 
-    Layers are stretched so that whole and half ones fill the cup exactly.
+    Layers of half a cell are stretched so that a whole number of them reaches the level.
     """
     if fill <= 0.0:
         return np.empty((0, 3))

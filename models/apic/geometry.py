@@ -160,7 +160,7 @@ def _means_along(
 ) -> np.ndarray:
     along = np.moveaxis(samples, 2 - axis, 0)
     cells = len(along) // SAMPLES - 2
-    weights = kernel((np.arange(2 * SAMPLES) + 0.5) / SAMPLES - 1.0) / np.float32(SAMPLES)
+    weights = kernel((np.arange(2 * SAMPLES) + 0.5) / SAMPLES - 1.0).astype(np.float32) / SAMPLES
     first = round(at[axis] * SAMPLES)
     found = sum(
         weight * along[first + n : first + n + cells * SAMPLES : SAMPLES]
@@ -204,6 +204,8 @@ def _friction(
     """Rubbing area of the faces along an axis over their distance from the wall.
 
     What rubs at a face that carries no momentum rubs at its neighbours away from the wall instead.
+    At the corner of the floor none may carry: cups of less than 3 cm in radius lose 3 to 5 % of
+    what rubs vertically.
     """
     area, faces = np.where(carries, rubbing, 0.0), grid.faces(axis).T
     lost = np.flatnonzero((rubbing > 0.0) & ~carries)

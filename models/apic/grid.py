@@ -47,11 +47,6 @@ class Grid:
         index = np.stack([i.ravel(), j.ravel(), k.ravel()], axis=1)
         return np.array(self.origin) + (index + np.array(at)) * self.cell
 
-    @property
-    def centres(self) -> np.ndarray:
-        """Of the cells [m], shape (cells, 3)."""
-        return self.points((0.5, 0.5, 0.5))
-
     def faces(self, axis: int) -> np.ndarray:
         """Centres of each cell's lower face along an axis [m], shape (cells, 3)."""
         return self.points(tuple(0.0 if axis == a else 0.5 for a in range(3)))

@@ -10,13 +10,14 @@ from ..fluid.faults import DRIFTED, LARGEST, RUNAWAY, SOUND, UNSOLVED
 from .lanes import LANES, lanes, mat3, vec3
 
 GRAVITY = 9.81
-OFF_WALL = 0.02  # cells that particles keep from walls
 LEVEL_GAIN = 4.0
 """A liquid whose mean height is too low by a share x asks for a density less by 4 x: particles that
 crowd in cut cells and sink otherwise."""
 MOST_DRIFT = 0.02  # of the fill, by which the level moves at most
 TOP_SPEED = 20.0  # m/s, ten times what falls from a cup
-THICKEST = 1e7  # viscosity that single precision works with, in squared cells a step
+THICKEST = 1e7
+"""Viscosity, in squared cells a step, beyond which a velocity that is no number is put down to it.
+Stirs are right up to 1e36 Pa s; beyond, single precision overflows."""
 STEEPEST = 0.5  # cells a step over a cell: a steeper slope would hold a lone particle in the air
 
 

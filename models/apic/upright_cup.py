@@ -3,10 +3,11 @@
 
 import taichi as ti
 
+from .filling import OFF_WALL
 from .lanes import STRIDE, vec3
 from .liquid_state import LiquidState
 from .pressure import add_rise, push, solve_pressure
-from .transfer import OFF_WALL, clear, deposit, list_cells, move
+from .transfer import clear, deposit, list_cells, move
 from .viscosity import extend
 
 

@@ -9,7 +9,7 @@ SOUND, COLLAPSED, RUNAWAY, UNSOLVED, DRIFTED = range(5)
 ABSENT = -1  # of a place among simulations that march together
 REASONS = {
     COLLAPSED: "the liquid collapsed: its particles have too many neighbours",
-    UNSOLVED: "its viscosity is too large to compute with; up to 100 Pa s it is safe",
+    UNSOLVED: "its viscosity is too large to compute with; take a smaller one",
     DRIFTED: "its level moved by more than 2 %: take smaller cells or shorter steps",
     RUNAWAY: "a particle ran away: its velocity is not finite or beyond any liquid's",
 }

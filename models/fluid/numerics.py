@@ -98,7 +98,7 @@ class ParticleNumerics:
         return density * (at_rest + FLOOR_OF_SPEED * speed * spacing)
 
 
-# The default stick drags like that of the solver that made the bundled recordings, 1.4 to 2.5 times
-# as towed rods do at Reynolds 1 to 100. This one is within 28 % of them at 6.5 mm (validation case
-# `cylinder_drag`).
+# The default stick drags like that of the solver that made the bundled recordings of version 0.1:
+# 1.4 to 2.5 times as towed rods do at Reynolds 1 to 100. This one is within 28 % of them at 6.5 mm
+# (validation case `cylinder_drag`).
 PUBLISHED_DRAG = ParticleNumerics(stick_thinner=0.3, stick_drag=0.5)

@@ -81,6 +81,16 @@ def time_limit(seconds: float) -> Iterator[None]:
         _ends.reset(token)
 
 
+def check_time_limit(done: int, steps: int) -> None:
+    """To be called between kernel calls, after `done` of `steps` steps.
+
+    Raises:
+        TimeLimitExceeded: the time of `time_limit` is over.
+    """
+    if time.monotonic() > _ends.get():
+        raise TimeLimitExceeded(f"stopped after {done} of {steps} steps")
+
+
 class Watch(NamedTuple):
     """What looks on while a scene runs; it changes nothing in it.
 
@@ -107,8 +117,7 @@ def run_chunks(scene, steps: int, run: Callable[[int, int], None], watch: Watch 
         looks = {steps, *(int(step) for step in np.rint(np.arange(0.0, steps, every)))}
         watch.look(scene, 0)
     for begin, end in pairwise(sorted({0, *range(0, steps, CHUNK), *looks, steps})):
-        if time.monotonic() > _ends.get():
-            raise TimeLimitExceeded(f"stopped after {begin} of {steps} substeps")
+        check_time_limit(begin, steps)
         run(begin, end)
         if watch is not None and end in looks:
             watch.look(scene, end)

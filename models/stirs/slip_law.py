@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 # Numbers, the same for all liquids, cells and steps; `tests/benchmarks/slip_constants.py` shows how
-# the error of reference recordings depends on each.
+# the error of reference recordings depends on those from QUADRATIC to HELD_RADIUS.
 QUADRATIC = 1.7  # slip: force on a node by density, radius, length and slip squared
 IMPULSE = 2.0  # of the displaced mass: added mass, and the displaced liquid itself
 TIP = 0.2  # cells from the tip to the end of the line

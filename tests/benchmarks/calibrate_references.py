@@ -16,10 +16,7 @@ from bolfi_liquids.checks.reference_stirs import open_reference
 
 BUDGET = 20
 LEAST_VISCOSITY = 0.01  # Pa s; thinner liquids look alike
-HELD, ERROR = (
-    11 / 14,
-    0.2,
-)  # bars: share of intervals that hold the truth, median error of the median
+HELD, ERROR = 11 / 14, 0.2  # bars: share of intervals that hold the truth, and median error
 
 
 def main(folder: Path, runs: Path) -> None:

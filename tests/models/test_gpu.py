@@ -1,4 +1,4 @@
-"""The same kernels on a GPU. Nobody has run this: no project machine had one."""
+"""The same kernels on a GPU. Not run: the tasks that wrote it had no GPU."""
 
 import json
 import os

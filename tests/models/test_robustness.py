@@ -154,12 +154,15 @@ def told(run):
 def stir_faults(drawn, violent):
     """Point -> what was wrong with its stir; 0 for what no single one can be told of."""
     setup, path = violent
-    fastest, places = [0.0], []
+    fastest, farthest, heights = 0.0, 0.0, (np.inf, -np.inf)
 
     def look(scene, step):
+        nonlocal fastest, farthest, heights
         held = scene.count.to_numpy()[..., None] > np.arange(scene.particles)
-        fastest.append(np.linalg.norm(scene.speed.to_numpy()[held], axis=-1).max(initial=0.0))
-        places[:] = [scene.position.to_numpy()[held]]
+        x, y, z = scene.position.to_numpy()[held].T
+        fastest = np.linalg.norm(scene.speed.to_numpy()[held], axis=-1).max(initial=fastest)
+        farthest = np.hypot(x, y).max(initial=farthest)
+        heights = z.min(initial=heights[0]), z.max(initial=heights[1])
 
     watch = Watch(1.0 / (LOOK * setup.step(path)), look)
     signal, reasons = told(
@@ -170,12 +173,11 @@ def stir_faults(drawn, violent):
             yield k, f"not finite: {reasons}"
         elif np.abs(angles).max() > STEEPEST:
             yield k, f"tilt {np.degrees(np.abs(angles).max()):.0f} deg"
-    reach, height = np.hypot(*places[0][:, :2].T), places[0][:, 2]
+    lowest, highest = heights
     checks = {
-        f"{reach.max():.4f} m from the axis": reach.max() <= setup.cup.radius,
-        f"height {height.min():.4f} to {height.max():.4f} m": 0.0 <= height.min()
-        and height.max() <= setup.cup.height,
-        f"{max(fastest):.2f} m/s": max(fastest) < FASTEST["stir"],
+        f"{farthest:.4f} m from the axis": farthest <= setup.cup.radius,
+        f"height {lowest:.4f} to {highest:.4f} m": 0.0 <= lowest and highest <= setup.cup.height,
+        f"{fastest:.2f} m/s": fastest < FASTEST["stir"],
     }
     yield from ((0, what) for what, fine in checks.items() if not fine)
 

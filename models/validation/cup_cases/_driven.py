@@ -1,4 +1,10 @@
-"""What the cases of steady flow around the axis share."""
+"""What the cases of steady flow around the axis share.
+
+Early rows see friction of the wall less than late ones. A mean of 0.45 s after the exact profile, a
+wall without friction would have changed the angular momentum of liquid that is driven in proportion
+to r by 24 ν t/R²: by a third at 0.05 Pa s, where 6 % is a fifth of the friction, and by more in
+thicker liquids. The friction itself is judged by the case `swirl_decay`.
+"""
 
 from collections.abc import Callable
 from typing import NamedTuple

@@ -12,7 +12,12 @@ DEPTHS = (0.03, 0.05, 0.0525)  # m; the last surface lies in the middle of cells
 VISCOSITY = np.array([0.001, 0.01])  # Pa s
 SPEED, SLOW = 0.12, 0.06  # m/s at the surface: waves of 6 and 3 mm, of a cell and of half
 SECONDS = 2.5
-TOLERANCE, MIDDLE_TOLERANCE = 0.04, 0.06  # where the surface lies on faces, and in the middle
+TOLERANCE = 0.04
+ON_FACES = {SPEED: (TOLERANCE, TOLERANCE), SLOW: (0.06, 0.06)}
+"""Largest errors at each viscosity where the surface at rest lies on faces of cells."""
+IN_THE_MIDDLE = {SPEED: (0.06, 0.06), SLOW: (0.13, 0.25)}
+"""The same where it lies in the middle. Seven seeds had 5 to 11 % and 5 to 23 % in slow waves: a
+wave within a cell is slower, and dies away sooner, than one that passes through cells."""
 
 
 def wave(depth: float, speed: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -29,18 +34,17 @@ def run(progress: Progress, seed: int) -> CaseResult:
     """Period of the liquid's centre, which is at rest in the middle before the wave."""
     rows, curves, notes = [], [], {}
     for number, depth in enumerate(DEPTHS):
-        time, centre = wave(depth, SPEED, seed)
         expected = sloshing_period(RADIUS, depth)
-        allowed = MIDDLE_TOLERANCE if depth == DEPTHS[-1] else TOLERANCE
-        for mu, x in zip(VISCOSITY, centre.T, strict=True):
-            swing = oscillation(time, x)
-            name = f"{1e3 * depth:g} mm deep, {mu:g} Pa s"
-            rows.append(Row.relative(f"period {name} [s]", expected, swing.period, allowed))
-            notes[f"decay {name} [1/s]"] = swing.decay
-            curves.append(Curve(name, time, 1e3 * x, series=len(curves)))
-        time, centre = wave(depth, SLOW, seed)
-        slow = oscillation(time, centre[:, 0]).period / expected
-        notes[f"period over theory, {1e3 * depth:g} mm deep, half the wave"] = slow
+        allowed = IN_THE_MIDDLE if depth == DEPTHS[-1] else ON_FACES
+        for speed in (SPEED, SLOW):
+            time, centre = wave(depth, speed, seed)
+            for mu, x, error in zip(VISCOSITY, centre.T, allowed[speed], strict=True):
+                swing = oscillation(time, x)
+                name = f"{1e3 * depth:g} mm deep, {mu:g} Pa s, {speed:g} m/s"
+                rows.append(Row.relative(f"period {name} [s]", expected, swing.period, error))
+                notes[f"decay {name} [1/s]"] = swing.decay
+                if speed == SPEED:
+                    curves.append(Curve(name, time, 1e3 * x, series=len(curves)))
         progress((number + 1) / len(DEPTHS))
     panel = Panel("time [s]", "centre of the liquid [mm]", tuple(curves))
     return CaseResult(tuple(rows), (panel,), notes)

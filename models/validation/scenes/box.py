@@ -183,8 +183,10 @@ class BoxScene(Fluid):
 
         Raises:
             RuntimeError: neighbour lists overflowed.
+            TimeLimitExceeded: the time of `runtime.time_limit` is over.
         """
         for start in range(0, steps, CHUNK):
+            runtime.check_time_limit(start, steps)
             self.run(active, min(CHUNK, steps - start))
         if self.fault.to_numpy()[:active].any():
             raise RuntimeError("the liquid in the box went wrong: it collapsed or ran away")

@@ -45,6 +45,8 @@ def slip_forces(
         seconds: How long.
         seed: Of the particles' places.
 
+    Raises:
+        TimeLimitExceeded: the time of `runtime.time_limit` is over.
     Warns:
         FailedSimulation: a liquid went wrong; its forces are NaN.
     """
@@ -66,7 +68,10 @@ def slip_forces(
         pivots = np.stack([pivots, np.zeros_like(pivots), np.full_like(pivots, LENGTH)], axis=-1)
         unseen = np.empty((*direction.shape[:2], steps + 1, 3), np.float32)
         scene.begin(pivots, unseen, len(points))
-        carried = [_held_step(scene, held, step, size) for step in range(steps)]
+        carried = []
+        for step in range(steps):
+            runtime.check_time_limit(step, steps)
+            carried.append(_held_step(scene, held, step, size))
         status = scene.status.to_numpy().reshape(-1)[:size]
     line = line_of(radius, cup.cell, cup.depth)
     height = (TIP + 0.5 + np.arange(line.nodes)) * cup.cell

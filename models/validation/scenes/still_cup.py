@@ -96,6 +96,8 @@ def flow_in_cup(
         Times of the positions at the steps' ends [s], shape [steps], and what was seen then, shape
         [steps, B, ...]; NaN for a liquid that went wrong.
 
+    Raises:
+        TimeLimitExceeded: the time of `runtime.time_limit` is over.
     Warns:
         FailedSimulation: a liquid went wrong.
     """
@@ -104,7 +106,8 @@ def flow_in_cup(
     with runtime.LOCK:
         scene, groups = _started(cup, viscosity, flow, seed)
         seen = []
-        for _ in range(steps):
+        for step in range(steps):
+            runtime.check_time_limit(step, steps)
             scene.step(groups)
             seen.append(_look(scene, size, look))
         status = scene.status.to_numpy().reshape(-1)[:size]

@@ -225,6 +225,12 @@ def test_a_case_may_take_so_long(tmp_path, registry):
     assert run(tmp_path, registry).ran == ("long",)
 
 
+@pytest.mark.slow
+def test_a_case_of_liquid_in_a_cup_may_take_so_long(tmp_path):
+    check = check_physics(tmp_path, ["ring_couette"], timeout=0.5, progress=False)
+    assert check.records[0]["error"].startswith("TimeLimitExceeded")
+
+
 def test_what_is_no_number_is_kept_as_null_and_fails(tmp_path):
     def diverged(progress, seed):
         panel = Panel("x", "y", (Curve("", [0.0, 1.0], [np.nan, 1.0]),))

@@ -280,6 +280,18 @@ def test_warnings_of_the_engine(calibration):
     assert any(str(thin).startswith(message) for message in QUOTED)
 
 
+def test_warnings_of_stirs_that_are_cut_too_roughly():
+    from bolfi_liquids.models.fluid.faults import DRIFTED, FailedSimulation, faulty
+    from bolfi_liquids.models.numerics import UntestedResolution, check_resolution
+
+    with pytest.warns(UntestedResolution) as warned:
+        check_resolution(0.002, 0.004)
+    with pytest.warns(FailedSimulation) as failed:
+        faulty(np.array([DRIFTED]), np.array([0]))
+    for warning in (*warned, *failed):
+        assert f"{warning.category.__name__}: {warning.message}" in QUOTED
+
+
 def test_warnings_of_a_wrong_frame_and_of_a_bad_fit(calibration):
     from bolfi_liquids.calibration.bad_fit import bad_fit
     from bolfi_liquids.inputs.bundled import bundled_recording
