@@ -72,7 +72,8 @@ class StirSetup:
         particles: Number of particles, which decides the cells; 0: as many as the cells make that
             `numerics` chooses for the stick.
         numerics: Constants of the discretisation; `ParticleNumerics` chooses the former fluid.
-        tilt: Of the stick at the start, in the xz and yz planes [rad]; the former fluid's hangs
+        tilt: Of the stick at the start, as the cameras see it, in the xz and yz planes [rad]; what
+            effects in the cameras add is no lean of the stick. The former fluid's hangs
             straight down.
     """
 
