@@ -120,7 +120,7 @@ def test_a_misfit_that_was_not_criticised_is_told(fine):
 
 def test_a_bad_fit_is_told_first(fine):
     """Of the calibration that is poured: an effect that was accepted may have mended it."""
-    far = replace(fine.calibrated, fit_rms_deg=0.9001)
+    far = replace(fine.calibrated, fit_rms_deg=0.902)
     first, *_ = warnings_of(replace(fine, calibrated=far, latest=far, criticised=None))
     assert (first.key, first.values) == ("calibration.bad_fit", {"summary": far})
     assert "3.0 times" in str(first)
