@@ -89,8 +89,10 @@ class StirSetup:
         check_numbers("setup", zero=True, particles=self.particles)
         if self.particles != int(self.particles):
             raise ValueError(f"setup: particles must be a whole number, got {self.particles}")
-        if not all(abs(angle) < MAX_TILT for angle in self.tilt):
-            raise ValueError(f"setup: tilt must be less than {MAX_TILT} rad, got {self.tilt}")
+        if len(self.tilt) != 2 or not all(abs(angle) < MAX_TILT for angle in self.tilt):
+            raise ValueError(
+                f"setup: tilt must be two angles of less than {MAX_TILT} rad, got {self.tilt}"
+            )
         if self.submerged > self.stick.length:
             raise ValueError(
                 "setup: submerged must be at most the stick's length, or its pivot is in the "
