@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 from functools import cache
 from itertools import pairwise
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "False")
 os.environ.setdefault("TI_ENABLE_PYBUF", "0")
 
 SLOTS = max(8, os.cpu_count() or 1)  # simulations of a scene side by side
+STALE_S = 60.0  # age of a lock that is held for a moment
 CHUNK = 240  # substeps a kernel call, so that Ctrl-C is prompt
 
 
@@ -123,6 +125,15 @@ def run_chunks(scene, steps: int, run: Callable[[int, int], None], watch: Watch 
             watch.look(scene, end)
 
 
+def remove_stale_lock(folder: Path) -> None:
+    """Of Taichi's cache of kernels: a process that is killed while it writes there leaves the lock,
+    and every later one compiles for itself."""
+    lock = folder / "ticache.lock"
+    with contextlib.suppress(OSError):
+        if time.time() - lock.stat().st_mtime > STALE_S:
+            lock.unlink()
+
+
 @cache
 def start() -> None:
     """Start Taichi on the CPU; later calls in the same process do nothing.
@@ -130,7 +141,9 @@ def start() -> None:
     Taichi keeps its settings for the life of a process, so other settings need another process.
     """
     import taichi as ti
+    from taichi.lang.impl import default_cfg
 
+    remove_stale_lock(Path(default_cfg().offline_cache_file_path))
     # Fast arithmetic would let the compiler split sums as it likes, and a simulation's bits depend
     # on its company. The banner is a bare print that no log level silences.
     with contextlib.redirect_stdout(io.StringIO()):
