@@ -77,9 +77,9 @@ def watched_stir(
             directions = np.empty((size, path.shape[0], 3))
             # what tilted cameras add is no lean of the stick
             upright = changed_signal(gripper.time, np.zeros((size, len(gripper.time), 2)), acting)
-            start = np.array(setup.tilt) - upright[:, 0]
+            start = hanging(np.array(setup.tilt) - upright[:, 0])
             for kinds, rows, coefficients in liquid_sets(acting, size):
-                stirs = Stirs(liquid, rig, seeds, hanging(start), coefficients).rows(rows)
+                stirs = Stirs(liquid, rig, seeds, start, coefficients).rows(rows)
                 directions[rows] = march(setup, stirs, step, kinds, watch)
         else:
             directions = stir_particles(setup, liquid, rig, seeds, acting, watch)

@@ -191,12 +191,16 @@ class CalibrationSummary(Section):
         """RMS that the simulator usually errs by, at the viscosity of the closest simulation."""
         return float(np.degrees(stirring_error(self.closest["viscosity"])))
 
+    @property
+    def unexplained_deg(self) -> float:
+        """What the simulator's own error leaves of `fit_rms_deg`."""
+        return unexplained(self.fit_rms_deg, self.simulator_error_deg)
+
     @computed_field
     @property
     def fit_to_noise(self) -> Number:
-        """What the simulator's own error leaves of `fit_rms_deg`, in units of the noise."""
-        left = unexplained(self.fit_rms_deg, self.simulator_error_deg)
-        return left / max(self.noise_deg, MIN_NOISE_DEG)
+        """`unexplained_deg` in units of the noise."""
+        return self.unexplained_deg / max(self.noise_deg, MIN_NOISE_DEG)
 
     @computed_field
     @property

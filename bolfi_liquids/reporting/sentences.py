@@ -6,12 +6,7 @@ Their wording is in `data/calibration_sentences.jinja` and `data/pour_sentences.
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration.summary import (
-    CalibrationSummary,
-    ParameterSummary,
-    SamplerStatus,
-    unexplained,
-)
+from ..calibration.summary import CalibrationSummary, ParameterSummary, SamplerStatus
 from ..pouring.result import PourSummary
 from ..wording import Sentence, sentence
 
@@ -52,7 +47,7 @@ def fit_sentence(summary: CalibrationSummary) -> Sentence:
         return sentence("calibration.fit_at_noise", summary=summary)
     if fit <= FIT_NEAR_NOISE * noise:
         return sentence("calibration.fit_near_noise", summary=summary, ratio=fit / noise)
-    if unexplained(fit, summary.simulator_error_deg) <= FIT_NEAR_NOISE * noise:
+    if summary.unexplained_deg <= FIT_NEAR_NOISE * noise:
         return sentence("calibration.fit_within_error", summary=summary)
     return sentence("calibration.fit_above_noise", summary=summary)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..calibration.bad_fit import bad_fit
 from ..calibration.result import Calibration
-from ..calibration.summary import CalibrationSummary, unexplained
+from ..calibration.summary import CalibrationSummary
 from ..criticism.result import is_criticised, latest_calibration
 from ..criticism.summary import CriticismSummary
 from ..criticism.verdict import Verdict
@@ -129,8 +129,7 @@ def _of_the_model(
     calibrated: CalibrationSummary, criticised: CriticismSummary | None
 ) -> list[Sentence]:
     if criticised is None:
-        left = unexplained(calibrated.fit_rms_deg, calibrated.simulator_error_deg)
-        if left > FIT_NEAR_NOISE * calibrated.noise_deg:
+        if calibrated.unexplained_deg > FIT_NEAR_NOISE * calibrated.noise_deg:
             return [sentence("warning.misfit_not_criticised")]
         return [sentence("warning.not_criticised")]
     found = []
