@@ -140,7 +140,7 @@ def test_every_effect_explains_itself(effect):
     assert np.isfinite(Univariate(effect.prior).log_prob(np.asarray(effect.neutral)))
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_a_pour_takes_what_a_stir_taught(pour):
     """Effects that do not act in a pour are accepted there, and change nothing."""
     elsewhere = [name for name, effect in models.EFFECTS.items() if "pour" not in effect.scenes]

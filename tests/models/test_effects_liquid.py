@@ -149,7 +149,7 @@ def test_adhesion_keeps_liquid_in_the_cup(cups):
     assert sticky > 0.1
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_adhesion_does_not_heat(cups):
     """A liquid at rest stays so: below 1.3 cm/s, where it has 0.5 without adhesion."""
     from bolfi_liquids.models.fluid.packing import pack_cylinder
@@ -168,7 +168,7 @@ def test_adhesion_does_not_heat(cups):
     assert np.sqrt(np.mean(speed**2)) < 0.013
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_a_liquid_may_name_its_adhesion(cups):
     action = models.PourAction(np.pi, 0.02)
 

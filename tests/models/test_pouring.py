@@ -56,7 +56,7 @@ def test_same_bits_again_and_anywhere_in_a_batch(cups):
     np.testing.assert_array_equal(whole.received[1:2], alone.received)
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_a_tilt_short_of_the_surface_spills_nothing(cups):
     gentle = cups.model_copy(
         update={"pour": cups.pour.model_copy(update={"final_angle_deg": 15.0})}

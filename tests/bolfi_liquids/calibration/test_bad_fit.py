@@ -21,8 +21,11 @@ TURN = np.exp(0.25j * np.pi)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "fault"),
-    [(lambda seen: TURN * seen, "yaw_deg"), (np.conj, "flip"), (lambda seen: seen, None)],
-    ids=["turned by 45 deg", "sign of yz", "right"],
+    [
+        pytest.param(lambda seen: TURN * seen, "yaw_deg", id="turned by 45 deg"),
+        pytest.param(np.conj, "flip", id="sign of yz", marks=pytest.mark.minutes),
+        pytest.param(lambda seen: seen, None, id="right"),
+    ],
 )
 def test_a_wrong_frame_is_never_passed_on(tmp_path, caplog, change, fault):
     whole = bl.open_recording(REFERENCE / "glycerin_v10.nc").first(SAMPLES)

@@ -86,7 +86,7 @@ def test_chosen_is_among_the_better_actions(pour):
     assert pour.chosen.expected_spillage < np.quantile(risk, 0.2)
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_other_seeds_agree_with_the_judgement(pour, calibration):
     """And other draws: the posterior's mean, as 64 of them say, with the landing off as much."""
     tree = xr.load_datatree(pour.path / "pour.nc")

@@ -71,10 +71,10 @@ def test_a_mistyped_run_is_not_made(tmp_path, command):
     assert list(tmp_path.iterdir()) == []
 
 
-POUR = """
-import json, sys
+REPORT = """
+import sys
 import bolfi_liquids as bl
-bl.choose_pour(sys.argv[1], force=True, **json.loads(sys.argv[2]))
+bl.report(sys.argv[1], moving=False)
 """
 
 
@@ -87,13 +87,11 @@ def is_signed(lock):
 
 
 @pytest.mark.slow
-def test_of_two_commands_at_once_one_is_refused_and_nothing_is_lost(
-    calibration, pour_settings, tmp_path
-):
-    """A pour is stopped in the middle of its work; while it holds the run, all others try."""
+def test_of_two_commands_at_once_one_is_refused_and_nothing_is_lost(calibration, tmp_path):
+    """A report is stopped in the middle of its work; while it holds the run, all others try."""
     run = shutil.copytree(calibration.path, tmp_path / "run")
-    pour = [sys.executable, "-c", POUR, str(run), json.dumps(pour_settings)]
-    with subprocess.Popen(pour, stderr=subprocess.DEVNULL) as first:
+    report = [sys.executable, "-c", REPORT, str(run)]
+    with subprocess.Popen(report, stderr=subprocess.DEVNULL) as first:
         while not is_signed(run / LOCK):
             assert first.poll() is None
             time.sleep(0.01)
@@ -106,8 +104,5 @@ def test_of_two_commands_at_once_one_is_refused_and_nothing_is_lost(
         finally:
             first.send_signal(signal.SIGCONT)
         assert first.wait() == 0
-    bl.report(run, moving=False, progress=False)
-    summary = read_summary(run)
-    assert {"calibrate", "pour"} <= set(summary)
-    assert summary["calibrate"] == read_summary(calibration.path)["calibrate"]
-    assert bl.Pour.open(run).chosen.action and not (run / LOCK).exists()
+    assert (run / "report.html").exists() and not (run / LOCK).exists()
+    assert read_summary(run) == read_summary(calibration.path)

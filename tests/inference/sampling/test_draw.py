@@ -277,7 +277,7 @@ def test_a_fit_agrees_with_its_quadrature(line_fit, sampler):
     assert posterior.attrs["status"] == Status.CONVERGED
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_finds_separated_modes_of_a_fit(prior):
     """The slope's modulus is observed, so plus and minus are equally likely; every chain must
     visit both."""

@@ -131,7 +131,7 @@ def test_a_run_that_blew_up_does_not_drown_the_others():
     assert np.abs(fitted.minimum() - 0.4).max() < 0.15
 
 
-@pytest.mark.slow
+@pytest.mark.minutes
 def test_marginalised_hyperparameters_widen_what_few_points_leave_open():
     u = sobol(0, 0, 7, 1)
     values = 1.0 + 3.0 * (u[:, 0] - 0.4) ** 2 + 0.2 * np.random.default_rng(1).normal(size=7)
