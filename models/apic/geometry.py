@@ -9,13 +9,21 @@ from .grid import Grid
 
 Distance = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """Of points x, y and z from the nearest wall [m], arrays that broadcast; negative within it."""
+Side = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""Of points x, y and z: ABOVE, INSIDE or OUTSIDE; of points within a wall, that of its nearer
+face."""
 Kernel = Callable[[np.ndarray], np.ndarray]
 """Weights of samples by their distance, in cells, from the point of a mean."""
+
+NOWHERE, ABOVE, INSIDE, OUTSIDE = -1, 0, 1, 2
+"""Sides of a wall that may be thinner than a cell. Liquid passes between any two but INSIDE and
+OUTSIDE, which the rim parts."""
 
 SLIVER = 0.1  # open share below which a cell is closed: liquid would drain into it
 LEAST_AREA = 0.02  # open share of a face that carries momentum
 LEAST_CAPACITY = 0.02
 ON_WALL = 1e-3  # cells from a wall within which a face lies in it
+BESIDE = 0.75  # cells from a wall within which a cell's centre is close to it
 NEAREST = 0.1  # cells from a wall at which friction is reckoned at least
 SAMPLES = 8  # along each edge of a cell
 TOGETHER = 4  # layers of cells that are sampled at once
@@ -28,24 +36,34 @@ EDGES = ((0.5, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, 0.5))  # centres of its lo
 class Geometry(NamedTuple):
     """Shares of cells, shape (cells,), and of their lower faces, shape (3, cells); float32.
 
+    A cell that a thin wall cuts counts for the side that has more of it.
+
     Attributes:
         usable: 1 where liquid may be.
+        beside: 1 where the centre is close to a wall.
+        side: Of the wall: ABOVE, INSIDE or OUTSIDE.
         volume: Open share of the cell.
         capacity: What full liquid deposits into the cell, of a whole cell's.
         area: Open share of the face.
         carries: 1 where the face carries momentum.
         shut: 1 where a wall closes the face.
-        friction: Area of wall that rubs at the face over its distance, in cells.
+        face_side: Of the wall, on which the face is.
+        wall: Area of wall that rubs at the face, in cells.
+        friction: The same over its distance.
         solid: Share of the box around the face that is wall, weighted as particles deposit.
         edge: Open share of the box around the cell's lowest edge along the axis.
     """
 
     usable: np.ndarray
+    beside: np.ndarray
+    side: np.ndarray
     volume: np.ndarray
     capacity: np.ndarray
     area: np.ndarray
     carries: np.ndarray
     shut: np.ndarray
+    face_side: np.ndarray
+    wall: np.ndarray
     friction: np.ndarray
     solid: np.ndarray
     edge: np.ndarray
@@ -61,48 +79,82 @@ def from_cup(radius: float, floor: bool = True) -> Distance:
     return distance
 
 
-def sample_geometry(grid: Grid, distance: Distance) -> Geometry:
+def sample_geometry(grid: Grid, distance: Distance, side: Side | None = None) -> Geometry:
     """The geometry of a vessel.
 
     Cells that are cut by walls follow Batty, Bertails and Bridson (2007), "A fast variational
     framework for accurate solid-fluid coupling"; here the shares are means over samples.
+
+    Args:
+        grid: Its cells.
+        distance: From the walls.
+        side: Of the walls, where liquid is on both sides of them.
     """
     inner = grid.inner()
-    volume, capacity = np.zeros((2, grid.cells))
+    kinds = (ABOVE,) if side is None else (ABOVE, INSIDE, OUTSIDE)
+    volumes, capacities = np.zeros((2, len(kinds), grid.cells))
     deposit, edge, rubbing = np.zeros((3, 3, grid.cells))
-    for cells, is_open, rubs in _samples(grid, distance):
-        volume[cells] = _means(is_open, _box, CENTRE)
-        capacity[cells] = _means(is_open, _hat, CENTRE)
+    for cells, sides, rubs in _samples(grid, distance, side):
+        for kind in kinds:
+            here = (sides == kind).astype(np.float32)
+            volumes[kind, cells] = _means(here, _box, CENTRE)
+            capacities[kind, cells] = _means(here, _hat, CENTRE)
+        is_open = (sides != NOWHERE).astype(np.float32)
         for axis in range(3):
             deposit[axis, cells] = _means(is_open, _hat, FACES[axis])
             edge[axis, cells] = _means(is_open, _box, EDGES[axis])
             rubbing[axis, cells] = _means(rubs[axis], _box, FACES[axis])
-    area = np.stack([_open_faces(grid, distance, axis) for axis in range(3)])
+    own = np.argmax(volumes, axis=0)
+    volume = np.choose(own, volumes)
+    capacity = sum(np.where(_joined(own, kind), capacities[kind], 0.0) for kind in kinds)
+    below = [np.roll(own, stride) for stride in grid.strides]
+    area = np.stack([_open_faces(grid, distance, side, a, (below[a], own)) for a in range(3)])
     sliver = inner & (volume <= SLIVER)
     for axis, stride in enumerate(grid.strides):
         area[axis, sliver] = 0.0
         area[axis, stride:][sliver[:-stride]] = 0.0
     carries = inner & (area > LEAST_AREA)
-    friction = np.stack(
-        [_friction(grid, distance, axis, rubbing[axis], carries[axis]) for axis in range(3)]
+    wall = np.stack(
+        [_moved_inward(grid, distance, axis, rubbing[axis], carries[axis]) for axis in range(3)]
     )
+    away = np.stack([distance(*grid.faces(axis).T) / grid.cell for axis in range(3)])
     fields = (
         inner & ~sliver,
+        distance(*grid.points(CENTRE).T) < BESIDE * grid.cell,
+        own,
         volume,
         np.maximum(capacity, LEAST_CAPACITY),
         area * inner,
         carries,
         inner & ~carries,
-        friction,
+        np.maximum(own, below),
+        wall,
+        wall / np.maximum(away, NEAREST),
         1.0 - deposit,
         edge,
     )
     return Geometry(*(np.ascontiguousarray(field, np.float32) for field in fields))
 
 
-def _samples(grid: Grid, distance: Distance) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
-    """Samples of a few layers of cells: the cells, which samples are open, shape (z, y, x), and how
-    much wall each stands for, in cells, times `_rub` of the wall's normal, shape (3, z, y, x)."""
+def _joined(one: np.ndarray, other: np.ndarray | int) -> np.ndarray:
+    """Whether liquid passes between two sides."""
+    return (one == other) | (one == ABOVE) | (np.asarray(other) == ABOVE)
+
+
+def _sides(
+    away: np.ndarray, side: Side | None, x: np.ndarray, y: np.ndarray, z: np.ndarray
+) -> np.ndarray:
+    """Of the points of a lattice, shape (z, y, x); NOWHERE where they are not `away` from walls."""
+    where = ABOVE if side is None else side(x, y[:, None], z[:, None, None])
+    return np.where(away, where, NOWHERE).astype(np.int8)
+
+
+def _samples(
+    grid: Grid, distance: Distance, side: Side | None
+) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
+    """Samples of a few layers of cells: the cells, on which side samples are, shape (z, y, x), and
+    how much wall each stands for, in cells, times `_rub` of the wall's normal, shape (3, z, y, x).
+    """
     x, y, z = (_along(grid, axis) for axis in range(3))
     for low in range(0, grid.shape[2], TOGETHER):
         high = min(low + TOGETHER, grid.shape[2])
@@ -114,7 +166,7 @@ def _samples(grid: Grid, distance: Distance) -> Iterator[tuple[slice, np.ndarray
         rubs = np.zeros((3, *away.shape), np.float32)
         rubs[:, beside_wall] = SAMPLES * _wall_at(away[beside_wall], normal) * _rub(normal**2)
         cells = slice(low * grid.strides[2], high * grid.strides[2])
-        yield cells, (away > 0.0).astype(np.float32), rubs
+        yield cells, _sides(away > 0.0, side, x, y, layers), rubs
 
 
 def _along(grid: Grid, axis: int) -> np.ndarray:
@@ -170,14 +222,31 @@ def _means_along(
     return np.moveaxis(np.asarray(found), 0, 2 - axis)
 
 
-def _open_faces(grid: Grid, distance: Distance, axis: int) -> np.ndarray:
-    """Open share of each cell's lower face along an axis, shape (cells,)."""
-    along = [_along(grid, a) for a in range(3)]
-    along[axis] = grid.origin[axis] + grid.cell * np.arange(grid.shape[axis])
-    share = (_distances(distance, *along) > ON_WALL * grid.cell).astype(np.float32)
-    for other in {0, 1, 2} - {axis}:
-        share = _means_along(share, _box, CENTRE, other)
-    return share.ravel()
+def _open_faces(
+    grid: Grid,
+    distance: Distance,
+    side: Side | None,
+    axis: int,
+    cells: tuple[np.ndarray, np.ndarray],
+) -> np.ndarray:
+    """Open share of each cell's lower face along an axis, shape (cells,).
+
+    `cells` are the sides of the cells below and above it.
+    """
+    x, y, z = (
+        grid.origin[a] + grid.cell * np.arange(grid.shape[a]) if a == axis else _along(grid, a)
+        for a in range(3)
+    )
+    away = _distances(distance, x, y, z) > ON_WALL * grid.cell
+    sides = _sides(away, side, x, y, z - ON_WALL * grid.cell)  # what is at the rim is below it
+    joins = np.where(_joined(*cells), np.maximum(*cells), NOWHERE)
+    open_share = np.zeros(grid.cells)
+    for kind in np.unique(joins[joins != NOWHERE]):
+        share = (sides == kind).astype(np.float32)
+        for other in {0, 1, 2} - {axis}:
+            share = _means_along(share, _box, CENTRE, other)
+        open_share += np.where(joins == kind, share.ravel(), 0.0)
+    return open_share
 
 
 def _normal(grid: Grid, distance: Distance, points: np.ndarray) -> np.ndarray:
@@ -198,21 +267,21 @@ def _rub(squared: np.ndarray) -> np.ndarray:
     return along / (along**2 + squared**2)
 
 
-def _friction(
+def _moved_inward(
     grid: Grid, distance: Distance, axis: int, rubbing: np.ndarray, carries: np.ndarray
 ) -> np.ndarray:
-    """Rubbing area of the faces along an axis over their distance from the wall.
+    """Rubbing area of the faces along an axis.
 
     What rubs at a face that carries no momentum rubs at its neighbours away from the wall instead.
     At the corner of the floor none may carry: cups of less than 3 cm in radius lose 3 to 5 % of
     what rubs vertically.
     """
     area, faces = np.where(carries, rubbing, 0.0), grid.faces(axis).T
-    lost = np.flatnonzero((rubbing > 0.0) & ~carries)
+    lost = np.flatnonzero((rubbing > 0.0) & ~carries & grid.inner())
     normal = _normal(grid, distance, faces[:, lost])
     steps = np.array(grid.strides)[:, None] * np.sign(normal).astype(int)
     inward = np.clip(lost + steps, 0, grid.cells - 1)
     weight = normal**2 * carries[inward]
     weight /= np.maximum(weight.sum(axis=0), 1e-20)
     np.add.at(area, inward, weight * rubbing[lost])
-    return area / np.maximum(distance(*faces) / grid.cell, NEAREST)
+    return area

@@ -17,11 +17,13 @@ class Grid:
         cell: Edge of a cell [m].
         shape: Cells along x, y and z.
         origin: Lowest corner of the box [m].
+        mirrored: Whether y = 0 is a mirror, behind `WALL` layers of cells.
     """
 
     cell: float
     shape: tuple[int, int, int]
     origin: tuple[float, float, float]
+    mirrored: bool = False
 
     @classmethod
     def around_cup(cls, cell: float, radius: float, depth: float) -> "Grid":
@@ -52,8 +54,10 @@ class Grid:
         return self.points(tuple(0.0 if axis == a else 0.5 for a in range(3)))
 
     def inner(self) -> np.ndarray:
-        """Which cells are not on the box's outside, bool (cells,)."""
+        """Which cells are neither on the box's outside nor before the mirror, bool (cells,)."""
         nx, ny, nz = self.shape
         inside = np.zeros((nz, ny, nx), bool)
         inside[1:-1, 1:-1, 1:-1] = True
+        if self.mirrored:
+            inside[:, :WALL] = False
         return inside.ravel()

@@ -23,6 +23,12 @@ def positive(x):
 
 
 @ti.func
+def at_least(x, least):
+    """1 where x >= least, else 0."""
+    return ti.select(x >= least, lanes(1.0), lanes(0.0))
+
+
+@ti.func
 def ratio(a, b):
     """a / b where b > 0, else 0."""
     return ti.select(b > 1e-20, a / ti.max(b, 1e-20), lanes(0.0))

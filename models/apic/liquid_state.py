@@ -6,6 +6,7 @@ import taichi as ti
 
 from ..fluid.faults import ABSENT, SOUND
 from .lanes import LANES, lanes, mat3, vec3
+from .surface import LIQUID
 from .transfer import GRAVITY, clear
 
 
@@ -24,9 +25,17 @@ class LiquidState:
         pressure: Times step over density and cell [m/s].
         status: How a lane fares, a code of `faults`.
 
-    A scene is a subclass with two functions: `acceleration` of a particle, by what acts on all
-    liquid, and `keep_inside`, the place and velocity of a particle that a wall stops.
+    A scene is a subclass with the function `accelerate`, which changes a particle's velocity, and
+    its slope, by what acts on all liquid. If it is SIDED, it has the fields `side` of cells and
+    `face_side` of faces, and the function `side_of` a point.
     """
+
+    UPRIGHT = True  # gravity is along -z
+    SIDED = False  # liquid is on both sides of walls that may be thinner than a cell
+    MIRRORED = False  # only y >= 0 is simulated, beyond two layers of cells
+    LEAST_AT_WALL = LIQUID  # share of its capacity from which a cell close to a wall is liquid
+    MENDING_TIME = 0.08  # s in which a wrong density is mended
+    TOLERANCE = 5e-3  # of the divergence that pressure leaves
 
     def __init__(self, groups, cells, particles, effects=()):
         """
@@ -53,7 +62,9 @@ class LiquidState:
         self.normal_weight = of_cells()
 
         # of the vessel
-        self.usable, self.open_volume, self.capacity = (ti.field(ti.f32, cells) for _ in range(3))
+        self.usable, self.open_volume, self.capacity, self.least = (
+            ti.field(ti.f32, cells) for _ in range(4)
+        )
         self.area, self.carries, self.shut, self.rub, self.solid, self.edge = (
             ti.field(ti.f32, (3, cells)) for _ in range(6)
         )
@@ -71,7 +82,7 @@ class LiquidState:
         )
         self.slope = ti.Matrix.field(3, 3, ti.f32, (groups, LANES, particles))
         self.count, self.status = (ti.field(ti.i32, (groups, LANES)) for _ in range(2))
-        self.particle, self.viscosity, self.density, self.fill = (
+        self.particle, self.viscosity, self.density, self.level = (
             ti.Vector.field(LANES, ti.f32, groups) for _ in range(4)
         )
         self.lack = ti.Vector.field(LANES, ti.f32, groups)  # of density, where the level is high
@@ -84,10 +95,11 @@ class LiquidState:
     def enter_vessel(self, grid, geometry, dt):
         """Take a vessel's `Grid` and `Geometry`, and a step [s]."""
         g = geometry
+        least = np.where(g.beside > 0.0, self.LEAST_AT_WALL, LIQUID).astype(np.float32)
         self._enter_vessel(
             np.array(grid.shape, np.int32),
             np.array([*grid.origin, grid.cell, dt], np.float32),
-            np.stack([g.usable, g.volume, g.capacity]),
+            np.stack([g.usable, g.volume, g.capacity, least]),
             np.stack([g.area, g.carries, g.shut, g.friction, g.solid, g.edge]),
         )
 
@@ -109,6 +121,7 @@ class LiquidState:
             self.usable[m] = of_cells[0, m]
             self.open_volume[m] = of_cells[1, m]
             self.capacity[m] = of_cells[2, m]
+            self.least[m] = of_cells[3, m]
             for a in range(3):
                 self.area[a, m] = of_faces[0, a, m]
                 self.carries[a, m] = of_faces[1, a, m]
@@ -131,7 +144,7 @@ class LiquidState:
             count: Of particles, shape [groups, LANES]; -1 where a lane has no simulation, which
                 takes no time.
             liquid: Volume of a particle [full cells], kinematic viscosity [m²/s], density [kg/m³]
-                and depth [m], shape [4, groups, LANES].
+                and height of the level [m], shape [4, groups, LANES].
         """
         for g in range(position.shape[0]):
             clear(self, g)
@@ -143,7 +156,7 @@ class LiquidState:
                 self.particle[g][lane] = liquid[0, g, lane]
                 self.viscosity[g][lane] = liquid[1, g, lane]
                 self.density[g][lane] = liquid[2, g, lane]
-                self.fill[g][lane] = liquid[3, g, lane]
+                self.level[g][lane] = liquid[3, g, lane]
                 for n in range(count[g, lane]):
                     for a in ti.static(range(3)):
                         self.position[g, lane, n][a] = position[g, lane, n, a]
@@ -155,7 +168,7 @@ class LiquidState:
                 z = self.origin[None][2] + (m // layer + 0.5) * cell
                 weight = self.usable[m] * GRAVITY * self.dt[None] / cell
                 for lane in range(LANES):
-                    self.pressure[g, m][lane] = weight * ti.max(self.fill[g][lane] - z, 0.0)
+                    self.pressure[g, m][lane] = weight * ti.max(self.level[g][lane] - z, 0.0)
 
     def set_coefficients(self, coefficients):
         """Of the effects, shape [effects, groups, LANES]."""

@@ -7,7 +7,7 @@ from .lanes import chosen, lanes, positive, ratio
 from .surface import to_surface
 from .transfer import strides
 
-TOLERANCE, LEAST_SPEED = 5e-3, 0.02  # of the divergence; m/s, the speed that it is relative to
+LEAST_SPEED = 0.02  # m/s, that the divergence left over is relative to
 MOST_ITERATIONS = 150
 
 
@@ -45,7 +45,7 @@ def solve_pressure(s, g):
         s.rise[g, m] = zero
         rz += b * z
         cells += s.liquid[g, m]
-    goal = TOLERANCE**2 * (cells * (LEAST_SPEED**2 / 6.0) + 1e-9)
+    goal = ti.static(s.TOLERANCE**2) * (cells * (LEAST_SPEED**2 / 6.0) + 1e-9)
     iteration, runs = 0, positive(rz - goal)
     while iteration < MOST_ITERATIONS and runs.max() > 0.0:
         dq = zero

@@ -3,13 +3,12 @@
 
 import taichi as ti
 
-from .lanes import chosen, lanes, ratio
+from .lanes import at_least, chosen, lanes, ratio
 from .transfer import strides
 
 LIQUID = 0.5  # share of its capacity from which a cell is liquid
 NEAREST_SURFACE = 0.15  # cells between a cell's centre and the surface, at least
 MOST_WRONG = 0.5  # density error that is mended, at most
-MENDING_TIME = 0.08  # s in which a wrong density is mended
 
 
 @ti.func
@@ -31,12 +30,13 @@ def find_liquid(s, g):
             s.mass[g, a, m] = s.mass[g, a, m] * s.carries[a, m]
             s.velocity[g, a, m] = ratio(s.velocity[g, a, m], s.mass[g, a, m])
         s.fraction[g, m] = s.volume[g, m] / s.capacity[m]
-        s.liquid[g, m] = s.usable[m] * ti.select(s.fraction[g, m] >= LIQUID, lanes(1.0), lanes(0.0))
-    # what lies under liquid is liquid: as air, at pressure 0, it would suck at depth
-    for k in range(s.nears[g]):
-        m = s.near[g, s.nears[g] - 1 - k]
-        if s.usable[m] > 0.5 and s.area[2, m + S[2]] > 0.0:
-            s.liquid[g, m] = ti.max(s.liquid[g, m], s.liquid[g, m + S[2]])
+        s.liquid[g, m] = s.usable[m] * at_least(s.fraction[g, m], s.least[m])
+    if ti.static(s.UPRIGHT):
+        # what lies under liquid is liquid: as air, at pressure 0, it would suck at depth
+        for k in range(s.nears[g]):
+            m = s.near[g, s.nears[g] - 1 - k]
+            if s.usable[m] > 0.5 and s.area[2, m + S[2]] > 0.0:
+                s.liquid[g, m] = ti.max(s.liquid[g, m], s.liquid[g, m + S[2]])
     wets = 0
     for n in range(s.arounds[g]):
         m = s.around[g, n]
@@ -55,7 +55,7 @@ def set_up_pressure(s, g):
     """
     S = strides(s)
     one = lanes(1.0)
-    rate = s.cell[None] / MENDING_TIME
+    rate = s.cell[None] / ti.static(s.MENDING_TIME)
     for n in range(s.wets[g]):
         m = s.wet[g, n]
         here, liquid = s.fraction[g, m], s.liquid[g, m]

@@ -7,6 +7,7 @@ Jiang, Schroeder, Selle, Teran and Stomakhin (2015), "The affine particle-in-cel
 import taichi as ti
 
 from ..fluid.faults import DRIFTED, LARGEST, RUNAWAY, SOUND, UNSOLVED
+from .geometry import INSIDE, OUTSIDE
 from .lanes import LANES, lanes, mat3, vec3
 
 GRAVITY = 9.81
@@ -58,6 +59,12 @@ def step_to(corner, S):
 
 
 @ti.func
+def passes(side, there):
+    """1 where liquid passes between two sides of a wall, else 0."""
+    return ti.select(side * there == INSIDE * OUTSIDE, 0.0, 1.0)
+
+
+@ti.func
 def clear(s, g):
     """Empty what the last step has filled."""
     zero = lanes(0.0)
@@ -86,8 +93,10 @@ def deposit(s, g):
         volume = s.particle[g][lane]
         for n in range(s.count[g, lane]):
             x = (s.position[g, lane, n] - s.origin[None]) * per_cell
-            pull = s.dt[None] * s.acceleration(g, lane, s.position[g, lane, n])
-            s.speed[g, lane, n] = s.speed[g, lane, n] + pull
+            s.accelerate(g, lane, n)
+            side = 0.0
+            if ti.static(s.SIDED):
+                side = s.side_of(s.position[g, lane, n])
             for a in range(3):
                 m, part = place(s, x - off_faces(a))
                 v = s.speed[g, lane, n][a]
@@ -97,6 +106,8 @@ def deposit(s, g):
                 for corner in range(8):
                     o = m + step_to(corner, S)
                     w = volume * share(corner, part)
+                    if ti.static(s.SIDED):
+                        w *= passes(side, s.face_side[a, o])
                     u = v
                     for b in ti.static(range(3)):
                         u += slope[b] * ((corner >> b & 1) - part[b])
@@ -106,7 +117,10 @@ def deposit(s, g):
             m, part = place(s, x - 0.5)
             for corner in range(8):
                 o = m + step_to(corner, S)
-                s.volume[g, o][lane] = s.volume[g, o][lane] + volume * share(corner, part)
+                w = volume * share(corner, part)
+                if ti.static(s.SIDED):
+                    w *= passes(side, s.side[o])
+                s.volume[g, o][lane] = s.volume[g, o][lane] + w
             s.mark[g, place(s, x)[0]] = 1
 
 
@@ -170,33 +184,41 @@ def interpolate(s, g, a, lane, x):
 
 
 @ti.func
+def motion_of(s, g, lane, n):
+    """Velocity of the flow where a particle is [m/s], and its slope [m/s per cell]."""
+    per_cell = 1.0 / s.cell[None]
+    x = (s.position[g, lane, n] - s.origin[None]) * per_cell
+    steepest = STEEPEST / (s.dt[None] * per_cell)
+    v = vec3(0.0)
+    slope = mat3(0.0)
+    for a in ti.static(range(3)):
+        at = x - 0.5
+        at[a] += 0.5
+        value, gradient = interpolate(s, g, a, lane, at)
+        v[a] = value
+        for b in ti.static(range(3)):
+            slope[a, b] = ti.math.clamp(gradient[b], -steepest, steepest)
+    return v, slope
+
+
+@ti.func
 def move(s, g):
     """Velocities and slopes back to the particles, which move, to second order, within the cup.
 
     A lane that went wrong gets its status and loses its particles.
     """
     per_cell, dt = 1.0 / s.cell[None], s.dt[None]
-    steepest = STEEPEST / (dt * per_cell)
     for lane in range(LANES):
         height, energy, fastest = 0.0, 0.0, 0.0
         for n in range(s.count[g, lane]):
-            x = (s.position[g, lane, n] - s.origin[None]) * per_cell
-            v = vec3(0.0)
-            slope = mat3(0.0)
-            for a in ti.static(range(3)):
-                at = x - 0.5
-                at[a] += 0.5
-                value, gradient = interpolate(s, g, a, lane, at)
-                v[a] = value
-                for b in ti.static(range(3)):
-                    slope[a, b] = ti.math.clamp(gradient[b], -steepest, steepest)
+            v, slope = motion_of(s, g, lane, n)
             s.slope[g, lane, n] = slope
             moved = s.position[g, lane, n] + dt * (v + 0.5 * dt * per_cell * (slope @ v))
             s.position[g, lane, n], s.speed[g, lane, n] = s.keep_inside(moved, v)
             height += s.position[g, lane, n][2]
             energy += v.dot(v)  # not a number where any is, which a maximum passes over
             fastest = ti.max(fastest, v.dot(v))
-        drift = 1.0 - 2.0 * height / ti.max(s.count[g, lane] * s.fill[g][lane], 1e-6)
+        drift = 1.0 - 2.0 * height / ti.max(s.count[g, lane] * s.level[g][lane], 1e-6)
         s.lack[g][lane] = LEVEL_GAIN * drift
         if s.count[g, lane] > 0:
             if not (energy < LARGEST and fastest < TOP_SPEED**2):

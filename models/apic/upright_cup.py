@@ -15,6 +15,8 @@ from .viscosity import extend
 class UprightCups(LiquidState):
     """A step is `transfer_in`, what a scene does with the velocities, `project`, `transfer_out`.
 
+    A scene is a subclass with the function `acceleration` of a particle.
+
     Attributes:
         cup_radius: Inside [m].
     """
@@ -23,6 +25,12 @@ class UprightCups(LiquidState):
         """The arguments are those of `LiquidState`."""
         super().__init__(groups, cells, particles, effects)
         self.cup_radius = ti.field(ti.f32, ())
+
+    @ti.func
+    def accelerate(self, g, lane, n):
+        """Change a particle's velocity by what acts on all liquid."""
+        pull = self.acceleration(g, lane, self.position[g, lane, n])
+        self.speed[g, lane, n] = self.speed[g, lane, n] + self.dt[None] * pull
 
     @ti.func
     def keep_inside(self, x, v):

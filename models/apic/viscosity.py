@@ -66,16 +66,23 @@ def find_shear(s, g, u: ti.template()):
 
 
 @ti.func
-def force(s, g, u: ti.template(), a, m, S):
-    """Divergence of the stress on a face; needs `find_shear` of the same velocities."""
-    here = u[g, a, m]
-    f = 2.0 * s.normal_weight[g, m] * (u[g, a, m + S[a]] - here)
-    f -= 2.0 * s.normal_weight[g, m - S[a]] * (here - u[g, a, m - S[a]])
+def add_shear(s, g, a, m, S, force):
+    """A force on a face, and to it the divergence of the stress around edges."""
+    f = force
     for c in range(3):
         if c != a:
             b = 3 - a - c
             f += s.shear[g, c, m + S[b]] - s.shear[g, c, m]
     return f
+
+
+@ti.func
+def force(s, g, u: ti.template(), a, m, S):
+    """Divergence of the stress on a face; needs `find_shear` of the same velocities."""
+    here = u[g, a, m]
+    f = 2.0 * s.normal_weight[g, m] * (u[g, a, m + S[a]] - here)
+    f -= 2.0 * s.normal_weight[g, m - S[a]] * (here - u[g, a, m - S[a]])
+    return add_shear(s, g, a, m, S, f)
 
 
 @ti.func

@@ -185,7 +185,7 @@ def start_line(s, t, g, lane):
     for n in range(t.nodes[None]):
         arm = arm_of(s, t, g, lane, n)
         x = t.pivot[g, lane] + arm
-        wet = ti.math.clamp((s.fill[g][lane] - x[2]) / dx + 0.5, 0.0, 1.0)
+        wet = ti.math.clamp((s.level[g][lane] - x[2]) / dx + 0.5, 0.0, 1.0)
         if arm.dot(u) < 0.0:
             wet = 0.0  # beyond the pivot
         t.wet_share[g, lane, n] = wet
@@ -252,7 +252,7 @@ def turn_stick(s, t, g, lane, torque, added):
     mass, per_length = t.mass[g, lane], s.density[g][lane] * math.pi * radius**2
     pivot, jolt = t.pivot[g, lane], t.jolt[g, lane]
     u, w = t.direction[g, lane], t.swing[g, lane]
-    dry = ti.math.clamp((pivot[2] - s.fill[g][lane]) / ti.max(-u[2], 0.2), 0.0, length)
+    dry = ti.math.clamp((pivot[2] - s.level[g][lane]) / ti.max(-u[2], 0.2), 0.0, length)
     displaced = per_length * (length**3 - dry**3) / 3.0
     lever = 0.5 * (length**2 - dry**2) * per_length
     up = vec3(0.0, 0.0, 1.0)

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bolfi_liquids.models import trajectory
-from bolfi_liquids.models.stirs.march import slots_of
+from bolfi_liquids.models.apic.places import Places
 from bolfi_liquids.models.stirs.slip_law import PIVOT_DAMPING
 from scipy.integrate import solve_ivp
 
@@ -230,7 +230,7 @@ def test_bad_seeds_are_named(glycerin, seeds):
 
 @pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 7, 8])
 def test_few_stirs_are_shared_among_all_groups(size):
-    slots = slots_of(size, groups=2, lanes=4)
+    slots = Places(size, 2, 4).slots
     assert len(set(slots)) == size and slots.max() < 8
     by_group = np.bincount(slots // 4, minlength=2)
     assert np.ptp(by_group) <= 1

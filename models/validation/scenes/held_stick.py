@@ -6,10 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...apic.places import room_for
 from ...fluid import runtime
 from ...fluid.faults import faulty
 from ...stir_setup import Stick
-from ...stirs.march import LEAST_NODES, LEAST_WIDTH, room_for
+from ...stirs.march import LEAST_NODES, LEAST_WIDTH
 from ...stirs.slip_law import TIP, line_of
 from .still_cup import DENSITY, StillCup, fill_scene, of_lanes
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ...apic.filling import fill_cup
+from ...apic.filling import Cylinder, fill_cup
 from ...apic.geometry import Geometry, from_cup, sample_geometry
 from ...apic.grid import Grid
+from ...apic.places import room_for
 from ...fluid import runtime
 from ...fluid.faults import faulty
-from ...stirs.march import room_for
 
 DENSITY = 1000.0  # kg/m³
 LEAST_CELLS, LEAST_PARTICLES = 16000, 12000
@@ -133,7 +133,7 @@ def fill_scene(scene: Any, cup: StillCup, viscosity: np.ndarray, seed: int) -> n
     """Fill the first lanes of a scene with liquids at rest [Pa s]; where their particles are [m],
     shape (n, 3)."""
     grid = cup.grid()
-    points = fill_cup(grid, cup.radius, cup.depth, cup.per_cell, seed)
+    points = fill_cup(grid, Cylinder(cup.radius), cup.depth, cup.per_cell, seed)
     scene.enter_vessel(grid, cup.geometry(), cup.dt)
     volume = np.pi * cup.radius**2 * cup.depth / len(points) / cup.cell**3
     rows = [len(points), volume, viscosity / DENSITY, DENSITY, cup.depth]

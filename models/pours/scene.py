@@ -1,0 +1,316 @@
+# type: ignore  (Taichi compiles this source and gives these names their types)
+"""Groups of pours from cups of one shape."""
+
+import numpy as np
+import taichi as ti
+
+from ..apic.filling import OFF_WALL
+from ..apic.geometry import ABOVE, INSIDE, OUTSIDE
+from ..apic.lanes import LANES, STRIDE, vec3
+from ..apic.liquid_state import LiquidState
+from ..apic.mirror import fold, image, images, reflect_velocity
+from ..apic.pressure import add_rise, push, solve_pressure
+from ..apic.surface import find_liquid, set_up_pressure
+from ..apic.tension import pull_surface
+from ..apic.transfer import GRAVITY, TOP_SPEED, clear, deposit, list_cells, motion_of
+from ..apic.viscosity import extend, solve_viscosity, weigh_stresses
+from ..fluid.faults import LARGEST, RUNAWAY
+
+LEFT_OVER = 5e-4  # of the liquid: a pour is over when less than this is in the region
+ON_WALL = 1e-4  # m beyond the inside of the cup that still counts as retained
+
+
+@ti.data_oriented
+class PouringScene(LiquidState):
+    """Half of each cup, in its own frame, which turns about the lip; `Vessel` says how it lies.
+
+    Turning changes gravity and adds centrifugal and Coriolis forces; where it starts or stops, what
+    is at rest in the room jumps in this frame. Particles that leave the region fly freely.
+
+    Attributes:
+        rate_of_turn: Of each lane, while it turns [rad/s].
+        turning: Steps for which it turns.
+        last: Step before which it ends.
+        tension: Over density [m³/s²].
+        cosine: Of the contact angle.
+        flown: Particles that have left the region.
+        flight: Of these in the room's frame where they left: place [m], velocity [m/s].
+        departure: When they did [s].
+        retained: Particles left in the cup at the end.
+    """
+
+    UPRIGHT, SIDED, MIRRORED = False, True, True
+    LEAST_AT_WALL = 0.02  # what touches a wall cannot leave it without making room for air
+    MENDING_TIME = 0.02
+    TOLERANCE = 1e-3
+
+    def __init__(self, groups, cells, particles, effects=()):
+        """The arguments are those of `LiquidState`."""
+        super().__init__(groups, cells, particles, effects)
+        self.side, self.open = (ti.field(ti.f32, cells) for _ in range(2))
+        self.face_side, self.wall, self.passage = (ti.field(ti.f32, (3, cells)) for _ in range(3))
+        self.tension, self.cosine = (ti.Vector.field(LANES, ti.f32, groups) for _ in range(2))
+        self.rate_of_turn, self.sine, self.turned = (
+            ti.field(ti.f32, (groups, LANES)) for _ in range(3)
+        )
+        self.turning, self.last, self.flown, self.retained = (
+            ti.field(ti.i32, (groups, LANES)) for _ in range(4)
+        )
+        # of the step at hand: angle of the cup, rate of turn, its jump, angle of Coriolis
+        self.frame = ti.Vector.field(6, ti.f32, (groups, LANES))
+        self.flight = ti.Vector.field(6, ti.f32, (groups, LANES, particles))
+        self.departure = ti.field(ti.f32, (groups, LANES, particles))
+        self.radius, self.height, self.rim, self.under = (ti.field(ti.f32, ()) for _ in range(4))
+        self.lowest, self.highest = (ti.Vector.field(3, ti.f32, ()) for _ in range(2))
+
+    def enter_cup(self, vessel, rim, dt):
+        """Take a `Vessel`, the thickness of its rim [m] and a step [s]."""
+        grid, geometry = vessel.grid(), vessel.geometry()
+        self.enter_vessel(grid, geometry, dt)
+        self.radius[None], self.height[None] = vessel.radius, vessel.height
+        self.rim[None], self.under[None] = rim, vessel.under
+        lows, highs = zip(*vessel.corners, strict=True)
+        self.lowest[None], self.highest[None] = lows, highs
+        self._enter_walls(
+            np.stack([geometry.side, geometry.usable]),
+            np.stack([geometry.face_side, geometry.wall, geometry.area]),
+        )
+
+    @ti.kernel
+    def _enter_walls(
+        self, of_cells: ti.types.ndarray(ti.f32, 2), of_faces: ti.types.ndarray(ti.f32, 3)
+    ):
+        for m in range(of_cells.shape[1]):
+            self.side[m] = of_cells[0, m]
+            self.open[m] = of_cells[1, m]
+            for a in range(3):
+                self.face_side[a, m] = of_faces[0, a, m]
+                self.wall[a, m] = of_faces[1, a, m]
+                self.passage[a, m] = of_faces[2, a, m]
+        for _ in range(1):
+            for n in range(images(self)):
+                m, o = image(self, n)
+                self.open[m] = self.open[o]
+                self.passage[1, o] = 1.0
+
+    @ti.kernel
+    def turn(self, turns: ti.types.ndarray(ti.f32, 3), steps: ti.types.ndarray(ti.i32, 3)):
+        """Begin a pour.
+
+        Args:
+            turns: Rate of turn [rad/s], final angle [rad], tension over density [m³/s²] and cosine
+                of the contact angle, shape [4, groups, LANES].
+            steps: For which the cup turns, and before which the pour ends, [2, groups, LANES].
+        """
+        for g in range(turns.shape[1]):
+            for lane in range(LANES):
+                self.rate_of_turn[g, lane] = turns[0, g, lane]
+                self.turned[g, lane] = turns[1, g, lane]
+                self.tension[g][lane] = turns[2, g, lane]
+                self.cosine[g][lane] = turns[3, g, lane]
+                self.turning[g, lane] = steps[0, g, lane]
+                self.last[g, lane] = steps[1, g, lane]
+                self.flown[g, lane], self.retained[g, lane] = 0, 0
+
+    @ti.func
+    def find_frame(self, g, lane, step):
+        turn, dt = self.rate_of_turn[g, lane], self.dt[None]
+        now = ti.select(step < self.turning[g, lane], turn, 0.0)
+        before = ti.select(step > 0 and step <= self.turning[g, lane], turn, 0.0)
+        angle = ti.min(turn * step * dt, self.turned[g, lane])
+        twice = 2.0 * now * dt
+        self.frame[g, lane] = ti.Vector(
+            [ti.cos(angle), ti.sin(angle), now, before - now, ti.cos(twice), ti.sin(twice)]
+        )
+
+    @ti.func
+    def accelerate(self, g, lane, n):
+        """Gravity and the forces of the turning frame."""
+        cosine, sine, turn, jump, whirl, swirl = self.frame[g, lane]
+        dt, dx = self.dt[None], self.cell[None]
+        x, v, slope = self.position[g, lane, n], self.speed[g, lane, n], self.slope[g, lane, n]
+        self.speed[g, lane, n] = vec3(
+            whirl * v[0] - swirl * v[2] + dt * (sine * GRAVITY + turn * turn * x[0]) + jump * x[2],
+            v[1],
+            swirl * v[0]
+            + whirl * v[2]
+            + dt * (turn * turn * x[2] - cosine * GRAVITY)
+            - jump * x[0],
+        )
+        for b in ti.static(range(3)):
+            along, up = slope[0, b], slope[2, b]
+            slope[0, b] = whirl * along - swirl * up
+            slope[2, b] = swirl * along + whirl * up
+        slope[0, 0] += dt * turn * turn * dx
+        slope[2, 2] += dt * turn * turn * dx
+        slope[0, 2] += jump * dx
+        slope[2, 0] -= jump * dx
+        self.slope[g, lane, n] = slope
+
+    @ti.func
+    def out(self, x):
+        """Distance of a point from the cup's axis."""
+        return ti.sqrt((x[0] + self.radius[None]) ** 2 + x[1] ** 2)
+
+    @ti.func
+    def side_of(self, x):
+        side = ti.cast(ABOVE, ti.f32)
+        if x[2] <= 0.0:
+            within = self.out(x) < self.radius[None] + 0.5 * self.rim[None]
+            side = ti.select(within, ti.cast(INSIDE, ti.f32), ti.cast(OUTSIDE, ti.f32))
+        return side
+
+    @ti.func
+    def keep_off_wall(self, before, after, velocity):
+        """Where a particle comes to that the walls stop, and its velocity."""
+        x, v = after, velocity
+        off = OFF_WALL * self.cell[None]
+        inner, outer = self.radius[None], self.radius[None] + self.rim[None]
+        if x[1] < 0.0:  # its image comes the other way
+            x[1], v[1] = -x[1], -v[1]
+        out = self.out(x)
+        if x[2] < off and out > inner - off and out < outer + off:
+            was = self.out(before)
+            if before[2] >= 0.99 * off and was > inner and was < outer:
+                x[2], v[2] = off, ti.max(v[2], 0.0)
+            else:
+                within = was < inner + 0.5 * self.rim[None]
+                if before[2] >= 0.0 and was >= outer:
+                    within = False
+                to = ti.select(within, inner - off, outer + off)
+                n = vec3(x[0] + inner, x[1], 0.0) / out
+                x += (to - out) * n
+                into = v.dot(n)
+                if (into > 0.0) == within:
+                    v -= into * n
+        if x[2] < off - self.height[None] and self.out(x) < outer:
+            x[2], v[2] = off - self.height[None], ti.max(v[2], 0.0)
+        return x, v
+
+    @ti.func
+    def has_left(self, x):
+        """Whether a particle is beyond the region."""
+        aside = x[0] < self.lowest[None][0] or x[0] > self.highest[None][0]
+        aside = aside or x[1] > self.highest[None][1] or x[2] > self.highest[None][2]
+        under = x[2] < -self.under[None] and self.side_of(x) == OUTSIDE
+        return aside or under
+
+    @ti.func
+    def fly(self, g, lane, n, step):
+        """Let a particle fly freely from where it is at the end of a step."""
+        cosine, sine, turn = self.frame[g, lane][0], self.frame[g, lane][1], self.frame[g, lane][2]
+        x, v = self.position[g, lane, n], self.speed[g, lane, n]
+        v += turn * vec3(x[2], 0.0, -x[0])
+        k = self.flown[g, lane]
+        self.flight[g, lane, k] = ti.Vector(
+            [
+                cosine * x[0] + sine * x[2],
+                x[1],
+                cosine * x[2] - sine * x[0],
+                cosine * v[0] + sine * v[2],
+                v[1],
+                cosine * v[2] - sine * v[0],
+            ]
+        )
+        self.departure[g, lane, k] = (step + 1) * self.dt[None]
+        self.flown[g, lane] = k + 1
+
+    @ti.func
+    def move_on(self, g, lane, step):
+        """Particles move; those that leave fly on, and the last takes the place of each."""
+        dt, per_cell = self.dt[None], 1.0 / self.cell[None]
+        n, last, energy, fastest = 0, self.count[g, lane], 0.0, 0.0
+        while n < last:
+            v, slope = motion_of(self, g, lane, n)
+            before = self.position[g, lane, n]
+            after = before + dt * (v + 0.5 * dt * per_cell * (slope @ v))
+            after, v = self.keep_off_wall(before, after, v)
+            self.position[g, lane, n], self.speed[g, lane, n] = after, v
+            self.slope[g, lane, n] = slope
+            energy += v.dot(v)
+            fastest = ti.max(fastest, v.dot(v))
+            if self.has_left(after):
+                self.fly(g, lane, n, step)
+                last -= 1
+                self.position[g, lane, n] = self.position[g, lane, last]
+                self.speed[g, lane, n] = self.speed[g, lane, last]
+                self.slope[g, lane, n] = self.slope[g, lane, last]
+            else:
+                n += 1
+        self.count[g, lane] = last
+        if not (energy < LARGEST and fastest < TOP_SPEED**2):
+            self.status[g, lane] = RUNAWAY
+            self.count[g, lane] = 0
+
+    @ti.func
+    def end(self, g, lane, step):
+        """What is outside of the cup at the end flies on."""
+        for n in range(self.count[g, lane]):
+            x = self.position[g, lane, n]
+            if x[2] < 0.0 and self.out(x) < self.radius[None] + ON_WALL:
+                self.retained[g, lane] += 1
+            else:
+                self.fly(g, lane, n, step)
+        self.count[g, lane] = 0
+
+    @ti.kernel
+    def transfer_in(self, groups: ti.i32, step: ti.i32):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                g = n // STRIDE
+                clear(self, g)
+                for lane in range(LANES):
+                    self.find_frame(g, lane, step)
+                deposit(self, g)
+                fold(self, g)
+                list_cells(self, g)
+
+    @ti.kernel
+    def prepare(self, groups: ti.i32, step: ti.i32):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                g = n // STRIDE
+                find_liquid(self, g)
+                set_up_pressure(self, g)
+                pull_surface(self, g)
+                push(self, g, self.pressure)
+                weigh_stresses(self, g, (step + 0.5) * self.dt[None])
+
+    @ti.kernel
+    def flow(self, groups: ti.i32):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                solve_viscosity(self, n // STRIDE)
+
+    @ti.kernel
+    def project(self, groups: ti.i32):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                g = n // STRIDE
+                solve_pressure(self, g)
+                push(self, g, self.rise)
+                add_rise(self, g)
+                extend(self, g)
+                reflect_velocity(self, g)
+
+    @ti.kernel
+    def transfer_out(self, groups: ti.i32, step: ti.i32):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                g = n // STRIDE
+                for lane in range(LANES):
+                    if self.count[g, lane] > 0:
+                        all_of_it = self.count[g, lane] + self.flown[g, lane]
+                        self.move_on(g, lane, step)
+                        few = self.count[g, lane] < LEFT_OVER * all_of_it
+                        if few or step + 1 >= self.last[g, lane]:
+                            self.end(g, lane, step)
+
+    def march(self, groups, start, stop):
+        """Steps start..stop-1 of so many groups."""
+        for step in range(start, stop):
+            self.transfer_in(groups, step)
+            self.prepare(groups, step)
+            self.flow(groups)
+            self.project(groups)
+            self.transfer_out(groups, step)

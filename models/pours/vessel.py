@@ -1,0 +1,105 @@
+"""The cup that pours, in its own frame: cells, walls, and the region beyond which liquid flies.
+
+The origin is the lip, the inner edge of the rim where liquid leaves. x points away from the cup, z
+along its axis to the rim, and only y >= 0 is held, since both halves flow alike.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from ..apic.filling import Cylinder, fill_cup
+from ..apic.geometry import ABOVE, INSIDE, OUTSIDE, Geometry, sample_geometry
+from ..apic.grid import WALL, Grid
+from ..cups import Cups
+
+RIM = 0.002  # m, thickness of the wall; the rim is flat
+BEYOND, OVER, UNDER = 38 / 28, 40 / 28, 25 / 28
+"""How far the region reaches beyond the lip, above the rim and below it, in radii of the cup: the
+references' own. Nearer, the stream would still be shaped by the rim."""
+AIR = 3  # cells beyond the region: two without liquid, and one that no stencil leaves
+BELOW_FLOOR = 0.02  # m of wall that nothing passes
+
+
+@dataclass(frozen=True)
+class Vessel:
+    """A cup of `radius` and `height` with liquid of depth `fill` [m], cut into cells [m]."""
+
+    radius: float
+    height: float
+    fill: float
+    cell: float
+
+    @classmethod
+    def of(cls, cups: Cups, cell: float) -> "Vessel":
+        source = cups.source
+        return cls(source.radius, source.height, source.fill, cell)
+
+    @property
+    def corners(self) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
+        """Lowest and highest x, y and z [m] of the region; y is its size to either side."""
+        across = math.ceil(2.0 * self.radius / self.cell - 1e-6) + 1
+        aside = math.ceil(self.radius / self.cell - 1e-6) + 1
+        down = math.ceil(self.height / self.cell - 1e-6) + 1
+        return (
+            (-across * self.cell, BEYOND * self.radius),
+            (0.0, aside * self.cell),
+            (-down * self.cell, OVER * self.radius),
+        )
+
+    @property
+    def under(self) -> float:
+        """How far below the rim, outside of the cup, the region ends [m]."""
+        return UNDER * self.radius
+
+    def grid(self) -> Grid:
+        """Lip, rim and mirror lie on faces, whatever the cells' size."""
+        lows, highs = zip(*self.corners, strict=True)
+        before = [round(-low / self.cell) + WALL for low in lows]
+        behind = [math.ceil(high / self.cell - 1e-6) + AIR for high in highs]
+        shape = tuple(low + high for low, high in zip(before, behind, strict=True))
+        return Grid(self.cell, shape, tuple(-self.cell * low for low in before), mirrored=True)
+
+    def distance(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Of points from the wall and the floor [m], negative within them."""
+        out, bottom = np.hypot(x + self.radius, y), -self.height - BELOW_FLOOR
+        wall = _from_ring(out, z, (self.radius, self.radius + RIM), (bottom, 0.0))
+        floor = _from_ring(out, z, (-1.0, self.radius + RIM), (bottom, -self.height))
+        return np.minimum(wall, floor)
+
+    def side(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Of the wall on which points are."""
+        out = np.hypot(x + self.radius, y)
+        below = np.where(out < self.radius + 0.5 * RIM, INSIDE, OUTSIDE)
+        return np.where(z > 0.0, ABOVE, below)
+
+    def geometry(self) -> Geometry:
+        """Nothing flows through the mirror."""
+        return _geometry(self)
+
+    def particles(self, per_cell: int, seed: int) -> np.ndarray:
+        """Where they start [m], shape (n, 3)."""
+        cup = Cylinder(self.radius, (-self.radius, 0.0, -self.height))
+        return fill_cup(self.grid(), cup, self.fill, per_cell, seed)
+
+
+def _from_ring(
+    out: np.ndarray, z: np.ndarray, radii: tuple[float, float], heights: tuple[float, float]
+) -> np.ndarray:
+    """Distance from what lies between two radii and two heights."""
+    aside = np.maximum(radii[0] - out, out - radii[1])
+    over = np.maximum(heights[0] - z, z - heights[1])
+    at_corner = np.hypot(np.maximum(aside, 0.0), np.maximum(over, 0.0))
+    return np.where((aside > 0.0) & (over > 0.0), at_corner, np.maximum(aside, over))
+
+
+@cache
+def _geometry(vessel: Vessel) -> Geometry:
+    grid = vessel.grid()
+    whole = sample_geometry(grid, vessel.distance, vessel.side)
+    mirror = np.arange(grid.cells) // grid.strides[1] % grid.shape[1] == WALL
+    for of_faces, value in ((whole.area, 0.0), (whole.carries, 0.0), (whole.shut, 1.0)):
+        of_faces[1, mirror] = value
+    return whole
