@@ -79,7 +79,9 @@ def from_cup(radius: float, floor: bool = True) -> Distance:
     return distance
 
 
-def sample_geometry(grid: Grid, distance: Distance, side: Side | None = None) -> Geometry:
+def sample_geometry(
+    grid: Grid, distance: Distance, side: Side | None = None, nearest: float = NEAREST
+) -> Geometry:
     """The geometry of a vessel.
 
     Cells that are cut by walls follow Batty, Bertails and Bridson (2007), "A fast variational
@@ -89,6 +91,7 @@ def sample_geometry(grid: Grid, distance: Distance, side: Side | None = None) ->
         grid: Its cells.
         distance: From the walls.
         side: Of the walls, where liquid is on both sides of them.
+        nearest: Cells from a wall at which friction is reckoned at least.
     """
     inner = grid.inner()
     kinds = (ABOVE,) if side is None else (ABOVE, INSIDE, OUTSIDE)
@@ -129,7 +132,7 @@ def sample_geometry(grid: Grid, distance: Distance, side: Side | None = None) ->
         inner & ~carries,
         np.maximum(own, below),
         wall,
-        wall / np.maximum(away, NEAREST),
+        wall / np.maximum(away, nearest),
         1.0 - deposit,
         edge,
     )

@@ -125,7 +125,9 @@ def _together(vessel, pours: Pours, turn: Turn, built, watch) -> list[Flights]:
     turning = np.rint(turn.final_angle / pours.rate / turn.dt)
     last = np.rint((turn.final_angle / pours.rate + turn.hold) / turn.dt)
     angle = np.full(len(density), turn.final_angle)
-    turns = pours.rate, angle, pours.tension / density, pours.cosine
+    surface = pours.tension / density, pours.cosine
+    scene.set_surfaces(np.stack([places.spread(row) for row in surface]))
+    turns = pours.rate, angle
     scene.turn(
         np.stack([places.spread(row) for row in turns]),
         np.stack([places.spread(row) for row in (turning, last)]).astype(np.int32),

@@ -7,13 +7,8 @@ import taichi as ti
 from ..apic.filling import OFF_WALL
 from ..apic.geometry import ABOVE, INSIDE, OUTSIDE
 from ..apic.lanes import LANES, STRIDE, vec3
-from ..apic.liquid_state import LiquidState
-from ..apic.mirror import fold, image, images, reflect_velocity
-from ..apic.pressure import add_rise, push, solve_pressure
-from ..apic.surface import find_liquid, set_up_pressure
-from ..apic.tension import pull_surface
-from ..apic.transfer import GRAVITY, TOP_SPEED, clear, deposit, list_cells, motion_of
-from ..apic.viscosity import extend, solve_viscosity, weigh_stresses
+from ..apic.transfer import GRAVITY, TOP_SPEED, motion_of
+from ..apic.wetting_liquid import WettingLiquid
 from ..fluid.faults import LARGEST, RUNAWAY
 
 LEFT_OVER = 5e-4  # of the liquid: a pour is over when less than this is in the region
@@ -21,7 +16,7 @@ ON_WALL = 1e-4  # m beyond the inside of the cup that still counts as retained
 
 
 @ti.data_oriented
-class PouringScene(LiquidState):
+class PouringScene(WettingLiquid):
     """Half of each cup, in its own frame, which turns about the lip; `Vessel` says how it lies.
 
     Turning changes gravity and adds centrifugal and Coriolis forces; where it starts or stops, what
@@ -31,28 +26,19 @@ class PouringScene(LiquidState):
         rate_of_turn: Of each lane, while it turns [rad/s].
         turning: Steps for which it turns.
         last: Step before which it ends.
-        tension: Over density [m³/s²].
-        cosine: Of the contact angle.
         flown: Particles that have left the region.
         flight: Of these in the room's frame where they left: place [m], velocity [m/s].
         departure: When they did [s].
         retained: Particles left in the cup at the end.
     """
 
-    UPRIGHT, SIDED, MIRRORED = False, True, True
-    LEAST_AT_WALL = 0.02  # what touches a wall cannot leave it without making room for air
-    MENDING_TIME = 0.02
-    TOLERANCE = 1e-3
+    SIDED, MIRRORED = True, True
 
     def __init__(self, groups, cells, particles, effects=()):
         """The arguments are those of `LiquidState`."""
         super().__init__(groups, cells, particles, effects)
-        self.side, self.open = (ti.field(ti.f32, cells) for _ in range(2))
-        self.face_side, self.wall, self.passage = (ti.field(ti.f32, (3, cells)) for _ in range(3))
-        self.tension, self.cosine = (ti.Vector.field(LANES, ti.f32, groups) for _ in range(2))
-        self.rate_of_turn, self.sine, self.turned = (
-            ti.field(ti.f32, (groups, LANES)) for _ in range(3)
-        )
+        self.side, self.face_side = ti.field(ti.f32, cells), ti.field(ti.f32, (3, cells))
+        self.rate_of_turn, self.final_angle = (ti.field(ti.f32, (groups, LANES)) for _ in range(2))
         self.turning, self.last, self.flown, self.retained = (
             ti.field(ti.i32, (groups, LANES)) for _ in range(4)
         )
@@ -71,53 +57,46 @@ class PouringScene(LiquidState):
         self.rim[None], self.under[None] = rim, vessel.under
         lows, highs = zip(*vessel.corners, strict=True)
         self.lowest[None], self.highest[None] = lows, highs
-        self._enter_walls(
-            np.stack([geometry.side, geometry.usable]),
-            np.stack([geometry.face_side, geometry.wall, geometry.area]),
-        )
+        self.enter_surfaces(geometry.usable, np.stack([geometry.wall, geometry.area]))
+        self._enter_sides(geometry.side, geometry.face_side)
 
     @ti.kernel
-    def _enter_walls(
-        self, of_cells: ti.types.ndarray(ti.f32, 2), of_faces: ti.types.ndarray(ti.f32, 3)
+    def _enter_sides(
+        self, of_cells: ti.types.ndarray(ti.f32, 1), of_faces: ti.types.ndarray(ti.f32, 2)
     ):
-        for m in range(of_cells.shape[1]):
-            self.side[m] = of_cells[0, m]
-            self.open[m] = of_cells[1, m]
+        for m in range(of_cells.shape[0]):
+            self.side[m] = of_cells[m]
             for a in range(3):
-                self.face_side[a, m] = of_faces[0, a, m]
-                self.wall[a, m] = of_faces[1, a, m]
-                self.passage[a, m] = of_faces[2, a, m]
-        for _ in range(1):
-            for n in range(images(self)):
-                m, o = image(self, n)
-                self.open[m] = self.open[o]
-                self.passage[1, o] = 1.0
+                self.face_side[a, m] = of_faces[a, m]
 
     @ti.kernel
     def turn(self, turns: ti.types.ndarray(ti.f32, 3), steps: ti.types.ndarray(ti.i32, 3)):
         """Begin a pour.
 
         Args:
-            turns: Rate of turn [rad/s], final angle [rad], tension over density [m³/s²] and cosine
-                of the contact angle, shape [4, groups, LANES].
+            turns: Rate of turn [rad/s] and final angle [rad], shape [2, groups, LANES].
             steps: For which the cup turns, and before which the pour ends, [2, groups, LANES].
         """
         for g in range(turns.shape[1]):
             for lane in range(LANES):
                 self.rate_of_turn[g, lane] = turns[0, g, lane]
-                self.turned[g, lane] = turns[1, g, lane]
-                self.tension[g][lane] = turns[2, g, lane]
-                self.cosine[g][lane] = turns[3, g, lane]
+                self.final_angle[g, lane] = turns[1, g, lane]
                 self.turning[g, lane] = steps[0, g, lane]
                 self.last[g, lane] = steps[1, g, lane]
                 self.flown[g, lane], self.retained[g, lane] = 0, 0
 
     @ti.func
+    def begin_step(self, g, step):
+        for lane in range(LANES):
+            self.find_frame(g, lane, step)
+
+    @ti.func
     def find_frame(self, g, lane, step):
+        """Angle of the cup, and how fast it turns, in a step."""
         turn, dt = self.rate_of_turn[g, lane], self.dt[None]
         now = ti.select(step < self.turning[g, lane], turn, 0.0)
         before = ti.select(step > 0 and step <= self.turning[g, lane], turn, 0.0)
-        angle = ti.min(turn * step * dt, self.turned[g, lane])
+        angle = ti.min(turn * step * dt, self.final_angle[g, lane])
         twice = 2.0 * now * dt
         self.frame[g, lane] = ti.Vector(
             [ti.cos(angle), ti.sin(angle), now, before - now, ti.cos(twice), ti.sin(twice)]
@@ -129,13 +108,12 @@ class PouringScene(LiquidState):
         cosine, sine, turn, jump, whirl, swirl = self.frame[g, lane]
         dt, dx = self.dt[None], self.cell[None]
         x, v, slope = self.position[g, lane, n], self.speed[g, lane, n], self.slope[g, lane, n]
+        pull_x = sine * GRAVITY + turn * turn * x[0]
+        pull_z = turn * turn * x[2] - cosine * GRAVITY
         self.speed[g, lane, n] = vec3(
-            whirl * v[0] - swirl * v[2] + dt * (sine * GRAVITY + turn * turn * x[0]) + jump * x[2],
+            whirl * v[0] - swirl * v[2] + dt * pull_x + jump * x[2],
             v[1],
-            swirl * v[0]
-            + whirl * v[2]
-            + dt * (turn * turn * x[2] - cosine * GRAVITY)
-            - jump * x[0],
+            swirl * v[0] + whirl * v[2] + dt * pull_z - jump * x[0],
         )
         for b in ti.static(range(3)):
             along, up = slope[0, b], slope[2, b]
@@ -197,7 +175,10 @@ class PouringScene(LiquidState):
 
     @ti.func
     def fly(self, g, lane, n, step):
-        """Let a particle fly freely from where it is at the end of a step."""
+        """Let a particle fly freely from where it is at the end of a step.
+
+        Its velocity is that of the step's middle, so half a step of gravity is taken back.
+        """
         cosine, sine, turn = self.frame[g, lane][0], self.frame[g, lane][1], self.frame[g, lane][2]
         x, v = self.position[g, lane, n], self.speed[g, lane, n]
         v += turn * vec3(x[2], 0.0, -x[0])
@@ -252,46 +233,6 @@ class PouringScene(LiquidState):
             else:
                 self.fly(g, lane, n, step)
         self.count[g, lane] = 0
-
-    @ti.kernel
-    def transfer_in(self, groups: ti.i32, step: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                g = n // STRIDE
-                clear(self, g)
-                for lane in range(LANES):
-                    self.find_frame(g, lane, step)
-                deposit(self, g)
-                fold(self, g)
-                list_cells(self, g)
-
-    @ti.kernel
-    def prepare(self, groups: ti.i32, step: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                g = n // STRIDE
-                find_liquid(self, g)
-                set_up_pressure(self, g)
-                pull_surface(self, g)
-                push(self, g, self.pressure)
-                weigh_stresses(self, g, (step + 0.5) * self.dt[None])
-
-    @ti.kernel
-    def flow(self, groups: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                solve_viscosity(self, n // STRIDE)
-
-    @ti.kernel
-    def project(self, groups: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                g = n // STRIDE
-                solve_pressure(self, g)
-                push(self, g, self.rise)
-                add_rise(self, g)
-                extend(self, g)
-                reflect_velocity(self, g)
 
     @ti.kernel
     def transfer_out(self, groups: ti.i32, step: ti.i32):

@@ -20,6 +20,7 @@ BEYOND, OVER, UNDER = 38 / 28, 40 / 28, 25 / 28
 """How far the region reaches beyond the lip, above the rim and below it, in radii of the cup: the
 references' own. Nearer, the stream would still be shaped by the rim."""
 AIR = 3  # cells beyond the region: two without liquid, and one that no stencil leaves
+NEAREST = 0.25  # cells from a wall at which friction is reckoned at least: films are thin
 BELOW_FLOOR = 0.02  # m of wall that nothing passes
 
 
@@ -98,7 +99,7 @@ def _from_ring(
 @cache
 def _geometry(vessel: Vessel) -> Geometry:
     grid = vessel.grid()
-    whole = sample_geometry(grid, vessel.distance, vessel.side)
+    whole = sample_geometry(grid, vessel.distance, vessel.side, NEAREST)
     mirror = np.arange(grid.cells) // grid.strides[1] % grid.shape[1] == WALL
     for of_faces, value in ((whole.area, 0.0), (whole.carries, 0.0), (whole.shut, 1.0)):
         of_faces[1, mirror] = value

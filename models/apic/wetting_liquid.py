@@ -1,0 +1,106 @@
+# type: ignore  (Taichi compiles this source and gives these names their types)
+"""Liquids whose surface pulls and that wet walls: what each of their steps begins and ends with."""
+
+import taichi as ti
+
+from .lanes import LANES, STRIDE
+from .liquid_state import LiquidState
+from .mirror import fold, image, images, reflect_velocity
+from .pressure import add_rise, push, solve_pressure
+from .surface import find_liquid, set_up_pressure
+from .tension import pull_surface
+from .transfer import clear, deposit, list_cells
+from .viscosity import extend, solve_viscosity, weigh_stresses
+
+
+@ti.data_oriented
+class WettingLiquid(LiquidState):
+    """A step is `transfer_in`, `prepare`, `flow`, `project`, and how a scene moves particles.
+
+    A scene is a subclass with the function `begin_step` of a group, too.
+
+    Attributes:
+        tension: Over density [m³/s²].
+        cosine: Of the contact angle.
+        open: 1 where liquid may be, or its image.
+        wall: Area of wall that rubs at the face, in cells.
+        passage: Open share of the face, or 1 in the mirror.
+    """
+
+    UPRIGHT = False
+    LEAST_AT_WALL = 0.02  # what touches a wall cannot leave it without making room for air
+    MENDING_TIME = 0.02
+    TOLERANCE = 1e-3
+
+    def __init__(self, groups, cells, particles, effects=()):
+        """The arguments are those of `LiquidState`."""
+        super().__init__(groups, cells, particles, effects)
+        self.open = ti.field(ti.f32, cells)
+        self.wall, self.passage = (ti.field(ti.f32, (3, cells)) for _ in range(2))
+        self.tension, self.cosine = (ti.Vector.field(LANES, ti.f32, groups) for _ in range(2))
+
+    @ti.kernel
+    def enter_surfaces(
+        self, usable: ti.types.ndarray(ti.f32, 1), of_faces: ti.types.ndarray(ti.f32, 3)
+    ):
+        """Take a geometry's `usable`, and its `wall` and `area` as [2, 3, cells]."""
+        for m in range(of_faces.shape[2]):
+            self.open[m] = usable[m]
+            for a in range(3):
+                self.wall[a, m] = of_faces[0, a, m]
+                self.passage[a, m] = of_faces[1, a, m]
+        if ti.static(self.MIRRORED):
+            for _ in range(1):
+                for n in range(images(self)):
+                    m, o = image(self, n)
+                    self.open[m] = self.open[o]
+                    self.passage[1, o] = 1.0
+
+    @ti.kernel
+    def set_surfaces(self, surface: ti.types.ndarray(ti.f32, 3)):
+        """Take tensions over densities and cosines of contact angles, [2, groups, LANES]."""
+        for g in range(surface.shape[1]):
+            for lane in range(LANES):
+                self.tension[g][lane] = surface[0, g, lane]
+                self.cosine[g][lane] = surface[1, g, lane]
+
+    @ti.kernel
+    def transfer_in(self, groups: ti.i32, step: ti.i32):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                g = n // STRIDE
+                clear(self, g)
+                self.begin_step(g, step)
+                deposit(self, g)
+                if ti.static(self.MIRRORED):
+                    fold(self, g)
+                list_cells(self, g)
+
+    @ti.kernel
+    def prepare(self, groups: ti.i32, step: ti.i32):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                g = n // STRIDE
+                find_liquid(self, g)
+                set_up_pressure(self, g)
+                pull_surface(self, g)
+                push(self, g, self.pressure)
+                weigh_stresses(self, g, (step + 0.5) * self.dt[None])
+
+    @ti.kernel
+    def flow(self, groups: ti.i32):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                solve_viscosity(self, n // STRIDE)
+
+    @ti.kernel
+    def project(self, groups: ti.i32):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                g = n // STRIDE
+                solve_pressure(self, g)
+                push(self, g, self.rise)
+                add_rise(self, g)
+                extend(self, g)
+                if ti.static(self.MIRRORED):
+                    reflect_velocity(self, g)
