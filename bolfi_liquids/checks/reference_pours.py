@@ -64,7 +64,6 @@ class PouredLiquid:
         cups: With the contact angle and the hold of these pours.
         retained_resolved: Whether the reference resolves the film that stays in the source.
         pours: From the slowest to the fastest.
-        hash: SHA-256 of the pours' table and of their landings, in hexadecimal.
     """
 
     name: str
@@ -76,12 +75,17 @@ class PouredLiquid:
     cups: "Cups"
     retained_resolved: bool
     pours: tuple[ReferencePour, ...]
-    hash: str
 
     @property
     def angular_velocity(self) -> NDArray[np.float64]:
         """Of each pour [rad/s], shape (pours,)."""
         return np.array([pour.angular_velocity for pour in self.pours])
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the pours, in hexadecimal."""
+        values = [np.hstack([one for one in pour if one is not None]) for pour in self.pours]
+        return sha256(b"".join(pour.tobytes() for pour in values)).hexdigest()
 
     @property
     def contact_angle_deg(self) -> float:
@@ -120,7 +124,6 @@ def open_poured_liquids(folder: Path) -> tuple[PouredLiquid, ...]:
         if name in found:
             fix = "leave one of the two rows, or give one of the liquids another name"
             raise InputError(f"{liquid!r} has another row of this angle", where=where, fix=fix)
-        pours, made_of = _pours(folder / file, liquid, cups[row])
         found[name] = PouredLiquid(
             name=name,
             liquid=liquid,
@@ -130,8 +133,7 @@ def open_poured_liquids(folder: Path) -> tuple[PouredLiquid, ...]:
             surface_tension=tension[row],
             cups=cups[row],
             retained_resolved=resolved[row],
-            pours=pours,
-            hash=made_of,
+            pours=_pours(folder / file, liquid, cups[row]),
         )
     return tuple(sorted(found.values(), key=lambda one: (one.viscosity, one.contact_angle_deg)))
 
@@ -178,13 +180,12 @@ def _check_files(folder: Path, table: Table) -> None:
             )
 
 
-def _pours(path: Path, liquid: str, cups: "Cups") -> tuple[tuple[ReferencePour, ...], str]:
-    """The pours of one liquid in a table, and the hash of all that they were read from."""
+def _pours(path: Path, liquid: str, cups: "Cups") -> tuple[ReferencePour, ...]:
+    """The pours of one liquid in a table, with their landings where these are known."""
     table = open_pours(path, liquid, told=False)
     check_scene(table, cups)
     beside = landings_file(path)
-    there = beside.is_file()
-    landed = open_landings(beside) if there else ()
+    landed = open_landings(beside) if beside.is_file() else ()
     pours = []
     for rate in np.unique(table.angular_velocity):
         pour, speed = _pour(table, float(rate)), float(np.degrees(rate))
@@ -192,8 +193,7 @@ def _pours(path: Path, liquid: str, cups: "Cups") -> tuple[tuple[ReferencePour, 
             if one.liquid == liquid and np.isclose(one.angular_velocity_deg_s, speed):
                 pour = _with_landing(pour, one, cups, f"{beside}: {liquid} at {speed:g} deg/s")
         pours.append(pour)
-    made_of = path.read_bytes() + (beside.read_bytes() if there else b"")
-    return tuple(pours), sha256(made_of).hexdigest()
+    return tuple(pours)
 
 
 def _pour(table: PourTable, rate: float) -> ReferencePour:

@@ -11,7 +11,7 @@ from ..checks.neighbours import MAX_DIFFERENCE
 from ..checks.physics_records import row_record
 from ..checks.pour_bars import MAX_EXCESS, MAX_LANDING_ERROR, MAX_RETAINED_ERROR, MAX_RMS
 from ..checks.pour_replay import EXCESS, LANDING, RETAINED, RMS
-from .record_cells import (
+from .physics_table import (
     compared,
     fixed,
     number_table,

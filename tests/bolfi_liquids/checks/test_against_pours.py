@@ -84,23 +84,30 @@ def test_an_interrupted_check_goes_on_without_repeating_what_has_finished(check,
     assert check().ran == NAMES[2:] and check().ran == ()
 
 
-@pytest.mark.parametrize("change", ["seed", "cell", "truth", "pours", "landings", "cups"])
+@pytest.mark.parametrize("change", ["seed", "cell", "truth", "distance", "retained", "cups"])
 def test_other_settings_run_again(check, pours, change):
     edits = {
-        "truth": ("pour_truths.csv", "thin,0.001", "thin,0.002"),
-        "pours": ("pours.csv", "thick,45.0,2.0,", "thick,45.0,2.1,"),
-        "landings": ("pours_landings.json", '"cases"', '"about": "", "cases"'),
+        "truth": ("pour_truths.csv", "0.001,1000,0.06,110", "0.001,999,0.06,110"),
+        "distance": ("wetting.csv", "thin,45.0,2.0,", "thin,45.0,2.1,"),
+        "retained": ("wetting.csv", "thin,90.0,6.0,1000000,0,0", "thin,90.0,6.0,999000,1000,0"),
         "cups": ("cups.toml", "lip_height = 0.20", "lip_height = 0.21"),
     }
-    check(["thin_contact_60"])
+    check(["thin_contact_110"])
     if change in edits:
         file, old, new = edits[change]
         text = (pours / file).read_text()
         assert old in text
         (pours / file).write_text(text.replace(old, new, 1))
     again = {"seed": int(change == "seed"), "cell": 0.004 if change == "cell" else None}
-    assert check(["thin_contact_60"], **again).ran == ("thin_contact_60",)
+    assert check(["thin_contact_110"], **again).ran == ("thin_contact_110",)
     assert len(check.calls) == 2
+
+
+def test_pours_of_another_liquid_run_nothing_again(check, pours):
+    check(["thin_contact_110"])
+    edited = (pours / "wetting.csv").read_text().replace("thick,45.0,2.0,", "thick,45.0,2.1,")
+    (pours / "wetting.csv").write_text(edited)
+    assert check(["thin_contact_110"]).ran == ()
 
 
 def test_pours_that_raise_cost_themselves_alone_and_are_tried_again(check, off):
