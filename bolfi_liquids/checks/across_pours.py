@@ -38,7 +38,7 @@ def _means(table: str, done: Iterable[PouredLiquid], records: Records) -> Iterat
     pours = [pour for one in own for pour in records[one.name]["notes"]["pours"]]
     rms = [pour["rms"] for pour in pours if pour["rms"] is not None]
     if rms:
-        yield Row.absolute(f"{MEAN_RMS}, {table}", 0.0, np.mean(rms), MAX_MEAN_RMS)
+        yield Row.absolute(f"{MEAN_RMS}, {table}", 0.0, float(np.mean(rms)), MAX_MEAN_RMS)
     excess = _numbers(pour["excess"] for pour in pours)
     yield Row.absolute(f"{MEAN_EXCESS}, {table}", 0.0, excess.mean(), MAX_MEAN_EXCESS)
 

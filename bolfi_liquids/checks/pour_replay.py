@@ -178,7 +178,7 @@ def judged_rows(repeats: Iterable[Repeated], retained_resolved: bool) -> tuple[R
         (EXCESS, np.max, [one.excess for one in repeats], MAX_EXCESS),
     )
     return tuple(
-        Row.absolute(quantity, 0.0, summary(values), bar)
+        Row.absolute(quantity, 0.0, float(summary(values)), bar)
         for quantity, summary, values, bar in rows
         if len(values)
     )

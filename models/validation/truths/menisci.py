@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import quad
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 
 from .surfaces import GRAVITY
 
@@ -88,5 +88,6 @@ def meniscus_between_walls(gap: float, angle: float, length: float) -> Meniscus:
     # a narrow gap is risen by its mean; in a wide one the middle dies away with the distance
     highest = 2.0 * float(mean_rise(gap, angle, length))
     lowest = 1e-2 * highest * np.exp(-gap / length)
-    middle = float(np.exp(brentq(too_wide, np.log(lowest), np.log(highest), xtol=1e-12)))
+    found = root_scalar(too_wide, bracket=(np.log(lowest), np.log(highest)), xtol=1e-12)
+    middle = float(np.exp(found.root))
     return Meniscus(middle, float(np.hypot(middle, steepest * length)))
