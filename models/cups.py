@@ -18,6 +18,8 @@ from .fluid.numerics import MODEL_VERSION, POUR_PARTICLES, ParticleNumerics
 
 MIN_LENGTH, MAX_RADIUS, MAX_HEIGHT = 1e-3, 0.25, 2.0  # [m] of cups that are poured by hand or arm
 MAX_DISTANCE = 0.5  # [m] from the lip to the receiver's axis
+CONTACT_ANGLE_DEG = 60.0
+"""Of a cup whose file has none: between those of water on glass and on plastics."""
 
 
 def _up_to(most: float) -> AfterValidator:
@@ -37,6 +39,7 @@ Radius = Annotated[Number, Field(ge=MIN_LENGTH), _up_to(MAX_RADIUS)]
 Height = Annotated[Number, Field(ge=MIN_LENGTH), _up_to(MAX_HEIGHT)]
 Distance = Annotated[Number, _up_to(MAX_DISTANCE)]
 Degrees = Annotated[Number, Field(gt=0, le=180)]
+ContactDegrees = Annotated[Number, Field(ge=0, le=180)]
 DegreesPerSecond = Annotated[Number, Field(gt=0, le=3600)]
 Seconds = Annotated[Number, Field(ge=0, le=60)]
 
@@ -46,11 +49,15 @@ class _Section(BaseModel, frozen=True, extra="forbid"):
 
 
 class Source(_Section, frozen=True):
-    """The cup that turns [m]; `fill` is the liquid's depth before the pour."""
+    """The cup that turns [m]; `fill` is the liquid's depth before the pour.
+
+    `contact_angle_deg` is that of the liquid's surface with wall and rim: below 90 it wets them.
+    """
 
     radius: Radius
     height: Height
     fill: Height
+    contact_angle_deg: ContactDegrees = CONTACT_ANGLE_DEG
 
     @model_validator(mode="after")
     def _holds_its_fill(self) -> "Source":
@@ -132,6 +139,11 @@ class Cups(_Section, frozen=True):
     def distance_range(self) -> tuple[float, float]:
         """Range of the decision [m]."""
         return self.pour.distance
+
+    @property
+    def contact_angle(self) -> float:
+        """Of the liquid with the source's wall and rim [rad]; below π/2 it wets them."""
+        return float(np.radians(self.source.contact_angle_deg))
 
     @property
     def liquid_volume(self) -> float:

@@ -1,27 +1,31 @@
-"""`check physics --against`: the fluid against stirs that a reference solver made."""
+"""`check physics --against`: the fluid against stirs and pours that a reference solver made."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..errors import Argument, InputError
 from ..files import write_text
 from ..inputs.settings import checked_seed
 from ..models.accuracy import LARGEST_ERRORS
-from . import replay
+from . import pour_bars, pour_replay, replay
+from .across_pours import across_pours
 from .case_files import CaseFiles, results_folder
 from .case_runner import Setting, run_unfinished
 from .neighbours import LEAST_JUDGED, MAX_DIFFERENCE, Neighbours, neighbours
-from .physics_records import made_with, plain, without_panels
-from .reference_stirs import Reference, ReferenceStir
-from .replay import Simulate, repeated, replay_case
+from .physics_records import made_with, plain, row_record, without_panels
+from .pour_replay import pour_case
+from .reference import Reference
 
 if TYPE_CHECKING:
     from ..inference.simulations import Workers
+    from ..models.validation import Case, Row
 
-STIRS = "against"
+REPEATED = "against"
 RESULTS = "against.json"
+MIN_CELLS, MAX_CELLS = 3, 50  # in the radius of a source that is poured from
 
 
 @dataclass(frozen=True)
@@ -29,38 +33,66 @@ class Replays:
     """What is to be repeated, and by what.
 
     Attributes:
-        reference: All recordings.
-        names: Of those to repeat, with or without the ending of a file; none for all.
-        simulate: Repeats a stir.
+        reference: All stirs and pours.
+        names: Of those to repeat, see `Reference.chosen`; none for all.
+        stir, pour: Repeat a stir, and the pours of a liquid.
+        cell: Width of the cells of pours [m]; None leaves the simulator its own.
     """
 
     reference: Reference
     names: tuple[str, ...] = ()
-    simulate: Simulate = repeated
+    stir: replay.Simulate = replay.repeated
+    pour: pour_replay.Simulate = pour_replay.repeated
+    cell: float | None = None
+
+    def cases(self) -> "dict[str, Case]":
+        """Of all stirs and pours, by name."""
+        stirs = [replay.replay_case(one, self.stir) for one in self.reference.stirs]
+        pours = [pour_case(one, self.pour, self.cell) for one in self.reference.pours]
+        return {case.name: case for case in (*stirs, *pours)}
 
 
 @dataclass(frozen=True)
-class AgainstCheck:
-    """What a check found.
+class Findings:
+    """What repeated stirs and pours have shown.
+
+    Attributes:
+        stirs: Records of recordings, from the thinnest liquid to the thickest.
+        neighbours: Pairs of these whose liquids follow each other in viscosity in the reference.
+        pours: Records of liquids that were poured, from the thinnest to the thickest.
+        across_pours: Comparisons that need several of these.
+    """
+
+    stirs: tuple[dict[str, Any], ...]
+    neighbours: tuple[Neighbours, ...]
+    pours: tuple[dict[str, Any], ...]
+    across_pours: "tuple[Row, ...]"
+
+    @property
+    def records(self) -> tuple[dict[str, Any], ...]:
+        """Of stirs and pours."""
+        return self.stirs + self.pours
+
+    @property
+    def passed(self) -> bool:
+        """Everything keeps its bars."""
+        rows = (*self.neighbours, *self.across_pours)
+        return all(record["passed"] for record in self.records) and all(row.passed for row in rows)
+
+
+@dataclass(frozen=True)
+class AgainstCheck(Findings):
+    """What a check found of the stirs and pours asked for.
 
     Attributes:
         path: Directory with the results file, records and plots.
-        records: Of the recordings asked for, from the thinnest liquid to the thickest.
-        neighbours: Pairs of these whose liquids follow each other in viscosity in the reference.
         left_out: Name -> hidden effect of recordings that are not repeated.
         ran: Names of those that ran now; the others had finished before.
     """
 
     path: Path
-    records: tuple[dict[str, Any], ...]
-    neighbours: tuple[Neighbours, ...]
     left_out: Mapping[str, str]
     ran: tuple[str, ...]
-
-    @property
-    def passed(self) -> bool:
-        """Every recording and every pair keeps its bars."""
-        return _passed(self.records, self.neighbours)
 
     @property
     def results(self) -> Path:
@@ -77,62 +109,85 @@ def check_against(
     timeout: float | None = None,
     progress: bool = True,
 ) -> AgainstCheck:
-    """Repeat a reference's recordings, those that have not finished in `out` before.
+    """Repeat a reference's stirs and pours, those that have not finished in `out` before.
 
-    A recording that raises costs itself alone and is tried again by the next check. Every record
-    is kept at once, so a check that was killed goes on where it was.
+    One that raises costs itself alone and is tried again by the next check. Every record is kept
+    at once, so a check that was killed goes on where it was.
 
     Args:
         out: Directory of results; made if missing.
-        replays: Recordings, and what simulates them.
-        seed: Decides the seeds of the simulations, `replay.SEEDS` of them.
-        executor: Runs each recording in a call of its own, see `calibrate`; None is this process.
-        timeout: Seconds that one recording may take; None sets no limit.
+        replays: Stirs and pours, and what simulates them.
+        seed: Decides the seeds of the simulations, `replay.SEEDS` of a stir, one of a pour.
+        executor: Runs each recording, and all pours of a liquid, in a call of their own, see
+            `calibrate`; None is this process.
+        timeout: Seconds that one such call may take; None sets no limit.
         progress: Whether to show progress on stderr.
 
     Raises:
-        InputError: an unknown name, a negative seed, or a directory that holds something else.
+        InputError: an unknown name, a negative seed, cells that do not fit the cup, or a directory
+            that holds something else.
     """
     reference = replays.reference
     chosen = reference.chosen(replays.names)
-    cases = {stir.name: replay_case(stir, replays.simulate) for stir in reference.stirs}
+    _check_cell(replays)
+    cases = replays.cases()
     setting = Setting(checked_seed(seed), timeout, executor, progress)
     out = results_folder(out)
-    files = CaseFiles(out / STIRS, out / STIRS)
+    files = CaseFiles(out / REPEATED, out / REPEATED)
     files.make()
 
     def keep() -> None:
-        held = list(files.of_today(cases.values(), setting.seed))
-        _write_results(out / RESULTS, reference, held, setting.seed)
+        held = files.of_today(cases.values(), setting.seed)
+        _write_results(out / RESULTS, reference, _findings(reference, held), setting.seed)
 
-    records, ran = run_unfinished([cases[stir.name] for stir in chosen], files, setting, keep)
-    pairs = _neighbours(reference.stirs, records)
-    return AgainstCheck(out, records, pairs, reference.left_out, ran)
-
-
-def _neighbours(
-    stirs: Iterable[ReferenceStir], records: Iterable[Mapping[str, Any]]
-) -> tuple[Neighbours, ...]:
-    return neighbours(stirs, {record["name"]: record for record in records})
+    records, ran = run_unfinished([cases[one.name] for one in chosen], files, setting, keep)
+    found = _findings(reference, records)
+    return AgainstCheck(**vars(found), path=out, left_out=reference.left_out, ran=ran)
 
 
-def _passed(records: Iterable[Mapping[str, Any]], pairs: Iterable[Neighbours]) -> bool:
-    return all(record["passed"] for record in records) and all(pair.passed for pair in pairs)
+def _check_cell(replays: Replays) -> None:
+    """Refuse cells that are too wide for a cup, or so narrow that no computer holds them."""
+    if replays.cell is None:
+        return
+    if not replays.reference.pours:
+        fix = "leave it out; stirs have cells of their own"
+        raise InputError("there are no pours", where=Argument("cell"), fix=fix)
+    narrowest = min(one.cups.source.radius for one in replays.reference.pours)
+    low, high = narrowest / MAX_CELLS, narrowest / MIN_CELLS
+    if not low <= replays.cell <= high:
+        raise InputError(
+            f"{1e3 * replays.cell:g} mm is not between {1e3 * low:.2g} and {1e3 * high:.2g} mm",
+            where=Argument("cell"),
+            fix=f"give a source {MIN_CELLS} to {MAX_CELLS} cells in its radius",
+        )
 
 
-def _write_results(
-    path: Path, reference: Reference, records: Sequence[Mapping[str, Any]], seed: int
-) -> None:
+def _findings(reference: Reference, records: Iterable[dict[str, Any]]) -> Findings:
+    by_name = {record["name"]: record for record in records}
+    stirs, pours = (
+        tuple(by_name[one.name] for one in part if one.name in by_name)
+        for part in (reference.stirs, reference.pours)
+    )
+    return Findings(
+        stirs,
+        neighbours(reference.stirs, by_name),
+        pours,
+        across_pours(reference.pours, by_name),
+    )
+
+
+def _write_results(path: Path, reference: Reference, found: Findings, seed: int) -> None:
     """All that the directory holds of a reference, without the points of plots."""
-    pairs = _neighbours(reference.stirs, records)
     results = {
         **made_with(seed),
-        "reference": {"directory": reference.path.resolve().name, "truths": reference.hash},
+        "reference": {"directory": reference.path.resolve().name, "truths": dict(reference.hashes)},
         "settings": _settings(),
-        "passed": _passed(records, pairs),
-        "recordings": without_panels(records),
-        "neighbours": [pair.to_json() for pair in pairs],
+        "passed": found.passed,
+        "recordings": without_panels(found.stirs),
+        "neighbours": [pair.to_json() for pair in found.neighbours],
         "left_out": dict(reference.left_out),
+        "pours": without_panels(found.pours),
+        "across_pours": plain([row_record(row) for row in found.across_pours]),
     }
     write_text(path, json.dumps(results, indent=2, allow_nan=False) + "\n")
 
@@ -149,5 +204,18 @@ def _settings() -> dict[str, Any]:
             "max_spread_deg": replay.MAX_SPREAD,
             "max_ratio_difference": MAX_DIFFERENCE,
             "least_judged_deg": LEAST_JUDGED,
+            "pours": {
+                "judged_spillage": pour_bars.JUDGED_SPILLAGE,
+                "max_rms": pour_bars.MAX_RMS,
+                "max_mean_rms": pour_bars.MAX_MEAN_RMS,
+                "max_landing_error_mm": 1e3 * pour_bars.MAX_LANDING_ERROR,
+                "max_retained_error": pour_bars.MAX_RETAINED_ERROR,
+                "max_excess": pour_bars.MAX_EXCESS,
+                "max_mean_excess": pour_bars.MAX_MEAN_EXCESS,
+                "max_shift_errors": [
+                    {"viscosity_below": limit, "max_mm": 1e3 * error}
+                    for limit, error in pour_bars.MAX_SHIFT_ERRORS
+                ],
+            },
         }
     )

@@ -20,7 +20,7 @@ from ..files import write_text
 from ..run.provenance import versions
 
 if TYPE_CHECKING:
-    from ..models.validation import Case, CaseResult
+    from ..models.validation import Case, CaseResult, Row
 
 CASES = "cases"
 RESULTS = "physics.json"
@@ -74,11 +74,6 @@ def finished_record(
     case: "Case", result: "CaseResult", seed: int, seconds: float
 ) -> dict[str, Any]:
     """A case that ran to its end, within its tolerances or not."""
-    from ..models.validation import Row
-
-    rows = [
-        dict(zip(Row._fields, row, strict=True)) | {"passed": row.passed} for row in result.rows
-    ]
     panels = [
         {"x_label": p.x_label, "y_label": p.y_label, "log": p.log}
         | {"curves": [dict(c._asdict()) for c in p.curves]}
@@ -88,11 +83,16 @@ def finished_record(
         "passed": result.passed,
         "error": None,
         "seconds": round(seconds, 3),
-        "rows": rows,
+        "rows": [row_record(row) for row in result.rows],
         "notes": dict(result.notes),
         "panels": panels,
     }
     return plain(record)
+
+
+def row_record(row: "Row") -> dict[str, Any]:
+    """One number compared with its truth, and whether it is within its tolerance."""
+    return row._asdict() | {"passed": row.passed}
 
 
 def failed_record(case: "Case", error: str, seed: int, seconds: float) -> dict[str, Any]:

@@ -1,23 +1,20 @@
 """Recordings of a reference solver, and the table of the liquids that it stirred."""
 
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from hashlib import sha256
 from pathlib import Path
+from typing import NamedTuple
 
-from ..errors import Argument, InputError
-from ..files import as_path
+from ..errors import InputError
 from ..inputs.open import open_recording
 from ..inputs.recording import Recording
 from ..inputs.start import above_liquid
 from ..inputs.table import MISSING, Table, read_table
+from .truth_columns import NAME, positive
 
 TRUTHS = "truths.csv"
 FILE, VISCOSITY, FILL, HIDDEN = "file", "viscosity_Pa_s", "true_fill_m", "hidden"
-UNITS = {VISCOSITY: "Pa s", FILL: "m"}
 FIX_HEADER = f"give a column for each of {FILE}, {VISCOSITY}, {FILL} and {HIDDEN}"
-NAME = re.compile(r"[a-z][a-z0-9_]*")  # of a case, too: its record's and its plot's file
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,67 +34,35 @@ class ReferenceStir:
     fill: float
 
 
-@dataclass(frozen=True, eq=False)
-class Reference:
-    """A directory of recordings with their truths.
+class ReferenceStirs(NamedTuple):
+    """The stirs of a reference.
 
     Attributes:
-        path: The directory.
         stirs: Those without a hidden effect, from the thinnest liquid to the thickest.
         left_out: Name -> hidden effect of the others.
-        hash: SHA-256 of the table's bytes, in hexadecimal.
     """
 
-    path: Path
     stirs: tuple[ReferenceStir, ...]
     left_out: Mapping[str, str]
-    hash: str
-
-    def chosen(self, names: Iterable[str]) -> tuple[ReferenceStir, ...]:
-        """Stirs by the names of their files, with or without the ending; all for no names.
-
-        Raises:
-            InputError: One is no recording here, or holds an effect.
-        """
-        wanted = [name.removesuffix(".nc") for name in names]
-        known = [stir.name for stir in self.stirs]
-        for name in wanted:
-            if name not in known:
-                effect = self.left_out.get(name)
-                what = f"no recording {name!r} in {self.path}"
-                if effect:
-                    what = f"recording {name!r} holds the hidden effect {effect}"
-                fix = f"choose from {', '.join(known)}, or leave `against` out to run other cases"
-                raise InputError(what, where=Argument("names"), fix=fix)
-        return tuple(stir for stir in self.stirs if stir.name in (wanted or known))
 
 
-def open_reference(path: str | Path) -> Reference:
+def open_reference_stirs(folder: Path) -> ReferenceStirs:
     """Read all recordings of a directory and their truths, so that nothing is found wrong later.
 
     Args:
-        path: The directory: NetCDF files, and truths.csv with a row for each. Its columns are
+        folder: A directory of NetCDF files, and truths.csv with a row for each. Its columns are
             `file`, `viscosity_Pa_s`, `true_fill_m`, and `hidden`, an effect that is in the data,
             empty where there is none. Other columns are not read.
 
     Raises:
-        InputError: The directory, the table or a recording cannot be used; the message names
-            file, line, column and value.
+        InputError: The table or a recording cannot be used; the message names file, line, column
+            and value.
     """
-    folder = as_path(path, Argument("against"))
-    if not folder.is_dir():
-        what = "a file, not a directory" if folder.exists() else "no such directory"
-        raise InputError(what, where=str(folder), fix="give that of the reference's recordings")
-    if not (folder / TRUTHS).is_file():
-        raise InputError(
-            f"holds no {TRUTHS}",
-            where=str(folder),
-            fix=f"write a row for each recording, and {FIX_HEADER}",
-        )
     table = read_table(folder / TRUTHS)
     _check_files(folder, table)
     hidden = [_effect(cell) for cell in table.column(HIDDEN, FIX_HEADER)]
-    viscosity, fill = _positive(table, VISCOSITY), _positive(table, FILL)
+    viscosity = positive(table, VISCOSITY, "Pa s", FIX_HEADER)
+    fill = positive(table, FILL, "m", FIX_HEADER)
     stirs, left_out = [], {}
     for row, file in enumerate(table.column(FILE)):
         if hidden[row]:
@@ -115,7 +80,7 @@ def open_reference(path: str | Path) -> Reference:
             fix="add a recording without one; the cell is then empty",
         )
     stirs.sort(key=lambda stir: (stir.viscosity, stir.name))
-    return Reference(folder, tuple(stirs), left_out, sha256(table.path.read_bytes()).hexdigest())
+    return ReferenceStirs(tuple(stirs), left_out)
 
 
 def _check_files(folder: Path, table: Table) -> None:
@@ -143,16 +108,6 @@ def _check_files(folder: Path, table: Table) -> None:
 
 def _effect(cell: str) -> str:
     return "" if cell.lower() in MISSING else cell
-
-
-def _positive(table: Table, name: str) -> list[float]:
-    """Numbers of a column, all of them positive."""
-    values = table.numbers(name, FIX_HEADER)
-    for value, cell, line in zip(values, table.column(name), table.lines, strict=True):
-        if not value > 0.0:
-            fix = f"give a positive number in {UNITS[name]}"
-            raise InputError(f"got {cell!r}", where=table.where(line, name), fix=fix)
-    return values.tolist()
 
 
 def _name(table: Table, row: int) -> str:

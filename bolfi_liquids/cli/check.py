@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from ..errors import Argument, InputError
 from ..inputs.settings import SbcSettings
 from .compute import Compute, StudyCompute
 from .errors import FAILED
@@ -21,6 +22,7 @@ app = typer.Typer(help="Long validation runs; a killed one goes on.", no_args_is
         "check physics --case couette",
         "check physics --out runs/physics",
         "check physics --against recordings --out runs/physics",
+        "check physics --against pours --cell 4 --out runs/cells_of_4_mm",
     )
 )
 @grouped
@@ -34,16 +36,21 @@ def physics(
         typer.Option(
             "--case",
             metavar="NAME",
-            help="Run this case, with --against this recording; may be repeated. Without it, all.",
+            help="Run this case, with --against this recording or poured liquid; may be repeated. "
+            "Without it, all.",
         ),
     ] = None,
     against: Annotated[
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Repeat a reference solver's recordings, whose liquids DIR/truths.csv holds, "
-            "in place of the cases.",
+            help="Repeat a reference solver's recordings, whose liquids DIR/truths.csv holds, and "
+            "its pours, whose liquids DIR/pour_truths.csv holds, in place of the cases.",
         ),
+    ] = None,
+    cell: Annotated[
+        float | None,
+        typer.Option(metavar="MM", help="Width of the cells of the reference's pours [mm]."),
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the initial packings.")] = 0,
 ) -> None:
@@ -55,10 +62,12 @@ def physics(
     """
     from rich.console import Console
 
-    from .physics_table import print_against, print_physics
-
     if against is None:
+        if cell is not None:
+            fix = "add `against`; cases have cells of their own"
+            raise InputError("is for pours of a reference", where=Argument("cell"), fix=fix)
         from ..checks.physics import check_physics
+        from .physics_table import print_physics
 
         with compute.executor() as executor:
             check = check_physics(
@@ -67,9 +76,11 @@ def physics(
         print_physics(check.records, Console())
     else:
         from ..checks.against import Replays, check_against
-        from ..checks.reference_stirs import open_reference
+        from ..checks.reference import open_reference
+        from .against_table import print_against
 
-        replays = Replays(open_reference(against), tuple(names or ()))
+        width = None if cell is None else cell / 1000.0
+        replays = Replays(open_reference(against), tuple(names or ()), cell=width)
         with compute.executor() as executor:
             check = check_against(
                 out, replays, seed=seed, executor=executor, timeout=compute.timeout

@@ -1,5 +1,6 @@
 """report.html: one file that shows a run, without anything from outside it."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import astuple
 from importlib.resources import files
@@ -151,6 +152,7 @@ def _pour_context(summary: PourSummary | None, tree: "DataTree | None") -> dict[
         "chosen": sentences.pour_sentence(summary),
         "plug_in": sentences.plug_in_sentence(summary),
         "limits": sentence("pour.limits"),
+        "contact_angle": sentences.contact_angle_sentences(json.loads(tree.attrs["cups"])),
         "figure": pour_figure(tree),
         "made_with": dict(tree.attrs),
         "rows": [("chosen pour", summary), ("best at θ* alone", summary.plug_in)],

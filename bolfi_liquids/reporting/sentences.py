@@ -3,6 +3,9 @@
 Their wording is in `data/calibration_sentences.jinja` and `data/pour_sentences.jinja`.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -85,3 +88,9 @@ def plug_in_sentence(summary: PourSummary) -> Sentence:
     if summary.plug_in.action == summary.action:
         return sentence("pour.plug_in_same")
     return sentence("pour.plug_in", plug_in=summary.plug_in)
+
+
+def contact_angle_sentences(cups: Mapping[str, Any]) -> list[Sentence]:
+    """How the liquid was taken to wet the source, by `Cups.settings`; older pours had no angle."""
+    degrees = cups["source"].get("contact_angle_deg")
+    return [] if degrees is None else [sentence("pour.contact_angle", degrees=degrees)]

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import bolfi_liquids as bl
-from bolfi_liquids.checks.reference_stirs import open_reference
+from bolfi_liquids.checks.reference import open_reference
 
 BUDGET = 20
 LEAST_VISCOSITY = 0.01  # Pa s; thinner liquids look alike

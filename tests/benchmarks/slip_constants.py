@@ -26,7 +26,7 @@ def errors(folder: Path, constant: str, factor: float) -> list[float]:
     from bolfi_liquids.models.stirs import slip_law
 
     setattr(slip_law, constant, factor * getattr(slip_law, constant))
-    from bolfi_liquids.checks.reference_stirs import open_reference
+    from bolfi_liquids.checks.reference import open_reference
     from bolfi_liquids.checks.replay import repeated
 
     stirs = {stir.name: stir for stir in open_reference(folder).stirs}

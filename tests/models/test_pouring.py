@@ -1,3 +1,5 @@
+from importlib.resources import files
+
 import numpy as np
 import pytest
 from scipy.stats import spearmanr
@@ -109,13 +111,15 @@ def test_bad_actions_are_named(cups):
         ("135.0", "nan", r"pour\.final_angle_deg.*nan"),
         ("hold = 0.9 ", "hold = nan ", r"pour\.hold.*nan"),
         ("135.0", "720.0", r"pour\.final_angle_deg.*720"),
+        ("_deg = 60.0", "_deg = -1.0", r"source\.contact_angle_deg.*-1"),
+        ("_deg = 60.0", "_deg = 180.5", r"source\.contact_angle_deg.*180.5"),
+        ("_deg = 60.0", "_deg = nan", r"source\.contact_angle_deg.*nan"),
+        ("_deg = 60.0", "_deg = '60'", r"source\.contact_angle_deg.*'60'"),
         ("[source]", "[source", "not a TOML file"),
     ],
 )
 def test_bad_cups_files_are_named(tmp_path, old, new, message):
-    from importlib.resources import files
-
-    text = (files("bolfi_liquids.data") / "cups.toml").read_text()
+    text = bundled_text()
     assert old in text
     path = tmp_path / "cups.toml"
     path.write_text(text.replace(old, new, 1))
@@ -123,11 +127,28 @@ def test_bad_cups_files_are_named(tmp_path, old, new, message):
         models.Cups.from_toml(path)
 
 
-def test_a_cups_file_may_begin_with_a_byte_order_mark(tmp_path, cups):
-    from importlib.resources import files
+@pytest.mark.parametrize("degrees", [0.0, 110.0, 180.0])
+def test_a_contact_angle_is_read_in_degrees_and_given_in_radians(tmp_path, cups, degrees):
+    path = tmp_path / "cups.toml"
+    path.write_text(bundled_text().replace("_deg = 60.0", f"_deg = {degrees}", 1))
+    wetted = models.Cups.from_toml(path)
+    assert wetted.contact_angle == pytest.approx(np.pi * degrees / 180.0)
+    assert wetted.settings() != cups.settings()  # so that no pour of another angle is reused
 
-    text = (files("bolfi_liquids.data") / "cups.toml").read_text()
-    (tmp_path / "cups.toml").write_text(text, encoding="utf-8-sig")
+
+def test_cups_without_a_contact_angle_are_taken_at_60_degrees(tmp_path, cups):
+    line = next(one for one in bundled_text().splitlines() if one.startswith("contact_angle"))
+    path = tmp_path / "cups.toml"
+    path.write_text(bundled_text().replace(line, ""))
+    assert models.Cups.from_toml(path).contact_angle == pytest.approx(np.pi / 3.0)
+
+
+def bundled_text():
+    return (files("bolfi_liquids.data") / "cups.toml").read_text()
+
+
+def test_a_cups_file_may_begin_with_a_byte_order_mark(tmp_path, cups):
+    (tmp_path / "cups.toml").write_text(bundled_text(), encoding="utf-8-sig")
     assert models.Cups.from_toml(tmp_path / "cups.toml") == cups
 
 

@@ -1,4 +1,5 @@
 import shutil
+import sys
 from importlib.resources import files
 from pathlib import Path
 from typing import NamedTuple
@@ -7,7 +8,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bolfi_liquids.checks.reference_stirs import open_reference
+from bolfi_liquids.checks.reference import open_reference
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import strip_pours  # noqa: E402, beside this file
 
 SAMPLES = 60  # 2 s: the pause and the first strokes
 HEADER = "file,liquid,viscosity_Pa_s,true_fill_m,hidden,size"
@@ -70,6 +75,48 @@ def shifted():
             signs = np.where(np.asarray(seeds) % 2, 1.0, -1.0)
             off = np.radians(offset + spread * signs)
             return stir.recording.inclination + off[:, None, None]
+
+        return simulate
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def made_pours(tmp_path_factory):
+    """A reference's directory of pours that land in strips."""
+    folder = tmp_path_factory.mktemp("poured") / "pours"
+    folder.mkdir()
+    strip_pours.write_reference(folder)
+    return folder
+
+
+@pytest.fixture
+def pours(made_pours, tmp_path):
+    """That directory, to be altered."""
+    return shutil.copytree(made_pours, tmp_path / "pours")
+
+
+@pytest.fixture(scope="session")
+def poured(made_pours):
+    """What that directory holds: name -> liquid."""
+    return {one.name: one for one in open_reference(made_pours).pours}
+
+
+@pytest.fixture
+def off():
+    """Makes a simulator: the reference's strips, moved by so much [m] by the liquid's name."""
+    strips = {strip.name: strip for strip in strip_pours.STRIPS}
+
+    def make(retained=0.0, **moved):
+        def simulate(liquid, seeds, cell):
+            strip = strips[liquid.name]
+            speeds = [round(float(np.degrees(one))) for one in liquid.angular_velocity]
+            middles = [
+                middle + moved.get(liquid.name, 0.0)
+                for middle, speed in zip(strip_pours.middles(strip), (45, 90), strict=True)
+                if speed in speeds
+            ]
+            return strip_pours.landed(middles, strip.retained + retained)
 
         return simulate
 

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from bolfi_liquids.checks import replay
 from bolfi_liquids.checks.against import Replays, check_against
-from bolfi_liquids.checks.reference_stirs import open_reference
+from bolfi_liquids.checks.reference import open_reference
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.errors import InputError
 
@@ -172,7 +172,7 @@ def test_a_case_of_the_fluid_is_no_recording(command, tmp_path):
     result = command("--case", "couette")
     assert result.exit_code == 2
     (line,) = result.stderr.strip().splitlines()
-    assert line.startswith("error: --case: no recording 'couette' in ")
+    assert line.startswith("error: --case: no recording or pour 'couette' in ")
     assert "or leave --against out to run other cases" in line
     assert not (tmp_path / "out").exists()
 

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from bolfi_liquids.checks.neighbours import neighbours
-from bolfi_liquids.checks.reference_stirs import open_reference
+from bolfi_liquids.checks.reference import open_reference
 from bolfi_liquids.checks.replay import rms, without_noise
 
 

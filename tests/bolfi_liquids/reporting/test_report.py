@@ -13,6 +13,7 @@ import pytest
 import bolfi_liquids as bl
 from bolfi_liquids.calibration.posterior_file import write_tree
 from bolfi_liquids.calibration.summary import ParameterSummary
+from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.pouring.result import ActionSummary, PourSummary
 from bolfi_liquids.reporting import criticism_sentences, frames, sentences
 from bolfi_liquids.reporting.report import prior_text
@@ -69,6 +70,7 @@ def test_report_shows_the_runs_numbers(pour, calibration):
     assert f"{summary.fit_rms_deg:.2f}° RMS" in text
     assert f"{summary.parameters['viscosity'].q50:.3g} Pa s" in text
     assert f"{pour.chosen.angular_velocity * 57.29578:.0f}°/s" in text
+    assert "contact angle with the source was taken as 60°" in text
     assert calibration.record["inputs"]["sha256"][0] in text
 
 
@@ -207,6 +209,15 @@ def test_sentence_repeats_no_action():
     other = replace(summary, plug_in=replace(chosen, distance_cm=1.236, expected_spillage=0.02))
     sentence = sentences.plug_in_sentence(other)
     assert sentence.key == "pour.plug_in" and "2 %" in str(sentence)
+
+
+def test_the_contact_angle_is_named_where_the_pour_had_one():
+    settings = bundled_cups().settings()
+    settings["source"]["contact_angle_deg"] = 110.0
+    (sentence,) = sentences.contact_angle_sentences(settings)
+    assert "was taken as 110°" in str(sentence)
+    del settings["source"]["contact_angle_deg"]  # of a pour by an older version
+    assert sentences.contact_angle_sentences(settings) == []
 
 
 @pytest.fixture
