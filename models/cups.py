@@ -1,7 +1,6 @@
 """The cups of a pour, as a person writes them down in a cups.toml."""
 
 import tomllib
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,7 +13,8 @@ from pydantic import (
     model_validator,
 )
 
-from .fluid.numerics import MODEL_VERSION, POUR_PARTICLES, ParticleNumerics
+from .fluid.numerics import MODEL_VERSION
+from .pours.resolution import LEAST_VISCOSITY, settings
 
 MIN_LENGTH, MAX_RADIUS, MAX_HEIGHT = 1e-3, 0.25, 2.0  # [m] of cups that are poured by hand or arm
 MAX_DISTANCE = 0.5  # [m] from the lip to the receiver's axis
@@ -150,23 +150,21 @@ class Cups(_Section, frozen=True):
         """Liquid in the source before the pour [m³]."""
         return float(np.pi * self.source.radius**2 * self.source.fill)
 
-    def spacing(self, particles: int = POUR_PARTICLES) -> float:
+    def spacing(self, particles: int) -> float:
         """Particle spacing [m], the cube root of the liquid's volume per particle."""
         return (self.liquid_volume / particles) ** (1.0 / 3.0)
 
-    def least_viscosity(self, density: float, angular_velocity: float) -> float:
-        """Viscosity [Pa s] below which pours cannot distinguish liquids of `density` [kg/m³]; see
-        `ParticleNumerics`. The source's floor turns about the lip at the flow's speed."""
-        speed = angular_velocity * self.source.height
-        return ParticleNumerics().least_viscosity(self.spacing(), density, speed)
+    def least_viscosity(self, density: float) -> float:
+        """Viscosity [Pa s] below which pours look alike, of liquids of `density` [kg/m³]."""
+        return LEAST_VISCOSITY * density
 
-    def settings(self, particles: int = POUR_PARTICLES) -> dict[str, Any]:
+    def settings(self, particles: int = 0) -> dict[str, Any]:
         """Everything that fixes the simulator, as plain numbers, with the model's version."""
         return {
             "model": MODEL_VERSION,
             "scene": "pour",
             "particles": particles,
-            "numerics": asdict(ParticleNumerics()),
+            "numerics": settings(self, particles),
             **self.model_dump(),
         }
 

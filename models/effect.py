@@ -16,22 +16,23 @@ if TYPE_CHECKING:
 
 RigHook = Callable[[Rig, np.ndarray], Rig]
 KernelHook = Callable[[], Callable[..., Any]]
+WettingHook = Callable[[np.ndarray, np.ndarray], np.ndarray]
 SignalHook = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 SCENES = {"liquid": ("stir", "pour"), "rig": ("stir",), "sensor": ("stir",)}
 # acts_in -> hooks of which such an effect needs at least one
-HOOKS = {"rig": ("rig",), "sensor": ("signal",), "liquid": ("make_rheology", "make_force")}
+HOOKS = {"rig": ("rig",), "sensor": ("signal",), "liquid": ("make_rheology", "wetting")}
 
 
 @dataclass(frozen=True)
 class Effect:
     """A physical effect that the base model leaves out.
 
-    The hooks `rig` and `signal` are pure functions of NumPy arrays. They are given only the B
-    simulations whose coefficient is not neutral, so the others keep their bits whatever a hook
-    computes. Those in the liquid are compiled into the simulation, which is why an effect has
-    a function that makes them: it imports taichi, as this package does when it first simulates.
-    It is called once a scene, and a scene runs only simulations in which all its effects act.
+    The hooks `rig`, `wetting` and `signal` are pure functions of NumPy arrays. They are given only
+    the B simulations whose coefficient is not neutral, so the others keep their bits whatever a
+    hook computes. A rheology is compiled into the simulation, which is why an effect has a function
+    that makes it: it imports taichi, as this package does when it first simulates. It is called
+    once a scene, and a scene runs only simulations in which all its effects act.
 
     Attributes:
         name: Name of the effect and of its coefficient, a Python identifier.
@@ -48,11 +49,8 @@ class Effect:
         make_rheology: Returns a `ti.func` (viscosity, shear_rate, time, coefficient) ->
             viscosity: of a particle and dynamic [Pa s], root of 2 D:D [1/s], since the
             recording or the pour began [s].
-        make_force: Returns a `ti.func` (scene, b, coefficient) that may change
-            scene.velocity[b, i], scene.grip[b, i] and scene.pair_coupling[b, k] of simulation
-            b, once a substep, after gravity and before pressure and viscosity. Annotate scene
-            as ti.template(). It acts in pours and not in stirs: of an effect with both hooks,
-            stirs keep the rheology alone.
+        wetting: (cosine [B], coefficient [B]) -> cosine [B], of the contact angle of the liquid
+            with the cup that pours. Of an effect with both hooks, stirs keep the rheology alone.
         lowest, highest: Coefficients outside are refused.
 
     Raises:
@@ -69,7 +67,7 @@ class Effect:
     rig: RigHook | None = None
     signal: SignalHook | None = None
     make_rheology: KernelHook | None = None
-    make_force: KernelHook | None = None
+    wetting: WettingHook | None = None
     lowest: float = -math.inf
     highest: float = math.inf
 
@@ -115,7 +113,7 @@ class Effect:
     def scenes(self) -> tuple[str, ...]:
         """Scenes in which it acts: "stir", "pour"; elsewhere its coefficient changes nothing.
 
-        Forces on the liquid are of surfaces, and stirs have none that pull.
+        Stirs know no surface tension, so how a liquid wets walls is nothing to them.
         """
         if self.acts_in == "liquid" and self.make_rheology is None:
             return ("pour",)

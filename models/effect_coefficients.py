@@ -109,13 +109,22 @@ def liquid_sets(
     Yields:
         The effects, which of `size` simulations [n], and coefficients [effects, size].
     """
-    inside = [a for a in acting if a.effect.make_rheology or a.effect.make_force]
+    inside = [a for a in acting if a.effect.make_rheology]
     changed = np.array([a.changed for a in inside], dtype=bool).reshape(len(inside), size)
     coefficients = np.array([a.coefficient for a in inside]).reshape(len(inside), size)
     for which in np.unique(changed, axis=1).T:
         rows = np.flatnonzero((changed == which[:, None]).all(axis=0))
         effects = tuple(a.effect for a, acts in zip(inside, which, strict=True) if acts)
         yield effects, rows, coefficients[which]
+
+
+def changed_wetting(cosine: np.ndarray, acting: tuple[Acting, ...]) -> np.ndarray:
+    """Cosines of contact angles [B] after every effect that acts on them, within -1 and 1."""
+    for act in acting:
+        if act.effect.wetting is not None:
+            found = act.effect.wetting(cosine[act.changed], act.coefficient[act.changed])
+            cosine = _put(act.effect, "wetting", cosine, act.changed, found)
+    return np.clip(cosine, -1.0, 1.0)
 
 
 def changed_rig(rig: Rig, acting: tuple[Acting, ...]) -> Rig:

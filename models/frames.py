@@ -11,6 +11,7 @@ from .fluid.checks import check_numbers
 from .fluid.liquid import Liquid
 from .fluid.runtime import Watch
 from .pouring import PourBatch, watched_landings
+from .pours.vessel import turned
 from .stir_setup import StirSetup
 from .stirring import watched_stir
 from .trajectory import Trajectory
@@ -41,8 +42,8 @@ class PourFrames:
 
     Attributes:
         time: Of each frame since the source began to turn [s], shape [F].
-        position: Of the particles [m], float32 of shape [F, n, 3]; NaN for what has passed the
-            receiver's rim. A row is not the same particle in every frame.
+        position: Of the particles of both halves [m], float32 of shape [F, n, 3]; NaN for what has
+            passed the receiver's rim. A row is not the same particle in every frame.
         angle: By which the source has turned [rad], shape [F].
     """
 
@@ -96,8 +97,7 @@ def stir_frames(
 def pour_frames(batch: PourBatch, *, rate: float = FRAME_RATE) -> PourFrames:
     """Frames of the very simulation that `landings` makes of one liquid and seed.
 
-    The first rows of `Landings.position` are what has landed by any frame, as many as are NaN in
-    it: there they stand in the order of their landing.
+    What has landed by a frame are the first rows of `Landings.position`, as many as are NaN in it.
 
     Args:
         batch: One pour.
@@ -110,14 +110,16 @@ def pour_frames(batch: PourBatch, *, rate: float = FRAME_RATE) -> PourFrames:
     """
     check_numbers("frames", rate=rate)
     seen, turning = list[PourFrames](), float(np.ravel(batch.angular_velocity)[0])
+    drop = batch.cups.pour.lip_height - batch.cups.receiver.height
 
     def look(scene: Any, step: int) -> None:
-        position = scene.position.to_numpy()[0]
-        position[scene.alive.to_numpy()[0] :] = np.nan
         time = step / scene.rate
-        # not the scene's own angle, which stands still once nothing is left to simulate
         angle = min(turning * time, batch.cups.pour.final_angle)
-        seen.append(PourFrames(np.array(time), position, np.array(angle)))
+        held, flights = scene.view()
+        half = np.concatenate([turned(held, angle), flights.before(time, drop)])
+        whole = np.full((flights.particles, 2, 3), np.nan, np.float32)
+        whole[: len(half), 0], whole[: len(half), 1] = half, half * [1.0, -1.0, 1.0]
+        seen.append(PourFrames(np.array(time), whole.reshape(-1, 3), np.array(angle)))
 
     watch = Watch(rate, look)
     landed = watched_landings(batch, watch)

@@ -6,28 +6,23 @@ it is, changes nothing in the fluid: one simulation tells what any receiver woul
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .cups import Cups
-from .effect import Effect
-from .effect_coefficients import acting_in, liquid_sets, with_adhesion
+from .effect_coefficients import Acting, acting_in, changed_wetting, liquid_sets, with_adhesion
 from .fluid import runtime
-from .fluid.checks import check_numbers
-from .fluid.faults import faulty
-from .fluid.liquid import Liquid
-from .fluid.numerics import POUR_PARTICLES, ParticleNumerics
-from .fluid.packing import checked_seeds, pack_cylinder
+from .fluid.checks import check_numbers, checked_seeds
+from .fluid.liquid import TENSION_AT_ONE, Liquid
 from .fluid.runtime import Watch
-from .fluid.settled import Packing, SettledPackings
+from .pours.flights import Flights, landing_of
+from .pours.march import Pours, Turn, march
+from .pours.resolution import cell_for, steps_for
+from .pours.vessel import Vessel
 
-SETTLING_TIME = 0.6  # s
-_packings = SettledPackings()
 SLOWEST, FASTEST = 0.01, 30.0  # rad/s: a pour of three minutes; a cup that is flung
-DRIP_TIME = 1.2  # s beyond the cups' hold; viscous liquids need it, and others end earlier
 
 
 @dataclass(frozen=True)
@@ -43,9 +38,9 @@ class PourAction:
 
 @dataclass(frozen=True)
 class PourResult:
-    """Fractions of all particles, shape [B] each; they sum to 1, or are NaN if a pour diverged.
+    """Fractions of all particles, shape [B] each; they sum to 1, or are NaN if a pour failed.
 
-    What still flies at the end counts as spilled.
+    What still flies at the end counts where it will land.
     """
 
     spilled: np.ndarray
@@ -59,9 +54,9 @@ class Landings:
 
     Attributes:
         position: Of every particle from below the source's lip, towards the receiver and across
-            [m], float32 of shape [B, particles, 2]; NaN for what has not landed: it is in the
-            source, or still in the air.
-        retained: Fraction left in the source, shape [B]; NaN if a pour diverged.
+            [m], float32 of shape [B, particles, 2], in the order in which they pass it; NaN for
+            what stays in the source.
+        retained: Fraction left in the source, shape [B]; NaN if a pour failed.
     """
 
     position: np.ndarray
@@ -101,7 +96,7 @@ def pour(
     action: PourAction,
     cups: Cups,
     seeds: ArrayLike,
-    particles: int = POUR_PARTICLES,
+    particles: int = 0,
     effects: Mapping[str, ArrayLike] | None = None,
 ) -> PourResult:
     """Where the liquid ends when the source turns about its lip to its final angle and holds.
@@ -109,15 +104,15 @@ def pour(
     Args:
         liquid: B liquids; scalars are shared.
         action: B actions; scalars are shared.
-        cups: Geometry.
-        seeds: One integer a simulation, shape [B]; it decides the initial packing.
-        particles: Number of particles.
+        cups: Geometry, contact angle and hold.
+        seeds: One integer a simulation, shape [B]; it decides where particles start.
+        particles: About as many; 0: cells follow the cup.
         effects: Coefficients of `EFFECTS` by name, scalars or of shape [B]. Those that do not
             act in a pour change nothing, so all that a stir has taught may be given.
 
     Raises:
-        ValueError: lengths do not agree, an action is not finite, too slow or too fast, there are
-            no particles, or an effect is unknown.
+        ValueError: lengths do not agree, an action is not finite, too slow or too fast, the
+            number of particles is negative, or an effect is unknown.
     Warns:
         FailedSimulation: a pour went wrong; its fractions are NaN.
     """
@@ -132,7 +127,7 @@ def landings(
     angular_velocity: ArrayLike,
     cups: Cups,
     seeds: ArrayLike,
-    particles: int = POUR_PARTICLES,
+    particles: int = 0,
     effects: Mapping[str, ArrayLike] | None = None,
 ) -> Landings:
     """Where the liquid lands, for receivers at any distance; arguments and errors of `pour`.
@@ -150,16 +145,49 @@ class PourBatch(NamedTuple):
     angular_velocity: ArrayLike
     cups: Cups
     seeds: ArrayLike
-    particles: int = POUR_PARTICLES
+    particles: int = 0
     effects: Mapping[str, ArrayLike] | None = None
 
 
 def watched_landings(batch: PourBatch, watch: Watch | None = None) -> Landings:
     """What `landings` returns, while `watch` looks at each of its scenes."""
-    cups, particles, seeds = batch.cups, batch.particles, checked_seeds(batch.seeds)
+    cups, seeds = batch.cups, checked_seeds(batch.seeds)
     acting = acting_in("pour", with_adhesion(batch.liquid, batch.effects, len(seeds)), len(seeds))
-    liquid = batch.liquid.batch(len(seeds))
-    rate = _batch("angular_velocity", batch.angular_velocity, len(seeds))
+    rate = _checked_rate(batch.angular_velocity, len(seeds))
+    check_numbers("pour", zero=True, particles=batch.particles)
+    vessel = Vessel.of(cups, cell_for(cups, batch.particles))
+    steps = steps_for(cups, vessel.cell, rate)
+    pours = _pours(batch.liquid.batch(len(seeds)), rate, cups, seeds, acting)
+    found: list[Flights] = [None] * len(seeds)  # type: ignore[list-item]  filled below
+    with runtime.LOCK:
+        for kinds, rows, coefficients in liquid_sets(acting, len(seeds)):
+            for step in np.unique(steps[rows]):
+                part = rows[steps[rows] == step]
+                turn = Turn(cups.pour.final_angle, cups.pour.hold, float(step))
+                alike = pours._replace(coefficients=coefficients).rows(part)
+                for at, flights in zip(part, march(vessel, alike, turn, kinds, watch), strict=True):
+                    found[at] = flights
+    drop = cups.pour.lip_height - cups.receiver.height
+    position = np.stack([landing_of(flights, drop) for flights in found])
+    return Landings(position, np.array([flights.retained for flights in found]))
+
+
+def _pours(
+    liquid: Liquid, rate: np.ndarray, cups: Cups, seeds: np.ndarray, acting: tuple[Acting, ...]
+) -> Pours:
+    cosine = np.full(len(seeds), np.cos(cups.contact_angle))
+    return Pours(
+        liquid,
+        TENSION_AT_ONE * np.asarray(liquid.cohesion, float),
+        changed_wetting(cosine, acting),
+        rate,
+        seeds,
+        np.zeros((0, len(seeds))),
+    )
+
+
+def _checked_rate(angular_velocity: ArrayLike, size: int) -> np.ndarray:
+    rate = _batch("angular_velocity", angular_velocity, size)
     if (rate <= 0).any():
         raise ValueError(f"angular_velocity must be positive [rad/s], got {rate.min()}")
     wrong = rate[(rate < SLOWEST) | (rate > FASTEST)]
@@ -168,72 +196,11 @@ def watched_landings(batch: PourBatch, watch: Watch | None = None) -> Landings:
             f"angular_velocity must be {SLOWEST} to {FASTEST} rad/s, got {wrong[0]:.4g}; "
             "is it in rad/s?"
         )
-    check_numbers("pour", particles=particles)
-    position = np.empty((len(seeds), particles, 2), np.float32)
-    retained = np.empty(len(seeds))
-    with runtime.LOCK:
-        for kinds, rows, coefficients in liquid_sets(acting, len(seeds)):
-            scene = _scene(cups, particles, kinds)
-            for low in range(0, len(rows), scene.slots):
-                part = rows[low : low + scene.slots]
-                held = liquid[part], coefficients[:, part]
-                position[part], retained[part] = _run(
-                    scene, cups, held, rate[part], seeds[part], watch=watch
-                )
-    return Landings(position, retained)
+    return rate
 
 
 def _batch(name: str, value: ArrayLike, size: int) -> np.ndarray:
-    array = np.asarray(value, dtype=np.float32)
+    array = np.asarray(value, dtype=np.float64)
     if array.ndim > 1 or array.size not in (1, size) or not np.isfinite(array).all():
         raise ValueError(f"{name} must be finite and of shape () or ({size},), got {value}")
     return np.broadcast_to(array, (size,))
-
-
-@cache
-def _scene(cups: Cups, particles: int, effects: tuple[Effect, ...] = ()):
-    """The scene compiled for liquid effects; its fields live as long as the process."""
-    runtime.start()
-    from .pouring_kernel import PouringScene
-
-    return PouringScene(
-        runtime.SLOTS, particles, cups.spacing(particles), ParticleNumerics(), cups, effects
-    )
-
-
-def _run(
-    scene, cups, held, rate, seeds, *, watch: Watch | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Position and retained fraction as in `Landings`.
-
-    `held` are the liquid and the coefficients [effects, B] of the scene's effects.
-    """
-    size = len(seeds)
-    source = cups.source
-    shift = np.array([source.radius, 0.0, source.height], np.float32)
-
-    def settle(places: list[int]) -> list[Packing]:
-        scene.place_cups(np.ones(len(places)))
-        packed = (
-            pack_cylinder(source.radius, scene.spacing, scene.particles, int(seeds[k]))
-            for k in places
-        )
-        return scene.settled([points - shift for points in packed], SETTLING_TIME)
-
-    # by scene too: with effects compiled in, the last bit of a rest may differ
-    fixed = cups, scene.particles, tuple(effect.name for effect in scene.effects)
-    packings = _packings.of([(fixed, seed) for seed in seeds], settle)
-    scene.place([p.position for p in packings], [p.multiplier for p in packings])
-    scene.place_cups(rate)
-    scene.pour_in(*held)
-    hold = cups.pour.hold + DRIP_TIME
-    steps = int((cups.pour.final_angle / rate.min() + hold) * scene.rate)
-    runtime.run_chunks(scene, steps, lambda start, stop: scene.pour(size, start, stop, hold), watch)
-    scene.count(size)
-    position = scene.landing.to_numpy()[:size]
-    landed = scene.landed.to_numpy()[:size]
-    position[np.arange(scene.particles) >= landed[:, None]] = np.nan
-    retained = scene.retained.to_numpy()[:size] / scene.particles
-    failed = faulty(scene.fault.to_numpy()[:size], seeds)
-    position[failed], retained[failed] = np.nan, np.nan
-    return position, retained

@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike
 
 from .effect_coefficients import acting_in, changed_rig, changed_signal, liquid_sets, with_adhesion
 from .fluid import runtime
+from .fluid.checks import checked_seeds
 from .fluid.liquid import Liquid
-from .fluid.packing import checked_seeds
 from .fluid.runtime import Watch
 from .numerics import Numerics
 from .particle_stirring import stir_particles

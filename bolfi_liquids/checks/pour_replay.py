@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..models import Cups, Landings, Liquid, landings
+from ..models.fluid.liquid import TENSION_AT_ONE
+from ..models.pours.resolution import PER_CELL
 from ..models.validation import Case, CaseResult, Curve, Panel, Progress, Row
 from .pour_bars import (
     JUDGED_SPILLAGE,
@@ -19,7 +21,6 @@ from .pour_bars import (
 )
 from .reference_pours import PouredLiquid, ReferencePour
 
-TENSION_AT_ONE = 0.08  # N/m, of a liquid whose cohesion is 1
 RMS = "RMS of the spilled fraction, mean over speeds"
 LANDING = "landing off by, mean over speeds [mm]"
 RETAINED = "retained off by, at most"
@@ -42,7 +43,7 @@ def repeated(
 
 def _fineness(cups: Cups, cell: float | None) -> dict[str, Any]:
     """The simulator's argument for cells of this width [m]; none leaves it its own."""
-    return {} if cell is None else {"particles": round(cups.liquid_volume / cell**3)}
+    return {} if cell is None else {"particles": round(PER_CELL * cups.liquid_volume / cell**3)}
 
 
 class Repeated(NamedTuple):

@@ -25,11 +25,11 @@ CupsOption = Annotated[
     typer.Option("--cups", metavar="FILE", help="cups.toml; without it, the bundled one."),
 ]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random numbers.")]
-StirParticlesOption = Annotated[
-    int, typer.Option("--particles", help="Number of particles; 0: cells follow the stick.")
-]
 ParticlesOption = Annotated[
-    int, typer.Option("--particles", help="Number of particles of the simulated liquid.")
+    int,
+    typer.Option(
+        "--particles", help="Number of particles; 0: cells follow the stick, or the cup that pours."
+    ),
 ]
 
 
@@ -47,7 +47,7 @@ class CalibrationOptions:
         str, typer.Option(metavar="|".join(SAMPLERS), help="Sampler of the posterior.")
     ] = CalibrationSettings.sampler
     seed: SeedOption = CalibrationSettings.seed
-    particles: StirParticlesOption = CalibrationSettings.particles
+    particles: ParticlesOption = CalibrationSettings.particles
     batch: Annotated[int, typer.Option(help="Simulations run at the same time.")] = (
         CalibrationSettings.batch
     )
@@ -174,5 +174,5 @@ class SbcOptions:
     noise_deg: Annotated[float, typer.Option("--noise", help="Of the cameras [deg].")] = (
         SbcSettings.noise_deg
     )
-    particles: StirParticlesOption = SbcSettings.particles
+    particles: ParticlesOption = SbcSettings.particles
     seed: SeedOption = SbcSettings.seed

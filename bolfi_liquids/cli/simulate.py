@@ -9,13 +9,12 @@ import typer
 from ..inputs.described_liquid import (
     COHESION,
     DENSITY,
-    POUR_PARTICLES,
     VISCOSITY,
 )
 from .compute import Compute
 from .examples import examples
 from .grouped import grouped
-from .options import CupsOption, ParticlesOption, StirParticlesOption
+from .options import CupsOption, ParticlesOption
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -98,7 +97,7 @@ def stir(
     density: Annotated[
         float | None, typer.Option(help="Of the liquid, in kg/m³; else the recording's.")
     ] = None,
-    particles: StirParticlesOption = 0,
+    particles: ParticlesOption = 0,
     recording: Annotated[
         Path | None,
         typer.Option(metavar="NC", help="Whose path and rig are used; else a bundled one."),
@@ -145,7 +144,7 @@ def pour(
     files: FileOptions,
     compute: Compute,
     density: Annotated[float, typer.Option(help="Of the liquid, in kg/m³.")] = DENSITY,
-    particles: ParticlesOption = POUR_PARTICLES,
+    particles: ParticlesOption = 0,
 ) -> None:
     """Pour a liquid from one cup into another.
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
 VISCOSITY, COHESION, DENSITY = 1.0, 0.2, 1260.0  # Pa s, 1, kg/m3: the bundled glycerin
 MAX_VISCOSITY, MAX_DENSITY = 1e6, 20_000.0  # Pa s, kg/m3: pitch by far, and mercury
-POUR_PARTICLES = 664
-"""Number of particles that a pour is simulated with, unless another is given."""
 
 
 @checked()
@@ -31,7 +29,7 @@ class Described:
         cohesion: 0 to 1, the simulator's useful range.
         density: [kg/m³].
         effects: Coefficients of `models.EFFECTS` by name.
-        particles: Number of particles of the simulated liquid.
+        particles: Number of particles of the simulated liquid; 0: as its cells make that.
         seed: Seed of the packing.
 
     Raises:
@@ -42,7 +40,7 @@ class Described:
     cohesion: Annotated[float, Field(ge=0.0, le=1.0)]
     density: Annotated[float, Field(gt=0.0, le=MAX_DENSITY)]
     effects: Mapping[str, float] = Field(default_factory=dict)
-    particles: Particles = POUR_PARTICLES
+    particles: Particles = 0
     seed: Seed = 0
 
     def liquid(self) -> "Liquid":
@@ -54,10 +52,13 @@ class Described:
     def lines(self) -> list[str]:
         """A description in three lines."""
         effects = [f"{name} {value:g}" for name, value in self.effects.items()]
+        many = f"{self.particles} particles, " if self.particles else ""
         return [
             f"viscosity {self.viscosity:g} Pa s, cohesion {self.cohesion:g}",
             ", ".join([f"{self.density:g} kg/m³", *effects]),
-            f"{self.particles} particles, seed {self.seed}",
+            f"{self.particles} particles, seed {self.seed}"
+            if self.particles
+            else f"seed {self.seed}",
         ]
 
     def attributes(self) -> dict[str, float | int | str]:

@@ -66,9 +66,8 @@ Integer = Annotated[int, BeforeValidator(_plain_integer)]
 Seed = Annotated[Integer, Field(ge=0, le=LARGEST_SEED)]
 Count = Annotated[Integer, Field(ge=1, le=MAX_COUNT)]
 Simulations = Annotated[Integer, Field(ge=MIN_SIMULATIONS, le=MAX_SIMULATIONS)]
-Particles = Annotated[Integer, Field(ge=MIN_PARTICLES, le=MAX_PARTICLES)]
-StirParticles = Annotated[Integer, Field(ge=0, le=MAX_PARTICLES), AfterValidator(_as_many)]
-"""0: cells follow the stick."""
+Particles = Annotated[Integer, Field(ge=0, le=MAX_PARTICLES), AfterValidator(_as_many)]
+"""0: cells follow the stick, or the cup that pours."""
 Surrogate = Annotated[str, one_of(SURROGATES)]
 
 T = TypeVar("T")
@@ -142,7 +141,7 @@ class CalibrationSettings:
     batch: Count = 4
     seed: Seed = 0
     surrogate: Surrogate = "discrepancy"
-    particles: StirParticles = 0
+    particles: Particles = 0
     sampler: Annotated[str, one_of(SAMPLERS)] = "nuts"
     chains: Annotated[Integer, Field(ge=2, le=1000)] = 4
     draws: Annotated[Integer, Field(ge=4, le=MAX_COUNT)] = 1000
@@ -167,7 +166,7 @@ class SbcSettings:
     design: Simulations = 512
     budget: Simulations = 20
     noise_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = 0.1
-    particles: StirParticles = 0
+    particles: Particles = 0
     seed: Seed = 0
 
     def __post_init__(self):

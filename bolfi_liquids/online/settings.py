@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from ..errors import InputError
-from ..inputs.settings import Count, Seed, Simulations, StirParticles, Surrogate, checked, one_of
+from ..inputs.settings import Count, Particles, Seed, Simulations, Surrogate, checked, one_of
 from ..pouring.map import DEFAULT_POURS, MIN_POURS
 
 STOPS = ("bound", "mean")
@@ -38,7 +38,7 @@ class OnlineSettings:
     budget: int = 48
     in_flight: Count = 1
     surrogate: Surrogate = "discrepancy"
-    particles: StirParticles = 0
+    particles: Particles = 0
     pours: Annotated[int, Field(ge=MIN_POURS)] = DEFAULT_POURS
     seed: Seed = 0
 

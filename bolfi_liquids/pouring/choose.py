@@ -214,7 +214,7 @@ def _keep(
         "finalists": choice.finalists,
     }
     liquids = {"liquids": drawn.search, "liquids_again": drawn.again}
-    least = cups.least_viscosity(pours.density, pour.chosen.angular_velocity)
+    least = cups.least_viscosity(pours.density)
     tree = pour_tree(pour, tried, liquids, settings.risk)
     tree.attrs.update(
         asdict(settings),

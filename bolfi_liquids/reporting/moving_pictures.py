@@ -113,7 +113,7 @@ def _pour_scene(run: Path, frames: "Dataset") -> dict[str, Any]:
         "distance": distance,
         "lip_height": lip,
         "depth": cups.liquid_volume / (np.pi * receiver.radius**2),
-        "radius": cups.spacing() / 2.0,
+        "radius": cups.spacing(frames.sizes["pour_particle"]) / 2.0,
         "seen": [low, high],
     }
 

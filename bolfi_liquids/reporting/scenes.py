@@ -1,6 +1,7 @@
 """Stirs and pours that are shown: one call simulates one liquid, in this process or a worker."""
 
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,6 +13,9 @@ if TYPE_CHECKING:
 
 FRAME_RATE = 15.0
 """Of the pictures [1/s]."""
+
+MOST_SHOWN = 1500
+"""Particles of a pour that are shown, so that a page stays small."""
 
 
 class Draw(NamedTuple):
@@ -80,9 +84,10 @@ class PourScene(NamedTuple):
             frames = models.pour_frames(models.PourBatch(*action, effects=effects), rate=FRAME_RATE)
         with _limited(self.timeout):
             landed = models.landings(*action, effects=effects)
-        radius = self.cups.receiver.radius
+        radius, few = self.cups.receiver.radius, -(-frames.position.shape[1] // MOST_SHOWN)
         caught = _caught(frames.position, landed.inside(self.distance, radius)[0])
         result = landed.into(self.distance, radius)
+        frames = replace(frames, position=frames.position[:, ::few])
         return PourShown(frames, caught, float(result.spilled[0]), float(result.retained[0]))
 
 

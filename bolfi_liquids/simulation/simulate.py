@@ -17,7 +17,6 @@ from ..inputs.cups import cups_of
 from ..inputs.described_liquid import (
     COHESION,
     DENSITY,
-    POUR_PARTICLES,
     VISCOSITY,
     check_effects,
     number_of,
@@ -194,7 +193,7 @@ class PourSimulator(TimeLimited):
         angular_velocity: Angular velocity of the source [rad/s].
         cups: Source and receiver.
         density: Density of the liquids [kg/m3].
-        particles: Number of particles of each.
+        particles: Number of particles of each; 0: cells follow the cup.
     """
 
     angular_velocity: float
@@ -227,7 +226,7 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     density: float = DENSITY,
     effects: Mapping[str, float] | None = None,
     cups: "Cups | str | Path | None" = None,
-    particles: int = POUR_PARTICLES,
+    particles: int = 0,
     seed: ArrayLike = 0,
     executor: "Workers | None" = None,
     timeout: float | None = None,
@@ -238,11 +237,12 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     """Simulate a pour from one cup into another.
 
     Args:
-        viscosity, cohesion, effects, particles, seed: See `simulate_stir`.
+        viscosity, cohesion, effects, seed: See `simulate_stir`.
         angular_velocity: Angular velocity of the source about its lip [rad/s].
         distance: Distance from the source's lip to the receiver's axis [m].
         density: Density of the liquid [kg/m3].
         cups: Source and receiver, or a TOML file of them; None are the bundled ones.
+        particles: Number of particles of the simulated liquid; 0: cells follow the cup.
         executor, timeout, movie, progress: See `simulate_stir`.
         out: File of the result, .nc.
 

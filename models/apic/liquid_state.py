@@ -5,9 +5,10 @@ import numpy as np
 import taichi as ti
 
 from ..fluid.faults import ABSENT, SOUND
+from .gravity import GRAVITY
 from .lanes import LANES, lanes, mat3, vec3
 from .surface import LIQUID
-from .transfer import GRAVITY, clear
+from .transfer import clear
 
 
 @ti.data_oriented

@@ -10,7 +10,6 @@ from ..fluid.faults import DRIFTED, LARGEST, RUNAWAY, SOUND, UNSOLVED
 from .geometry import INSIDE, OUTSIDE
 from .lanes import LANES, lanes, mat3, vec3
 
-GRAVITY = 9.81
 LEVEL_GAIN = 4.0
 """A liquid whose mean height is too low by a share x asks for a density less by 4 x: particles that
 crowd in cut cells and sink otherwise."""

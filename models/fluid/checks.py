@@ -2,6 +2,9 @@
 
 import math
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 
 def check_numbers(what: str, *, zero: bool = False, **numbers: float) -> None:
     """Refuse what is not finite and positive; 0 passes if `zero`.
@@ -17,3 +20,15 @@ def check_numbers(what: str, *, zero: bool = False, **numbers: float) -> None:
             fine = False
         if not fine:
             raise ValueError(f"{what}: {name} must be a number, finite and {wanted}, got {value!r}")
+
+
+def checked_seeds(seeds: ArrayLike) -> np.ndarray:
+    """Seeds as an array of shape [B].
+
+    Raises:
+        ValueError: there is none, or one is no integer or negative.
+    """
+    array = np.atleast_1d(np.asarray(seeds))
+    if array.size == 0 or array.ndim > 1 or array.dtype.kind not in "iu" or (array < 0).any():
+        raise ValueError(f"seeds must be integers of at least 0, one a simulation, got {seeds}")
+    return array

@@ -48,15 +48,6 @@ class Fluid(Attraction):
         return 1e9, vec3(0.0), 0.0
 
     @ti.func
-    def act(self, b):
-        """Forces of the effects, and their time."""
-        for n in ti.static(range(len(self.force_hooks))):
-            at = ti.static(self.force_at[n])
-            if self.acts[at, b] == 1:
-                self.force_hooks[n](self, b, self.coefficient[at, b])
-        self.substeps[b] = self.substeps[b] + 1
-
-    @ti.func
     def flow(self, b):
         """One substep."""
         self.search(b)
@@ -67,7 +58,7 @@ class Fluid(Attraction):
         if self.cohesion[b] > 0.0:
             self.attract(b)
         if ti.static(len(self.effects) > 0):
-            self.act(b)
+            self.substeps[b] = self.substeps[b] + 1
         for sweep in range(self.numerics.iterations - 1):
             self.project(b, sweep % 2)
         self.shear(b)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+TENSION_AT_ONE = 0.08  # N/m, surface tension of a liquid whose cohesion is 1
 FIELDS = ("viscosity", "cohesion", "density")  # names that no effect may have
 
 
@@ -13,11 +14,11 @@ class Liquid:
     """A batch of liquids; scalars broadcast against arrays of shape (B,).
 
     Attributes:
-        viscosity: Effective dynamic viscosity [Pa s].
-        cohesion: Dimensionless attraction between particles, useful from 0 to 1.
+        viscosity: Dynamic viscosity [Pa s].
+        cohesion: Surface tension over 0.08 N/m: 0.9 of water, 0.4 of oils.
         density: Rest density [kg/m³].
-        adhesion: Dimensionless attraction to the walls of cups, useful from 0 to 1; the
-            coefficient of the effect of that name.
+        adhesion: Wetting of the cup beyond its contact angle: the coefficient of the effect of that
+            name.
     """
 
     viscosity: ArrayLike
@@ -29,8 +30,8 @@ class Liquid:
         """The same liquids with every field of shape (size,) and dtype float32.
 
         Raises:
-            ValueError: a field is not finite, is negative (density: not positive) or does not
-                broadcast to `size`.
+            ValueError: a field is not finite, is negative (density: not positive; adhesion may be)
+                or does not broadcast to `size`.
         """
         fields = {}
         for name in (*FIELDS, "adhesion"):
@@ -39,7 +40,8 @@ class Liquid:
             except (TypeError, ValueError):
                 given = getattr(self, name)
                 raise ValueError(f"{name} must be a number or an array, got {given!r}") from None
-            if not np.isfinite(value).all() or (value < 0).any():
+            least = -np.inf if name == "adhesion" else 0.0
+            if not np.isfinite(value).all() or (value < least).any():
                 raise ValueError(f"{name} must be finite and not negative, got {value}")
             if value.ndim > 1 or value.size not in (1, size):
                 raise ValueError(

@@ -4,12 +4,11 @@ from dataclasses import asdict, dataclass
 
 from .checks import check_numbers
 
-MODEL_VERSION = "7"  # rises with every change that alters a simulation's bits
+MODEL_VERSION = "8"  # rises with every change that alters a simulation's bits
 COARSE = 0.0065  # m, the particle spacing that `ParticleNumerics.rate` is for
 FLOOR_AT_REST = 2.2e-3  # least kinematic viscosity of slow flow, in d² a substep
 FLOOR_OF_SPEED = 0.018  # what flow at a speed U past walls adds to it, in U d
 STIR_PARTICLES = 1000
-POUR_PARTICLES = 664  # 5 mm apart in the bundled cups
 
 
 @dataclass(frozen=True)

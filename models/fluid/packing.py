@@ -1,7 +1,6 @@
 """Where particles start: a jittered lattice in a cylinder, different for each seed."""
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 TIGHTNESS = 0.97  # of the lattice, so that the wanted number fits below the surface
 JITTER = 0.05  # sd of each coordinate, in spacings
@@ -56,15 +55,3 @@ def _lattice(radius: float, spacing: float, layers: int, seed: int) -> np.ndarra
     c, s = np.cos(turn), np.sin(turn)
     points[:, :2] @= np.array([[c, -s], [s, c]])
     return step * (points + [0.0, 0.0, 0.5] + JITTER * rng.standard_normal(points.shape))
-
-
-def checked_seeds(seeds: ArrayLike) -> np.ndarray:
-    """Seeds as an array of shape [B].
-
-    Raises:
-        ValueError: there is none, or one is no integer or negative.
-    """
-    array = np.atleast_1d(np.asarray(seeds))
-    if array.size == 0 or array.ndim > 1 or array.dtype.kind not in "iu" or (array < 0).any():
-        raise ValueError(f"seeds must be integers of at least 0, one a simulation, got {seeds}")
-    return array

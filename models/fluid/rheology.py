@@ -26,9 +26,7 @@ class Rheology(Pressure):
         self.effects = tuple(effects)
         numbered = list(enumerate(self.effects))
         rheologies = [(n, e.make_rheology()) for n, e in numbered if e.make_rheology]
-        forces = [(n, e.make_force()) for n, e in numbered if e.make_force]
         self.rheology_at, self.rheology_hooks = _columns(rheologies)
-        self.force_at, self.force_hooks = _columns(forces)
         if self.effects:
             shape = (len(self.effects), self.slots)
             self.coefficient, self.acts = ti.field(ti.f32, shape), ti.field(ti.i32, shape)

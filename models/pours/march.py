@@ -13,6 +13,8 @@ from ..fluid import runtime
 from ..fluid.faults import faulty
 from ..fluid.liquid import Liquid
 from ..fluid.runtime import Watch
+from .flights import Flights
+from .resolution import PER_CELL
 from .vessel import RIM, Vessel
 
 LEAST_CELLS, LEAST_PARTICLES = 12000, 4000
@@ -50,28 +52,10 @@ class Turn(NamedTuple):
     dt: float
 
 
-class Flights(NamedTuple):
-    """Where liquid of half a cup leaves the lip's surroundings, and flies freely.
-
-    Attributes:
-        place, velocity: In the room's frame, whose origin is the lip [m] and [m/s], shape (n, 3).
-        time: Since the cup began to turn [s], shape (n,).
-        retained: Share of the liquid that is left in the cup; NaN if the pour went wrong.
-        particles: Of half a cup.
-    """
-
-    place: np.ndarray
-    velocity: np.ndarray
-    time: np.ndarray
-    retained: float
-    particles: int
-
-
 def march(
     vessel: Vessel,
     pours: Pours,
     turn: Turn,
-    per_cell: int,
     effects: tuple[Effect, ...] = (),
     watch: Watch | None = None,
 ) -> list[Flights]:
@@ -85,7 +69,7 @@ def march(
 
     found: list[Any] = [None] * len(pours.seeds)
     for part in _like(pours, GROUPS * LANES):
-        together = _together(vessel, pours.rows(part), turn, (per_cell, effects), watch)
+        together = _together(vessel, pours.rows(part), turn, effects, watch)
         for at, one in zip(part, together, strict=True):
             found[at] = one
     return found
@@ -100,13 +84,12 @@ def _like(pours: Pours, size: int) -> Sequence[np.ndarray]:
     return [order[low : low + size] for low in range(0, len(order), size)]
 
 
-def _together(vessel, pours: Pours, turn: Turn, built, watch) -> list[Flights]:
+def _together(vessel, pours: Pours, turn: Turn, effects, watch) -> list[Flights]:
     """What `march` returns, of at most as many pours as there are lanes."""
     from ..apic.lanes import LANES
 
-    per_cell, effects = built
     places = Places(len(pours.seeds), GROUPS, LANES)
-    points = [vessel.particles(per_cell, int(seed)) for seed in pours.seeds]
+    points = [vessel.particles(PER_CELL, int(seed)) for seed in pours.seeds]
     n = len(points[0])
     scene = _scene_for(vessel, n, effects)
     scene.enter_cup(vessel, RIM, turn.dt)

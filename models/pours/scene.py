@@ -6,10 +6,12 @@ import taichi as ti
 
 from ..apic.filling import OFF_WALL
 from ..apic.geometry import ABOVE, INSIDE, OUTSIDE
+from ..apic.gravity import GRAVITY
 from ..apic.lanes import LANES, STRIDE, vec3
-from ..apic.transfer import GRAVITY, TOP_SPEED, motion_of
+from ..apic.transfer import TOP_SPEED, motion_of
 from ..apic.wetting_liquid import WettingLiquid
 from ..fluid.faults import LARGEST, RUNAWAY
+from .flights import Flights
 
 LEFT_OVER = 5e-4  # of the liquid: a pour is over when less than this is in the region
 ON_WALL = 1e-4  # m beyond the inside of the cup that still counts as retained
@@ -225,10 +227,11 @@ class PouringScene(WettingLiquid):
 
     @ti.func
     def end(self, g, lane, step):
-        """What is outside of the cup at the end flies on."""
+        """What is outside of the cup at the end flies on; the rest comes first."""
         for n in range(self.count[g, lane]):
             x = self.position[g, lane, n]
             if x[2] < 0.0 and self.out(x) < self.radius[None] + ON_WALL:
+                self.position[g, lane, self.retained[g, lane]] = x
                 self.retained[g, lane] += 1
             else:
                 self.fly(g, lane, n, step)
@@ -255,3 +258,14 @@ class PouringScene(WettingLiquid):
             self.flow(groups)
             self.project(groups)
             self.transfer_out(groups, step)
+
+    def view(self):
+        """The first pour: places of its particles in the cup's frame [m], shape [n, 3], and its
+        `Flights` so far."""
+        held = max(self.count[0, 0], self.retained[0, 0])
+        flown = self.flown[0, 0]
+        flight = self.flight.to_numpy()[0, 0, :flown]
+        flights = Flights(
+            flight[:, :3], flight[:, 3:], self.departure.to_numpy()[0, 0, :flown], 0.0, held + flown
+        )
+        return self.position.to_numpy()[0, 0, :held], flights

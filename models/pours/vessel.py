@@ -86,6 +86,14 @@ class Vessel:
         return fill_cup(self.grid(), cup, self.fill, per_cell, seed)
 
 
+def turned(points: np.ndarray, angle: float) -> np.ndarray:
+    """Points of the cup's frame (n, 3) in the room's, whose origin is the lip too, once the cup has
+    turned by an angle [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y, z = points.T
+    return np.stack([c * x + s * z, y, c * z - s * x], axis=1)
+
+
 def _from_ring(
     out: np.ndarray, z: np.ndarray, radii: tuple[float, float], heights: tuple[float, float]
 ) -> np.ndarray:

@@ -4,10 +4,10 @@
 import numpy as np
 import taichi as ti
 
+from ..apic.gravity import GRAVITY
 from ..apic.lanes import LANES, STRIDE, vec3
 from ..apic.pressure import push
 from ..apic.surface import find_liquid, set_up_pressure
-from ..apic.transfer import GRAVITY
 from ..apic.upright_cup import UprightCups
 from ..apic.viscosity import solve_viscosity, weigh_stresses
 from ..fluid.faults import SOUND

@@ -10,9 +10,10 @@ import math
 
 import taichi as ti
 
+from ..apic.gravity import GRAVITY
 from ..apic.lanes import LANES, vec3
 from ..apic.rheology import kinematic
-from ..apic.transfer import GRAVITY, strides
+from ..apic.transfer import strides
 from .slip_law import (
     HELD_RADIUS,
     IMPULSE,

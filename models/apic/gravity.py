@@ -1,0 +1,3 @@
+"""What pulls liquids down."""
+
+GRAVITY = 9.81  # m/s²
