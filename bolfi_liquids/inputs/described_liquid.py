@@ -56,9 +56,7 @@ class Described:
         return [
             f"viscosity {self.viscosity:g} Pa s, cohesion {self.cohesion:g}",
             ", ".join([f"{self.density:g} kg/m³", *effects]),
-            f"{self.particles} particles, seed {self.seed}"
-            if self.particles
-            else f"seed {self.seed}",
+            f"{many}seed {self.seed}",
         ]
 
     def attributes(self) -> dict[str, float | int | str]:
