@@ -22,6 +22,16 @@ def images(s):
 
 
 @ti.func
+def clear_images(s, g):
+    """Empty what the last step has filled, farther from particles than `clear` goes."""
+    for n in range(images(s)):
+        m, _ = image(s, n)
+        s.fraction[g, m] = lanes(0.0)
+        for a in range(3):
+            s.velocity[g, a, m] = lanes(0.0)
+
+
+@ti.func
 def fold(s, g):
     """What particles have deposited before the mirror belongs behind it."""
     for n in range(images(s)):

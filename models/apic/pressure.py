@@ -15,8 +15,8 @@ MOST_ITERATIONS = 150
 def push(s, g, p: ti.template()):
     """Velocities less the gradient of a pressure, which is 0 on the surface, where that is."""
     S = strides(s)
-    for n in range(s.nears[g]):
-        m = s.near[g, n]
+    for n in range(s.arounds[g]):  # all faces of liquid cells, whatever lanes march beside
+        m = s.around[g, n]
         for a in range(3):
             if s.area[a, m] > 0.0:
                 o = m - S[a]

@@ -12,7 +12,7 @@ force along the wall, sigma (1 + cos a) towards the dry side, makes the contact 
 
 import taichi as ti
 
-from .lanes import lanes
+from .lanes import lanes, positive
 from .mirror import reflect_cells, reflect_vectors
 from .transfer import strides
 from .viscosity import add_shear
@@ -24,15 +24,59 @@ LEAST_MASS = 0.05  # of a face, in full cells, that tension accelerates
 def pull_surface(s, g):
     """What tension does to the velocities in a step.
 
-    It works in fields that the viscosity fills anew: the colour is in `cell_product`, its gradient
-    in `product`, the stress in `rest` (along the axes) and `shear` (around the edges).
+    It works in fields that the viscosity fills anew: the colour's gradient is in `product`, the
+    stress in `rest` (along the axes) and `shear` (around the edges).
     """
     S = strides(s)
     strength = s.tension[g] * s.dt[None] / s.cell[None] ** 2
     if strength.max() > 0.0:
         find_gradient(s, g)
+        find_stress(s, g, strength)
         for n in range(s.nears[g]):
             m = s.near[g, n]
+            for a in range(3):
+                o = m - S[a]
+                force = add_shear(s, g, a, m, S, s.rest[g, a, m] - s.rest[g, a, o])
+                step = colour(s, g, m) - colour(s, g, o)
+                wet = s.wall[a, m] * s.open[m] * s.open[o] * (1.0 + s.cosine[g]) * strength
+                push = positive(s.mass[g, a, m]) * (force - wet * step)
+                s.velocity[g, a, m] += push / ti.max(s.mass[g, a, m], LEAST_MASS)
+
+
+@ti.func
+def colour(s, g, m):
+    """How full a cell is, at most 1; 0 farther than a cell from any particle."""
+    return ti.min(s.fraction[g, m], 1.0) * s.open[m]
+
+
+@ti.func
+def find_gradient(s, g):
+    """Half the differences of the colour over two cells."""
+    S = strides(s)
+    for n in range(s.arounds[g]):
+        m = s.around[g, n]
+        for a in range(3):
+            s.product[g, a, m] = lanes(0.0)
+            s.rest[g, a, m] = lanes(0.0)
+            s.shear[g, a, m] = lanes(0.0)
+    reflect_cells(s, g, s.fraction)
+    for n in range(s.arounds[g]):  # to all cells where it is not 0, whatever lanes march beside
+        m = s.around[g, n]
+        if s.open[m] > 0.5:
+            for a in range(3):
+                here = colour(s, g, m)
+                up = step_to_next(here, colour(s, g, m + S[a]), s.passage[a, m + S[a]])
+                down = step_to_next(here, colour(s, g, m - S[a]), s.passage[a, m])
+                s.product[g, a, m] = 0.5 * (up - down)
+    reflect_vectors(s, g, s.product)
+
+
+@ti.func
+def find_stress(s, g, strength):
+    S = strides(s)
+    for n in range(s.arounds[g]):
+        m = s.around[g, n]
+        if m >= S[1] + S[2]:
             square = lanes(1e-12)
             for a in range(3):
                 square += s.product[g, a, m] * s.product[g, a, m]
@@ -41,38 +85,6 @@ def pull_surface(s, g):
                 along = s.product[g, a, m]
                 s.rest[g, a, m] = strength * (square - along * along) / size
                 s.shear[g, a, m] = strength * stress_around(s, g, a, m, S)
-        for n in range(s.nears[g]):
-            m = s.near[g, n]
-            for a in range(3):
-                o = m - S[a]
-                force = add_shear(s, g, a, m, S, s.rest[g, a, m] - s.rest[g, a, o])
-                step = s.cell_product[g, m] - s.cell_product[g, o]
-                wet = s.wall[a, m] * s.open[m] * s.open[o] * (1.0 + s.cosine[g]) * strength
-                push = s.carries[a, m] * (force - wet * step)
-                s.velocity[g, a, m] += push / ti.max(s.mass[g, a, m], LEAST_MASS)
-
-
-@ti.func
-def find_gradient(s, g):
-    """The colour, and half its differences over two cells."""
-    S = strides(s)
-    for n in range(s.arounds[g]):
-        m = s.around[g, n]
-        s.cell_product[g, m] = ti.min(s.fraction[g, m], 1.0) * s.open[m]
-        for a in range(3):
-            s.product[g, a, m] = lanes(0.0)
-            s.rest[g, a, m] = lanes(0.0)
-            s.shear[g, a, m] = lanes(0.0)
-    reflect_cells(s, g, s.cell_product)
-    for n in range(s.nears[g]):
-        m = s.near[g, n]
-        if s.open[m] > 0.5:
-            for a in range(3):
-                here = s.cell_product[g, m]
-                up = step_to_next(here, s.cell_product[g, m + S[a]], s.passage[a, m + S[a]])
-                down = step_to_next(here, s.cell_product[g, m - S[a]], s.passage[a, m])
-                s.product[g, a, m] = 0.5 * (up - down)
-    reflect_vectors(s, g, s.product)
 
 
 @ti.func

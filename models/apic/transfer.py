@@ -201,6 +201,16 @@ def motion_of(s, g, lane, n):
 
 
 @ti.func
+def fault_of(s, g, lane, energy, fastest):
+    """A lane's fault, by the sum of its particles' squared speeds and the largest of these."""
+    fault = SOUND
+    if not (energy < LARGEST and fastest < TOP_SPEED**2):  # the sum is no number if any is none
+        thick = s.viscosity[g][lane] * s.dt[None] / s.cell[None] ** 2 > THICKEST
+        fault = UNSOLVED if thick else RUNAWAY
+    return fault
+
+
+@ti.func
 def move(s, g):
     """Velocities and slopes back to the particles, which move, to second order, within the cup.
 
@@ -215,15 +225,13 @@ def move(s, g):
             moved = s.position[g, lane, n] + dt * (v + 0.5 * dt * per_cell * (slope @ v))
             s.position[g, lane, n], s.speed[g, lane, n] = s.keep_inside(moved, v)
             height += s.position[g, lane, n][2]
-            energy += v.dot(v)  # not a number where any is, which a maximum passes over
+            energy += v.dot(v)
             fastest = ti.max(fastest, v.dot(v))
         drift = 1.0 - 2.0 * height / ti.max(s.count[g, lane] * s.level[g][lane], 1e-6)
         s.lack[g][lane] = LEVEL_GAIN * drift
         if s.count[g, lane] > 0:
-            if not (energy < LARGEST and fastest < TOP_SPEED**2):
-                thick = s.viscosity[g][lane] * dt * per_cell**2 > THICKEST
-                s.status[g, lane] = UNSOLVED if thick else RUNAWAY
-            elif ti.abs(drift) > MOST_DRIFT:
+            s.status[g, lane] = fault_of(s, g, lane, energy, fastest)
+            if s.status[g, lane] == SOUND and ti.abs(drift) > MOST_DRIFT:
                 s.status[g, lane] = DRIFTED
             if s.status[g, lane] != SOUND:
                 s.count[g, lane] = 0

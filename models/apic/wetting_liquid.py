@@ -5,7 +5,7 @@ import taichi as ti
 
 from .lanes import LANES, STRIDE
 from .liquid_state import LiquidState
-from .mirror import fold, image, images, reflect_velocity
+from .mirror import clear_images, fold, image, images, reflect_velocity
 from .pressure import add_rise, push, solve_pressure
 from .surface import find_liquid, set_up_pressure
 from .tension import pull_surface
@@ -70,6 +70,8 @@ class WettingLiquid(LiquidState):
             if n % STRIDE == 0:
                 g = n // STRIDE
                 clear(self, g)
+                if ti.static(self.MIRRORED):
+                    clear_images(self, g)
                 self.begin_step(g, step)
                 deposit(self, g)
                 if ti.static(self.MIRRORED):

@@ -8,9 +8,9 @@ from ..apic.filling import OFF_WALL
 from ..apic.geometry import ABOVE, INSIDE, OUTSIDE
 from ..apic.gravity import GRAVITY
 from ..apic.lanes import LANES, STRIDE, vec3
-from ..apic.transfer import TOP_SPEED, motion_of
+from ..apic.transfer import fault_of, motion_of
 from ..apic.wetting_liquid import WettingLiquid
-from ..fluid.faults import LARGEST, RUNAWAY
+from ..fluid.faults import SOUND
 from .flights import Flights
 
 LEFT_OVER = 5e-4  # of the liquid: a pour is over when less than this is in the region
@@ -221,8 +221,8 @@ class PouringScene(WettingLiquid):
             else:
                 n += 1
         self.count[g, lane] = last
-        if not (energy < LARGEST and fastest < TOP_SPEED**2):
-            self.status[g, lane] = RUNAWAY
+        self.status[g, lane] = fault_of(self, g, lane, energy, fastest)
+        if self.status[g, lane] != SOUND:
             self.count[g, lane] = 0
 
     @ti.func
