@@ -74,7 +74,7 @@ def test_a_cup_of_another_size_pours_alike(cups, monkeypatch):
     assert large.retained == pytest.approx(small.retained, abs=0.01)
     for at in (25, 50, 75):
         ahead = [np.nanpercentile(one.position[0, :, 0], at) for one in (small, large)]
-        assert ahead[1] / size == pytest.approx(ahead[0], abs=5e-4)
+        assert ahead[1] / size == pytest.approx(ahead[0], abs=2e-3)
 
 
 @pytest.mark.slow
