@@ -150,6 +150,7 @@ def _pour_context(summary: PourSummary | None, tree: "DataTree | None") -> dict[
         "summary": summary,
         "chosen": sentences.pour_sentence(summary),
         "plug_in": sentences.plug_in_sentence(summary),
+        "map": sentences.map_sentences(summary),
         "limits": sentence("pour.limits"),
         "figure": pour_figure(tree),
         "made_with": dict(tree.attrs),

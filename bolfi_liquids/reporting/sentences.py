@@ -85,3 +85,9 @@ def plug_in_sentence(summary: PourSummary) -> Sentence:
     if summary.plug_in.action == summary.action:
         return sentence("pour.plug_in_same")
     return sentence("pour.plug_in", plug_in=summary.plug_in)
+
+
+def map_sentences(summary: PourSummary) -> list[Sentence]:
+    """From how many pours was learned where the liquid lands, and how well; older versions did
+    not learn it."""
+    return [] if summary.map_error is None else [sentence("pour.map", summary=summary)]
