@@ -13,6 +13,8 @@ from .checks import replicates as replicates
 from .checks import sbc as sbc
 from .checks import shared_design as shared_design
 from .checks import tarp as tarp
+from .emulation import Emulation as Emulation
+from .emulation import emulate as emulate
 from .loop import fit as fit
 from .prior import Prior as Prior
 from .regression import Regression as Regression

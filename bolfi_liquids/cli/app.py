@@ -171,8 +171,9 @@ def pour(
     if execution.execute:
         if options != PourOptions():
             raise typer.BadParameter(
-                "--execute carries out the pour that RUN has chosen already; --cups, --iterations, "
-                "--risk and --force belong to the choice, which is made without --execute"
+                "--execute carries out the pour that RUN has chosen already; --cups, --pours, "
+                "--iterations, --risk and --force belong to the choice, which is made without "
+                "--execute"
             )
         cli_record.execute(run, execution)
         return
@@ -182,6 +183,7 @@ def pour(
         choose_pour(
             run,
             options.cups,
+            pours=options.pours,
             iterations=options.iterations,
             risk=options.risk,
             force=options.force,

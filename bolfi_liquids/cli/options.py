@@ -113,6 +113,9 @@ class PourOptions:
     """What decides the choice of a pour."""
 
     cups: CupsOption = None
+    pours: Annotated[int, typer.Option(help="Pours simulated at most, 24 to 100.")] = (
+        PourSettings.pours
+    )
     iterations: Annotated[int, typer.Option(help="Angular velocities tried.")] = (
         PourSettings.iterations
     )

@@ -60,7 +60,8 @@ def print_pour(summary: "PourSummary", console: Console) -> None:
             f"{action.spillage_q95:.2%}",
         )
     console.print(table)
-    console.print(f"simulations: {summary.n_simulations} pours", highlight=False)
+    error = "" if summary.map_error is None else f", error of their map {summary.map_error:.2%}"
+    console.print(f"simulations: {summary.n_simulations} pours{error}", highlight=False)
 
 
 def print_criticism(

@@ -33,6 +33,8 @@ MAX_COUNT = 1_000_000
 """Of draws, simulations at a time and the like: more is a slip of the pen."""
 LARGEST_SEED = 2**31 - 1
 """That every random number generator takes."""
+MIN_POURS, MAX_POURS = 24, 100
+"""Of one decision: with fewer its map is coarse, and with more it is hardly finer."""
 MIN_PARTICLES = 100
 """With fewer, the stick is thinner than the gaps between them."""
 
@@ -68,6 +70,7 @@ Count = Annotated[Integer, Field(ge=1, le=MAX_COUNT)]
 Simulations = Annotated[Integer, Field(ge=MIN_SIMULATIONS, le=MAX_SIMULATIONS)]
 Particles = Annotated[Integer, Field(ge=0, le=MAX_PARTICLES), AfterValidator(_as_many)]
 """0: cells follow the stick, or the cup that pours."""
+Pours = Annotated[Integer, Field(ge=MIN_POURS, le=MAX_POURS)]
 Surrogate = Annotated[str, one_of(SURROGATES)]
 
 T = TypeVar("T")
@@ -195,14 +198,16 @@ class PourSettings:
     """What decides the choice of a pour besides the posterior and the cups.
 
     Attributes:
-        iterations: Angular velocities that are tried, each with every distance.
-        draws: Posterior draws over which spillage is averaged, and again among the best actions.
+        pours: Simulated at most; a map of landings is learned from them.
+        iterations: Angular velocities that are tried on the map, each with every distance.
+        draws: Posterior draws over which spillage is averaged.
         risk: "mean", or "cvar": the mean over the worst tenth of the draws.
         seed: Seed of all random draws.
     """
 
-    iterations: Simulations = 15
-    draws: Count = 16
+    pours: Pours = 64
+    iterations: Simulations = 31
+    draws: Count = 128
     risk: Annotated[str, one_of(RISKS)] = "mean"
     seed: Seed = 0
 

@@ -22,6 +22,9 @@ BAD_CASE = 0.9  # quantile over the draws of the second map
 SURE, BOOTSTRAP_SAMPLES = 0.95, 200
 """Confidence that an action is worse, and number of bootstrap samples for it."""
 
+SHOWN_OUTCOMES = 160
+"""Equally probable ones, of more that were judged."""
+
 MIN_COMPARED_DRAWS = 8
 """Fewer draws cannot show that an action is worse."""
 
@@ -130,8 +133,9 @@ def draw_outcomes(axes: "Axes", tree: "DataTree") -> None:
     """Spilled percentage of each outcome of both actions, 90 % of them, and their means."""
     for at, (name, (colour, marker, _)) in enumerate(CHOICES.items()):
         percent = 100.0 * tree[name]["spilled"].to_numpy()
-        spread = np.linspace(-0.18, 0.18, len(percent))
-        axes.plot(percent, at + spread, ".", color=colour, alpha=0.45, markersize=5)
+        shown = np.quantile(percent, np.linspace(0.0, 1.0, min(len(percent), SHOWN_OUTCOMES)))
+        spread = np.linspace(-0.18, 0.18, len(shown))
+        axes.plot(shown, at + spread, ".", color=colour, alpha=0.45, markersize=5)
         low, high = np.quantile(percent, (0.05, 0.95))
         axes.plot([low, high], [at + 0.3] * 2, color=colour, linewidth=2.0)
         axes.plot(percent.mean(), at + 0.3, marker, color=colour, markersize=7)

@@ -1,14 +1,15 @@
 """pour.nc: everything that a report shows of a pour.
 
 Its groups are `actions` and `actions_plug_in`, over a grid of actions, the spillage expected for
-each draw of the posterior, or at theta*, and the risk that was minimised; `finalists`, the same of
-the most promising ones over more draws; `chosen` and `plug_in`, over outcomes, fractions with
-fresh seeds; `liquids` and `liquids_again`, the posterior draws that the choice was made with.
+each draw of the posterior, or at theta*, and the risk that was minimised; `chosen` and `plug_in`,
+over outcomes, fractions with draws that did not choose; `liquids`, the posterior draws that the
+choice was made with; `pours`, those that the map was learned from, and how far it missed each.
 """
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+import numpy as np
 from numpy.typing import NDArray
 
 from .result import Judged, Pour
@@ -17,28 +18,45 @@ from .spillage import ACTION, FRACTIONS, RISK, Surface
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
+    from .landing_map import LandingMap
+
 ACTION_UNITS = {"angular_velocity": "rad s-1", "distance": "m"}
 
 
 def pour_tree(
     pour: Pour,
     tried: Mapping[str, Surface],
-    liquids: Mapping[str, Mapping[str, NDArray]],
+    liquids: Mapping[str, NDArray],
+    learned: "LandingMap",
     risk: str,
 ) -> "DataTree":
-    """Everything that a report shows of a pour; `tried` and `liquids` are groups by name."""
+    """Everything that a report shows of a pour.
+
+    Args:
+        pour: The chosen one.
+        tried: What actions may be expected to spill, by the name of the group.
+        liquids: The posterior draws of the choice, name -> (draws,).
+        learned: The map that it was made with.
+        risk: Which measure of `spillage.RISK` was minimised.
+    """
     from xarray import Dataset, DataTree
 
     groups = {
         **{name: _actions(surface, risk) for name, surface in tried.items()},
         "chosen": _outcomes(pour.chosen),
         "plug_in": _outcomes(pour.plug_in),
-        **{
-            group: Dataset({name: ("draw", values) for name, values in drawn.items()})
-            for group, drawn in liquids.items()
-        },
+        "liquids": Dataset({name: ("draw", values) for name, values in liquids.items()}),
+        "pours": _pours(learned),
     }
     return DataTree.from_dict({f"/{name}": dataset for name, dataset in groups.items()})
+
+
+def _pours(learned: "LandingMap") -> "Dataset":
+    from xarray import Dataset
+
+    missed = np.sqrt(np.mean(learned.error**2, axis=1))
+    theta = {name: ("pour", values) for name, values in learned.poured.theta.items()}
+    return Dataset({**theta, "missed": ("pour", missed)})
 
 
 def _actions(surface: Surface, risk: str) -> "Dataset":
@@ -46,7 +64,7 @@ def _actions(surface: Surface, risk: str) -> "Dataset":
 
     return Dataset(
         {
-            "spilled": (("draw", *ACTION), surface.spilled),
+            "spilled": (("draw", *ACTION), surface.spilled.astype(np.float32)),
             "risk": (ACTION, RISK[risk](surface.spilled)),
         },
         coords={

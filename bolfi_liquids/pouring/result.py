@@ -27,7 +27,7 @@ SPILLAGE_QUANTILE = 0.95
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """An action and what it spills, on draws and seeds that did not choose it.
+    """An action and what it spills, on draws that did not choose it.
 
     Attributes:
         angular_velocity: Of the source about its lip [rad/s].
@@ -179,7 +179,9 @@ class PourSummary(ActionSummary, Section):
 
     Attributes:
         least_viscosity: Below it the simulator cannot distinguish liquids in this pour [Pa s].
-        n_simulations: Pours of one liquid, in the searches and in judging.
+        n_simulations: Pours that the map of landings was learned from.
+        map_error: RMS by which that map misses the spilled fraction of pours left out of it. None
+            where an older version chose, which had no map.
         risk: "mean" or "cvar".
         seed: Of all random draws.
         plug_in: The action that would be best if theta* were the truth.
@@ -195,6 +197,7 @@ class PourSummary(ActionSummary, Section):
     seed: int
     plug_in: ActionSummary
     fit_status: FitStatus | None = None
+    map_error: Number | None = None
 
     @classmethod
     def from_pour(
@@ -203,6 +206,7 @@ class PourSummary(ActionSummary, Section):
         settings: PourSettings,
         *,
         n_simulations: int,
+        map_error: float,
         least_viscosity: float,
         fit_status: FitStatus,
     ) -> Self:
@@ -213,6 +217,7 @@ class PourSummary(ActionSummary, Section):
             seed=settings.seed,
             plug_in=ActionSummary.of(pour.plug_in),
             n_simulations=n_simulations,
+            map_error=map_error,
             least_viscosity=least_viscosity,
             fit_status=fit_status,
         )

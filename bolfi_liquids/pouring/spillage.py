@@ -87,28 +87,24 @@ class Surface(NamedTuple):
     distance: NDArray[np.float64]
     spilled: NDArray[np.float64]
 
-    def risk(self, risk: str, *, neighbours: bool = True) -> NDArray[np.float64]:
-        """A measure of `RISK` at every action, shape (W, D).
+    def risk(self, risk: str) -> NDArray[np.float64]:
+        """A measure of `RISK` at every action, shape (W, D)."""
+        return RISK[risk](self.spilled)
 
-        Neighbouring angular velocities of a grid spill alike, so averages over them take chance
-        out of a choice.
-        """
-        from scipy.ndimage import gaussian_filter1d
-
-        measured = RISK[risk](self.spilled)
-        return gaussian_filter1d(measured, 1.0, axis=0, mode="nearest") if neighbours else measured
-
-    def least(self, risk: str, *, neighbours: bool = True) -> dict[str, float]:
+    def least(self, risk: str) -> dict[str, float]:
         """The action at which `risk` is least."""
-        surface = self.risk(risk, neighbours=neighbours)
-        row, column = np.unravel_index(np.argmin(surface), surface.shape)
+        measured = self.risk(risk)
+        row, column = np.unravel_index(np.argmin(measured), measured.shape)
         chosen = self.angular_velocity[row], self.distance[column]
         return dict(zip(ACTION, map(float, chosen), strict=True))
 
-    def with_draws(self, more: "Surface") -> "Surface":
-        """The angular velocities of `more`, which are among these, over the draws of both."""
-        rows = np.isin(self.angular_velocity, more.angular_velocity)
-        return more._replace(spilled=np.concatenate([self.spilled[:, rows], more.spilled]))
+
+def reachable_distances(cups: "Cups") -> NDArray[np.float64]:
+    """Those of the decision [m], and so far beyond as liquid may land elsewhere."""
+    low, high = cups.distance_range
+    beyond = int(np.ceil(MAX_LANDING_SDS * landing_sd(cups) / DISTANCE_STEP))
+    steps = np.arange(-beyond, round((high - low) / DISTANCE_STEP) + beyond + 1)
+    return np.asarray(low + DISTANCE_STEP * steps, np.float64)
 
 
 def surface(profiles: Profiles, cups: "Cups") -> Surface:
@@ -163,11 +159,8 @@ class Outcomes(TimeLimited):
 
     @property
     def distances(self) -> NDArray[np.float64]:
-        """Those of the decision [m], and so far beyond as liquid may land elsewhere."""
-        low, high = self.cups.distance_range
-        beyond = int(np.ceil(MAX_LANDING_SDS * landing_sd(self.cups) / DISTANCE_STEP))
-        steps = np.arange(-beyond, round((high - low) / DISTANCE_STEP) + beyond + 1)
-        return np.asarray(low + DISTANCE_STEP * steps, np.float64)
+        """See `reachable_distances`."""
+        return reachable_distances(self.cups)
 
     def simulate(self, action: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         """Fractions (actions, draws, D, 3) spilled, received and retained.

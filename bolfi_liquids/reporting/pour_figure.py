@@ -37,8 +37,8 @@ def pour_figure(tree: "DataTree") -> str:
 
 
 def _draw_maps(figure: "SubFigure", panels: NDArray, tree: "DataTree") -> list[Readout]:
-    """The risk on which the first round chose, with the actions that are not surely worse than the
-    chosen one, and a quantile over the draws."""
+    """The risk by which the pour was chosen, with the actions that are not surely worse, and a
+    quantile over the draws."""
     actions = tree["actions"].to_dataset()
     x, y = action_axes(tree)
     bad = np.quantile(actions["spilled"].to_numpy(), BAD_CASE, axis=0)

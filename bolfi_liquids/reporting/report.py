@@ -151,6 +151,7 @@ def _pour_context(summary: PourSummary | None, tree: "DataTree | None") -> dict[
         "summary": summary,
         "chosen": sentences.pour_sentence(summary),
         "plug_in": sentences.plug_in_sentence(summary),
+        "map": sentences.map_sentences(summary),
         "limits": sentence("pour.limits"),
         "contact_angle": sentences.contact_angle_sentences(json.loads(tree.attrs["cups"])),
         "figure": pour_figure(tree),

@@ -94,3 +94,9 @@ def contact_angle_sentences(cups: Mapping[str, Any]) -> list[Sentence]:
     """How the liquid was taken to wet the source, by `Cups.settings`; older pours had no angle."""
     degrees = cups["source"].get("contact_angle_deg")
     return [] if degrees is None else [sentence("pour.contact_angle", degrees=degrees)]
+
+
+def map_sentences(summary: PourSummary) -> list[Sentence]:
+    """From how many pours was learned where the liquid lands, and how well; older versions did
+    not learn it."""
+    return [] if summary.map_error is None else [sentence("pour.map", summary=summary)]

@@ -153,6 +153,16 @@ class SimulationBank:
                 row,
             )
 
+    def holds(self, identity: str) -> bool:
+        """Whether there is a signal of this simulator."""
+        check_text("identity", identity)
+        with self._lock:
+            found = self._connection.execute(
+                "SELECT 1 FROM simulation WHERE identity = ? AND signal IS NOT NULL LIMIT 1",
+                (identity,),
+            ).fetchone()
+        return found is not None
+
     def simulations(self, identity: str) -> Simulations:
         """All signals of one simulator, those of NaN included, those that raised left out.
 

@@ -229,6 +229,24 @@ def noise_share(emulator: Emulator) -> float:
     return float((weight @ np.minimum(noise, 1.0) + rest) / total) if total > 0 else 0.0
 
 
+@in_float64
+def mean(emulator: Emulator, u: np.ndarray) -> np.ndarray:
+    """Mean of the outputs at u [n, d]: [n, m]."""
+    return _outputs(emulator.basis, predict_scores(emulator.gp, u)[0])
+
+
+@in_float64
+def left_out(emulator: Emulator) -> np.ndarray:
+    """What all other runs predict of each run, components and hyperparameters kept: [n, m]."""
+    scores = np.asarray(leave_one_out(emulator.gp)[0])[:, : len(emulator.outputs)]
+    return _outputs(emulator.basis, scores)
+
+
+def _outputs(basis: Basis, scores: np.ndarray) -> np.ndarray:
+    """Outputs [n, m] of scores [k, n]."""
+    return basis.centre + basis.scale * (scores.T @ basis.vectors.T)
+
+
 def predict(emulator: Emulator, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean and sd, run-to-run noise included, of the outputs at u [n, d]: [n, m] each."""
     basis, remainder = emulator.basis, emulator.remainder

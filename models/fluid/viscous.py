@@ -180,10 +180,7 @@ class Viscous(Rheology):
         thickest = self.kinematic(b)
         if ti.static(len(self.rheology_hooks) > 0):
             thickest = self.thickest[b]
-        weak = thickest * self.dt < WEAK * self.h * self.h
-        if ti.static(len(self.force_hooks) > 0):
-            weak = False  # a force may have coupled them strongly
-        if weak:
+        if thickest * self.dt < WEAK * self.h * self.h:
             for i in range(alive):
                 self.velocity[b, i] = self.velocity[b, i] + self.search_direction[b, i]
             self.body_step(b, 1.0)

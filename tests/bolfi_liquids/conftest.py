@@ -21,7 +21,7 @@ from bolfi_liquids.run.directory import CRITICISM_FORMAT
 BUNDLED = Path(str(files("bolfi_liquids.data"))) / "glycerin_v10.nc"
 SHORT = 60  # samples, 2 s: the pause and the first strokes
 SETTINGS = {"budget": 8, "batch": 2, "particles": 200, "seed": 5}
-POUR_SETTINGS = {"iterations": 7, "draws": 2}
+POUR_SETTINGS = {"pours": 24, "draws": 16}
 
 
 @pytest.fixture

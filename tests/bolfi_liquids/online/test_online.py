@@ -246,7 +246,7 @@ def test_stops_at_the_last_stroke(finish):
 @pytest.mark.minutes  # other tests have it of a calibration that was never online
 def test_a_pour_is_chosen_and_reported_after_an_online_calibration(met):
     _, run = met
-    small = {"iterations": 7, "draws": 2, "force": True}  # eight simulations need not come near
+    small = {"pours": 24, "draws": 16, "force": True}  # eight simulations need not come near
     pour = bl.choose_pour(bl.Calibration.open(run), progress=False, **small)
     assert bl.report(run, moving=False).is_file() and 0.0 <= pour.chosen.expected_spillage <= 1.0
 

@@ -22,7 +22,7 @@ WRITTEN = {
 ADDED_SINCE = {
     "calibrate": {"simulator_error_deg", "fit_to_noise", "fit_status", "frame_faults"},
     "criticise": {"frame_faults"},
-    "pour": {"fit_status"},
+    "pour": {"fit_status", "map_error"},
 }
 SECTIONS = [(name, section) for name, written in WRITTEN.items() for section in written]
 

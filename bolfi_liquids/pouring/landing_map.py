@@ -1,0 +1,125 @@
+"""Where the liquid of any pour lands, learned from a few dozen pours.
+
+The parcels of a pour (see `parcels`) are smooth functions of the liquid and of the angular
+velocity, which an emulator learns. Each pour is also predicted from all others. What that misses is
+the error of the map, chance between pours included; it is added to what the map predicts, so that
+figures that rest on the map count it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..seeds import Phase, generator
+from .design import RATE, Box
+from .landed_pours import Poured
+from .parcels import fractions_of, scale
+from .spillage import Profiles, Surface, reachable_distances, surface
+
+if TYPE_CHECKING:
+    from ..inference import Emulation
+    from ..models import Cups
+
+MIN_POURS = 16  # from fewer a map of three inputs learns next to nothing
+
+
+@dataclass(frozen=True, eq=False)
+class LandingMap:
+    """Predicted landings of the pours in a box; see `learn_map`.
+
+    Attributes:
+        box: Of the liquids; those beyond are taken at its edge.
+        cups: From and into which is poured.
+        poured: What was learned from.
+        emulation: Of the parcels, over quantiles within the box.
+    """
+
+    box: Box
+    cups: "Cups"
+    poured: Poured
+    emulation: "Emulation"
+
+    @property
+    def pours(self) -> int:
+        """That were learned from."""
+        return len(self.poured.rows)
+
+    def profiles(self, rates: NDArray, liquids: Mapping[str, NDArray], misses: NDArray) -> Profiles:
+        """What liquids spill at angular velocities [rad/s], (W,), of receivers at any distance.
+
+        Args:
+            rates: Within the range of the cups.
+            liquids: Parameters and coefficients, name -> (draws,); others are ignored.
+            misses: Which left-out pour each draw is as far from its prediction as, shape (draws,).
+        """
+        rows = self._predicted(rates, liquids) + np.tile(
+            self.emulation.missed[misses], (len(rates), 1)
+        )
+        distance = reachable_distances(self.cups)
+        fractions = fractions_of(rows, distance, self.cups.receiver.radius)
+        return Profiles(rates, distance, fractions.reshape(len(rates), len(misses), -1, 3))
+
+    def surface(self, rates: NDArray, liquids: Mapping[str, NDArray], misses: NDArray) -> Surface:
+        """What actions may be expected to spill of each liquid; arguments as in `profiles`."""
+        return surface(self.profiles(rates, liquids, misses), self.cups)
+
+    def misses(self, count: int, seed: int) -> NDArray[np.int64]:
+        """Left-out pours, each about as often as any other, shape (count,)."""
+        rng = generator(seed, Phase.MAP_MISSES)
+        return rng.permutation(np.arange(count) % self.pours)
+
+    @cached_property
+    def error(self) -> NDArray[np.float64]:
+        """Spilled fraction of each pour less that predicted from the others, shape (pours, D),
+        over the distances of the decision, averaged over where the liquid may land."""
+        at = np.zeros(1)
+        distance = reachable_distances(self.cups)
+        radius = self.cups.receiver.radius
+        pairs = (self.poured.rows, self.emulation.left_out)
+        known, expected = (
+            surface(Profiles(at, distance, fractions_of(rows, distance, radius)[None]), self.cups)
+            for rows in pairs
+        )
+        return (known.spilled - expected.spilled)[:, 0]
+
+    @property
+    def rms_error(self) -> float:
+        """Of the spilled fraction, over pours that were left out and all distances."""
+        return float(np.sqrt(np.mean(self.error**2)))
+
+    def _predicted(self, rates: NDArray, liquids: Mapping[str, NDArray]) -> NDArray[np.float64]:
+        """Rows (W * draws, ROW), the rates first."""
+        names = [name for name in self.box.prior.names if name != RATE]
+        draws = len(liquids[names[0]])
+        theta = {name: np.tile(liquids[name], len(rates)) for name in names}
+        return self.emulation.predict(_inputs(self.box, {**theta, RATE: np.repeat(rates, draws)}))
+
+
+def learn_map(box: Box, cups: "Cups", poured: Poured) -> LandingMap:
+    """Learn from the pours in a box.
+
+    Raises:
+        RuntimeError: They are too few.
+    """
+    import numpyro.distributions as dist
+
+    from ..inference import Prior, emulate
+
+    if len(poured.rows) < MIN_POURS:
+        raise RuntimeError(
+            f"{len(poured.rows)} pours succeeded, and a map needs {MIN_POURS}; allow more time, "
+            "or more pours, and repeat the call: nothing that has finished is lost"
+        )
+    sides = zip(box.prior.names, box.low, box.high, strict=True)
+    within = Prior({name: dist.Uniform(low, high) for name, low, high in sides})
+    learned = emulate(within, _inputs(box, poured.theta), poured.rows, scale())
+    return LandingMap(box, cups, poured, learned)
+
+
+def _inputs(box: Box, theta: Mapping[str, NDArray]) -> dict[str, NDArray[np.float64]]:
+    """Quantiles of the box's prior, those beyond the box at its edge, name -> (n,)."""
+    return box.prior.to_dict(np.clip(box.prior.to_unit(theta), box.low, box.high))

@@ -1,0 +1,76 @@
+"""A vector as a function of parameters, learned from runs that were made before."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ._float64 import in_float64
+from .arguments import checked_array
+from .gp.process import padded_rows
+from .prior import Prior, checked_prior
+from .regression import MIN_VALUES
+from .surrogates import emulator as vectors
+from .surrogates.emulator import Emulator, Limits
+from .types import Theta
+
+COMPONENTS = 4  # at most; of smooth outputs the fifth and later ones are noise
+
+
+class Emulation:
+    """Gaussian processes of the principal components of outputs [m]; see `emulate`.
+
+    Attributes:
+        prior: Of the parameters; its quantiles are what the processes know.
+        left_out: What the other runs predict of each run, [n, m].
+        missed: Output of each run less that, [n, m]: the error of the emulation, chance between
+            runs included.
+    """
+
+    def __init__(self, prior: Prior, learned: Emulator):
+        self.prior, self._learned = prior, learned
+        self.left_out = vectors.left_out(learned)
+        self.missed = learned.outputs - self.left_out
+
+    def predict(self, theta: Theta) -> np.ndarray:
+        """Mean output [n, m] at theta, name -> [n]; outside the support, at its edge."""
+        return vectors.mean(self._learned, np.atleast_2d(self.prior.to_unit(theta)))
+
+
+@in_float64
+def emulate(prior: Prior, theta: Theta, outputs: ArrayLike, scale: ArrayLike) -> Emulation:
+    """Learn a vector as a function of parameters.
+
+    No simulator is run, nothing is observed and nothing is sampled. Where the output is one
+    number, `regress` says more of it.
+
+    Args:
+        prior: Gives names, ranges and scales of the parameters.
+        theta: Name -> [n], in the prior's support.
+        outputs: [n, m]; a row that is not finite is left out.
+        scale: [m], positive: differences that count alike.
+
+    Raises:
+        ValueError: shapes disagree, fewer than three finite rows, theta outside the support, or a
+            scale that is not positive.
+    """
+    checked_prior(prior)
+    rows = prior.to_dict(np.atleast_2d(prior.to_array(theta)))
+    known, weights = checked_array("outputs", outputs), checked_array("scale", scale)
+    n = len(next(iter(rows.values())))
+    if known.ndim != 2 or len(known) != n:
+        raise ValueError(f"outputs must have shape ({n}, m), a row per theta, got {known.shape}")
+    if weights.shape != known.shape[1:] or not (weights > 0.0).all():
+        raise ValueError(
+            f"scale must hold {known.shape[1]} positive numbers, one per output, got shape "
+            f"{weights.shape} and least {weights.min(initial=np.inf)}"
+        )
+    finite = np.isfinite(known).all(axis=1)
+    if finite.sum() < MIN_VALUES:
+        raise ValueError(
+            f"outputs must hold {MIN_VALUES} finite rows, got {finite.sum()} of {n}; make more"
+        )
+    if not prior.contains(rows).all():
+        raise ValueError("theta must lie in the support of the prior; leave the other rows out")
+    limits = Limits(COMPONENTS, padded_rows(int(finite.sum())))
+    u = prior.to_unit(rows)[finite]
+    learned = vectors.emulate(u, known[finite], lambda _: weights, limits, None, prior.normal)
+    return Emulation(prior, learned)

@@ -1,0 +1,47 @@
+"""Pours whose landings are known in closed form."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from scipy.special import ndtri
+
+from bolfi_liquids import models
+
+PARTICLES = 400
+STREAM_SD = 0.008  # m, along the stream, of which nothing lands aside
+
+
+class MadeUp(NamedTuple):
+    """What stands in place of `models.landings`, and the liquids of each of its calls so far."""
+
+    calls: list[int]
+
+    def middle(self, viscosity, cohesion, rate, adhesion=0.0):
+        """Of the stream [m]: fast and thin liquids land far, and sticking ones near."""
+        slow = 0.004 * np.log(viscosity)
+        return 0.04 - slow + 0.01 * np.log(rate) - 0.005 * cohesion - 0.02 * adhesion
+
+    def landings(self, liquid, angular_velocity, cups, seeds, effects=None):
+        size = len(seeds)
+        self.calls.append(size)
+        viscosity, cohesion, rate = (
+            np.broadcast_to(np.asarray(values, float), size)
+            for values in (liquid.viscosity, liquid.cohesion, angular_velocity)
+        )
+        adhesion = np.broadcast_to((effects or {}).get("adhesion", 0.0), size)
+        kept = np.round(0.3 * viscosity / (1.0 + viscosity) * PARTICLES) / PARTICLES  # a film
+        position = np.full((size, PARTICLES, 2), np.nan, np.float32)
+        for row, at in enumerate(self.middle(viscosity, cohesion, rate, adhesion)):
+            count = round(PARTICLES * (1.0 - kept[row]))
+            spread = STREAM_SD * ndtri((np.arange(count) + 0.5) / count)
+            position[row, :count] = np.stack([at + spread, np.zeros(count)], axis=-1)
+        return models.Landings(position, kept)
+
+
+@pytest.fixture
+def made_up(monkeypatch):
+    """Pours are made up."""
+    made = MadeUp([])
+    monkeypatch.setattr(models, "landings", made.landings)
+    return made
