@@ -189,7 +189,7 @@ def noted(one: Repeated) -> dict[str, Any]:
     """As plain numbers, in the units of the tables of pours."""
     error = one.landing_error
     return {
-        "angular_velocity_deg_s": float(np.degrees(one.angular_velocity)),
+        "angular_velocity_deg_s": round(float(np.degrees(one.angular_velocity)), 6),
         "rms": one.rms,
         "landing_mm": 1e3 * one.landing,
         "landing_error_mm": None if error is None else 1e3 * error,
