@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from bolfi_liquids.models import pouring
-from bolfi_liquids.models.fluid.packing import pack_cylinder
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
@@ -110,36 +108,6 @@ def test_stronger_cohesion_breaks_a_column_into_larger_drops(run):
     sizes = [np.mean(drops(points)) for points in positions]
     assert sizes[0] < sizes[1] < sizes[2]
     assert 1.5 * sizes[0] < sizes[2] < 0.5 * len(start)
-
-
-def test_cohesion_draws_a_poured_stream_together(cups):
-    """What falls from a fast pour is in larger pieces, and in a narrower stream."""
-    cohesion, seeds = np.array([0.0, 0.0, 1.0, 1.0]), np.array([0, 1, 0, 1])
-    slots, particles, interval = len(seeds), 664, 0.02
-    scene = pouring._scene(cups, particles, ())
-    shift = np.array([cups.source.radius, 0.0, cups.source.height])
-    scene.place_cups(np.ones(slots))
-    packed = (pack_cylinder(cups.source.radius, scene.spacing, particles, s) for s in seeds)
-    packings = scene.settled([points - shift for points in packed], 0.6)
-    scene.place([p.position for p in packings], [p.multiplier for p in packings])
-    scene.place_cups(np.full(slots, 3.0))
-    scene.pour_in(models.Liquid(0.03, cohesion, DENSITY).batch(slots))
-    falling, pieces, widths = np.zeros(slots), np.zeros(slots), [[] for _ in seeds]
-    every = round(interval * scene.rate)
-    for start in range(0, round(scene.rate), every):
-        scene.pour(slots, start, start + every, 1.0)
-        position, alive = scene.position.to_numpy(), scene.alive.to_numpy()
-        for b in range(slots):
-            points = position[b, : alive[b]]
-            # below the lip, on the receiver's side
-            stream = points[(points[:, 2] < -0.06) & (points[:, 0] > 0.0)]
-            if len(stream) > 5:
-                falling[b] += len(stream)
-                pieces[b] += len(drops(stream, scene.spacing))
-                widths[b].append(stream[:, 1].std())
-    size, width = falling / pieces, np.array([np.mean(w) for w in widths])
-    assert size[2:].min() > 1.5 * size[:2].max()
-    assert width[2:].max() < 0.9 * width[:2].min()
 
 
 def test_a_bar_contracts_towards_a_ball(run):

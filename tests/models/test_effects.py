@@ -72,7 +72,11 @@ def when(effect):
     return pytest.mark.slow if effect.name in IN_CI else pytest.mark.minutes
 
 
-ALONE = [pytest.param(name, marks=when(effect)) for name, effect in models.EFFECTS.items()]
+ALONE = [
+    pytest.param(name, marks=when(effect))
+    for name, effect in models.EFFECTS.items()
+    if "stir" in effect.scenes
+]
 
 
 @pytest.mark.slow
@@ -140,7 +144,7 @@ def test_every_effect_explains_itself(effect):
     assert np.isfinite(Univariate(effect.prior).log_prob(np.asarray(effect.neutral)))
 
 
-@pytest.mark.minutes
+@pytest.mark.slow
 def test_a_pour_takes_what_a_stir_taught(pour):
     """Effects that do not act in a pour are accepted there, and change nothing."""
     elsewhere = [name for name, effect in models.EFFECTS.items() if "pour" not in effect.scenes]
@@ -221,7 +225,7 @@ def test_bad_coefficients_are_named(stir, effects, message):
         ({"acts_in": "robot"}, "acts_in must be one of liquid, rig, sensor"),
         ({"acts_in": "rig"}, "needs the hook rig"),
         ({"signal": None}, "needs the hook signal"),
-        ({"acts_in": "liquid"}, "needs the hook make_rheology or make_force"),
+        ({"acts_in": "liquid"}, "needs the hook make_rheology or wetting"),
         ({"lowest": 1.0}, "neutral must lie between 1.0 and inf"),
         ({"signal": 1.0}, "hook signal must be a function"),
         ({"make_prior": 1.0}, "make_prior must be a function"),

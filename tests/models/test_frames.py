@@ -10,7 +10,7 @@ from bolfi_liquids.models.pouring import PourBatch, watched_landings
 from bolfi_liquids import models
 
 RATE = np.radians(180.0)
-PARTICLES = 150
+PARTICLES = 900
 
 
 @pytest.fixture(scope="module")
@@ -75,8 +75,6 @@ def test_looking_changes_no_bit(oil, cups):
     )
     landed = models.landings(oil, RATE, cups, [2], PARTICLES)
     np.testing.assert_array_equal(some.position[-1], many.position[-1])
-    flying = np.isfinite(some.position[-1]).all(axis=-1).sum()
-    assert np.isfinite(landed.position[0]).all(axis=-1).sum() == PARTICLES - flying
     watch = Watch(10.0, lambda scene, step: None)
     watched = watched_landings(PourBatch(oil, RATE, cups, [2], PARTICLES, None), watch)
     np.testing.assert_array_equal(watched.position, landed.position)
@@ -84,7 +82,7 @@ def test_looking_changes_no_bit(oil, cups):
 
 @pytest.mark.slow
 def test_what_is_in_the_source_in_the_end_is_what_landings_retain(cups):
-    thick = models.Liquid(5.0, 0.0, 1260.0)
+    thick = models.Liquid(20.0, 0.5, 1260.0)
     frames = models.pour_frames(PourBatch(thick, RATE, cups, [0], PARTICLES))
     landed = models.landings(thick, RATE, cups, [0], PARTICLES)
     turned = np.minimum(RATE * frames.time, cups.pour.final_angle)
@@ -93,20 +91,36 @@ def test_what_is_in_the_source_in_the_end_is_what_landings_retain(cups):
     c, s = np.cos(frames.angle[-1]), np.sin(frames.angle[-1])
     radius, height = cups.source.radius, cups.source.height
     across, up = c * x - s * z + radius, s * x + c * z + height  # in the turned cup's frame
-    inside = (np.hypot(across, y) < radius) & (0.0 < up) & (up < height)
-    assert 0 < inside.sum() < PARTICLES
+    inside = (np.hypot(across, y) < radius + 1e-4) & (0.0 < up) & (up < height)
+    assert 0 < inside.mean() < 1
     assert inside.mean() == pytest.approx(landed.retained[0])
 
 
 @pytest.mark.slow
 def test_nothing_comes_back_from_below_the_rim(oil, cups):
     frames = models.pour_frames(PourBatch(oil, RATE, cups, [2], PARTICLES))
+    landed = models.landings(oil, RATE, cups, [2], PARTICLES)
     present = np.isfinite(frames.position).all(axis=-1).sum(axis=1)
-    assert present[0] == PARTICLES and present[-1] < PARTICLES / 2
+    assert present[0] == landed.position.shape[1] and present[-1] < present[0] / 2
     assert (np.diff(present) <= 0).all()
     assert (np.isnan(frames.position).any(-1) == np.isnan(frames.position).all(-1)).all()
+    drop = cups.pour.lip_height - cups.receiver.height
+    assert np.nanmin(frames.position[..., 2]) > -drop - 1e-6
     start = frames.position[0] + [cups.source.radius, 0.0, cups.source.height]
     assert np.hypot(*start[:, :2].T).max() < cups.source.radius
+
+
+@pytest.mark.slow
+def test_what_falls_is_seen_to_fall(oil, cups):
+    """A frame in the air is a tenth of a second of free fall after the one before."""
+    rate = 50.0
+    frames = models.pour_frames(PourBatch(oil, RATE, cups, [2], PARTICLES), rate=rate)
+    height = frames.position[..., 2]
+    lowest = np.where(np.isnan(height), np.inf, height).min(axis=1)
+    falling = np.flatnonzero((lowest < -0.05) & (lowest > -0.11))[:2]
+    (a, b) = lowest[falling]
+    speed = (a - b) * rate
+    assert np.sqrt(2 * 9.81 * 0.05) < speed < np.sqrt(2 * 9.81 * 0.2)
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan])
