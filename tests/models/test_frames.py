@@ -115,8 +115,8 @@ def test_what_falls_is_seen_to_fall(oil, cups):
     """A frame in the air is a tenth of a second of free fall after the one before."""
     rate = 50.0
     frames = models.pour_frames(PourBatch(oil, RATE, cups, [2], PARTICLES), rate=rate)
-    height = frames.position[..., 2]
-    lowest = np.where(np.isnan(height), np.inf, height).min(axis=1)
+    beyond_lip = frames.position[..., 0] > 0.0
+    lowest = np.where(beyond_lip, frames.position[..., 2], np.inf).min(axis=1)
     falling = np.flatnonzero((lowest < -0.05) & (lowest > -0.11))[:2]
     (a, b) = lowest[falling]
     speed = (a - b) * rate
