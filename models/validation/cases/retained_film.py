@@ -6,7 +6,8 @@ from ...cups import Cups
 from ...fluid.liquid import Liquid
 from ...pouring import DRIP_TIME, PourAction, pour
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
-from ..truths.surfaces import GRAVITY, jeffreys_volume
+from ..truths.films import jeffreys_volume
+from ..truths.surfaces import GRAVITY
 
 CUPS = Cups.model_validate(
     {

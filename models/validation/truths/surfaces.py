@@ -1,4 +1,4 @@
-"""Liquids at rest, films that drain and drops that oscillate."""
+"""Liquids at rest, and drops that oscillate."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,51 +9,6 @@ GRAVITY = 9.81
 def hydrostatic_pressure(depth: ArrayLike, density: float, gravity: float = GRAVITY) -> np.ndarray:
     """Pressure [Pa] at `depth` [m] below a free surface; none above it."""
     return density * gravity * np.maximum(np.asarray(depth, float), 0.0)
-
-
-def jeffreys_thickness(
-    below_edge: ArrayLike,
-    time: ArrayLike,
-    *,
-    viscosity: ArrayLike,
-    density: float,
-    gravity: float = GRAVITY,
-) -> np.ndarray:
-    """Thickness [m] of a film that drains down a wall: sqrt(μ z / (ρ g t)).
-
-    Jeffreys 1930 (Proc. Camb. Phil. Soc. 26, 204); long after the liquid left, without surface
-    tension. A wall at angle α to the vertical has g cos α in place of g.
-
-    Args:
-        below_edge: Distance z below the film's upper edge [m].
-        time: Since the wall was laid bare [s].
-        viscosity: Scalar or array; all broadcast.
-    """
-    z, time = np.asarray(below_edge, float), np.asarray(time, float)
-    return np.sqrt(np.asarray(viscosity, float) * z / (density * gravity * time))
-
-
-def jeffreys_volume(
-    width: float,
-    height: float,
-    time: ArrayLike,
-    *,
-    viscosity: ArrayLike,
-    density: float,
-    gravity: float = GRAVITY,
-) -> np.ndarray:
-    """Volume [m³] that the film of `jeffreys_thickness` still holds.
-
-    Its mean thickness is two thirds of that at the bottom. On the inside of a cup the width is
-    the wetted part of the circumference, if the film is thin against the radius.
-
-    Args:
-        width, height: Of the wall [m].
-    """
-    thickest = jeffreys_thickness(
-        height, time, viscosity=viscosity, density=density, gravity=gravity
-    )
-    return width * height * thickest * 2.0 / 3.0
 
 
 def rayleigh_frequency(radius: float, *, tension: float, density: float, mode: int = 2) -> float:

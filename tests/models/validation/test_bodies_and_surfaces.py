@@ -1,4 +1,4 @@
-"""Cylinders in a stream, rods on a pivot, films and drops."""
+"""Cylinders in a stream, rods on a pivot, and drops."""
 
 import dataclasses
 
@@ -115,26 +115,6 @@ def test_the_torque_is_the_slope_of_the_potential_energy():
 def test_pressure_grows_from_the_surface_down():
     depth = np.array([-0.01, 0.0, 0.1])
     np.testing.assert_allclose(surfaces.hydrostatic_pressure(depth, 1000.0), [0, 0, 981.0])
-
-
-def test_jeffreys_film_conserves_mass():
-    """h_t + (ρ g h³ / 3 μ)_z = 0 with the flux of a film in free fall."""
-    liquid = {"viscosity": 1.4, "density": 1260.0}
-
-    def film(z, t):
-        return surfaces.jeffreys_thickness(z, t, **liquid)
-
-    def flux(z, t):
-        return 1260.0 * 9.81 * film(z, t) ** 3 / (3 * 1.4)
-
-    z, t, step = 0.07, 3.0, 1e-4
-    thinning = (film(z, t + step) - film(z, t - step)) / (2 * step)
-    outflow = (flux(z + step, t) - flux(z - step, t)) / (2 * step)
-    assert thinning == pytest.approx(-outflow, rel=1e-5)
-    held, _ = quad(lambda z: 0.2 * film(z, t), 0, 0.1)
-    assert surfaces.jeffreys_volume(0.2, 0.1, t, **liquid) == pytest.approx(held, rel=1e-6)
-    # 1.5 mm of glycerol, 0.1 m down after 5 s
-    assert film(0.1, 5.0) == pytest.approx(1.5e-3, rel=0.05)
 
 
 def test_drops_of_known_size():

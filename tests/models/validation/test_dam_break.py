@@ -52,3 +52,40 @@ def test_a_track_that_ends_early_is_refused():
         dam_break.fit_time_shift(short, dam_break.FRONT[2])
     with pytest.raises(ValueError, match="needs 3"):
         dam_break.front_speed(short)
+
+
+def test_ritters_flow_keeps_volume_and_momentum():
+    """h_t + (h u)_x = 0 and u_t + u u_x + g h_x = 0 between the two ends of what flows."""
+    depth, step = 0.1, 1e-5
+    wave = np.sqrt(9.81 * depth)
+    x, t = np.linspace(-0.9, 1.9, 15) * wave * 0.3, 0.3
+
+    def h(x, t):
+        return dam_break.ritter_depth(x, t, depth)
+
+    def u(x, t):
+        return dam_break.ritter_speed(x, t, depth)
+
+    def over_time(f):
+        return (f(x, t + step) - f(x, t - step)) / (2 * step)
+
+    def over_place(f):
+        return (f(x + step, t) - f(x - step, t)) / (2 * step)
+
+    lost = over_time(h) + over_place(lambda x, t: h(x, t) * u(x, t))
+    np.testing.assert_allclose(lost, 0.0, atol=1e-6)
+    pushed = over_time(u) + u(x, t) * over_place(u) + 9.81 * over_place(h)
+    np.testing.assert_allclose(pushed, 0.0, atol=1e-6)
+
+
+def test_ritters_flow_begins_and_ends_where_its_waves_are():
+    depth, time = 0.1, 0.3
+    wave = np.sqrt(9.81 * depth)
+    ends = np.array([-1.5, -1.0, 0.0, 2.0, 3.0]) * wave * time
+    np.testing.assert_allclose(
+        dam_break.ritter_depth(ends, time, depth), [depth, depth, 4 / 9 * depth, 0, 0], atol=1e-15
+    )
+    speed = dam_break.ritter_speed(ends, time, depth) / wave
+    np.testing.assert_allclose(speed, [0, 0, 2 / 3, 2, 2], atol=1e-15)
+    length = wave * time  # the reservoir is untouched at its wall until then
+    assert dam_break.ritter_end(length, depth) == pytest.approx(time)

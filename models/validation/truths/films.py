@@ -1,0 +1,105 @@
+"""Films that flow down a wall under their own weight.
+
+A wall at angle α to the vertical has g cos α in place of g. Surface tension and inertia are left
+out.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .surfaces import GRAVITY
+
+
+def nusselt_velocity(
+    across: ArrayLike,
+    thickness: float,
+    *,
+    viscosity: ArrayLike,
+    density: float,
+    gravity: float = GRAVITY,
+) -> np.ndarray:
+    """Speed [m/s] down the wall in a steady film: ρ g (h y - y²/2) / μ.
+
+    Nusselt 1916 (Z. Ver. Dtsch. Ing. 60, 541); Batchelor 1967, section 4.2. The wall holds the
+    liquid, and nothing rubs on the surface.
+
+    Args:
+        across: Distance y from the wall [m], from 0 to `thickness`.
+        thickness: h [m].
+        viscosity: μ [Pa s]; broadcast against `across`.
+    """
+    y = np.asarray(across, float)
+    return density * gravity * (thickness * y - 0.5 * y**2) / np.asarray(viscosity, float)
+
+
+def nusselt_flux(
+    thickness: ArrayLike, *, viscosity: ArrayLike, density: float, gravity: float = GRAVITY
+) -> np.ndarray:
+    """Volume that a steady film carries for each width and time [m²/s]: ρ g h³ / (3 μ).
+
+    Its mean speed is this over the thickness h, two thirds of that of its surface.
+    """
+    h = np.asarray(thickness, float)
+    return density * gravity * h**3 / (3.0 * np.asarray(viscosity, float))
+
+
+def nusselt_thickness(
+    flux: ArrayLike, *, viscosity: ArrayLike, density: float, gravity: float = GRAVITY
+) -> np.ndarray:
+    """Thickness [m] of the steady film that carries a `nusselt_flux` [m²/s]."""
+    drag = 3.0 * np.asarray(viscosity, float) * np.asarray(flux, float)
+    return np.cbrt(drag / (density * gravity))
+
+
+def film_startup_time(thickness: float, *, viscosity: ArrayLike, density: float) -> np.ndarray:
+    """Time [s] in which a film's flow comes within 1/e of its steady one: 4 h² / (π² ν).
+
+    Of the slowest part of a flow between a wall and a free surface (Batchelor 1967, section 4.3).
+    """
+    kinematic = np.asarray(viscosity, float) / density
+    return 4.0 * thickness**2 / (np.pi**2 * kinematic)
+
+
+def jeffreys_thickness(
+    below_edge: ArrayLike,
+    time: ArrayLike,
+    *,
+    viscosity: ArrayLike,
+    density: float,
+    gravity: float = GRAVITY,
+) -> np.ndarray:
+    """Thickness [m] of a film that drains down a wall: sqrt(μ z / (ρ g t)).
+
+    Jeffreys 1930 (Proc. Camb. Phil. Soc. 26, 204); long after the liquid left, without surface
+    tension.
+
+    Args:
+        below_edge: Distance z below the film's upper edge [m].
+        time: Since the wall was laid bare [s].
+        viscosity: Scalar or array; all broadcast.
+    """
+    z, time = np.asarray(below_edge, float), np.asarray(time, float)
+    return np.sqrt(np.asarray(viscosity, float) * z / (density * gravity * time))
+
+
+def jeffreys_volume(
+    width: float,
+    height: float,
+    time: ArrayLike,
+    *,
+    viscosity: ArrayLike,
+    density: float,
+    gravity: float = GRAVITY,
+) -> np.ndarray:
+    """Volume [m³] that the film of `jeffreys_thickness` still holds.
+
+    Its mean thickness is two thirds of that at the bottom. On the inside of a cup the width is
+    the wetted part of the circumference, if the film is thin against the radius.
+
+    Args:
+        width, height: Of the wall [m].
+    """
+    thickest = jeffreys_thickness(
+        height, time, viscosity=viscosity, density=density, gravity=gravity
+    )
+    return width * height * thickest * 2.0 / 3.0
