@@ -96,14 +96,18 @@ def step_to_next(here, there, area):
 
 @ti.func
 def stress_around(s, g, c, m, S):
-    """Stress around a cell's lowest edge along c, by the mean gradient of the open cells there."""
+    """Stress around a cell's lowest edge along c, by the mean gradient of the cells there.
+
+    On a wall it is 0: all that pulls along walls is Young's force.
+    """
     a, b = (c + 1) % 3, (c + 2) % 3
-    along, across, third, room = lanes(0.0), lanes(0.0), lanes(0.0), 0.0
+    along, across, third = lanes(0.0), lanes(0.0), lanes(0.0)
     for k in range(4):
         o = m - (k & 1) * S[a] - (k >> 1) * S[b]
-        along += s.open[o] * s.product[g, a, o]
-        across += s.open[o] * s.product[g, b, o]
-        third += s.open[o] * s.product[g, c, o]
-        room += s.open[o]
+        along += s.product[g, a, o]
+        across += s.product[g, b, o]
+        third += s.product[g, c, o]
     square = along * along + across * across + third * third
-    return -along * across / (ti.max(room, 1.0) * ti.sqrt(square + 1e-12))
+    of_a = ti.min(s.passage[a, m], s.passage[a, m - S[b]])
+    of_b = ti.min(s.passage[b, m], s.passage[b, m - S[a]])
+    return -ti.min(of_a, of_b) * along * across / (4.0 * ti.sqrt(square + 1e-12))

@@ -1,0 +1,107 @@
+# type: ignore  (Taichi compiles this source and gives these names their types)
+"""Liquids with surface tension in boxes of one shape."""
+
+import taichi as ti
+
+from ...apic.filling import OFF_WALL
+from ...apic.lanes import LANES, STRIDE
+from ...apic.transfer import TOP_SPEED, motion_of
+from ...apic.wetting_liquid import WettingLiquid
+from ...fluid.faults import LARGEST, RUNAWAY
+
+
+@ti.data_oriented
+class WetBoxScene(WettingLiquid):
+    """The liquid of pours, step by step as they do it, in a room that stands still.
+
+    Attributes:
+        pull: Acceleration of all of a lane's liquid [m/s²].
+        lowest, highest: Corners of the inside [m].
+        block_lowest, block_highest: Corners of a block within it [m].
+    """
+
+    def __init__(self, groups, cells, particles):
+        super().__init__(groups, cells, particles)
+        self.pull = ti.Vector.field(3, ti.f32, (groups, LANES))
+        self.lowest, self.highest, self.block_lowest, self.block_highest = (
+            ti.Vector.field(3, ti.f32, ()) for _ in range(4)
+        )
+
+    @ti.kernel
+    def drive(self, pull: ti.types.ndarray(ti.f32, 3), velocity: ti.types.ndarray(ti.f32, 4)):
+        """Accelerations of lanes [m/s²], shape [groups, LANES, 3], and velocities of particles
+        at the start [m/s], shape [groups, LANES, n, 3]."""
+        for g, lane in ti.ndrange(velocity.shape[0], LANES):
+            for a in ti.static(range(3)):
+                self.pull[g, lane][a] = pull[g, lane, a]
+            for n in range(self.count[g, lane]):
+                for a in ti.static(range(3)):
+                    self.speed[g, lane, n][a] = velocity[g, lane, n, a]
+
+    @ti.func
+    def begin_step(self, g, step):
+        """Nothing changes from step to step."""
+
+    @ti.func
+    def accelerate(self, g, lane, n):
+        self.speed[g, lane, n] = self.speed[g, lane, n] + self.dt[None] * self.pull[g, lane]
+
+    @ti.func
+    def keep_inside(self, after, velocity):
+        """Where a particle comes to that the walls stop, and its velocity."""
+        x, v = after, velocity
+        off = OFF_WALL * self.cell[None]
+        for a in ti.static(range(3)):
+            low, high = self.lowest[None][a] + off, self.highest[None][a] - off
+            if x[a] < low:
+                x[a], v[a] = low, ti.max(v[a], 0.0)
+            if x[a] > high:
+                x[a], v[a] = high, ti.min(v[a], 0.0)
+        axis, to, nearest = 0, 0.0, 1e30
+        inside = True
+        for a in ti.static(range(3)):  # leave the block by its nearest face
+            low, high = self.block_lowest[None][a] - off, self.block_highest[None][a] + off
+            inside = inside and x[a] > low and x[a] < high
+            if x[a] - low < nearest:
+                axis, to, nearest = a, low, x[a] - low
+            if high - x[a] < nearest:
+                axis, to, nearest = a, high, high - x[a]
+        if inside:
+            for a in ti.static(range(3)):
+                if a == axis:
+                    v[a] = ti.select(to < x[a], ti.min(v[a], 0.0), ti.max(v[a], 0.0))
+                    x[a] = to
+        return x, v
+
+    @ti.kernel
+    def transfer_out(self, groups: ti.i32):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                for lane in range(LANES):
+                    self.move(n // STRIDE, lane)
+
+    @ti.func
+    def move(self, g, lane):
+        """A lane that went wrong gets its status and loses its particles."""
+        dt, per_cell = self.dt[None], 1.0 / self.cell[None]
+        energy, fastest = 0.0, 0.0
+        for n in range(self.count[g, lane]):
+            v, slope = motion_of(self, g, lane, n)
+            self.slope[g, lane, n] = slope
+            before = self.position[g, lane, n]
+            moved = before + dt * (v + 0.5 * dt * per_cell * (slope @ v))
+            self.position[g, lane, n], self.speed[g, lane, n] = self.keep_inside(moved, v)
+            energy += v.dot(v)  # not a number where any is, which a maximum passes over
+            fastest = ti.max(fastest, v.dot(v))
+        if not (energy < LARGEST and fastest < TOP_SPEED**2):
+            self.status[g, lane] = RUNAWAY
+            self.count[g, lane] = 0
+
+    def march(self, groups, start, stop):
+        """Steps start..stop-1 of so many groups."""
+        for step in range(start, stop):
+            self.transfer_in(groups, step)
+            self.prepare(groups, step)
+            self.flow(groups)
+            self.project(groups)
+            self.transfer_out(groups)
