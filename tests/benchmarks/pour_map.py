@@ -33,7 +33,7 @@ DENSITY = 1000.0  # kg/m3
 RATES, TRIED, FINALISTS = 15, 16, 3  # of the direct search
 MAP_RATES, MAP_DRAWS = 31, 128
 JUDGED = 64  # fresh draws that judge
-POURS = (40, 60, 80, 100)
+POURS = (40, 64, 80, 100)
 LEAST_COHESION = 0.2
 HEAD = "liquid    pours, by     deg/s    cm  left out   stated  spilled  regret"
 
