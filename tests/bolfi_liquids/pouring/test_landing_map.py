@@ -59,9 +59,9 @@ def test_the_map_says_what_every_pour_spills(made_up, bank):
     box = box_of()
     learned = learn_map(box, CUPS, pours_in(box, pours_of(), POURS, Keep(bank)))
     assert learned.rms_error < 0.005
-    liquids, rates = liquids_in(box, 40), np.array([0.6, 1.3, 2.9])
-    found = learned.surface(rates, liquids, learned.misses(40, 0))
-    for row, rate in enumerate(rates):
+    liquids = liquids_in(box, 64)
+    found = learned.surface(liquids, rates=5)
+    for row, rate in enumerate(found.angular_velocity):
         for column in (0, 35, 70):
             known = expected(made_up, liquids, rate, found.distance[column])
             missed = found.spilled[:, row, column] - known
@@ -84,12 +84,8 @@ def test_chance_between_pours_counts_in_what_is_expected(made_up, bank):
     shifts = learned.emulation.missed[:, 1 : 1 + PARCELS].mean(axis=1)
     assert 0.7 * NOISE < np.sqrt(np.mean(shifts**2)) < 1.5 * NOISE
     assert learned.rms_error > 5.0 * known.rms_error
-    liquids = {name: np.full(POURS, values[0]) for name, values in liquids_in(box, 1).items()}
-    at = np.array([1.3])
-    spread = [
-        one.surface(at, liquids, one.misses(POURS, 0)).spilled.std(axis=0).max()
-        for one in (learned, known)
-    ]
+    liquids = liquids_in(box, 1)
+    spread = [one.surface(liquids).spilled.std(axis=0).max() for one in (learned, known)]
     assert spread[0] > 5.0 * spread[1]
 
 
