@@ -12,8 +12,6 @@ class Phase(Enum):
     CAMERA_NOISE = "camera noise"
     EXECUTION = "execution of a chosen pour"
     GEOMETRY = "pours of other cups"
-    GRID_POURS = "pours of the grid"
-    HELD_BACK_POURS = "pours that judge the spillage map"
     MOVING_PICTURES = "moving pictures"
     MAP_DESIGN = "design of the map of landings"
     MAP_MISSES = "misses of the map that draws meet"

@@ -12,7 +12,7 @@ from .surrogates import emulator as vectors
 from .surrogates.emulator import Emulator, Limits
 from .types import Theta
 
-COMPONENTS = 4  # at most; of smooth outputs the fifth and later ones are noise
+COMPONENTS = 6  # at most; of smooth outputs later ones are noise
 
 
 class Emulation:
@@ -70,7 +70,7 @@ def emulate(prior: Prior, theta: Theta, outputs: ArrayLike, scale: ArrayLike) ->
         )
     if not prior.contains(rows).all():
         raise ValueError("theta must lie in the support of the prior; leave the other rows out")
-    limits = Limits(COMPONENTS, padded_rows(int(finite.sum())))
+    limits = Limits(COMPONENTS, padded_rows(int(finite.sum())), predicted=None)
     u = prior.to_unit(rows)[finite]
     learned = vectors.emulate(u, known[finite], lambda _: weights, limits, None, prior.normal)
     return Emulation(prior, learned)

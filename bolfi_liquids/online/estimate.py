@@ -19,7 +19,7 @@ from ..calibration.summary import BAD_FIT_RATIO, MIN_NOISE_DEG, unexplained
 from ..inputs.frame import frame_faults
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from ..models import stirring_error
-from ..pouring.map import SpillageMap
+from ..pouring.landing_map import LandingMap
 from ..seeds import Phase, generator, simulation_seeds
 from .plan import Followed
 from .settings import OnlineSettings
@@ -156,7 +156,7 @@ def proposals(problem: Problem, made: Made, observed: NDArray, first: int, n: in
 
 
 def estimate(
-    problem: Problem, made: Made, followed: Followed, spillage: SpillageMap, ended: float
+    problem: Problem, made: Made, followed: Followed, landing_map: LandingMap, ended: float
 ) -> OnlineEstimate:
     """Posterior and best pour, given the data so far.
 
@@ -164,7 +164,7 @@ def estimate(
         problem: What stays the same.
         made: Simulations so far.
         followed: The data.
-        spillage: Of the pour's cups.
+        landing_map: Of the pour's cups.
         ended: When the last finished stroke ended, by `time.monotonic` [s].
 
     Raises:
@@ -179,15 +179,15 @@ def estimate(
     posterior = tree["posterior"]
     status = str(posterior.attrs["status"])
     draws = {name: posterior[name].to_numpy().ravel() for name in problem.prior.names}
-    pour = spillage.best(draws)
+    pour = landing_map.best(draws)
     good = np.isfinite(fit.history.signals).all(axis=(1, 2))
     viscosity = fit.history.theta[:, problem.prior.names.index("viscosity")]
     return OnlineEstimate(
         strokes=followed.strokes,
         covered=followed.covered,
         parameters={name: _spread(values) for name, values in draws.items()},
-        action={"angular_velocity": pour.angular_velocity, "distance": pour.distance},
-        expected_spillage=pour.spillage,
+        action=pour.action,
+        expected_spillage=pour.expected_spillage,
         spillage_q95=pour.spillage_q95,
         simulations=engine.succeeded,
         lag=time.monotonic() - ended,
@@ -231,7 +231,7 @@ def enough(estimate: OnlineEstimate, settings: OnlineSettings) -> bool:
     return estimate.strokes >= settings.least_strokes and spillage < settings.target
 
 
-def warm_up(problem: Problem, spillage: SpillageMap) -> None:
+def warm_up(problem: Problem, landing_map: LandingMap) -> None:
     """Compile all that estimates and proposals need, on signals made up for that."""
     rng = generator(0, Phase.WARM_UP)
     n = problem.settings.design
@@ -244,7 +244,7 @@ def warm_up(problem: Problem, spillage: SpillageMap) -> None:
         observed = made.signals[0].copy()
         observed[part:] = np.nan
         followed = Followed(observed, 1, float(time_[part - 1]), 0.0, 0.0, "")
-        estimate(problem, made, followed, spillage, 0.0)
+        estimate(problem, made, followed, landing_map, 0.0)
         proposals(problem, made, observed, n, problem.settings.in_flight)
 
 

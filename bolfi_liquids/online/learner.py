@@ -60,25 +60,21 @@ class _Learner:
     def prepare(self) -> bool:
         """Simulate the design; meanwhile learn the map and compile. Whether all went well."""
         from ..inference import SimulationBank
-        from ..pouring.map import make_map
+        from ..inference.simulations import Keep
+        from ..pouring.landed_pours import LandedPours
+        from ..pouring.landing_map import map_of_prior
         from .estimate import design, warm_up
 
         settings, jobs = self.request.settings, design(self.problem)
         side_by_side = os.cpu_count() or 1  # nothing is urgent before the robot moves
         for start in range(0, len(jobs), side_by_side):
             self._send(jobs[start : start + side_by_side])
-        self._tell(OnlinePhase.PREPARING, "learning the map of spillage")
+        self._tell(OnlinePhase.PREPARING, "learning the map of landings")
+        pours = LandedPours(self.request.cups, self.plan.number("liquid_density"))
         with SimulationBank(self.request.bank) as bank:
-            self.spillage = make_map(
-                self.request.cups,
-                self.plan.number("liquid_density"),
-                bank,
-                prior=self.problem.prior,
-                pours=settings.pours,
-                progress=False,
-            )
+            self.landing_map = map_of_prior(self.problem.prior, pours, settings.pours, Keep(bank))
         self._tell(OnlinePhase.PREPARING, "compiling")
-        warm_up(self.problem, self.spillage)
+        warm_up(self.problem, self.landing_map)
         while self.flying:
             self._tell(OnlinePhase.PREPARING, "simulating the plan")
             self._land()
@@ -117,7 +113,7 @@ class _Learner:
         if known or not np.isfinite(followed.observed).any():
             return
         self.followed = followed
-        found = estimate(self.problem, self.made, followed, self.spillage, ended)
+        found = estimate(self.problem, self.made, followed, self.landing_map, ended)
         self.parent.send(found)
         self._tell(OnlinePhase.READY, "")
         with self.request.log.open("a", encoding="utf-8") as log:

@@ -30,7 +30,9 @@ from ..inputs.prior import (
     read_prior,
 )
 from ..inputs.recording import Recording
-from ..pouring.map import make_pours
+from ..pouring.design import joint_prior, whole
+from ..pouring.landed_pours import LandedPours, pours_in
+from ..progress import progress_bar
 from ..run.directory import RUN_TOML
 from ..run.entering import working_in
 from .learner import learn_online
@@ -80,7 +82,7 @@ class OnlineCalibration:
         *,
         progress: bool = True,
     ) -> "OnlineCalibration":
-        """Make the pours of the spillage map, unless the bank has them, and start to prepare.
+        """Make the pours of the map of landings, unless the bank has them, and start to prepare.
 
         The first time the pours take minutes, in this process; everything after that happens in
         two others (they are spawned: a script needs `if __name__ == "__main__":`). Let the robot
@@ -98,6 +100,7 @@ class OnlineCalibration:
             InputError: The plan, the prior or the directory of the run cannot be used.
         """
         from ..inference import SimulationBank
+        from ..inference.simulations import Keep
 
         settings = choice.settings
         prior = default_prior() if choice.prior is None else choice.prior
@@ -116,9 +119,17 @@ class OnlineCalibration:
                     "holds a run already", where=str(out), fix="choose another directory"
                 )
             (out / LOG).unlink(missing_ok=True)
-            with SimulationBank(bank) as kept:
-                make_pours(
-                    cups, density, kept, prior=prior, pours=settings.pours, progress=progress
+            with (
+                SimulationBank(bank) as kept,
+                progress_bar("pouring", settings.pours, shown=progress) as advance,
+            ):
+                # to be found there by the process that learns, which shows no bar
+                pours_in(
+                    whole(joint_prior(prior, (), cups)),
+                    LandedPours(cups, density),
+                    settings.pours,
+                    Keep(kept),
+                    advance,
                 )
             request = Request(
                 time=plan.gripper.time,

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from ..errors import InputError
 from ..inputs.settings import Count, Particles, Seed, Simulations, Surrogate, checked, one_of
-from ..pouring.map import DEFAULT_POURS, MIN_POURS
+from ..pouring.landing_map import MIN_POURS, PRIOR_POURS
 
 STOPS = ("bound", "mean")
 WHERE = "online setting {}"
@@ -27,7 +27,7 @@ class OnlineSettings:
         in_flight: Simulations made together while the robot stirs; each occupies a core.
         surrogate: "discrepancy", the paper's, or "signal", which emulates the inclination itself.
         particles: Number of particles of the simulated liquid; 0: cells follow the stick.
-        pours: Number of pours of the spillage map.
+        pours: Number of pours from which a map of landings is learned, of all liquids of the prior.
         seed: Seed of all random draws.
     """
 
@@ -39,7 +39,7 @@ class OnlineSettings:
     in_flight: Count = 1
     surrogate: Surrogate = "discrepancy"
     particles: Particles = 0
-    pours: Annotated[int, Field(ge=MIN_POURS)] = DEFAULT_POURS
+    pours: Annotated[int, Field(ge=MIN_POURS)] = PRIOR_POURS
     seed: Seed = 0
 
     def __post_init__(self):

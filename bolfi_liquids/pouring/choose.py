@@ -26,14 +26,8 @@ from .design import acting_in_pours, box_around, joint_prior
 from .landed_pours import LandedPours, pours_in
 from .landing_map import LandingMap, learn_map
 from .pour_file import pour_tree
-from .result import Judged, Pour, PourSummary
-from .spillage import (
-    MAX_LANDING_SDS,
-    Surface,
-    landed,
-    landing_sd,
-    normal_scores,
-)
+from .result import Pour, PourSummary
+from .spillage import Surface, landing_sd
 
 if TYPE_CHECKING:
     from ..inference.simulations import Workers
@@ -41,9 +35,6 @@ if TYPE_CHECKING:
 
 JUDGE_DRAWS_FACTOR = 2
 """How many times as many draws judge the two actions as search for them."""
-
-LANDINGS_PER_DRAW = 5
-"""Equally probable places where the liquid of each judging draw may land."""
 
 SEARCH_STRATUM = 1
 """Stratum of the posterior draws that choose; all others judge."""
@@ -126,7 +117,7 @@ def _chosen(
     """Search the map, judge, and write what was found into the run."""
     choice = _search(learned, settings, drawn.search, calibration.best)
     chosen, plug_in = (
-        _judge(learned, action, drawn.judge, settings.seed)
+        learned.judge(action, drawn.judge, seed=settings.seed)
         for action in (choice.chosen, choice.plug_in)
     )
     pour = Pour(calibration.path, chosen, plug_in)
@@ -185,27 +176,13 @@ def _search(
     best: Mapping[str, float],
 ) -> _Choice:
     """Try all actions over the posterior and at theta* (`best`)."""
-    rates = np.geomspace(*learned.cups.angular_velocity_range, settings.iterations)
-    misses = learned.misses(settings.draws, settings.seed)
-    at_theta = {name: np.full(settings.draws, value) for name, value in best.items()}
-    over_posterior = learned.surface(rates, liquids, misses)
-    at_best = learned.surface(rates, at_theta, misses)
+    at_theta = {name: np.array([value]) for name, value in best.items()}
+    over_posterior, at_best = (
+        learned.surface(tried, rates=settings.iterations, seed=settings.seed)
+        for tried in (liquids, at_theta)
+    )
     chosen, plug_in = (tried.least(settings.risk) for tried in (over_posterior, at_best))
     return _Choice(over_posterior, at_best, chosen, plug_in)
-
-
-def _judge(
-    learned: LandingMap, action: Mapping[str, float], liquids: Mapping[str, NDArray], seed: int
-) -> Judged:
-    """What an action spills of liquids, wherever they land."""
-    rate, distance = action["angular_velocity"], action["distance"]
-    misses = learned.misses(len(next(iter(liquids.values()))), seed)
-    profiles = learned.profiles(np.array([rate]), liquids, misses)
-    sd = landing_sd(learned.cups)
-    off = np.clip(
-        sd * normal_scores(LANDINGS_PER_DRAW), -MAX_LANDING_SDS * sd, MAX_LANDING_SDS * sd
-    )
-    return Judged(rate, distance, landed(profiles.fractions[0], profiles.distance, distance, off))
 
 
 def _keep(  # noqa: PLR0913  all that pour.nc and the summary tell

@@ -14,17 +14,35 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..progress import Advance, silent
 from ..seeds import Phase, generator
-from .design import RATE, Box
-from .landed_pours import Poured
+from .design import RATE, Box, joint_prior, whole
+from .landed_pours import LandedPours, Poured, pours_in
 from .parcels import fractions_of, scale
-from .spillage import Profiles, Surface, reachable_distances, surface
+from .result import Judged
+from .spillage import (
+    MAX_LANDING_SDS,
+    Profiles,
+    Surface,
+    landed,
+    landing_sd,
+    normal_scores,
+    reachable_distances,
+    surface,
+)
 
 if TYPE_CHECKING:
-    from ..inference import Emulation
+    from ..inference import Emulation, Prior
+    from ..inference.simulations import Keep
     from ..models import Cups
 
 MIN_POURS = 16  # from fewer a map of three inputs learns next to nothing
+PRIOR_POURS = 256  # for a map of all liquids
+RATES = 31  # angular velocities that are tried
+MIN_OUTCOMES = 64  # of an action, however few the draws
+BEST_DRAWS = 384  # posterior draws at most that choose and judge the best action
+LANDINGS_PER_DRAW = 5
+"""Equally probable places where the liquid of each judging draw may land."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +81,54 @@ class LandingMap:
         fractions = fractions_of(rows, distance, self.cups.receiver.radius)
         return Profiles(rates, distance, fractions.reshape(len(rates), len(misses), -1, 3))
 
-    def surface(self, rates: NDArray, liquids: Mapping[str, NDArray], misses: NDArray) -> Surface:
-        """What actions may be expected to spill of each liquid; arguments as in `profiles`."""
-        return surface(self.profiles(rates, liquids, misses), self.cups)
+    def surface(
+        self, liquids: Mapping[str, NDArray], *, rates: int = RATES, seed: int = 0
+    ) -> Surface:
+        """What every action may be expected to spill of liquids that might be in the cup.
+
+        Each draw meets one of the map's errors, the same for all actions, which then differ by what
+        they are and not by luck. Few draws are repeated, so that they meet errors of all kinds.
+
+        Args:
+            liquids: As for `profiles`.
+            rates: How many angular velocities are tried.
+            seed: Of which error each draw meets.
+        """
+        outcomes = repeated(liquids, MIN_OUTCOMES)
+        tried = np.geomspace(*self.cups.angular_velocity_range, rates)
+        misses = self.misses(number_of(outcomes), seed)
+        return surface(self.profiles(tried, outcomes, misses), self.cups)
+
+    def judge(
+        self, action: Mapping[str, float], liquids: Mapping[str, NDArray], *, seed: int = 0
+    ) -> Judged:
+        """What an action spills of liquids, each at `LANDINGS_PER_DRAW` places where it may land.
+
+        Args:
+            action: `angular_velocity` [rad/s] and `distance` [m].
+            liquids, seed: As for `surface`.
+        """
+        rate, distance = action["angular_velocity"], action["distance"]
+        outcomes = repeated(liquids, MIN_OUTCOMES)
+        misses = self.misses(number_of(outcomes), seed)
+        profiles = self.profiles(np.array([rate]), outcomes, misses)
+        sd = landing_sd(self.cups)
+        scores = np.clip(normal_scores(LANDINGS_PER_DRAW), -MAX_LANDING_SDS, MAX_LANDING_SDS)
+        at = profiles.distance, distance, sd * scores
+        return Judged(rate, distance, landed(profiles.fractions[0], *at))
+
+    def best(self, liquids: Mapping[str, NDArray]) -> Judged:
+        """The action that is expected to spill least, judged on draws that did not choose it.
+
+        Args:
+            liquids: Posterior draws in no order, name -> (draws,).
+        """
+        several = number_of(liquids) > 1
+        chosen, others = (
+            {name: values[part] for name, values in liquids.items()}
+            for part in (slice(0, BEST_DRAWS, 2), slice(int(several), BEST_DRAWS, 2))
+        )
+        return self.judge(self.surface(chosen).least("mean"), others)
 
     def misses(self, count: int, seed: int) -> NDArray[np.int64]:
         """Left-out pours, each about as often as any other, shape (count,)."""
@@ -97,6 +160,36 @@ class LandingMap:
         draws = len(liquids[names[0]])
         theta = {name: np.tile(liquids[name], len(rates)) for name in names}
         return self.emulation.predict(_inputs(self.box, {**theta, RATE: np.repeat(rates, draws)}))
+
+
+def repeated(liquids: Mapping[str, NDArray], least: int) -> dict[str, NDArray]:
+    """Each draw so often that there are `least` in all."""
+    times = -(-least // number_of(liquids))
+    return {name: np.repeat(values, times) for name, values in liquids.items()}
+
+
+def number_of(liquids: Mapping[str, NDArray]) -> int:
+    """Draws."""
+    return len(next(iter(liquids.values())))
+
+
+def map_of_prior(
+    prior: "Prior",
+    pours: LandedPours,
+    count: int,
+    keep: "Keep",
+    advance: Advance = silent,
+) -> LandingMap:
+    """Of every liquid of a prior.
+
+    Args:
+        prior: Of viscosity and cohesion.
+        pours: The simulator.
+        count: Pours of the sequence, see `pours_in`, which explains the rest.
+        keep, advance: See there.
+    """
+    box = whole(joint_prior(prior, pours.effects, pours.cups))
+    return learn_map(box, pours.cups, pours_in(box, pours, count, keep, advance))
 
 
 def learn_map(box: Box, cups: "Cups", poured: Poured) -> LandingMap:

@@ -10,6 +10,7 @@ from ..pouring.spillage import (
     DISTANCE_STEP,
     Outcomes,
     Profiles,
+    Surface,
     pour_all,
 )
 from ..progress import silent
@@ -21,43 +22,49 @@ if TYPE_CHECKING:
     from ..inference import Prior
     from ..inference.simulations import Keep
     from ..models import Cups
-    from ..pouring.grid import PourGrid
+    from ..pouring.landing_map import LandingMap
     from ..progress import Advance
 
 RULES = ("plug_in", "mean", "cvar")
 """The best pour at theta*, as in the paper; least expected spillage over the posterior; least mean
 spillage over the worst tenth of its draws."""
 
+RATES = 12  # angular velocities; each that is chosen is poured for every truth
 PRIOR_DRAWS = 64  # draws of the prior over which a pour is chosen without any calibration
 EXECUTION_SEEDS = 4  # seeds with which a chosen pour is carried out
 
 Action = Mapping[str, float]
 
 
-def decide(concluded: NDArray, grid: "PourGrid") -> dict[str, Action]:
+def decide(concluded: NDArray, landing_map: "LandingMap") -> dict[str, Action]:
     """The action of each rule, from theta* and draws, shape (1 + draws, 2)."""
     liquids = dict(zip(PARAMETER_NAMES, concluded.T, strict=True))
     best = {name: values[:1] for name, values in liquids.items()}
-    over = grid.surface({name: values[1:] for name, values in liquids.items()})
+    over = tried(landing_map, {name: values[1:] for name, values in liquids.items()})
     return {
-        "plug_in": grid.surface(best).least("mean"),
+        "plug_in": tried(landing_map, best).least("mean"),
         "mean": over.least("mean"),
         "cvar": over.least("cvar"),
     }
 
 
-def decide_unknowing(grid: "PourGrid", prior: "Prior", seed: int) -> dict[str, float]:
+def decide_unknowing(landing_map: "LandingMap", prior: "Prior", seed: int) -> dict[str, float]:
     """The action that spills least in expectation over the prior."""
     drawn = prior.from_unit(
         generator(seed, Phase.UNKNOWING).uniform(size=(PRIOR_DRAWS, len(prior)))
     )
-    return grid.surface(drawn).least("mean")
+    return tried(landing_map, drawn).least("mean")
+
+
+def tried(landing_map: "LandingMap", liquids: Mapping[str, NDArray]) -> Surface:
+    """What the actions spill that a study chooses among."""
+    return landing_map.surface(liquids, rates=RATES)
 
 
 def execute(
     truths: Truths,
     actions: Iterable[Iterable[Action]],
-    grid: "PourGrid",
+    landing_map: "LandingMap",
     keep: "Keep",
     advance: "Advance",
 ) -> list[NDArray[np.float64]]:
@@ -65,15 +72,15 @@ def execute(
 
     Args:
         truths: n liquids.
-        actions: Those of each, with angular velocities of the grid.
-        grid: Its cups are poured.
+        actions: Those of each.
+        landing_map: Its cups are poured.
         keep: Where pours are made and kept.
         advance: Called after each truth.
     """
     spilled = []
     for at, chosen in enumerate(actions):
         theta = {name: float(values[at]) for name, values in truths.theta.items()}
-        outcomes = executions(theta, DENSITY, grid.cups, int(truths.seed[at]))
+        outcomes = executions(theta, DENSITY, landing_map.cups, int(truths.seed[at]))
         spilled.append(spilled_by(outcomes, list(chosen), keep))
         advance(1)
     return spilled

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 OTHER_CHOICES = {
     "plug_in": ("x", "best at θ* alone"),
-    "cvar": ("^", "least CVaR of the first draws"),
+    "cvar": ("^", "least CVaR of the draws"),
 }
 """Rules beside the least expected spillage -> marker and label."""
 
@@ -41,7 +41,7 @@ def _judged(shared: SharedSimulations) -> "Dataset":
     runs = [(surrogate, n) for surrogate in scale.surrogates for n in scale.recorded]
     shape = len(POURED_LIQUIDS), len(runs), len(RULES)
     spilled, error, rates, distances = (np.empty(shape) for _ in range(4))
-    unknowing = decide_unknowing(shared.grid, default_prior(), scale.seed)
+    unknowing = decide_unknowing(shared.landing_map, default_prior(), scale.seed)
     best, unknown = np.empty(len(POURED_LIQUIDS)), np.empty((len(POURED_LIQUIDS), 2))
     for row, liquid in enumerate(POURED_LIQUIDS):
         table = bundled_pours(liquid)
@@ -93,10 +93,7 @@ def _chosen(
 
 
 def _least(run: Path, risk: str) -> dict[str, float]:
-    """The action at which another measure of risk is least, over the draws tried everywhere.
-
-    `choose_pour` would try the most promising ones on other draws, too.
-    """
+    """The action at which another measure of risk is least, over the same draws."""
     actions = read_pour(run)["actions"]
     return Surface(*(actions[name].to_numpy() for name in Surface._fields)).least(risk)
 

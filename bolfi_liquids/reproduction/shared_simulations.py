@@ -11,7 +11,8 @@ from ..calibration.result import Calibration
 from ..inputs.bundled import bundled_recording
 from ..inputs.cups import bundled_cups
 from ..inputs.prior import default_prior
-from ..pouring.grid import PourGrid, make_grid
+from ..pouring.landed_pours import LandedPours
+from ..pouring.landing_map import LandingMap, map_of_prior
 from ..progress import progress_bar
 from ..run.directory import SIMULATIONS
 from ..run.execution import HERE, Execution
@@ -48,18 +49,18 @@ class SharedSimulations:
     execution: Execution = HERE
 
     @cached_property
-    def grid(self) -> PourGrid:
-        """Of pours with the bundled cups, by which actions are chosen."""
-        size, shown = self.scale.grid, self.execution.progress
-        with progress_bar("pouring a grid of liquids", size.rates, shown=shown) as advance:
-            cups, prior, keep = bundled_cups(), default_prior(), self.execution.keep(self.bank)
-            return make_grid(cups, DENSITY, prior, keep, advance, size=size)
+    def landing_map(self) -> LandingMap:
+        """Of all liquids and the bundled cups, by which actions are chosen."""
+        count, keep = self.scale.pours, self.execution.keep(self.bank)
+        with progress_bar("pouring", count, shown=self.execution.progress) as advance:
+            pours = LandedPours(bundled_cups(), DENSITY)
+            return map_of_prior(default_prior(), pours, count, keep, advance)
 
     @cached_property
     def study(self) -> "Dataset":
         """Spillage after stirring and after pouring; see `spillage_study`."""
         made = self._learners_bank, self.execution.timeout
-        return self._studied(by_stirring_and_pouring(self.grid.cups, self.scale, *made))
+        return self._studied(by_stirring_and_pouring(self.landing_map.cups, self.scale, *made))
 
     @cached_property
     def strokes(self) -> "Dataset":
@@ -75,7 +76,7 @@ class SharedSimulations:
         return self.out / SIMULATIONS if self.execution.local else ":memory:"
 
     def _studied(self, learners: "Mapping[str, Learner]") -> "Dataset":
-        return spillage_study(learners, self.bank, self.grid, self.scale, self.execution)
+        return spillage_study(learners, self.bank, self.landing_map, self.scale, self.execution)
 
     def begin_sticky(self) -> None:
         """Start the sticky liquids in the pool: they take longest and depend on nothing else."""

@@ -71,7 +71,7 @@ def spilled_where_it_sticks(
     sticks = executions(truth.theta, density, cups, truth.seed)
     flows = executions(truth.liquid, density, cups, truth.seed)
     rehearsed = executions(truth.theta, density, cups, truth.seed, Phase.REHEARSAL)
-    rates = np.geomspace(*cups.angular_velocity_range, scale.grid.rates)
+    rates = np.geomspace(*cups.angular_velocity_range, scale.rates)
     with open_bank(out) as bank:
         keep = execution.keep(bank)
         known = surface(pour_all(rehearsed, rates, keep, silent), cups).least("mean")

@@ -11,14 +11,14 @@ from ..inputs.prior import default_prior
 from ..progress import progress_bar
 from ..run.execution import HERE, Execution
 from .calibrations import Learner
-from .decisions import RULES, Action, decide, decide_unknowing, execute
+from .decisions import RULES, Action, decide, decide_unknowing, execute, tried
 from .truths import Truths, draw_truths
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
     from ..inference import SimulationBank
-    from ..pouring.grid import PourGrid
+    from ..pouring.landing_map import LandingMap
     from .study_size import Scale
 
 
@@ -28,19 +28,19 @@ class Tasks:
 
     Attributes:
         truths: The liquids.
-        grid: Of pours, by which actions are chosen.
+        landing_map: By which actions are chosen.
         bank: Where all simulations are kept.
     """
 
     truths: Truths
-    grid: "PourGrid"
+    landing_map: "LandingMap"
     bank: "SimulationBank"
 
 
 def spillage_study(
     learners: Mapping[str, Learner],
     bank: "SimulationBank",
-    grid: "PourGrid",
+    landing_map: "LandingMap",
     scale: "Scale",
     execution: Execution = HERE,
 ) -> "Dataset":
@@ -51,12 +51,12 @@ def spillage_study(
     Args:
         learners: By name, with the same budgets.
         bank: Where all simulations and calibrations are kept.
-        grid: Of pours, by which actions are chosen, and with whose cups they are carried out.
+        landing_map: By which actions are chosen, and with whose cups they are carried out.
         scale: How many of what.
         execution: How simulations and calibrations are made.
     """
-    tasks = Tasks(draw_truths(scale.repetitions, scale.seed), grid, bank)
-    unknowing = decide_unknowing(grid, default_prior(), scale.seed)
+    tasks = Tasks(draw_truths(scale.repetitions, scale.seed), landing_map, bank)
+    unknowing = decide_unknowing(landing_map, default_prior(), scale.seed)
     concluded = {
         name: conclusions(learner, name, tasks, execution) for name, learner in learners.items()
     }
@@ -90,7 +90,7 @@ def _judged(
 ) -> "Dataset":
     from xarray import Dataset
 
-    truths, grid = tasks.truths, tasks.grid
+    truths, landing_map = tasks.truths, tasks.landing_map
     shape = len(concluded), len(RULES), len(truths.seed), len(budgets)
     chosen = [
         (learner, rule, at, n, action)
@@ -98,17 +98,17 @@ def _judged(
         for at, found in enumerate(made)
         if found is not None
         for n in range(len(budgets))
-        for rule, action in enumerate(decide(found[n], grid).values())
+        for rule, action in enumerate(decide(found[n], landing_map).values())
     ]
     actions: list[list[Action]] = []
     for at in range(len(truths.seed)):
         own = {name: values[at : at + 1] for name, values in truths.theta.items()}
         mine = [action for _, _, truth, _, action in chosen if truth == at]
-        actions.append([grid.surface(own).least("mean"), unknowing, *mine])
+        actions.append([tried(landing_map, own).least("mean"), unknowing, *mine])
     with progress_bar(
         "pouring what was chosen", len(truths.seed), shown=execution.progress
     ) as advance:
-        spilled = execute(truths, actions, grid, execution.keep(tasks.bank), advance)
+        spilled = execute(truths, actions, landing_map, execution.keep(tasks.bank), advance)
     values, rates, distances = (np.full(shape, np.nan) for _ in range(3))
     for at, outcome in enumerate(spilled):
         mine = [row for row in chosen if row[2] == at]

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ..pouring.grid import FINE_GRID, GridSize
+from ..pouring.landing_map import PRIOR_POURS
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Scale:
         particles: Of the stirs by which bundled recordings are calibrated; 0: cells follow the
             stick.
         drawn_particles: Of the stirs of drawn truths, and of those by which they are calibrated.
-        grid: Of the pours by which actions are chosen.
+        pours: Of the map by which actions are chosen.
         seed: Seed of all random draws.
     """
 
@@ -39,7 +39,7 @@ class Scale:
     lips: tuple[float, ...] = (0.10, 0.14, 0.20, 0.26)
     particles: int = 0
     drawn_particles: int = 0
-    grid: GridSize = FINE_GRID
+    pours: int = PRIOR_POURS
     seed: int = 0
 
 
@@ -54,5 +54,5 @@ QUICK = Scale(
     rates=9,
     surrogates=("discrepancy",),
     lips=(0.14, 0.20),
-    grid=GridSize(viscosities=16, cohesions=2, rates=12),
+    pours=PRIOR_POURS // 2,
 )

@@ -31,9 +31,9 @@ from bolfi_liquids.progress import silent
 
 DENSITY = 1000.0  # kg/m3
 RATES, TRIED, FINALISTS = 15, 16, 3  # of the direct search
-MAP_RATES, MAP_DRAWS = 31, 128
+MAP_DRAWS = 128
 JUDGED = 64  # fresh draws that judge
-POURS = (40, 60, 80, 100)
+POURS = (40, 64, 80, 100)
 LEAST_COHESION = 0.2
 HEAD = "liquid    pours, by     deg/s    cm  left out   stated  spilled  regret"
 
@@ -80,9 +80,7 @@ class Bench:
         own = np.isin(made.theta[RATE], first)
         theta = {name: values[own] for name, values in made.theta.items()}
         learned = learn_map(self.box, self.cups, Poured(theta, made.rows[own]))
-        rates = np.geomspace(*self.cups.angular_velocity_range, MAP_RATES)
-        liquids, misses = draws(self.liquid, MAP_DRAWS, 2), learned.misses(MAP_DRAWS, 0)
-        tried = learned.surface(rates, liquids, misses)
+        tried = learned.surface(draws(self.liquid, MAP_DRAWS, 2))
         return tried.least("mean"), float(tried.risk("mean").min()), learned.rms_error
 
     def by_search(self) -> tuple[dict[str, float], float]:

@@ -88,9 +88,23 @@ def cases():
         "Prior.sample": (prior.sample, {"key": jax.random.key(0), "n": 2}),
         "regress": (inference.regress, {"prior": prior, "theta": THETA, "values": THETA["a"]}),
         "Regression.predict": (regression.predict, {"theta": THETA}),
+        "emulate": (
+            inference.emulate,
+            {
+                "prior": prior,
+                "theta": THETA,
+                "outputs": signals,
+                "scale": np.ones(signals.shape[1]),
+            },
+        ),
+        "Emulation.predict": (
+            inference.emulate(prior, THETA, signals, np.ones(signals.shape[1])).predict,
+            {"theta": THETA},
+        ),
         "SimulationBank": (inference.SimulationBank, {}),
         "SimulationBank.get": (bank.get, row),
         "SimulationBank.put": (bank.put, {**row, "simulation": Simulation(signals[0], None, 0.0)}),
+        "SimulationBank.holds": (bank.holds, {"identity": ""}),
         "SimulationBank.simulations": (bank.simulations, {"identity": ""}),
         "SimulationBank.claim": (bank.claim, row),
         "SimulationBank.release": (bank.release, row),

@@ -31,7 +31,7 @@ from bolfi_liquids.online.plan import (
 )
 from bolfi_liquids.online.record import BAD_FIT, sentence
 from bolfi_liquids.online.settings import OnlineSettings
-from bolfi_liquids.pouring.map import Expected
+from bolfi_liquids.pouring.result import Judged
 
 ATTRS = {
     "cup_radius": 0.04,
@@ -50,11 +50,12 @@ NOISE = 0.01
 
 
 class NoMap:
-    """In the place of a map of spillage: what it was asked."""
+    """In the place of a map of landings: what it was asked."""
 
     def best(self, liquids):
         self.liquids = liquids
-        return Expected(1.0, 0.02, float(liquids["cohesion"].mean()), 0.9)
+        spilled = float(liquids["cohesion"].mean())
+        return Judged(1.0, 0.02, np.array([[spilled, 1.0 - spilled, 0.0]]))
 
 
 def signals(theta, seeds, time=PLAN.time):
@@ -122,11 +123,9 @@ def test_missing_samples_equal_a_shorter_recording():
     engine.tell(known.theta, known.signals[:, :samples], known.seeds)
     fit = engine.fit()
     again = fit.sample("quadrature", chains=2, draws=500, seed=0)["posterior"]
-    spillage = NoMap()
-    estimate(of, known, seen, spillage, 0.0)
-    np.testing.assert_array_equal(
-        again["viscosity"].to_numpy().ravel(), spillage.liquids["viscosity"]
-    )
+    asked = NoMap()
+    estimate(of, known, seen, asked, 0.0)
+    np.testing.assert_array_equal(again["viscosity"].to_numpy().ravel(), asked.liquids["viscosity"])
     # the paper's integral, by another rule than the engine's own
     square = np.square(seen.observed[:samples] - known.signals[0, :samples]).sum(axis=1)
     assert fit.history.discrepancy[0] == pytest.approx(np.trapezoid(square, short.time))

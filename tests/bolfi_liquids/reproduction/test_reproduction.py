@@ -190,15 +190,15 @@ def test_runs_of_recordings_are_simulated_by_the_executor(tmp_path, monkeypatch)
         assert named.items() >= EXECUTION._asdict().items()
 
 
-def test_grids_of_pours_are_simulated_by_the_executor(tmp_path, monkeypatch):
+def test_maps_of_pours_are_simulated_by_the_executor(tmp_path, monkeypatch):
     shared, calls = SharedSimulations(tmp_path, FULL, None, EXECUTION), []
-    monkeypatch.setattr(shared_simulations, "make_grid", called(calls))
+    monkeypatch.setattr(shared_simulations, "map_of_prior", called(calls))
     monkeypatch.setattr(figure_of_geometry, "simulate_kept", called(calls))
-    for make in (lambda: shared.grid, lambda: figure_of_geometry.geometry(shared)):
+    for make in (lambda: shared.landing_map, lambda: figure_of_geometry.geometry(shared)):
         with pytest.raises(Called):
             make()
-    grid, geometry = (given[3] for given, _ in calls)
-    assert (grid.executor, grid.timeout) == (EXECUTION.executor, 60.0)
+    poured, geometry = (given[3] for given, _ in calls)
+    assert (poured.executor, poured.timeout) == (EXECUTION.executor, 60.0)
     liquids = len(figure_of_geometry.VISCOSITIES)  # of one call
     assert (geometry.executor, geometry.timeout) == (EXECUTION.executor, 60.0 * liquids)
 
@@ -211,7 +211,7 @@ def test_workers_of_other_computers_are_given_no_path(tmp_path, monkeypatch, exe
     monkeypatch.setattr(
         SharedSimulations, "_studied", lambda shared, learners: learned.append(learners)
     )
-    monkeypatch.setattr(SharedSimulations, "grid", Grid)
+    monkeypatch.setattr(SharedSimulations, "landing_map", Map)
     shared = SharedSimulations(tmp_path, FULL, None, Execution(executor, 60.0, progress=False))
     _ = shared.study, shared.strokes
     for learner in (one for learners in learned for one in learners.values()):
@@ -219,7 +219,7 @@ def test_workers_of_other_computers_are_given_no_path(tmp_path, monkeypatch, exe
         assert learner.timeout == 60.0
 
 
-class Grid:
+class Map:
     cups = bundled_cups()
 
 

@@ -44,16 +44,16 @@ def spilled(viscosity):
     return (np.log10(viscosity)[:, None, None] - SUITED) ** 2 / 20.0
 
 
-class Grid:
-    """In place of thousands of pours."""
+class Map:
+    """In place of pours."""
 
     cups = bundled_cups()
 
-    def surface(self, liquids):
+    def surface(self, liquids, rates):
         return Surface(RATES, DISTANCES, spilled(np.atleast_1d(liquids["viscosity"])))
 
 
-def execute(truths, actions, grid, keep, advance):
+def execute(truths, actions, landing_map, keep, advance):
     """In place of pours with the true liquid."""
     for viscosity, chosen in zip(truths.viscosity, actions, strict=True):
         by_action = spilled(np.array([viscosity]))[0]
@@ -88,20 +88,20 @@ def made(monkeypatch):
     monkeypatch.setattr(study, "execute", lambda *given: list(execute(*given)))
     learners = {name: Learner(name, 3 if name == "pour" else None) for name in OFF}
     with inference.SimulationBank() as bank:
-        return study.spillage_study(learners, bank, Grid(), SCALE, SILENT)
+        return study.spillage_study(learners, bank, Map(), SCALE, SILENT)
 
 
 def test_chosen_pours_are_simulated_where_calibrations_are(monkeypatch):
     kept = []
 
-    def recorded(truths, actions, grid, keep, advance):
+    def recorded(truths, actions, landing_map, keep, advance):
         kept.append(keep)
-        return list(execute(truths, actions, grid, keep, advance))
+        return list(execute(truths, actions, landing_map, keep, advance))
 
     monkeypatch.setattr(study, "execute", recorded)
     with inference.SimulationBank() as bank, ThreadPoolExecutor(2) as pool:
         execution = Execution(pool, timeout=60.0, progress=False)
-        study.spillage_study({"signal": Learner("signal")}, bank, Grid(), SCALE, execution)
+        study.spillage_study({"signal": Learner("signal")}, bank, Map(), SCALE, execution)
     assert [(one.executor, one.timeout) for one in kept] == [(pool, 60.0)]
 
 
@@ -190,7 +190,7 @@ def test_what_was_concluded_before_a_kill_is_not_concluded_again(tmp_path, monke
 
     def run(path, learner):
         with inference.SimulationBank(path) as bank:
-            return study.spillage_study({"signal": learner}, bank, Grid(), SCALE, SILENT)
+            return study.spillage_study({"signal": learner}, bank, Map(), SCALE, SILENT)
 
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path / "bank.sqlite", Killed("signal"))
@@ -215,7 +215,7 @@ def test_recordings_say_what_the_table_says_of_what_was_chosen(monkeypatch):
         lambda *given: {"angular_velocity": np.radians(30.0), "distance": 0.03},
     )
     scale = SCALE.__class__(recorded=(10,))
-    drawn = figure_of_recordings.recordings(SimpleNamespace(scale=scale, grid=None))
+    drawn = figure_of_recordings.recordings(SimpleNamespace(scale=scale, landing_map=None))
     oil = drawn.data.sel(liquid="oil", run="discrepancy, N = 10")
     # rows of the other solver's table
     assert float(oil["spilled"].sel(rule="mean")) == pytest.approx(21 / 664)
