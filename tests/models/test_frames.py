@@ -110,18 +110,6 @@ def test_nothing_comes_back_from_below_the_rim(oil, cups):
     assert np.hypot(*start[:, :2].T).max() < cups.source.radius
 
 
-@pytest.mark.slow
-def test_what_falls_is_seen_to_fall(oil, cups):
-    """The last of it in the air is faster at a frame than at the one before, by g."""
-    rate = 100.0
-    frames = models.pour_frames(PourBatch(oil, RATE, cups, [2], PARTICLES), rate=rate)
-    beyond_lip = frames.position[..., 0] > 0.0
-    lowest = np.where(beyond_lip, frames.position[..., 2], np.inf).min(axis=1)
-    first = np.argmax(lowest < -0.05)  # the front of the stream is the same for a few frames
-    front = lowest[first : first + 3]
-    assert np.diff(front, 2)[0] * rate**2 == pytest.approx(-9.81, rel=0.05)
-
-
 @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan])
 def test_a_rate_that_is_none_is_refused(oil, cups, setup, path, rate):
     with pytest.raises(ValueError, match="frames: rate must be"):

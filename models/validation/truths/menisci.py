@@ -10,11 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import quad
-<<<<<<< HEAD
 from scipy.optimize import root_scalar
-=======
-from scipy.optimize import brentq
->>>>>>> be42f449171fa3dc34e872cdec434bf18604930f
 
 from .surfaces import GRAVITY
 
@@ -92,10 +88,6 @@ def meniscus_between_walls(gap: float, angle: float, length: float) -> Meniscus:
     # a narrow gap is risen by its mean; in a wide one the middle dies away with the distance
     highest = 2.0 * float(mean_rise(gap, angle, length))
     lowest = 1e-2 * highest * np.exp(-gap / length)
-<<<<<<< HEAD
     found = root_scalar(too_wide, bracket=(np.log(lowest), np.log(highest)), xtol=1e-12)
     middle = float(np.exp(found.root))
-=======
-    middle = float(np.exp(brentq(too_wide, np.log(lowest), np.log(highest), xtol=1e-12)))
->>>>>>> be42f449171fa3dc34e872cdec434bf18604930f
     return Meniscus(middle, float(np.hypot(middle, steepest * length)))
