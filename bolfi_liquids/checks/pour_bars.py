@@ -17,7 +17,7 @@ MAX_MEAN_RMS = 0.085
 MAX_LANDING_ERROR = 5e-3
 """Mean over a liquid's pours of how far the mean landing is off [m]; the reference's is 4 mm."""
 MAX_RETAINED_ERROR = 0.04
-"""Of any pour; the reference's own error is up to .03."""
+"""Mean over a liquid's pours; the reference's own error is up to .03."""
 MAX_EXCESS = 0.06
 """Fraction that the distance best in simulation spills in the reference beyond the least there."""
 MAX_MEAN_EXCESS = 0.02

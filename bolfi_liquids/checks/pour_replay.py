@@ -23,7 +23,7 @@ from .reference_pours import PouredLiquid, ReferencePour
 
 RMS = "RMS of the spilled fraction, mean over speeds"
 LANDING = "landing off by, mean over speeds [mm]"
-RETAINED = "retained off by, at most"
+RETAINED = "retained off by, mean over speeds"
 EXCESS = "spilled beyond the least, at most"
 REFERENCE, SIMULATED = "reference", "simulated"  # curves of a plot
 
@@ -175,7 +175,7 @@ def judged_rows(repeats: Iterable[Repeated], retained_resolved: bool) -> tuple[R
     rows = (
         (RMS, np.mean, rms, MAX_RMS),
         (LANDING, np.mean, 1e3 * np.array(off), 1e3 * MAX_LANDING_ERROR),
-        (RETAINED, np.max, retained, MAX_RETAINED_ERROR),
+        (RETAINED, np.mean, retained, MAX_RETAINED_ERROR),
         (EXCESS, np.max, [one.excess for one in repeats], MAX_EXCESS),
     )
     return tuple(
