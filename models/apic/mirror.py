@@ -29,6 +29,8 @@ def clear_images(s, g):
         s.fraction[g, m] = lanes(0.0)
         for a in range(3):
             s.velocity[g, a, m] = lanes(0.0)
+            s.product[g, a, m] = lanes(0.0)
+            s.friction[g, a, m] = lanes(0.0)
 
 
 @ti.func

@@ -7,13 +7,16 @@ multiphase flows with SURFER"). So momentum is conserved, and a sheet thinner th
 two surfaces.
 
 A wall is colour 0: the stress runs on along it, as if the liquid did not wet it at all. Young's
-force along the wall, sigma (1 + cos a) towards the dry side, makes the contact angle a.
+force along the wall, sigma (1 + cos a) towards the dry side, makes the contact angle a. The
+gradient towards walls has a stress of its own: in a film of one cell it would cancel that of the
+free surface, and where a surface meets a wall it would round the corner.
 """
 
 import taichi as ti
 
-from .lanes import lanes, positive
+from .lanes import at_least, chosen, lanes, positive
 from .mirror import reflect_cells, reflect_vectors
+from .surface import LIQUID, to_surface
 from .transfer import strides
 from .viscosity import add_shear
 
@@ -24,23 +27,41 @@ LEAST_MASS = 0.05  # of a face, in full cells, that tension accelerates
 def pull_surface(s, g):
     """What tension does to the velocities in a step.
 
-    It works in fields that the viscosity fills anew: the colour's gradient is in `product`, the
-    stress in `rest` (along the axes) and `shear` (around the edges).
+    It works in fields that the viscosity fills anew: the colour's gradients to free surfaces and to
+    walls are in `product` and `friction`, the stress in `rest` (along the axes) and `shear` (around
+    the edges), at last the forces in `product`. All of these are 0 farther than two cells from any
+    particle, so that it does not matter which lanes march beside.
     """
     S = strides(s)
     strength = s.tension[g] * s.dt[None] / s.cell[None] ** 2
     if strength.max() > 0.0:
-        find_gradient(s, g)
-        find_stress(s, g, strength)
-        for n in range(s.nears[g]):
-            m = s.near[g, n]
+        find_gradients(s, g)
+        add_stress(s, g, s.product, strength)
+        add_stress(s, g, s.friction, strength)
+        for n in range(s.arounds[g]):
+            m = s.around[g, n]
             for a in range(3):
-                o = m - S[a]
-                force = add_shear(s, g, a, m, S, s.rest[g, a, m] - s.rest[g, a, o])
-                step = colour(s, g, m) - colour(s, g, o)
-                wet = s.wall[a, m] * s.open[m] * s.open[o] * (1.0 + s.cosine[g]) * strength
-                push = positive(s.mass[g, a, m]) * (force - wet * step)
-                s.velocity[g, a, m] += push / ti.max(s.mass[g, a, m], LEAST_MASS)
+                force = lanes(0.0)
+                if s.carries[a, m] > 0.0:
+                    o = m - S[a]
+                    wet = s.wall[a, m] * s.open[m] * s.open[o] * (1.0 + s.cosine[g]) * strength
+                    force = add_shear(s, g, a, m, S, s.rest[g, a, m] - s.rest[g, a, o])
+                    force -= wet * (colour(s, g, m) - colour(s, g, o))
+                    force *= positive(s.fraction[g, m] + s.fraction[g, o])  # known to all lanes
+                s.product[g, a, m] = force
+        accelerate(s, g)
+
+
+@ti.func
+def clear_work(s, g):
+    """Empty what tension and viscosity have worked in, in the cells of the last step."""
+    for n in range(s.arounds[g]):
+        m = s.around[g, n]
+        for a in range(3):
+            s.product[g, a, m] = lanes(0.0)
+            s.friction[g, a, m] = lanes(0.0)
+            s.rest[g, a, m] = lanes(0.0)
+            s.shear[g, a, m] = lanes(0.0)
 
 
 @ti.func
@@ -50,52 +71,92 @@ def colour(s, g, m):
 
 
 @ti.func
-def find_gradient(s, g):
-    """Half the differences of the colour over two cells."""
+def accelerate(s, g):
+    """Velocities of faces by the forces on them, in `product`.
+
+    The forces at a surface reach a cell beyond it, where little or no liquid is and no pressure
+    holds it. The liquid would bear half of its tension, and its skin would fly inward. So a surface
+    of filled cells takes what acts on the two faces beyond it, and its own, as the pressure that it
+    is under. Where no cell is filled, in films and sheets, each face keeps its force.
+    """
     S = strides(s)
     for n in range(s.arounds[g]):
         m = s.around[g, n]
         for a in range(3):
-            s.product[g, a, m] = lanes(0.0)
-            s.rest[g, a, m] = lanes(0.0)
-            s.shear[g, a, m] = lanes(0.0)
-    reflect_cells(s, g, s.fraction)
-    for n in range(s.arounds[g]):  # to all cells where it is not 0, whatever lanes march beside
-        m = s.around[g, n]
-        if s.open[m] > 0.5:
-            for a in range(3):
-                here = colour(s, g, m)
-                up = step_to_next(here, colour(s, g, m + S[a]), s.passage[a, m + S[a]])
-                down = step_to_next(here, colour(s, g, m - S[a]), s.passage[a, m])
-                s.product[g, a, m] = 0.5 * (up - down)
-    reflect_vectors(s, g, s.product)
+            if s.carries[a, m] > 0.0:
+                o = m - S[a]
+                above, below = filled(s, g, m), filled(s, g, o)
+                on_surface = ti.abs(above - below)
+                force = s.product[g, a, m]
+                force += on_surface * above * beyond(s, g, a, o, -S[a])
+                force += on_surface * below * beyond(s, g, a, m + S[a], S[a])
+                far = to_surface(s.fraction[g, m], s.fraction[g, o])
+                mass = ti.max(s.mass[g, a, m], LEAST_MASS)
+                given = (1.0 - above) * (1.0 - below)
+                given *= ti.max(near_filled(s, g, a, m, S[a]), near_filled(s, g, a, o, -S[a]))
+                kept = (1.0 - given) * force / chosen(on_surface, far, mass)
+                s.velocity[g, a, m] = s.velocity[g, a, m] + kept
 
 
 @ti.func
-def find_stress(s, g, strength):
+def filled(s, g, m):
+    return s.open[m] * at_least(s.fraction[g, m], LIQUID)
+
+
+@ti.func
+def beyond(s, g, a, face, step):
+    """What acts on a face and on the next one."""
+    return s.product[g, a, face] + s.product[g, a, face + step]
+
+
+@ti.func
+def near_filled(s, g, a, m, step):
+    """Whether one of the next two cells on a side is filled, 1 or 0, and nothing stands between."""
+    first = ti.max(m, m + step)
+    second = first + step
+    way = s.carries[a, first]
+    return way * ti.max(filled(s, g, m + step), s.carries[a, second] * filled(s, g, m + 2 * step))
+
+
+@ti.func
+def find_gradients(s, g):
+    """Of the colour."""
+    S = strides(s)
+    reflect_cells(s, g, s.fraction)
+    for n in range(s.arounds[g]):
+        m = s.around[g, n]
+        if s.open[m] > 0.5:
+            here = colour(s, g, m)
+            for a in range(3):
+                below, above = s.passage[a, m], s.passage[a, m + S[a]]
+                up = above * (colour(s, g, m + S[a]) - here)
+                down = below * (here - colour(s, g, m - S[a]))
+                s.product[g, a, m] = 0.5 * (up + down)
+                s.friction[g, a, m] = (above - below) * here  # walls are half a cell away
+    reflect_vectors(s, g, s.product)
+    reflect_vectors(s, g, s.friction)
+
+
+@ti.func
+def add_stress(s, g, gradient: ti.template(), strength):
     S = strides(s)
     for n in range(s.arounds[g]):
         m = s.around[g, n]
         if m >= S[1] + S[2]:
             square = lanes(1e-12)
             for a in range(3):
-                square += s.product[g, a, m] * s.product[g, a, m]
+                square += gradient[g, a, m] * gradient[g, a, m]
             size = ti.sqrt(square)
             for a in range(3):
-                along = s.product[g, a, m]
-                s.rest[g, a, m] = strength * (square - along * along) / size
-                s.shear[g, a, m] = strength * stress_around(s, g, a, m, S)
+                along = gradient[g, a, m]
+                pull = strength * (square - along * along) / size
+                s.rest[g, a, m] = s.rest[g, a, m] + pull
+                around = strength * stress_around(s, g, gradient, a, m, S)
+                s.shear[g, a, m] = s.shear[g, a, m] + around
 
 
 @ti.func
-def step_to_next(here, there, area):
-    """Difference of the colour to the next cell; the closed share of the face is a wall, of colour
-    0 half a cell away."""
-    return area * (there - here) - (1.0 - area) * 2.0 * here
-
-
-@ti.func
-def stress_around(s, g, c, m, S):
+def stress_around(s, g, gradient: ti.template(), c, m, S):
     """Stress around a cell's lowest edge along c, by the mean gradient of the cells there.
 
     On a wall it is 0: all that pulls along walls is Young's force.
@@ -104,9 +165,9 @@ def stress_around(s, g, c, m, S):
     along, across, third = lanes(0.0), lanes(0.0), lanes(0.0)
     for k in range(4):
         o = m - (k & 1) * S[a] - (k >> 1) * S[b]
-        along += s.product[g, a, o]
-        across += s.product[g, b, o]
-        third += s.product[g, c, o]
+        along += gradient[g, a, o]
+        across += gradient[g, b, o]
+        third += gradient[g, c, o]
     square = along * along + across * across + third * third
     of_a = ti.min(s.passage[a, m], s.passage[a, m - S[b]])
     of_b = ti.min(s.passage[b, m], s.passage[b, m - S[a]])

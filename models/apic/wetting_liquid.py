@@ -8,7 +8,7 @@ from .liquid_state import LiquidState
 from .mirror import clear_images, fold, image, images, reflect_velocity
 from .pressure import add_rise, push, solve_pressure
 from .surface import find_liquid, set_up_pressure
-from .tension import pull_surface
+from .tension import clear_work, pull_surface
 from .transfer import clear, deposit, list_cells
 from .viscosity import extend, solve_viscosity, weigh_stresses
 
@@ -69,6 +69,7 @@ class WettingLiquid(LiquidState):
         for n in range(groups * STRIDE):
             if n % STRIDE == 0:
                 g = n // STRIDE
+                clear_work(self, g)
                 clear(self, g)
                 if ti.static(self.MIRRORED):
                     clear_images(self, g)
