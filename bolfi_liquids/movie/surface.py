@@ -15,12 +15,12 @@ from scipy.ndimage import affine_transform, gaussian_filter, map_coordinates
 
 from .view import View
 
-CELLS_PER_SPACING = 3.5  # grid cells a particle spacing
-SMEAR_SD = 0.6  # sd of a smeared particle, by the spacing
-SURFACE_LEVEL = 0.4  # of the rest density: here is the surface
-MIN_PARTICLE_DENSITY = (
-    0.7  # least density at a particle, so that a single one is a drop of its own volume
-)
+CELLS_PER_SPACING = 2.5  # grid cells a particle spacing
+SMEAR_SD = 0.9  # sd of a smeared particle, by the spacing: particles on a grid lie unevenly
+SURFACE_LEVEL = 0.5  # of the rest density: here is the surface, where it is flat
+DROP_RADIUS = (3.0 / (4.0 * np.pi)) ** (1.0 / 3.0)  # of a particle's volume, by the spacing
+MIN_PARTICLE_DENSITY = SURFACE_LEVEL * np.exp(0.5 * (DROP_RADIUS / SMEAR_SD) ** 2)
+"""Least density at a particle, so that a single one is a drop of its own volume."""
 SURFACE_BLUR = 1.0  # cells
 LEAST_SHARE = 0.2  # of a smeared particle that is inside the cup's corners
 

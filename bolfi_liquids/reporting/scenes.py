@@ -84,10 +84,10 @@ class PourScene(NamedTuple):
             frames = models.pour_frames(models.PourBatch(*action, effects=effects), rate=FRAME_RATE)
         with _limited(self.timeout):
             landed = models.landings(*action, effects=effects)
-        radius, few = self.cups.receiver.radius, -(-frames.position.shape[1] // MOST_SHOWN)
+        radius = self.cups.receiver.radius
         caught = _caught(frames.position, landed.inside(self.distance, radius)[0])
         result = landed.into(self.distance, radius)
-        frames = replace(frames, position=frames.position[:, ::few])
+        frames = replace(frames, position=_fewer(frames.position))
         return PourShown(frames, caught, float(result.spilled[0]), float(result.retained[0]))
 
 
@@ -104,6 +104,12 @@ def _caught(position: NDArray, inside: NDArray) -> NDArray:
     """Share of all particles in the receiver, by frame; they land in the order of `inside`."""
     gone = np.isnan(position[..., 0]).sum(axis=1)
     return np.append(0, np.cumsum(inside))[gone] / len(inside)
+
+
+def _fewer(position: NDArray) -> NDArray:
+    """At most `MOST_SHOWN` particles of a pour, of both halves of the cup, whose rows alternate."""
+    every = -(-position.shape[1] // MOST_SHOWN)
+    return position[:, :: every + 1 - every % 2]
 
 
 def _limited(timeout: float | None) -> AbstractContextManager[None]:

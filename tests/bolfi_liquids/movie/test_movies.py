@@ -246,8 +246,9 @@ def test_a_film_that_breaks_leaves_the_old_one(tmp_path, suffix):
         ("warmth=1", "stir", "--effect warmth=1: unknown; there are .*warming"),
         ("warming", "stir", "'' is no coefficient.*warming=NUMBER"),
         ("adhesion=nan", "pour", "'nan' is no coefficient"),
-        ("adhesion=-1", "stir", "no coefficient.*from 0"),
+        ("adhesion=-3", "pour", "no coefficient.*from -2 to 2"),
         ("camera_tilt=0.1", "pour", "does not act in a pour"),
+        ("adhesion=0.3", "stir", "does not act in a stir"),
     ],
 )
 def test_bad_effects_are_named(text, scene, message):

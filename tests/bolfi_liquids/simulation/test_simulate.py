@@ -12,7 +12,7 @@ import bolfi_liquids as bl
 from bolfi_liquids import hardware, models
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.cups import bundled_cups
-from bolfi_liquids.inputs.described_liquid import DENSITY, POUR_PARTICLES
+from bolfi_liquids.inputs.described_liquid import DENSITY
 from bolfi_liquids.inputs.recording import Trajectory
 
 pytestmark = pytest.mark.slow  # kernels compile for ten seconds and more
@@ -179,7 +179,6 @@ def test_settings_may_be_integers_of_numpy():
     assert type(made.attrs["particles"]) is int and type(made.attrs["seed"]) is int
 
 
-def test_defaults_are_those_of_the_simulator():
-    assert POUR_PARTICLES == models.fluid.numerics.POUR_PARTICLES
+def test_the_default_density_is_that_of_the_default_recording():
     recording = bundled_recording("glycerin")
     assert recording.number("liquid_density") == DENSITY
