@@ -17,6 +17,8 @@ from ..inputs.prior import PARAMETERS
 from ..seeds import Phase, generator, simulation_seeds
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from ..inference import Prior
     from ..inference.simulations import Job
     from ..models import Cups
@@ -74,7 +76,7 @@ class Box:
 
     def holds(self, u: NDArray) -> NDArray[np.bool_]:
         """Which quantiles (n, d) lie inside, shape (n,)."""
-        return ((u >= self.low) & (u <= self.high)).all(axis=1)
+        return np.all((u >= self.low) & (u <= self.high), axis=1)
 
     def jobs(self, count: int) -> "list[Job]":
         """The sequence's first pours inside, in an order in which pours of like viscosity and
@@ -119,33 +121,38 @@ def box_around(prior: "Prior", draws: Mapping[str, NDArray], best: Mapping[str, 
         draws: Posterior draws of its liquids, name -> (n,), and of other parameters.
         best: Parameters that must lie inside, likewise.
     """
-    from ..models import EFFECTS
-
-    liquid = [name for name in prior.names if name != RATE]
-    middle = float(prior.from_unit(np.full(len(prior), 0.5))[RATE])
-
-    def quantiles(values: Mapping[str, NDArray]) -> NDArray[np.float64]:
-        count = np.size(values[liquid[0]])
-        named = {name: np.reshape(values[name], count) for name in liquid}
-        return prior.to_unit({**named, RATE: np.full(count, middle)})
-
-    u = quantiles(draws)
-    low, high = np.quantile(u, [TAIL, 1.0 - TAIL], axis=0)
+    drawn = _quantiles(prior, draws)
+    low, high = np.quantile(drawn, [TAIL, 1.0 - TAIL], axis=0)
     margin = MARGIN * (high - low)
     # pours without an effect are pours with its neutral coefficient
-    neutral = {name: EFFECTS[name].neutral for name in liquid if name in EFFECTS}
-    inside = quantiles({**{name: np.asarray(best[name]) for name in liquid}})
-    without = quantiles({**{name: np.asarray(best[name]) for name in liquid}, **neutral})
-    low = np.minimum(low - margin, np.minimum(inside, without)[0])
-    high = np.maximum(high + margin, np.maximum(inside, without)[0])
-    low, high = np.floor(low * CELLS), np.maximum(np.ceil(high * CELLS), np.floor(low * CELLS) + 1)
-    low, high = (
-        np.clip(low / CELLS, 0.0, 1.0 - 1.0 / CELLS),
-        np.clip(high / CELLS, 1.0 / CELLS, 1.0),
-    )
-    at_rate = prior.names.index(RATE)
-    low[at_rate], high[at_rate] = 0.0, 1.0
+    inside = _quantiles(prior, best), _quantiles(prior, {**best, **_neutral(prior)})
+    points = np.concatenate([[low - margin], [high + margin], *inside])
+    low, high = _on_lattice(points.min(axis=0), points.max(axis=0))
+    rate = prior.names.index(RATE)
+    low[rate], high[rate] = 0.0, 1.0
     return _large_enough(Box(prior, low, high))
+
+
+def _quantiles(prior: "Prior", liquids: "Mapping[str, ArrayLike]") -> NDArray[np.float64]:
+    """Of liquids (n, d), at the middle angular velocity."""
+    middle = float(prior.from_unit(np.full(len(prior), 0.5))[RATE])
+    named = {name: np.atleast_1d(liquids[name]) for name in prior.names if name != RATE}
+    count = len(named["viscosity"])
+    return prior.to_unit({**named, RATE: np.full(count, middle)})
+
+
+def _neutral(prior: "Prior") -> dict[str, float]:
+    """Coefficients of a prior's effects where these do nothing."""
+    from ..models import EFFECTS
+
+    return {name: EFFECTS[name].neutral for name in prior.names if name in EFFECTS}
+
+
+def _on_lattice(low: NDArray, high: NDArray) -> tuple[NDArray, NDArray]:
+    """The least box of whole cells that holds all between, within all quantiles."""
+    first = np.clip(np.floor(low * CELLS), 0, CELLS - 1)
+    last = np.clip(np.ceil(high * CELLS), first + 1, CELLS)
+    return first / CELLS, last / CELLS
 
 
 def _large_enough(box: Box) -> Box:

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from ..models import Cups
 
 MIN_POURS = 16  # from fewer a map of three inputs learns next to nothing
-PRIOR_POURS = 256  # for a map of all liquids
+PRIOR_POURS = 192  # for a map of all liquids, which then misses pours left out by .02
 RATES = 31  # angular velocities that are tried
 MIN_OUTCOMES = 64  # of an action, however few the draws
 BEST_DRAWS = 384  # posterior draws at most that choose and judge the best action
