@@ -18,7 +18,7 @@ ADHESION_CASES = {
 
 
 def adhesion(shared: SharedSimulations) -> Drawn:
-    """Spilled by liquids like glycerin that stick to their cup."""
+    """Spilled by liquids like oil that stick to their cup."""
     from xarray import Dataset
 
     found = shared.sticky

@@ -7,7 +7,6 @@ import numpy as np
 
 from ..calibration.calibrate import calibrate
 from ..criticism.criticise import criticise
-from ..inputs.cups import bundled_cups
 from ..pouring.choose import choose_pour
 from ..pouring.spillage import pour_all, surface
 from ..progress import silent
@@ -15,7 +14,7 @@ from ..run.directory import open_bank
 from ..run.execution import HERE, Execution
 from ..seeds import Phase
 from .decisions import executions, spilled_by
-from .sticky import Sticky, draw_sticky, poured, recipe, stirred
+from .sticky import Sticky, draw_sticky, poured, recipe, stirred, waxed_cups
 from .study_size import Scale
 
 
@@ -46,7 +45,7 @@ def spilled_where_it_sticks(
         number: Of the liquid.
         execution: How simulations are made.
     """
-    cups, seed, particles = bundled_cups(), scale.seed, scale.drawn_particles
+    cups, seed, particles = waxed_cups(), scale.seed, scale.drawn_particles
     truth = draw_sticky(number, seed)
     folder = runs / f"sticky_{number}_{recipe(cups, particles, seed)}"
     folder.mkdir(parents=True, exist_ok=True)

@@ -11,7 +11,7 @@ LIQUIDS = {"water": 0.005, "thin oil": 0.03, "oil": 0.15, "glycerin": 1.0, "gel"
 """Median viscosity [Pa s] of each kind."""
 
 LOG_VISCOSITY_SD = 0.2  # sd of the log of the viscosity within a kind
-DENSITY = 1000.0  # kg/m3; only the ratio of viscosity to density matters to the flow
+DENSITY = 1000.0  # kg/m3
 
 
 class Truths(NamedTuple):

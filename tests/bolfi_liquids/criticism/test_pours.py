@@ -8,7 +8,7 @@ from bolfi_liquids.criticism.pours import Pouring
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.seeds import Phase, simulation_seeds
 
-RATE = np.radians([80.0, 40.0, 80.0, 110.0, 40.0])  # neither sorted nor once each
+RATE = np.radians([160.0, 120.0, 160.0, 180.0, 120.0])  # neither sorted nor once each
 DISTANCE = np.array([0.01, 0.03, 0.04, 0.02, -0.01])
 DENSITY = 1000.0
 
