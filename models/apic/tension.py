@@ -7,13 +7,16 @@ multiphase flows with SURFER"). So momentum is conserved, and a sheet thinner th
 two surfaces.
 
 A wall is colour 0: the stress runs on along it, as if the liquid did not wet it at all. Young's
-force along the wall, sigma (1 + cos a) towards the dry side, makes the contact angle a.
+force along the wall, sigma (1 + cos a) towards the dry side, makes the contact angle a. The
+gradient towards walls has a stress of its own: in a film of one cell it would cancel that of the
+free surface, and where a surface meets a wall it would round the corner.
 """
 
 import taichi as ti
 
-from .lanes import lanes
+from .lanes import at_least, chosen, lanes
 from .mirror import reflect_cells, reflect_vectors
+from .surface import LIQUID, to_surface
 from .transfer import strides
 from .viscosity import add_shear
 
@@ -24,23 +27,16 @@ LEAST_MASS = 0.05  # of a face, in full cells, that tension accelerates
 def pull_surface(s, g):
     """What tension does to the velocities in a step.
 
-    It works in fields that the viscosity fills anew: the colour is in `cell_product`, its gradient
-    in `product`, the stress in `rest` (along the axes) and `shear` (around the edges).
+    It works in fields that the viscosity fills anew: the colour is in `cell_product`, its gradients
+    to free surfaces and to walls in `product` and `friction`, the stress in `rest` (along the axes)
+    and `shear` (around the edges), at last the forces in `product`.
     """
     S = strides(s)
     strength = s.tension[g] * s.dt[None] / s.cell[None] ** 2
     if strength.max() > 0.0:
-        find_gradient(s, g)
-        for n in range(s.nears[g]):
-            m = s.near[g, n]
-            square = lanes(1e-12)
-            for a in range(3):
-                square += s.product[g, a, m] * s.product[g, a, m]
-            size = ti.sqrt(square)
-            for a in range(3):
-                along = s.product[g, a, m]
-                s.rest[g, a, m] = strength * (square - along * along) / size
-                s.shear[g, a, m] = strength * stress_around(s, g, a, m, S)
+        find_gradients(s, g)
+        add_stress(s, g, s.product, strength)
+        add_stress(s, g, s.friction, strength)
         for n in range(s.nears[g]):
             m = s.near[g, n]
             for a in range(3):
@@ -48,42 +44,104 @@ def pull_surface(s, g):
                 force = add_shear(s, g, a, m, S, s.rest[g, a, m] - s.rest[g, a, o])
                 step = s.cell_product[g, m] - s.cell_product[g, o]
                 wet = s.wall[a, m] * s.open[m] * s.open[o] * (1.0 + s.cosine[g]) * strength
-                push = s.carries[a, m] * (force - wet * step)
-                s.velocity[g, a, m] += push / ti.max(s.mass[g, a, m], LEAST_MASS)
+                s.product[g, a, m] = s.carries[a, m] * (force - wet * step)
+        accelerate(s, g)
 
 
 @ti.func
-def find_gradient(s, g):
-    """The colour, and half its differences over two cells."""
+def accelerate(s, g):
+    """Velocities of faces by the forces on them, in `product`.
+
+    The forces at a surface reach a cell beyond it, where little or no liquid is and no pressure
+    holds it. The liquid would bear half of its tension, and its skin would fly inward. So a surface
+    of filled cells takes what acts on the two faces beyond it, and its own, as the pressure that it
+    is under. Where no cell is filled, in films and sheets, each face keeps its force.
+    """
+    S = strides(s)
+    for n in range(s.nears[g]):
+        m = s.near[g, n]
+        for a in range(3):
+            if s.carries[a, m] > 0.0:
+                o = m - S[a]
+                above, below = filled(s, g, m), filled(s, g, o)
+                on_surface = ti.abs(above - below)
+                force = s.product[g, a, m]
+                force += on_surface * above * beyond(s, g, a, o, -S[a])
+                force += on_surface * below * beyond(s, g, a, m + S[a], S[a])
+                far = to_surface(s.fraction[g, m], s.fraction[g, o])
+                mass = ti.max(s.mass[g, a, m], LEAST_MASS)
+                given = (1.0 - above) * (1.0 - below)
+                given *= ti.max(near_filled(s, g, a, m, S[a]), near_filled(s, g, a, o, -S[a]))
+                kept = (1.0 - given) * force / chosen(on_surface, far, mass)
+                s.velocity[g, a, m] = s.velocity[g, a, m] + kept
+
+
+@ti.func
+def filled(s, g, m):
+    return s.open[m] * at_least(s.fraction[g, m], LIQUID)
+
+
+@ti.func
+def beyond(s, g, a, face, step):
+    """What acts on a face and on the next one."""
+    return s.product[g, a, face] + s.product[g, a, face + step]
+
+
+@ti.func
+def near_filled(s, g, a, m, step):
+    """Whether one of the next two cells on a side is filled, 1 or 0, and nothing stands between."""
+    first = ti.max(m, m + step)
+    second = first + step
+    way = s.carries[a, first]
+    return way * ti.max(filled(s, g, m + step), s.carries[a, second] * filled(s, g, m + 2 * step))
+
+
+@ti.func
+def find_gradients(s, g):
+    """The colour, and its gradients."""
     S = strides(s)
     for n in range(s.arounds[g]):
         m = s.around[g, n]
         s.cell_product[g, m] = ti.min(s.fraction[g, m], 1.0) * s.open[m]
         for a in range(3):
             s.product[g, a, m] = lanes(0.0)
+            s.friction[g, a, m] = lanes(0.0)
             s.rest[g, a, m] = lanes(0.0)
             s.shear[g, a, m] = lanes(0.0)
     reflect_cells(s, g, s.cell_product)
     for n in range(s.nears[g]):
         m = s.near[g, n]
         if s.open[m] > 0.5:
+            here = s.cell_product[g, m]
             for a in range(3):
-                here = s.cell_product[g, m]
-                up = step_to_next(here, s.cell_product[g, m + S[a]], s.passage[a, m + S[a]])
-                down = step_to_next(here, s.cell_product[g, m - S[a]], s.passage[a, m])
-                s.product[g, a, m] = 0.5 * (up - down)
+                below, above = s.passage[a, m], s.passage[a, m + S[a]]
+                up = above * (s.cell_product[g, m + S[a]] - here)
+                down = below * (here - s.cell_product[g, m - S[a]])
+                s.product[g, a, m] = 0.5 * (up + down)
+                s.friction[g, a, m] = (above - below) * here  # walls are half a cell away
     reflect_vectors(s, g, s.product)
+    reflect_vectors(s, g, s.friction)
 
 
 @ti.func
-def step_to_next(here, there, area):
-    """Difference of the colour to the next cell; the closed share of the face is a wall, of colour
-    0 half a cell away."""
-    return area * (there - here) - (1.0 - area) * 2.0 * here
+def add_stress(s, g, gradient: ti.template(), strength):
+    S = strides(s)
+    for n in range(s.nears[g]):
+        m = s.near[g, n]
+        square = lanes(1e-12)
+        for a in range(3):
+            square += gradient[g, a, m] * gradient[g, a, m]
+        size = ti.sqrt(square)
+        for a in range(3):
+            along = gradient[g, a, m]
+            pull = strength * (square - along * along) / size
+            s.rest[g, a, m] = s.rest[g, a, m] + pull
+            around = strength * stress_around(s, g, gradient, a, m, S)
+            s.shear[g, a, m] = s.shear[g, a, m] + around
 
 
 @ti.func
-def stress_around(s, g, c, m, S):
+def stress_around(s, g, gradient: ti.template(), c, m, S):
     """Stress around a cell's lowest edge along c, by the mean gradient of the cells there.
 
     On a wall it is 0: all that pulls along walls is Young's force.
@@ -92,9 +150,9 @@ def stress_around(s, g, c, m, S):
     along, across, third = lanes(0.0), lanes(0.0), lanes(0.0)
     for k in range(4):
         o = m - (k & 1) * S[a] - (k >> 1) * S[b]
-        along += s.product[g, a, o]
-        across += s.product[g, b, o]
-        third += s.product[g, c, o]
+        along += gradient[g, a, o]
+        across += gradient[g, b, o]
+        third += gradient[g, c, o]
     square = along * along + across * across + third * third
     of_a = ti.min(s.passage[a, m], s.passage[a, m - S[b]])
     of_b = ti.min(s.passage[b, m], s.passage[b, m - S[a]])
