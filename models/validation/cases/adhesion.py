@@ -2,11 +2,24 @@
 
 import numpy as np
 
+from ...cups import Cups
 from ...fluid.liquid import Liquid
 from ...pouring import PourAction, pour
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
-from .retained_film import CUPS
 
+CUPS = Cups.model_validate(
+    {
+        "source": {"radius": 0.028, "height": 0.06, "fill": 0.034},
+        "receiver": {"radius": 0.035, "height": 0.07},
+        "pour": {
+            "lip_height": 0.2,
+            "final_angle_deg": 135.0,
+            "hold": 0.9,
+            "angular_velocity_deg_s": (30.0, 180.0),
+            "distance": (0.0, 0.07),
+        },
+    }
+)
 ACTION = PourAction(angular_velocity=np.pi, distance=0.02)
 VISCOSITY = np.array([0.01, 0.1, 1.0])
 ADHESION = (0.0, 0.5, 1.0)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,17 +61,10 @@ class WetBox:
         away = np.minimum(np.minimum(x, high_x - x), np.minimum(z, high_z - z))
         if not self.flat:
             away = np.minimum(away, np.minimum(y, high_y - y))
-        return away if self.block is None else np.minimum(away, self._from_block((x, y, z)))
-
-    def _from_block(self, point: tuple[np.ndarray, ...]) -> np.ndarray:
-        assert self.block is not None
+        if self.block is None:
+            return away
         axes = (0, 2) if self.flat else (0, 1, 2)
-        over = [np.maximum(self.block[0][a] - point[a], point[a] - self.block[1][a]) for a in axes]
-        outside = np.sqrt(sum(np.maximum(one, 0.0) ** 2 for one in over))
-        deepest = over[0]
-        for one in over[1:]:
-            deepest = np.maximum(deepest, one)
-        return np.where(outside > 0.0, outside, deepest)
+        return np.minimum(away, _from_block(self.block, axes, (x, y, z)))
 
     def geometry(self) -> Geometry:
         """Nothing flows through the sides of a flat box."""
@@ -113,6 +106,13 @@ class WetBox:
             points[:, 1] = 0.5 * self.cell
         off = OFF_WALL * self.cell
         return np.clip(points, off, np.array(self.highest) - off)
+
+
+def _from_block(block: Block, axes: tuple[int, ...], point: tuple[np.ndarray, ...]) -> np.ndarray:
+    """Distance of points from a block, by some of the axes [m]; negative within it."""
+    over = [np.maximum(block[0][a] - point[a], point[a] - block[1][a]) for a in axes]
+    outside = np.sqrt(sum(np.maximum(one, 0.0) ** 2 for one in over))
+    return np.where(outside > 0.0, outside, reduce(np.maximum, over))
 
 
 @dataclass(frozen=True)
@@ -175,9 +175,10 @@ def flow_in_box(
         for a liquid that went wrong.
 
     Raises:
-        TimeLimitExceeded: the time of `runtime.time_limit` is over.
+        ValueError: A box or its liquid is larger than `CELLS` and `PARTICLES` allow.
+        TimeLimitExceeded: The time of `runtime.time_limit` is over.
     Warns:
-        FailedSimulation: a liquid went wrong.
+        FailedSimulation: A liquid went wrong.
     """
     steps = round(seconds / box.dt / every) * every
     with runtime.LOCK:
@@ -201,6 +202,12 @@ def _started(
     from ...apic.lanes import LANES
 
     places, grid, geometry = Places(len(liquids), GROUPS, LANES), box.grid(), box.geometry()
+    most = max(len(body.points) for body in bodies)
+    if grid.cells > CELLS or most > PARTICLES:
+        raise ValueError(
+            f"a box has room for {CELLS} cells and {PARTICLES} particles, got {grid.cells} and "
+            f"{most}; take a smaller one or larger cells"
+        )
     scene = _scene()
     scene.enter_vessel(grid, geometry, box.dt)
     scene.enter_surfaces(geometry.usable, np.stack([geometry.wall, geometry.area]))

@@ -24,6 +24,19 @@ def rayleigh_frequency(radius: float, *, tension: float, density: float, mode: i
     return float(np.sqrt(squared) / (2.0 * np.pi))
 
 
+def column_frequency(radius: float, *, tension: float, density: float, mode: int = 2) -> float:
+    """Frequency [Hz] of small oscillations across a round column of liquid, alike along it.
+
+    Rayleigh 1879 (Proc. R. Soc. 29, 71): ω² = n (n² - 1) σ / (ρ R³).
+
+    Args:
+        tension: Surface tension σ [N/m].
+        mode: n, 2 for an ellipse.
+    """
+    squared = mode * (mode**2 - 1) * tension / (density * radius**3)
+    return float(np.sqrt(squared) / (2.0 * np.pi))
+
+
 def rayleigh_decay(radius: float, *, viscosity: float, density: float, mode: int = 2) -> float:
     """Rate [1/s] at which `rayleigh_frequency` dies away in a liquid of low viscosity.
 

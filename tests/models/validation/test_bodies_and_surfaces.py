@@ -11,6 +11,7 @@ from bolfi_liquids.models.validation.truths import (
     surfaces,
 )
 from scipy.integrate import quad, solve_ivp
+from scipy.special import ellipe
 
 ROD = pendulum.Rod(length=0.14, radius=0.005, mass=0.015)
 
@@ -148,6 +149,19 @@ def test_the_rayleigh_frequency_is_that_of_its_energies():
     expected = np.sqrt(stiffness / inertia) / (2 * np.pi)
     ours = surfaces.rayleigh_frequency(1.0, tension=1.0, density=1.0)
     assert ours == pytest.approx(expected, rel=0.02)
+
+
+def test_the_frequency_of_a_column_is_that_of_its_energies():
+    """Axes exp(±a), volume constant: kinetic energy π/4 ȧ², surface the ellipse's perimeter."""
+
+    def perimeter(a):
+        return 4.0 * np.exp(a) * ellipe(1.0 - np.exp(-4.0 * a))
+
+    a = 1e-3
+    stiffness = 2.0 * (perimeter(a) - perimeter(0.0)) / a**2
+    expected = np.sqrt(stiffness / (0.5 * np.pi)) / (2.0 * np.pi)
+    ours = surfaces.column_frequency(1.0, tension=1.0, density=1.0)
+    assert ours == pytest.approx(expected, rel=1e-3)
 
 
 @pytest.mark.parametrize("kinematic", [0.01, 0.3, 5.0])

@@ -15,6 +15,7 @@ from bolfi_liquids.models.validation import (
     cases,
     cup_cases,
     discover,
+    wet_cases,
 )
 
 
@@ -116,7 +117,7 @@ def test_names_are_unique_over_packages(importable):
 
 
 def test_every_case_of_the_models_says_what_it_is():
-    for name, found in discover(cases, cup_cases).items():
+    for name, found in discover(cases, cup_cases, wet_cases).items():
         assert name == found.name
         assert found.title and found.truth and found.source
         assert not found.truth.endswith(".") and not found.title.endswith(".")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bolfi_liquids.models.validation.cases import _stirring, retained_film, seed_noise
+from bolfi_liquids.models.validation.cases import _stirring, seed_noise
 
 
 def test_a_pivot_at_rest_stays_on_the_axis():
@@ -32,9 +32,3 @@ def test_spread_is_the_noise_put_in():
     rng = np.random.default_rng(1)
     signals = np.linspace(-5, 5, 400)[:, None] + 0.3 * rng.standard_normal((8, 400, 2))
     assert seed_noise.spread(signals) == pytest.approx(0.3, rel=0.03)
-
-
-def test_the_film_grows_with_the_root_of_the_viscosity():
-    thin, thick = retained_film.film(np.array([0.01, 1.0]))
-    assert thick / thin == pytest.approx(10.0)
-    assert 0.0 < thick < 0.2

@@ -107,3 +107,15 @@ def test_a_cap_holds_its_volume():
 def test_a_lake_is_no_drop():
     with pytest.raises(ValueError, match="a drop of 1 m³ is wider than 0.13.* m; take a smaller"):
         sessile_drops.sessile_drop(1.0, 1.0, WATER)
+
+
+@pytest.mark.parametrize("angle", np.radians([30.0, 90.0, 140.0]))
+def test_half_a_ridge_is_below_its_height_and_half_within_its_width(angle):
+    """By points in a circle above the floor, of which there are some 50 thousand: 0.5 %."""
+    points = np.random.default_rng(0).uniform(-1.0, 1.0, (200_000, 2))
+    points[:, 1] -= np.cos(angle)
+    within = np.hypot(points[:, 0], points[:, 1] + np.cos(angle)) < 1.0
+    x, z = points[within & (points[:, 1] > 0.0)].T
+    ridge = sessile_drops.cylindrical_cap(angle - 0.5 * np.sin(2.0 * angle), angle)
+    assert ridge.height == pytest.approx(np.median(z), rel=0.03)
+    assert ridge.width == pytest.approx(np.median(np.abs(x)), rel=0.03)
