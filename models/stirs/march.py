@@ -109,10 +109,11 @@ def _together(setup, stirs: Stirs, step, effects, watch) -> np.ndarray:
     path = stirs.rig.path
     ahead = 2.0 * path[:, -1:] - path[:, -2:-1]
     path = places.spread(np.concatenate([path[:, :1], path, ahead], axis=1))
-    directions = np.empty((*path.shape[:2], path.shape[2] - 2, 3), np.float32)
+    steps = path.shape[2] - 3
+    directions = np.empty((*path.shape[:2], steps + 1, 3), np.float32)
     directions[:, :, 0] = places.spread(stirs.start)
     scene.begin(path, directions, len(points[0]))
-    runtime.run_chunks(scene, directions.shape[2] - 1, scene.march, watch)
+    runtime.run_chunks(scene, steps, scene.march, watch)
     found = places.gather(directions).astype(np.float64)
     found[faulty(places.gather(scene.status.to_numpy()), stirs.seeds)] = np.nan
     return found
