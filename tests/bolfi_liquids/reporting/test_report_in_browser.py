@@ -10,6 +10,7 @@ import pytest
 import bolfi_liquids as bl
 from bolfi_liquids.reporting.frames import _stack
 from bolfi_liquids.reporting.moving_pictures import BYTE_LEVELS, _packed, moving_context
+from bolfi_liquids.reporting.scenes import MOST_SHOWN
 
 WIDTHS = {"laptop": (1280, 800), "phone": (390, 844)}
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -135,8 +136,12 @@ def test_dragging_enlarges_and_a_double_click_goes_back(opened):
 
 
 def test_the_frames_lose_no_liquid_and_lean_as_the_simulator_says(frames):
-    last = frames["caught"][:, -1]
-    np.testing.assert_allclose(last + frames["spilled"] + frames["retained"], 1.0, atol=1e-9)
+    assert (frames["caught"].diff("pour_frame") >= 0.0).all()
+    shown = frames["poured"][..., 0].notnull().mean("pour_particle")
+    np.testing.assert_array_equal(shown[:, 0], 1.0)
+    flying = shown[:, -1] - frames["retained"]  # of those shown, which are some of all
+    yet = 1.0 - frames["spilled"] - frames["retained"] - frames["caught"][:, -1]
+    assert ((yet > -1e-9) & (yet < flying + 0.02)).all()
     stick = (frames["tip"] - frames["pivot"]).to_numpy()
     leaning = np.arctan2(stick[..., :2], -stick[..., 2:])
     seen = frames["inclination"].to_numpy()
@@ -145,6 +150,12 @@ def test_the_frames_lose_no_liquid_and_lean_as_the_simulator_says(frames):
             between = np.interp(frames["stir_time"], frames["time"], seen[draw, :, plane])
             # both are interpolated, between samples and between substeps
             assert np.abs(between - leaning[draw, :, plane]).max() < np.radians(0.3)
+
+
+def test_both_halves_of_the_cup_are_shown(frames):
+    across = frames["poured"][:, 0, :, 1]
+    np.testing.assert_allclose((across > 0.0).mean("pour_particle"), 0.5, atol=0.01)
+    assert across.sizes["pour_particle"] <= MOST_SHOWN
 
 
 def test_a_draw_that_failed_is_not_shown(pour, frames):
