@@ -1,12 +1,13 @@
 """Drops at rest on a floor that they meet at a contact angle."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.integrate import solve_ivp
-from scipy.optimize import root_scalar
+from scipy.integrate import cumulative_trapezoid, solve_ivp
+from scipy.optimize import brentq
 
+STRIPS = 2001  # of a cross-section
 LONGEST_ARC = 50.0  # capillary lengths along the surface, from the top; a drop is smaller
 
 
@@ -70,8 +71,7 @@ def sessile_drop(volume: float, angle: float, length: float) -> Drop:
     high = low + 1.0
     while too_large(high) < 0.0:
         high += 1.0
-    log_top = root_scalar(too_large, bracket=(low, high), xtol=1e-10).root
-    found = _drop(float(np.exp(log_top)), angle)
+    found = _drop(float(np.exp(brentq(too_large, low, high, xtol=1e-10))), angle)
     if found is None or not np.isclose(found.volume, size, rtol=1e-6):
         widest = LONGEST_ARC * length
         raise ValueError(f"a drop of {volume:g} m³ is wider than {widest:g} m; take a smaller one")
@@ -101,13 +101,43 @@ def _drop(top: float, angle: float) -> _Held | None:
     def at_floor(_, state):
         return state[2] - angle
 
-    end: Any = at_floor
-    end.terminal = True
+    at_floor.terminal = True
     begun = [start, start**2 / (2.0 * top), start / top, np.pi * start**4 / (4.0 * top)]
     solved = solve_ivp(
-        along, (start, LONGEST_ARC), begun, events=end, rtol=1e-10, atol=1e-14, method="DOP853"
+        along, (start, LONGEST_ARC), begun, events=at_floor, rtol=1e-10, atol=1e-14, method="DOP853"
     )
     if not solved.t_events[0].size:
         return None
     r, z, _, volume = solved.y_events[0][0]
     return _Held(float(z), float(r), float(volume))
+
+
+class Ridge(NamedTuple):
+    """Of a long drop: half of it is below `height`, and half within `width` to either side [m]."""
+
+    height: float
+    width: float
+
+
+def cylindrical_cap(area: float, angle: float) -> Ridge:
+    """A long drop without weight, whose cross-section is a segment of a circle.
+
+    The segment's area is R² (a - sin a cos a).
+
+    Args:
+        area: Of the cross-section [m²].
+        angle: Contact angle a [rad], above 0.
+    """
+    radius = np.sqrt(area / (angle - np.sin(angle) * np.cos(angle)))
+    middle = -radius * np.cos(angle)  # height of the circle's
+    up = np.linspace(0.0, middle + radius, STRIPS)
+    across = np.linspace(0.0, radius * np.sin(min(angle, 0.5 * np.pi)), STRIPS)
+    half_chord = np.sqrt(np.maximum(radius**2 - across**2, 0.0))
+    over_floor = middle + half_chord - np.maximum(middle - half_chord, 0.0)
+    width_there = np.sqrt(np.maximum(radius**2 - (up - middle) ** 2, 0.0))
+    return Ridge(_median(up, width_there), _median(across, over_floor))
+
+
+def _median(at: np.ndarray, density: np.ndarray) -> float:
+    so_far = cumulative_trapezoid(density, at, initial=0.0)
+    return float(np.interp(0.5 * so_far[-1], so_far, at))
