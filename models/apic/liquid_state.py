@@ -32,6 +32,7 @@ class LiquidState:
     """
 
     UPRIGHT = True  # gravity is along -z
+    WETTING = False  # its surface pulls, and walls are wetted
     SIDED = False  # liquid is on both sides of walls that may be thinner than a cell
     MIRRORED = False  # only y >= 0 is simulated, beyond two layers of cells
     LEAST_AT_WALL = LIQUID  # share of its capacity from which a cell close to a wall is liquid

@@ -53,18 +53,6 @@ def pull_surface(s, g):
 
 
 @ti.func
-def clear_work(s, g):
-    """Empty what tension and viscosity have worked in, in the cells of the last step."""
-    for n in range(s.arounds[g]):
-        m = s.around[g, n]
-        for a in range(3):
-            s.product[g, a, m] = lanes(0.0)
-            s.friction[g, a, m] = lanes(0.0)
-            s.rest[g, a, m] = lanes(0.0)
-            s.shear[g, a, m] = lanes(0.0)
-
-
-@ti.func
 def colour(s, g, m):
     """How full a cell is, at most 1; 0 farther than a cell from any particle."""
     return ti.min(s.fraction[g, m], 1.0) * s.open[m]

@@ -81,6 +81,11 @@ def clear(s, g):
             s.mass[g, a, m] = zero
             s.search[g, a, m] = zero
             s.shear_weight[g, a, m] = zero
+            if ti.static(s.WETTING):  # what tension works in
+                s.product[g, a, m] = zero
+                s.friction[g, a, m] = zero
+                s.rest[g, a, m] = zero
+                s.shear[g, a, m] = zero
 
 
 @ti.func

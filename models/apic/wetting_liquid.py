@@ -8,7 +8,7 @@ from .liquid_state import LiquidState
 from .mirror import clear_images, fold, image, images, reflect_velocity
 from .pressure import add_rise, push, solve_pressure
 from .surface import find_liquid, set_up_pressure
-from .tension import clear_work, pull_surface
+from .tension import pull_surface
 from .transfer import clear, deposit, list_cells
 from .viscosity import extend, solve_viscosity, weigh_stresses
 
@@ -27,7 +27,7 @@ class WettingLiquid(LiquidState):
         passage: Open share of the face, or 1 in the mirror.
     """
 
-    UPRIGHT = False
+    UPRIGHT, WETTING = False, True
     LEAST_AT_WALL = 0.02  # what touches a wall cannot leave it without making room for air
     MENDING_TIME = 0.02
     TOLERANCE = 1e-3
@@ -69,7 +69,6 @@ class WettingLiquid(LiquidState):
         for n in range(groups * STRIDE):
             if n % STRIDE == 0:
                 g = n // STRIDE
-                clear_work(self, g)
                 clear(self, g)
                 if ti.static(self.MIRRORED):
                     clear_images(self, g)

@@ -201,7 +201,7 @@ def test_cells_are_given_in_millimetres(command, tmp_path):
     assert command("--cell", "4", "--case", "thin_contact_60").exit_code == 0
     results = json.loads((tmp_path / "out/against.json").read_text())
     cups = results["pours"]["thin_contact_60"]["settings"]["cups"]
-    assert cups["particles"] == round(np.pi * 28.0**2 * 34.0 / 4.0**3)
+    assert cups["particles"] == round(4 * np.pi * 28.0**2 * 34.0 / 4.0**3)
 
 
 def test_cells_of_cases_cannot_be_chosen(tmp_path):

@@ -174,7 +174,7 @@ def test_section_is_of_the_pour(pour, calibration, pour_settings):
         np.degrees(pour.chosen.angular_velocity)
     )
     assert section["distance_cm"] == pytest.approx(100 * pour.chosen.distance)
-    floor = bundled_cups().least_viscosity(calibration.liquid_density, pour.chosen.angular_velocity)
+    floor = bundled_cups().least_viscosity(calibration.liquid_density)
     assert section["least_viscosity"] == pytest.approx(floor, rel=1e-12) and floor > 0.0
     plug_in = section["plug_in"]["expected_spillage"]
     assert plug_in == pytest.approx(pour.plug_in.expected_spillage, rel=1e-12)
