@@ -180,6 +180,12 @@ def flow_in_box(
     Warns:
         FailedSimulation: A liquid went wrong.
     """
+    cells, most = box.grid().cells, max(len(body.points) for body in bodies)
+    if cells > CELLS or most > PARTICLES:
+        raise ValueError(
+            f"a box has room for {CELLS} cells and {PARTICLES} particles, got {cells} and "
+            f"{most}; take a smaller one or larger cells"
+        )
     steps = round(seconds / box.dt / every) * every
     with runtime.LOCK:
         scene, places = _started(box, liquids, bodies)
@@ -202,12 +208,6 @@ def _started(
     from ...apic.lanes import LANES
 
     places, grid, geometry = Places(len(liquids), GROUPS, LANES), box.grid(), box.geometry()
-    most = max(len(body.points) for body in bodies)
-    if grid.cells > CELLS or most > PARTICLES:
-        raise ValueError(
-            f"a box has room for {CELLS} cells and {PARTICLES} particles, got {grid.cells} and "
-            f"{most}; take a smaller one or larger cells"
-        )
     scene = _scene()
     scene.enter_vessel(grid, geometry, box.dt)
     scene.enter_surfaces(geometry.usable, np.stack([geometry.wall, geometry.area]))
