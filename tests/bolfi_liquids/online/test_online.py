@@ -136,7 +136,7 @@ def test_nothing_is_simulated_twice(story):
     rows = connection.execute("SELECT theta, seed FROM simulation").fetchall()
     connection.close()
     assert len(set(rows)) == len(rows)
-    stirs = [row for row in rows if "distance" not in row[0]]
+    stirs = [row for row in rows if "angular_velocity" not in row[0]]
     assert story.later.simulations <= len(stirs) <= SMALL.budget
 
 
