@@ -93,9 +93,8 @@ def filled(s, g, m):
 
 @ti.func
 def beyond(s, g, a, face, step):
-    """What acts on a face and on the next one, which may be farther out than what is listed."""
-    last = ti.select(s.spread[g, face + step] > 0, s.product[g, a, face + step], lanes(0.0))
-    return s.product[g, a, face] + last
+    """What acts on a face and on the next one."""
+    return s.product[g, a, face] + s.product[g, a, face + step]
 
 
 @ti.func
