@@ -19,6 +19,7 @@ NEAREST = 0.25  # cells from a wall at which friction is reckoned at least, as i
 GRAVITY = 9.81
 
 Point = tuple[float, float, float]
+NO_PULL: Point = (0.0, 0.0, 0.0)
 Block = tuple[Point, Point]
 """Lowest and highest corner [m]."""
 

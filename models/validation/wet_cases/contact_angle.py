@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
-from ..scenes.wet_box import Body, WetBox, WetLiquid, flow_in_box
+from ..scenes.wet_box import NO_PULL, Body, WetBox, WetLiquid, flow_in_box
 from ..truths.sessile_drops import cylindrical_cap
 
 BOX = WetBox((0.12, 0.0, 0.04))
@@ -24,7 +24,7 @@ def run(progress: Progress, seed: int) -> CaseResult:
         side = 0.5 * (BOX.size[0] - width)
         points = BOX.fill(((side, 0.0, 0.0), (side + width, 0.0, height)), seed)
         for angle in ANGLES:
-            liquids.append(WetLiquid(VISCOSITY, 1000.0, TENSION, np.radians(angle), (0.0,) * 3))
+            liquids.append(WetLiquid(VISCOSITY, 1000.0, TENSION, np.radians(angle), NO_PULL))
             bodies.append(Body(points, width * height * BOX.cell))
             names.append((name, angle))
 
