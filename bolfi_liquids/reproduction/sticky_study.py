@@ -62,10 +62,8 @@ def spilled_where_it_sticks(
     )
     tried = {"iterations": scale.rates, "seed": seed, "force": True, **execution._asdict()}
     before = choose_pour(calibration, cups, **tried)
-    effects = scale.considered
-    criticism = criticise(
-        calibration, pours=table, effects=effects, seed=seed, **execution._asdict()
-    )
+    given = {"pours": table, "cups": cups, "effects": scale.considered, "seed": seed}
+    criticism = criticise(calibration, **given, **execution._asdict())
     after = choose_pour(criticism.calibration, cups, **tried)
     sticks = executions(truth.theta, density, cups, truth.seed)
     flows = executions(truth.liquid, density, cups, truth.seed)

@@ -1,4 +1,4 @@
-"""The paper's failure: a liquid that sticks to its cup, of which stirring shows nothing."""
+"""A liquid that wets its cup more than the cups file says, of which stirring shows nothing."""
 
 import csv
 from importlib.resources import files
@@ -9,12 +9,12 @@ import xarray as xr
 
 import bolfi_liquids as bl
 from bolfi_liquids import models
-from bolfi_liquids.inputs.cups import bundled_cups
+from bolfi_liquids.reproduction.sticky import waxed_cups
 
-TEMPLATE = files("bolfi_liquids.data") / "glycerin_v10.nc"
-LIQUID = {"viscosity": 0.3, "cohesion": 0.5}
-ADHESION = {"adhesion": 0.8}
-STIRRED, POURED = 1100, 900  # particles of what is data; models have others
+TEMPLATE = files("bolfi_liquids.data") / "oil_v10.nc"
+LIQUID = {"viscosity": 0.15, "cohesion": 0.8}
+ADHESION = {"adhesion": 0.9}  # 56 deg where 110 are written
+STIRRED, POURED = 1100, 8000  # particles of what is data; models have others
 ACTIONS = [(rate, distance) for rate in (40.0, 70.0, 110.0) for distance in (0.5, 1.5, 2.5, 4.0)]
 REPEATS = 16
 COLUMNS = ("angular_velocity_deg_s", "distance_cm", "received", "retained", "spilled")
@@ -32,17 +32,17 @@ def stirred(path):
 
 
 def liquid():
-    return models.Liquid(**LIQUID, density=1260.0)
+    return models.Liquid(**LIQUID, density=900.0)
 
 
-def poured(actions, seeds):
+def poured(actions, seeds, effects):
     rate, distance = np.array(actions).T
     action = models.PourAction(np.radians(rate), distance / 100.0)
-    return models.pour(liquid(), action, bundled_cups(), seeds, particles=POURED, effects=ADHESION)
+    return models.pour(liquid(), action, waxed_cups(), seeds, particles=POURED, effects=effects)
 
 
 def table_of_pours(path):
-    made = poured(ACTIONS, 500 + np.arange(len(ACTIONS)))
+    made = poured(ACTIONS, 500 + np.arange(len(ACTIONS)), ADHESION)
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
@@ -55,30 +55,26 @@ def table_of_pours(path):
     return path
 
 
-def truly_spilled(pour):
+def truly_spilled(pour, effects):
     chosen = [(np.degrees(pour.chosen.angular_velocity), 100.0 * pour.chosen.distance)]
-    return float(np.mean(poured(chosen * REPEATS, 9000 + np.arange(REPEATS)).spilled))
+    return float(np.mean(poured(chosen * REPEATS, 9000 + np.arange(REPEATS), effects).spilled))
 
 
 @pytest.mark.minutes
-def test_adhesion_is_found_in_pours_and_the_next_pour_spills_less(tmp_path):
+def test_unknown_wetting_costs_little_and_nothing_else_is_blamed(tmp_path):
+    """The landing shifts by 4 to 8 mm, of which criticism may take 3 for the simulator's error."""
+    cups = waxed_cups()
     calibration = bl.calibrate(stirred(tmp_path / "stir.nc"), out=tmp_path / "run", progress=False)
-    before = bl.choose_pour(calibration, bundled_cups(), force=True, progress=False)
+    before = bl.choose_pour(calibration, cups, force=True, progress=False)
     criticism = bl.criticise(
         calibration,
         pours=table_of_pours(tmp_path / "pours.csv"),
+        cups=cups,
         effects=["adhesion", "shear_thinning", "yield_stress"],
         progress=False,
     )
-    after = bl.choose_pour(criticism.calibration, bundled_cups(), force=True, progress=False)
-    assert criticism.verdict == "effect"
-    assert criticism.effects == ("adhesion",)
-    pours = criticism.summary.pours
-    assert pours.after < 0.5 * pours.before
-    coefficient = criticism.summary.coefficient["adhesion"]
-    # an interval of 99.9 %, since one of 90 % would miss on one computer of ten; the prior is
-    # uniform from 0 to 1, and its lower half must be out of the question
-    assert abs(coefficient.mean - ADHESION["adhesion"]) < 3.3 * coefficient.sd
-    assert coefficient.q05 > 0.5
-    spilled = [truly_spilled(pour) for pour in (before, after)]
-    assert spilled[1] < 0.5 * spilled[0]
+    after = bl.choose_pour(criticism.calibration, cups, force=True, progress=False)
+    assert criticism.effects in ((), ("adhesion",))
+    flows, sticks = (truly_spilled(before, effects) for effects in ({}, ADHESION))
+    assert sticks - flows < 0.05
+    assert truly_spilled(after, ADHESION) < sticks + 0.01
