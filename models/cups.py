@@ -14,7 +14,7 @@ from pydantic import (
 )
 
 from .fluid.numerics import MODEL_VERSION
-from .pours.resolution import LEAST_VISCOSITY, settings
+from .pours.resolution import LEAST_VISCOSITY, Filled, settings
 
 MIN_LENGTH, MAX_RADIUS, MAX_HEIGHT = 1e-3, 0.25, 2.0  # [m] of cups that are poured by hand or arm
 MAX_DISTANCE = 0.5  # [m] from the lip to the receiver's axis
@@ -58,6 +58,11 @@ class Source(_Section, frozen=True):
     height: Height
     fill: Height
     contact_angle_deg: ContactDegrees = CONTACT_ANGLE_DEG
+
+    @property
+    def filled(self) -> Filled:
+        """Its sizes, by which pours are cut into cells."""
+        return Filled(self.radius, self.height, self.fill)
 
     @model_validator(mode="after")
     def _holds_its_fill(self) -> "Source":
@@ -148,7 +153,7 @@ class Cups(_Section, frozen=True):
     @property
     def liquid_volume(self) -> float:
         """Liquid in the source before the pour [m³]."""
-        return float(np.pi * self.source.radius**2 * self.source.fill)
+        return self.source.filled.volume
 
     def spacing(self, particles: int) -> float:
         """Particle spacing [m], the cube root of the liquid's volume per particle."""
@@ -164,7 +169,7 @@ class Cups(_Section, frozen=True):
             "model": MODEL_VERSION,
             "scene": "pour",
             "particles": particles,
-            "numerics": settings(self, particles),
+            "numerics": settings(self.source.filled, particles),
             **self.model_dump(),
         }
 

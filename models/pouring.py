@@ -155,8 +155,9 @@ def watched_landings(batch: PourBatch, watch: Watch | None = None) -> Landings:
     acting = acting_in("pour", with_adhesion(batch.liquid, batch.effects, len(seeds)), len(seeds))
     rate = _checked_rate(batch.angular_velocity, len(seeds))
     check_numbers("pour", zero=True, particles=batch.particles)
-    vessel = Vessel.of(cups, cell_for(cups, batch.particles))
-    steps = steps_for(cups, vessel.cell, rate)
+    cup = cups.source.filled
+    vessel = Vessel(*cup, cell_for(cup, batch.particles))
+    steps = steps_for(cup.height, vessel.cell, rate)
     pours = _pours(batch.liquid.batch(len(seeds)), rate, cups, seeds, acting)
     found: list[Flights] = [None] * len(seeds)  # type: ignore[list-item]  filled below
     with runtime.LOCK:

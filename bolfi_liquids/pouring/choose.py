@@ -121,7 +121,7 @@ def _chosen(
         for action in (choice.chosen, choice.plug_in)
     )
     pour = Pour(calibration.path, chosen, plug_in)
-    _keep(pour, choice, learned, settings, drawn, calibration)
+    _keep(pour, choice, learned, settings, calibration)
     return pour
 
 
@@ -161,8 +161,9 @@ def strata(calibration: Calibration, draws: int, seed: int) -> Drawn:
 
 
 class _Choice(NamedTuple):
-    """What was tried, and the two actions that it led to."""
+    """What was tried, on which liquids, and the two actions that it led to."""
 
+    liquids: Mapping[str, NDArray]
     over_posterior: Surface
     at_best: Surface
     chosen: dict[str, float]
@@ -182,22 +183,21 @@ def _search(
         for tried in (liquids, at_theta)
     )
     chosen, plug_in = (tried.least(settings.risk) for tried in (over_posterior, at_best))
-    return _Choice(over_posterior, at_best, chosen, plug_in)
+    return _Choice(liquids, over_posterior, at_best, chosen, plug_in)
 
 
-def _keep(  # noqa: PLR0913  all that pour.nc and the summary tell
+def _keep(
     pour: Pour,
     choice: _Choice,
     learned: LandingMap,
     settings: PourSettings,
-    drawn: Drawn,
     calibration: Calibration,
 ) -> None:
     """Write pour.nc and the section "pour" of summary.json."""
     cups, fit_status = learned.cups, calibration.summary.fit_status
     tried = {"actions": choice.over_posterior, "actions_plug_in": choice.at_best}
     least = cups.least_viscosity(calibration.liquid_density)
-    tree = pour_tree(pour, tried, drawn.search, learned, settings.risk)
+    tree = pour_tree(pour, tried, choice.liquids, learned, settings.risk)
     tree.attrs.update(
         asdict(settings),
         cups=json.dumps(cups.settings()),

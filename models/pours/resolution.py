@@ -4,14 +4,11 @@ Pours of cells of 1/5.6 to 1/9 of the cup's radius were compared with references
 """
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..apic.gravity import GRAVITY
-
-if TYPE_CHECKING:
-    from ..cups import Cups
 
 CELLS = 7.0  # in the radius of the cup
 LAYERS = 4.0  # of cells, at least, in liquid that is shallow
@@ -24,34 +21,45 @@ half a millimetre, as other seeds do."""
 FAST_TURN = 0.5  # speed of the floor over that of the fall beyond which steps are halved
 
 
-def cell_for(cups: "Cups", particles: int = 0) -> float:
+class Filled(NamedTuple):
+    """A cup and its liquid [m]."""
+
+    radius: float
+    height: float
+    fill: float
+
+    @property
+    def volume(self) -> float:
+        """Of the liquid [m³]."""
+        return math.pi * self.radius**2 * self.fill
+
+
+def cell_for(cup: Filled, particles: int = 0) -> float:
     """Edge of a cell [m].
 
     Args:
-        cups: The source decides, unless `particles` do.
+        cup: It decides, unless `particles` do.
         particles: About as many in the whole cup; 0: cells follow the cup.
     """
     if particles:
-        return float((PER_CELL * cups.liquid_volume / particles) ** (1.0 / 3.0))
-    radius, fill = cups.source.radius, cups.source.fill
-    return max(min(radius / CELLS, fill / LAYERS), radius / FINEST)
+        return float((PER_CELL * cup.volume / particles) ** (1.0 / 3.0))
+    return max(min(cup.radius / CELLS, cup.fill / LAYERS), cup.radius / FINEST)
 
 
-def steps_for(cups: "Cups", cell: float, rate: np.ndarray) -> np.ndarray:
-    """Step of each pour [s], of cells [m] and rates of turn [rad/s], shape (B,).
+def steps_for(height: float, cell: float, rate: np.ndarray) -> np.ndarray:
+    """Step of each pour [s], in cells [m], from a cup of a height [m]; rates of turn are in rad/s.
 
     All slow pours share one, and fast ones halve it, since pours that march together share theirs.
     """
-    height = cups.source.height
     fall = math.sqrt(GRAVITY * height)
     halvings = np.ceil(np.log2((fall + rate * height) / (fall * (1.0 + FAST_TURN))) - 1e-9)
     return COURANT * cell / fall / 2.0 ** np.maximum(halvings, 0.0)
 
 
-def settings(cups: "Cups", particles: int = 0) -> dict[str, Any]:
+def settings(cup: Filled, particles: int = 0) -> dict[str, Any]:
     """What decides how pours are cut up, as plain numbers."""
     return {
-        "cell": cell_for(cups, particles),
+        "cell": cell_for(cup, particles),
         "per_cell": PER_CELL,
         "courant": COURANT,
         "fast_turn": FAST_TURN,

@@ -13,7 +13,6 @@ import numpy as np
 from ..apic.filling import Cylinder, fill_cup
 from ..apic.geometry import ABOVE, INSIDE, OUTSIDE, Geometry, sample_geometry
 from ..apic.grid import WALL, Grid
-from ..cups import Cups
 
 RIM = 0.002  # m, thickness of the wall; the rim is flat
 BEYOND, OVER, UNDER = 38 / 28, 40 / 28, 25 / 28
@@ -32,11 +31,6 @@ class Vessel:
     height: float
     fill: float
     cell: float
-
-    @classmethod
-    def of(cls, cups: Cups, cell: float) -> "Vessel":
-        source = cups.source
-        return cls(source.radius, source.height, source.fill, cell)
 
     @property
     def corners(self) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:

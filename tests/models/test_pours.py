@@ -9,7 +9,7 @@ import pytest
 from bolfi_liquids.models.apic.geometry import ABOVE, INSIDE, OUTSIDE
 from bolfi_liquids.models.pours import march, vessel
 from bolfi_liquids.models.pours.flights import Flights, landing_of
-from bolfi_liquids.models.pours.resolution import cell_for, steps_for
+from bolfi_liquids.models.pours.resolution import Filled, cell_for, steps_for
 from bolfi_liquids.models.pours.vessel import Vessel, turned
 
 from bolfi_liquids import models
@@ -161,11 +161,12 @@ def test_the_cup_holds_its_volume_and_its_wall_parts_two_sides(cell):
         assert (found.area[axis, stride:][apart[axis]] == 0.0).all()
 
 
-def test_cells_and_steps_follow_the_cup(cups):
-    assert cell_for(cups) == pytest.approx(0.004)
-    assert cell_for(changed(cups, source={"fill": 0.012})) == pytest.approx(0.003)
-    assert cell_for(changed(cups, source={"fill": 0.002})) == pytest.approx(0.002)
-    slow, fast, fastest = steps_for(cups, 0.004, np.array([0.5, 10.0, 30.0]))
+def test_cells_and_steps_follow_the_cup():
+    cup = Filled(0.028, 0.06, 0.034)
+    assert cell_for(cup) == pytest.approx(0.004)
+    assert cell_for(cup._replace(fill=0.012)) == pytest.approx(0.003)
+    assert cell_for(cup._replace(fill=0.002)) == pytest.approx(0.002)
+    slow, fast, fastest = steps_for(0.06, 0.004, np.array([0.5, 10.0, 30.0]))
     assert slow == 2.0 * fast == 4.0 * fastest
-    volume = Vessel.of(cups, cell_for(cups, 5000))
+    volume = Vessel(*cup, cell_for(cup, 5000))
     assert 2 * len(volume.particles(4, 0)) == pytest.approx(5000, rel=0.05)
