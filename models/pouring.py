@@ -88,7 +88,8 @@ class Landings:
         retained = np.broadcast_to(self.retained, received.shape)
         # whole particles, so that what is left of three fractions is not a rounding error
         spilled = np.round((1.0 - received - retained) * self.position.shape[1])
-        return PourResult(spilled / self.position.shape[1], received, retained)
+        spilled = spilled / self.position.shape[1] + 0.0  # no negative zero
+        return PourResult(spilled, received, retained)
 
 
 def pour(

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -180,9 +180,9 @@ def _delay(plan: Recording, time: NDArray, position: NDArray, before: float) -> 
     # of a stroke that has just begun, there may be several minima
     tried = before + np.arange(-SEARCHED, SEARCHED + STEP, STEP)
     near = float(tried[np.argmin([squared(delay) for delay in tried])])
-    found = minimize_scalar(squared, bounds=(near - STEP, near + STEP), method="bounded").x
+    found: Any = minimize_scalar(squared, bounds=(near - STEP, near + STEP), method="bounded")
     # as recorded, where that is as near as can be
-    return before if squared(before) <= squared(found) else float(found)
+    return before if squared(before) <= squared(found.x) else float(found.x)
 
 
 def _sampled(wanted: NDArray, time: NDArray, values: NDArray) -> NDArray[np.float64]:

@@ -40,8 +40,14 @@ class Pours(NamedTuple):
     coefficients: np.ndarray
 
     def rows(self, part: np.ndarray) -> "Pours":
-        of_each = (field[part] for field in self[:-1])
-        return Pours(*of_each, self.coefficients[:, part])
+        return Pours(
+            self.liquid[part],
+            self.tension[part],
+            self.cosine[part],
+            self.rate[part],
+            self.seeds[part],
+            self.coefficients[:, part],
+        )
 
 
 class Turn(NamedTuple):

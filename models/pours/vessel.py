@@ -52,10 +52,10 @@ class Vessel:
     def grid(self) -> Grid:
         """Lip, rim and mirror lie on faces, whatever the cells' size."""
         lows, highs = zip(*self.corners, strict=True)
-        before = [round(-low / self.cell) + WALL for low in lows]
-        behind = [math.ceil(high / self.cell - 1e-6) + AIR for high in highs]
-        shape = tuple(low + high for low, high in zip(before, behind, strict=True))
-        return Grid(self.cell, shape, tuple(-self.cell * low for low in before), mirrored=True)
+        x, y, z = (round(-low / self.cell) + WALL for low in lows)
+        nx, ny, nz = (math.ceil(high / self.cell - 1e-6) + AIR for high in highs)
+        origin = -x * self.cell, -y * self.cell, -z * self.cell
+        return Grid(self.cell, (x + nx, y + ny, z + nz), origin, mirrored=True)
 
     def distance(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Of points from the wall and the floor [m], negative within them."""

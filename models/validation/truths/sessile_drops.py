@@ -1,11 +1,11 @@
 """Drops at rest on a floor that they meet at a contact angle."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import cumulative_trapezoid, solve_ivp
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 
 STRIPS = 2001  # of a cross-section
 LONGEST_ARC = 50.0  # capillary lengths along the surface, from the top; a drop is smaller
@@ -71,7 +71,8 @@ def sessile_drop(volume: float, angle: float, length: float) -> Drop:
     high = low + 1.0
     while too_large(high) < 0.0:
         high += 1.0
-    found = _drop(float(np.exp(brentq(too_large, low, high, xtol=1e-10))), angle)
+    log_top = root_scalar(too_large, bracket=(low, high), xtol=1e-10).root
+    found = _drop(float(np.exp(log_top)), angle)
     if found is None or not np.isclose(found.volume, size, rtol=1e-6):
         widest = LONGEST_ARC * length
         raise ValueError(f"a drop of {volume:g} m³ is wider than {widest:g} m; take a smaller one")
@@ -101,10 +102,11 @@ def _drop(top: float, angle: float) -> _Held | None:
     def at_floor(_, state):
         return state[2] - angle
 
-    at_floor.terminal = True
+    end: Any = at_floor
+    end.terminal = True
     begun = [start, start**2 / (2.0 * top), start / top, np.pi * start**4 / (4.0 * top)]
     solved = solve_ivp(
-        along, (start, LONGEST_ARC), begun, events=at_floor, rtol=1e-10, atol=1e-14, method="DOP853"
+        along, (start, LONGEST_ARC), begun, events=end, rtol=1e-10, atol=1e-14, method="DOP853"
     )
     if not solved.t_events[0].size:
         return None
