@@ -6,9 +6,12 @@ import taichi as ti
 
 from ..fluid.faults import ABSENT, SOUND
 from .gravity import GRAVITY
-from .lanes import LANES, lanes, mat3, vec3
+from .lanes import LANES, STRIDE, lanes, mat3, vec3
+from .mirror import clear_images, fold, reflect_velocity
+from .pressure import add_rise, push, solve_pressure
 from .surface import LIQUID
-from .transfer import clear
+from .transfer import clear, deposit, list_cells
+from .viscosity import extend
 
 
 @ti.data_oriented
@@ -26,9 +29,10 @@ class LiquidState:
         pressure: Times step over density and cell [m/s].
         status: How a lane fares, a code of `faults`.
 
-    A scene is a subclass with the function `accelerate`, which changes a particle's velocity, and
-    its slope, by what acts on all liquid. If it is SIDED, it has the fields `side` of cells and
-    `face_side` of faces, and the function `side_of` a point.
+    A step is `transfer_in`, what a scene does with the velocities, `project`, and how it moves
+    particles. A scene is a subclass with the function `accelerate`, which changes a particle's
+    velocity, and its slope, by what acts on all liquid. If it is SIDED, it has the fields `side` of
+    cells and `face_side` of faces, and the function `side_of` a point.
     """
 
     UPRIGHT = True  # gravity is along -z
@@ -177,3 +181,33 @@ class LiquidState:
         for effect, of_groups in enumerate(coefficients):
             for g, values in enumerate(of_groups):
                 self.coefficient[effect, g] = values
+
+    @ti.func
+    def begin_step(self, g, step):
+        """What a scene does with a group before its particles are accelerated."""
+
+    @ti.kernel
+    def transfer_in(self, groups: ti.i32, step: ti.i32):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                g = n // STRIDE
+                clear(self, g)
+                if ti.static(self.MIRRORED):
+                    clear_images(self, g)
+                self.begin_step(g, step)
+                deposit(self, g)
+                if ti.static(self.MIRRORED):
+                    fold(self, g)
+                list_cells(self, g)
+
+    @ti.kernel
+    def project(self, groups: ti.i32):
+        for n in range(groups * STRIDE):
+            if n % STRIDE == 0:
+                g = n // STRIDE
+                solve_pressure(self, g)
+                push(self, g, self.rise)
+                add_rise(self, g)
+                extend(self, g)
+                if ti.static(self.MIRRORED):
+                    reflect_velocity(self, g)

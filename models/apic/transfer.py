@@ -206,6 +206,13 @@ def motion_of(s, g, lane, n):
 
 
 @ti.func
+def place_after(s, x, v, slope):
+    """Where a particle is after a step, to second order [m]."""
+    dt, per_cell = s.dt[None], 1.0 / s.cell[None]
+    return x + dt * (v + 0.5 * dt * per_cell * (slope @ v))
+
+
+@ti.func
 def fault_of(s, g, lane, energy, fastest):
     """A lane's fault, by the sum of its particles' squared speeds and the largest of these."""
     fault = SOUND
@@ -221,13 +228,12 @@ def move(s, g):
 
     A lane that went wrong gets its status and loses its particles.
     """
-    per_cell, dt = 1.0 / s.cell[None], s.dt[None]
     for lane in range(LANES):
         height, energy, fastest = 0.0, 0.0, 0.0
         for n in range(s.count[g, lane]):
             v, slope = motion_of(s, g, lane, n)
             s.slope[g, lane, n] = slope
-            moved = s.position[g, lane, n] + dt * (v + 0.5 * dt * per_cell * (slope @ v))
+            moved = place_after(s, s.position[g, lane, n], v, slope)
             s.position[g, lane, n], s.speed[g, lane, n] = s.keep_inside(moved, v)
             height += s.position[g, lane, n][2]
             energy += v.dot(v)

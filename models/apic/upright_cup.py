@@ -6,16 +6,12 @@ import taichi as ti
 from .filling import OFF_WALL
 from .lanes import STRIDE, vec3
 from .liquid_state import LiquidState
-from .pressure import add_rise, push, solve_pressure
-from .transfer import clear, deposit, list_cells, move
-from .viscosity import extend
+from .transfer import move
 
 
 @ti.data_oriented
 class UprightCups(LiquidState):
-    """A step is `transfer_in`, what a scene does with the velocities, `project`, `transfer_out`.
-
-    A scene is a subclass with the function `acceleration` of a particle.
+    """A scene is a subclass with the function `acceleration` of a particle.
 
     Attributes:
         cup_radius: Inside [m].
@@ -50,25 +46,6 @@ class UprightCups(LiquidState):
             x[2] = top
             v[2] = ti.min(v[2], 0.0)
         return x, v
-
-    @ti.kernel
-    def transfer_in(self, groups: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                g = n // STRIDE
-                clear(self, g)
-                deposit(self, g)
-                list_cells(self, g)
-
-    @ti.kernel
-    def project(self, groups: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                g = n // STRIDE
-                solve_pressure(self, g)
-                push(self, g, self.rise)
-                add_rise(self, g)
-                extend(self, g)
 
     @ti.kernel
     def transfer_out(self, groups: ti.i32):

@@ -5,19 +5,16 @@ import taichi as ti
 
 from .lanes import LANES, STRIDE
 from .liquid_state import LiquidState
-from .mirror import clear_images, fold, image, images, reflect_velocity
-from .pressure import add_rise, push, solve_pressure
+from .mirror import image, images
+from .pressure import push
 from .surface import find_liquid, set_up_pressure
 from .tension import pull_surface
-from .transfer import clear, deposit, list_cells
-from .viscosity import extend, solve_viscosity, weigh_stresses
+from .viscosity import solve_viscosity, weigh_stresses
 
 
 @ti.data_oriented
 class WettingLiquid(LiquidState):
-    """A step is `transfer_in`, `prepare`, `flow`, `project`, and how a scene moves particles.
-
-    A scene is a subclass with the function `begin_step` of a group, too.
+    """A scene is a subclass with the kernel `transfer_out` of groups and a step.
 
     Attributes:
         tension: Over density [m³/s²].
@@ -65,20 +62,6 @@ class WettingLiquid(LiquidState):
                 self.cosine[g][lane] = surface[1, g, lane]
 
     @ti.kernel
-    def transfer_in(self, groups: ti.i32, step: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                g = n // STRIDE
-                clear(self, g)
-                if ti.static(self.MIRRORED):
-                    clear_images(self, g)
-                self.begin_step(g, step)
-                deposit(self, g)
-                if ti.static(self.MIRRORED):
-                    fold(self, g)
-                list_cells(self, g)
-
-    @ti.kernel
     def prepare(self, groups: ti.i32, step: ti.i32):
         for n in range(groups * STRIDE):
             if n % STRIDE == 0:
@@ -95,14 +78,11 @@ class WettingLiquid(LiquidState):
             if n % STRIDE == 0:
                 solve_viscosity(self, n // STRIDE)
 
-    @ti.kernel
-    def project(self, groups: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                g = n // STRIDE
-                solve_pressure(self, g)
-                push(self, g, self.rise)
-                add_rise(self, g)
-                extend(self, g)
-                if ti.static(self.MIRRORED):
-                    reflect_velocity(self, g)
+    def march(self, groups, start, stop):
+        """Steps start..stop-1 of so many groups."""
+        for step in range(start, stop):
+            self.transfer_in(groups, step)
+            self.prepare(groups, step)
+            self.flow(groups)
+            self.project(groups)
+            self.transfer_out(groups, step)

@@ -8,7 +8,7 @@ from ..apic.filling import OFF_WALL
 from ..apic.geometry import ABOVE, INSIDE, OUTSIDE
 from ..apic.gravity import GRAVITY
 from ..apic.lanes import LANES, STRIDE, vec3
-from ..apic.transfer import fault_of, motion_of
+from ..apic.transfer import fault_of, motion_of, place_after
 from ..apic.wetting_liquid import WettingLiquid
 from ..fluid.faults import SOUND
 from .flights import Flights
@@ -201,12 +201,11 @@ class PouringScene(WettingLiquid):
     @ti.func
     def move_on(self, g, lane, step):
         """Particles move; those that leave fly on, and the last takes the place of each."""
-        dt, per_cell = self.dt[None], 1.0 / self.cell[None]
         n, last, energy, fastest = 0, self.count[g, lane], 0.0, 0.0
         while n < last:
             v, slope = motion_of(self, g, lane, n)
             before = self.position[g, lane, n]
-            after = before + dt * (v + 0.5 * dt * per_cell * (slope @ v))
+            after = place_after(self, before, v, slope)
             after, v = self.keep_off_wall(before, after, v)
             self.position[g, lane, n], self.speed[g, lane, n] = after, v
             self.slope[g, lane, n] = slope
@@ -249,15 +248,6 @@ class PouringScene(WettingLiquid):
                         few = self.count[g, lane] < LEFT_OVER * all_of_it
                         if few or step + 1 >= self.last[g, lane]:
                             self.end(g, lane, step)
-
-    def march(self, groups, start, stop):
-        """Steps start..stop-1 of so many groups."""
-        for step in range(start, stop):
-            self.transfer_in(groups, step)
-            self.prepare(groups, step)
-            self.flow(groups)
-            self.project(groups)
-            self.transfer_out(groups, step)
 
     def view(self):
         """The first pour: places of its particles in the cup's frame [m], shape [n, 3], and its

@@ -86,7 +86,7 @@ class StirringScene(UprightCups):
         """Steps start..stop-1."""
         groups = len(self.path)
         for step in range(start, stop):
-            self.transfer_in(groups)
+            self.transfer_in(groups, step)
             self.prepare(groups, step, self.path)
             self.flow(groups, step, self.directions)
             self.project(groups)

@@ -62,7 +62,7 @@ class StillCupScene(UprightCups):
                 solve_viscosity(self, n // STRIDE)
 
     def step(self, groups):
-        self.transfer_in(groups)
+        self.transfer_in(groups, 0)
         self.prepare(groups)
         self.flow(groups)
         self.project(groups)

@@ -5,9 +5,9 @@ import taichi as ti
 
 from ...apic.filling import OFF_WALL
 from ...apic.lanes import LANES, STRIDE
-from ...apic.transfer import TOP_SPEED, motion_of
+from ...apic.transfer import fault_of, motion_of, place_after
 from ...apic.wetting_liquid import WettingLiquid
-from ...fluid.faults import LARGEST, RUNAWAY
+from ...fluid.faults import SOUND
 
 
 @ti.data_oriented
@@ -37,10 +37,6 @@ class WetBoxScene(WettingLiquid):
             for n in range(self.count[g, lane]):
                 for a in ti.static(range(3)):
                     self.speed[g, lane, n][a] = velocity[g, lane, n, a]
-
-    @ti.func
-    def begin_step(self, g, step):
-        """Nothing changes from step to step."""
 
     @ti.func
     def accelerate(self, g, lane, n):
@@ -74,7 +70,7 @@ class WetBoxScene(WettingLiquid):
         return x, v
 
     @ti.kernel
-    def transfer_out(self, groups: ti.i32):
+    def transfer_out(self, groups: ti.i32, step: ti.i32):
         for n in range(groups * STRIDE):
             if n % STRIDE == 0:
                 for lane in range(LANES):
@@ -83,25 +79,14 @@ class WetBoxScene(WettingLiquid):
     @ti.func
     def move(self, g, lane):
         """A lane that went wrong gets its status and loses its particles."""
-        dt, per_cell = self.dt[None], 1.0 / self.cell[None]
         energy, fastest = 0.0, 0.0
         for n in range(self.count[g, lane]):
             v, slope = motion_of(self, g, lane, n)
             self.slope[g, lane, n] = slope
-            before = self.position[g, lane, n]
-            moved = before + dt * (v + 0.5 * dt * per_cell * (slope @ v))
+            moved = place_after(self, self.position[g, lane, n], v, slope)
             self.position[g, lane, n], self.speed[g, lane, n] = self.keep_inside(moved, v)
-            energy += v.dot(v)  # not a number where any is, which a maximum passes over
+            energy += v.dot(v)
             fastest = ti.max(fastest, v.dot(v))
-        if not (energy < LARGEST and fastest < TOP_SPEED**2):
-            self.status[g, lane] = RUNAWAY
+        self.status[g, lane] = fault_of(self, g, lane, energy, fastest)
+        if self.status[g, lane] != SOUND:
             self.count[g, lane] = 0
-
-    def march(self, groups, start, stop):
-        """Steps start..stop-1 of so many groups."""
-        for step in range(start, stop):
-            self.transfer_in(groups, step)
-            self.prepare(groups, step)
-            self.flow(groups)
-            self.project(groups)
-            self.transfer_out(groups)
