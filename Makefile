@@ -52,7 +52,7 @@ test: setup
 	$(BIN)/pytest --durations 20 -m "$(SELECTED) and $(ALONE)" $(ALONE_IN)
 
 test-long: setup
-	$(BIN)/pytest -m minutes
+	$(BIN)/pytest -m minutes -o faulthandler_timeout=0
 
 lint: setup
 	$(BIN)/ruff check
