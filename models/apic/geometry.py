@@ -48,8 +48,8 @@ class Geometry(NamedTuple):
         carries: 1 where the face carries momentum.
         shut: 1 where a wall closes the face.
         face_side: Of the wall, on which the face is.
-        wall: Area of wall that rubs at the face, in cells.
-        friction: The same over its distance.
+        wall: Area of wall along which the face's component goes, in cells.
+        friction: Area of wall that rubs at the face, in cells, over its distance.
         solid: Share of the box around the face that is wall, weighted as particles deposit.
         edge: Open share of the box around the cell's lowest edge along the axis.
     """
@@ -96,17 +96,22 @@ def sample_geometry(
     inner = grid.inner()
     kinds = (ABOVE,) if side is None else (ABOVE, INSIDE, OUTSIDE)
     volumes, capacities = np.zeros((2, len(kinds), grid.cells))
-    deposit, edge, rubbing = np.zeros((3, 3, grid.cells))
-    for cells, sides, rubs in _samples(grid, distance, side):
+    deposit, edge = np.zeros((2, 3, grid.cells))
+    walls = np.zeros((len(kinds), 2, 3, grid.cells))
+    for layers in _samples(grid, distance, side):
+        cells = layers.cells
         for kind in kinds:
-            here = (sides == kind).astype(np.float32)
+            here = ((layers.side == kind) & layers.is_open).astype(np.float32)
             volumes[kind, cells] = _means(here, _box, CENTRE)
             capacities[kind, cells] = _means(here, _hat, CENTRE)
-        is_open = (sides != NOWHERE).astype(np.float32)
+        is_open = layers.is_open.astype(np.float32)
         for axis in range(3):
             deposit[axis, cells] = _means(is_open, _hat, FACES[axis])
             edge[axis, cells] = _means(is_open, _box, EDGES[axis])
-            rubbing[axis, cells] = _means(rubs[axis], _box, FACES[axis])
+            for kind in kinds:
+                for what in range(2):
+                    area = np.where(layers.side == kind, layers.wall[what, axis], 0.0)
+                    walls[kind, what, axis, cells] = _means(area, _box, FACES[axis])
     own = np.argmax(volumes, axis=0)
     volume = np.choose(own, volumes)
     capacity = sum(np.where(_joined(own, kind), capacities[kind], 0.0) for kind in kinds)
@@ -117,8 +122,24 @@ def sample_geometry(
         area[axis, sliver] = 0.0
         area[axis, stride:][sliver[:-stride]] = 0.0
     carries = inner & (area > LEAST_AREA)
-    wall = np.stack(
-        [_moved_inward(grid, distance, axis, rubbing[axis], carries[axis]) for axis in range(3)]
+    face_side = np.maximum(own, below)
+    wall, rubbing = (
+        np.stack(
+            [
+                sum(
+                    _moved_inward(
+                        grid,
+                        distance,
+                        axis,
+                        walls[kind, what, axis],
+                        carries[axis] & _joined(face_side[axis], kind),
+                    )
+                    for kind in kinds
+                )
+                for axis in range(3)
+            ]
+        )
+        for what in range(2)
     )
     away = np.stack([distance(*grid.faces(axis).T) / grid.cell for axis in range(3)])
     fields = (
@@ -130,9 +151,9 @@ def sample_geometry(
         area * inner,
         carries,
         inner & ~carries,
-        np.maximum(own, below),
+        face_side,
         wall,
-        wall / np.maximum(away, nearest),
+        rubbing / np.maximum(away, nearest),
         1.0 - deposit,
         edge,
     )
@@ -144,32 +165,64 @@ def _joined(one: np.ndarray, other: np.ndarray | int) -> np.ndarray:
     return (one == other) | (one == ABOVE) | (np.asarray(other) == ABOVE)
 
 
-def _sides(
-    away: np.ndarray, side: Side | None, x: np.ndarray, y: np.ndarray, z: np.ndarray
-) -> np.ndarray:
-    """Of the points of a lattice, shape (z, y, x); NOWHERE where they are not `away` from walls."""
-    where = ABOVE if side is None else side(x, y[:, None], z[:, None, None])
-    return np.where(away, where, NOWHERE).astype(np.int8)
+class _Layers(NamedTuple):
+    """Samples of a few layers of cells, of shape (z, y, x).
 
-
-def _samples(
-    grid: Grid, distance: Distance, side: Side | None
-) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
-    """Samples of a few layers of cells: the cells, on which side samples are, shape (z, y, x), and
-    how much wall each stands for, in cells, times `_rub` of the wall's normal, shape (3, z, y, x).
+    Attributes:
+        cells: Of the layers.
+        is_open: Whether they are outside of walls.
+        side: Of the wall, where they are.
+        wall: How much wall each stands for, in cells: along each axis, and times `_rub`; shape
+            (2, 3, z, y, x).
     """
+
+    cells: slice
+    is_open: np.ndarray
+    side: np.ndarray
+    wall: np.ndarray
+
+
+def _sides(side: Side | None, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Of the points of a lattice, shape (z, y, x)."""
+    where = ABOVE if side is None else side(x, y[:, None], z[:, None, None])
+    return np.broadcast_to(where, (len(z), len(y), len(x))).astype(np.int8)
+
+
+def _samples(grid: Grid, distance: Distance, side: Side | None) -> Iterator[_Layers]:
+    """All samples, layer by layer."""
     x, y, z = (_along(grid, axis) for axis in range(3))
     for low in range(0, grid.shape[2], TOGETHER):
         high = min(low + TOGETHER, grid.shape[2])
         layers = z[low * SAMPLES : (high + 2) * SAMPLES]
         away = _distances(distance, x, y, layers) * (SAMPLES / grid.cell)
-        beside_wall = np.abs(away) < np.sqrt(3.0)
-        k, j, i = np.nonzero(beside_wall)
+        at = np.stack(np.nonzero(np.abs(away) < np.sqrt(3.0)))
+        k, j, i = at
         normal = _normal(grid, distance, np.stack([x[i], y[j], layers[k]]))
-        rubs = np.zeros((3, *away.shape), np.float32)
-        rubs[:, beside_wall] = SAMPLES * _wall_at(away[beside_wall], normal) * _rub(normal**2)
-        cells = slice(low * grid.strides[2], high * grid.strides[2])
-        yield cells, _sides(away > 0.0, side, x, y, layers), rubs
+        stands_for = SAMPLES * _wall_at(away[k, j, i], normal)
+        if side is not None:
+            at = _before_wall(at, away[k, j, i], normal, away.shape)
+        wall = np.zeros((2, 3, *away.shape), np.float32)
+        for of_kind, share in zip(wall, (1.0 - normal**2, _rub(normal**2)), strict=True):
+            np.add.at(of_kind, (slice(None), *at), stands_for * share)
+        yield _Layers(
+            slice(low * grid.strides[2], high * grid.strides[2]),
+            away > 0.0,
+            _sides(side, x, y, layers),
+            wall,
+        )
+
+
+def _before_wall(
+    at: np.ndarray, away: np.ndarray, normal: np.ndarray, shape: tuple[int, ...]
+) -> np.ndarray:
+    """Samples (z, y, x) of a lattice, those within a wall mirrored in it.
+
+    Their wall would belong to cells behind it otherwise, and where it is thinner than a cell there
+    is other liquid.
+    """
+    inside = 2.0 * np.maximum(-away, 0.0)
+    mirrored = at + np.rint(inside * normal[::-1]).astype(int)
+    return np.clip(mirrored, 0, np.array(shape)[:, None] - 1)
 
 
 def _along(grid: Grid, axis: int) -> np.ndarray:
@@ -240,12 +293,12 @@ def _open_faces(
         grid.origin[a] + grid.cell * np.arange(grid.shape[a]) if a == axis else _along(grid, a)
         for a in range(3)
     )
-    away = _distances(distance, x, y, z) > ON_WALL * grid.cell
-    sides = _sides(away, side, x, y, z - ON_WALL * grid.cell)  # what is at the rim is below it
+    is_open = _distances(distance, x, y, z) > ON_WALL * grid.cell
+    sides = _sides(side, x, y, z - ON_WALL * grid.cell)  # what is at the rim is below it
     joins = np.where(_joined(*cells), np.maximum(*cells), NOWHERE)
     open_share = np.zeros(grid.cells)
     for kind in np.unique(joins[joins != NOWHERE]):
-        share = (sides == kind).astype(np.float32)
+        share = ((sides == kind) & is_open).astype(np.float32)
         for other in {0, 1, 2} - {axis}:
             share = _means_along(share, _box, CENTRE, other)
         open_share += np.where(joins == kind, share.ravel(), 0.0)
@@ -271,20 +324,22 @@ def _rub(squared: np.ndarray) -> np.ndarray:
 
 
 def _moved_inward(
-    grid: Grid, distance: Distance, axis: int, rubbing: np.ndarray, carries: np.ndarray
+    grid: Grid, distance: Distance, axis: int, wall: np.ndarray, carries: np.ndarray
 ) -> np.ndarray:
-    """Rubbing area of the faces along an axis.
+    """Area of wall at the faces along an axis.
 
-    What rubs at a face that carries no momentum rubs at its neighbours away from the wall instead.
-    At the corner of the floor none may carry: cups of less than 3 cm in radius lose 3 to 5 % of
-    what rubs vertically.
+    That of a face that carries no momentum counts at its neighbours away from the wall instead, or
+    behind it where a thin wall's other side is nearer. At the corner of the floor none may carry:
+    cups of less than 3 cm in radius lose 3 to 5 % of what rubs vertically.
     """
-    area, faces = np.where(carries, rubbing, 0.0), grid.faces(axis).T
-    lost = np.flatnonzero((rubbing > 0.0) & ~carries & grid.inner())
+    area, faces = np.where(carries, wall, 0.0), grid.faces(axis).T
+    lost = np.flatnonzero((wall > 0.0) & ~carries & grid.inner())
     normal = _normal(grid, distance, faces[:, lost])
     steps = np.array(grid.strides)[:, None] * np.sign(normal).astype(int)
-    inward = np.clip(lost + steps, 0, grid.cells - 1)
+    inward, behind = (np.clip(lost + way * steps, 0, grid.cells - 1) for way in (1, -1))
+    none = ~(normal**2 * carries[inward]).any(axis=0)
+    inward[:, none] = behind[:, none]
     weight = normal**2 * carries[inward]
     weight /= np.maximum(weight.sum(axis=0), 1e-20)
-    np.add.at(area, inward, weight * rubbing[lost])
+    np.add.at(area, inward, weight * wall[lost])
     return area

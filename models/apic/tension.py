@@ -48,14 +48,18 @@ def pull_surface(s, g):
                     force = add_shear(s, g, a, m, S, s.rest[g, a, m] - s.rest[g, a, o])
                     force -= wet * (colour(s, g, m) - colour(s, g, o))
                     force *= positive(s.fraction[g, m] + s.fraction[g, o])  # known to all lanes
+                    force /= ti.max(takers(s, g, a, m, S[a]), 1.0)
                 s.product[g, a, m] = force
         accelerate(s, g)
 
 
 @ti.func
 def colour(s, g, m):
-    """How full a cell is, at most 1; 0 farther than a cell from any particle."""
-    return ti.min(s.fraction[g, m], 1.0) * s.open[m]
+    """1 in liquid cells, less in emptier ones; 0 farther than a cell from any particle.
+
+    How full a cell is would give a film of half a cell half of a surface's tension.
+    """
+    return ti.min(s.fraction[g, m] / LIQUID, 1.0) * s.open[m]
 
 
 @ti.func
@@ -80,10 +84,8 @@ def accelerate(s, g):
                 force += on_surface * below * beyond(s, g, a, m + S[a], S[a])
                 far = to_surface(s.fraction[g, m], s.fraction[g, o])
                 mass = ti.max(s.mass[g, a, m], LEAST_MASS)
-                given = (1.0 - above) * (1.0 - below)
-                given *= ti.max(near_filled(s, g, a, m, S[a]), near_filled(s, g, a, o, -S[a]))
-                kept = (1.0 - given) * force / chosen(on_surface, far, mass)
-                s.velocity[g, a, m] = s.velocity[g, a, m] + kept
+                kept = positive(1.0 - takers(s, g, a, m, S[a])) * force
+                s.velocity[g, a, m] = s.velocity[g, a, m] + kept / chosen(on_surface, far, mass)
 
 
 @ti.func
@@ -93,17 +95,29 @@ def filled(s, g, m):
 
 @ti.func
 def beyond(s, g, a, face, step):
-    """What acts on a face and on the next one."""
-    return s.product[g, a, face] + s.product[g, a, face + step]
+    """What acts on the next two faces beyond a surface; no wall and no other filled cell is
+    passed."""
+    further = ti.min(face, face + step)  # the cell behind the face
+    first = s.carries[a, face] * (1.0 - filled(s, g, further))
+    second = s.carries[a, face + step] * (1.0 - filled(s, g, further + step))
+    return first * (s.product[g, a, face] + second * s.product[g, a, face + step])
 
 
 @ti.func
-def near_filled(s, g, a, m, step):
-    """Whether one of the next two cells on a side is filled, 1 or 0, and nothing stands between."""
-    first = ti.max(m, m + step)
-    second = first + step
-    way = s.carries[a, first]
-    return way * ti.max(filled(s, g, m + step), s.carries[a, second] * filled(s, g, m + 2 * step))
+def takers(s, g, a, m, step):
+    """How many surfaces take what acts on a face: 0 to 2, and 0 if it is one itself."""
+    o = m - step
+    neither = (1.0 - filled(s, g, m)) * (1.0 - filled(s, g, o))
+    return neither * (near_filled(s, g, a, m, step) + near_filled(s, g, a, o, -step))
+
+
+@ti.func
+def near_filled(s, g, a, cell, step):
+    """Whether one of the next two cells is filled, 1 or 0, and no wall stands between."""
+    there = cell + step
+    first, second = ti.max(cell, there), ti.max(there, there + step)  # the faces on the way
+    is_second = s.carries[a, second] * filled(s, g, there + step)
+    return s.carries[a, first] * ti.max(filled(s, g, there), is_second)
 
 
 @ti.func

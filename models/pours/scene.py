@@ -105,6 +105,14 @@ class PouringScene(WettingLiquid):
         )
 
     @ti.func
+    def in_room(self, g, lane, steps, v):
+        """A vector of the cup's frame in the room's, so many steps after the start."""
+        turned = self.rate_of_turn[g, lane] * steps * self.dt[None]
+        angle = ti.min(turned, self.final_angle[g, lane])
+        c, s = ti.cos(angle), ti.sin(angle)
+        return vec3(c * v[0] + s * v[2], v[1], c * v[2] - s * v[0])
+
+    @ti.func
     def accelerate(self, g, lane, n):
         """Gravity and the forces of the turning frame."""
         cosine, sine, turn, jump, whirl, swirl = self.frame[g, lane]
@@ -151,11 +159,11 @@ class PouringScene(WettingLiquid):
         out = self.out(x)
         if x[2] < off and out > inner - off and out < outer + off:
             was = self.out(before)
-            if before[2] >= 0.99 * off and was > inner and was < outer:
+            if before[2] >= 0.99 * off and out > inner and out < outer:
                 x[2], v[2] = off, ti.max(v[2], 0.0)
             else:
                 within = was < inner + 0.5 * self.rim[None]
-                if before[2] >= 0.0 and was >= outer:
+                if before[2] >= 0.0 and out >= outer:
                     within = False
                 to = ti.select(within, inner - off, outer + off)
                 n = vec3(x[0] + inner, x[1], 0.0) / out
@@ -179,22 +187,18 @@ class PouringScene(WettingLiquid):
     def fly(self, g, lane, n, step):
         """Let a particle fly freely from where it is at the end of a step.
 
-        Its velocity is that of the step's middle, so half a step of gravity is taken back.
+        Its velocity is that of the step's middle, so gravity acts for half a step more.
         """
-        cosine, sine, turn = self.frame[g, lane][0], self.frame[g, lane][1], self.frame[g, lane][2]
+        dt, turn = self.dt[None], self.frame[g, lane][2]
         x, v = self.position[g, lane, n], self.speed[g, lane, n]
-        v += turn * vec3(x[2], 0.0, -x[0])
+        x_middle = x - 0.5 * dt * v
+        v += turn * vec3(x_middle[2], 0.0, -x_middle[0])
+        place = self.in_room(g, lane, step + 1.0, x)
+        velocity = self.in_room(g, lane, step + 0.5, v) - vec3(0.0, 0.0, 0.5 * dt * GRAVITY)
         k = self.flown[g, lane]
-        self.flight[g, lane, k] = ti.Vector(
-            [
-                cosine * x[0] + sine * x[2],
-                x[1],
-                cosine * x[2] - sine * x[0],
-                cosine * v[0] + sine * v[2],
-                v[1],
-                cosine * v[2] - sine * v[0],
-            ]
-        )
+        for a in ti.static(range(3)):
+            self.flight[g, lane, k][a] = place[a]
+            self.flight[g, lane, k][3 + a] = velocity[a]
         self.departure[g, lane, k] = (step + 1) * self.dt[None]
         self.flown[g, lane] = k + 1
 
