@@ -20,6 +20,9 @@ from .surface import LIQUID, to_surface
 from .transfer import strides
 from .viscosity import add_shear
 
+FULL = 0.75
+"""Share of its capacity from which a cell has no surface: within liquid particles lie unevenly, and
+where they are few is nothing that pulls."""
 LEAST_MASS = 0.05  # of a face, in full cells, that tension accelerates
 
 
@@ -55,11 +58,8 @@ def pull_surface(s, g):
 
 @ti.func
 def colour(s, g, m):
-    """1 in liquid cells, less in emptier ones; 0 farther than a cell from any particle.
-
-    How full a cell is would give a film of half a cell half of a surface's tension.
-    """
-    return ti.min(s.fraction[g, m] / LIQUID, 1.0) * s.open[m]
+    """1 in full cells, less in emptier ones; 0 farther than a cell from any particle."""
+    return ti.min(s.fraction[g, m] / FULL, 1.0) * s.open[m]
 
 
 @ti.func
