@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from threading import Event, Thread
 
+import psutil
 import pytest
 from _pytest.runner import runtestprotocol
 
@@ -19,6 +20,7 @@ ALONE_IN = ("hardware", "properties")  # where Makefile looks for tests that hav
 MOST_REPEATS = 3  # of a session; with more of them, tests hide what fails
 CALM, MOST_CALM = 1.0, 30.0  # s, without a stall before a repetition; and waited for at most
 REPEATED = pytest.StashKey[list[str]]()
+MOST_MEMORY = 2.5e9  # bytes, beyond which a process forgets what JAX has compiled
 STALL = 0.03  # s; a watchdog of 0.1 s and several processes wait for each other
 
 
@@ -80,6 +82,14 @@ def _figures_are_closed():
     yield
     if "matplotlib.pyplot" in sys.modules:
         sys.modules["matplotlib.pyplot"].close("all")
+
+
+def pytest_runtest_teardown(item, nextitem):
+    """Compiled functions of all tests together take several gigabytes in each process."""
+    if nextitem is not None and nextitem.path == item.path:
+        return
+    if "jax" in sys.modules and psutil.Process().memory_info().rss > MOST_MEMORY:
+        sys.modules["jax"].clear_caches()
 
 
 def pytest_runtest_protocol(item, nextitem):

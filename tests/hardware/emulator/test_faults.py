@@ -136,6 +136,7 @@ say(control.moveJ([0.3, -1.4, 1.6, -1.7, -1.5, 0.3]))
 """
 
 
+@pytest.mark.punctual  # the client learns of the stop by a link of its own
 def test_nothing_resumes_after_a_protective_stop(emulator):
     with Client(emulator, RESUME) as client:
         assert client.hear() == "moving"

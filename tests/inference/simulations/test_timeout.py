@@ -54,15 +54,15 @@ def test_a_batch_has_the_time_of_all_and_then_each_its_own(forever):
 
 
 def test_a_slow_batch_is_no_failure():
-    """Four runs of 0.1 s in one call, with 0.2 s for each."""
+    """Four runs of 0.2 s in one call, with 0.6 s for each."""
 
     def simulate(theta, seeds):
-        time.sleep(0.1 * len(seeds))
+        time.sleep(0.2 * len(seeds))
         return theta["a"][:, None]
 
-    found = run_batch(simulate, JOBS, (1,), 0.2)
+    found = run_batch(simulate, JOBS, (1,), 0.6)
     assert all(result.error is None for result in found)
-    assert sum(result.seconds for result in found) == pytest.approx(0.4, abs=0.3)
+    assert 0.8 <= sum(result.seconds for result in found) < 10.0
 
 
 @pytest.mark.parametrize("error", [ValueError("bad"), TimeoutError("of its own"), SystemExit(3)])
