@@ -124,22 +124,7 @@ def sample_geometry(
     carries = inner & (area > LEAST_AREA)
     face_side = np.maximum(own, below)
     wall, rubbing = (
-        np.stack(
-            [
-                sum(
-                    _moved_inward(
-                        grid,
-                        distance,
-                        axis,
-                        walls[kind, what, axis],
-                        carries[axis] & _joined(face_side[axis], kind),
-                    )
-                    for kind in kinds
-                )
-                for axis in range(3)
-            ]
-        )
-        for what in range(2)
+        _by_side(grid, distance, walls[:, what], carries, face_side) for what in range(2)
     )
     away = np.stack([distance(*grid.faces(axis).T) / grid.cell for axis in range(3)])
     fields = (
@@ -321,6 +306,17 @@ def _rub(squared: np.ndarray) -> np.ndarray:
     """
     along = 1.0 - squared
     return along / (along**2 + squared**2)
+
+
+def _by_side(
+    grid: Grid, distance: Distance, walls: np.ndarray, carries: np.ndarray, face_side: np.ndarray
+) -> np.ndarray:
+    """Area of wall at the faces, shape (3, cells), from that on each side, (sides, 3, cells)."""
+    area = np.zeros(face_side.shape)
+    for kind, axis in np.ndindex(walls.shape[:2]):
+        of_side = carries[axis] & _joined(face_side[axis], kind)
+        area[axis] += _moved_inward(grid, distance, axis, walls[kind, axis], of_side)
+    return area
 
 
 def _moved_inward(
