@@ -110,7 +110,7 @@ def sample_geometry(
             edge[axis, cells] = _means(is_open, _box, EDGES[axis])
             for kind in kinds:
                 for what in range(2):
-                    area = np.where(layers.side == kind, layers.wall[what, axis], 0.0)
+                    area = layers.wall[what, axis] * (layers.side == kind)
                     walls[kind, what, axis, cells] = _means(area, _box, FACES[axis])
     own = np.argmax(volumes, axis=0)
     volume = np.choose(own, volumes)
@@ -186,9 +186,11 @@ def _samples(grid: Grid, distance: Distance, side: Side | None) -> Iterator[_Lay
         stands_for = SAMPLES * _wall_at(away[k, j, i], normal)
         if side is not None:
             at = _before_wall(at, away[k, j, i], normal, away.shape)
-        wall = np.zeros((2, 3, *away.shape), np.float32)
-        for of_kind, share in zip(wall, (1.0 - normal**2, _rub(normal**2)), strict=True):
-            np.add.at(of_kind, (slice(None), *at), stands_for * share)
+        where = np.ravel_multi_index(tuple(at), away.shape)
+        shares = np.concatenate([1.0 - normal**2, _rub(normal**2)])
+        wall = np.empty((2, 3, *away.shape), np.float32)
+        for of_share, share in zip(wall.reshape(6, -1), shares, strict=True):
+            of_share[:] = np.bincount(where, stands_for * share, away.size)
         yield _Layers(
             slice(low * grid.strides[2], high * grid.strides[2]),
             away > 0.0,
