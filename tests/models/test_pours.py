@@ -1,6 +1,7 @@
 """Pours of the new liquid: against volume of fluid, similarity, and what is conserved."""
 
 import csv
+import re
 from functools import cache
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from bolfi_liquids.models.apic.geometry import ABOVE, INSIDE, OUTSIDE
 from bolfi_liquids.models.pours import march, vessel
 from bolfi_liquids.models.pours.flights import Flights, landing_of
 from bolfi_liquids.models.pours.resolution import Filled, cell_for, steps_for
-from bolfi_liquids.models.pours.vessel import Vessel, turned
+from bolfi_liquids.models.pours.vessel import Vessel, turned, vessel_of
 
 from bolfi_liquids import models
 
@@ -159,6 +160,38 @@ def test_the_cup_holds_its_volume_and_its_wall_parts_two_sides(cell):
     apart = [found.side[s:] * found.side[:-s] == INSIDE * OUTSIDE for s in grid.strides]
     for axis, stride in enumerate(grid.strides):
         assert (found.area[axis, stride:][apart[axis]] == 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("particles", "source", "message"),
+    [
+        (
+            1,
+            {},
+            "1 particles make cells of 69.4 mm in a cup of 28 mm in radius; .* 16, or 0",
+        ),
+        (10**8, {}, "particles make 83276440 cells of 0.15 mm, and .* is the most; give particles"),
+        (0, {"radius": 0.001, "height": 2.0}, "particles=0, make 5.* cells of 0.143 mm"),
+    ],
+)
+def test_cells_too_coarse_or_too_many_are_refused_before_the_first_step(
+    cups, monkeypatch, particles, source, message
+):
+    monkeypatch.setattr(models.pouring, "march", lambda *_: pytest.fail("a pour began"))
+    with pytest.raises(ValueError, match=message):
+        models.landings(WATER, 2.0, changed(cups, source=source), [0], particles)
+
+
+@pytest.mark.parametrize(
+    "cup", [Filled(0.028, 0.06, 0.034), Filled(0.25, 2.0, 0.001), Filled(0.001, 2.0, 0.5)]
+)
+def test_as_few_and_as_many_particles_as_a_refusal_names_can_be_poured(cup):
+    for particles in (1e-9, 1e9):
+        with pytest.raises(ValueError, match="give particles of ") as refused:
+            vessel_of(cup, particles)
+        advised = int(re.search(r"particles of (?:at least )?(\d+)", str(refused.value))[1])
+        made = vessel_of(cup, advised)
+        assert len(made.particles(4, 0)) > 0 and made.grid().cells < 2e6
 
 
 def test_cells_and_steps_follow_the_cup():
