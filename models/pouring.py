@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .cups import Cups
+from .cups import FASTEST, SLOWEST, Cups
 from .effect_coefficients import Acting, acting_in, changed_wetting, liquid_sets, with_adhesion
 from .fluid import runtime
 from .fluid.checks import check_numbers, checked_seeds
@@ -21,8 +21,6 @@ from .pours.flights import Flights, landing_of
 from .pours.march import Pours, Turn, march
 from .pours.resolution import steps_for
 from .pours.vessel import vessel_of
-
-SLOWEST, FASTEST = 0.01, 30.0  # rad/s: a pour of three minutes; a cup that is flung
 
 
 @dataclass(frozen=True)
