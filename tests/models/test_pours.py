@@ -1,6 +1,7 @@
 """Pours of the new liquid: against volume of fluid, similarity, and what is conserved."""
 
 import csv
+import json
 import re
 from functools import cache
 from pathlib import Path
@@ -15,7 +16,8 @@ from bolfi_liquids.models.pours.vessel import Vessel, turned, vessel_of
 
 from bolfi_liquids import models
 
-REFERENCE = Path(__file__).parents[1] / "data/pour_reference/pours_vof.csv"
+REFERENCES = Path(__file__).parents[1] / "data/pour_reference"
+SPILLED, LANDINGS = REFERENCES / "pours_vof.csv", REFERENCES / "pours_vof_landings.json"
 WATER, GLYCERIN = models.Liquid(1e-3, 0.9, 1000.0), models.Liquid(1.0, 0.79, 1260.0)
 FEW = 900  # particles, of cells of 7 mm
 
@@ -28,7 +30,7 @@ def changed(cups, **sections):
 
 @cache
 def spilled_in_reference(liquid, rate):
-    with REFERENCE.open() as file:
+    with SPILLED.open() as file:
         rows = [row for row in csv.DictReader(file) if row["liquid"] == liquid]
     names = "distance_cm", "spilled_fraction", "retained_fraction"
     found = [[float(row[name]) for name in names] for row in rows
@@ -36,20 +38,32 @@ def spilled_in_reference(liquid, rate):
     return np.array(found).T
 
 
+def mean_landing_in_reference(liquid, rate):
+    """Of all that left, from the lip towards the receiver [m]."""
+    cases = json.loads(LANDINGS.read_text())["cases"]
+    lower, _, share = np.array(cases[f"{liquid}_{rate:g}"]["x_y_fraction"]).T
+    return 1e-3 * np.average(lower + 0.5, weights=share)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "liquid", "rate", "hold"),
-    [("water", WATER, 90.0, 0.9), ("glycerin", GLYCERIN, 45.0, 2.1)],
+    ("name", "liquid", "hold"), [("water", WATER, 0.9), ("glycerin", GLYCERIN, 2.1)]
 )
-def test_a_pour_lands_where_volume_of_fluid_says(cups, name, liquid, rate, hold):
-    """Today's RMS are 0.04 and 0.10; the former particles' were 0.2 and more."""
-    cups = changed(cups, pour={"hold": hold})
-    distance, spilled, retained = spilled_in_reference(name, rate)
-    landed = models.landings(liquid, np.radians(rate), cups, [0])
-    found = landed.into(distance[:, None] / 100.0, cups.receiver.radius)
-    judged = (0.02 <= spilled) & (spilled <= 0.98)
-    assert np.sqrt(np.mean((found.spilled[:, 0] - spilled)[judged] ** 2)) < 0.13
-    assert landed.retained[0] == pytest.approx(retained[0], abs=0.07)
+def test_pours_land_where_volume_of_fluid_says(cups, name, liquid, hold):
+    """On average over three rates. Today's RMS are 0.09 and 0.08, mean landings are off by 1.6 and
+    3.1 mm, and glycerin's retained fractions by 0.03; the former particles' RMS were 0.2 and more.
+    """
+    cups, off = changed(cups, pour={"hold": hold}), []
+    for rate in (45.0, 90.0, 180.0):
+        distance, spilled, retained = spilled_in_reference(name, rate)
+        landed = models.landings(liquid, np.radians(rate), cups, [0])
+        found = landed.into(distance[:, None] / 100.0, cups.receiver.radius)
+        judged = (0.02 <= spilled) & (spilled <= 0.98)
+        rms = np.sqrt(np.mean((found.spilled[:, 0] - spilled)[judged] ** 2))
+        ahead = np.nanmean(landed.position[0, :, 0]) - mean_landing_in_reference(name, rate)
+        off.append([rms, abs(ahead), abs(landed.retained[0] - retained[0])])
+    rms, ahead, retained = np.mean(off, axis=0)
+    assert rms < 0.11 and ahead < 5e-3 and retained < 0.04, off
 
 
 @pytest.mark.slow
