@@ -11,7 +11,14 @@ from functools import cache
 import numpy as np
 
 from ..apic.filling import Cylinder, fill_cup
-from ..apic.geometry import ABOVE, INSIDE, OUTSIDE, Geometry, sample_geometry
+from ..apic.geometry import (
+    ABOVE,
+    INSIDE,
+    NEAREST_OF_FILMS,
+    OUTSIDE,
+    Geometry,
+    sample_geometry,
+)
 from ..apic.grid import WALL, Grid
 from .resolution import Filled, cell_for, particles_for
 
@@ -20,7 +27,6 @@ BEYOND, OVER, UNDER = 38 / 28, 40 / 28, 25 / 28
 """How far the region reaches beyond the lip, above the rim and below it, in radii of the cup: the
 references' own. Nearer, the stream would still be shaped by the rim."""
 AIR = 3  # cells beyond the region: two without liquid, and one that no stencil leaves
-NEAREST = 0.25  # cells from a wall at which friction is reckoned at least: films are thin
 BELOW_FLOOR = 0.02  # m of wall that nothing passes
 COARSEST = 1.0  # cells in the cup's radius, at least; coarser ones may hold no particle
 MOST_CELLS = 1_500_000  # which take 1 to 2 GB a processor
@@ -129,7 +135,7 @@ def _from_ring(
 @cache
 def _geometry(vessel: Vessel) -> Geometry:
     grid = vessel.grid()
-    whole = sample_geometry(grid, vessel.distance, vessel.side, NEAREST)
+    whole = sample_geometry(grid, vessel.distance, vessel.side, NEAREST_OF_FILMS)
     mirror = np.arange(grid.cells) // grid.strides[1] % grid.shape[1] == WALL
     for of_faces, value in ((whole.area, 0.0), (whole.carries, 0.0), (whole.shut, 1.0)):
         of_faces[1, mirror] = value
