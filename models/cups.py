@@ -18,6 +18,7 @@ from .pours.resolution import LEAST_VISCOSITY, Filled, settings
 
 MIN_LENGTH, MAX_RADIUS, MAX_HEIGHT = 1e-3, 0.25, 2.0  # [m] of cups that are poured by hand or arm
 MAX_DISTANCE = 0.5  # [m] from the lip to the receiver's axis
+SLOWEST, FASTEST = 0.01, 30.0  # rad/s: a pour of three minutes; a cup that is flung
 CONTACT_ANGLE_DEG = 60.0
 """Of a cup whose file has none: between those of water on glass and on plastics."""
 
@@ -34,13 +35,21 @@ def _up_to(most: float) -> AfterValidator:
     return AfterValidator(check)
 
 
+def _pourable(rate: float) -> float:
+    """A rule for angular velocities [deg/s], the same as that of `pour`."""
+    if not SLOWEST <= np.radians(rate) <= FASTEST:
+        slowest, fastest = np.degrees([SLOWEST, FASTEST])
+        raise ValueError(f"it must be {slowest:.3g} to {fastest:.5g} deg/s")
+    return rate
+
+
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Radius = Annotated[Number, Field(ge=MIN_LENGTH), _up_to(MAX_RADIUS)]
 Height = Annotated[Number, Field(ge=MIN_LENGTH), _up_to(MAX_HEIGHT)]
 Distance = Annotated[Number, _up_to(MAX_DISTANCE)]
 Degrees = Annotated[Number, Field(gt=0, le=180)]
 ContactDegrees = Annotated[Number, Field(ge=0, le=180)]
-DegreesPerSecond = Annotated[Number, Field(gt=0, le=3600)]
+DegreesPerSecond = Annotated[Number, AfterValidator(_pourable)]
 Seconds = Annotated[Number, Field(ge=0, le=60)]
 
 

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .fluid.checks import check_numbers
+from .fluid.checks import check_numbers, checked_seeds
 from .fluid.liquid import Liquid
 from .fluid.runtime import Watch
 from .pouring import PourBatch, watched_landings
@@ -104,11 +104,14 @@ def pour_frames(batch: PourBatch, *, rate: float = FRAME_RATE) -> PourFrames:
         rate: Frames per second, each at the nearest substep; the last is the end of the pour.
 
     Raises:
-        ValueError: as `landings`, or the rate is not positive.
+        ValueError: as `landings`, there are several seeds, or the rate is not positive.
     Warns:
         FailedSimulation: the simulation went wrong; positions are NaN.
     """
     check_numbers("frames", rate=rate)
+    pours = checked_seeds(batch.seeds).size
+    if pours > 1:
+        raise ValueError(f"frames: seeds must be one integer, got {pours}; take one pour at a time")
     seen, turning = list[PourFrames](), float(np.ravel(batch.angular_velocity)[0])
     drop = batch.cups.pour.lip_height - batch.cups.receiver.height
 

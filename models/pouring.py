@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .cups import Cups
+from .cups import FASTEST, SLOWEST, Cups
 from .effect_coefficients import Acting, acting_in, changed_wetting, liquid_sets, with_adhesion
 from .fluid import runtime
 from .fluid.checks import check_numbers, checked_seeds
@@ -19,10 +19,8 @@ from .fluid.liquid import TENSION_AT_ONE, Liquid
 from .fluid.runtime import Watch
 from .pours.flights import Flights, landing_of
 from .pours.march import Pours, Turn, march
-from .pours.resolution import cell_for, steps_for
-from .pours.vessel import Vessel
-
-SLOWEST, FASTEST = 0.01, 30.0  # rad/s: a pour of three minutes; a cup that is flung
+from .pours.resolution import steps_for
+from .pours.vessel import vessel_of
 
 
 @dataclass(frozen=True)
@@ -113,7 +111,8 @@ def pour(
 
     Raises:
         ValueError: lengths do not agree, an action is not finite, too slow or too fast, the
-            number of particles is negative, or an effect is unknown.
+            number of particles is negative, an effect is unknown, or cells are wider than the
+            cup's radius or too many.
     Warns:
         FailedSimulation: a pour went wrong; its fractions are NaN.
     """
@@ -157,7 +156,7 @@ def watched_landings(batch: PourBatch, watch: Watch | None = None) -> Landings:
     rate = _checked_rate(batch.angular_velocity, len(seeds))
     check_numbers("pour", zero=True, particles=batch.particles)
     cup = cups.source.filled
-    vessel = Vessel(*cup, cell_for(cup, batch.particles))
+    vessel = vessel_of(cup, batch.particles)
     steps = steps_for(cup.height, vessel.cell, rate)
     pours = _pours(batch.liquid.batch(len(seeds)), rate, cups, seeds, acting)
     found: list[Flights] = [None] * len(seeds)  # type: ignore[list-item]  filled below

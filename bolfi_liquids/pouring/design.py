@@ -27,7 +27,9 @@ RATE = "angular_velocity"
 CELLS = 32  # of the lattice, along each side
 TAIL = 0.005  # of a parameter's draws, at either end, that may lie outside
 MARGIN = 0.1  # by which the box is wider at either end, in units of the draws' range
-MIN_VOLUME = 2.0**-13  # of a box; a smaller one would hold too few points of the sequence
+MIN_VOLUME = 2.0**-13
+"""Of a box, which then has 128 of the sequence's points on average; no decision asks for more than
+100. Of 120 boxes of this size, the poorest had 128 with six inputs, and 104 with eight."""
 SEQUENCE, BLOCK = 2**20, 2**14  # points that are looked at, and at a time
 PACKINGS = 64  # initial packings of the pours
 WIDE = 0.1  # share of the prior's viscosities that are poured alike

@@ -280,7 +280,7 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
 
 
 def _check_action(angular_velocity: float, distance: float) -> None:
-    from ..models.pouring import FASTEST, SLOWEST
+    from ..models.cups import FASTEST, SLOWEST
 
     angular_velocity = number_of(angular_velocity, Argument("angular_velocity"))
     distance = number_of(distance, Argument("distance"))

@@ -25,6 +25,7 @@ LEAST_CAPACITY = 0.02
 ON_WALL = 1e-3  # cells from a wall within which a face lies in it
 BESIDE = 0.75  # cells from a wall within which a cell's centre is close to it
 NEAREST = 0.1  # cells from a wall at which friction is reckoned at least
+NEAREST_OF_FILMS = 0.25  # the same of liquids that leave thin films on walls
 SAMPLES = 8  # along each edge of a cell
 TOGETHER = 4  # layers of cells that are sampled at once
 

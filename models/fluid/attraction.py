@@ -13,9 +13,8 @@ limited in length, pairs exchange momentum along their line of centres e in two 
 
 Both keep linear and angular momentum. Walls do not attract, so liquids do not wet them by this.
 The strength of cohesion follows the particles, not the liquid: its tension grows with density and
-spacing², and is about 0.06 N/m at cohesion 1 with water's density and particles 6 mm apart. It has
-less rounding than the effect `surface_tension`, whose drops swing at the right frequency but whose
-streams part into smaller ones.
+spacing², and is about 0.06 N/m at cohesion 1 with water's density and particles 6 mm apart. With
+so much rounding that drops swing at the right frequency, streams part into smaller ones.
 """
 
 import taichi as ti

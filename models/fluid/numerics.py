@@ -86,7 +86,7 @@ class ParticleNumerics:
 
         Measured without gravity in channels twelve particles wide (validation case `poiseuille`).
         It rises with speed, as particles that pass each other pick up disorder, and, beyond what
-        this says, with the pressure that they bear (case `film_flow`).
+        this says, with the pressure that they bear.
 
         Args:
             spacing: Particle spacing [m].

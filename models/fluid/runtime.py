@@ -42,7 +42,8 @@ class OneThread:
 
     def __enter__(self) -> None:
         self._lock.acquire()
-        if self._owner is not None and self._owner.ident != threading.get_ident():
+        # idents of threads that have ended are used again
+        if self._owner is not None and self._owner is not threading.current_thread():
             self._lock.release()
             raise WrongThread(
                 f"Taichi was started in the thread {self._owner.name!r} and works in no other; "

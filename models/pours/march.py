@@ -99,7 +99,7 @@ def _together(vessel, pours: Pours, turn: Turn, effects, watch) -> list[Flights]
     n = len(points[0])
     scene = _scene_for(vessel, n, effects)
     scene.enter_cup(vessel, RIM, turn.dt)
-    scene.rate = 1.0 / turn.dt
+    scene.rate, scene.shown = 1.0 / turn.dt, n
     density = np.asarray(pours.liquid.density)
     volume = 0.5 * np.pi * vessel.radius**2 * vessel.fill / n / vessel.cell**3
     rows = (

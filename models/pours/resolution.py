@@ -46,6 +46,11 @@ def cell_for(cup: Filled, particles: int = 0) -> float:
     return max(min(cup.radius / CELLS, cup.fill / LAYERS), cup.radius / FINEST)
 
 
+def particles_for(cup: Filled, cell: float) -> float:
+    """How many fill cells of an edge [m], about."""
+    return PER_CELL * cup.volume / cell**3
+
+
 def steps_for(height: float, cell: float, rate: np.ndarray) -> np.ndarray:
     """Step of each pour [s], in cells [m], from a cup of a height [m]; rates of turn are in rad/s.
 

@@ -32,6 +32,7 @@ class PouringScene(WettingLiquid):
         flight: Of these in the room's frame where they left: place [m], velocity [m/s].
         departure: When they did [s].
         retained: Particles left in the cup at the end.
+        shown: Particles of the first pour at its start, of which a fault leaves none.
     """
 
     SIDED, MIRRORED = True, True
@@ -260,6 +261,6 @@ class PouringScene(WettingLiquid):
         flown = self.flown[0, 0]
         flight = self.flight.to_numpy()[0, 0, :flown]
         flights = Flights(
-            flight[:, :3], flight[:, 3:], self.departure.to_numpy()[0, 0, :flown], 0.0, held + flown
+            flight[:, :3], flight[:, 3:], self.departure.to_numpy()[0, 0, :flown], 0.0, self.shown
         )
         return self.position.to_numpy()[0, 0, :held], flights

@@ -11,16 +11,25 @@ from functools import cache
 import numpy as np
 
 from ..apic.filling import Cylinder, fill_cup
-from ..apic.geometry import ABOVE, INSIDE, OUTSIDE, Geometry, sample_geometry
+from ..apic.geometry import (
+    ABOVE,
+    INSIDE,
+    NEAREST_OF_FILMS,
+    OUTSIDE,
+    Geometry,
+    sample_geometry,
+)
 from ..apic.grid import WALL, Grid
+from .resolution import Filled, cell_for, particles_for
 
 RIM = 0.002  # m, thickness of the wall; the rim is flat
 BEYOND, OVER, UNDER = 38 / 28, 40 / 28, 25 / 28
 """How far the region reaches beyond the lip, above the rim and below it, in radii of the cup: the
 references' own. Nearer, the stream would still be shaped by the rim."""
 AIR = 3  # cells beyond the region: two without liquid, and one that no stencil leaves
-NEAREST = 0.25  # cells from a wall at which friction is reckoned at least: films are thin
 BELOW_FLOOR = 0.02  # m of wall that nothing passes
+COARSEST = 1.0  # cells in the cup's radius, at least; coarser ones may hold no particle
+MOST_CELLS = 1_500_000  # which take 1 to 2 GB a processor
 
 
 @dataclass(frozen=True)
@@ -80,6 +89,31 @@ class Vessel:
         return fill_cup(self.grid(), cup, self.fill, per_cell, seed)
 
 
+def vessel_of(cup: Filled, particles: int = 0) -> Vessel:
+    """A cup cut into cells, as `cell_for` chooses them.
+
+    Raises:
+        ValueError: Cells are wider than the cup's radius, or more than `MOST_CELLS`.
+    """
+    vessel = Vessel(*cup, cell_for(cup, particles))
+    if vessel.cell * COARSEST > cup.radius * (1.0 + 1e-6):
+        least = math.ceil(particles_for(cup, cup.radius / COARSEST))
+        raise ValueError(
+            f"pour: {particles:g} particles make cells of {1e3 * vessel.cell:.3g} mm in a cup of "
+            f"{1e3 * cup.radius:.3g} mm in radius; give particles of at least {least}, or 0"
+        )
+    if vessel.grid().cells > MOST_CELLS:
+        fewer = particles or particles_for(cup, vessel.cell)
+        while Vessel(*cup, cell_for(cup, fewer)).grid().cells > MOST_CELLS:
+            fewer //= 2
+        wanted = f"{particles:g} particles" if particles else "the cup's own cells, particles=0,"
+        raise ValueError(
+            f"pour: {wanted} make {vessel.grid().cells} cells of {1e3 * vessel.cell:.3g} mm, and "
+            f"{MOST_CELLS} is the most; give particles of {fewer:g}, or a wider or lower cup"
+        )
+    return vessel
+
+
 def turned(points: np.ndarray, angle: float) -> np.ndarray:
     """Points of the cup's frame (n, 3) in the room's, whose origin is the lip too, once the cup has
     turned by an angle [rad]."""
@@ -101,7 +135,7 @@ def _from_ring(
 @cache
 def _geometry(vessel: Vessel) -> Geometry:
     grid = vessel.grid()
-    whole = sample_geometry(grid, vessel.distance, vessel.side, NEAREST)
+    whole = sample_geometry(grid, vessel.distance, vessel.side, NEAREST_OF_FILMS)
     mirror = np.arange(grid.cells) // grid.strides[1] % grid.shape[1] == WALL
     for of_faces, value in ((whole.area, 0.0), (whole.carries, 0.0), (whole.shut, 1.0)):
         of_faces[1, mirror] = value

@@ -1,15 +1,12 @@
-"""Speed of the fluid, and how well it repeats pours, beside their bars.
+"""Speed of the fluid beside its bars.
 
-    .venv/bin/python tests/benchmarks/fluid.py --recordings FOLDER --only speed pours
+    .venv/bin/python tests/benchmarks/fluid.py --only speed start
 
-FOLDER holds recordings LIQUID_*.nc and the tables of pours with their cups; without it, and
-without BOLFI_LIQUIDS_RECORDINGS, the bundled recordings are taken, and pours are left out. The
-comparison with SPlisHSPlasH needs an environment of its own: `make peers`. Times are true only on
-a machine that does nothing else.
+The comparison with SPlisHSPlasH needs an environment of its own: `make peers`. Times are true only
+on a machine that does nothing else. How well pours land is judged by `check physics --against`.
 """
 
 import argparse
-import os
 from collections.abc import Callable, Iterator
 from importlib.resources import files
 from pathlib import Path
@@ -18,7 +15,6 @@ from bars import (
     HEAD,
     Line,
     against_peer,
-    pours,
     row,
     start_up,
     stirring_seconds,
@@ -26,14 +22,12 @@ from bars import (
 )
 from machine import machine
 
-BUNDLED = Path(str(files("bolfi_liquids.data")))
-TIMED = BUNDLED / "glycerin_v10.nc"
+TIMED = Path(str(files("bolfi_liquids.data"))) / "glycerin_v10.nc"
 PARTS: dict[str, Callable[[Path], Iterator[Line]]] = {
-    "speed": lambda _: stirring_seconds(TIMED),
-    "throughput": lambda _: throughput(TIMED),
-    "start": lambda _: start_up(TIMED),
-    "peer": lambda _: against_peer(TIMED),
-    "pours": pours,
+    "speed": stirring_seconds,
+    "throughput": throughput,
+    "start": start_up,
+    "peer": against_peer,
 }
 
 
@@ -43,7 +37,7 @@ def main(arguments: list[str] | None = None) -> None:
     lines = []
     for name in chosen.only:
         before = len(lines)
-        for line in PARTS[name](chosen.recordings):
+        for line in PARTS[name](TIMED):
             print(row(line), flush=True)
             lines.append(line)
         if len(lines) == before:
@@ -56,8 +50,6 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    folder = Path(os.environ.get("BOLFI_LIQUIDS_RECORDINGS", BUNDLED))
-    parser.add_argument("--recordings", type=Path, metavar="FOLDER", default=folder)
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS))
     return parser
 

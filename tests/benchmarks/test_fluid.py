@@ -1,4 +1,4 @@
-"""The table of the fluid's bars, and that its own arithmetic is right."""
+"""The table of the fluid's bars, and what its peer's scene needs."""
 
 import ast
 from pathlib import Path
@@ -7,7 +7,6 @@ import fluid
 import numpy as np
 import pytest
 from bars import Line, row
-from bars.pours import Table, regret
 
 HERE = Path(__file__).parent
 
@@ -23,22 +22,6 @@ def test_a_line_says_whether_its_bar_is_met():
     assert row(Line("rank", 0.4, 0.85, least=True)).endswith(">= 0.85 NOT MET")
     assert row(Line("failed", np.nan, 0.5)).endswith("NOT MET")
     assert Line("for information", 1.0).met is None
-
-
-def bowl(rate, distance):
-    return 0.002 * np.abs(rate - 90.0) / 45.0 + 0.05 * np.abs(distance - 3.0)
-
-
-def test_regret_is_read_from_the_table_where_ours_is_least():
-    rate, distance = (axis.ravel() for axis in np.meshgrid([45.0, 90.0, 180.0], [1.0, 3.0, 5.0]))
-    table = Table(np.full(9, "oil"), rate, distance, bowl(rate, distance))
-    best = regret(table, lambda tried: bowl(tried.rate, tried.distance))
-    assert best == pytest.approx((0.0, 0.0))
-    # ours likes a distance between two of the table's
-    shifted = regret(table, lambda tried: bowl(tried.rate, tried.distance + 1.0))
-    assert shifted == pytest.approx((0.05, 0.05))
-    mean, worst = regret(table, lambda tried: np.zeros(len(tried.rate)))
-    assert 0.0 < mean < worst == pytest.approx(0.104)
 
 
 def test_the_peer_s_scene_needs_only_old_python_and_numpy():

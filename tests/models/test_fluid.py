@@ -21,7 +21,7 @@ def test_viscosity_damps_a_shear_wave_as_its_number_says(viscosity):
 
     Channel flow has the viscosity asked for within a tenth; a single packing and a wave of twelve
     particles deserve a sixth. Without room to pass each other particles jam, so the block has 2 %
-    along each side; what pressure does is for the validation case `film_flow`.
+    along each side. Pressure, which would take that room, is not tested here.
     """
     spacing, counts, speed = 0.0065, (8, 12, 10), 0.03
     size = tuple(1.02 * spacing * n for n in counts)

@@ -118,6 +118,23 @@ def test_a_rate_that_is_none_is_refused(oil, cups, setup, path, rate):
         models.stir_frames(oil, path, setup, 0, rate=rate)
 
 
+def test_frames_of_several_pours_are_refused(oil, cups):
+    """They would show the first alone."""
+    with pytest.raises(ValueError, match="seeds must be one integer, got 2"):
+        models.pour_frames(PourBatch(oil, RATE, cups, [0, 1], PARTICLES))
+
+
+@pytest.mark.slow
+def test_a_pour_that_goes_wrong_has_no_frames(cups):
+    runtime.start()
+    sound = PourBatch(models.Liquid(20.0, 0.5, 1260.0), RATE, cups, [0], PARTICLES)
+    count = models.pour_frames(sound, rate=2.0).position.shape[1]
+    with pytest.warns(models.FailedSimulation):
+        frames = models.pour_frames(sound._replace(liquid=models.Liquid(3e38, 0.0, 1e3)), rate=2.0)
+    assert np.isnan(frames.position).all()
+    assert frames.position.shape == (len(frames.time), count, 3) and len(frames.time) > 1
+
+
 def test_a_stir_that_goes_wrong_has_no_frames(setup, path):
     runtime.start()  # Taichi warns when it is imported
     with pytest.warns(models.FailedSimulation):

@@ -39,6 +39,12 @@ def test_bad_actions_are_named(cups):
         ("135.0", "nan", r"pour\.final_angle_deg.*nan"),
         ("hold = 0.9 ", "hold = nan ", r"pour\.hold.*nan"),
         ("135.0", "720.0", r"pour\.final_angle_deg.*720"),
+        (
+            "[30.0, 180.0]",
+            "[30.0, 1720.0]",
+            r"angular_velocity_deg_s\.1: .* 1718.9 deg/s, got 1720",
+        ),
+        ("[30.0, 180.0]", "[0.57, 180.0]", r"angular_velocity_deg_s\.0: .*0.573 to .*, got 0.57"),
         ("_deg = 60.0", "_deg = -1.0", r"source\.contact_angle_deg.*-1"),
         ("_deg = 60.0", "_deg = 180.5", r"source\.contact_angle_deg.*180.5"),
         ("_deg = 60.0", "_deg = nan", r"source\.contact_angle_deg.*nan"),
@@ -69,6 +75,13 @@ def test_cups_without_a_contact_angle_are_taken_at_60_degrees(tmp_path, cups):
     path = tmp_path / "cups.toml"
     path.write_text(bundled_text().replace(line, ""))
     assert models.Cups.from_toml(path).contact_angle == pytest.approx(np.pi / 3.0)
+
+
+def test_every_angular_velocity_of_a_cups_file_is_one_that_pours_take(tmp_path):
+    path = tmp_path / "cups.toml"
+    path.write_text(bundled_text().replace("[30.0, 180.0]", "[0.573, 1718.8]", 1))
+    for rate in models.Cups.from_toml(path).angular_velocity_range:
+        assert models.pouring._checked_rate(rate, 1) == rate
 
 
 def bundled_text():

@@ -1,6 +1,8 @@
 """Pours of the new liquid: against volume of fluid, similarity, and what is conserved."""
 
 import csv
+import json
+import re
 from functools import cache
 from pathlib import Path
 
@@ -10,11 +12,12 @@ from bolfi_liquids.models.apic.geometry import ABOVE, INSIDE, OUTSIDE
 from bolfi_liquids.models.pours import march, vessel
 from bolfi_liquids.models.pours.flights import Flights, landing_of
 from bolfi_liquids.models.pours.resolution import Filled, cell_for, steps_for
-from bolfi_liquids.models.pours.vessel import Vessel, turned
+from bolfi_liquids.models.pours.vessel import Vessel, turned, vessel_of
 
 from bolfi_liquids import models
 
-REFERENCE = Path(__file__).parents[1] / "data/pour_reference/pours_vof.csv"
+REFERENCES = Path(__file__).parents[1] / "data/pour_reference"
+SPILLED, LANDINGS = REFERENCES / "pours_vof.csv", REFERENCES / "pours_vof_landings.json"
 WATER, GLYCERIN = models.Liquid(1e-3, 0.9, 1000.0), models.Liquid(1.0, 0.79, 1260.0)
 FEW = 900  # particles, of cells of 7 mm
 
@@ -27,7 +30,7 @@ def changed(cups, **sections):
 
 @cache
 def spilled_in_reference(liquid, rate):
-    with REFERENCE.open() as file:
+    with SPILLED.open() as file:
         rows = [row for row in csv.DictReader(file) if row["liquid"] == liquid]
     names = "distance_cm", "spilled_fraction", "retained_fraction"
     found = [[float(row[name]) for name in names] for row in rows
@@ -35,20 +38,32 @@ def spilled_in_reference(liquid, rate):
     return np.array(found).T
 
 
+def mean_landing_in_reference(liquid, rate):
+    """Of all that left, from the lip towards the receiver [m]."""
+    cases = json.loads(LANDINGS.read_text())["cases"]
+    lower, _, share = np.array(cases[f"{liquid}_{rate:g}"]["x_y_fraction"]).T
+    return 1e-3 * np.average(lower + 0.5, weights=share)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "liquid", "rate", "hold"),
-    [("water", WATER, 90.0, 0.9), ("glycerin", GLYCERIN, 45.0, 2.1)],
+    ("name", "liquid", "hold"), [("water", WATER, 0.9), ("glycerin", GLYCERIN, 2.1)]
 )
-def test_a_pour_lands_where_volume_of_fluid_says(cups, name, liquid, rate, hold):
-    """Today's RMS are 0.04 and 0.10; the former particles' were 0.2 and more."""
-    cups = changed(cups, pour={"hold": hold})
-    distance, spilled, retained = spilled_in_reference(name, rate)
-    landed = models.landings(liquid, np.radians(rate), cups, [0])
-    found = landed.into(distance[:, None] / 100.0, cups.receiver.radius)
-    judged = (0.02 <= spilled) & (spilled <= 0.98)
-    assert np.sqrt(np.mean((found.spilled[:, 0] - spilled)[judged] ** 2)) < 0.13
-    assert landed.retained[0] == pytest.approx(retained[0], abs=0.07)
+def test_pours_land_where_volume_of_fluid_says(cups, name, liquid, hold):
+    """On average over three rates. Today's RMS are 0.09 and 0.08, mean landings are off by 1.6 and
+    3.1 mm, and glycerin's retained fractions by 0.03; the former particles' RMS were 0.2 and more.
+    """
+    cups, off = changed(cups, pour={"hold": hold}), []
+    for rate in (45.0, 90.0, 180.0):
+        distance, spilled, retained = spilled_in_reference(name, rate)
+        landed = models.landings(liquid, np.radians(rate), cups, [0])
+        found = landed.into(distance[:, None] / 100.0, cups.receiver.radius)
+        judged = (0.02 <= spilled) & (spilled <= 0.98)
+        rms = np.sqrt(np.mean((found.spilled[:, 0] - spilled)[judged] ** 2))
+        ahead = np.nanmean(landed.position[0, :, 0]) - mean_landing_in_reference(name, rate)
+        off.append([rms, abs(ahead), abs(landed.retained[0] - retained[0])])
+    rms, ahead, retained = np.mean(off, axis=0)
+    assert rms < 0.11 and ahead < 5e-3 and retained < 0.04, off
 
 
 @pytest.mark.slow
@@ -159,6 +174,38 @@ def test_the_cup_holds_its_volume_and_its_wall_parts_two_sides(cell):
     apart = [found.side[s:] * found.side[:-s] == INSIDE * OUTSIDE for s in grid.strides]
     for axis, stride in enumerate(grid.strides):
         assert (found.area[axis, stride:][apart[axis]] == 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("particles", "source", "message"),
+    [
+        (
+            1,
+            {},
+            "1 particles make cells of 69.4 mm in a cup of 28 mm in radius; .* 16, or 0",
+        ),
+        (10**8, {}, "particles make 83276440 cells of 0.15 mm, and .* is the most; give particles"),
+        (0, {"radius": 0.001, "height": 2.0}, "particles=0, make 5.* cells of 0.143 mm"),
+    ],
+)
+def test_cells_too_coarse_or_too_many_are_refused_before_the_first_step(
+    cups, monkeypatch, particles, source, message
+):
+    monkeypatch.setattr(models.pouring, "march", lambda *_: pytest.fail("a pour began"))
+    with pytest.raises(ValueError, match=message):
+        models.landings(WATER, 2.0, changed(cups, source=source), [0], particles)
+
+
+@pytest.mark.parametrize(
+    "cup", [Filled(0.028, 0.06, 0.034), Filled(0.25, 2.0, 0.001), Filled(0.001, 2.0, 0.5)]
+)
+def test_as_few_and_as_many_particles_as_a_refusal_names_can_be_poured(cup):
+    for particles in (1e-9, 1e9):
+        with pytest.raises(ValueError, match="give particles of ") as refused:
+            vessel_of(cup, particles)
+        advised = int(re.search(r"particles of (?:at least )?(\d+)", str(refused.value))[1])
+        made = vessel_of(cup, advised)
+        assert len(made.particles(4, 0)) > 0 and made.grid().cells < 2e6
 
 
 def test_cells_and_steps_follow_the_cup():

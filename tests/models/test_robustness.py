@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import threading
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -226,6 +227,19 @@ def test_a_thread_that_did_not_start_taichi_is_refused_and_does_no_harm(cups):
         with pytest.raises(runtime.WrongThread, match="--nthreads 1"):
             pool.submit(poured).result()
     np.testing.assert_array_equal(poured(), before)
+
+
+def test_a_thread_with_the_ident_of_the_ended_owner_is_refused(monkeypatch):
+    """Operating systems use idents again, often at once; here the owner's is made to be."""
+    lock = runtime.OneThread()
+    owner = threading.Thread(target=lock.own, name="ended")
+    owner.start()
+    owner.join()
+    again = SimpleNamespace(get_ident=lambda: owner.ident, current_thread=threading.current_thread)
+    monkeypatch.setattr(runtime, "threading", again)
+    for _ in range(2):  # a refusal leaves the lock free
+        with pytest.raises(runtime.WrongThread, match=owner.name), lock:
+            pass
 
 
 def test_taichi_starts_without_a_word_also_under_a_progress_bar():

@@ -22,6 +22,7 @@ IN_CI = (
 )
 WORSE = 1.25  # times the error below that a missed comparison may have, on another computer
 
+HALF_A_CELL_OFF = "walls rub by the speed of the lowest faces"
 TUNED = "the stick's drag was tuned to the recorded stirs; as published it keeps more"
 
 
@@ -40,6 +41,12 @@ MISSES = {
         "torque at 25 deg [N m]": Miss(0.101, TUNED),
         "torque at 8 deg, drag as published [N m]": Miss(-0.228, "why is not known"),
     },
+    "film_flow": {
+        "mean speed, 2 cells thick [m/s]": Miss(0.126, HALF_A_CELL_OFF),
+        "mean speed, 1 cells thick [m/s]": Miss(0.414, HALF_A_CELL_OFF),
+        "mean speed, 0.5 cells thick [m/s]": Miss(1.25, HALF_A_CELL_OFF),
+        "mean speed, 0.25 cells thick [m/s]": Miss(3.17, HALF_A_CELL_OFF),
+    },
     "hydrostatic_column": {
         "speed at 0.003 Pa s, cohesion 0 [m/s]": Miss(0.0657, "thin deep liquid keeps moving"),
         "density at 0.003 Pa s, cohesion 0": Miss(0.032, "its tolerance is 0.03", everywhere=False),
@@ -52,7 +59,8 @@ MISSES = {
 def judge(record, known):
     """Raise AssertionError unless a case's record keeps its tolerances but for the known misses.
 
-    Those must miss, or their entries are out of date, and by no more than was measured.
+    Those must miss, or their entries are out of date, to the side where they were measured, and by
+    no more.
     """
     assert record["error"] is None, record["error"]
     rows = {row["quantity"]: row for row in record["rows"]}
@@ -64,6 +72,7 @@ def judge(record, known):
         assert not healed, f"{name} keeps its tolerance now: take it off MISSES"
         error = rows[name]["error"]  # None where a simulation failed
         assert error is not None and abs(error) <= WORSE * abs(miss.error), rows[name]
+        assert rows[name]["passed"] or error * miss.error > 0, rows[name]
 
 
 @pytest.mark.parametrize(
@@ -114,6 +123,7 @@ def test_a_record_as_it_is_known_passes():
         made(mass=None, speed=-0.3),  # a simulation that failed
         made(mass=0.05, speed=0.05),  # a miss that healed
         made(mass=0.05, speed=-0.4),  # one that grew
+        made(mass=0.05, speed=0.3),  # one that changed sides
         made(mass=0.05, speed=None),
         made(mass=0.05),  # a comparison that is gone
         made(mass=0.05, speed=-0.3) | {"error": "RuntimeError: broken"},

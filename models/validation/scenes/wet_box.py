@@ -8,15 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...apic.filling import JITTER, OFF_WALL
-from ...apic.geometry import Geometry, sample_geometry
+from ...apic.geometry import NEAREST_OF_FILMS, Geometry, sample_geometry
+from ...apic.gravity import GRAVITY
 from ...apic.grid import WALL, Grid
 from ...apic.places import GROUPS, Places
 from ...fluid import runtime
 from ...fluid.faults import faulty
 
 CELLS, PARTICLES = 20000, 8000  # room that all boxes share, so that one scene is compiled
-NEAREST = 0.25  # cells from a wall at which friction is reckoned at least, as in pours
-GRAVITY = 9.81
 
 Point = tuple[float, float, float]
 NO_PULL: Point = (0.0, 0.0, 0.0)
@@ -70,7 +69,7 @@ class WetBox:
     def geometry(self) -> Geometry:
         """Nothing flows through the sides of a flat box."""
         grid = self.grid()
-        whole = sample_geometry(grid, self.distance, nearest=NEAREST)
+        whole = sample_geometry(grid, self.distance, nearest=NEAREST_OF_FILMS)
         if not self.flat:
             return whole
         row = np.arange(grid.cells) // grid.strides[1] % grid.shape[1]

@@ -1,4 +1,4 @@
-"""A liquid column that collapses over a dry floor: Martin & Moyce 1952, and Ritter's solution.
+"""A liquid column that collapses over a dry floor: Martin & Moyce 1952.
 
 Martin & Moyce, Phil. Trans. R. Soc. A 244, 312. A column of base a (2.25 in) and height n² a,
 two-dimensional, released by a diaphragm. Dimensionless: front Z = x/a over T = n t sqrt(g/a);
@@ -118,41 +118,3 @@ def fit_time_shift(ours: Track, table: Track, largest: float = LARGEST_SHIFT) ->
     step = coarse[1] - coarse[0]
     fine: Any = minimize_scalar(rms, bounds=(best - step, best + step), method="bounded")
     return TimeShift(float(fine.x), rms(float(fine.x)))
-
-
-def ritter_depth(
-    ahead: ArrayLike, time: ArrayLike, depth: float, gravity: float = 9.81
-) -> np.ndarray:
-    """Depth [m] after the dam of a long, shallow reservoir has gone.
-
-    Ritter 1892 (Z. Ver. Dtsch. Ing. 36, 947): between the front, at 2 sqrt(g h) t, and the wave
-    that runs back at sqrt(g h), depth is (2 sqrt(g h) - x/t)² / (9 g), at the dam 4/9 of h. No
-    friction. A reservoir that ends in a wall is like a long one until `ritter_end`.
-
-    Args:
-        ahead: x from the dam [m], negative in the reservoir.
-        time: Since the dam went [s], positive.
-        depth: h, of the reservoir before [m].
-    """
-    wave = np.sqrt(gravity * depth)
-    thinned = (2.0 * wave - _ritter_ratio(ahead, time, wave)) ** 2 / (9.0 * gravity)
-    return np.asarray(thinned)
-
-
-def ritter_speed(
-    ahead: ArrayLike, time: ArrayLike, depth: float, gravity: float = 9.81
-) -> np.ndarray:
-    """Speed [m/s] under `ritter_depth`: 2/3 (sqrt(g h) + x/t); that of the front beyond it."""
-    wave = np.sqrt(gravity * depth)
-    return np.asarray(2.0 / 3.0 * (wave + _ritter_ratio(ahead, time, wave)))
-
-
-def ritter_end(length: float, depth: float, gravity: float = 9.81) -> float:
-    """Time [s] at which the wave that runs back meets the wall that ends a reservoir [m]."""
-    return float(length / np.sqrt(gravity * depth))
-
-
-def _ritter_ratio(ahead: ArrayLike, time: ArrayLike, wave: float) -> np.ndarray:
-    """x/t within the part that has begun to flow."""
-    ratio = np.asarray(ahead, float) / np.asarray(time, float)
-    return np.clip(ratio, -wave, 2.0 * wave)

@@ -43,23 +43,6 @@ def nusselt_flux(
     return density * gravity * h**3 / (3.0 * np.asarray(viscosity, float))
 
 
-def nusselt_thickness(
-    flux: ArrayLike, *, viscosity: ArrayLike, density: float, gravity: float = GRAVITY
-) -> np.ndarray:
-    """Thickness [m] of the steady film that carries a `nusselt_flux` [m²/s]."""
-    drag = 3.0 * np.asarray(viscosity, float) * np.asarray(flux, float)
-    return np.cbrt(drag / (density * gravity))
-
-
-def film_startup_time(thickness: float, *, viscosity: ArrayLike, density: float) -> np.ndarray:
-    """Time [s] in which a film's flow comes within 1/e of its steady one: 4 h² / (π² ν).
-
-    Of the slowest part of a flow between a wall and a free surface (Batchelor 1967, section 4.3).
-    """
-    kinematic = np.asarray(viscosity, float) / density
-    return 4.0 * thickness**2 / (np.pi**2 * kinematic)
-
-
 def jeffreys_thickness(
     below_edge: ArrayLike,
     time: ArrayLike,

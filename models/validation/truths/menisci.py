@@ -24,18 +24,6 @@ def capillary_length(tension: float, density: float, gravity: float = GRAVITY) -
     return float(np.sqrt(tension / (density * gravity)))
 
 
-def wall_rise(angle: ArrayLike, length: float) -> np.ndarray:
-    """Height [m] of the surface at one vertical wall: ±sqrt(2 (1 - sin a)) times `length`.
-
-    Landau & Lifshitz, Fluid Mechanics, section 61.
-
-    Args:
-        angle: Contact angle a [rad].
-    """
-    angle = np.asarray(angle, float)
-    return np.sign(np.cos(angle)) * length * np.sqrt(2.0 * (1.0 - np.sin(angle)))
-
-
 def mean_rise(gap: ArrayLike, angle: ArrayLike, length: float) -> np.ndarray:
     """Mean height [m] of the surface between two vertical walls: 2 σ cos a / (ρ g d).
 

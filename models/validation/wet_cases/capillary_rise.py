@@ -18,8 +18,8 @@ LENGTH = 0.01  # m, capillary length: cells of 4 mm resolve it, weight is less t
 ANGLES = (30.0, 60.0, 90.0, 110.0)  # deg
 VISCOSITY, DENSITY, TENSION = 0.2, 1000.0, 0.072
 SECONDS, SETTLED = 6.0, 3.0
-TOLERANCE = 1.2  # mm, 0.3 of a cell
-UNWETTED = 2.0  # mm, beyond 90 deg, where the narrow column stands too high in most seeds
+PACKINGS = 2  # of which levels are the mean: currents move a single one's by up to 1.3 mm
+TOLERANCE = 1.2  # mm, 0.3 of a cell; the least rise or fall, without which it would fail, is 1.7
 
 
 def run(progress: Progress, seed: int) -> CaseResult:
@@ -29,7 +29,10 @@ def run(progress: Progress, seed: int) -> CaseResult:
         ((0.0, 0.0, UNDER), (NARROW, 0.0, LEVEL)),
         ((NARROW + WALL, 0.0, UNDER), (BOX.size[0], 0.0, LEVEL)),
     )
-    points = np.concatenate([BOX.fill(block, seed + n) for n, block in enumerate(blocks)])
+    packings = [
+        np.concatenate([BOX.fill(block, seed * PACKINGS + k + n) for n, block in enumerate(blocks)])
+        for k in range(PACKINGS)
+    ]
     area = BOX.size[0] * UNDER + (NARROW + WIDE) * (LEVEL - UNDER)
     weight = TENSION / DENSITY / LENGTH**2
     liquids = [
@@ -43,17 +46,17 @@ def run(progress: Progress, seed: int) -> CaseResult:
         narrow = (over < NARROW + 0.5 * WALL).sum() * each
         return narrow / NARROW - (len(over) * each - narrow) / WIDE
 
-    bodies = [Body(points, area * CELL)] * len(liquids)
-    time, seen = flow_in_box(BOX, liquids, bodies, SECONDS, look, every=10)
+    bodies = [Body(points, area * CELL) for points in packings for _ in liquids]
+    time, seen = flow_in_box(BOX, liquids * PACKINGS, bodies, SECONDS, look, every=10)
+    seen = seen.reshape(len(time), PACKINGS, len(liquids)).mean(axis=1)
     progress(1.0)
     rows, curves = [], []
     for k, angle in enumerate(ANGLES):
         radians = np.radians(angle)
         truth = mean_rise(NARROW, radians, LENGTH) - mean_rise(WIDE, radians, LENGTH)
         ours = seen[time > SETTLED, k].mean()
-        allowed = TOLERANCE if angle <= 90.0 else UNWETTED
         name = f"the narrow column stands higher by, {angle:g} deg [mm]"
-        rows.append(Row.absolute(name, 1e3 * float(truth), 1e3 * float(ours), allowed))
+        rows.append(Row.absolute(name, 1e3 * float(truth), 1e3 * float(ours), TOLERANCE))
         curves += [
             Curve("", time[[0, -1]], [1e3 * float(truth)] * 2, truth=True, series=k),
             Curve(f"{angle:g} deg", time, 1e3 * seen[:, k], series=k),
@@ -73,6 +76,7 @@ CASE = Case(
         "widths": (NARROW, WIDE),
         "cell": CELL,
         "angles": ANGLES,
+        "packings": PACKINGS,
         "length": LENGTH,
         "viscosity": VISCOSITY,
         "seconds": (SECONDS, SETTLED),

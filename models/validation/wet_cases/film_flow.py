@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from ...apic.gravity import GRAVITY
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
-from ..scenes.wet_box import GRAVITY, Body, WetBox, WetLiquid, flow_in_box
+from ..scenes.wet_box import Body, WetBox, WetLiquid, flow_in_box
 from ..truths.films import nusselt_flux, nusselt_velocity
 
 BOX = WetBox((0.36, 0.0, 0.024))
@@ -14,9 +15,8 @@ DENSITY = 1000.0
 SECONDS = 0.3
 LAYERS = 8
 TOLERANCE = 0.03
-THIN = {2.0: 0.16, 1.0: 0.46, 0.5: 1.35, 0.25: 3.6}
-"""Largest errors by cells. Walls rub by the speed of the lowest faces, half a cell off: films of
-one cell are 1.4 times too fast, those of half a cell 2.3 times, and of a quarter 4 times."""
+"""Films of two cells and less miss it, since walls rub by the speed of the lowest faces, half a
+cell off: they are 1.1, 1.4, 2.3 and 4.2 times too fast."""
 
 
 def run(progress: Progress, seed: int) -> CaseResult:
@@ -44,7 +44,7 @@ def run(progress: Progress, seed: int) -> CaseResult:
     for k, (h, mu) in enumerate(zip(thickness, viscosity, strict=True)):
         flux = nusselt_flux(h, viscosity=mu, density=DENSITY)
         name = f"mean speed, {CELLS[k]:g} cells thick [m/s]"
-        rows.append(Row.relative(name, float(flux / h), late[k, 0], THIN.get(CELLS[k], TOLERANCE)))
+        rows.append(Row.relative(name, float(flux / h), late[k, 0], TOLERANCE))
     thick = np.linspace(0.0, thickness[0], 50)
     exact = nusselt_velocity(thick, thickness[0], viscosity=viscosity[0], density=DENSITY)
     middle = (np.arange(LAYERS) + 0.5) / LAYERS * thickness[0]
@@ -71,7 +71,6 @@ CASE = Case(
     tolerance=TOLERANCE,
     settings={
         "cells": CELLS.tolist(),
-        "thin": list(THIN.values()),
         "cell": BOX.cell,
         "seconds": SECONDS,
     },

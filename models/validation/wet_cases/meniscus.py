@@ -13,12 +13,16 @@ ANGLES = (30.0, 60.0, 110.0, 150.0)  # deg
 VISCOSITY, DENSITY, TENSION = 0.2, 1000.0, 0.072
 SECONDS, SETTLED = 6.0, 3.0
 CELLS = round(GAP / BOX.cell)
-TOLERANCE = 1.0  # mm, a quarter of a cell
+PACKINGS = 2  # of which heights are the mean
+TOLERANCE = {30.0: 1.0, 60.0: 0.6, 110.0: 0.6, 150.0: 1.0}
+"""By angle [mm], a quarter of a cell and less: surfaces without wetting would be off by 0.8 at
+least, and by 2.0 at 30 and 150 deg."""
 
 
 def run(progress: Progress, seed: int) -> CaseResult:
     """Height of the middle over the mean level."""
-    points = BOX.fill(((0.0, 0.0, 0.0), (GAP, 0.0, LEVEL)), seed)
+    block = (0.0, 0.0, 0.0), (GAP, 0.0, LEVEL)
+    packings = [BOX.fill(block, seed * PACKINGS + k) for k in range(PACKINGS)]
     weight = TENSION / DENSITY / LENGTH**2
     liquids = [
         WetLiquid(VISCOSITY, DENSITY, TENSION, np.radians(angle), (0.0, 0.0, -weight))
@@ -29,8 +33,9 @@ def run(progress: Progress, seed: int) -> CaseResult:
         count = np.histogram(position[:, 0], CELLS, (0.0, GAP))[0]
         return LEVEL * (CELLS * count / len(position) - 1.0)
 
-    bodies = [Body(points, GAP * LEVEL * BOX.cell)] * len(liquids)
-    time, seen = flow_in_box(BOX, liquids, bodies, SECONDS, look, every=10)
+    bodies = [Body(points, GAP * LEVEL * BOX.cell) for points in packings for _ in liquids]
+    time, seen = flow_in_box(BOX, liquids * PACKINGS, bodies, SECONDS, look, every=10)
+    seen = seen.reshape(len(time), PACKINGS, len(liquids), CELLS).mean(axis=1)
     progress(1.0)
     across = 1e3 * (np.arange(CELLS) + 0.5) * BOX.cell
     rows, curves = [], []
@@ -41,7 +46,7 @@ def run(progress: Progress, seed: int) -> CaseResult:
         height = 1e3 * seen[time > SETTLED, k].mean(axis=0)
         middle = height[CELLS // 2 - 2 : CELLS // 2 + 2].mean()
         name = f"middle over the mean level, {angle:g} deg [mm]"
-        rows.append(Row.absolute(name, 1e3 * (exact.middle - lifted), middle, TOLERANCE))
+        rows.append(Row.absolute(name, 1e3 * (exact.middle - lifted), middle, TOLERANCE[angle]))
         ends = 1e3 * (np.array([exact.wall, exact.middle, exact.wall]) - lifted)
         curves += [
             Curve("", 1e3 * np.array([0.0, 0.5, 1.0]) * GAP, ends, truth=True, series=k),
@@ -57,11 +62,13 @@ CASE = Case(
     truth="the curve whose pressure bears its weight and that meets the walls at the contact angle",
     source="Landau & Lifshitz, Fluid Mechanics, section 61",
     unit="",
-    tolerance=TOLERANCE,
+    tolerance=max(TOLERANCE.values()),
     settings={
         "gap": GAP,
         "cell": BOX.cell,
         "angles": ANGLES,
+        "tolerances": list(TOLERANCE.values()),
+        "packings": PACKINGS,
         "length": LENGTH,
         "viscosity": VISCOSITY,
         "seconds": (SECONDS, SETTLED),

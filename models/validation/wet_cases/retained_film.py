@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from ...apic.gravity import GRAVITY
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
-from ..scenes.wet_box import GRAVITY, Body, WetBox, WetLiquid, flow_in_box
+from ..scenes.wet_box import Body, WetBox, WetLiquid, flow_in_box
 from ..truths.films import jeffreys_thickness, jeffreys_volume
 
 BOX = WetBox((0.32, 0.0, 0.02))

@@ -2,14 +2,12 @@
 
 from .line import HEAD, Line, row
 from .peer import against_peer
-from .pours import pours
 from .speed import start_up, stirring_seconds, throughput
 
 __all__ = [
     "HEAD",
     "Line",
     "against_peer",
-    "pours",
     "row",
     "start_up",
     "stirring_seconds",
