@@ -103,7 +103,7 @@ def vessel_of(cup: Filled, particles: int = 0) -> Vessel:
             f"{1e3 * cup.radius:.3g} mm in radius; give particles of at least {least}, or 0"
         )
     if vessel.grid().cells > MOST_CELLS:
-        fewer = particles or particles_for(cup, vessel.cell)
+        fewer = int(particles or particles_for(cup, vessel.cell))
         while Vessel(*cup, cell_for(cup, fewer)).grid().cells > MOST_CELLS:
             fewer //= 2
         wanted = f"{particles:g} particles" if particles else "the cup's own cells, particles=0,"

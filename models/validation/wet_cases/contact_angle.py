@@ -62,7 +62,8 @@ def run(progress: Progress, seed: int) -> CaseResult:
         ]
     low, high = (np.mean(heights[k :: len(ANGLES)], axis=0) for k in range(len(ANGLES)))
     name = f"{ANGLES[1]:g} deg higher than {ANGLES[0]:g}, mean of both [mm]"
-    rows.append(Row.relative(name, *(high - low), DIFFERENCE_TOLERANCE))
+    truth, found = high - low
+    rows.append(Row.relative(name, truth, found, DIFFERENCE_TOLERANCE))
     panel = Panel("time [s]", "median height [mm]", tuple(curves))
     return CaseResult(tuple(rows), (panel,))
 
