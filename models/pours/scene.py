@@ -115,16 +115,18 @@ class PouringScene(WettingLiquid):
 
     @ti.func
     def accelerate(self, g, lane, n):
-        """Gravity and the forces of the turning frame."""
+        """Gravity and the forces of the turning frame, half before and half after Coriolis'."""
         cosine, sine, turn, jump, whirl, swirl = self.frame[g, lane]
         dt, dx = self.dt[None], self.cell[None]
         x, v, slope = self.position[g, lane, n], self.speed[g, lane, n], self.slope[g, lane, n]
         pull_x = sine * GRAVITY + turn * turn * x[0]
         pull_z = turn * turn * x[2] - cosine * GRAVITY
+        half_x, half_z = 0.5 * dt * pull_x, 0.5 * dt * pull_z
+        along, up = v[0] + half_x, v[2] + half_z
         self.speed[g, lane, n] = vec3(
-            whirl * v[0] - swirl * v[2] + dt * pull_x + jump * x[2],
+            whirl * along - swirl * up + half_x + jump * x[2],
             v[1],
-            swirl * v[0] + whirl * v[2] + dt * pull_z - jump * x[0],
+            swirl * along + whirl * up + half_z - jump * x[0],
         )
         for b in ti.static(range(3)):
             along, up = slope[0, b], slope[2, b]
