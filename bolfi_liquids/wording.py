@@ -20,6 +20,10 @@ LIQUID_UNITS = {"viscosity": "Pa s"}
 WHOLE_PERCENTS_FROM = 0.1
 """Fraction from which a percentage is written without decimals."""
 
+LEAST_SPILLED = 0.0025
+"""Spilled fraction below which nothing is told apart: half of a parcel of `pouring.parcels`. A pour
+that is simulated loses a few drops where the map of landings says 0."""
+
 
 def spoken(name: str) -> str:
     """The name of an effect or of an explanation as it is written in a sentence."""
@@ -48,6 +52,13 @@ def with_unit(name: str, value: float) -> str:
 def percent(fraction: float) -> str:
     """A fraction as a percentage of two digits, without decimals above ten."""
     return f"{100 * fraction:{'.0f' if fraction >= WHOLE_PERCENTS_FROM else '.2g'}} %"
+
+
+def spilled(fraction: float) -> str:
+    """A spilled fraction as a percentage."""
+    if fraction < LEAST_SPILLED:
+        return f"under {percent(LEAST_SPILLED)}"
+    return percent(fraction)
 
 
 def command(*words: object) -> str:
@@ -109,6 +120,7 @@ def _environment() -> "Environment":
         "spoken": spoken,
         "listed": listed,
         "percent": percent,
+        "spilled": spilled,
         "digits": lambda value, count=2: f"{value:.{count}g}",
         "fixed": lambda value, decimals=2: f"{value:.{decimals}f}",
         "of": lambda value, name: with_unit(name, value),

@@ -24,10 +24,13 @@ def across_pours(liquids: Iterable[PouredLiquid], records: Records) -> tuple[Row
 
     Args:
         liquids: All of the reference.
-        records: By name; liquids without a record, or with one that raised, are left out.
+        records: By name; liquids without a record, or with one that raised, are left out, and means
+            over tables of such liquids.
     """
+    liquids = tuple(liquids)
     done = [one for one in liquids if one.name in records and records[one.name]["panels"]]
-    tables = dict.fromkeys(one.table for one in done)
+    partial = {one.table for one in liquids if one not in done}
+    tables = dict.fromkeys(one.table for one in done if one.table not in partial)
     means = [row for table in tables for row in _means(table, done, records)]
     return (*means, *_shifts(done, records))
 

@@ -11,7 +11,7 @@ from rich.table import Column, Table
 
 from ..criticism.verdict import Verdict
 from ..reporting import criticism_sentences as criticism
-from ..wording import LIQUID_UNITS, Sentence
+from ..wording import LIQUID_UNITS, Sentence, spilled
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -56,8 +56,8 @@ def print_pour(summary: "PourSummary", console: Console) -> None:
             label,
             f"{action.angular_velocity_deg_s:.1f}",
             f"{action.distance_cm:.2f}",
-            f"{action.expected_spillage:.2%}",
-            f"{action.spillage_q95:.2%}",
+            spilled(action.expected_spillage),
+            spilled(action.spillage_q95),
         )
     console.print(table)
     error = "" if summary.map_error is None else f", error of their map {summary.map_error:.2%}"

@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..inputs.settings import PourSettings
 from ..run.directory import POUR, run_path
 from ..run.summary import Number, Section
-from ..wording import command, html_table, percent
+from ..wording import command, html_table, spilled
 from .spillage import ACTION, FRACTIONS
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class Judged:
     def __str__(self) -> str:
         return (
             f"{np.degrees(self.angular_velocity):.1f} deg/s, {100 * self.distance:.2f} cm, "
-            f"expected to spill {percent(self.expected_spillage)}"
+            f"expected to spill {spilled(self.expected_spillage)}"
         )
 
 

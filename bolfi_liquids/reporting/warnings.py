@@ -18,7 +18,7 @@ from ..pouring.result import PourSummary, read_pour
 from ..pouring.spillage import ACTION
 from ..run.directory import POUR
 from ..run.summary import read_summary
-from ..wording import Sentence, sentence
+from ..wording import LEAST_SPILLED, Sentence, sentence
 from .criticism_sentences import verdict_sentence
 from .sentences import (
     FIT_NEAR_NOISE,
@@ -145,7 +145,7 @@ def _of_the_model(
 def _of_the_pour(poured: PourSummary | None, pour: "DataTree | None") -> list[Sentence]:
     if poured is None or pour is None:
         return []
-    found = _of_the_edge(pour)
+    found = _of_the_edge(pour) if poured.spillage_q95 >= LEAST_SPILLED else []
     if poured.expected_spillage > MUCH_SPILLED:
         found.append(sentence("warning.much_spilled", share=poured.expected_spillage))
     retained = float(pour["chosen"].to_dataset()["retained"].mean())

@@ -112,6 +112,11 @@ def test_each_warning_of_the_chosen_action(fine, action, key, values):
     assert (sentence.key, sentence.values) == (f"warning.{key}", values)
 
 
+def test_an_end_of_the_range_is_no_loss_where_nothing_is_spilled(fine):
+    nothing = replace(fine.poured, spillage_q95=0.0)
+    assert not warnings_of(replace(fine, pour=poured(rate=0.5), poured=nothing))
+
+
 def test_a_misfit_that_was_not_criticised_is_told(fine):
     far = replace(fine.calibrated, fit_rms_deg=0.9)
     (sentence,) = warnings_of(replace(fine, calibrated=far, criticised=None))

@@ -9,7 +9,16 @@ import pytest
 from jinja2 import Environment, UndefinedError, nodes
 
 import bolfi_liquids
-from bolfi_liquids.wording import listed, percent, sentence, with_unit, wordings
+from bolfi_liquids.pouring.parcels import PARCELS
+from bolfi_liquids.wording import (
+    LEAST_SPILLED,
+    listed,
+    percent,
+    sentence,
+    spilled,
+    with_unit,
+    wordings,
+)
 
 HOME = Path(bolfi_liquids.__file__).parent
 TEMPLATES = {
@@ -68,3 +77,9 @@ def test_numbers_carry_their_units():
 )
 def test_names_are_listed(names, expected):
     assert listed(names) == expected
+
+
+def test_less_than_half_a_parcel_is_not_told_apart():
+    assert LEAST_SPILLED == 0.5 / PARCELS
+    assert spilled(0.0) == spilled(0.99 * LEAST_SPILLED) != spilled(LEAST_SPILLED)
+    assert spilled(0.03) == percent(0.03)

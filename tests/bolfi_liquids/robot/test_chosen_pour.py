@@ -21,7 +21,7 @@ from bolfi_liquids.reporting.warnings import results_of, warnings_of
 from bolfi_liquids.robot.chosen_pour import BAD_FIT, chosen_pour
 from bolfi_liquids.robot.pour import plan_pour
 from bolfi_liquids.robot.stir import plan_stir
-from bolfi_liquids.wording import percent, sentence
+from bolfi_liquids.wording import sentence, spilled
 
 
 def rewritten(path, change):
@@ -247,8 +247,8 @@ def test_a_person_reads_the_pour_and_the_worries_before_the_question(poured_run)
     for text in (
         f"{np.degrees(judged.angular_velocity):.1f} deg/s",
         f"{100 * judged.distance:.2f} cm",
-        percent(judged.expected_spillage),
-        f"{percent(judged.spillage_q95)} in 95 %",
+        spilled(judged.expected_spillage),
+        f"{spilled(judged.spillage_q95)} in 95 %",
     ):
         assert text in plan.split("allowed")[0]
     told = warnings_of(results_of(bl.Calibration.open(poured_run)))
