@@ -103,7 +103,7 @@ def test_viscosity_by_formula():
     )
 
 
-FEW = 900  # particles
+FEW = 2600  # particles, in cells of 5 mm
 
 
 def landed(cups, **liquid):

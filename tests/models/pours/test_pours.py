@@ -16,7 +16,7 @@ from bolfi_liquids.models.pours.vessel import Vessel, turned, vessel_of
 
 from bolfi_liquids import models
 
-REFERENCES = Path(__file__).parents[1] / "data/pour_reference"
+REFERENCES = Path(__file__).parents[2] / "data/pour_reference"
 SPILLED, LANDINGS = REFERENCES / "pours_vof.csv", REFERENCES / "pours_vof_landings.json"
 WATER, GLYCERIN = models.Liquid(1e-3, 0.9, 1000.0), models.Liquid(1.0, 0.79, 1260.0)
 FEW = 900  # particles, of cells of 7 mm
