@@ -16,6 +16,7 @@ APPLICATION = "bolfi_liquids"
 POURED = {"pour", "frames"}  # its fixtures that take a minute where nothing is compiled yet
 SIMULATED = {"calibration", *POURED}
 SIMULATING = ("models", "simulation")  # folders of tests
+CONTROLLED = {"arm", "emulator", "robot"}  # fixtures of tests that talk to an emulated controller
 ALONE_IN = ("hardware", "properties")  # where Makefile looks for tests that have the computer alone
 MOST_REPEATS = 3  # of a session; with more of them, tests hide what fails
 CALM, MOST_CALM = 1.0, 30.0  # s, without a stall before a repetition; and waited for at most
@@ -94,7 +95,7 @@ def pytest_runtest_teardown(item, nextitem):
 
 def pytest_runtest_protocol(item, nextitem):
     """Repeat a test that failed while the computer stood still; a failure in peace counts."""
-    if item.get_closest_marker("punctual") is None:
+    if item.get_closest_marker("punctual") is None and not CONTROLLED & set(item.fixturenames):
         return None
     item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
     with _Stillness() as stillness:
