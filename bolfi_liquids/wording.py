@@ -21,8 +21,8 @@ WHOLE_PERCENTS_FROM = 0.1
 """Fraction from which a percentage is written without decimals."""
 
 LEAST_SPILLED = 0.0025
-"""Spilled fraction below which nothing is told apart: half of a parcel of `pouring.parcels`. A pour
-that is simulated loses a few drops where the map of landings says 0."""
+"""Spilled fraction that the map of landings cannot tell from 0: half of one of its parcels. Pours
+that are simulated lose a few drops there."""
 
 
 def spoken(name: str) -> str:

@@ -99,17 +99,22 @@ class PouringScene(WettingLiquid):
         turn, dt = self.rate_of_turn[g, lane], self.dt[None]
         now = ti.select(step < self.turning[g, lane], turn, 0.0)
         before = ti.select(step > 0 and step <= self.turning[g, lane], turn, 0.0)
-        angle = ti.min(turn * step * dt, self.final_angle[g, lane])
+        angle = self.angle_after(g, lane, step)
         twice = 2.0 * now * dt
         self.frame[g, lane] = ti.Vector(
             [ti.cos(angle), ti.sin(angle), now, before - now, ti.cos(twice), ti.sin(twice)]
         )
 
     @ti.func
+    def angle_after(self, g, lane, steps):
+        """By which the cup has turned after so many steps."""
+        turned = self.rate_of_turn[g, lane] * steps * self.dt[None]
+        return ti.min(turned, self.final_angle[g, lane])
+
+    @ti.func
     def in_room(self, g, lane, steps, v):
         """A vector of the cup's frame in the room's, so many steps after the start."""
-        turned = self.rate_of_turn[g, lane] * steps * self.dt[None]
-        angle = ti.min(turned, self.final_angle[g, lane])
+        angle = self.angle_after(g, lane, steps)
         c, s = ti.cos(angle), ti.sin(angle)
         return vec3(c * v[0] + s * v[2], v[1], c * v[2] - s * v[0])
 

@@ -21,7 +21,7 @@ from bolfi_liquids.checks.reference_pours import PouredLiquid, open_poured_liqui
 
 BUDGET = 10
 HOLD = 2.1  # s
-TABLE = "pours_vof.csv"  # its cups wet as a user's file says who knows nothing better
+TABLE = "pours_vof.csv"  # of cups that the liquids wet
 MANY = 4  # angular velocities
 BAR = 0.05  # spilled fraction
 HEAD = "recording             deg/s    cm  promised  spilled  choice, s"

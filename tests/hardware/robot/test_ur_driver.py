@@ -98,7 +98,7 @@ def test_a_lost_link_is_seen_at_once_and_stays_lost(emulator):
 
 def test_taking_control_sets_tool_and_payload_and_moves_nothing(arm, emulator):
     assert arm.tcp() == pytest.approx(RIG.robot.stirring_tcp, abs=1e-9)
-    assert wait_for(lambda: arm.payload().mass == pytest.approx(RIG.robot.payload))  # it is told
+    assert wait_for(lambda: arm.payload().mass == pytest.approx(RIG.robot.payload))
     payload = arm.payload()
     assert payload.centre == pytest.approx(RIG.robot.payload_centre)
     assert wait_for(lambda: np.array(arm.read().pose[:3]) == pytest.approx(PATH[0, :3], abs=1e-6))
