@@ -61,6 +61,11 @@ def spilled(fraction: float) -> str:
     return percent(fraction)
 
 
+def at_most(fraction: float) -> str:
+    """An upper bound of the spilled fraction."""
+    return spilled(fraction) if fraction < LEAST_SPILLED else f"at most {percent(fraction)}"
+
+
 def command(*words: object) -> str:
     """A command of this program, to be copied into a shell whatever blanks its paths have."""
     return shlex.join(["bolfi-liquids", *map(str, words)])
@@ -121,6 +126,7 @@ def _environment() -> "Environment":
         "listed": listed,
         "percent": percent,
         "spilled": spilled,
+        "at_most": at_most,
         "digits": lambda value, count=2: f"{value:.{count}g}",
         "fixed": lambda value, decimals=2: f"{value:.{decimals}f}",
         "of": lambda value, name: with_unit(name, value),

@@ -17,7 +17,7 @@ from ..pouring.result import ActionSummary, Judged, PourSummary, check_poured, j
 from ..reporting.warnings import results_of, stale_sentences, warnings_of
 from ..run.directory import POUR, RUN_TOML
 from ..run.summary import SUMMARY_FILE
-from ..wording import Sentence, command, spilled
+from ..wording import Sentence, at_most, command, spilled
 
 if TYPE_CHECKING:
     from xarray import DataTree
@@ -99,7 +99,7 @@ class ChosenPour:
                 f"{np.degrees(chosen.angular_velocity):.1f} deg/s, the lip "
                 f"{100 * chosen.distance:.2f} cm from the receiver's axis",
                 f"expected to spill {spilled(chosen.expected_spillage)}, "
-                f"at most {spilled(chosen.spillage_q95)} in 95 % of outcomes",
+                f"{at_most(chosen.spillage_q95)} in 95 % of outcomes",
                 *(f"warning: {worry}" for worry in self.worries),
             ]
         )
