@@ -3,6 +3,7 @@
 import errno
 import os
 import sqlite3
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
@@ -77,4 +78,23 @@ def _prepare(connection: sqlite3.Connection, mark: int, schema: str, foreign: st
     for statement in schema.split(";")[:-1]:
         execute(statement)
     execute("COMMIT")
-    execute("PRAGMA journal_mode = WAL")
+    write_ahead(connection)
+
+
+def write_ahead(connection: sqlite3.Connection) -> None:
+    """Change to WAL mode, once other connections have written.
+
+    Raises:
+        sqlite3.OperationalError: the file cannot be written, or others write for too long.
+    """
+    last = time.monotonic() + BUSY_MS / 1000
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode = WAL")
+        except sqlite3.OperationalError as error:
+            # SQLite does not wait here itself: it has read already which mode the file is in
+            if error.sqlite_errorcode & 0xFF != sqlite3.SQLITE_BUSY or time.monotonic() > last:
+                raise
+            time.sleep(0.005)
+        else:
+            return
