@@ -4,21 +4,19 @@ from .accuracy import stirring_error
 from .cups import Cups
 from .effect import Effect
 from .effects import EFFECTS, register
-from .fluid.faults import FailedSimulation
-from .fluid.liquid import Liquid
-from .fluid.numerics import MODEL_VERSION, PUBLISHED_DRAG, ParticleNumerics
-from .fluid.runtime import TimeLimitExceeded, time_limit
+from .faults import FailedSimulation
 from .frames import PourFrames, StirFrames, pour_frames, stir_frames
-from .numerics import Numerics, UntestedResolution
+from .liquid import Liquid
+from .numerics import MODEL_VERSION, Numerics, UntestedResolution
 from .pouring import Landings, PourAction, PourBatch, PourResult, landings, pour
 from .rig import Rig
+from .runtime import TimeLimitExceeded, time_limit
 from .stir_setup import Cup, Stick, StirSetup
 from .stirring import stir
 
 __all__ = [
     "EFFECTS",
     "MODEL_VERSION",
-    "PUBLISHED_DRAG",
     "Cup",
     "Cups",
     "Effect",
@@ -26,7 +24,6 @@ __all__ = [
     "Landings",
     "Liquid",
     "Numerics",
-    "ParticleNumerics",
     "PourAction",
     "PourBatch",
     "PourFrames",

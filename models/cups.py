@@ -13,7 +13,7 @@ from pydantic import (
     model_validator,
 )
 
-from .fluid.numerics import MODEL_VERSION
+from .numerics import MODEL_VERSION
 from .pours.resolution import LEAST_VISCOSITY, Filled, settings
 
 MIN_LENGTH, MAX_RADIUS, MAX_HEIGHT = 1e-3, 0.25, 2.0  # [m] of cups that are poured by hand or arm

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from .fluid.liquid import FIELDS
+from .liquid import FIELDS
 from .rig import Rig
 
 if TYPE_CHECKING:

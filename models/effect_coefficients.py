@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from .effect import Effect
 from .effects import EFFECTS
-from .fluid.liquid import Liquid
+from .liquid import Liquid
 from .rig import Rig
 
 

@@ -7,11 +7,11 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .fluid.checks import check_numbers, checked_seeds
-from .fluid.liquid import Liquid
-from .fluid.runtime import Watch
+from .liquid import Liquid
+from .number_checks import check_numbers, checked_seeds
 from .pouring import PourBatch, watched_landings
 from .pours.vessel import turned
+from .runtime import Watch
 from .stir_setup import StirSetup
 from .stirring import watched_stir
 from .trajectory import Trajectory

@@ -11,16 +11,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from . import runtime
 from .cups import FASTEST, SLOWEST, Cups
 from .effect_coefficients import Acting, acting_in, changed_wetting, liquid_sets, with_adhesion
-from .fluid import runtime
-from .fluid.checks import check_numbers, checked_seeds
-from .fluid.liquid import TENSION_AT_ONE, Liquid
-from .fluid.runtime import Watch
+from .liquid import TENSION_AT_ONE, Liquid
+from .number_checks import check_numbers, checked_seeds
 from .pours.flights import Flights, landing_of
 from .pours.march import Pours, Turn, march
 from .pours.resolution import steps_for
 from .pours.vessel import vessel_of
+from .runtime import Watch
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .fluid.checks import check_numbers
-from .fluid.numerics import MODEL_VERSION, STIR_PARTICLES, ParticleNumerics
-from .numerics import LEAST_VISCOSITY, Numerics, check_resolution
-from .trajectory import Trajectory, mean_speed, top_speed
+from .number_checks import check_numbers
+from .numerics import LEAST_VISCOSITY, MODEL_VERSION, Numerics, check_resolution
+from .trajectory import Trajectory, top_speed
 
 MAX_FILL_RATIO = 1.5  # times the setup's fill is the largest
 MAX_TILT = 1.5  # rad
@@ -71,17 +70,16 @@ class StirSetup:
         submerged: Depth of the stick's tip below the surface at rest [m].
         particles: Number of particles, which decides the cells; 0: as many as the cells make that
             `numerics` chooses for the stick.
-        numerics: Constants of the discretisation; `ParticleNumerics` chooses the former fluid.
+        numerics: Constants of the discretisation.
         tilt: Of the stick at the start, as the cameras see it, in the xz and yz planes [rad]; what
-            effects in the cameras add is no lean of the stick. The former fluid's hangs
-            straight down.
+            effects in the cameras add is no lean of the stick.
     """
 
     cup: Cup
     stick: Stick
     submerged: float
     particles: int = 0
-    numerics: Numerics | ParticleNumerics = field(default_factory=Numerics)
+    numerics: Numerics = field(default_factory=Numerics)
     tilt: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
@@ -111,7 +109,7 @@ class StirSetup:
         cls,
         recording: HasRig,
         particles: int = 0,
-        numerics: Numerics | ParticleNumerics | None = None,
+        numerics: Numerics | None = None,
     ) -> "StirSetup":
         """The setup that a recording's attributes describe (the first pivot position too).
 
@@ -152,14 +150,13 @@ class StirSetup:
             numerics=numerics or Numerics(),
             tilt=_first_tilt(recording),
         )
-        if isinstance(setup.numerics, Numerics):
-            check_resolution(radius, setup.cell)
+        check_resolution(radius, setup.cell)
         return setup
 
     @property
     def per_cell(self) -> int:
-        """Particles in a full cell; the former fluid has as many cells as particles."""
-        return self.numerics.per_cell if isinstance(self.numerics, Numerics) else 1
+        """Particles in a full cell."""
+        return self.numerics.per_cell
 
     @property
     def cell(self) -> float:
@@ -174,8 +171,6 @@ class StirSetup:
 
     def step(self, gripper: Trajectory) -> float:
         """Step of time [s] for a path of the gripper."""
-        if isinstance(self.numerics, ParticleNumerics):
-            return 1.0 / self.numerics.substep_rate(self.spacing)
         longest = self.numerics.step(self.cell, 0.0)
         return self.numerics.step(self.cell, top_speed(gripper, longest))
 
@@ -184,16 +179,11 @@ class StirSetup:
         """Largest depth of liquid for which there is room [m]."""
         return max(min(self.cup.height, MAX_FILL_RATIO * self.cup.fill), self.cup.fill)
 
-    def least_viscosity(self, density: float, gripper: Trajectory) -> float:
-        """Viscosity [Pa s] below which this path of the gripper cannot distinguish liquids of
-        `density` [kg/m³]."""
-        if isinstance(self.numerics, ParticleNumerics):
-            return self.numerics.least_viscosity(self.spacing, density, mean_speed(gripper))
+    def least_viscosity(self, density: float) -> float:
+        """Viscosity [Pa s] below which stirs look alike, of liquids of `density` [kg/m³]."""
         return LEAST_VISCOSITY * density
 
     def _usual_particles(self) -> int:
-        if isinstance(self.numerics, ParticleNumerics):
-            return STIR_PARTICLES
         cell = self.numerics.cell_for(self.stick.radius)
         return max(round(self.per_cell * self.liquid_volume(self.cup.fill) / cell**3), 1)
 

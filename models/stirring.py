@@ -5,17 +5,15 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
+from . import runtime
 from .effect_coefficients import acting_in, changed_rig, changed_signal, liquid_sets, with_adhesion
-from .fluid import runtime
-from .fluid.checks import checked_seeds
-from .fluid.liquid import Liquid
-from .fluid.runtime import Watch
-from .numerics import Numerics
-from .particle_stirring import stir_particles
+from .liquid import Liquid
+from .number_checks import checked_seeds
 from .rig import Rig, check_rig
+from .runtime import Watch
 from .stir_setup import StirSetup, hanging
 from .stirs.march import Stirs, march
-from .trajectory import Trajectory, step_path, substep_path
+from .trajectory import Trajectory, step_path
 
 
 def stir(
@@ -63,7 +61,7 @@ def watched_stir(
     acting = acting_in("stir", with_adhesion(liquid, effects, size), size)
     liquid = liquid.batch(size)
     step = setup.step(gripper)
-    path = _pivots(gripper, setup, step)
+    path = step_path(gripper, step)
     written = Rig(
         stick_mass=np.full(size, setup.stick.mass),
         pivot_friction=np.zeros(size),
@@ -72,17 +70,14 @@ def watched_stir(
     )
     rig = changed_rig(written, acting)
     check_rig(rig, setup.deepest, [a.effect.name for a in acting])
+    directions = np.empty((size, path.shape[0], 3))
     with runtime.LOCK:
-        if isinstance(setup.numerics, Numerics):
-            directions = np.empty((size, path.shape[0], 3))
-            # what tilted cameras add is no lean of the stick
-            upright = changed_signal(gripper.time, np.zeros((size, len(gripper.time), 2)), acting)
-            start = hanging(np.array(setup.tilt) - upright[:, 0])
-            for kinds, rows, coefficients in liquid_sets(acting, size):
-                stirs = Stirs(liquid, rig, seeds, start, coefficients).rows(rows)
-                directions[rows] = march(setup, stirs, step, kinds, watch)
-        else:
-            directions = stir_particles(setup, liquid, rig, seeds, acting, watch)
+        # what tilted cameras add is no lean of the stick
+        upright = changed_signal(gripper.time, np.zeros((size, len(gripper.time), 2)), acting)
+        start = hanging(np.array(setup.tilt) - upright[:, 0])
+        for kinds, rows, coefficients in liquid_sets(acting, size):
+            stirs = Stirs(liquid, rig, seeds, start, coefficients).rows(rows)
+            directions[rows] = march(setup, stirs, step, kinds, watch)
     return changed_signal(gripper.time, inclination(directions, gripper.time, step), acting)
 
 
@@ -105,10 +100,3 @@ def inclination(directions: np.ndarray, time: np.ndarray, step: float) -> np.nda
             for trial in angles
         ]
     )
-
-
-def _pivots(gripper: Trajectory, setup: StirSetup, step: float) -> np.ndarray:
-    """The pivot at the start and at the end of each step [m]."""
-    if isinstance(setup.numerics, Numerics):
-        return step_path(gripper, step)
-    return substep_path(gripper, 1.0 / step)

@@ -15,19 +15,6 @@ class Trajectory(Protocol):
     def position(self) -> np.ndarray: ...
 
 
-def substep_path(gripper: Trajectory, rate: float) -> np.ndarray:
-    """Pivot at the start and at the end of each substep [m], shape [substeps + 1, 3].
-
-    Raises:
-        ValueError: fewer than two finite samples, times that do not rise, positions of another
-            shape.
-    """
-    time, (seen, position) = np.asarray(gripper.time), finite_samples(gripper)
-    substeps = int(np.ceil((time[-1] - time[0]) * rate))
-    grid = time[0] + np.arange(substeps + 1) / rate
-    return np.stack([np.interp(grid, seen, position[:, axis]) for axis in range(3)], axis=1)
-
-
 def step_path(gripper: Trajectory, step: float) -> np.ndarray:
     """Pivot at the start and at the end of each step [m], shape [steps + 1, 3].
 
@@ -68,15 +55,3 @@ def finite_samples(gripper: Trajectory) -> tuple[np.ndarray, np.ndarray]:
     if finite.sum() < 2:
         raise ValueError(f"the gripper path has {finite.sum()} finite samples; it needs 2 or more")
     return time[finite], position[finite]
-
-
-def mean_speed(gripper: Trajectory) -> float:
-    """Root mean square speed of the pivot between its finite samples [m/s].
-
-    Raises:
-        ValueError: fewer than two finite samples.
-    """
-    time, position = finite_samples(gripper)
-    interval = np.diff(time)
-    stretch = np.sum(np.diff(position, axis=0) ** 2, axis=1) / interval
-    return float(np.sqrt(stretch.sum() / interval.sum()))

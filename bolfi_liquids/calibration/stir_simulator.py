@@ -58,7 +58,7 @@ class Stirring(TimeLimited):
     def least_viscosity(self) -> float:
         """Viscosity [Pa s] below which no recording distinguishes liquids."""
         return min(
-            setup.least_viscosity(recording.number("liquid_density"), recording.gripper)
+            setup.least_viscosity(recording.number("liquid_density"))
             for recording, setup in zip(self.recordings, self.setups, strict=True)
         )
 

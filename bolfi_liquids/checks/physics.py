@@ -42,8 +42,8 @@ class PhysicsCheck:
 
 
 def all_cases() -> "dict[str, Case]":
-    """Every case, by name: first `cases`, of the former fluid but for sticks that swing and for the
-    noise of seeds, then `cup_cases`, of the liquid of stirs, and `wet_cases`, of that of pours."""
+    """Every case, by name: first `cases` of whole stirs, then `cup_cases`, of the liquid of stirs,
+    and `wet_cases`, of that of pours."""
     from ..models.validation import cases, cup_cases, discover, wet_cases
 
     return discover(cases, cup_cases, wet_cases)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..models import Cups, Landings, Liquid, landings
-from ..models.fluid.liquid import TENSION_AT_ONE
+from ..models.liquid import TENSION_AT_ONE
 from ..models.pours.resolution import PER_CELL
 from ..models.validation import Case, CaseResult, Curve, Panel, Progress, Row
 from .pour_bars import (

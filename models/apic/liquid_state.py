@@ -4,7 +4,7 @@
 import numpy as np
 import taichi as ti
 
-from ..fluid.faults import ABSENT, SOUND
+from ..faults import ABSENT, SOUND
 from .gravity import GRAVITY
 from .lanes import LANES, STRIDE, lanes, mat3, vec3
 from .mirror import clear_images, fold, reflect_velocity

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..fluid.faults import ABSENT
+from ..faults import ABSENT
 
 GROWTH = 1.5  # of the room from one scene to the next
 

@@ -26,10 +26,15 @@ def kinematic(s, g, lane, rate, time):
 
 @ti.func
 def find_thickness(s, g, time):
-    """Viscosity of each cell [m²/s] at the shear rate that it has now."""
+    """Viscosity [m²/s] at a time [s] of each cell that liquid may come into in a step.
+
+    The shear rate is that of velocities right after the viscous solve. What the mending of density
+    and the transfer of particles add to velocities later has slopes of several 1/s from cell to
+    cell, which are no shear of the liquid; viscosity damps them at once.
+    """
     if ti.static(len(s.rheologies) > 0):
-        for n in range(s.nears[g]):
-            m = s.near[g, n]
+        for n in range(s.arounds[g]):
+            m = s.around[g, n]
             rate = shear_rate(s, g, m)
             for lane in range(LANES):
                 s.thickness[g, m][lane] = kinematic(s, g, lane, rate[lane], time)
@@ -40,6 +45,35 @@ def thickness_of(s, g, m):
     nu = s.viscosity[g]
     if ti.static(len(s.rheologies) > 0):
         nu = s.thickness[g, m]
+    return nu
+
+
+@ti.func
+def thickness_around(s, g, m, along_a, along_b):
+    """Viscosity around the edge at a cell's lower corner, of four cells by their liquid [m²/s].
+
+    The mean is harmonic: a gel's viscosity goes as one over the rate, so it is that of the mean
+    rate. An arithmetic one would let a plug hold what flows beside it.
+    """
+    nu = s.viscosity[g]
+    if ti.static(len(s.rheologies) > 0):
+        full, thin = lanes(0.0), lanes(0.0)
+        for k in range(4):
+            o = m - (k & 1) * along_a - (k >> 1) * along_b
+            full += s.volume[g, o]
+            thin += ratio(s.volume[g, o], s.thickness[g, o])
+        nu = ratio(full, thin)
+    return nu
+
+
+@ti.func
+def thickness_between(s, g, m, o):
+    """The same of two cells."""
+    nu = s.viscosity[g]
+    if ti.static(len(s.rheologies) > 0):
+        full = s.volume[g, m] + s.volume[g, o]
+        thin = ratio(s.volume[g, m], s.thickness[g, m]) + ratio(s.volume[g, o], s.thickness[g, o])
+        nu = ratio(full, thin)
     return nu
 
 

@@ -6,7 +6,7 @@ Jiang, Schroeder, Selle, Teran and Stomakhin (2015), "The affine particle-in-cel
 
 import taichi as ti
 
-from ..fluid.faults import DRIFTED, LARGEST, RUNAWAY, SOUND, UNSOLVED
+from ..faults import DRIFTED, LARGEST, RUNAWAY, SOUND, UNSOLVED
 from .geometry import INSIDE, OUTSIDE
 from .lanes import LANES, lanes, mat3, vec3
 

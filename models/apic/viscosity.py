@@ -4,7 +4,14 @@
 import taichi as ti
 
 from .lanes import chosen, lanes, positive, ratio
-from .rheology import LEAST_MASS, find_thickness, has_velocity, thickness_of
+from .rheology import (
+    LEAST_MASS,
+    find_thickness,
+    has_velocity,
+    thickness_around,
+    thickness_between,
+    thickness_of,
+)
 from .transfer import strides
 
 TOLERANCE = 1e-3  # of the speed
@@ -18,8 +25,8 @@ def has_mass(s, g, a, m):
 
 
 @ti.func
-def weigh_stresses(s, g, time):
-    """Weights of the stresses: viscosity at a time [s], by how full their cells are.
+def weigh_stresses(s, g, step):
+    """Weights of the stresses: viscosity by how full their cells are.
 
     Around an edge that is how full the liquid leaves what walls leave open: particles deposit into
     walls too, so their volume alone would make full liquid thinner there. A stress that a face
@@ -31,7 +38,8 @@ def weigh_stresses(s, g, time):
         m = s.around[g, n]
         for c in range(3):
             s.shear[g, c, m] = lanes(0.0)
-    find_thickness(s, g, time)
+    if step == 0:
+        find_thickness(s, g, 0.5 * s.dt[None])
     for n in range(s.nears[g]):
         m = s.near[g, n]
         known = lanes(1.0)
@@ -41,12 +49,12 @@ def weigh_stresses(s, g, time):
         s.normal_weight[g, m] = nu * ti.min(s.volume[g, m], 1.0) * known
         for c in range(3):  # edges along c
             a, b = (c + 1) % 3, (c + 2) % 3
-            full, thick, room = lanes(0.0), lanes(0.0), 1e-6
+            full, room = lanes(0.0), 1e-6
             for k in range(4):
                 o = m - (k & 1) * S[a] - (k >> 1) * S[b]
                 full += s.volume[g, o]
-                thick += s.volume[g, o] * thickness_of(s, g, o)
                 room += s.capacity[o]
+            thick = full * thickness_around(s, g, m, S[a], S[b])
             known_a = has_mass(s, g, a, m) * has_mass(s, g, a, m - S[b])
             known_b = has_mass(s, g, b, m) * has_mass(s, g, b, m - S[a])
             share = s.edge[c, m] * ti.min(1.0 / room, 1.0 / ti.max(full, 1e-6))
@@ -97,8 +105,10 @@ def stiffness(s, g, a, m, S):
 
 
 @ti.func
-def solve_viscosity(s, g):
+def solve_viscosity(s, g, step):
     """Velocities after viscosity, by conjugate gradients, each lane until it has converged.
+
+    What they say of the viscosity holds for the next step.
 
     `rest` is the residual over the diagonal: to read one field less counts, as memory is the limit.
     """
@@ -111,7 +121,7 @@ def solve_viscosity(s, g):
         m = s.near[g, n]
         for a in range(3):
             known, u, mass = has_mass(s, g, a, m), s.velocity[g, a, m], s.mass[g, a, m]
-            nu = 0.5 * (thickness_of(s, g, m) + thickness_of(s, g, m - S[a]))
+            nu = thickness_between(s, g, m, m - S[a])
             rub = s.rub[a, m] * scale * nu
             r = known * (force(s, g, s.velocity, a, m, S) - rub * u)
             inverse = ratio(known, mass + rub + stiffness(s, g, a, m, S))
@@ -152,6 +162,7 @@ def solve_viscosity(s, g):
                 s.search[g, a, m] = s.rest[g, a, m] + beta * d
         iteration += 1
         runs = positive(rz - goal)
+    find_thickness(s, g, (step + 1.5) * s.dt[None])
 
 
 @ti.func

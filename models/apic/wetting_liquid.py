@@ -70,19 +70,19 @@ class WettingLiquid(LiquidState):
                 set_up_pressure(self, g)
                 pull_surface(self, g)
                 push(self, g, self.pressure)
-                weigh_stresses(self, g, (step + 0.5) * self.dt[None])
+                weigh_stresses(self, g, step)
 
     @ti.kernel
-    def flow(self, groups: ti.i32):
+    def flow(self, groups: ti.i32, step: ti.i32):
         for n in range(groups * STRIDE):
             if n % STRIDE == 0:
-                solve_viscosity(self, n // STRIDE)
+                solve_viscosity(self, n // STRIDE, step)
 
     def march(self, groups, start, stop):
         """Steps start..stop-1 of so many groups."""
         for step in range(start, stop):
             self.transfer_in(groups, step)
             self.prepare(groups, step)
-            self.flow(groups)
+            self.flow(groups, step)
             self.project(groups)
             self.transfer_out(groups, step)

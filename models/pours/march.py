@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import runtime
 from ..apic.places import GROUPS, Places, room_for
 from ..effect import Effect
-from ..fluid import runtime
-from ..fluid.faults import faulty
-from ..fluid.liquid import Liquid
-from ..fluid.runtime import Watch
+from ..faults import faulty
+from ..liquid import Liquid
+from ..runtime import Watch
 from .flights import Flights
 from .resolution import PER_CELL
 from .vessel import RIM, Vessel

@@ -10,7 +10,7 @@ from ..apic.gravity import GRAVITY
 from ..apic.lanes import LANES, STRIDE, vec3
 from ..apic.transfer import fault_of, motion_of, place_after
 from ..apic.wetting_liquid import WettingLiquid
-from ..fluid.faults import SOUND
+from ..faults import SOUND
 from .flights import Flights
 
 LEFT_OVER = 5e-4  # of the liquid: a pour is over when less than this is in the region

@@ -5,16 +5,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import runtime
 from ..apic.filling import Cylinder, fill_cup
 from ..apic.geometry import Geometry, from_cup, sample_geometry
 from ..apic.grid import Grid
 from ..apic.places import GROUPS, Places, room_for
 from ..effect import Effect
-from ..fluid import runtime
-from ..fluid.faults import faulty
-from ..fluid.liquid import Liquid
-from ..fluid.runtime import Watch
+from ..faults import faulty
+from ..liquid import Liquid
 from ..rig import Rig
+from ..runtime import Watch
 from ..stir_setup import StirSetup
 from .slip_law import line_of
 

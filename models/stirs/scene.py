@@ -10,7 +10,7 @@ from ..apic.pressure import push
 from ..apic.surface import find_liquid, set_up_pressure
 from ..apic.upright_cup import UprightCups
 from ..apic.viscosity import solve_viscosity, weigh_stresses
-from ..fluid.faults import SOUND
+from ..faults import SOUND
 from .stick_line import StickLine, slip_line, start_line
 
 
@@ -57,14 +57,14 @@ class StirringScene(UprightCups):
                         self.hold(path, g, lane, step)
                         start_line(self, self.sticks, g, lane)
                 push(self, g, self.pressure)
-                weigh_stresses(self, g, (step + 0.5) * self.dt[None])
+                weigh_stresses(self, g, step)
 
     @ti.kernel
     def flow(self, groups: ti.i32, step: ti.i32, directions: ti.types.ndarray(vec3, 3)):
         for n in range(groups * STRIDE):
             if n % STRIDE == 0:
                 g = n // STRIDE
-                solve_viscosity(self, g)
+                solve_viscosity(self, g, step)
                 for lane in range(LANES):
                     if self.status[g, lane] == SOUND:
                         slip_line(self, self.sticks, g, lane, (step + 0.5) * self.dt[None])

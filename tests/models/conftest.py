@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from bolfi_liquids.models import effects as registry
-from bolfi_liquids.models.fluid import runtime
 
 from bolfi_liquids import models
 
@@ -56,37 +55,6 @@ def water():
 @pytest.fixture(scope="session")
 def cups():
     return models.Cups.from_toml(files("bolfi_liquids.data") / "cups.toml")
-
-
-@pytest.fixture(scope="session")
-def weightless():
-    """Builds a scene of liquids without walls and gravity, whose `step` a test calls."""
-    runtime.start()
-    import taichi as ti
-    from bolfi_liquids.models.fluid.fluid import STRIDE, Fluid
-
-    @ti.data_oriented
-    class Weightless(Fluid):
-        def __init__(self, slots, particles, spacing, extent, effects=()):
-            super().__init__(slots, particles, spacing, models.ParticleNumerics(), extent)
-            self.bring(effects)
-
-        @ti.func
-        def gravity(self, b):
-            return ti.math.vec3(0.0)
-
-        @ti.kernel
-        def advance(self, active: ti.i32, steps: ti.i32):
-            for n in range(active * STRIDE):
-                if n % STRIDE == 0:
-                    for _n in range(steps):
-                        self.flow(n // STRIDE)
-
-        def step(self, active, steps):
-            self.advance(active, steps)
-            assert not self.fault.to_numpy().any()
-
-    return Weightless
 
 
 @pytest.fixture

@@ -1,11 +1,10 @@
 """Effects in the liquid: their hooks, what they do, and that they leave alone what they should."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
-from bolfi_liquids.models.fluid import runtime
-from bolfi_liquids.models.validation.analysis.profiles import binned_profile
-from bolfi_liquids.models.validation.scenes.channel import Channel, Drive, channel_flow
-from bolfi_liquids.models.validation.truths.generalised_flows import herschel_bulkley_channel
+from bolfi_liquids.models import runtime
 
 from bolfi_liquids import models
 
@@ -37,41 +36,32 @@ def _effect(name, **changes):
     return models.Effect(name=name, **{**fields, **changes})
 
 
-@pytest.mark.minutes
-def test_a_rheology_from_outside_acts(register):
-    """Twice half the viscosity is the same flow."""
+@pytest.mark.slow
+def test_a_rheology_from_outside_acts(register, glycerin):
+    """Twice half the viscosity is the same stir, but for rounding."""
     register(thicken())
-
-    def flow(viscosity, factor):
-        # one at a time, each in the same packing: between packings speeds differ by 5 %
-        liquid = models.Liquid(viscosity, 0.0, 1000.0)
-        drive = Drive(np.zeros(1), np.full(1, 0.5), np.zeros_like)
-        effects = {"thicken": np.full(1, factor)}
-        _, u = channel_flow(Channel(layers=6), liquid, drive, [0.75], effects=effects)
-        return u.mean()
-
-    base = flow(1.0, 1.0)
-    assert flow(0.5, 2.0) == pytest.approx(base, rel=0.05)
-    assert flow(1.0, 2.0) < 0.7 * base
-
-
-@pytest.mark.minutes
-def test_gels_flow_as_plugs():
-    """A plug of a quarter of the gap, within a tenth of its speed (Herschel-Bulkley)."""
-    channel, push, stress, still = Channel(layers=12), 1.0, 10.0, np.zeros(2)
-    z, u = channel_flow(
-        channel,
-        models.Liquid(2.0, 0.0, 1000.0),
-        Drive(still, still + push, np.zeros_like),
-        [1.5, 2.0],
-        effects={"yield_stress": still + stress},
+    setup = models.StirSetup.from_recording(glycerin)
+    early = glycerin.gripper.time < 1.5
+    path = SimpleNamespace(
+        time=glycerin.gripper.time[early], position=glycerin.gripper.position[early]
     )
-    profile = binned_profile(z, u, 0.0, channel.gap, channel.layers)
-    expected = herschel_bulkley_channel(
-        profile.at, gap=channel.gap, gradient=1000.0 * push, consistency=2.0, yield_stress=stress
-    )
-    inner = slice(1, -1)  # a bin at a wall cannot follow the slope there
-    assert np.abs(profile.mean - expected)[inner].max() < 0.1 * expected.max()
+    plain = models.stir(models.Liquid([1.0, 2.0], 0.2, 1260.0), path, setup, [0, 0])
+    liquid = models.Liquid([0.5, 1.0], 0.2, 1260.0)
+    thickened = models.stir(liquid, path, setup, [0, 0], {"thicken": 2.0})
+    np.testing.assert_allclose(thickened, plain, atol=1e-3 * np.ptp(plain))
+
+
+@pytest.mark.slow
+def test_a_viscosity_may_vary_by_thousands_within_the_cup(glycerin):
+    """A gel of 0.03 Pa s that yields at 30 Pa: at rest 4000 times as thick as where it flows."""
+    setup = models.StirSetup.from_recording(glycerin)
+    liquid = models.Liquid(0.03, 0.2, 1000.0)
+    signal = models.stir(liquid, glycerin.gripper, setup, [0, 1], {"yield_stress": 30.0})
+    assert np.isfinite(signal).all()
+    held = models.stir(models.Liquid(120.0, 0.2, 1000.0), glycerin.gripper, setup, [0])
+    thin = models.stir(liquid, glycerin.gripper, setup, [0])
+    size = [np.sqrt(np.mean(one**2)) for one in (thin, signal, held)]
+    assert size[0] < size[1] < size[2]
 
 
 def test_viscosity_by_formula():

@@ -3,9 +3,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bolfi_liquids.models.fluid import runtime
-from bolfi_liquids.models.fluid.runtime import Watch
+from bolfi_liquids.models import runtime
 from bolfi_liquids.models.pouring import PourBatch, watched_landings
+from bolfi_liquids.models.runtime import Watch
 
 from bolfi_liquids import models
 

@@ -15,7 +15,7 @@ import json, sys
 import taichi as ti
 from bolfi_liquids import models
 from bolfi_liquids.inputs.open import open_recording
-from bolfi_liquids.models.fluid import runtime
+from bolfi_liquids.models import runtime
 
 recording = open_recording(sys.argv[1]).first(40)
 setup = models.StirSetup.from_recording(recording)

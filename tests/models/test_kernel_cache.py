@@ -4,7 +4,7 @@ import os
 import time
 
 import pytest
-from bolfi_liquids.models.fluid.runtime import STALE_S, remove_stale_lock
+from bolfi_liquids.models.runtime import STALE_S, remove_stale_lock
 
 
 @pytest.mark.parametrize(("age", "stays"), [(2.0 * STALE_S, False), (0.0, True)])

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from bolfi_liquids.models.fluid import faults, runtime
-from bolfi_liquids.models.fluid.runtime import Watch
+from bolfi_liquids.models import faults, runtime
 from bolfi_liquids.models.pouring import PourBatch, watched_landings
 from bolfi_liquids.models.pours.vessel import RIM
+from bolfi_liquids.models.runtime import Watch
 from bolfi_liquids.models.stirring import watched_stir
 from jax import random
 
@@ -247,7 +247,7 @@ def test_taichi_starts_without_a_word_also_under_a_progress_bar():
     code = """
 import io, sys
 sys.stdout = io.StringIO()
-from bolfi_liquids.models.fluid import fluid, runtime
+from bolfi_liquids.models import runtime
 runtime.start()
 assert not sys.stdout.getvalue()
 """

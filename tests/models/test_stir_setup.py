@@ -33,12 +33,11 @@ def test_what_cannot_be_is_named(cup, stick, particles, message):
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("rate", 0.0), ("stick_drag", -1.0), ("feedback", np.inf)]
+    ("name", "value"), [("cell", 0.0), ("longest_step", -1.0), ("courant", np.inf)]
 )
 def test_numerics_are_positive_and_finite(name, value):
     with pytest.raises(ValueError, match=f"numerics: {name} must be"):
-        models.ParticleNumerics(**{name: value})
-    assert models.ParticleNumerics(stick_thinner=0.0).stick_core(0.005, 0.006) == 0.005
+        models.Numerics(**{name: value})
 
 
 @pytest.mark.parametrize(

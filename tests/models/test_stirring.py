@@ -129,13 +129,6 @@ def test_liquid_at_rest_stays_at_rest(water):
     assert level == pytest.approx(setup.cup.fill, rel=0.005)
 
 
-def test_the_former_fluid_stirs_where_it_is_asked_for(glycerin):
-    short = first_seconds(glycerin, 0.2)
-    setup = models.StirSetup.from_recording(short, 200, models.ParticleNumerics())
-    signal = models.stir(models.Liquid(1.0, 0.2, 1260.0), short.gripper, setup, [0])
-    assert np.isfinite(signal).all() and setup.particles == 200
-
-
 def test_a_stick_that_starts_inclined_is_simulated_so(glycerin):
     setup = models.StirSetup.from_recording(glycerin)
     assert setup.tilt == pytest.approx(glycerin.inclination[:5].mean(axis=0), abs=2e-3)
@@ -186,23 +179,6 @@ def test_a_setup_says_what_fixes_it(glycerin):
     displaced = np.pi * setup.stick.radius**2 * setup.submerged
     cup = np.pi * setup.cup.radius**2 * setup.cup.fill
     assert volume + displaced == pytest.approx(cup)
-
-
-def test_a_stir_s_least_viscosity_is_that_of_its_mean_speed(glycerin):
-    """A pivot that moves at 10 cm/s for half of the time, then with samples missing."""
-    time = np.linspace(0.0, 2.0, 61)
-    position = np.zeros((61, 3))
-    position[:, 0] = 0.1 * np.maximum(time - 1.0, 0.0)
-    speed = 0.1 / np.sqrt(2.0)
-    path = SimpleNamespace(time=time, position=position)
-    assert trajectory.mean_speed(path) == pytest.approx(speed)
-    position[40:43] = np.nan
-    assert trajectory.mean_speed(path) == pytest.approx(speed)
-    setup = models.StirSetup.from_recording(glycerin)
-    former = replace(setup, particles=1000, numerics=models.ParticleNumerics())
-    expected = former.numerics.least_viscosity(former.spacing, 1260.0, speed)
-    assert former.least_viscosity(1260.0, path) == pytest.approx(expected)
-    assert setup.least_viscosity(1260.0, path) < expected
 
 
 def test_missing_geometry_and_a_short_stick_are_named(glycerin):

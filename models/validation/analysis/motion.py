@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import least_squares
 
 
 class Oscillation(NamedTuple):
@@ -38,16 +37,6 @@ class FarSide(NamedTuple):
 def rms_speed(velocity: ArrayLike) -> np.ndarray:
     """Root mean square of the speed [m/s]; velocities [..., n, 3] give shape [...]."""
     return np.sqrt(np.mean(np.sum(np.square(np.asarray(velocity, float)), axis=-1), axis=-1))
-
-
-def kinetic_energy(velocity: ArrayLike, particle_mass: float) -> np.ndarray:
-    """Of all particles [J]; velocities [m/s], shape [..., n, 3]."""
-    return 0.5 * particle_mass * np.sum(np.square(np.asarray(velocity, float)), axis=(-1, -2))
-
-
-def mean_velocity(velocity: ArrayLike) -> np.ndarray:
-    """Of the centre of mass [m/s]; velocities [..., n, 3] give shape [..., 3]."""
-    return np.mean(np.asarray(velocity, float), axis=-2)
 
 
 def passages(time: ArrayLike, signal: ArrayLike, level: float = 0.0) -> np.ndarray:
@@ -98,33 +87,3 @@ def far_side(time: ArrayLike, signal: ArrayLike, middle: float = 0.0) -> FarSide
     stop = crossed[0] + back[0] if len(back) else len(off)
     at = crossed[0] + int(np.abs(off[crossed[0] : stop]).argmax())
     return FarSide(float(time[at] - time[0]), float(abs(off[at] / off[0])))
-
-
-def fit_damped_oscillation(time: ArrayLike, signal: ArrayLike, period: float) -> Oscillation:
-    """Least squares of m + a exp(-d t) cos(2π t/T + phase), for strong damping or an unknown m.
-
-    Args:
-        time: [s], shape [t].
-        signal: Shape [t].
-        period: A first guess, right within a third [s].
-
-    Raises:
-        ValueError: the fit did not converge.
-    """
-    time, signal = np.asarray(time, float), np.asarray(signal, float)
-    shifted = time - time[0]
-    span = float(np.ptp(signal)) or 1.0
-
-    def residual(parameters: np.ndarray) -> np.ndarray:
-        turns, decay, cosine, sine, middle = parameters
-        phase = 2.0 * np.pi * turns * shifted / period
-        wave = cosine * np.cos(phase) + sine * np.sin(phase)
-        return middle + np.exp(-decay * shifted) * wave - signal / span
-
-    start = np.array([1.0, 0.3 / period, 0.5, 0.0, signal.mean() / span])
-    fit = least_squares(residual, start, x_scale=(0.1, 1 / period, 0.1, 0.1, 0.1))
-    if not fit.success:
-        raise ValueError(f"no damped oscillation fits: {fit.message}")
-    turns, decay, cosine, sine, middle = (float(value) for value in fit.x)
-    amplitude = span * np.hypot(cosine, sine)
-    return Oscillation(period / turns, decay, float(amplitude), span * middle)

@@ -5,11 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...fluid.numerics import PUBLISHED_DRAG, ParticleNumerics
 from ...stir_setup import Stick
 from ..truths.pendulum import Rod
-
-STICKS = {"": ParticleNumerics(), ", drag as published": PUBLISHED_DRAG}
 
 
 class Path(NamedTuple):

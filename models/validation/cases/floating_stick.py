@@ -6,7 +6,7 @@ stick wherever it was put.
 
 import numpy as np
 
-from ...fluid.liquid import Liquid
+from ...liquid import Liquid
 from ...stir_setup import Cup, Stick, StirSetup
 from ...stirring import stir
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row

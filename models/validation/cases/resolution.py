@@ -1,9 +1,9 @@
-"""The inclination that four times as many particles give."""
+"""The inclination that smaller cells give."""
 
 import numpy as np
 
-from ...fluid.liquid import Liquid
-from ...fluid.numerics import ParticleNumerics
+from ...liquid import Liquid
+from ...numerics import Numerics
 from ...stir_setup import StirSetup
 from ...stirring import stir
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
@@ -11,7 +11,7 @@ from . import seed_noise
 
 VISCOSITY = (0.03, 0.3, 1.0, 5.0)
 DENSITY = 1000.0
-PARTICLES = (1000, 4000)
+CELLS = (0.005, 0.0036)  # m
 SEEDS = 4
 BEGIN = 1.0  # s, of the first stroke
 TOLERANCE = 0.25  # deg
@@ -22,17 +22,14 @@ def run(progress: Progress, seed: int) -> CaseResult:
     path, rows, curves, seeds = seed_noise.strokes(), [], [], seed * SEEDS + np.arange(SEEDS)
     for number, viscosity in enumerate(VISCOSITY):
         liquid, seen = Liquid(viscosity, 0.0, DENSITY), []
-        for count in PARTICLES:
+        for cell in CELLS:
+            numerics = Numerics(cell=cell)
             setup = StirSetup(
-                seed_noise.CUP,
-                seed_noise.STICK,
-                seed_noise.SUBMERGED,
-                count,
-                numerics=ParticleNumerics(),
+                seed_noise.CUP, seed_noise.STICK, seed_noise.SUBMERGED, numerics=numerics
             )
             seen.append(np.degrees(stir(liquid, path, setup, seeds)[..., 0]))
-            step = number * len(PARTICLES) + len(seen)
-            progress(step / len(VISCOSITY) / len(PARTICLES))
+            step = number * len(CELLS) + len(seen)
+            progress(step / len(VISCOSITY) / len(CELLS))
         late = path.time > BEGIN
         coarse, fine = (float(np.abs(angle[:, late]).mean()) for angle in seen)
         name = f"mean inclination at {viscosity:g} Pa s [deg]"
@@ -47,11 +44,11 @@ def run(progress: Progress, seed: int) -> CaseResult:
 
 CASE = Case(
     name="resolution",
-    title="A thousand particles against four thousand",
-    truth="the inclination does not depend on the size of particles",
-    source="the same stir with more particles",
+    title="Cells of 5 mm against cells of 3.6 mm",
+    truth="the inclination does not depend on the size of cells",
+    source="the same stir in smaller cells",
     unit="deg",
     tolerance=TOLERANCE,
-    settings={"viscosity": VISCOSITY, "particles": PARTICLES, "seeds": SEEDS, "begin": BEGIN},
+    settings={"viscosity": VISCOSITY, "cells": CELLS, "seeds": SEEDS, "begin": BEGIN},
     run=run,
 )

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...fluid.liquid import Liquid
+from ...liquid import Liquid
 from ...stir_setup import Cup, Stick, StirSetup
 from ...stirring import stir
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row

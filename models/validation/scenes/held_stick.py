@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ... import runtime
 from ...apic.places import room_for
-from ...fluid import runtime
-from ...fluid.faults import faulty
+from ...faults import faulty
 from ...stir_setup import Stick
 from ...stirs.march import LEAST_NODES, LEAST_WIDTH
 from ...stirs.slip_law import TIP, line_of

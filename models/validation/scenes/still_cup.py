@@ -1,18 +1,20 @@
 """Liquids of several viscosities in cups of one shape, without a stick, side by side."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
 import numpy as np
 
+from ... import runtime
 from ...apic.filling import Cylinder, fill_cup
 from ...apic.geometry import Geometry, from_cup, sample_geometry
 from ...apic.grid import Grid
 from ...apic.places import room_for
-from ...fluid import runtime
-from ...fluid.faults import faulty
+from ...effect import Effect
+from ...effects import EFFECTS
+from ...faults import faulty
 
 DENSITY = 1000.0  # kg/m³
 LEAST_CELLS, LEAST_PARTICLES = 16000, 12000
@@ -66,11 +68,13 @@ class Flow:
         start: Velocity [m/s] of points (n, 3) [m].
         swirl: Acceleration around the axis [m/s²].
         strength: What multiplies `swirl` in each liquid, scalar or [B].
+        effects: Coefficients of effects in the liquid by name, scalars or [B].
     """
 
     start: Callable[[np.ndarray], np.ndarray] = np.zeros_like
     swirl: Profile = np.zeros_like
     strength: float | np.ndarray = 1.0
+    effects: Mapping[str, float | np.ndarray] = field(default_factory=dict)
 
 
 def flow_in_cup(
@@ -108,7 +112,7 @@ def flow_in_cup(
         seen = []
         for step in range(steps):
             runtime.check_time_limit(step, steps)
-            scene.step(groups)
+            scene.step(groups, step)
             seen.append(_look(scene, size, look))
         status = scene.status.to_numpy().reshape(-1)[:size]
     found = np.array(seen, float)
@@ -160,11 +164,13 @@ def _started(cup: StillCup, viscosity: np.ndarray, flow: Flow, seed: int) -> tup
     from .still_cup_scene import RINGS
 
     strength = of_lanes(flow.strength, len(viscosity))
-    scene = _scene(len(strength), *cup.room())
+    acting = tuple(EFFECTS[name] for name in flow.effects)
+    scene = _scene(len(strength), *cup.room(), acting)
     scene.cup_radius[None] = cup.radius
     scene.turns.from_numpy(flow.swirl(np.linspace(0.0, cup.radius, RINGS + 1)).astype(np.float32))
     scene.strength.from_numpy(strength)
     points = fill_scene(scene, cup, viscosity, seed)
+    scene.set_coefficients([of_lanes(row, len(viscosity)) for row in flow.effects.values()])
     scene.give_speed(_in_all(flow.start(points), *strength.shape))
     return scene, len(strength)
 
@@ -184,7 +190,7 @@ def _look(scene: Any, size: int, look: Callable[[np.ndarray, np.ndarray], Any]) 
 
 
 @cache
-def _scene(groups: int, cells: int, particles: int) -> Any:
+def _scene(groups: int, cells: int, particles: int, effects: tuple[Effect, ...]) -> Any:
     from .still_cup_scene import StillCupScene
 
-    return StillCupScene(groups, cells, particles)
+    return StillCupScene(groups, cells, particles, effects)

@@ -22,8 +22,9 @@ class StillCupScene(UprightCups):
         strength: What multiplies it in each lane.
     """
 
-    def __init__(self, groups, cells, particles):
-        super().__init__(groups, cells, particles)
+    def __init__(self, groups, cells, particles, effects=()):
+        """The arguments are those of `LiquidState`."""
+        super().__init__(groups, cells, particles, effects)
         self.turns = ti.field(ti.f32, RINGS + 1)
         self.strength = ti.field(ti.f32, (groups, LANES))
 
@@ -46,24 +47,24 @@ class StillCupScene(UprightCups):
                     self.speed[g, lane, n][a] = velocity[g, lane, n, a]
 
     @ti.kernel
-    def prepare(self, groups: ti.i32):
+    def prepare(self, groups: ti.i32, step: ti.i32):
         for n in range(groups * STRIDE):
             if n % STRIDE == 0:
                 g = n // STRIDE
                 find_liquid(self, g)
                 set_up_pressure(self, g)
                 push(self, g, self.pressure)
-                weigh_stresses(self, g, 0.0)
+                weigh_stresses(self, g, step)
 
     @ti.kernel
-    def flow(self, groups: ti.i32):
+    def flow(self, groups: ti.i32, step: ti.i32):
         for n in range(groups * STRIDE):
             if n % STRIDE == 0:
-                solve_viscosity(self, n // STRIDE)
+                solve_viscosity(self, n // STRIDE, step)
 
-    def step(self, groups):
-        self.transfer_in(groups, 0)
-        self.prepare(groups)
-        self.flow(groups)
+    def step(self, groups, step):
+        self.transfer_in(groups, step)
+        self.prepare(groups, step)
+        self.flow(groups, step)
         self.project(groups)
         self.transfer_out(groups)

@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ... import runtime
 from ...apic.filling import JITTER, OFF_WALL
 from ...apic.geometry import NEAREST_OF_FILMS, Geometry, sample_geometry
 from ...apic.gravity import GRAVITY
 from ...apic.grid import WALL, Grid
 from ...apic.places import GROUPS, Places
-from ...fluid import runtime
-from ...fluid.faults import faulty
+from ...faults import faulty
 
 CELLS, PARTICLES = 20000, 8000  # room that all boxes share, so that one scene is compiled
 

@@ -7,7 +7,7 @@ from ...apic.filling import OFF_WALL
 from ...apic.lanes import LANES, STRIDE
 from ...apic.transfer import fault_of, motion_of, place_after
 from ...apic.wetting_liquid import WettingLiquid
-from ...fluid.faults import SOUND
+from ...faults import SOUND
 
 
 @ti.data_oriented

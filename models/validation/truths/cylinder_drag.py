@@ -40,23 +40,3 @@ def drag_coefficient(reynolds: ArrayLike) -> np.ndarray:
     if not ((reynolds >= known[0]) & (reynolds <= known[-1])).all():
         raise ValueError(f"Reynolds numbers must be {known[0]:g} to {known[-1]:g}, got {reynolds}")
     return np.exp(np.interp(np.log(reynolds), np.log(known), np.log(values)))
-
-
-def drag_per_length(
-    speed: ArrayLike, *, radius: float, density: float, viscosity: float
-) -> np.ndarray:
-    """Force per length [N/m] on a cylinder of `radius` [m] towed at `speed` [m/s]."""
-    speed, diameter = np.asarray(speed, float), 2.0 * radius
-    reynolds = density * speed * diameter / viscosity
-    return drag_coefficient(reynolds) * 0.5 * density * speed**2 * diameter
-
-
-def lamb_drag_coefficient(reynolds: ArrayLike) -> np.ndarray:
-    """Cd at Reynolds numbers below about 0.3, in Kaplun's second approximation.
-
-    Kaplun 1957 (J. Math. Mech. 6, 595): with ε = 1 / (½ - γ - ln(Re/8)), after Lamb 1911,
-    Cd = 8π ε/Re (1 - 0.87 ε²).
-    """
-    reynolds = np.asarray(reynolds, float)
-    eps = 1.0 / (0.5 - np.euler_gamma - np.log(reynolds / 8.0))
-    return 8.0 * np.pi * eps / reynolds * (1.0 - 0.87 * eps**2)

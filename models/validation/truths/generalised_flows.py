@@ -1,8 +1,7 @@
-"""Plane Poiseuille flow of liquids whose viscosity depends on the shear rate.
+"""Steady flow around a cup's axis of liquids whose viscosity depends on the shear rate.
 
-Channels reach from z = 0 to z = gap, with walls at rest, driven by a force per volume
-`gradient` G [Pa/m]; the shear stress is G times the distance from the middle, whatever the
-liquid.
+An acceleration A r around the axis drives them. At a distance r from it the shear stress is then
+drive r² / 4 whatever the liquid, where `drive` is density times A [Pa/m²].
 """
 
 from collections.abc import Callable
@@ -12,94 +11,30 @@ from numpy.typing import ArrayLike
 from scipy.integrate import cumulative_simpson
 from scipy.optimize import root_scalar
 
-NODES = 2001  # across half a channel, for the profiles that are integrated
+NODES = 2001  # from the axis to the wall, for the profiles that are integrated
 
 
-def herschel_bulkley_channel(
-    z: ArrayLike,
-    *,
-    gap: float,
-    gradient: float,
-    consistency: float,
-    index: float = 1.0,
-    yield_stress: float = 0.0,
+def generalised_swirl(
+    r: ArrayLike, *, radius: float, drive: float, viscosity: Callable[[float], float]
 ) -> np.ndarray:
-    """Velocity [m/s] of a liquid of stress τ_y + K γ̇^n; a plug where the stress is below τ_y.
+    """Speed around the axis [m/s] of any liquid whose stress grows with the shear rate.
 
-    Bird, Dai & Yarusso 1983 (Rev. Chem. Eng. 1, 1) and, for τ_y = 0 and n = 1, the parabola.
+    At each distance the rate solves viscosity(rate) rate = stress; the angular velocity is the
+    integral of rate over distance, from the wall.
 
     Args:
-        consistency: K [Pa s^n].
-        index: n.
-        yield_stress: τ_y [Pa].
-    """
-    half, plug = 0.5 * gap, yield_stress / gradient
-    z = np.asarray(z, float)
-    if plug >= half:
-        return np.zeros_like(z)
-    power = 1.0 + 1.0 / index
-    scale = (gradient / consistency) ** (1.0 / index) / power
-    beyond = np.maximum(np.abs(z - half) - plug, 0.0)
-    return scale * ((half - plug) ** power - beyond**power)
-
-
-def herschel_bulkley_flow_rate(
-    *,
-    gap: float,
-    gradient: float,
-    consistency: float,
-    index: float = 1.0,
-    yield_stress: float = 0.0,
-) -> float:
-    """Flow rate per width [m²/s] of `herschel_bulkley_channel`."""
-    half, plug = 0.5 * gap, yield_stress / gradient
-    if plug >= half:
-        return 0.0
-    sheared = half - plug
-    power = 1.0 + 1.0 / index
-    scale = (gradient / consistency) ** (1.0 / index) / power
-    return 2.0 * scale * sheared**power * (half - sheared * index / (2.0 * index + 1.0))
-
-
-def power_law_viscosity(rate: ArrayLike, *, consistency: float, index: float) -> np.ndarray:
-    """Viscosity [Pa s] K γ̇^(n-1) (Ostwald & de Waele)."""
-    return consistency * np.asarray(rate, float) ** (index - 1.0)
-
-
-def carreau_viscosity(
-    rate: ArrayLike, *, zero: float, infinite: float, time: float, index: float
-) -> np.ndarray:
-    """Viscosity [Pa s] of Carreau 1972 (Trans. Soc. Rheol. 16, 99).
-
-    Args:
-        rate: Shear rate [1/s].
-        zero, infinite: Viscosities at rest and at large rates [Pa s].
-        time: λ [s]; thinning sets in at 1/λ.
-        index: n of the power law in between.
-    """
-    thinned = (1.0 + (time * np.asarray(rate, float)) ** 2) ** (0.5 * (index - 1.0))
-    return infinite + (zero - infinite) * thinned
-
-
-def generalised_channel(
-    z: ArrayLike, *, gap: float, gradient: float, viscosity: Callable[[float], float]
-) -> np.ndarray:
-    """Velocity [m/s] of any liquid whose stress grows with the shear rate.
-
-    At each distance from the middle the rate γ̇ solves viscosity(γ̇) γ̇ = stress; the velocity
-    is its integral from the wall.
-
-    Args:
+        r: Distances from the axis [m].
+        radius: Of the wall [m].
         viscosity: Function of the shear rate [1/s], in Pa s.
 
     Raises:
         ValueError: no shear rate below 1e9 /s carries the stress at the wall.
     """
-    half = 0.5 * gap
-    distance = np.linspace(0.0, half, NODES)
-    rates = np.array([_shear_rate(gradient * y, viscosity) for y in distance])
-    from_middle = cumulative_simpson(rates, x=distance, initial=0.0)
-    return np.interp(np.abs(np.asarray(z, float) - half), distance, from_middle[-1] - from_middle)
+    at = np.linspace(0.0, radius, NODES)
+    rates = np.array([_shear_rate(0.25 * drive * d**2, viscosity) for d in at])
+    turn = cumulative_simpson(rates[1:] / at[1:], x=at[1:], initial=0.0)
+    turn = np.concatenate([turn[:1], turn])  # nothing is sheared at the axis
+    return np.asarray(r, float) * np.interp(np.asarray(r, float), at, turn[-1] - turn)
 
 
 def _shear_rate(stress: float, viscosity: Callable[[float], float]) -> float:

@@ -12,17 +12,6 @@ from numpy.typing import ArrayLike
 from scipy.integrate import quad
 from scipy.optimize import root_scalar
 
-from .surfaces import GRAVITY
-
-
-def capillary_length(tension: float, density: float, gravity: float = GRAVITY) -> float:
-    """Length [m] over which surface tension holds against weight: sqrt(σ / (ρ g)), 2.7 mm of water.
-
-    Args:
-        tension: Surface tension σ [N/m].
-    """
-    return float(np.sqrt(tension / (density * gravity)))
-
 
 def mean_rise(gap: ArrayLike, angle: ArrayLike, length: float) -> np.ndarray:
     """Mean height [m] of the surface between two vertical walls: 2 σ cos a / (ρ g d).

@@ -212,7 +212,7 @@ def test_a_pool_that_is_broken_already_is_recorded(tmp_path, registry):
 
 
 def test_a_case_may_take_so_long(tmp_path, registry):
-    from bolfi_liquids.models.fluid.runtime import run_chunks
+    from bolfi_liquids.models.runtime import run_chunks
 
     def long(progress, seed):
         run_chunks(None, 1000, lambda begin, end: time.sleep(0.02), None)
@@ -345,7 +345,7 @@ def test_misuse_of_the_command_is_one_line(tmp_path):
 def test_all_cases_are_there_without_starting_taichi():
     code = (
         "import sys; from bolfi_liquids.checks.physics import all_cases; all_cases();"
-        "from bolfi_liquids.models.fluid import runtime; print(runtime.start.cache_info().currsize,"
+        "from bolfi_liquids.models import runtime; print(runtime.start.cache_info().currsize,"
         "[m for m in ('jax', 'matplotlib') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -281,7 +281,7 @@ def test_warnings_of_the_engine(calibration):
 
 
 def test_warnings_of_stirs_that_are_cut_too_roughly():
-    from bolfi_liquids.models.fluid.faults import DRIFTED, FailedSimulation, faulty
+    from bolfi_liquids.models.faults import DRIFTED, FailedSimulation, faulty
     from bolfi_liquids.models.numerics import UntestedResolution, check_resolution
 
     with pytest.warns(UntestedResolution) as warned:

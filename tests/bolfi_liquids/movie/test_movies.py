@@ -299,7 +299,7 @@ def test_what_cannot_be_done_is_told_before_anything_is_simulated(
 ):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "here.gif").mkdir()
-    monkeypatch.setattr(models.fluid.runtime, "start", lambda: pytest.fail("Taichi was started"))
+    monkeypatch.setattr(models.runtime, "start", lambda: pytest.fail("Taichi was started"))
     result = CliRunner().invoke(app, ["simulate", *arguments])
     assert result.exit_code == 2
     assert message in " ".join(result.stderr.split())

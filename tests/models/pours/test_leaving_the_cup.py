@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bolfi_liquids.models.fluid import runtime
+from bolfi_liquids.models import runtime
 from bolfi_liquids.models.pours.flights import Flights
 from bolfi_liquids.models.pours.vessel import turned
 

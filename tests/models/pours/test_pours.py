@@ -51,7 +51,7 @@ def mean_landing_in_reference(liquid, rate):
 )
 def test_pours_land_where_volume_of_fluid_says(cups, name, liquid, hold):
     """On average over three rates. Today's RMS are 0.09 and 0.08, mean landings are off by 1.6 and
-    3.1 mm, and glycerin's retained fractions by 0.03; the former particles' RMS were 0.2 and more.
+    3.1 mm, and glycerin's retained fractions by 0.03.
     """
     cups, off = changed(cups, pour={"hold": hold}), []
     for rate in (45.0, 90.0, 180.0):

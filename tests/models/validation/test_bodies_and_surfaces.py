@@ -17,9 +17,10 @@ ROD = pendulum.Rod(length=0.14, radius=0.005, mass=0.015)
 
 
 def test_drag_meets_the_creeping_flow_and_the_computed_one():
-    assert cylinder_drag.drag_coefficient(0.1) == pytest.approx(
-        cylinder_drag.lamb_drag_coefficient(0.1), rel=0.03
-    )
+    # Kaplun 1957 (J. Math. Mech. 6, 595), after Lamb 1911
+    small = 1.0 / (0.5 - np.euler_gamma - np.log(0.1 / 8.0))
+    slow = 8.0 * np.pi * small / 0.1 * (1.0 - 0.87 * small**2)
+    assert cylinder_drag.drag_coefficient(0.1) == pytest.approx(slow, rel=0.03)
     for reynolds, computed in cylinder_drag.DENNIS_CHANG.items():
         assert cylinder_drag.drag_coefficient(reynolds) == pytest.approx(computed, rel=0.12)
 
@@ -30,8 +31,7 @@ def test_drag_interpolates_its_table_and_falls():
     fine = np.geomspace(0.1, 1000, 300)
     assert (np.diff(cylinder_drag.drag_coefficient(fine)) < 0).all()
     # while the force per length rises with the speed all the way
-    force = cylinder_drag.drag_per_length(fine, radius=0.5, density=1.0, viscosity=1.0)
-    assert (np.diff(force) > 0).all()
+    assert (np.diff(fine**2 * cylinder_drag.drag_coefficient(fine)) > 0).all()
     with pytest.raises(ValueError, match="0.1 to 1000"):
         cylinder_drag.drag_coefficient(2000.0)
 
@@ -111,44 +111,6 @@ def test_the_torque_is_the_slope_of_the_potential_energy():
 
     slope = (energy(0.4 + 1e-4) - energy(0.4 - 1e-4)) / 2e-4
     assert pendulum.archimedes_torque(0.4, ROD, surface, density) == pytest.approx(slope, rel=1e-6)
-
-
-def test_pressure_grows_from_the_surface_down():
-    depth = np.array([-0.01, 0.0, 0.1])
-    np.testing.assert_allclose(surfaces.hydrostatic_pressure(depth, 1000.0), [0, 0, 981.0])
-
-
-def test_drops_of_known_size():
-    """A water drop of 1 mm radius: near 120 Hz, 146 Pa inside, 5 ν/R² = 5 /s."""
-    water = {"density": 998.2}
-    assert surfaces.rayleigh_frequency(1e-3, tension=0.0728, **water) == pytest.approx(121.6, 0.01)
-    assert surfaces.rayleigh_decay(1e-3, viscosity=1e-3, **water) == pytest.approx(5.0, rel=0.01)
-    assert surfaces.laplace_pressure(1e-3, 0.0728) == pytest.approx(145.6)
-    assert surfaces.rayleigh_frequency(1e-3, tension=0.07, density=1e3, mode=1) == 0.0
-
-
-def test_the_rayleigh_frequency_is_that_of_its_energies():
-    """Mode 2 of amplitude a: surface energy 8/5·π... by quadrature of the spheroid's area.
-
-    R(1 + a P2) has kinetic energy ½ (4π/5)(ρ R⁵/2) ȧ² and, at constant volume, an area that
-    grows by k a²/2: ω² = σ k / ((4π/5) ρ R⁵ / 2).
-    """
-
-    def area(a):
-        x, weight = np.polynomial.legendre.leggauss(60)
-        p2, slope = 0.5 * (3 * x**2 - 1), 3 * x
-        r = 1 + a * p2
-        tilt = a * slope * np.sqrt(1 - x**2)
-        volume = 2 * np.pi / 3 * np.sum(weight * r**3)
-        surface = 2 * np.pi * np.sum(weight * r * np.sqrt(r**2 + tilt**2))
-        return surface * (4 * np.pi / 3 / volume) ** (2 / 3)
-
-    a = 1e-2
-    stiffness = 2 * (area(a) - area(0.0)) / a**2
-    inertia = 4 * np.pi / 5 / 2
-    expected = np.sqrt(stiffness / inertia) / (2 * np.pi)
-    ours = surfaces.rayleigh_frequency(1.0, tension=1.0, density=1.0)
-    assert ours == pytest.approx(expected, rel=0.02)
 
 
 def test_the_frequency_of_a_column_is_that_of_its_energies():

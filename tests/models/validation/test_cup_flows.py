@@ -3,16 +3,21 @@
 import numpy as np
 import pytest
 from bolfi_liquids.models.validation.truths import cup_flows
-from bolfi_liquids.models.validation.truths.shear_flows import spin_up
-from scipy.special import jvp
+from scipy.special import jn_zeros, jv, jvp
 
 R, NU = 0.04, 1e-3
 r = np.linspace(1e-4, R, 400)
 
 
-def test_the_slowest_swirl_is_what_spin_up_ends_with():
-    late = [0.2, 0.3]
-    short = 1.0 * r - spin_up(r, late, radius=R, angular_velocity=1.0, kinematic=NU)
+def spun_up(time, angular_velocity):
+    """Speed in a long cylinder that started to turn at time 0 (Batchelor 1967, section 4.5)."""
+    zeros = jn_zeros(1, 200)
+    modes = 2.0 * angular_velocity * R * jv(1, np.outer(r / R, zeros)) / (zeros * jv(0, zeros))
+    return angular_velocity * r + modes @ np.exp(-NU * (zeros / R) ** 2 * time)
+
+
+def test_the_slowest_swirl_is_what__spin_up_ends_with():
+    short = np.stack([r - spun_up(late, 1.0) for late in (0.2, 0.3)])
     rate = np.log(short[0, 10:-10] / short[1, 10:-10]) / 0.1
     np.testing.assert_allclose(rate, cup_flows.swirl_decay(R, NU), rtol=0.02)
     ratio = short[1][10:-10] / cup_flows.swirl_mode(r, R)[10:-10]

@@ -20,7 +20,6 @@ import numpy as np
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "False")
 os.environ.setdefault("TI_ENABLE_PYBUF", "0")
 
-SLOTS = max(8, os.cpu_count() or 1)  # simulations of a scene side by side
 STALE_S = 60.0  # age of a lock that is held for a moment
 CHUNK = 240  # substeps a kernel call, so that Ctrl-C is prompt
 

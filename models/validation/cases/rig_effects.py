@@ -1,0 +1,141 @@
+"""What effects in the rig do: a floating stick, one that swings in air, and a scaled path."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from ...liquid import Liquid
+from ...stir_setup import Cup, Stick, StirSetup
+from ...stirring import stir
+from ...stirs.slip_law import PIVOT_DAMPING
+from ..case import Case, CaseResult, Curve, Panel, Progress, Row
+from ..truths.pendulum import GRAVITY, floating_angle
+from . import _stirring, floating_stick, pendulum_in_air, seed_noise
+
+MASS, DEEPER = 1.1, 0.006  # times the floating stick's mass; m of liquid more
+TORQUE = np.array([2e-5, 5e-5, 1e-4])  # N m, in the pivot
+START = 20.0  # deg, from which the stick swings in air
+SCALE = 0.8  # of the gripper's path
+FLOAT_TOLERANCE, AIR_TOLERANCE, PATH_TOLERANCE = 0.1, 0.02, 0.01  # deg, relative, deg
+
+
+def floating(effects: dict[str, float], seed: int) -> float:
+    """Angle [deg] at which the stick of the case `floating_stick` comes to rest."""
+    stick, cup, rests = floating_stick.STICK, floating_stick.CUP, floating_stick.SECONDS
+    surface = stick.length - floating_stick.SUBMERGED
+    path = _stirring.resting(surface + cup.fill, rests, floating_stick.RATE)
+    tilt = (np.radians(floating_stick.STARTS["below"]), 0.0)
+    setup = StirSetup(cup, stick, floating_stick.SUBMERGED, tilt=tilt)
+    liquid = Liquid(floating_stick.VISCOSITY, 0.0, floating_stick.DENSITY)
+    signal = stir(liquid, path, setup, [seed], effects)[0]
+    return float(np.degrees(_stirring.tilt(signal)[path.time > rests - 1.0].mean()))
+
+
+def float_rows(seed: int) -> list[Row]:
+    """A heavier stick, and one in deeper liquid, against Archimedes."""
+    stick = floating_stick.STICK
+    surface, density = stick.length - floating_stick.SUBMERGED, floating_stick.DENSITY
+    heavier = _stirring.rod(replace(stick, mass=MASS * stick.mass))
+    truths = {
+        "stick_mass": (MASS, floating_angle(heavier, surface, density)),
+        "fill_level": (
+            DEEPER,
+            floating_angle(_stirring.rod(stick), surface - DEEPER, density),
+        ),
+    }
+    return [
+        Row.absolute(
+            f"angle afloat, {name} {size:g} [deg]",
+            float(np.degrees(truth)),
+            floating({name: size}, seed),
+            FLOAT_TOLERANCE,
+        )
+        for name, (size, truth) in truths.items()
+    ]
+
+
+def rubbed_peaks(first: float, count: int, torque: float) -> np.ndarray:
+    """Sizes of a swing's extremes [rad] from the first on.
+
+    I θ'' + k θ = -τ sign(θ') swings about -τ/k and τ/k in turns, of which the pivot's viscous
+    damping c leaves exp(-c π / (2 I ω)) of each half.
+    """
+    stick = pendulum_in_air.STICK
+    stiffness = 0.5 * stick.mass * GRAVITY * stick.length
+    kept = np.exp(-PIVOT_DAMPING * np.pi / (2.0 * np.sqrt(stiffness * stick.inertia)))
+    sizes = [first]
+    for _ in range(count - 1):
+        sizes.append(kept * (sizes[-1] - torque / stiffness) - torque / stiffness)
+    return np.array(sizes)
+
+
+def friction_rows(seed: int) -> tuple[list[Row], Panel]:
+    """What dry friction takes from a swing in air."""
+    stick, cup, dip = pendulum_in_air.STICK, pendulum_in_air.CUP, pendulum_in_air.DIP
+    path = _stirring.resting(stick.length + cup.fill - dip, 4.0, pendulum_in_air.RATE)
+    setup = StirSetup(cup, stick, dip, tilt=(np.radians(START), 0.0))
+    effects = {**pendulum_in_air.EMPTY, "pivot_friction": TORQUE}
+    seeds = np.full(len(TORQUE), seed)
+    swings = stir(Liquid(0.0, 0.0, 1.0), path, setup, seeds, effects)[..., 0]
+    rows, curves = [], []
+    for number, (swing, torque) in enumerate(zip(swings, TORQUE, strict=True)):
+        at = find_peaks(np.abs(swing))[0]
+        sizes = np.abs(swing[at])
+        exact = rubbed_peaks(sizes[0], len(sizes), torque)
+        name = f"pivot_friction {torque:g}"
+        lost, ours = exact[0] - exact[-1], sizes[0] - sizes[-1]
+        rows.append(
+            Row.relative(
+                f"lost in {len(sizes) - 1} halves of a swing, {name} [rad]",
+                lost,
+                ours,
+                AIR_TOLERANCE,
+            )
+        )
+        curves += [
+            Curve(name, path.time[at], np.degrees(exact), truth=True, series=number),
+            Curve("", path.time[at], np.degrees(sizes), series=number),
+        ]
+    return rows, Panel("time [s]", "size of the swing [deg]", tuple(curves))
+
+
+def scaled_row(seed: int) -> Row:
+    """A path that the effect scales, against the scaled path."""
+    setup, path = (
+        StirSetup(seed_noise.CUP, seed_noise.STICK, seed_noise.SUBMERGED),
+        seed_noise.strokes(),
+    )
+    scaled = path._replace(position=path.position * [SCALE, SCALE, 1.0])
+    liquid = Liquid(0.1, 0.0, 1000.0)
+    expected = stir(liquid, scaled, setup, [seed])
+    ours = stir(liquid, path, setup, [seed], {"gripper_scale": SCALE})
+    worst = float(np.degrees(np.abs(ours - expected).max()))
+    name = f"largest difference to a scaled path, gripper_scale {SCALE:g} [deg]"
+    return Row.absolute(name, 0.0, worst, PATH_TOLERANCE)
+
+
+def run(progress: Progress, seed: int) -> CaseResult:
+    """One effect after the other."""
+    afloat = float_rows(seed)
+    progress(0.5)
+    rubbed, panel = friction_rows(seed)
+    progress(0.7)
+    return CaseResult((*afloat, *rubbed, scaled_row(seed)), (panel,))
+
+
+CASE = Case(
+    name="rig_effects",
+    title="Effects in the rig",
+    truth="Archimedes' angle, Coulomb's loss in each swing, and the path itself",
+    source="Archimedes, On Floating Bodies; Landau & Lifshitz, Mechanics, section 25",
+    unit="",
+    tolerance=AIR_TOLERANCE,
+    settings={
+        "mass, depth": (MASS, DEEPER),
+        "torque": TORQUE.tolist(),
+        "start": START,
+        "scale": SCALE,
+    },
+    run=run,
+)

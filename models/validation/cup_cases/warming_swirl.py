@@ -1,0 +1,72 @@
+"""Liquid that turns in a cup while it gets warmer, or cooler, comes to rest by its viscosity."""
+
+import numpy as np
+
+from ..case import Case, CaseResult, Curve, Panel, Progress, Row
+from ..scenes.still_cup import DENSITY, Flow, StillCup, around, flow_in_cup, swirl_of
+from ..truths.cup_flows import swirl_decay, swirl_mode
+
+CUP = StillCup(slippery_floor=True)
+VISCOSITY = 0.5  # Pa s at the start
+WARMING = np.array([-3.0, 0.0, 3.0])  # 1/s
+SPEED = 0.05  # m/s, the fastest at the start
+SECONDS = 0.3
+TOLERANCE = 0.05
+
+
+def left(time: np.ndarray, warming: float) -> np.ndarray:
+    """Share of the slowest mode that implicit steps leave, at their ends [s].
+
+    Each multiplies it by 1 / (1 + rate dt), with the rate of its own middle.
+    """
+    viscosity = VISCOSITY * np.exp(-warming * (time - 0.5 * CUP.dt))
+    rate = swirl_decay(CUP.radius, viscosity / DENSITY)
+    return np.cumprod(1.0 / (1.0 + rate * CUP.dt))
+
+
+def run(progress: Progress, seed: int) -> CaseResult:
+    """Mean rates of decay of the slowest mode."""
+
+    def start(points: np.ndarray) -> np.ndarray:
+        mode = swirl_mode(np.hypot(points[:, 0], points[:, 1]), CUP.radius)
+        return around(points, SPEED * mode)
+
+    def look(position: np.ndarray, velocity: np.ndarray) -> float:
+        r, speed = swirl_of(position, velocity)
+        mode = swirl_mode(r, CUP.radius)
+        return float(speed @ mode / (mode @ mode))
+
+    flow = Flow(start, effects={"warming": WARMING})
+    viscosity = np.full(len(WARMING), VISCOSITY)
+    time, seen = flow_in_cup(CUP, viscosity, flow, SECONDS, look, seed)
+    progress(1.0)
+    rows, curves = [], []
+    for number, (warming, size) in enumerate(zip(WARMING, seen.T, strict=True)):
+        exact = left(time, warming)
+        # from the first step on: how fast the start is on the grid is no matter of viscosity
+        truth, ours = (-np.log(one[-1] / one[0]) / (time[-1] - time[0]) for one in (exact, size))
+        name = f"warming {warming:g} 1/s"
+        rows.append(Row.relative(f"mean decay, {name} [1/s]", truth, ours, TOLERANCE))
+        curves += [
+            Curve(name, time, exact / exact[0], truth=True, series=number),
+            Curve("", time, size / size[0], series=number),
+        ]
+    panel = Panel("time [s]", "size of the swirl / that at the start", tuple(curves), log="y")
+    return CaseResult(tuple(rows), (panel,))
+
+
+CASE = Case(
+    name="warming_swirl",
+    title="Swirl in a liquid that gets warmer",
+    truth="the slowest turning flow decays at ν(t) (3.83/R)², as implicit steps of that rate do",
+    source="Batchelor 1967, section 4.5, with a viscosity that is the same everywhere",
+    unit="relative",
+    tolerance=TOLERANCE,
+    settings={
+        "viscosity": VISCOSITY,
+        "warming": WARMING.tolist(),
+        "speed": SPEED,
+        "seconds": SECONDS,
+    },
+    run=run,
+)
