@@ -75,9 +75,9 @@ def neighbours(
 
 
 def _same_paths(stirs: Iterable[ReferenceStir]) -> Iterator[Sequence[ReferenceStir]]:
-    """Stirs in groups of one path and rig, in the order of the stirs."""
+    """Stirs without a hidden effect in groups of one path and rig, in their order."""
     groups: list[list[ReferenceStir]] = []
-    for stir in stirs:
+    for stir in (stir for stir in stirs if not stir.effects):
         group = next((one for one in groups if _alike(one[0], stir)), None)
         if group is None:
             groups.append([stir])

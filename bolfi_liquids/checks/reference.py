@@ -17,7 +17,8 @@ class Reference:
 
     Attributes:
         path: The directory.
-        stirs: Those without a hidden effect, from the thinnest liquid to the thickest.
+        stirs: Those whose hidden effect is known, or that have none, from the thinnest liquid to
+            the thickest.
         left_out: Name -> hidden effect of the others.
         pours: Of each liquid from each cup, from the thinnest liquid to the thickest.
         hashes: SHA-256 of the tables of truths, in hexadecimal, by the files' names.
@@ -43,7 +44,7 @@ class Reference:
                 effect = self.left_out.get(name)
                 what = f"no recording or pour {name!r} in {self.path}"
                 if effect:
-                    what = f"recording {name!r} holds the hidden effect {effect}"
+                    what = f"recording {name!r} holds the hidden effect {effect}, of no known size"
                 fix = f"choose from {', '.join(known)}, or leave `against` out to run other cases"
                 raise InputError(what, where=Argument("names"), fix=fix)
         return tuple(known[name] for name in known if name in (wanted or known))

@@ -1,9 +1,11 @@
 """Recordings of a reference solver, and the table of the liquids that it stirred."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
 
 from ..errors import InputError
 from ..inputs.open import open_recording
@@ -14,7 +16,23 @@ from .truth_columns import NAME, positive
 
 TRUTHS = "truths.csv"
 FILE, VISCOSITY, FILL, HIDDEN = "file", "viscosity_Pa_s", "true_fill_m", "hidden"
+SIZE = "size"  # of what is hidden; a table without it tells no size
 FIX_HEADER = f"give a column for each of {FILE}, {VISCOSITY}, {FILL} and {HIDDEN}"
+
+
+Coefficient = Callable[[float, float], float]
+"""Of an effect, from the size in a table of truths and the recording's duration [s]."""
+
+HIDDEN_EFFECTS: Mapping[str, tuple[str, Coefficient]] = {
+    "delay": ("camera_delay", lambda size, seconds: size),
+    "pivot": ("pivot_friction", lambda size, seconds: size),
+    "mass": ("stick_mass", lambda size, seconds: 1.0 + size),
+    "warming": ("warming", lambda size, seconds: float(np.log(size)) / seconds),
+    "scale": ("gripper_scale", lambda size, seconds: 1.0 / size),
+}
+"""What tables call the effects of `models.EFFECTS`. Sizes are s, N m, the fraction by which the
+stick is heavier, the factor by which the viscosity falls until the end, and how many times the true
+path the written one is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,19 +44,28 @@ class ReferenceStir:
         recording: What cameras would have recorded of it.
         viscosity: Given to the solver [Pa s].
         fill: Depth of the liquid in the solver [m]; the recording's own is nominal.
+        effects: Coefficients of `models.EFFECTS` that the recording does not tell.
     """
 
     name: str
     recording: Recording
     viscosity: float
     fill: float
+    effects: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def thinnest(self) -> float:
+        """Viscosity at the end, if the liquid warms [Pa s]."""
+        fallen = self.effects.get("warming", 0.0) * float(np.ptp(self.recording.time))
+        return self.viscosity * float(np.exp(-max(fallen, 0.0)))
 
 
 class ReferenceStirs(NamedTuple):
     """The stirs of a reference.
 
     Attributes:
-        stirs: Those without a hidden effect, from the thinnest liquid to the thickest.
+        stirs: Those whose hidden effect is known, or that have none, from the thinnest liquid to
+            the thickest.
         left_out: Name -> hidden effect of the others.
     """
 
@@ -52,7 +79,8 @@ def open_reference_stirs(folder: Path) -> ReferenceStirs:
     Args:
         folder: A directory of NetCDF files, and truths.csv with a row for each. Its columns are
             `file`, `viscosity_Pa_s`, `true_fill_m`, and `hidden`, an effect that is in the data,
-            empty where there is none. Other columns are not read.
+            empty where there is none; and perhaps `size`, the effect's, see `HIDDEN_EFFECTS`.
+            Other columns are not read.
 
     Raises:
         InputError: The table or a recording cannot be used; the message names file, line, column
@@ -63,21 +91,22 @@ def open_reference_stirs(folder: Path) -> ReferenceStirs:
     hidden = [_effect(cell) for cell in table.column(HIDDEN, FIX_HEADER)]
     viscosity = positive(table, VISCOSITY, "Pa s", FIX_HEADER)
     fill = positive(table, FILL, "m", FIX_HEADER)
+    sizes = table.numbers(SIZE) if table.has(SIZE) else None
     stirs, left_out = [], {}
     for row, file in enumerate(table.column(FILE)):
-        if hidden[row]:
+        if hidden[row] and (sizes is None or hidden[row] not in HIDDEN_EFFECTS):
             left_out[Path(file).stem] = hidden[row]
             continue
-        stir = ReferenceStir(
-            _name(table, row), open_recording(folder / file), viscosity[row], fill[row]
-        )
+        recording = open_recording(folder / file)
+        effects = _effects(table, row, hidden[row], sizes, float(np.ptp(recording.time)))
+        stir = ReferenceStir(_name(table, row), recording, viscosity[row], fill[row], effects)
         _check_fill(stir, table.where(table.lines[row], FILL))
         stirs.append(stir)
     if not stirs:
         raise InputError(
-            "every recording holds a hidden effect",
+            "every recording holds a hidden effect whose size is not known",
             where=f"{table.path}: column {HIDDEN}",
-            fix="add a recording without one; the cell is then empty",
+            fix=f"add a recording without one; the cell is then empty; or a column {SIZE}",
         )
     stirs.sort(key=lambda stir: (stir.viscosity, stir.name))
     return ReferenceStirs(tuple(stirs), left_out)
@@ -108,6 +137,21 @@ def _check_files(folder: Path, table: Table) -> None:
 
 def _effect(cell: str) -> str:
     return "" if cell.lower() in MISSING else cell
+
+
+def _effects(
+    table: Table, row: int, hidden: str, sizes: np.ndarray | None, seconds: float
+) -> dict[str, float]:
+    if not hidden or sizes is None:
+        return {}
+    name, coefficient = HIDDEN_EFFECTS[hidden]
+    if not np.isfinite(sizes[row]) or (hidden in ("warming", "scale") and sizes[row] <= 0.0):
+        raise InputError(
+            f"got {table.column(SIZE)[row]!r}",
+            where=table.where(table.lines[row], SIZE),
+            fix=f"give the size of {hidden}, a number",
+        )
+    return {name: coefficient(float(sizes[row]), seconds)}
 
 
 def _name(table: Table, row: int) -> str:

@@ -36,8 +36,8 @@ def repeated(reference: ReferenceStir, seeds: NDArray[np.int64]) -> NDArray[np.f
     """
     recording = reference.recording
     liquid = Liquid(reference.viscosity, 0.0, recording.number("liquid_density"))
-    deeper = {"fill_level": reference.fill - recording.number("fill")}
-    return stir(liquid, recording.gripper, StirSetup.from_recording(recording), seeds, deeper)
+    effects = {"fill_level": reference.fill - recording.number("fill"), **reference.effects}
+    return stir(liquid, recording.gripper, StirSetup.from_recording(recording), seeds, effects)
 
 
 def replay_case(reference: ReferenceStir, simulate: Simulate = repeated) -> Case:
@@ -47,7 +47,7 @@ def replay_case(reference: ReferenceStir, simulate: Simulate = repeated) -> Case
         reference: The stir.
         simulate: What repeats it.
     """
-    bar = rms_bar(reference.viscosity)
+    bar = rms_bar(reference.thinnest)
     return Case(
         name=reference.name,
         title=f"{reference.name}, {reference.viscosity:g} Pa s",
@@ -78,7 +78,7 @@ class Replay:
         recorded = np.degrees(recording.inclination)
         far = rms(signals - recorded)
         rows = (
-            Row.absolute(RMS, 0.0, without_noise(far), rms_bar(self.reference.viscosity)),
+            Row.absolute(RMS, 0.0, without_noise(far), rms_bar(self.reference.thinnest)),
             Row.absolute(SPREAD, 0.0, spread(signals), MAX_SPREAD),
         )
         notes = {
@@ -129,6 +129,7 @@ def _settings(reference: ReferenceStir) -> Mapping[str, Any]:
         "viscosity": reference.viscosity,
         "density": recording.number("liquid_density"),
         "fill": reference.fill,
+        "effects": dict(reference.effects),
         "seeds": SEEDS,
         "noise_deg": CAMERA_NOISE,
         "max_spread_deg": MAX_SPREAD,

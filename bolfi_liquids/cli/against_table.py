@@ -73,7 +73,9 @@ def _recordings(records: Records) -> Table:
     numbers = ("Pa s", "RMS [deg]", "bar", "spread over seeds [deg]", "bar", "CPU s a stir")
     table = number_table("recording", *numbers)
     for record in records:
-        cells = [record["name"], f"{record['settings']['viscosity']:g}"]
+        effects = record["settings"]["effects"].items()
+        hidden = (f"\n{name} {size:.3g}" for name, size in effects)
+        cells = [record["name"] + "".join(hidden), f"{record['settings']['viscosity']:g}"]
         for row in record["rows"]:
             cells += [fixed(row["ours"]), f"{row['tolerance']:g}"]
         # a recording that raised has no rows

@@ -166,13 +166,14 @@ def _stirs(
 
     stirring, settings = inputs.stirring, inputs.settings
     extensions = effects_of("stir", settings.effects)
+    viscosity = calibration.summary.best.get("viscosity")
     return inference.criticism.criticise(
-        stir_experiment(stirring, cameras, usual_for(stirring, clean), "stir"),
+        stir_experiment(stirring, cameras, usual_for(stirring, clean, viscosity), "stir"),
         calibration.prior,
         extensions,
         earlier=_learned_from(calibration),
-        held_out=[_kept_back(one, stirring, clean) for one in inputs.held_out],
-        proposals=stir_proposals(stirring, cameras, usual_elsewhere(clean)),
+        held_out=[_kept_back(one, stirring, clean, viscosity) for one in inputs.held_out],
+        proposals=stir_proposals(stirring, cameras, usual_elsewhere(clean, viscosity)),
         accept=_among(settings.accept, extensions),
         level=inputs.level,
         plan=settings.stir_plan,
@@ -181,11 +182,11 @@ def _stirs(
 
 
 def _kept_back(
-    recording: Recording, fitted: Stirring, clean: Sequence[Clean]
+    recording: Recording, fitted: Stirring, clean: Sequence[Clean], viscosity: float | None
 ) -> "inference.criticism.Experiment":
     own = stirring_of([recording], fitted.setups[0].particles)
     cameras = held_out_noise(recording, fitted.recordings)
-    return stir_experiment(own, cameras, usual_for(own, clean), recording.path.name)
+    return stir_experiment(own, cameras, usual_for(own, clean, viscosity), recording.path.name)
 
 
 def _pours(

@@ -104,9 +104,11 @@ class Gap:
     or held out.
 
     Attributes:
-        before, after: What exceeds the noise of a right model, in quadrature.
+        before, after: What exceeds noise and the usual residual, in quadrature.
         held_out_before, held_out_after: The same on recordings that were not fitted.
-        noise, held_out_noise: What cameras and simulator leave of a right model.
+        noise, held_out_noise: What cameras and simulator's seeds leave of a right model.
+        usual, held_out_usual: What the simulator leaves of clean recordings besides, 0 where none
+            was given.
         rms_before, rms_after, held_out_rms_before, held_out_rms_after: The RMS itself.
     """
 
@@ -115,11 +117,13 @@ class Gap:
     held_out_before: float | None
     held_out_after: float | None
     noise: Number
+    usual: Number
     rms_before: Number
     rms_after: float | None
     held_out_rms_before: float | None
     held_out_rms_after: float | None
     held_out_noise: float | None
+    held_out_usual: float | None
 
     @classmethod
     def of(cls, source: "inference.criticism.Criticism") -> Self:
@@ -130,17 +134,20 @@ class Gap:
         gaps = () if best is None else source.gaps.get(best.names, ())
         noise = rms(np.sqrt(np.diag(base.own) + np.diag(source.measurement)))
         before, after = _rms(base), None if best is None else _rms(best.hypothesis)
+        known = float(np.hypot(noise, source.usual))
         numbers = {
-            "before": beyond(before, noise),
-            "after": None if after is None else beyond(after, noise),
-            "held_out_before": _pooled([gap.excess[0] for gap in gaps]),
-            "held_out_after": _pooled([gap.excess[1] for gap in gaps]),
+            "before": beyond(before, known),
+            "after": None if after is None else beyond(after, known),
+            "held_out_before": _pooled([gap.unexplained[0] for gap in gaps]),
+            "held_out_after": _pooled([gap.unexplained[1] for gap in gaps]),
             "noise": noise,
+            "usual": source.usual,
             "rms_before": before,
             "rms_after": after,
             "held_out_rms_before": _pooled([gap.before for gap in gaps]),
             "held_out_rms_after": _pooled([gap.after for gap in gaps]),
             "held_out_noise": _pooled([gap.noise for gap in gaps]),
+            "held_out_usual": _pooled([gap.usual for gap in gaps]),
         }
         in_degrees: dict[str, Any] = {name: _degrees(value) for name, value in numbers.items()}
         return cls(**in_degrees)

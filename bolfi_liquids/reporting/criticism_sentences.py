@@ -143,9 +143,15 @@ def parameter_sentences(summary: CriticismSummary) -> list[Sentence]:
 def gap_sentences(gap: Gap, accepted: Sequence[str]) -> list[Sentence]:
     """How far stirs and model are apart, before and after, fitted and held out."""
     if gap.after is None:
-        return [sentence("criticism.gap_before", before=gap.before, noise=gap.noise)]
+        known = {"noise": gap.noise, "usual": gap.usual}
+        return [sentence("criticism.gap_before", before=gap.before, **known)]
     fitted = sentence(
-        "criticism.gap", before=gap.before, after=gap.after, noise=gap.noise, accepted=accepted
+        "criticism.gap",
+        before=gap.before,
+        after=gap.after,
+        noise=gap.noise,
+        usual=gap.usual,
+        accepted=accepted,
     )
     if gap.held_out_before is None:
         return [fitted]
@@ -154,6 +160,7 @@ def gap_sentences(gap: Gap, accepted: Sequence[str]) -> list[Sentence]:
         before=gap.held_out_before,
         after=gap.held_out_after,
         noise=gap.held_out_noise,
+        usual=gap.held_out_usual,
     )
     return [fitted, held_out]
 

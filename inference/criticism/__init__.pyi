@@ -1,3 +1,4 @@
+from .clean_data import OwnResidual as OwnResidual
 from .clean_data import own_residual as own_residual
 from .criticise import Criticism as Criticism
 from .criticise import criticise as criticise

@@ -1,5 +1,7 @@
 """Residual of the base model on clean data."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..prior import Prior
@@ -11,10 +13,22 @@ from .simulate import Keeping, Laboratory
 CLEAN_RUNS = 4  # runs where the model fits best, whose mean is free of the emulator's error
 
 
+class OwnResidual(NamedTuple):
+    """A residual, and where the model leaves it.
+
+    Attributes:
+        residual: Observed less the model's expectation [*signal_shape], NaN where missing.
+        best: The most probable parameters.
+    """
+
+    residual: np.ndarray
+    best: dict[str, float]
+
+
 def own_residual(
     experiment: Experiment, prior: Prior, extensions: Extensions, keeping: Keeping, plan: Plan
-) -> np.ndarray:
-    """Observed less the calibrated base model's expectation [*signal_shape], NaN where missing.
+) -> OwnResidual:
+    """What the calibrated base model leaves of data in which no effect is expected.
 
     Raises:
         RuntimeError: every simulation failed, or the executor lost its workers.
@@ -33,4 +47,4 @@ def own_residual(
         best = fit_base(study, None)[0].best
         at_best = {name: np.full(CLEAN_RUNS, value) for name, value in best.items()}
         mean = laboratory.run("repeat", at_best).signals.mean(0)
-    return experiment.observed - mean
+    return OwnResidual(experiment.observed - mean, dict(best))

@@ -22,7 +22,7 @@ from .posterior import Interval, Weighted, weighted_posterior
 from .search import Base, Plan, Study, examine, explain
 from .signatures import confusion
 from .simulate import AllRunsFailed, Keeping, Laboratory
-from .usual_residual import without_usual
+from .usual_residual import usual_rms, without_usual
 from .verdict import REJECTION_LEVEL, Candidate, Verdict, VerdictKind, conclude, tied
 
 
@@ -124,6 +124,11 @@ class Criticism:
     def measurement(self) -> np.ndarray:
         """Covariance of the data's own noise, without what is usual for the simulator [n, n]."""
         return without_usual(self.noise).covariance(samples(self.base.hypothesis.fit.observed))
+
+    @property
+    def usual(self) -> float:
+        """RMS over the data of what is usual for the simulator, 0 where that is not known."""
+        return usual_rms(self.noise, samples(self.base.hypothesis.fit.observed))
 
     @property
     def confusion(self) -> np.ndarray:

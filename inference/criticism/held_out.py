@@ -12,7 +12,7 @@ from .measurement_noise import gaussian
 from .misfit import MODES_PER_CHANNEL, exceedance, orthonormal, slow_modes
 from .run_noise import errors_of, smooth_covariance
 from .simulate import Laboratory
-from .usual_residual import without_usual
+from .usual_residual import usual_rms, without_usual
 from .verdict import ACCEPTANCE_LEVEL
 
 NOISE_QUANTILE = 0.99  # quantile of the noise's RMS below which a gap may be noise
@@ -28,6 +28,7 @@ class Gap(NamedTuple):
         label: The experiment's.
         before, after: RMS of observed less expected.
         noise: RMS that measurement and the simulator's own noise would leave of a right model.
+        usual: RMS of what is usual for the simulator.
         floor: RMS that these exceed once in a hundred times.
         p_value: Of what is left after, by its RMS and by its slow part (Bonferroni), all noise
             and what is usual for the simulator considered.
@@ -38,6 +39,7 @@ class Gap(NamedTuple):
     before: float
     after: float
     noise: float
+    usual: float
     floor: float
     p_value: float
     lpd_gain: float
@@ -46,6 +48,12 @@ class Gap(NamedTuple):
     def excess(self) -> tuple[float, float]:
         """Before and after, less the noise (in quadrature)."""
         return beyond(self.before, self.noise), beyond(self.after, self.noise)
+
+    @property
+    def unexplained(self) -> tuple[float, float]:
+        """Before and after, less the noise and what is usual (in quadrature)."""
+        known = float(np.hypot(self.noise, self.usual))
+        return beyond(self.before, known), beyond(self.after, known)
 
     @property
     def fits(self) -> bool:
@@ -119,6 +127,7 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
         before=sizes[0],
         after=sizes[1],
         noise=float(np.sqrt(np.trace(measured.covariance(at) + simulated) / len(observed))),
+        usual=usual_rms(experiment.noise, at),
         floor=float(np.quantile(np.sqrt(np.mean(noise**2, axis=1)), NOISE_QUANTILE)),
         p_value=min(1.0, 2.0 * float(exceedance(measures(null), left).min())),
         lpd_gain=density(means[1]) - density(means[0]),

@@ -25,15 +25,15 @@ class UsualResidual:
         autocovariance: Of clean residuals by lag in samples, shape [lags]; zero beyond.
         shapes: Clean residuals of the same experiment at each sample, shape [k, T, channels];
             NaN where missing.
-        freedom: Clean data sets that speak for this experiment: the size is known as well as a
-            variance from so many numbers, but never less than from MIN_FREEDOM.
+        freedom: Clean data sets that speak for this experiment, by their weights: the size is
+            known as well as a variance from so many numbers, but never less than from MIN_FREEDOM.
         others: For each shape the autocovariance of all clean data but it, shape [k, lags]; none
             where there are no other clean data.
     """
 
     autocovariance: np.ndarray
     shapes: np.ndarray
-    freedom: int
+    freedom: float
     others: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def covariance(self, at: Layout) -> np.ndarray:
@@ -65,7 +65,10 @@ class UsualResidual:
 
 
 def usual_residual(
-    residuals: Sequence[np.ndarray], noises: Sequence[Noise], same: Sequence[bool]
+    residuals: Sequence[np.ndarray],
+    noises: Sequence[Noise],
+    same: Sequence[bool],
+    weights: Sequence[float] | None = None,
 ) -> UsualResidual:
     """What clean data teach.
 
@@ -74,12 +77,20 @@ def usual_residual(
             samples equally far apart; NaN where missing.
         noises: Of each one's measurement, which is not the simulator's fault.
         same: Which of them repeat the experiment that will be looked at, sample by sample.
+        weights: How much each tells of the system that will be looked at, above 0 and at most 1;
+            None where all tell the same. A simulator may err by much in one regime and by nothing
+            in another.
 
     Raises:
-        ValueError: there are none.
+        ValueError: there are none, or a weight is not above 0 and at most 1.
     """
     if not residuals:
         raise ValueError("a usual residual needs at least one clean data set")
+    weight = np.ones(len(residuals)) if weights is None else np.asarray(weights, float)
+    if weight.shape != (len(residuals),) or not ((weight > 0.0) & (weight <= 1.0)).all():
+        raise ValueError(
+            f"weights must be {len(residuals)} numbers above 0 and at most 1, got {weights}"
+        )
     lags = max(len(residual) for residual in residuals)
     found = [_autocovariance(residual, lags) for residual in residuals]
     measured = [
@@ -88,17 +99,23 @@ def usual_residual(
     ]
     each = np.array(found) - np.array(measured)
     repeated = [k for k, again in enumerate(same) if again]
+    own = [max(1.0 - measured[k][0] / max(found[k][0], measured[k][0]), 0.0) for k in repeated]
     kept = [
-        residuals[k] * np.sqrt(max(1.0 - measured[k][0] / max(found[k][0], measured[k][0]), 0.0))
-        for k in repeated
+        residuals[k] * np.sqrt(weight[k] * share) for k, share in zip(repeated, own, strict=True)
     ]
-    others = [np.delete(each, k, axis=0).mean(0) for k in repeated if len(each) > 1]
+    others = [
+        _mean(np.delete(each, k, axis=0), np.delete(weight, k)) for k in repeated if len(each) > 1
+    ]
     return UsualResidual(
-        autocovariance=positive_autocovariance(each.mean(0)),
+        autocovariance=positive_autocovariance(_mean(each, weight)),
         shapes=np.stack(kept) if kept else np.zeros((0, 0, 0)),
-        freedom=len(kept) or len(residuals),
+        freedom=float(weight[repeated].sum() if kept else weight.sum()),
         others=np.reshape([positive_autocovariance(of) for of in others], (len(others), lags)),
     )
+
+
+def _mean(rows: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    return np.average(rows, axis=0, weights=weight)
 
 
 def without_usual(noise: Noise) -> Noise:
@@ -112,6 +129,14 @@ def usual_in(noise: Noise) -> UsualResidual | None:
     """The part of the noise that is the simulator's fault, if any is known."""
     parts = noise.parts if isinstance(noise, SumOfNoises) else ()
     return next((part for part in parts if isinstance(part, UsualResidual)), None)
+
+
+def usual_rms(noise: Noise, at: Layout) -> float:
+    """RMS over samples of the part that is the simulator's fault, 0 where none is known."""
+    usual = usual_in(noise)
+    if usual is None:
+        return 0.0
+    return float(np.sqrt(np.trace(usual.covariance(at)) / len(at.sample)))
 
 
 def _autocovariance(residual: np.ndarray, lags: int) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from ...liquid import Liquid
-from ...stir_setup import Cup, Stick, StirSetup
+from ...stir_setup import StirSetup
 from ...stirring import stir
 from ...stirs.slip_law import PIVOT_DAMPING
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row

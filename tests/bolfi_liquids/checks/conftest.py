@@ -30,7 +30,7 @@ LIQUIDS = {
     "water_v10": Liquid("0.001", 1.3),
     "oil_v10": Liquid("0.1", 1.1),
     "gel_v10": Liquid("12", 1.0),
-    "hidden_oil_delay_v10": Liquid("0.1", 1.1, "delay"),
+    "hidden_oil_bubbles_v10": Liquid("0.1", 1.1, "bubbles"),
 }
 
 

@@ -38,7 +38,7 @@ def check(grid, shifted, tmp_path):
 def test_a_check_leaves_records_plots_and_one_results_file(check):
     found = check(seed=3)
     assert found.passed and found.ran == NAMES
-    assert found.left_out == {"hidden_oil_delay_v10": "delay"}
+    assert found.left_out == {"hidden_oil_bubbles_v10": "bubbles"}
     assert [record["name"] for record in found.records] == list(NAMES)
     results = json.loads(found.results.read_text())
     assert results["passed"] is True and results["seed"] == 3
@@ -50,7 +50,7 @@ def test_a_check_leaves_records_plots_and_one_results_file(check):
     assert water["settings"]["viscosity"] == 0.001 and water["settings"]["setup"]["cup"]
     assert water["notes"]["cpu_s"] >= 0.0 and "panels" not in water
     assert [pair["passed"] for pair in results["neighbours"]] == [True, True]
-    assert results["left_out"] == {"hidden_oil_delay_v10": "delay"}
+    assert results["left_out"] == {"hidden_oil_bubbles_v10": "bubbles"}
     for name in NAMES:
         for ending in ("json", "svg"):
             assert (found.path / "against" / f"{name}.{ending}").exists()
@@ -154,7 +154,7 @@ def test_the_command_prints_both_tables_and_what_was_left_out(command, tmp_path)
     assert result.exit_code == 0, result.stderr
     for text in ("water_v10", "0.001", "[deg]", "CPU s", "0.36", "pass", "1 ± 0.25"):
         assert text in result.stdout
-    assert "left out, for they hold an effect: hidden_oil_delay_v10 (delay)" in result.stdout
+    assert "left out, for they hold an effect: hidden_oil_bubbles_v10 (bubbles)" in result.stdout
     assert "recordings within their bars: 3 of 3" in result.stdout
     assert "pairs within their bar: 2 of 2 judged" in result.stdout
     assert f"results: {tmp_path}/out/against.json" in result.stdout

@@ -1,5 +1,6 @@
 """What is refused of a reference's recordings, before anything is simulated."""
 
+import numpy as np
 import pytest
 
 from bolfi_liquids.checks.reference import open_reference
@@ -11,7 +12,31 @@ def test_stirs_go_from_thin_to_thick_and_hidden_effects_are_left_out(grid):
     assert [stir.name for stir in reference.stirs] == ["water_v10", "oil_v10", "gel_v10"]
     assert [stir.viscosity for stir in reference.stirs] == [0.001, 0.1, 12.0]
     assert {stir.fill for stir in reference.stirs} == {0.0503}
-    assert reference.left_out == {"hidden_oil_delay_v10": "delay"}
+    assert reference.left_out == {"hidden_oil_bubbles_v10": "bubbles"}
+
+
+@pytest.mark.parametrize(
+    ("hidden", "size", "effects"),
+    [
+        ("delay", "0.08", {"camera_delay": 0.08}),
+        ("mass", "0.2", {"stick_mass": 1.2}),
+        ("pivot", "3e-4", {"pivot_friction": 3e-4}),
+        ("scale", "1.25", {"gripper_scale": 0.8}),
+    ],
+)
+def test_a_hidden_effect_whose_size_is_known_acts_in_the_repetition(grid, hidden, size, effects):
+    edited("0.0503,bubbles,0.08", f"0.0503,{hidden},{size}")(grid)
+    reference = open_reference(grid)
+    (stir,) = [one for one in reference.stirs if one.effects]
+    assert stir.effects == pytest.approx(effects) and not reference.left_out
+
+
+def test_a_liquid_that_warms_is_as_thin_at_the_end_as_the_table_says(grid):
+    edited("0.1,0.0503,bubbles,0.08", "0.1,0.0503,warming,4")(grid)
+    (stir,) = [one for one in open_reference(grid).stirs if one.effects]
+    seconds = stir.recording.time[-1] - stir.recording.time[0]
+    assert np.exp(stir.effects["warming"] * seconds) == pytest.approx(4.0)
+    assert stir.thinnest == pytest.approx(0.025)
 
 
 def test_stirs_are_chosen_by_the_names_of_their_files(grid):
@@ -21,8 +46,10 @@ def test_stirs_are_chosen_by_the_names_of_their_files(grid):
     assert reference.chosen([]) == reference.stirs
     with pytest.raises(InputError, match="^names: no recording .*'couette'.*from water_v10"):
         reference.chosen(["couette"])
-    with pytest.raises(InputError, match="'hidden_oil_delay_v10' holds the hidden effect delay"):
-        reference.chosen(["hidden_oil_delay_v10"])
+    with pytest.raises(
+        InputError, match="'hidden_oil_bubbles_v10' holds the hidden effect bubbles"
+    ):
+        reference.chosen(["hidden_oil_bubbles_v10"])
 
 
 def edited(old, new):
@@ -66,7 +93,9 @@ FAULTS = {
     "no effects": (edited("hidden,size", "effect,size"), "no column 'hidden'.*give a column"),
     "damaged": (broken, "oil_v10.nc: not a NetCDF file"),
     "odd name": (renamed, "column file: 'Oil 10' cannot name results; rename"),
-    "all hidden": (edited("0.0503,,", "0.0503,mass,0.2"), "every recording holds a hidden effect"),
+    "all hidden": (edited("0.0503,,", "0.0503,bubbles,1"), "every recording holds a hidden effect"),
+    "no size": (edited("bubbles,0.08", "mass,"), "line 5, column size: got ''; give the size"),
+    "no warming": (edited("bubbles,0.08", "warming,0"), "line 5, column size: got '0'"),
 }
 
 

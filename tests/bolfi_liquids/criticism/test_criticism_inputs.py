@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 from bolfi_liquids.calibration.stir_simulator import stirring_of
-from bolfi_liquids.criticism.baseline import Clean, usual_elsewhere, usual_for
+from bolfi_liquids.criticism.baseline import Clean, likeness, usual_elsewhere, usual_for
 from bolfi_liquids.criticism.inputs import Given, open_inputs
 from bolfi_liquids.criticism.result import finished_criticism
 from bolfi_liquids.criticism.stirs import camera_noise, held_out_noise, stir_experiment
@@ -202,15 +202,28 @@ def test_clean_recordings_of_the_same_path_say_where_it_errs(calibration):
     rng = np.random.default_rng(0)
     recording = recorded(calibration, rng)
     residual = 10.0 * SD * np.sin(np.linspace(0.0, 9.0, len(recording.time)))[:, None] * [1.0, 0.5]
-    clean = [Clean(recording, residual, 1)]
+    clean = [Clean(recording, residual, 1.0, 1)]
     stirring = stirring_of([recording], 200)
-    same, elsewhere = usual_for(stirring, clean), usual_elsewhere(clean)
+    same, elsewhere = usual_for(stirring, clean, 0.5), usual_elsewhere(clean, 0.5)
     assert len(same.shapes) == 1 and len(elsewhere.shapes) == 0
     cameras = camera_noise([recording])
     noise = stir_experiment(stirring, cameras, same, "stir").noise
     assert [type(part).__name__ for part in noise.parts] == ["AutoregressiveNoise", "UsualResidual"]
-    assert usual_for(stirring, []) is None
+    assert usual_for(stirring, [], 0.5) is None
     assert stir_experiment(stirring, cameras, None, "stir").noise is cameras
+
+
+def test_recordings_of_the_nearest_liquid_tell_most():
+    """Of water, oil and glycerin: nothing of one another, and all the same of unknown liquids."""
+    known = [0.001, 0.1, 1.0]
+    for nearest, viscosity in enumerate(known):
+        found = likeness(known, viscosity)
+        assert found[nearest] == 1.0 and np.delete(found, nearest).max() < 0.01
+    between = likeness(known, 0.4)
+    assert between[2] == 1.0 and 0.1 < between[1] < 0.9
+    # beyond all, the nearest one tells all that can be told
+    np.testing.assert_allclose(likeness(known, 20.0), [0.0, 0.0, 1.0], atol=1e-3)
+    assert (likeness(known, None) == 1.0).all() and (likeness([None, 1.0], 1.0) == 1.0).all()
 
 
 @pytest.mark.parametrize("option", ["pours", "held_out_pours"])

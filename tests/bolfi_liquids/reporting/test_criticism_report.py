@@ -120,7 +120,7 @@ def test_chapter_of_a_model_that_agrees(criticism_summary, made, calibrated):
     tree = made(after=False, status=[EffectStatus.NOT_NEEDED] * 3)
     chapter = criticism_chapter(replace(criticism_summary, **NONE, gap=gap), tree, calibrated)
     assert keys(chapter["gap"]) == ["gap_before"]
-    assert chapter["gap"][0].values == {"before": 0.3, "noise": 0.33}
+    assert chapter["gap"][0].values == {"before": 0.3, "noise": 0.33, "usual": 0.2}
     assert chapter["where"].key == "criticism.nowhere"
     assert chapter["sources"][0]["rows"][1][4:6] == ["–", "–"]
 

@@ -110,7 +110,7 @@ def test_what_is_usual_for_a_simulator_does_not_make_it_deaf():
 
 def test_gains_of_several_recordings_add_up_and_each_may_veto():
     def of(gain, p_value=0.5):
-        return criticism.Gap("", 1.0, 0.5, 0.3, 0.4, p_value, gain)
+        return criticism.Gap("", 1.0, 0.5, 0.3, 0.2, 0.4, p_value, gain)
 
     assert not holds([of(2.0)])
     assert holds([of(2.0), of(2.0)]) and holds([])
@@ -119,14 +119,14 @@ def test_gains_of_several_recordings_add_up_and_each_may_veto():
 
 def test_most_of_a_gap_must_go_unless_it_may_be_noise():
     """Beyond noise of .3 in quadrature; .4 of noise is rare."""
-    small = criticism.Gap("", 0.45, 0.39, 0.3, 0.4, 0.5, 20.0)
+    small = criticism.Gap("", 0.45, 0.39, 0.3, 0.2, 0.4, 0.5, 20.0)
     assert small.excess[1] > 0.5 * small.excess[0]
     assert holds([small])
-    large = [criticism.Gap("", 1.0, after, 0.3, 0.4, 0.5, 20.0) for after in (0.55, 0.6)]
+    large = [criticism.Gap("", 1.0, after, 0.3, 0.2, 0.4, 0.5, 20.0) for after in (0.55, 0.6)]
     assert [one.excess[1] / one.excess[0] < 0.5 for one in large] == [True, False]
     assert [holds([one]) for one in large] == [True, False]
     # a recording that shows nothing of it takes nothing away
-    indifferent = criticism.Gap("", 0.45, 0.45, 0.3, 0.4, 0.5, 0.0)
+    indifferent = criticism.Gap("", 0.45, 0.45, 0.3, 0.2, 0.4, 0.5, 0.0)
     assert holds([large[0]._replace(after=0.4), indifferent]) and not holds([indifferent])
 
 

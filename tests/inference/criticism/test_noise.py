@@ -177,6 +177,21 @@ def test_residuals_of_the_same_experiment_say_where_it_errs_again(clean):
     assert (learned.freedom, other.freedom) == (2, 3)
 
 
+def test_what_tells_little_of_a_system_counts_little(clean):
+    """A regime in which the simulator errs tenfold, weighed by next to nothing."""
+    two, none = list(clean[:2]), [NOTHING] * 3
+    alone = criticism.usual_residual(two, none[:2], [True, False])
+    beside = criticism.usual_residual(
+        [*two, 10.0 * clean[2]], none, [True, False, True], [1.0, 1.0, 1e-6]
+    )
+    at = Layout(np.repeat([0, 1], 40), np.tile(np.arange(40), 2))
+    expected = alone.covariance(at)
+    np.testing.assert_allclose(beside.covariance(at), expected, atol=1e-3 * expected.max())
+    assert beside.freedom == pytest.approx(1.0, abs=1e-3)
+    with pytest.raises(ValueError, match="weights must be 2 numbers above 0"):
+        criticism.usual_residual(two, none[:2], [True, True], [1.0, 0.0])
+
+
 @pytest.mark.parametrize("longest", [12, 40, 70], ids=["shorter", "as long", "longer"])
 def test_the_covariance_is_positive_semidefinite(longest):
     """Also where the noise exceeds the residuals, they alternate, or the data are longer."""
