@@ -19,7 +19,7 @@ app = typer.Typer(help="Long validation runs; a killed one goes on.", no_args_is
 
 @app.command(
     epilog=examples(
-        "check physics --case couette",
+        "check physics --case ring_couette",
         "check physics --out runs/physics",
         "check physics --against recordings --out runs/physics",
         "check physics --against pours --cell 4 --out runs/cells_of_4_mm",

@@ -23,6 +23,8 @@ def main(folder: Path, runs: Path) -> None:
     held, errors = [], []
     print(f"{'recording':20} {'Pa s':>6} {'5 %':>8} {'50 %':>8} {'95 %':>8}  holds")
     for reference in open_reference(folder).stirs:
+        if reference.effects:
+            continue
         truth = reference.viscosity
         if truth < LEAST_VISCOSITY:
             continue

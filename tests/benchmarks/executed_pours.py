@@ -36,7 +36,7 @@ def main(data: Path, runs: Path) -> None:
     print(f"{machine()}\n{HEAD}", flush=True)
     spilled = []
     for stir in open_reference(data / "stirring_reference").stirs:
-        if stir.viscosity not in poured:
+        if stir.effects or stir.viscosity not in poured:
             continue
         liquid, out = poured[stir.viscosity], runs / stir.name
         calibration = bl.calibrate(
