@@ -5,10 +5,9 @@ import warnings
 import numpy as np
 
 LARGEST = 1e30  # squared speed [m²/s²] that single precision can still work with
-SOUND, COLLAPSED, RUNAWAY, UNSOLVED, DRIFTED = range(5)
+SOUND, RUNAWAY, UNSOLVED, DRIFTED = range(4)
 ABSENT = -1  # of a place among simulations that march together
 REASONS = {
-    COLLAPSED: "the liquid collapsed: its particles have too many neighbours",
     UNSOLVED: "its viscosity is too large to compute with; take a smaller one",
     DRIFTED: "its level moved by more than 2 %: take smaller cells or shorter steps",
     RUNAWAY: "a particle ran away: its velocity is not finite or beyond any liquid's",

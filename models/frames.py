@@ -72,7 +72,7 @@ def stir_frames(
         liquid: One liquid.
         gripper, setup, effects: As for `stir`.
         seed: Decides the initial packing.
-        rate: Frames per second, each at the nearest substep; the last is the end of the path.
+        rate: Frames per second, each at the nearest step; the last is the end of the path.
 
     Raises:
         ValueError: as `stir`, or the rate is not positive.
@@ -101,7 +101,7 @@ def pour_frames(batch: PourBatch, *, rate: float = FRAME_RATE) -> PourFrames:
 
     Args:
         batch: One pour.
-        rate: Frames per second, each at the nearest substep; the last is the end of the pour.
+        rate: Frames per second, each at the nearest step; the last is the end of the pour.
 
     Raises:
         ValueError: as `landings`, there are several seeds, or the rate is not positive.

@@ -21,7 +21,7 @@ os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "False")
 os.environ.setdefault("TI_ENABLE_PYBUF", "0")
 
 STALE_S = 60.0  # age of a lock that is held for a moment
-CHUNK = 240  # substeps a kernel call, so that Ctrl-C is prompt
+CHUNK = 240  # steps between two looks at the time limit, so that Ctrl-C is prompt
 
 
 class WrongThread(RuntimeError):
@@ -98,7 +98,7 @@ class Watch(NamedTuple):
 
     Attributes:
         rate: Looks per second of the simulation, besides those at its start and at its end.
-        look: (scene, substeps done); called between two kernel calls.
+        look: (scene, steps done); called between two kernel calls.
     """
 
     rate: float
@@ -106,7 +106,7 @@ class Watch(NamedTuple):
 
 
 def run_chunks(scene, steps: int, run: Callable[[int, int], None], watch: Watch | None) -> None:
-    """Call `run(start, stop)` until `steps` substeps of a scene are done.
+    """Call `run(start, stop)` until `steps` steps of a scene are done.
 
     Where one call ends and the next begins changes no bit, so neither does a watch.
 

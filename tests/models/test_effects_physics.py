@@ -131,7 +131,7 @@ def test_more_liquid_stands_higher(setup, short):
 
 
 def kicked(setup):
-    """A gripper that jerks by 2 cm and then stands still for 4 s, seen at every substep."""
+    """A gripper that jerks by 2 cm and then stands still for 4 s, seen at every step."""
     time = np.arange(0.0, 4.0, setup.numerics.step(setup.cell, 0.0))
     position = np.zeros((len(time), 3))
     position[:, 0] = 0.02 * np.clip(time / 0.1, 0.0, 1.0)

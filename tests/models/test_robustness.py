@@ -25,7 +25,7 @@ SOME_EFFECTS = 125  # of the points have a subset of the effects, one for each b
 FEW = 300  # particles of a pour
 FIRST, LAST = 0.5, 4.5  # s of the recording: from rest into strokes at 10 cm/s,
 HASTE = 2.0  # times as fast
-LOOK = 20  # substeps between two looks at the particles' speeds
+LOOK = 20  # steps between two looks at the particles' speeds
 FASTEST = {"stir": 2.0, "pour": 4.0}  # m/s; a fall over the cup's depth gains 1.2, a pour's 1.9
 STEEPEST = np.radians(60.0)
 

@@ -148,7 +148,7 @@ def test_the_frames_lose_no_liquid_and_lean_as_the_simulator_says(frames):
     for draw in range(frames.sizes["draw"]):
         for plane in range(2):
             between = np.interp(frames["stir_time"], frames["time"], seen[draw, :, plane])
-            # both are interpolated, between samples and between substeps
+            # both are interpolated, between samples and between steps
             assert np.abs(between - leaning[draw, :, plane]).max() < np.radians(0.3)
 
 
