@@ -135,7 +135,9 @@ def _of_the_model(
     found = []
     if criticised.frame_faults:
         found.append(sentence("warning.compared_in_a_wrong_frame", faults=criticised.frame_faults))
-    if criticised.verdict != Verdict.NONE and not criticised.accepted:
+    # an effect can take up any error that looks like it, also the simulator's own
+    confirmed = criticised.accepted and criticised.held_out
+    if criticised.verdict != Verdict.NONE and not confirmed:
         found.append(verdict_sentence(criticised))
     if not criticised.baseline:
         found.append(sentence("criticism.no_baseline"))

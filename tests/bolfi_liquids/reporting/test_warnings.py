@@ -24,6 +24,8 @@ FINE = {
     "emulator_warnings": (),
 }
 AGREES = {"verdict": Verdict.NONE, "effects": (), "accepted": ()}
+CONFIRMED = {"verdict": Verdict.EFFECT, "effects": ("stick_mass",), "accepted": ("stick_mass",)}
+UNCONFIRMED = CONFIRMED | {"held_out": 0}
 ACTION = ActionSummary(60.0, 3.0, 0.01, 0.05)
 POURED = PourSummary(
     **vars(ACTION), least_viscosity=0.01, n_simulations=99, risk="mean", seed=0, plug_in=ACTION
@@ -88,6 +90,7 @@ def test_nothing_is_said_where_nothing_is_wrong(fine):
             {"faults": ("other.nc: turned",)},
         ),
         ("criticised", {"verdict": Verdict.UNKNOWN}, "criticism.unexplained", {}),
+        ("criticised", UNCONFIRMED, "criticism.effect_unconfirmed", {"effects": ("stick_mass",)}),
         ("poured", {"expected_spillage": 0.12}, "warning.much_spilled", {"share": 0.12}),
     ],
 )
@@ -121,6 +124,11 @@ def test_a_misfit_that_was_not_criticised_is_told(fine):
     far = replace(fine.calibrated, fit_rms_deg=0.9)
     (sentence,) = warnings_of(replace(fine, calibrated=far, criticised=None))
     assert sentence.key == "warning.misfit_not_criticised"
+
+
+def test_an_effect_that_held_out_data_confirm_is_nothing_to_warn_of(fine):
+    confirmed = replace(fine.criticised, held_out=1, **CONFIRMED)
+    assert warnings_of(replace(fine, criticised=confirmed)) == []
 
 
 def test_a_bad_fit_is_told_first(fine):
