@@ -227,7 +227,7 @@ def _refused(
     if field.startswith(("engine.", "simulator.")):  # settings and recordings are the same
         made_by = record.get("versions", {}).get(PROGRAM)
         what = f"{field} was {held!r} and is {wanted!r} now"
-        fix = "calibrate again into another `out`"
+        fix = "begin again with another `out`"
         if made_by not in (None, version(PROGRAM)):
             fix += f", or go on with version {made_by}, which made the run"
     else:

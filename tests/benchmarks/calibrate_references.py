@@ -42,12 +42,12 @@ def main(folder: Path, runs: Path) -> None:
         errors.append(abs(middle / truth - 1.0))
         interval = {"q05": float(low), "q50": float(middle), "q95": float(high)}
         found[reference.name] = {"viscosity": truth, **interval}
+        results = {"budget": BUDGET, "model": MODEL_VERSION, "calibrations": found}
+        (runs / "calibrations.json").write_text(json.dumps(results, indent=2) + "\n")
         print(
             f"{reference.name:20} {truth:6g} {low:8.3g} {middle:8.3g} {high:8.3g}  {held[-1]}",
             flush=True,
         )
-    results = {"budget": BUDGET, "model": MODEL_VERSION, "calibrations": found}
-    (runs / "calibrations.json").write_text(json.dumps(results, indent=2) + "\n")
     print(f"intervals that hold the truth: {sum(held)} of {len(held)} (bar {HELD:.2f})")
     print(f"median of |q50 / true - 1|: {np.median(errors):.3f} (bar {ERROR})")
 
