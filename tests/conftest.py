@@ -5,11 +5,13 @@ import os
 import sys
 import tarfile
 import time
+import tomllib
 from pathlib import Path
 from threading import Event, Thread
 
 import psutil
 import pytest
+import tomli_w
 from _pytest.runner import runtestprotocol
 
 APPLICATION = "bolfi_liquids"
@@ -68,13 +70,21 @@ def importable(monkeypatch):
 
 @pytest.fixture
 def poured_run(tmp_path):
-    """A run that has chosen a pour: a small one of version 0.1, without its criticism."""
+    """A run that has chosen a pour: a small one of version 0.1, without its criticism.
+
+    It names today's model, for a pour over another model's liquid is not executed.
+    """
     with tarfile.open(Path(__file__).parent / "data" / "run_0_1.tar.xz") as archive:
         archive.extractall(tmp_path, filter="data")
     run = tmp_path / "run_0_1"
     summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
     del summary["criticise"]
     (run / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
+    from bolfi_liquids.models import MODEL_VERSION
+
+    record = tomllib.loads((run / "run.toml").read_text(encoding="utf-8"))
+    record["simulator"]["recording_1"]["model"] = MODEL_VERSION
+    (run / "run.toml").write_text(tomli_w.dumps(record), encoding="utf-8")
     return run
 
 

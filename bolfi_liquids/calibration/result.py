@@ -83,7 +83,7 @@ class Calibration:
                 fix="go on with it: "
                 + command(
                     *("calibrate", "RECORDING...", "--out", run, "--resume"),
-                    *_given_options(record),
+                    *given_options(record),
                 ),
             )
         loaded = read_tree(
@@ -193,7 +193,7 @@ def _unpickled(values: dict[str, Any]) -> Calibration:
     return Calibration(**{**values, "record": MappingProxyType(values["record"])})
 
 
-def _given_options(record: Mapping[str, Any]) -> list[str]:
+def given_options(record: Mapping[str, Any]) -> list[str]:
     """Options of `calibrate` with which a run was started, where they are not the default."""
     settings, usual = record.get("settings", {}), asdict(CalibrationSettings())
     given = {name: settings.get(name, usual[name]) for name in RESUMED_OPTIONS}

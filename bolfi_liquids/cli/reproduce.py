@@ -33,7 +33,7 @@ def reproduce(
 
     - `inclination`: recorded stirs, and what the calibrated simulator predicts
     - `posterior`: what stirring teaches, on recordings of a reference solver
-    - `recordings`: what is poured after each of them, and what another solver spilled
+    - `recordings`: what is poured after those of water and glycerin, and the reference spilled
     - `geometry`: over lip heights and receivers, where knowing the liquid matters
     - `spillage`: against the number of simulations, by stirring and by pouring
     - `liquids`: the same by liquid

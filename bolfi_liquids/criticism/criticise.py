@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..calibration.former_model import refuse_other_model
 from ..calibration.posterior_file import write_tree
 from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, stirring_of
@@ -85,7 +86,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         progress: Whether to show phases on stderr.
 
     Raises:
-        InputError, ValueError: Something given cannot be used, or another command works in the run.
+        InputError, ValueError: Something given cannot be used, the run is of another model, or
+            another command works in it.
         ImportError, ConnectionError: `executor` cannot be used.
         RuntimeError: Simulations failed; the message says how.
     """
@@ -102,6 +104,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     with working_in_run(run):
         if not isinstance(calibration, Calibration):
             calibration = Calibration.open(run)
+        refuse_other_model(calibration)
         inputs = open_inputs(calibration, settings, given)
         for notice in [*aborted_recordings(inputs.compared), *frame_warnings(inputs.compared)]:
             logger.warning(notice)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.bad_fit import refuse_bad_fit
+from ..calibration.former_model import refuse_other_model
 from ..calibration.posterior_file import write_tree
 from ..calibration.result import Calibration
 from ..criticism.result import latest_calibration
@@ -78,14 +79,15 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         progress: Whether to show a bar on stderr.
 
     Raises:
-        InputError: A setting, `timeout` or the file of the cups cannot be used; the fit is bad; or
-            another command works in the run.
+        InputError: A setting, `timeout` or the file of the cups cannot be used; the fit is bad; the
+            run is of another model; or another command works in it.
         ValueError, ImportError, ConnectionError: `executor` cannot be used.
         RuntimeError: Too few pours succeeded.
     """
     settings = PourSettings(pours=pours, iterations=iterations, draws=draws, risk=risk, seed=seed)
     with working_in_run(run_path(calibration)):
         latest = latest_calibration(calibration)
+        refuse_other_model(latest)
         if not force:
             refuse_bad_fit(latest.summary, latest.path)
         drawn = strata(latest, settings.draws, settings.seed)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..calibration.fit_figures import inclination_figure, stroke_figure
+from ..calibration.former_model import refuse_other_model
 from ..calibration.posterior_figure import posterior_figure
 from ..calibration.result import Calibration
 from ..calibration.search_figure import search_figure
@@ -50,12 +51,14 @@ def report(
         progress: Whether to show a bar on stderr while they are.
 
     Raises:
-        InputError: The directory holds no finished calibration, or another command works in it.
+        InputError: The directory holds no finished calibration, or one of another model, or another
+            command works in it.
         RuntimeError: A simulation took longer than `timeout`.
     """
     how = {"executor": executor, "timeout": timeout, "progress": progress}
     with working_in_run(run_path(run)):
         calibration = Calibration.open(run_path(run))
+        refuse_other_model(calibration)
         # before anything is simulated: a damaged file is refused
         results, criticism = results_of(calibration), criticism_context(calibration)
         pictures = _moving(calibration, how) if moving else None

@@ -94,12 +94,12 @@ def warnings_of(run: Results) -> list[Sentence]:
     """The gravest first; none if nothing is known to be wrong."""
     return [
         *filter(None, [bad_fit(run.latest)]),
-        *sampler_sentences(run.calibrated),
+        *sampler_sentences(run.latest),
         *surrogate_sentences(run.calibrated),
         *_of_the_search(run.calibrated, run.searched),
         *stale_sentences(run),
         *_of_the_model(run.calibrated, run.criticised),
-        *least_viscosity_sentences(run.calibrated),
+        *least_viscosity_sentences(run.latest),
         *_of_the_pour(run.poured, run.pour),
     ]
 
@@ -135,8 +135,17 @@ def _of_the_model(
     found = []
     if criticised.frame_faults:
         found.append(sentence("warning.compared_in_a_wrong_frame", faults=criticised.frame_faults))
-    if criticised.verdict != Verdict.NONE and not criticised.accepted:
+    # an effect can take up any error that looks like it, also the simulator's own
+    confirmed = criticised.accepted and criticised.held_out
+    if criticised.verdict != Verdict.NONE and not confirmed:
         found.append(verdict_sentence(criticised))
+    if criticised.verdict != Verdict.UNKNOWN:  # what one source named explains nothing of the other
+        sources = {"stirs": criticised.stirs, "pours": criticised.pours}
+        found += [
+            verdict_sentence(one, data)
+            for data, one in sources.items()
+            if one is not None and one.verdict == Verdict.UNKNOWN
+        ]
     if not criticised.baseline:
         found.append(sentence("criticism.no_baseline"))
     return found

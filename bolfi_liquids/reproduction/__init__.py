@@ -1,1 +1,1 @@
-"""The paper's figures and what it left open, on simulated truths and another solver's pours."""
+"""The paper's figures and what it left open, on simulated truths and a reference solver's pours."""

@@ -1,4 +1,4 @@
-"""From recordings of stirs to what the chosen pours spill in another solver."""
+"""From recordings of stirs to what the chosen pours spill in the reference solver."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,7 +29,7 @@ OTHER_CHOICES = {
 
 
 def recordings(shared: SharedSimulations) -> Drawn:
-    """Chosen from a recording of stirring alone, spilled in another solver."""
+    """Chosen from a recording of stirring alone, spilled in the reference solver."""
     data = _judged(shared)
     return Drawn(data, _figure(data), _says(data))
 
@@ -123,7 +123,7 @@ def _figure(data: "Dataset") -> "Figure":
                 shown = name if at == 2 else None
                 axes.plot(x, other, marker, color=INK, mfc="none", ms=5, label=shown)
         axes.set_xticks(places, data["liquid"].to_numpy())
-        axes.set_ylabel("spilled in the other solver [%]")
+        axes.set_ylabel("spilled in the reference solver [%]")
         figure.legend(loc="outside lower center", ncols=3)
     return figure
 
@@ -135,7 +135,7 @@ def _whiskers(axes: "Axes", x: np.ndarray, percent: "DataArray", error: "DataArr
 
 
 def _says(data: "Dataset") -> str:
-    lines = ["spilled by the other solver [%], its table interpolated:"]
+    lines = ["spilled by the reference solver [%], its table interpolated:"]
     for liquid in data["liquid"].to_numpy():
         for run in data["run"].to_numpy():
             one = data.sel(liquid=liquid, run=run)

@@ -12,7 +12,7 @@ class Scale:
     Attributes:
         repetitions: Truths of each liquid.
         budgets: Simulations to learn from, ascending.
-        recorded: Simulations for each recording of the other solver.
+        recorded: Simulations for each recording of the reference solver.
         strokes: Numbers of strokes to calibrate after.
         few: Budget of each calibration after some strokes.
         sticky: Repetitions of the liquid that sticks to its cup.

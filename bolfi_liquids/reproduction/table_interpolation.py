@@ -42,10 +42,8 @@ def between(table: "PourTable", rate: float, distance: float) -> tuple[float, fl
 
     Along the distance by monotone cubics: the best distance lies in a valley, where linear
     interpolation overestimates the minimum. On bundled pours that are left out, linear
-    interpolation has RMS errors of .110 (water), .089 (oil) and .041 (glycerin), mostly upwards,
-    and cubics of .087, .071 and .034. On finely simulated rows, evaluated at the table's
-    distances, the errors are .018 and .011 where less than 5 % is spilled. Between angular
-    velocities linear in their logarithm.
+    interpolation has RMS errors of .043 (water) and .041 (glycerin), cubics of .023 and .031.
+    Between angular velocities linear in their logarithm.
 
     Args:
         table: Of at least two pours for each angular velocity.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..calibration.bad_fit import bad_fit
+from ..calibration.former_model import refuse_other_model
 from ..calibration.result import Calibration
 from ..calibration.summary import FitStatus
 from ..errors import InputError
@@ -109,15 +110,17 @@ def chosen_pour(run: Path) -> ChosenPour:
     """The pour of a run, from pour.nc.
 
     Raises:
-        InputError: The run has chosen none, a file is damaged, or the pour is not that of
-            summary.json or lies outside of what its cups allow.
+        InputError: The run has chosen none or is of another model, a file is damaged, or the pour
+            is not that of summary.json or lies outside of what its cups allow.
     """
     if not (run / RUN_TOML).exists() and not (run / POUR).exists():
         raise InputError(
             "no run", where=str(run), fix="calibrate first: bolfi-liquids calibrate RECORDING"
         )
     check_poured(run)
-    results = results_of(Calibration.open(run))
+    calibration = Calibration.open(run)
+    refuse_other_model(calibration)
+    results = results_of(calibration)
     if results.pour is None or results.poured is None:
         raise InputError(
             f"has no section pour, though there is a {POUR}",

@@ -5,6 +5,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from difflib import get_close_matches
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -224,9 +225,11 @@ def _refused(
         fix = f"give those that {RUN_TOML} names under files, unchanged, or choose another `out`"
         return InputError(what, where=str(run), fix=fix)
     if field.startswith(("engine.", "simulator.")):  # settings and recordings are the same
-        version = record.get("versions", {}).get(PROGRAM, "of the program")
+        made_by = record.get("versions", {}).get(PROGRAM)
         what = f"{field} was {held!r} and is {wanted!r} now"
-        fix = f"go on with version {version}, which made the run, or choose another `out`"
+        fix = "begin again with another `out`"
+        if made_by not in (None, version(PROGRAM)):
+            fix += f", or go on with version {made_by}, which made the run"
     else:
         what = f"{field} is {held!r} in the run, but {wanted!r} was asked"
         own = "the run's own value" + (" or a larger one" if field == growing else "")

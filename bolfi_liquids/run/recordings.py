@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +65,13 @@ def kept_recordings(run: Path, record: dict[str, Any]) -> list[Recording]:
             )
         opened.append(read_recording(path))  # with these bytes it has been checked
     return opened
+
+
+def kept_paths(run: Path, record: Mapping[str, Any]) -> tuple[Path, ...]:
+    """Of those copies that are there; none in runs from before they were kept."""
+    names = enumerate(record["files"]["recordings"], start=1)
+    paths = [run / RECORDINGS_FOLDER / _name(number, name) for number, name in names]
+    return tuple(path for path in paths if path.is_file())
 
 
 def _name(number: int, name: str) -> str:

@@ -4,12 +4,15 @@
 
 Every recording without a hidden effect, from 0.01 Pa s on, is calibrated with 20 simulations into a
 directory of its own below RUNS; one that is finished there is not calibrated again.
+RUNS/calibrations.json holds what accuracy_page.py tells of them.
 """
 
+import json
 import sys
 from pathlib import Path
 
 import numpy as np
+from bolfi_liquids.models import MODEL_VERSION
 
 import bolfi_liquids as bl
 from bolfi_liquids.checks.reference import open_reference
@@ -20,7 +23,7 @@ HELD, ERROR = 11 / 14, 0.2  # bars: share of intervals that hold the truth, and 
 
 
 def main(folder: Path, runs: Path) -> None:
-    held, errors = [], []
+    held, errors, found = [], [], {}
     print(f"{'recording':20} {'Pa s':>6} {'5 %':>8} {'50 %':>8} {'95 %':>8}  holds")
     for reference in open_reference(folder).stirs:
         if reference.effects:
@@ -39,6 +42,10 @@ def main(folder: Path, runs: Path) -> None:
         low, middle, high = calibration.posterior["viscosity"].quantile([0.05, 0.5, 0.95]).values
         held.append(low <= truth <= high)
         errors.append(abs(middle / truth - 1.0))
+        interval = {"q05": float(low), "q50": float(middle), "q95": float(high)}
+        found[reference.name] = {"viscosity": truth, **interval}
+        results = {"budget": BUDGET, "model": MODEL_VERSION, "calibrations": found}
+        (runs / "calibrations.json").write_text(json.dumps(results, indent=2) + "\n")
         print(
             f"{reference.name:20} {truth:6g} {low:8.3g} {middle:8.3g} {high:8.3g}  {held[-1]}",
             flush=True,

@@ -15,10 +15,10 @@ def machine() -> str:
         text=True,
         check=False,
     ).stdout.strip()
-    return f"{date.today()}, {platform.machine()} {_processor()}, commit {commit}"
+    return f"{date.today()}, {platform.machine()} {processor()}, commit {commit}"
 
 
-def _processor() -> str:
+def processor() -> str:
     """As the system names it, where it does."""
     information = Path("/proc/cpuinfo")
     lines = information.read_text().splitlines() if information.exists() else []

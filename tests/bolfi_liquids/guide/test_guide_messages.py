@@ -203,6 +203,12 @@ def test_runs_that_cannot_go_on(told, run, calibration):
     assert told("calibrate stir.nc --out runs/mine") in QUOTED
     options = "--budget 7 --batch 2 --seed 3 --particles 200 --resume"
     assert told(f"calibrate stir.nc --out runs/mine {options}") in QUOTED
+    whole = (run / "run.toml").read_text(encoding="utf-8")
+    former = re.sub(r'^model = "\d+"', 'model = "7"', whole, flags=re.M)
+    (run / "run.toml").write_text(former, encoding="utf-8")
+    said = told("report runs/mine").replace("1-short.nc", "1-stir.nc")
+    assert re.sub(r"model([ _])(?!7)\d+", r"model\g<1>8", said) in QUOTED
+    (run / "run.toml").write_text(whole, encoding="utf-8")
     (run / "posterior.nc").write_bytes(b"cut off")
     assert told("report runs/mine") in QUOTED
     (run / "posterior.nc").unlink()

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 from bolfi_liquids.calibration.fit_figures import _rms_by
+from bolfi_liquids.criticism.source_summary import PourVerdict
 from bolfi_liquids.criticism.verdict import Verdict
 from bolfi_liquids.pouring.figures import not_surely_worse
 from bolfi_liquids.pouring.result import ActionSummary, PourSummary
@@ -24,6 +25,8 @@ FINE = {
     "emulator_warnings": (),
 }
 AGREES = {"verdict": Verdict.NONE, "effects": (), "accepted": ()}
+CONFIRMED = {"verdict": Verdict.EFFECT, "effects": ("stick_mass",), "accepted": ("stick_mass",)}
+UNCONFIRMED = CONFIRMED | {"held_out": 0}
 ACTION = ActionSummary(60.0, 3.0, 0.01, 0.05)
 POURED = PourSummary(
     **vars(ACTION), least_viscosity=0.01, n_simulations=99, risk="mean", seed=0, plug_in=ACTION
@@ -66,9 +69,9 @@ def test_nothing_is_said_where_nothing_is_wrong(fine):
 @pytest.mark.parametrize(
     ("field", "changes", "key", "values"),
     [
-        ("calibrated", {"rhat_max": 1.2}, "calibration.not_converged", {}),
+        ("latest", {"rhat_max": 1.2}, "calibration.not_converged", {}),
         (
-            "calibrated",
+            "latest",
             {"below_least_viscosity": 0.5, "least_viscosity": 0.03},
             "calibration.least_viscosity",
             {"least": 0.03, "share": 0.5},
@@ -88,6 +91,7 @@ def test_nothing_is_said_where_nothing_is_wrong(fine):
             {"faults": ("other.nc: turned",)},
         ),
         ("criticised", {"verdict": Verdict.UNKNOWN}, "criticism.unexplained", {}),
+        ("criticised", UNCONFIRMED, "criticism.effect_unconfirmed", {"effects": ("stick_mass",)}),
         ("poured", {"expected_spillage": 0.12}, "warning.much_spilled", {"share": 0.12}),
     ],
 )
@@ -121,6 +125,18 @@ def test_a_misfit_that_was_not_criticised_is_told(fine):
     far = replace(fine.calibrated, fit_rms_deg=0.9)
     (sentence,) = warnings_of(replace(fine, calibrated=far, criticised=None))
     assert sentence.key == "warning.misfit_not_criticised"
+
+
+def test_pours_that_nothing_explains_are_told_beside_an_effect_of_the_stirs(fine):
+    unexplained = PourVerdict(Verdict.UNKNOWN, (), 0.003, (), 0, before=0.4, after=None)
+    found = replace(fine.criticised, held_out=1, pours=unexplained, **CONFIRMED)
+    (sentence,) = warnings_of(replace(fine, criticised=found))
+    assert sentence.key == "criticism.unexplained" and sentence.values["data"] == "pours"
+
+
+def test_an_effect_that_held_out_data_confirm_is_nothing_to_warn_of(fine):
+    confirmed = replace(fine.criticised, held_out=1, **CONFIRMED)
+    assert warnings_of(replace(fine, criticised=confirmed)) == []
 
 
 def test_a_bad_fit_is_told_first(fine):

@@ -216,13 +216,13 @@ def test_recordings_say_what_the_table_says_of_what_was_chosen(monkeypatch):
     )
     scale = SCALE.__class__(recorded=(10,))
     drawn = figure_of_recordings.recordings(SimpleNamespace(scale=scale, landing_map=None))
-    oil = drawn.data.sel(liquid="oil", run="discrepancy, N = 10")
-    # rows of the other solver's table
-    assert float(oil["spilled"].sel(rule="mean")) == pytest.approx(21 / 664)
-    assert float(oil["spilled"].sel(rule="cvar")) == pytest.approx(52 / 664)
-    assert float(oil["unknown"]) == pytest.approx(82 / 664)
-    assert float(oil["best"]) == pytest.approx(4 / 664)
-    assert float(oil["distance"].sel(rule="mean")) == 0.02
-    assert 0.0 < float(oil["error"].sel(rule="mean")) < 0.2
-    assert "oil, discrepancy, N = 10: 3.2 (error of interpolation" in drawn.says
-    assert "oil, signal, N = 10: 24.5 (beyond the table: its edge)" in drawn.says
+    water = drawn.data.sel(liquid="water", run="discrepancy, N = 10")
+    # rows of the reference's table
+    assert float(water["spilled"].sel(rule="mean")) == pytest.approx(0.2237)
+    assert float(water["spilled"].sel(rule="cvar")) == pytest.approx(0.2981)
+    assert float(water["unknown"]) == pytest.approx(0.0132)
+    assert float(water["best"]) == pytest.approx(0.005)
+    assert float(water["distance"].sel(rule="mean")) == 0.02
+    assert 0.0 < float(water["error"].sel(rule="mean")) < 0.2
+    assert "water, discrepancy, N = 10: 22.4 (error of interpolation" in drawn.says
+    assert "water, signal, N = 10: 7.0 (beyond the table: its edge)" in drawn.says

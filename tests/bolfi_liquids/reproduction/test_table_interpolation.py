@@ -62,11 +62,11 @@ def test_beyond_the_table_its_edge_is_taken_and_no_error_is_claimed():
 @pytest.mark.slow
 @pytest.mark.parametrize(("viscosity", "rate"), [(0.01, 30.0), (0.1, 30.0), (1.0, 90.0)])
 def test_it_is_nearer_than_chords_to_a_finely_simulated_valley(viscosity, rate):
-    """Of liquids like water, oil and glycerin, told at the other solver's distances.
+    """Of liquids like water, oil and glycerin, told at the distances of the bundled pours.
 
     Compared where less than 5 % is spilled: there choices lie.
     """
-    pours, cups = bundled_pours("oil"), bundled_cups()
+    pours, cups = bundled_pours("water"), bundled_cups()
     slowest = pours.angular_velocity == pours.angular_velocity.min()
     known, rate = np.sort(pours.distance[slowest]), np.radians(rate)
     fine = np.arange(known[0], known[-1], 5e-4)
