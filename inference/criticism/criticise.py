@@ -128,7 +128,7 @@ class Criticism:
     @property
     def usual(self) -> float:
         """RMS over the data of what is usual for the simulator, 0 where that is not known."""
-        return usual_rms(self.noise, samples(self.base.hypothesis.fit.observed))
+        return usual_rms(self.noise)
 
     @property
     def confusion(self) -> np.ndarray:

@@ -45,11 +45,6 @@ class Gap(NamedTuple):
     lpd_gain: float
 
     @property
-    def excess(self) -> tuple[float, float]:
-        """Before and after, less the noise (in quadrature)."""
-        return beyond(self.before, self.noise), beyond(self.after, self.noise)
-
-    @property
     def unexplained(self) -> tuple[float, float]:
         """Before and after, less the noise and what is usual (in quadrature)."""
         known = float(np.hypot(self.noise, self.usual))
@@ -72,11 +67,12 @@ def holds(gaps: Sequence[Gap]) -> bool:
     It leaves no more than noise and the usual residual on each of them, predicts better on all of
     them together, and explains most of the gap there.
 
-    What is usual is no excuse for the gap, or a wrong explanation would hide behind it.
+    What is usual is taken off the gap, and a wrong explanation cannot hide behind it: it must
+    predict better, and what it leaves must look like what is usual.
     """
     if not gaps:
         return True
-    before, after = np.sqrt(np.mean(np.square([one.excess for one in gaps]), axis=0))
+    before, after = np.sqrt(np.mean(np.square([one.unexplained for one in gaps]), axis=0))
     explained = after <= MAX_LEFT_SHARE * before or all(one.after <= one.floor for one in gaps)
     gained = sum(one.lpd_gain for one in gaps) > MIN_LPD_GAIN
     return bool(all(one.fits for one in gaps) and explained and gained)
@@ -127,7 +123,7 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
         before=sizes[0],
         after=sizes[1],
         noise=float(np.sqrt(np.trace(measured.covariance(at) + simulated) / len(observed))),
-        usual=usual_rms(experiment.noise, at),
+        usual=usual_rms(experiment.noise),
         floor=float(np.quantile(np.sqrt(np.mean(noise**2, axis=1)), NOISE_QUANTILE)),
         p_value=min(1.0, 2.0 * float(exceedance(measures(null), left).min())),
         lpd_gain=density(means[1]) - density(means[0]),

@@ -34,6 +34,12 @@ def around(centre: np.ndarray, sd: np.ndarray, least: float) -> Box:
     return Box(np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0))
 
 
+def within(centre: np.ndarray, sd: np.ndarray) -> Box:
+    """All that a posterior may reach of what was simulated about it when it was last fitted."""
+    half = np.maximum(MIN_POSTERIOR_SDS * sd, LATER_HALF_WIDTH)
+    return Box(np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0))
+
+
 def with_coefficient(box: Box) -> Box:
     """The box of the base parameters, and the whole prior of a coefficient."""
     return Box(np.append(box.low, PRIOR_END), np.append(box.high, 1.0 - PRIOR_END))

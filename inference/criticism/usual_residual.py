@@ -131,12 +131,10 @@ def usual_in(noise: Noise) -> UsualResidual | None:
     return next((part for part in parts if isinstance(part, UsualResidual)), None)
 
 
-def usual_rms(noise: Noise, at: Layout) -> float:
-    """RMS over samples of the part that is the simulator's fault, 0 where none is known."""
+def usual_rms(noise: Noise) -> float:
+    """RMS of what a simulator leaves of clean data, without noise; 0 where that is not known."""
     usual = usual_in(noise)
-    if usual is None:
-        return 0.0
-    return float(np.sqrt(np.trace(usual.covariance(at)) / len(at.sample)))
+    return 0.0 if usual is None else float(np.sqrt(usual.autocovariance[0]))
 
 
 def _autocovariance(residual: np.ndarray, lags: int) -> np.ndarray:

@@ -118,12 +118,12 @@ def test_gains_of_several_recordings_add_up_and_each_may_veto():
 
 
 def test_most_of_a_gap_must_go_unless_it_may_be_noise():
-    """Beyond noise of .3 in quadrature; .4 of noise is rare."""
+    """Beyond noise of .3 and what is usual, .2, in quadrature; .4 of noise is rare."""
     small = criticism.Gap("", 0.45, 0.39, 0.3, 0.2, 0.4, 0.5, 20.0)
-    assert small.excess[1] > 0.5 * small.excess[0]
+    assert small.unexplained[1] > 0.5 * small.unexplained[0]
     assert holds([small])
     large = [criticism.Gap("", 1.0, after, 0.3, 0.2, 0.4, 0.5, 20.0) for after in (0.55, 0.6)]
-    assert [one.excess[1] / one.excess[0] < 0.5 for one in large] == [True, False]
+    assert [one.unexplained[1] / one.unexplained[0] < 0.5 for one in large] == [True, False]
     assert [holds([one]) for one in large] == [True, False]
     # a recording that shows nothing of it takes nothing away
     indifferent = criticism.Gap("", 0.45, 0.45, 0.3, 0.2, 0.4, 0.5, 0.0)
