@@ -19,8 +19,8 @@ PACE = 0.02  # m/s; strokes are faster than that nearly everywhere
 NEAR = 0.01  # m from the path; further away the stick is out of the liquid, or elsewhere
 FADE = 0.5  # s, in which a stick that has left the path comes to hang straight down
 RECOVERY = 0.05  # s of going on, in which what was waited for is undone to 1/e
-AT_REST = 1e-3  # m from the end of the path, in which its last rest has begun
-MAX_SCALE = 2.0  # of a lean, over the one with which the table's last rest begins
+AT_REST = 4e-4  # m from the end of the path, in which its last rest has begun
+HEADING = 0.3  # s of the way that tells a direction
 
 
 class Replay(NamedTuple):
@@ -62,8 +62,8 @@ def advance(motion: StickMotion, state: Replay, pivot: Numbers, dt: float) -> Re
         if (near := state.near - dt / FADE) > 0.0:
             return state._replace(near=near)
         return state._replace(phase=float(motion.time[0]), still=0.0, near=0.0)
-    # slower than half the table's pace, the arm waits, or comes to a stop
-    waits = phase - state.phase < 0.5 * dt
+    # slower than half the table's pace, the arm waits, or comes to a stop; a rest is no stop
+    waits = phase - state.phase < 0.5 * dt and _heading(motion, phase) != 0.0
     still = state.still + dt if waits else state.still * math.exp(-dt / RECOVERY)
     return Replay(phase, still, min(state.near + dt / FADE, 1.0), state.rest)
 
@@ -71,16 +71,14 @@ def advance(motion: StickMotion, state: Replay, pivot: Numbers, dt: float) -> Re
 def angles(motion: StickMotion, state: Replay) -> tuple[float, float]:
     """Inclination in the xz and yz planes of the table's frame [rad].
 
-    While the arm waits, the stick relaxes as it does at the table's end: that rest, turned and
-    scaled to how the stick leans here. Strokes of a star are alike but for their direction.
+    While the arm waits, the stick relaxes as in the table's last rest, turned to where the arm came
+    from: strokes of a star are alike but for their direction. What it leans otherwise fades.
     """
     lean = _lean(motion, state.phase)
     if state.still > 0.0:
+        turn = _heading(motion, state.phase) * _heading(motion, state.rest).conjugate()
         first, then = _lean(motion, state.rest), _lean(motion, state.rest + state.still)
-        scale = lean / first if first else 0.0
-        if abs(scale) > MAX_SCALE:
-            scale *= MAX_SCALE / abs(scale)
-        lean += scale * (then - first)
+        lean = turn * then + (lean - turn * first) * math.exp(-state.still / FADE)
     lean *= state.near
     return float(lean.real), float(lean.imag)
 
@@ -89,6 +87,15 @@ def _lean(motion: StickMotion, time: float) -> complex:
     """Inclination at a time of the table, in xz as the real and in yz as the imaginary part."""
     x, y = _between(motion.time, motion.inclination, time)
     return complex(x, y)
+
+
+def _heading(motion: StickMotion, time: float) -> complex:
+    """Direction of the way before a time of the table, of length 1; 0 where it rests."""
+    x, y, _ = _between(motion.time, motion.pivot, time) - _between(
+        motion.time, motion.pivot, time - HEADING
+    )
+    way = abs(complex(x, y))
+    return complex(x, y) / way if way > AT_REST else 0j
 
 
 def _between(times: np.ndarray, rows: np.ndarray, time: float) -> np.ndarray:

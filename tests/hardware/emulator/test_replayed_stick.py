@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from bolfi_liquids.hardware import bundled_rig
 from bolfi_liquids.hardware.emulator.replayed_stick import (
     FADE,
     NEAR,
@@ -9,6 +10,7 @@ from bolfi_liquids.hardware.emulator.replayed_stick import (
     angles,
     init,
 )
+from bolfi_liquids.hardware.emulator.servoed_path import servoed
 from bolfi_liquids.hardware.emulator.stick_motion import (
     StickMotion,
     checked,
@@ -16,7 +18,7 @@ from bolfi_liquids.hardware.emulator.stick_motion import (
     read,
     write,
 )
-from bolfi_liquids.hardware.motion import star
+from bolfi_liquids.hardware.motion import PosePath, joined, star, strokes
 
 DT = 0.008
 RATE = 125.0
@@ -106,22 +108,43 @@ def test_a_late_start_is_waited_for():
     np.testing.assert_allclose(found[later, 1:], at(STIRRED, since + DT)[later], atol=0.02)
 
 
-def test_a_stopped_stick_relaxes_as_the_table_s_last_rest_does_and_then_goes_on():
+def trailing(path):
+    """A stick that trails behind its pivot and takes 0.4 s to do so, whatever the direction."""
+    velocity = np.diff(path.position[:, :2], axis=0, prepend=path.position[:1, :2]) * RATE
+    lean = np.zeros_like(velocity)
+    for at in range(1, len(lean)):
+        lean[at] = lean[at - 1] - DT / 0.4 * (lean[at - 1] + 3.0 * velocity[at])
+    return StickMotion(path.time, path.position, lean)
+
+
+@pytest.mark.parametrize("strokes_made", [4, 9, 13])
+def test_a_stick_that_is_stopped_at_a_stroke_s_end_relaxes_as_if_it_had_been_planned(strokes_made):
+    """Nothing of that rest is in the table, whose only rest at a stroke's end is its last one."""
+    rig = bundled_rig()
+    plan = strokes(rig, 2)
+    whole, ended = trailing(servoed(joined(plan))), joined(plan[:strokes_made])
+    rest = np.tile(ended.pose[-1], (250, 1))
+    stopped = trailing(servoed(joined([ended, PosePath(np.arange(250) * DT, rest, True)])))
+    found, _ = followed(whole, stopped.pivot)
+    resting = stopped.time > ended.duration
+    size = np.linalg.norm(stopped.inclination[resting], axis=1).max()
+    assert size > 0.1
+    error = found[resting, 1:] - stopped.inclination[resting]
+    assert np.abs(error).max() < 0.05 * size
+
+
+def test_after_a_pause_it_goes_on_and_nowhere_jumps():
     stop = REST + 2.175  # in the middle of a stroke
     time = np.arange(0.0, stop, DT)
     found, state = followed(STIRRED, there(STIRRED, time))
-    lean = np.linalg.norm(found[-1, 1:])
     waiting, state = followed(STIRRED, np.tile(there(STIRRED, [stop]), (62, 1)), state)
-    sizes = np.linalg.norm(waiting[:, 1:], axis=1)
-    assert (np.diff(sizes[1:]) <= 0.0).all()
-    assert sizes[-1] == pytest.approx(lean * np.exp(-3.0 * 62 * DT), rel=0.15)
     assert state.phase == pytest.approx(stop, abs=0.01)
+    assert np.linalg.norm(waiting[-1, 1:]) < 0.5 * np.linalg.norm(found[-1, 1:])
     since = np.arange(stop, MOVING, DT)
     again, _ = followed(STIRRED, there(STIRRED, since), state)
-    later = since > stop + 0.2
+    later = since > stop + 0.3
     np.testing.assert_allclose(again[later, 1:], at(STIRRED, since + DT)[later], atol=0.02)
-    # nor does it jump where it goes on
-    assert np.abs(np.diff(np.vstack([waiting, again])[:, 1:], axis=0)).max() < 0.03
+    assert np.abs(np.diff(np.vstack([found, waiting, again])[:, 1:], axis=0)).max() < 0.05
 
 
 def test_before_and_after_the_stir_it_hangs_straight_down_and_a_second_stir_is_like_the_first():
