@@ -56,6 +56,7 @@ def record(
     check_one(ask, emulate, "record")
     opened, hidden = rig_of(rig), hidden_liquid(emulate)
     plan, out = plan_stir(opened, cycles), given_path(out, Argument("out"))
+    check_new(out)
     title = "stirring" if hidden is None else "stirring, emulated"
     hidden = None if hidden is None else with_stir(opened, plan, hidden)
     with (
@@ -65,6 +66,18 @@ def record(
     ):
         follow_plan(session, plan, view)
     return finished(out)
+
+
+def check_new(directory: Path) -> None:
+    """Refuse a directory that holds something, before anything that takes long begins.
+
+    Raises:
+        RigError: It holds something.
+    """
+    from ..hardware.recorder.directory import check_empty
+
+    if directory.is_dir():
+        check_empty(directory)
 
 
 def finished(directory: Path) -> Recording:

@@ -67,8 +67,8 @@ def read(path: str | Path) -> StickMotion:
     """
     try:
         rows = np.load(path, allow_pickle=False)
-    except OSError as err:
-        raise ValueError(f"{path}: {err.strerror or err}; name a file of a stick's motion") from err
+    except (OSError, EOFError) as err:
+        raise ValueError(f"{path}: {err}; name a file of a stick's motion") from err
     if rows.ndim != 2 or rows.shape[1] != COLUMNS:
         raise ValueError(f"{path} holds shape {rows.shape}; give rows of {COLUMNS} columns")
     return checked(StickMotion(rows[:, 0], rows[:, 1:4], rows[:, 4:]))

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
@@ -38,7 +38,7 @@ class HiddenLiquid:
 
     viscosity: float = 1.0
     seed: int = 0
-    stir: StickMotion | None = None
+    stir: StickMotion | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self):
         if not (np.isfinite(self.viscosity) and self.viscosity > 0):

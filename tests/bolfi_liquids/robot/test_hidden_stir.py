@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from bolfi_liquids.hardware import StickMotion
 from bolfi_liquids.hardware.motion import joined
 
 import bolfi_liquids as bl
@@ -44,3 +45,19 @@ def test_a_stir_that_cannot_be_simulated_is_refused_before_the_session(tmp_path,
     with pytest.raises(InputError, match=r"viscosity.*1e\+06 Pa s"):
         bl.record(RIG, out=tmp_path / "out", emulate=hardware.HiddenLiquid(viscosity=1e6))
     assert not (tmp_path / "out").exists()
+
+
+def test_a_directory_that_holds_something_is_refused_before_the_stir_is_simulated(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(models, "stir", lambda *_: pytest.fail("simulated"))
+    (tmp_path / "mine.txt").write_text("kept")
+    with pytest.raises(hardware.RigError, match=r"mine\.txt"):
+        bl.record(RIG, out=tmp_path, emulate=True)
+
+
+def test_hidden_liquids_compare_by_what_they_are_and_not_by_their_table():
+    still = StickMotion(np.arange(2.0), np.zeros((2, 3)), np.zeros((2, 2)))
+    one, other = hardware.HiddenLiquid(stir=still), hardware.HiddenLiquid()
+    assert one == other
+    assert hash(one) == hash(other)
