@@ -1,5 +1,7 @@
 from . import motion as motion
 from . import vision as vision
+from .emulator.servoed_path import servoed as servoed
+from .emulator.stick_motion import StickMotion as StickMotion
 from .errors import MotionRejected as MotionRejected
 from .errors import RigError as RigError
 from .recorder.finalise import finalise as finalise

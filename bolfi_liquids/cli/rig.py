@@ -103,7 +103,8 @@ def emulate(
 
     Any client of a real controller may connect to it, ours by `host` under `robot` in rig.toml.
     """
-    from ..inputs.rigs import emulator_until_interrupted, rig_of
+    from ..inputs.rigs import rig_of
+    from ..robot.lone_emulator import emulator_until_interrupted
 
     for line in emulator_until_interrupted(rig_of(rig), address, viscosity):
         typer.echo(line)

@@ -1,7 +1,5 @@
-"""Rigs as the command line meets them: read, written as a template, emulated."""
+"""Rigs as the command line meets them: read, written as a template."""
 
-import time
-from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -48,27 +46,3 @@ def write_template(path: str | Path) -> Path:
         return write_new_text(new_file(path), text)
     except FileExistsError:
         raise InputError("exists already", where=str(path), fix=fix) from None
-
-
-def emulator_until_interrupted(
-    rig: "Rig", address: str | None = None, viscosity: float = 1.0
-) -> Iterator[str]:
-    """Run an emulator of a rig's controller; yields what to tell, ends at Ctrl-C.
-
-    Raises:
-        RigError: It cannot start.
-    """
-    from ..hardware import HiddenLiquid, emulated
-    from ..hardware.motion import above_cup
-
-    liquid = HiddenLiquid(viscosity=viscosity)
-    with emulated(rig, above_cup(rig), address=address, liquid=liquid) as running:
-        at = running.emulator.address
-        yield f"emulator of a {rig.robot.controller} controller on {at}; end it with Ctrl-C"
-        yield f'to use it, set host = "{at}" under [robot] in rig.toml'
-        try:
-            while running.emulator.alive:
-                time.sleep(0.2)
-        except KeyboardInterrupt:
-            return
-        raise RuntimeError(f"the emulator ended by itself; it said: {running.emulator.notes()}")

@@ -12,8 +12,9 @@ from ..files import given_path
 from ..inputs.recording import Recording
 from ..inputs.rigs import rig_of
 from ..robot.armed_session import Ask, check_one, hidden_liquid
+from ..robot.hidden_stir import with_stir
 from ..robot.live_view import SessionView
-from ..robot.record import finished, kept
+from ..robot.record import check_new, finished, kept
 from ..robot.stir import (
     PATHS_AHEAD,
     StirPlan,
@@ -78,6 +79,8 @@ def record_online(
     check_one(ask, emulate, "record")
     rig, hidden = rig_of(rig), hidden_liquid(emulate)
     plan, out = plan_stir(rig, online.cycles), given_path(out, Argument("out"))
+    check_new(out)
+    hidden = None if hidden is None else with_stir(rig, plan, hidden)
     with OnlineCalibration.start(
         _simulated(plan),
         rig_attributes(rig),

@@ -12,6 +12,7 @@ from ..inputs.recording import Recording
 from ..inputs.rigs import rig_of
 from ..wording import command
 from .armed_session import Ask, check_one, hidden_liquid
+from .hidden_stir import with_stir
 from .live_view import SessionView
 from .stir import follow_plan, plan_stir, stir_session
 
@@ -46,7 +47,8 @@ def record(
         The recording, of `out`/recording.nc.
 
     Raises:
-        InputError: Neither `ask` nor `emulate` is given, or both.
+        InputError: Neither `ask` nor `emulate` is given, or both; or the stir of the emulated
+            liquid cannot be simulated.
         RigError: The rig, the directory or a device cannot be used, or the person did not agree.
         MotionRejected: The plan breaks one of the rig's limits.
         SessionStopped: The arm was stopped; the message says why.
@@ -54,7 +56,9 @@ def record(
     check_one(ask, emulate, "record")
     opened, hidden = rig_of(rig), hidden_liquid(emulate)
     plan, out = plan_stir(opened, cycles), given_path(out, Argument("out"))
+    check_new(out)
     title = "stirring" if hidden is None else "stirring, emulated"
+    hidden = None if hidden is None else with_stir(opened, plan, hidden)
     with (
         kept(out),
         stir_session(opened, plan, out, ask=ask, emulate=hidden) as session,
@@ -62,6 +66,18 @@ def record(
     ):
         follow_plan(session, plan, view)
     return finished(out)
+
+
+def check_new(directory: Path) -> None:
+    """Refuse a directory that holds something, before anything that takes long begins.
+
+    Raises:
+        RigError: It holds something.
+    """
+    from ..hardware.recorder.directory import check_empty
+
+    if directory.is_dir():
+        check_empty(directory)
 
 
 def finished(directory: Path) -> Recording:

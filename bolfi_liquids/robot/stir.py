@@ -91,7 +91,8 @@ def stir_session(
         plan: That will be followed.
         out: Directory of the recording; new or empty.
         ask: Shows the plan; what it returns must be the sentence that the plan asks for.
-        emulate: Start an emulator and rendered cameras instead; nobody is asked.
+        emulate: Start an emulator and rendered cameras instead; nobody is asked. Its `stir` is that
+            of the plan.
 
     Raises:
         InputError: `ask` and `emulate` are both given, or neither is; or a camera is a file.

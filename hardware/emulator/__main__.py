@@ -13,8 +13,8 @@ from ..errors import RigError
 from ..motion.kinematics import ARMS
 from ..priority import hurry
 from .controller import HOME_JOINTS, MODELS, Options
-from .hanging_stick import Stick, checked
 from .loop import Emulator
+from .stick_motion import read
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -48,7 +48,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--tcp", type=json.loads, default=[0.0] * 6, help="JSON, six in m and rad")
     parser.add_argument("--rate", type=float, help="ticks per second")
-    parser.add_argument("--stick", type=json.loads, help="JSON object: what hangs in the gripper")
+    parser.add_argument(
+        "--stick", help="file of a stick's motion; without it, no stick hangs in the gripper"
+    )
     parser.add_argument("--seed", type=int, default=0, help="of the force's noise")
     parser.add_argument("--unlock-after", type=float, default=5.0, help="of a protective stop, s")
     parser.add_argument("--while-stdin", action="store_true", help="end when the input ends")
@@ -66,7 +68,7 @@ def _options(given: argparse.Namespace) -> Options:
         joints=tuple(float(value) for value in given.joints),
         tcp=tuple(float(value) for value in given.tcp),
         rate=given.rate,
-        stick=None if given.stick is None else checked(Stick(**given.stick)),
+        stick=None if given.stick is None else read(given.stick),
         seed=given.seed,
         unlock_after=given.unlock_after,
     )

@@ -9,13 +9,14 @@ from ..host_clock import REAL_CLOCK, HostClock
 from ..motion.kinematics import ARMS
 from .arm import Arm
 from .force import ForceReading
-from .hanging_stick import HangingStick, Stick
 from .machine import ProgramError
 from .motion import MotionError
 from .program import Program
 from .registers import Registers
+from .replayed_stick import ReplayedStick
 from .script import ScriptError, parse
 from .snapshot import Snapshot
+from .stick_motion import StickMotion
 
 STOPPED, PLAYING = 1, 2
 NORMAL_BITS = 1 << 0
@@ -71,7 +72,7 @@ class Options(NamedTuple):
         joints: At the start [rad].
         tcp: The tool's centre in the flange's frame, as its installation has it [m, rad].
         rate: Ticks per second.
-        stick: What hangs in the gripper.
+        stick: How the stick in the gripper hangs, in the base frame; None for no stick.
         seed: Of the force's noise.
         tcp_speed: Safety limit [m/s].
         unlock_after: A protective stop cannot be unlocked earlier [s].
@@ -82,7 +83,7 @@ class Options(NamedTuple):
     joints: tuple[float, ...] = HOME_JOINTS
     tcp: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     rate: float | None = None
-    stick: Stick | None = None
+    stick: StickMotion | None = None
     seed: int = 0
     tcp_speed: float = 1.5
     unlock_after: float = 5.0
@@ -103,7 +104,7 @@ class Controller:
         self.arm = Arm(arm, np.array(options.joints), tcp_speed=options.tcp_speed)
         self.arm.mount(np.array(options.tcp))
         self.force = ForceReading(options.seed)
-        self.stick = None if options.stick is None else HangingStick(options.stick, self.arm.pose)
+        self.stick = None if options.stick is None else ReplayedStick(options.stick)
         self.program: Program | None = None
         self.payload: tuple[float, tuple[float, ...]] = (0.0, (0.0, 0.0, 0.0))
         self.reason = ""
@@ -200,7 +201,7 @@ class Controller:
             self.protective_stop(str(err))
         self._rested = self._rested + 1 if self.arm.resting else 0
         if self.stick is not None:
-            self.stick.advance(self.arm.pose, self.arm.velocity, self.dt)
+            self.stick.advance(self.arm.pose, self.dt)
         self.snapshot = self._look()
         return self.snapshot
 

@@ -177,7 +177,7 @@ def servo(arm: DhArm, target: np.ndarray, lookahead: float, gain: float, limit: 
     fastest = np.array(arm.joint_speed)
 
     def step(state: ArmState, dt: float) -> ArmState:
-        stay, push, swing, keep = _oscillator(gain, gain * lookahead, dt)
+        stay, push, swing, keep = oscillator(gain, gain * lookahead, dt)
         away = state.joints - target
         wanted = swing * away + keep * state.speed
         change = np.clip(wanted - state.speed, -limit * dt, limit * dt)
@@ -196,7 +196,7 @@ def servo(arm: DhArm, target: np.ndarray, lookahead: float, gain: float, limit: 
 _CACHE: dict[tuple[float, float, float], tuple[float, float, float, float]] = {}
 
 
-def _oscillator(stiffness: float, damping: float, dt: float) -> tuple[float, float, float, float]:
+def oscillator(stiffness: float, damping: float, dt: float) -> tuple[float, float, float, float]:
     """exp(A dt) of x'' = -stiffness x - damping x', row by row: exact at any step."""
     key = (stiffness, damping, dt)
     if key not in _CACHE:
@@ -205,7 +205,7 @@ def _oscillator(stiffness: float, damping: float, dt: float) -> tuple[float, flo
         values, vectors = np.linalg.eig(np.array([[0.0, 1.0], [-stiffness, -damping]]) + 0j)
         # two equal roots leave no basis of eigenvectors; a shift of 1e-6 of one does not show
         if abs(values[0] - values[1]) < 1e-6 * abs(values[0]):
-            return _oscillator(stiffness * (1.0 + 1e-6), damping, dt)
+            return oscillator(stiffness * (1.0 + 1e-6), damping, dt)
         exact = (vectors * np.exp(values * dt)) @ np.linalg.inv(vectors)
         (a, b), (c, d) = exact.real.tolist()
         _CACHE[key] = (a, b, c, d)

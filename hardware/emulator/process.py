@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from ..errors import RigError
 from .admin_client import Admin
 from .servers.network import ADMIN, DASHBOARD, RTDE, SCRIPT
+from .stick_motion import StickMotion, write
 
 START_TIMEOUT = 20.0  # s
 ADDRESS_TRIES = 20  # random addresses of which one must be free
@@ -49,7 +50,7 @@ class EmulatorProcess:
         *,
         controller: str = "cb3",
         joints: Sequence[float] | None = None,
-        stick: Mapping[str, object] | None = None,
+        stick: StickMotion | None = None,
         options: Mapping[str, object] | None = None,
     ) -> "EmulatorProcess":
         """Start one and wait until it listens.
@@ -58,22 +59,25 @@ class EmulatorProcess:
             address: One of 127.0.0.0/8; None takes one at random that is free.
             controller: "cb3" or "e-series".
             joints: At the start [rad], shape [6].
-            stick: Fields of `hanging_stick.Stick`.
+            stick: How the stick in the gripper hangs, in the base frame; None for no stick.
             options: Further options of its command line, such as {"seed": 1, "unlock-after": 0}.
 
         Raises:
             RigError: It did not start; the message holds what it said.
+            ValueError: `stick` is no motion.
         """
         address = free_address() if address is None else address
         command = [sys.executable, "-m", __package__, "--while-stdin", f"--address={address}"]
         command.append(f"--controller={controller}")
         if joints is not None:
             command.append(f"--joints={json.dumps([float(value) for value in joints])}")
-        if stick is not None:
-            command.append(f"--stick={json.dumps(dict(stick))}")
         command += [f"--{name}={value}" for name, value in (options or {}).items()]
-        started = cls(command, address)
-        started._wait_until_ready()
+        with tempfile.NamedTemporaryFile(suffix=".npy") as table:
+            if stick is not None:
+                write(stick, table.name)
+                command.append(f"--stick={table.name}")
+            started = cls(command, address)
+            started._wait_until_ready()
         return started
 
     @property

@@ -86,7 +86,7 @@ def start_directory(
     }
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        _check_empty(directory)
+        check_empty(directory)
         _check_room(directory, expected_bytes(rig, duration, videos=videos))
         _write_first(directory / RIG, json.dumps(written, indent=1) + "\n")
         _reserve(directory)
@@ -166,7 +166,13 @@ def read_provenance(directory: Path) -> Provenance:
         ) from err
 
 
-def _check_empty(directory: Path) -> None:
+def check_empty(directory: Path) -> None:
+    """Refuse a directory that holds something.
+
+    Raises:
+        RigError: The message names a file in it.
+        OSError: It cannot be looked into.
+    """
     held = sorted(path.name for path in directory.iterdir())
     if held:
         raise RigError(
@@ -181,7 +187,7 @@ def _write_first(path: Path, text: str) -> None:
     try:
         file = path.open("x", encoding="utf-8")
     except FileExistsError:
-        _check_empty(path.parent)
+        check_empty(path.parent)
         raise
     try:
         with file:

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,6 +12,7 @@ import numpy as np
 from ..board import check_can_start
 from ..cameras.base import Camera
 from ..emulator.process import EmulatorProcess
+from ..emulator.stick_motion import StickMotion, checked, hanging_still
 from ..errors import RigError
 from ..motion.cup_frame import cup_frame
 from ..motion.kinematics import inverse
@@ -30,22 +31,22 @@ class HiddenLiquid:
 
     Attributes:
         viscosity: Dynamic [Pa s].
-        drag: Factor on the published drag of a towed cylinder; recordings of an independent
-            solver, in a cup as narrow, need 4 to 7.
-        seed: Of the pictures' noise and faults.
+        seed: Of the pictures' noise and faults, and of the liquid's particles.
+        stir: How the stick hangs while the liquid is stirred, in the cup's frame; None where
+            nobody has simulated that: the stick hangs straight down.
     """
 
     viscosity: float = 1.0
-    drag: float = 5.0
     seed: int = 0
+    stir: StickMotion | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self):
-        for name in ("viscosity", "drag"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise RigError(
-                    f"{value}", where=f"emulated {name}", fix="give a positive, finite number"
-                )
+        if not (np.isfinite(self.viscosity) and self.viscosity > 0):
+            raise RigError(
+                f"{self.viscosity}",
+                where="emulated viscosity",
+                fix="give a positive, finite number",
+            )
 
 
 class EmulatedRig(NamedTuple):
@@ -83,25 +84,16 @@ def emulated(
 
     Raises:
         RigError: The arm does not reach `pose`, or the emulator does not start.
+        ValueError: The liquid's `stir` is no motion of a stick.
     """
     check_can_start()
     liquid = HiddenLiquid() if liquid is None else liquid
-    stick = {
-        "radius": rig.stick.radius,
-        "length": rig.stick.length,
-        "mass": rig.stick.mass,
-        "liquid_density": rig.liquid.density,
-        "viscosity": liquid.viscosity,
-        "fill": rig.cup.fill,
-        "cup_position": list(rig.cup.position),
-        "drag": liquid.drag,
-    }
     joints = _joints(rig, pose, tool)
     with EmulatorProcess.start(
         address,
         controller=rig.robot.controller,
         joints=joints,
-        stick=stick if tool == "stirring" else None,
+        stick=_stick(rig, pose, liquid) if tool == "stirring" else None,
         options={"seed": liquid.seed, "tcp": json.dumps(list(workspace(rig, tool).tcp))},
     ) as emulator:
         cameras: dict[View, Callable[[], Camera]] = {
@@ -141,6 +133,17 @@ class RenderedView(NamedTuple):
         timing = Timing(rate=camera.rate, offset=1000.0 * _SEEDS[self.view], seed=seed)
         truth = None if self.truth is None else self.truth / truth_file(self.view)
         return RenderedCamera(stage, StreamedWorld(self.address, place), timing, truth=truth)
+
+
+def _stick(rig: Rig, pose: np.ndarray, liquid: HiddenLiquid) -> StickMotion:
+    """How the stick hangs, in the base frame."""
+    frame = cup_frame(rig.cup)
+    if liquid.stir is None:
+        return hanging_still(frame.to_base(pose))
+    time, pivot, inclination = checked(liquid.stir)
+    # inclinations in two planes turn as the tangents do, which are a direction's components
+    turned = np.arctan(np.tan(inclination) @ frame.axes[:2, :2].T)
+    return StickMotion(time, frame.origin + pivot @ frame.axes.T, turned)
 
 
 def _joints(rig: Rig, pose: np.ndarray, tool: Tool) -> list[float]:

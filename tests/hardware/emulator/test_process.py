@@ -6,20 +6,14 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 from bolfi_liquids.hardware.emulator import EmulatorProcess
+from bolfi_liquids.hardware.emulator.stick_motion import hanging_still
 from bolfi_liquids.hardware.errors import RigError
 
 HOME = [0.3, -1.4, 1.6, -1.7, -1.5, 0.2]
-STICK = {
-    "radius": 0.004,
-    "length": 0.25,
-    "mass": 0.02,
-    "liquid_density": 1260.0,
-    "viscosity": 1.0,
-    "fill": 0.1,
-    "cup_position": [0.0, 0.0, 0.4],
-}
+STICK = hanging_still(np.array([0.0, 0.0, 0.5]))
 
 
 @pytest.fixture
@@ -39,8 +33,7 @@ def test_only_this_computer_and_free_ports_are_served(emulator):
     ("options", "message"),
     [
         ({"joints": [0.0] * 5}, "joints must be six finite numbers"),
-        ({"stick": {"radius": 0.004}}, "missing"),
-        ({"stick": {**STICK, "mass": -1.0}}, "mass must be positive and finite, got -1.0"),
+        ({"options": {"stick": "none.npy"}}, r"none\.npy"),
         ({"options": {"rate": 0}}, "rate must be between"),
     ],
 )
