@@ -12,6 +12,7 @@ from ..inputs.open import open_recording
 from ..inputs.recording import Recording
 from ..inputs.start import above_liquid
 from ..inputs.table import MISSING, Table, read_table
+from ..models import EFFECTS
 from .truth_columns import NAME, positive
 
 TRUTHS = "truths.csv"
@@ -20,10 +21,10 @@ SIZE = "size"  # of what is hidden; a table without it tells no size
 FIX_HEADER = f"give a column for each of {FILE}, {VISCOSITY}, {FILL} and {HIDDEN}"
 
 
-Coefficient = Callable[[float, float], float]
+CoefficientOf = Callable[[float, float], float]
 """Of an effect, from the size in a table of truths and the recording's duration [s]."""
 
-HIDDEN_EFFECTS: Mapping[str, tuple[str, Coefficient]] = {
+HIDDEN_EFFECTS: Mapping[str, tuple[str, CoefficientOf]] = {
     "delay": ("camera_delay", lambda size, seconds: size),
     "pivot": ("pivot_friction", lambda size, seconds: size),
     "mass": ("stick_mass", lambda size, seconds: 1.0 + size),
@@ -33,6 +34,9 @@ HIDDEN_EFFECTS: Mapping[str, tuple[str, Coefficient]] = {
 """What tables call the effects of `models.EFFECTS`. Sizes are s, N m, the fraction by which the
 stick is heavier, the factor by which the viscosity falls until the end, and how many times the true
 path the written one is."""
+
+
+POSITIVE = ("warming", "scale")  # whose sizes are factors
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,13 +149,16 @@ def _effects(
     if not hidden or sizes is None:
         return {}
     name, coefficient = HIDDEN_EFFECTS[hidden]
-    if not np.isfinite(sizes[row]) or (hidden in ("warming", "scale") and sizes[row] <= 0.0):
+    size, effect = float(sizes[row]), EFFECTS[name]
+    known = size > 0.0 or (np.isfinite(size) and hidden not in POSITIVE)
+    value = coefficient(size, seconds) if known else np.nan
+    if not effect.lowest <= value <= effect.highest:
         raise InputError(
             f"got {table.column(SIZE)[row]!r}",
             where=table.where(table.lines[row], SIZE),
-            fix=f"give the size of {hidden}, a number",
+            fix=f"give the size of {hidden}, a number that {name} may have",
         )
-    return {name: coefficient(float(sizes[row]), seconds)}
+    return {name: value}
 
 
 def _name(table: Table, row: int) -> str:

@@ -37,7 +37,7 @@ def print_against(check: "AgainstCheck", console: Console) -> None:
     print_errors(check.records, console)
     if check.left_out:
         effects = ", ".join(f"{name} ({effect})" for name, effect in check.left_out.items())
-        print_line(f"left out, for they hold an effect: {effects}", console)
+        print_line(f"left out, for they hold an effect of no known size: {effects}", console)
     if check.stirs:
         _print_count("recordings within their bars", check.stirs, console)
         judged = [pair for pair in check.neighbours if pair.judged]

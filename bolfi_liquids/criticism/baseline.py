@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from ..inference import Prior
     from ..inference.criticism import Extension, Keeping, Plan, UsualResidual
 
-ALIKE = np.log(2.0)  # of the viscosities, by which the simulator's error changes little
-LEAST_LIKENESS = 1e-6  # so that a mean over recordings is one
+LIKENESS_WIDTH = np.log(2.0)  # between viscosities by which the simulator's error changes little
+MIN_LIKENESS = 1e-6  # so that a mean over recordings is one
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,16 +79,18 @@ def usual_for(
     """
     only = stirring.recordings[0] if len(stirring.recordings) == 1 else None
     same = [only is not None and same_experiment(one.recording, only) for one in clean]
-    return _usual(clean, same, viscosity)
+    return _usual(clean, same, viscosity, stirring.least_viscosity)
 
 
-def usual_elsewhere(clean: Sequence[Clean], viscosity: float | None) -> "UsualResidual | None":
+def usual_elsewhere(
+    stirring: "Stirring", clean: Sequence[Clean], viscosity: float | None
+) -> "UsualResidual | None":
     """What is usual on paths of which there is no clean recording; None if there is none at all."""
-    return _usual(clean, [False] * len(clean), viscosity)
+    return _usual(clean, [False] * len(clean), viscosity, stirring.least_viscosity)
 
 
 def _usual(
-    clean: Sequence[Clean], same: list[bool], viscosity: float | None
+    clean: Sequence[Clean], same: list[bool], viscosity: float | None, least: float
 ) -> "UsualResidual | None":
     from ..inference.criticism import KnownNoise, usual_residual
 
@@ -96,22 +98,26 @@ def _usual(
         return None
     # the whole recording tells white noise better than the short rest tells correlated noise
     noises = [KnownNoise(sensor_noise(one.recording.inclination)) for one in clean]
-    weights = likeness([one.viscosity for one in clean], viscosity)
+    weights = likeness([one.viscosity for one in clean], viscosity, least)
     return usual_residual([one.residual for one in clean], noises, same, weights)
 
 
-def likeness(known: Sequence[float | None], viscosity: float | None) -> NDArray[np.float64]:
+def likeness(
+    known: Sequence[float | None], viscosity: float | None, least: float
+) -> NDArray[np.float64]:
     """How much recordings of liquids tell of the simulator's error on another, shape (n,).
 
     1 of the liquid nearest in viscosity, less of those farther away: the simulator errs by half a
-    degree in water and by a hundredth of that in glycerin.
+    degree in water and by less than 0.05 degrees in glycerin.
 
     Args:
         known: Their viscosities [Pa s]; all tell the same where one is not known.
-        viscosity: Of the other [Pa s].
+        viscosity: Of the other [Pa s], by the model that lacks the effect.
+        least: Below it liquids look alike [Pa s].
     """
     if viscosity is None or None in known:
         return np.ones(len(known))
-    apart = np.log(np.array(known, float) / viscosity) / ALIKE
+    apart = np.log(np.maximum(np.array(known, float), least) / max(viscosity, least))
+    apart /= LIKENESS_WIDTH
     nearest = np.min(apart**2)
-    return np.maximum(np.exp(-0.5 * (apart**2 - nearest)), LEAST_LIKENESS)
+    return np.maximum(np.exp(-0.5 * (apart**2 - nearest)), MIN_LIKENESS)

@@ -176,7 +176,7 @@ def _stirs(
         extensions,
         earlier=_learned_from(calibration),
         held_out=[_kept_back(one, stirring, clean, viscosity) for one in inputs.held_out],
-        proposals=stir_proposals(stirring, cameras, usual_elsewhere(clean, viscosity)),
+        proposals=stir_proposals(stirring, cameras, usual_elsewhere(stirring, clean, viscosity)),
         accept=_among(settings.accept, extensions),
         level=inputs.level,
         plan=settings.stir_plan,

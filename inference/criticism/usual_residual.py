@@ -8,6 +8,7 @@ import numpy as np
 from ..surrogates.measurement_noise import Layout
 from .measurement_noise import Noise, SumOfNoises, gaussian
 
+LEAST_OTHERS = 0.5  # weight of the other clean data by which one of them can be judged
 MIN_FREEDOM = 3  # with fewer, draws have no variance and no effect would be found
 
 
@@ -25,16 +26,19 @@ class UsualResidual:
         autocovariance: Of clean residuals by lag in samples, shape [lags]; zero beyond.
         shapes: Clean residuals of the same experiment at each sample, shape [k, T, channels];
             NaN where missing.
-        freedom: Clean data sets that speak for this experiment, by their weights: the size is
-            known as well as a variance from so many numbers, but never less than from MIN_FREEDOM.
+        freedom: Weight of the clean data of this very experiment, or of all where there are none:
+            the size is known as well as a variance from so many numbers, but never less than from
+            MIN_FREEDOM.
         others: For each shape the autocovariance of all clean data but it, shape [k, lags]; none
             where there are no other clean data.
+        weights: Of the shapes, shape [k]; 0 where the others tell next to nothing.
     """
 
     autocovariance: np.ndarray
     shapes: np.ndarray
     freedom: float
     others: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    weights: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def covariance(self, at: Layout) -> np.ndarray:
         apart = np.abs(np.subtract.outer(at.sample, at.sample))
@@ -110,6 +114,9 @@ def usual_residual(
         autocovariance=positive_autocovariance(_mean(each, weight)),
         shapes=np.stack(kept) if kept else np.zeros((0, 0, 0)),
         freedom=float(weight[repeated].sum() if kept else weight.sum()),
+        weights=np.array(
+            [weight[k] * (weight.sum() - weight[k] >= LEAST_OTHERS) for k in repeated]
+        ),
         others=np.reshape([positive_autocovariance(of) for of in others], (len(others), lags)),
     )
 

@@ -155,6 +155,9 @@ class LiquidState:
         for g in range(position.shape[0]):
             clear(self, g)
             self.arounds[g], self.nears[g], self.wets[g] = 0, 0, 0
+            if ti.static(len(self.rheologies) > 0):
+                for m in range(self.thickness.shape[1]):
+                    self.thickness[g, m] = lanes(0.0)
             self.lack[g] = lanes(0.0)
             for lane in range(LANES):
                 self.count[g, lane] = ti.max(count[g, lane], 0)

@@ -30,7 +30,8 @@ def find_thickness(s, g, time):
 
     The shear rate is that of velocities right after the viscous solve. What the mending of density
     and the transfer of particles add to velocities later has slopes of several 1/s from cell to
-    cell, which are no shear of the liquid; viscosity damps them at once.
+    cell, which are no shear of the liquid; viscosity damps them at once. Cells that liquid enters
+    have the viscosity at rest for a step.
     """
     if ti.static(len(s.rheologies) > 0):
         for n in range(s.arounds[g]):
@@ -55,26 +56,20 @@ def thickness_around(s, g, m, along_a, along_b):
     The mean is harmonic: a gel's viscosity goes as one over the rate, so it is that of the mean
     rate. An arithmetic one would let a plug hold what flows beside it.
     """
-    nu = s.viscosity[g]
-    if ti.static(len(s.rheologies) > 0):
-        full, thin = lanes(0.0), lanes(0.0)
-        for k in range(4):
-            o = m - (k & 1) * along_a - (k >> 1) * along_b
-            full += s.volume[g, o]
-            thin += ratio(s.volume[g, o], s.thickness[g, o])
-        nu = ratio(full, thin)
-    return nu
+    full, thin = lanes(0.0), lanes(0.0)
+    for k in range(4):
+        o = m - (k & 1) * along_a - (k >> 1) * along_b
+        full += s.volume[g, o]
+        thin += ratio(s.volume[g, o], s.thickness[g, o])
+    return ratio(full, thin)
 
 
 @ti.func
 def thickness_between(s, g, m, o):
     """The same of two cells."""
-    nu = s.viscosity[g]
-    if ti.static(len(s.rheologies) > 0):
-        full = s.volume[g, m] + s.volume[g, o]
-        thin = ratio(s.volume[g, m], s.thickness[g, m]) + ratio(s.volume[g, o], s.thickness[g, o])
-        nu = ratio(full, thin)
-    return nu
+    full = s.volume[g, m] + s.volume[g, o]
+    thin = ratio(s.volume[g, m], s.thickness[g, m]) + ratio(s.volume[g, o], s.thickness[g, o])
+    return ratio(full, thin)
 
 
 @ti.func

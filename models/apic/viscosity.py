@@ -49,12 +49,14 @@ def weigh_stresses(s, g, step):
         s.normal_weight[g, m] = nu * ti.min(s.volume[g, m], 1.0) * known
         for c in range(3):  # edges along c
             a, b = (c + 1) % 3, (c + 2) % 3
-            full, room = lanes(0.0), 1e-6
+            full, thick, room = lanes(0.0), lanes(0.0), 1e-6
             for k in range(4):
                 o = m - (k & 1) * S[a] - (k >> 1) * S[b]
                 full += s.volume[g, o]
+                thick += s.volume[g, o] * s.viscosity[g]
                 room += s.capacity[o]
-            thick = full * thickness_around(s, g, m, S[a], S[b])
+            if ti.static(len(s.rheologies) > 0):
+                thick = full * thickness_around(s, g, m, S[a], S[b])
             known_a = has_mass(s, g, a, m) * has_mass(s, g, a, m - S[b])
             known_b = has_mass(s, g, b, m) * has_mass(s, g, b, m - S[a])
             share = s.edge[c, m] * ti.min(1.0 / room, 1.0 / ti.max(full, 1e-6))
@@ -121,7 +123,9 @@ def solve_viscosity(s, g, step):
         m = s.near[g, n]
         for a in range(3):
             known, u, mass = has_mass(s, g, a, m), s.velocity[g, a, m], s.mass[g, a, m]
-            nu = thickness_between(s, g, m, m - S[a])
+            nu = 0.5 * (thickness_of(s, g, m) + thickness_of(s, g, m - S[a]))
+            if ti.static(len(s.rheologies) > 0):
+                nu = thickness_between(s, g, m, m - S[a])
             rub = s.rub[a, m] * scale * nu
             r = known * (force(s, g, s.velocity, a, m, S) - rub * u)
             inverse = ratio(known, mass + rub + stiffness(s, g, a, m, S))

@@ -28,7 +28,7 @@ SIZES = {
     "warming": 0.05,
     "yield_stress": 5.0,
 }
-SLOPE = 1.1  # times the viscosity, by which a change of it is told
+VISCOSITY_FACTOR = 1.1  # times the viscosity, by which a change of it is told
 
 
 class Signature(NamedTuple):
@@ -48,7 +48,7 @@ def signatures(viscosity: float, density: float) -> Iterator[tuple[str, Signatur
         return np.degrees(models.stir(liquid, recording.gripper, setup, [0], effects)[0]).ravel()
 
     plain = stir(viscosity)
-    slope = stir(SLOPE * viscosity) - plain
+    slope = stir(VISCOSITY_FACTOR * viscosity) - plain
     for name, size in SIZES.items():
         change = stir(viscosity, {name: size}) - plain
         left = change - slope * (slope @ change) / (slope @ slope)

@@ -11,7 +11,7 @@ VISCOSITY = 0.5  # Pa s at the start
 WARMING = np.array([-3.0, 0.0, 3.0])  # 1/s
 SPEED = 0.05  # m/s, the fastest at the start
 SECONDS = 0.3
-TOLERANCE = 0.05
+TOLERANCE = 0.02
 
 
 def left(time: np.ndarray, warming: float) -> np.ndarray:

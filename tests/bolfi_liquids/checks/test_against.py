@@ -154,7 +154,10 @@ def test_the_command_prints_both_tables_and_what_was_left_out(command, tmp_path)
     assert result.exit_code == 0, result.stderr
     for text in ("water_v10", "0.001", "[deg]", "CPU s", "0.36", "pass", "1 ± 0.25"):
         assert text in result.stdout
-    assert "left out, for they hold an effect: hidden_oil_bubbles_v10 (bubbles)" in result.stdout
+    assert (
+        "left out, for they hold an effect of no known size: hidden_oil_bubbles_v10 (bubbles)"
+        in result.stdout
+    )
     assert "recordings within their bars: 3 of 3" in result.stdout
     assert "pairs within their bar: 2 of 2 judged" in result.stdout
     assert f"results: {tmp_path}/out/against.json" in result.stdout

@@ -95,6 +95,7 @@ FAULTS = {
     "odd name": (renamed, "column file: 'Oil 10' cannot name results; rename"),
     "all hidden": (edited("0.0503,,", "0.0503,bubbles,1"), "every recording holds a hidden effect"),
     "no size": (edited("bubbles,0.08", "mass,"), "line 5, column size: got ''; give the size"),
+    "no stick": (edited("bubbles,0.08", "mass,-1.5"), "line 5, column size: got '-1.5'"),
     "no warming": (edited("bubbles,0.08", "warming,0"), "line 5, column size: got '0'"),
 }
 

@@ -204,7 +204,7 @@ def test_clean_recordings_of_the_same_path_say_where_it_errs(calibration):
     residual = 10.0 * SD * np.sin(np.linspace(0.0, 9.0, len(recording.time)))[:, None] * [1.0, 0.5]
     clean = [Clean(recording, residual, 1.0, 1)]
     stirring = stirring_of([recording], 200)
-    same, elsewhere = usual_for(stirring, clean, 0.5), usual_elsewhere(clean, 0.5)
+    same, elsewhere = usual_for(stirring, clean, 0.5), usual_elsewhere(stirring, clean, 0.5)
     assert len(same.shapes) == 1 and len(elsewhere.shapes) == 0
     cameras = camera_noise([recording])
     noise = stir_experiment(stirring, cameras, same, "stir").noise
@@ -217,13 +217,18 @@ def test_recordings_of_the_nearest_liquid_tell_most():
     """Of water, oil and glycerin: nothing of one another, and all the same of unknown liquids."""
     known = [0.001, 0.1, 1.0]
     for nearest, viscosity in enumerate(known):
-        found = likeness(known, viscosity)
+        found = likeness(known, viscosity, 0.005)
         assert found[nearest] == 1.0 and np.delete(found, nearest).max() < 0.01
-    between = likeness(known, 0.4)
+    between = likeness(known, 0.4, 0.005)
     assert between[2] == 1.0 and 0.1 < between[1] < 0.9
     # beyond all, the nearest one tells all that can be told
-    np.testing.assert_allclose(likeness(known, 20.0), [0.0, 0.0, 1.0], atol=1e-3)
-    assert (likeness(known, None) == 1.0).all() and (likeness([None, 1.0], 1.0) == 1.0).all()
+    np.testing.assert_allclose(likeness(known, 20.0, 0.005), [0.0, 0.0, 1.0], atol=1e-3)
+    assert (likeness(known, None, 0.005) == 1.0).all()
+    assert (likeness([None, 1.0], 1.0, 0.005) == 1.0).all()
+    # water is water, wherever below the least viscosity it was fitted
+    np.testing.assert_allclose(
+        likeness([3e-4, 0.004, 0.1], 0.001, 0.005), [1.0, 1.0, 0.0], atol=1e-3
+    )
 
 
 @pytest.mark.parametrize("option", ["pours", "held_out_pours"])

@@ -16,7 +16,7 @@ def spun_up(time, angular_velocity):
     return angular_velocity * r + modes @ np.exp(-NU * (zeros / R) ** 2 * time)
 
 
-def test_the_slowest_swirl_is_what__spin_up_ends_with():
+def test_the_slowest_swirl_is_what_spinning_up_ends_with():
     short = np.stack([r - spun_up(late, 1.0) for late in (0.2, 0.3)])
     rate = np.log(short[0, 10:-10] / short[1, 10:-10]) / 0.1
     np.testing.assert_allclose(rate, cup_flows.swirl_decay(R, NU), rtol=0.02)
