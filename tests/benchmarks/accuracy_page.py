@@ -204,14 +204,22 @@ def _by_liquid(by_name: Record) -> dict[tuple[str, float], list[Record]]:
     """(name of the liquid, viscosity) -> its recordings, from the thinnest to the thickest."""
     groups: dict[tuple[str, float], list[Record]] = {}
     for name, one in sorted(by_name.items(), key=lambda pair: (pair[1]["viscosity"], pair[0])):
-        groups.setdefault((name.partition("_")[0], one["viscosity"]), []).append(one)
+        groups.setdefault((_liquid(name, one), one["viscosity"]), []).append(one)
     return groups
+
+
+def _liquid(name: str, one: Record) -> str:
+    """Of a recording: LIQUID_..., or hidden_LIQUID_... with the effects that act in it."""
+    effects = ", ".join(f"`{effect}`" for effect in one.get("effects", ()))
+    words = name.removeprefix("hidden_").split("_")
+    return f"{words[0]} with {effects}" if effects else words[0]
 
 
 def _replayed(record: Record) -> dict[str, Any]:
     rms, spread = record["rows"]
     return {
         "viscosity": record["settings"]["viscosity"],
+        "effects": sorted(record["settings"]["effects"]),
         "rms": _rounded(rms["ours"]),
         "bar": rms["tolerance"],
         "spread": _rounded(spread["ours"]),
