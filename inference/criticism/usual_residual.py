@@ -72,7 +72,7 @@ def usual_residual(
     residuals: Sequence[np.ndarray],
     noises: Sequence[Noise],
     same: Sequence[bool],
-    weights: Sequence[float] | None = None,
+    weights: Sequence[float] | np.ndarray | None = None,
 ) -> UsualResidual:
     """What clean data teach.
 

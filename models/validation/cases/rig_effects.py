@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 from scipy.signal import find_peaks
 
 from ...liquid import Liquid
@@ -67,11 +67,13 @@ def rubbed_peaks(first: float, count: int, torque: float) -> np.ndarray:
     sizes = [first]
     for _ in range(count - 1):
         a = sizes[-1]
-        other = brentq(
-            lambda b, a=a: stiffness * (np.cos(b) - np.cos(a)) - torque * (a + b), 0.0, a
-        )
+
+        def missing(b: float, a: float = a) -> float:
+            return stiffness * (np.cos(b) - np.cos(a)) - torque * (a + b)
+
+        other = float(root_scalar(missing, bracket=(0.0, a)).root)
         period = float(period_in_air(a, _stirring.rod(stick)))
-        sizes.append(float(other) * np.exp(-0.25 * PIVOT_DAMPING * period / stick.inertia))
+        sizes.append(other * np.exp(-0.25 * PIVOT_DAMPING * period / stick.inertia))
     return np.array(sizes)
 
 
