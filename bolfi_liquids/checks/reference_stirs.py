@@ -12,7 +12,6 @@ from ..inputs.open import open_recording
 from ..inputs.recording import Recording
 from ..inputs.start import above_liquid
 from ..inputs.table import MISSING, Table, read_table
-from ..models import EFFECTS
 from .truth_columns import NAME, positive
 
 TRUTHS = "truths.csv"
@@ -36,7 +35,8 @@ stick is heavier, the factor by which the viscosity falls until the end, and how
 path the written one is."""
 
 
-POSITIVE = ("warming", "scale")  # whose sizes are factors
+MORE_THAN = {"pivot": 0.0, "mass": -1.0, "warming": 0.0, "scale": 0.0}
+"""What the sizes of some of them exceed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,16 +149,14 @@ def _effects(
     if not hidden or sizes is None:
         return {}
     name, coefficient = HIDDEN_EFFECTS[hidden]
-    size, effect = float(sizes[row]), EFFECTS[name]
-    known = size > 0.0 or (np.isfinite(size) and hidden not in POSITIVE)
-    value = coefficient(size, seconds) if known else np.nan
-    if not effect.lowest <= value <= effect.highest:
+    size = float(sizes[row])
+    if not (np.isfinite(size) and size > MORE_THAN.get(hidden, -np.inf)):
         raise InputError(
             f"got {table.column(SIZE)[row]!r}",
             where=table.where(table.lines[row], SIZE),
-            fix=f"give the size of {hidden}, a number that {name} may have",
+            fix=f"give the size of {hidden}, a number it may have",
         )
-    return {name: value}
+    return {name: coefficient(size, seconds)}
 
 
 def _name(table: Table, row: int) -> str:

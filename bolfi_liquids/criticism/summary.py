@@ -174,11 +174,14 @@ class CriticismSummary(Section):
         )
 
     def to_json(self) -> dict[str, Any]:
-        """The section as `json.dumps` takes it; the window of a stroke has no `speed`."""
+        """The section as `json.dumps` takes it; the window of a stroke has no `speed`, and a gap
+        of version 0.1 nothing usual."""
         section = super().to_json()
         for window in section["where"]:
             if window["speed"] is None:
                 del window["speed"]
+        if self.gap.usual is None:
+            del section["gap_deg"]["usual"], section["gap_deg"]["held_out_usual"]
         return section
 
     @property

@@ -87,11 +87,10 @@ class Processes:
     def stop(self, stopped: Stopped) -> None:
         """Stop the arm and write the reason down, if there is none yet."""
         self.send(Stop(stopped.reason))
-        with self._progress.news:
+        with self._progress.writing:
             if self._progress.stopped is None:
                 self._progress.stopped = stopped
                 self._log.write("stopped", guard=stopped.guard, reason=stopped.reason)
-            self._progress.news.notify_all()
 
     def end(self, last: Order, patience: float) -> None:
         """End them all: the control process by its last order, within so many seconds."""

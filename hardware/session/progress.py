@@ -1,9 +1,12 @@
 """How far a session has come, as its control process reports it."""
 
+import math
+import threading
+import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from enum import Enum
-from threading import Condition
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +14,8 @@ import numpy as np
 from ..board import Row, Who
 from ..robot.orders import Began, Checked, Done, Left, Report, Stopped, Told
 from ..safety.guards import Reading
+
+POLL_SECONDS = 5e-3  # between looks while a caller waits
 
 
 class SessionStopped(RuntimeError):
@@ -55,10 +60,10 @@ class Status(NamedTuple):
 
 @dataclass
 class Progress:
-    """What was ordered and what was reported; written under `news`, read from any thread.
+    """What was ordered and what was reported; written under `writing`, read from any thread.
 
     Attributes:
-        news: Notified at each change.
+        writing: Held by whoever writes.
         started: Whether the processes were started.
         checked: The pre-flight list, once it is there.
         told: The latest readings.
@@ -71,7 +76,7 @@ class Progress:
         joints: Where the latest of them ends [rad], shape (6,).
     """
 
-    news: Condition = field(default_factory=Condition)
+    writing: AbstractContextManager = field(default_factory=threading.RLock)
     started: bool = False
     checked: Checked | None = None
     told: Told = field(default_factory=lambda: Told((), np.full(6, np.nan)))
@@ -109,7 +114,7 @@ class Progress:
 
     def take(self, report: Report) -> None:
         """Note a report of the control process."""
-        with self.news:
+        with self.writing:
             match report:
                 case Checked():
                     self.checked = report
@@ -123,9 +128,10 @@ class Progress:
                     self.stopped = self.stopped or report
                 case Left():
                     self.left = True
-            self.news.notify_all()
 
     def wait_for(self, happened: Callable[[], bool], timeout: float | None) -> None:
         """Wait until something has happened, the arm was stopped, or the time [s] is over."""
-        with self.news:
-            self.news.wait_for(lambda: happened() or self.stopped is not None, timeout)
+        last = math.inf if timeout is None else time.monotonic() + timeout
+        # a second Ctrl-C while a condition waits would lose its lock, and raise something else
+        while not (happened() or self.stopped is not None) and time.monotonic() < last:
+            time.sleep(POLL_SECONDS)

@@ -221,7 +221,7 @@ class Session:
 
     def close(self) -> None:
         """End all processes, within about a second where the arm rests; harmless when repeated."""
-        with self._progress.news:
+        with self._progress.writing:
             if self._progress.closing:
                 return
             self._progress.closing = True

@@ -56,12 +56,16 @@ def test_a_viscosity_may_vary_by_thousands_within_the_cup(glycerin):
     """A gel of 0.03 Pa s that yields at 30 Pa: at rest 4000 times as thick as where it flows."""
     setup = models.StirSetup.from_recording(glycerin)
     liquid = models.Liquid(0.03, 0.2, 1000.0)
-    signal = models.stir(liquid, glycerin.gripper, setup, [0, 1], {"yield_stress": 30.0})
-    assert np.isfinite(signal).all()
-    held = models.stir(models.Liquid(120.0, 0.2, 1000.0), glycerin.gripper, setup, [0])
-    thin = models.stir(liquid, glycerin.gripper, setup, [0])
-    size = [np.sqrt(np.mean(one**2)) for one in (thin, signal, held)]
-    assert size[0] < size[1] < size[2]
+    gel, again = models.stir(liquid, glycerin.gripper, setup, [0, 1], {"yield_stress": 30.0})
+    assert np.isfinite(gel).all()
+    (thin,) = models.stir(liquid, glycerin.gripper, setup, [0])
+    (held,) = models.stir(models.Liquid(120.0, 0.2, 1000.0), glycerin.gripper, setup, [0])
+
+    def apart(one, other):
+        return np.sqrt(np.mean((one - other) ** 2))
+
+    # where the stick does not make it yield, it carries the stick along like what hardly flows
+    assert max(apart(gel, again), apart(gel, held)) < 0.1 * apart(gel, thin)
 
 
 def test_viscosity_by_formula():

@@ -17,7 +17,7 @@ from . import _stirring, floating_stick, pendulum_in_air
 MASS, DEEPER = 1.1, 0.006  # times the floating stick's mass; m of liquid more
 TORQUE = np.array([2e-5, 5e-5, 1e-4])  # N m, in the pivot
 START = 20.0  # deg, from which the stick swings in air
-FLOAT_TOLERANCE, FRICTION_TOLERANCE = 0.1, 0.03  # deg, relative
+FLOAT_TOLERANCE, FRICTION_TOLERANCE = 0.1, 0.03  # deg, of what is lost
 
 
 def floating(effects: dict[str, float], seed: int) -> float:
@@ -92,8 +92,9 @@ def friction_rows(seed: int) -> tuple[list[Row], Panel]:
         exact = rubbed_peaks(sizes[0], len(sizes), torque)
         name = f"pivot_friction {torque:g}"
         free = rubbed_peaks(sizes[0], len(sizes), 0.0)[-1]
-        what = f"lost by friction in {len(sizes) - 1} halves of a swing, {name} [rad]"
-        rows.append(Row.relative(what, free - exact[-1], free - sizes[-1], FRICTION_TOLERANCE))
+        what = f"lost by friction in {len(sizes) - 1} halves of a swing over the exact, {name}"
+        ours = (free - sizes[-1]) / (free - exact[-1])
+        rows.append(Row.absolute(what, 1.0, float(ours), FRICTION_TOLERANCE))
         curves += [
             Curve(name, path.time[at], np.degrees(exact), truth=True, series=number),
             Curve("", path.time[at], np.degrees(sizes), series=number),

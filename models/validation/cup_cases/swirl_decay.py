@@ -1,5 +1,7 @@
 """Liquid that turns in a cup comes to rest by its viscosity."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
@@ -17,7 +19,11 @@ TOLERANCE, THINNEST_TOLERANCE = 0.05, 0.1
 
 
 def swirl_over_time(
-    cup: StillCup, viscosity: np.ndarray, seconds: float, seed: int
+    cup: StillCup,
+    viscosity: np.ndarray,
+    seconds: float,
+    seed: int,
+    effects: Mapping[str, np.ndarray] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and the size of the slowest mode [m/s], shape [steps, B], from that mode on."""
 
@@ -30,7 +36,7 @@ def swirl_over_time(
         mode = swirl_mode(r, cup.radius)
         return float(speed @ mode / (mode @ mode))
 
-    return flow_in_cup(cup, viscosity, Flow(start), seconds, look, seed)
+    return flow_in_cup(cup, viscosity, Flow(start, effects=effects or {}), seconds, look, seed)
 
 
 def decay(time: np.ndarray, size: np.ndarray) -> float:

@@ -3,13 +3,13 @@
 import numpy as np
 
 from ..case import Case, CaseResult, Curve, Panel, Progress, Row
-from ..scenes.still_cup import DENSITY, Flow, StillCup, around, flow_in_cup, swirl_of
-from ..truths.cup_flows import swirl_decay, swirl_mode
+from ..scenes.still_cup import DENSITY, StillCup
+from ..truths.cup_flows import swirl_decay
+from .swirl_decay import SPEED, swirl_over_time
 
 CUP = StillCup(slippery_floor=True)
 VISCOSITY = 0.5  # Pa s at the start
 WARMING = np.array([-3.0, 0.0, 3.0])  # 1/s
-SPEED = 0.05  # m/s, the fastest at the start
 SECONDS = 0.3
 TOLERANCE = 0.02
 
@@ -26,19 +26,8 @@ def left(time: np.ndarray, warming: float) -> np.ndarray:
 
 def run(progress: Progress, seed: int) -> CaseResult:
     """Mean rates of decay of the slowest mode."""
-
-    def start(points: np.ndarray) -> np.ndarray:
-        mode = swirl_mode(np.hypot(points[:, 0], points[:, 1]), CUP.radius)
-        return around(points, SPEED * mode)
-
-    def look(position: np.ndarray, velocity: np.ndarray) -> float:
-        r, speed = swirl_of(position, velocity)
-        mode = swirl_mode(r, CUP.radius)
-        return float(speed @ mode / (mode @ mode))
-
-    flow = Flow(start, effects={"warming": WARMING})
     viscosity = np.full(len(WARMING), VISCOSITY)
-    time, seen = flow_in_cup(CUP, viscosity, flow, SECONDS, look, seed)
+    time, seen = swirl_over_time(CUP, viscosity, SECONDS, seed, {"warming": WARMING})
     progress(1.0)
     rows, curves = [], []
     for number, (warming, size) in enumerate(zip(WARMING, seen.T, strict=True)):

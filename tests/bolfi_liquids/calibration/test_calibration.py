@@ -49,7 +49,7 @@ def test_summary_says_below_which_viscosity_liquids_look_alike(
     setup = models.StirSetup.from_recording(recording, settings["particles"])
     density = recording.number("liquid_density")
     floor = calibration.summary.least_viscosity
-    assert floor == pytest.approx(setup.least_viscosity(density, recording.gripper))
+    assert floor == pytest.approx(setup.least_viscosity(density))
     assert calibration.tree.attrs["least_viscosity"] == floor
     draws = calibration.posterior["viscosity"].to_numpy()
     assert calibration.summary.below_least_viscosity == pytest.approx((draws < floor).mean())
