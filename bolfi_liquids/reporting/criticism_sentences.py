@@ -142,16 +142,11 @@ def parameter_sentences(summary: CriticismSummary) -> list[Sentence]:
 
 def gap_sentences(gap: Gap, accepted: Sequence[str]) -> list[Sentence]:
     """How far stirs and model are apart, before and after, fitted and held out."""
+    known = {"noise": gap.noise, "usual": gap.usual}
     if gap.after is None:
-        known = {"noise": gap.noise, "usual": gap.usual}
         return [sentence("criticism.gap_before", before=gap.before, **known)]
     fitted = sentence(
-        "criticism.gap",
-        before=gap.before,
-        after=gap.after,
-        noise=gap.noise,
-        usual=gap.usual,
-        accepted=accepted,
+        "criticism.gap", before=gap.before, after=gap.after, accepted=accepted, **known
     )
     if gap.held_out_before is None:
         return [fitted]

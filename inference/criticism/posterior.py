@@ -11,7 +11,7 @@ from ..sampling.importance import explore
 from ..sampling.mixture import to_unit
 from ..surrogates.signal_likelihood import SignalState, log_likelihood
 from .hypothesis import Hypothesis
-from .prior_boxes import within
+from .prior_boxes import LATER_HALF_WIDTH, around
 
 
 class Interval(NamedTuple):
@@ -67,7 +67,7 @@ def weighted_posterior(hypothesis: Hypothesis, seed: int = 0) -> Weighted:
     noise that explains anything.
     """
     surrogate, prior = hypothesis.surrogate, hypothesis.fit.prior
-    box = within(hypothesis.u, hypothesis.sd)
+    box = around(hypothesis.u, hypothesis.sd, LATER_HALF_WIDTH, most=np.inf)
     near = _Near(surrogate.state, jnp.asarray(box.low), jnp.asarray(box.high))
     found = explore(jax.random.key(seed), _log_likelihood_near, near, len(prior))
     log_weights = np.asarray(found.log_weights)

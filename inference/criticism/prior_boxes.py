@@ -25,18 +25,12 @@ class Box(NamedTuple):
         return np.all((u >= self.low) & (u <= self.high), axis=-1)
 
 
-def around(centre: np.ndarray, sd: np.ndarray, least: float) -> Box:
-    """The box about a posterior, `least` or wider to each side.
+def around(centre: np.ndarray, sd: np.ndarray, least: float, most: float = MAX_HALF_WIDTH) -> Box:
+    """The box about a posterior, from `least` to `most` to each side.
 
     A missing effect displaces the base parameters by many of their sds, so the first box is wide.
     """
-    half = np.clip(MIN_POSTERIOR_SDS * sd, least, MAX_HALF_WIDTH)
-    return Box(np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0))
-
-
-def within(centre: np.ndarray, sd: np.ndarray) -> Box:
-    """All that a posterior may reach of what was simulated about it when it was last fitted."""
-    half = np.maximum(MIN_POSTERIOR_SDS * sd, LATER_HALF_WIDTH)
+    half = np.clip(MIN_POSTERIOR_SDS * sd, least, most)
     return Box(np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0))
 
 

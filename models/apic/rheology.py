@@ -66,10 +66,14 @@ def thickness_around(s, g, m, along_a, along_b):
 
 @ti.func
 def thickness_between(s, g, m, o):
-    """The same of two cells."""
-    full = s.volume[g, m] + s.volume[g, o]
-    thin = ratio(s.volume[g, m], s.thickness[g, m]) + ratio(s.volume[g, o], s.thickness[g, o])
-    return ratio(full, thin)
+    """Viscosity between two cells, by the same mean [m²/s]."""
+    nu = s.viscosity[g]
+    if ti.static(len(s.rheologies) > 0):
+        full = s.volume[g, m] + s.volume[g, o]
+        thin = ratio(s.volume[g, m], s.thickness[g, m])
+        thin += ratio(s.volume[g, o], s.thickness[g, o])
+        nu = ratio(full, thin)
+    return nu
 
 
 @ti.func

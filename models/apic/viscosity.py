@@ -53,8 +53,9 @@ def weigh_stresses(s, g, step):
             for k in range(4):
                 o = m - (k & 1) * S[a] - (k >> 1) * S[b]
                 full += s.volume[g, o]
-                thick += s.volume[g, o] * s.viscosity[g]
                 room += s.capacity[o]
+                if ti.static(len(s.rheologies) == 0):
+                    thick += s.volume[g, o] * s.viscosity[g]
             if ti.static(len(s.rheologies) > 0):
                 thick = full * thickness_around(s, g, m, S[a], S[b])
             known_a = has_mass(s, g, a, m) * has_mass(s, g, a, m - S[b])
@@ -123,9 +124,7 @@ def solve_viscosity(s, g, step):
         m = s.near[g, n]
         for a in range(3):
             known, u, mass = has_mass(s, g, a, m), s.velocity[g, a, m], s.mass[g, a, m]
-            nu = 0.5 * (thickness_of(s, g, m) + thickness_of(s, g, m - S[a]))
-            if ti.static(len(s.rheologies) > 0):
-                nu = thickness_between(s, g, m, m - S[a])
+            nu = thickness_between(s, g, m, m - S[a])
             rub = s.rub[a, m] * scale * nu
             r = known * (force(s, g, s.velocity, a, m, S) - rub * u)
             inverse = ratio(known, mass + rub + stiffness(s, g, a, m, S))
