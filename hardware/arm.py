@@ -121,17 +121,5 @@ class PathFollower(ArmReader, Protocol):
         ...
 
 
-class Pourer(PathFollower, Protocol):
-    """A follower whose tool's centre can be set to the lip of a source cup."""
-
-    def mount(self, tcp: Six) -> None:
-        """Set the tool's centre in the flange's frame; at rest only, waits for the answer.
-
-        Raises:
-            LinkLost: The controller did not take it.
-        """
-        ...
-
-
 class LinkLost(RuntimeError):
     """The controller cannot be commanded any more; where its arm is going is not known."""

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.board import SPAWN, Board, Row, Who
 from bolfi_liquids.hardware.emulator.controller import Options
-from bolfi_liquids.hardware.host_clock import SteppedClock
 from bolfi_liquids.hardware.motion.cup_frame import cup_frame
 from bolfi_liquids.hardware.motion.kinematics import inverse
 from bolfi_liquids.hardware.recorder.events import EventLog, read_events
@@ -29,6 +28,7 @@ from bolfi_liquids.hardware.robot.orders import (
 from bolfi_liquids.hardware.safety.limits import Tool, workspace
 
 sys.path.insert(0, str(Path(__file__).parent))
+from stepped_clock import SteppedClock  # noqa: E402
 from stepped_emulator import SteppedEmulator, library  # noqa: E402
 
 LONGEST = 120.0  # s of the stepped clock, after which a test has failed

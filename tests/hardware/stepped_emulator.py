@@ -17,7 +17,7 @@ from bolfi_liquids.hardware.emulator.loop import Emulator
 from bolfi_liquids.hardware.emulator.process import free_address
 from bolfi_liquids.hardware.emulator.servers import wire
 from bolfi_liquids.hardware.emulator.servers.network import RTDE, SCRIPT
-from bolfi_liquids.hardware.host_clock import SteppedClock
+from stepped_clock import SteppedClock
 
 ANSWER_TIMEOUT = 10.0  # s of this computer's clock; the emulator answers in this thread
 

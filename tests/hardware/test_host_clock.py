@@ -1,6 +1,7 @@
 import time
 
-from bolfi_liquids.hardware.host_clock import RealClock, SteppedClock
+from bolfi_liquids.hardware.host_clock import RealClock
+from stepped_clock import SteppedClock
 
 
 def test_what_is_due_happens_in_its_order_at_its_moment():

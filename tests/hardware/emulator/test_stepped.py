@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from bolfi_liquids.hardware.emulator.controller import MODELS
-from bolfi_liquids.hardware.host_clock import SteppedClock
 from bolfi_liquids.hardware.motion.kinematics import inverse
 from bolfi_liquids.hardware.robot.ur import RTDE_FIELDS
+from stepped_clock import SteppedClock
 
 HOME = (0.3, -1.4, 1.6, -1.7, -1.5, 0.2)
 DT = 0.008

@@ -4,9 +4,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from bolfi_liquids.models.validation.truths.pendulum import GRAVITY
 from numpy.typing import NDArray
 
-from ..pendulum import GRAVITY
 from . import immersed_boundary as immersed
 from .box import Box
 from .gripper_paths import Motion

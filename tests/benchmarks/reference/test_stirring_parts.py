@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bolfi_liquids.models.validation.truths import pendulum
-from bolfi_liquids.models.validation.truths.stirring_reference import (
+from stirring_reference import (
     Motion,
     StirScene,
     advection,
@@ -13,7 +13,7 @@ from bolfi_liquids.models.validation.truths.stirring_reference import (
     star,
     stick,
 )
-from bolfi_liquids.models.validation.truths.stirring_reference.box import (
+from stirring_reference.box import (
     Box,
     diffused,
     divergence,

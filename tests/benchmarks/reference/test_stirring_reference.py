@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from bolfi_liquids.models.validation.truths.cylinder_drag import DENNIS_CHANG
 from bolfi_liquids.models.validation.truths.oscillating_rod import stokes_reaction_in_cup
-from bolfi_liquids.models.validation.truths.stirring_reference import (
+from scipy.interpolate import CubicSpline
+from stirring_reference import (
     CylinderScene,
     GripperPath,
     Liquid,
@@ -20,8 +21,7 @@ from bolfi_liquids.models.validation.truths.stirring_reference import (
     reference_stir,
     star,
 )
-from bolfi_liquids.models.validation.truths.stirring_reference import stir as stir_module
-from scipy.interpolate import CubicSpline
+from stirring_reference import stir as stir_module
 
 from bolfi_liquids.inputs.open import open_recording
 

@@ -1,9 +1,10 @@
 """Make a recording of a stir by the Navier-Stokes reference, with or without a hidden effect.
 
-    .venv/bin/python tests/benchmarks/make_reference_stirs.py honey.nc --viscosity 6 \\
-        --density 1400 --cell-mm 2.1 --step-ms 0.4
-    .venv/bin/python tests/benchmarks/make_reference_stirs.py rubbing.nc --viscosity 0.1 \\
-        --density 920 --rest 2 --dry-friction 3e-4 --true-fill-cm 5.02 --tilt-deg 0.1 -0.2
+    .venv/bin/python tests/benchmarks/reference/make_reference_stirs.py honey.nc \\
+        --viscosity 6 --density 1400 --cell-mm 2.1 --step-ms 0.4
+    .venv/bin/python tests/benchmarks/reference/make_reference_stirs.py rubbing.nc \\
+        --viscosity 0.1 --density 920 --rest 2 --dry-friction 3e-4 \\
+        --true-fill-cm 5.02 --tilt-deg 0.1 -0.2
 
 The path is a star, or a circle with `--turns`, or straight strokes along `--corners-cm`. The file
 has the form of a recorded stir (`bolfi-liquids guide recordings`), 30 samples a second with
@@ -20,7 +21,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from bolfi_liquids.models.validation.truths.stirring_reference import (
+from scipy.interpolate import CubicSpline
+from stirring_reference import (
     GripperPath,
     Liquid,
     Motion,
@@ -32,7 +34,6 @@ from bolfi_liquids.models.validation.truths.stirring_reference import (
     reference_stir,
     star,
 )
-from scipy.interpolate import CubicSpline
 
 from bolfi_liquids.files import given_path, new_netcdf, write_netcdf
 from bolfi_liquids.inputs.fields import AXES, PLANES

@@ -3,7 +3,7 @@
 import make_reference_stirs
 import numpy as np
 import pytest
-from bolfi_liquids.models.validation.truths.stirring_reference import Stir, circle
+from stirring_reference import Stir, circle
 
 from bolfi_liquids.inputs.open import open_recording
 
