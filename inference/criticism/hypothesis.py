@@ -12,6 +12,7 @@ from ..bolfi import Bolfi
 from ..gp import process as processes
 from ..gp.linalg import small_inverse_cholesky
 from ..gp.optimise import minimise_in_box
+from ..prior import Prior
 from ..result import Fit
 from ..surrogates.emulator import latent_covariance, predict
 from ..surrogates.families import SignalFamily
@@ -19,6 +20,7 @@ from ..surrogates.measurement_noise import Layout, Reduced
 from ..surrogates.signal import SignalSurrogate
 from ..surrogates.signal_likelihood import SignalState
 from .measurement_noise import Noise
+from .prior_boxes import Box
 from .run_noise import own_errors, resized, smooth_covariance
 from .run_table import Runs
 
@@ -35,7 +37,8 @@ class Hypothesis:
     Attributes:
         names: Effects that act.
         fit: The engine's; its likelihood takes all noise from here.
-        u: Where the expected output is nearest to what was observed, prior quantiles [d].
+        within: Where it was simulated.
+        u: Where in there the expected output is nearest to what was observed, prior quantiles [d].
         difference: Observed less expected there [m].
         latent: Covariance of what the emulator does not know [m, m].
         own: Covariance of the simulator's own noise [m, m].
@@ -44,6 +47,7 @@ class Hypothesis:
 
     names: tuple[str, ...]
     fit: Fit
+    within: Box
     u: np.ndarray
     difference: np.ndarray
     latent: np.ndarray
@@ -120,7 +124,12 @@ class Hypothesis:
 
 @in_float64
 def hypothesise(
-    names: tuple[str, ...], prior, runs: Runs, observed: np.ndarray, noise: Noise
+    names: tuple[str, ...],
+    prior: Prior,
+    runs: Runs,
+    observed: np.ndarray,
+    noise: Noise,
+    within: Box,
 ) -> Hypothesis:
     """Fit the model in which the named effects act to what was observed.
 
@@ -129,6 +138,8 @@ def hypothesise(
         runs: Simulations; those in which another effect acts are left out.
         observed: [*signal_shape], NaN where missing.
         noise: Between the simulator and the data.
+        within: Where the effects were simulated. Elsewhere the emulator only guesses, and of all
+            guesses some are near to whatever was observed.
     """
     told = runs.of(names)
     # every component: a small effect may show in one that few runs hardly predict
@@ -144,14 +155,15 @@ def hypothesise(
     known = surrogate.known.covariance
     errors = own_errors(emulator)
     counting, _ = _with_own_noise(surrogate, known, errors)
-    near = minimise_in_box(_squared_distance, counting.state, len(prior))
+    near = minimise_in_box(_squared_distance, counting.state, len(prior), *within)
     # now that it is known where it fits best, so is how noisy the simulator is there
     errors = resized(errors, prior.to_unit(theta), near)
     surrogate, own = _with_own_noise(surrogate, known, errors)
-    u = minimise_in_box(_squared_distance, surrogate.state, len(prior))
+    u = minimise_in_box(_squared_distance, surrogate.state, len(prior), *within)
     return Hypothesis(
         names=names,
         fit=replace(fit, learned=surrogate),
+        within=within,
         u=u,
         difference=surrogate.observed - predict(emulator, u[None])[0][0],
         latent=latent_covariance(emulator, u),

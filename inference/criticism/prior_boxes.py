@@ -25,6 +25,16 @@ class Box(NamedTuple):
         return np.all((u >= self.low) & (u <= self.high), axis=-1)
 
 
+def everywhere(dimension: int) -> Box:
+    """All prior quantiles."""
+    return Box(np.zeros(dimension), np.ones(dimension))
+
+
+def hull(one: Box, other: Box) -> Box:
+    """The smallest box that holds both."""
+    return Box(np.minimum(one.low, other.low), np.maximum(one.high, other.high))
+
+
 def around(centre: np.ndarray, sd: np.ndarray, least: float, most: float = MAX_HALF_WIDTH) -> Box:
     """The box about a posterior, from `least` to `most` to each side.
 

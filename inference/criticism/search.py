@@ -18,7 +18,9 @@ from .prior_boxes import (
     LATER_HALF_WIDTH,
     Box,
     around,
+    everywhere,
     fill,
+    hull,
     with_coefficient,
 )
 from .run_table import Runs, joined
@@ -69,10 +71,10 @@ class Study(NamedTuple):
     def seed(self) -> int:
         return self.laboratory.seed
 
-    def hypothesis(self, names: tuple[str, ...], runs: Runs) -> Hypothesis:
-        """The model in which the named effects act, fitted."""
+    def hypothesis(self, names: tuple[str, ...], runs: Runs, within: Box) -> Hypothesis:
+        """The model in which the named effects act, fitted where it was simulated."""
         prior = extended(self.laboratory.prior, self.laboratory.extensions, names)
-        return hypothesise(names, prior, runs, self.observed, self.noise)
+        return hypothesise(names, prior, runs, self.observed, self.noise, within)
 
     def run(self, phase: str, box: Box, names: tuple[str, ...], count: int) -> Runs:
         """Runs all over a box."""
@@ -101,19 +103,19 @@ class Base(NamedTuple):
     null: np.ndarray  # [m, n], residuals of a right model
     signatures: dict[str, Signature]
     singles: dict[str, Hypothesis]
+    box: Box  # in which effects were simulated
     runs: Runs
     given: int  # of the runs, made before
 
 
 def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Box]:
     """Fit the base model near its optimum. Return the fit, its runs and their box."""
-    dimension = len(study.laboratory.prior)
-    everywhere = Box(np.zeros(dimension), np.ones(dimension))
-    runs = study.run("start", everywhere, (), study.plan.start) if earlier is None else earlier
-    first = study.hypothesis((), runs)
+    whole = everywhere(len(study.laboratory.prior))
+    runs = study.run("start", whole, (), study.plan.start) if earlier is None else earlier
+    first = study.hypothesis((), runs, whole)
     box = around(first.u, first.sd, FIRST_HALF_WIDTH)
     runs = joined([runs, study.run("base", box, (), study.plan.base)])
-    return study.hypothesis((), runs), runs, box
+    return study.hypothesis((), runs, whole), runs, box
 
 
 def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
@@ -136,7 +138,7 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
             untested.append(name)
             continue
         parts.append(made)
-        singles[name] = study.hypothesis((name,), joined([runs, made]))
+        singles[name] = study.hypothesis((name,), joined([runs, made]), wide)
     signatures = {
         name: signature(base, single, laboratory.extensions[name])
         for name, single in singles.items()
@@ -144,7 +146,8 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
     signatures = scored_on_clean(base, study.noise, signatures)
     tested, null = study.check(base, signatures)
     given = 0 if earlier is None else len(earlier)
-    return Base(base, tested, null, signatures, singles, joined(parts), given), tuple(untested)
+    found = Base(base, tested, null, signatures, singles, box, joined(parts), given)
+    return found, tuple(untested)
 
 
 def explain(
@@ -179,9 +182,17 @@ def explain(
     accepted = [one for one in found.values() if one.accepted]
     singles = [one for one in accepted if len(one.names) == 1]
     if forced and not (forced in found and found[forced].refitted):
-        unrefined = study.candidate(base, study.hypothesis(forced, runs))
+        unrefined = _unrefined(study, base, forced, runs)
         found[forced], _ = _refit(study, base, unrefined, runs, most=None)
     return list(found.values()), singles or accepted
+
+
+def _unrefined(study: Study, base: Base, names: tuple[str, ...], runs: Runs) -> Candidate:
+    """Effects that were simulated one by one, as if together."""
+    within = base.box
+    for _ in names:
+        within = with_coefficient(within)
+    return study.candidate(base, study.hypothesis(names, runs, within))
 
 
 def _refit(
@@ -204,7 +215,8 @@ def _refit(
         except AllRunsFailed:
             break
         runs = joined([runs, made])
-        candidate = study.candidate(base, study.hypothesis(names, runs), refitted=True)
+        within = hull(candidate.hypothesis.within, box)
+        candidate = study.candidate(base, study.hypothesis(names, runs, within), refitted=True)
         if box.holds(candidate.hypothesis.u):
             break
     return candidate, runs
@@ -221,7 +233,7 @@ def _pairs(
         return [], runs
     best = max(found.values(), key=lambda c: c.gain)
     pairs = [
-        study.candidate(base, study.hypothesis((*best.names, other), runs))
+        _unrefined(study, base, (*best.names, other), runs)
         for other in base.singles
         if other not in best.names
     ]

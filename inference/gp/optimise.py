@@ -119,31 +119,46 @@ def _values(objective: Objective, state: Any, u: jax.Array) -> jax.Array:
 
 
 @partial(jax.jit, static_argnums=0)
-def _value_and_grad(objective: Objective, state: Any, x: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Over unbounded coordinates x, u = sigmoid(x)."""
+def _value_and_grad(
+    objective: Objective, state: Any, low: np.ndarray, size: np.ndarray, x: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    """Over unbounded coordinates x, u = low + size * sigmoid(x)."""
 
     def one(x: jax.Array) -> tuple[jax.Array, jax.Array]:
-        return jax.value_and_grad(lambda x: objective(state, jax.nn.sigmoid(x)))(x)
+        return jax.value_and_grad(lambda x: objective(state, low + size * jax.nn.sigmoid(x)))(x)
 
     return jax.vmap(one)(x)
 
 
-def minimise_in_box(objective: Objective, state: Any, dimension: int) -> np.ndarray:
+def minimise_in_box(
+    objective: Objective,
+    state: Any,
+    dimension: int,
+    low: np.ndarray | float = 0.0,
+    high: np.ndarray | float = 1.0,
+) -> np.ndarray:
     """Global minimiser u [dimension]: quasi-Newton from the best of a Sobol screen.
 
     Of a fixed screen the best few points are refined, so the result is a pure function of
-    objective and state.
+    objective, state and box.
+
+    Args:
+        low, high: The box, in the unit box [dimension].
     """
+    low, high = (np.broadcast_to(np.asarray(end, float), dimension) for end in (low, high))
+    size = high - low
     screen = sobol(0, 0, SCREENED_POINTS, dimension)
-    order = np.argsort(np.asarray(_values(objective, state, screen)))[:REFINED_POINTS]
+    values = np.asarray(_values(objective, state, low + size * screen))
+    order = np.argsort(values)[:REFINED_POINTS]
     x, value = minimise_many(
-        lambda x, _: _value_and_grad(objective, state, x),
+        lambda x, _: _value_and_grad(objective, state, low, size, x),
         _logit(screen[order]),
         np.ones(REFINED_POINTS, bool),
         tolerance=1e-6,
     )
     best = x[np.argmin(value)]
-    return np.clip(np.asarray(jax.nn.sigmoid(jnp.asarray(best))), BOX_EDGE, 1.0 - BOX_EDGE)
+    u = low + size * np.asarray(jax.nn.sigmoid(jnp.asarray(best)))
+    return np.clip(u, BOX_EDGE, 1.0 - BOX_EDGE)
 
 
 def _logit(u: np.ndarray) -> np.ndarray:

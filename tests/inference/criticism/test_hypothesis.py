@@ -6,7 +6,7 @@ import pytest
 from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference.criticism.hypothesis import hypothesise, samples, values_of
 from bolfi_liquids.inference.criticism.misfit import locate, null_draws
-from bolfi_liquids.inference.criticism.prior_boxes import Box, fill
+from bolfi_liquids.inference.criticism.prior_boxes import everywhere, fill
 from bolfi_liquids.inference.criticism.simulate import Laboratory
 from bolfi_liquids.inference.surrogates import output_vectors
 from scipy.stats import binom, chi2, norm
@@ -32,8 +32,8 @@ def oscillate(theta, seeds):
 def fitted(simulate, observed, noise, bank, count=RUNS):
     with criticism.Keeping(batch=64).opened("") as keep:
         laboratory = Laboratory(simulate, PRIOR, EXTENSIONS, keep, bank)
-        runs = laboratory.run("start", fill(Box(np.zeros(1), np.ones(1)), PRIOR, bank, count))
-    return hypothesise((), PRIOR, runs, observed, noise)
+        runs = laboratory.run("start", fill(everywhere(1), PRIOR, bank, count))
+    return hypothesise((), PRIOR, runs, observed, noise, everywhere(1))
 
 
 @pytest.fixture(scope="module")
