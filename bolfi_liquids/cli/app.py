@@ -16,7 +16,7 @@ from . import record as cli_record
 from . import rig as cli_rig
 from . import simulate as cli_simulate
 from . import trim as cli_trim
-from .compute import Compute
+from .compute import Compute, StudyCompute
 from .errors import OneLineErrors
 from .examples import examples, session
 from .grouped import grouped
@@ -219,22 +219,23 @@ def report(
 @app.command(epilog=examples("demo --out runs/demo"))
 @grouped
 def demo(
-    compute: Compute,
+    compute: StudyCompute,
     out: Annotated[Path, typer.Option(metavar="RUN", help="Directory of the run.")] = Path(
         "runs/demo"
     ),
 ) -> None:
-    """Calibrate on the bundled glycerin, criticise, choose a pour and write the report."""
+    """Calibrate on a bundled recording, find what is hidden in it, choose a pour, report."""
     from ..criticism.result import Criticism
     from ..demo import run_demo
 
     with complaints_among_results(), compute.executor() as executor:
-        path = run_demo(out, executor=executor, timeout=compute.timeout)
+        made = run_demo(out, executor=executor, timeout=compute.timeout)
     print_section(out, "calibrate")
     print_findings(Criticism.open(out))
+    typer.echo(f"pour before criticism: {made.pour_before}")
     print_section(out, "pour")
     print_warnings(out)
-    typer.echo(f"report: {path}")
+    typer.echo(f"report: {made.report}")
 
 
 # after the commands above, for the help lists them in this order

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from ..inference import Prior
     from ..inference.criticism import Extension, Keeping, Plan, UsualResidual
 
-LIKENESS_WIDTH = np.log(2.0)  # between viscosities by which the simulator's error changes little
-MIN_LIKENESS = 1e-6  # so that a mean over recordings is one
+VISCOSITY_FACTOR = 2.0  # over which the simulator's error changes
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +74,8 @@ def usual_for(
 ) -> "UsualResidual | None":
     """What is usual for an experiment on a liquid [Pa s]; None where nothing is known to be.
 
-    A clean recording of the same path also shows where on it the simulator errs.
+    A clean recording of the same path, of a liquid like this one, shows where on it the simulator
+    errs.
     """
     only = stirring.recordings[0] if len(stirring.recordings) == 1 else None
     same = [only is not None and same_experiment(one.recording, only) for one in clean]
@@ -98,26 +98,23 @@ def _usual(
         return None
     # the whole recording tells white noise better than the short rest tells correlated noise
     noises = [KnownNoise(sensor_noise(one.recording.inclination)) for one in clean]
-    weights = likeness([one.viscosity for one in clean], viscosity, least)
-    return usual_residual([one.residual for one in clean], noises, same, weights)
+    away = apart([one.viscosity for one in clean], viscosity, least)
+    return usual_residual([one.residual for one in clean], noises, same, away)
 
 
-def likeness(
+def apart(
     known: Sequence[float | None], viscosity: float | None, least: float
 ) -> NDArray[np.float64]:
-    """How much recordings of liquids tell of the simulator's error on another, shape (n,).
+    """How far liquids are from another one, as simulator errors go, shape (n,).
 
-    1 of the liquid nearest in viscosity, less of those farther away: the simulator errs by half a
-    degree in water and by less than 0.05 degrees in glycerin.
+    The simulator errs by half a degree in water and by less than 0.05 degrees in glycerin.
 
     Args:
-        known: Their viscosities [Pa s]; all tell the same where one is not known.
+        known: Their viscosities [Pa s]; all are alike where one is not known.
         viscosity: Of the other [Pa s], by the model that lacks the effect.
         least: Below it liquids look alike [Pa s].
     """
     if viscosity is None or None in known:
-        return np.ones(len(known))
-    apart = np.log(np.maximum(np.array(known, float), least) / max(viscosity, least))
-    apart /= LIKENESS_WIDTH
-    nearest = np.min(apart**2)
-    return np.maximum(np.exp(-0.5 * (apart**2 - nearest)), MIN_LIKENESS)
+        return np.zeros(len(known))
+    ratio = np.maximum(np.array(known, float), least) / max(viscosity, least)
+    return np.log(ratio) / np.log(VISCOSITY_FACTOR)

@@ -73,7 +73,6 @@ def _posterior(findings: Findings) -> "Dataset":
 def _residual(findings: Findings, name: str, source: "inference.criticism.Criticism") -> "Dataset":
     from xarray import Dataset
 
-    observed = source.base.hypothesis.fit.observed
     if name == "stirs":
         dims = ("frame", "plane")
         time = findings.inputs.stirring.time
@@ -91,20 +90,22 @@ def _residual(findings: Findings, name: str, source: "inference.criticism.Critic
             "distance": ("pour", table.distance, {"units": "m"}),
             "outcome": ["spilled", "retained"],
         }
-    columns = {"observed": (dims, observed)}
+    columns = {"observed": (dims, source.observed)}
     models = {"before": source.base.hypothesis, "after": source.extended}
     for when, hypothesis in models.items():
         if hypothesis is not None:
-            expected, sd = _expected(hypothesis)
+            left, sd = _left(hypothesis)
+            expected = source.observed - left
             columns |= {f"expected_{when}": (dims, expected), f"sd_{when}": (dims, sd)}
     return Dataset({key: (*of, UNITS[name]) for key, of in columns.items()}, coords=coords)
 
 
-def _expected(hypothesis: "inference.criticism.Hypothesis") -> tuple[np.ndarray, np.ndarray]:
+def _left(hypothesis: "inference.criticism.Hypothesis") -> tuple[np.ndarray, np.ndarray]:
+    """Observed less expected, what is known to be usual included, and its sd."""
     output = hypothesis.surrogate.output
     sd = np.sqrt(np.diag(hypothesis.spread + hypothesis.noise))
-    residual, sd = (output.restore(row[None])[0] for row in (hypothesis.difference, sd))
-    return hypothesis.fit.observed - residual, sd
+    left, sd = (output.restore(row[None])[0] for row in (hypothesis.difference, sd))
+    return left, sd
 
 
 def _where(source: "inference.criticism.Criticism", units: dict[str, str]) -> "Dataset":

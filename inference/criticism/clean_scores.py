@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .hypothesis import Hypothesis, samples, values_of
-from .measurement_noise import Noise
+from .hypothesis import Hypothesis, values_of
+from .measurement_noise import Noise, samples
 from .signatures import Signature
 from .usual_residual import usual_in, without_usual
 
@@ -17,8 +17,9 @@ def scored_on_clean(
     """Signatures with the size of their scores on clean data of the same experiment, at least 1.
 
     Each clean residual is scored with the other residuals only; a single residual is not scored.
-    Scores of either sign count: what errs one way on one liquid may err the other
-    way on another. The mean square is by the shapes' weights, with a score of 1 besides.
+    Scores of either sign count: what errs one way in one regime may err the other way in
+    another. Of a residual that the data are expected to show again, only the share counts that
+    remains unexpected. The mean square is by the residuals' weights, with a score of 1 besides.
     """
     usual = usual_in(noise)
     if usual is None:
@@ -26,19 +27,19 @@ def scored_on_clean(
     at = samples(base.fit.observed)
     measured = without_usual(noise).covariance(at)
     squares = dict.fromkeys(signatures, 1.0)
-    parts = zip(usual.shapes_at(at), usual.leave_one_out(), usual.weights, strict=False)
-    # one by one: where there are no others, there is nothing to learn from
-    for shape, taught, weight in parts:
-        if weight == 0.0:
+    counted = 1.0
+    for clean, taught in zip(usual.repeats, usual.leave_one_out(), strict=True):
+        if taught is None or clean.weight == 0.0:
             continue
         covariance = values_of(base, values_of(base, measured + taught.covariance(at)).T)
         others = replace(base, noise=covariance)
-        left = others.project(others.whiten(values_of(base, shape[None])))[:, 0]
+        unexpected = values_of(base, (clean.at(at) - taught.mean(at))[None])
+        left = others.project(others.whiten(unexpected))[:, 0]
+        share = clean.weight * (1.0 - clean.alike**2)
         for name, of in signatures.items():
             change = others.project(others.whiten(of.change))[:, 0]
             length = max(float(np.linalg.norm(change)), 1e-12)
-            # a shape is its residual times the root of its weight
-            squares[name] += float(change @ left / length) ** 2
-    counted = 1.0 + float(usual.weights.sum())
+            squares[name] += share * float(change @ left / length) ** 2
+        counted += clean.weight
     sizes = {name: max(1.0, (of / counted) ** 0.5) for name, of in squares.items()}
     return {name: of._replace(clean=sizes[name]) for name, of in signatures.items()}

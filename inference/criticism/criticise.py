@@ -13,8 +13,8 @@ from ..notebook_display import as_html, as_text
 from ..prior import Prior, checked_prior
 from .experiment import Experiment, Proposal
 from .held_out import Gap, gap, holds, predict
-from .hypothesis import Hypothesis, samples
-from .measurement_noise import Noise
+from .hypothesis import Hypothesis
+from .measurement_noise import Noise, samples
 from .misfit import Found, locate, null_draws
 from .model_extension import Extensions, check_extensions
 from .next_experiment import Suggestion, suggest
@@ -43,7 +43,7 @@ class Criticism:
         suggestions: Experiments that would separate explanations, best first.
         untested: Effects whose simulations failed, or that were not refitted, or could not be
             simulated for the held-out data, though they might explain the difference.
-        noise: The experiment's.
+        observed, noise: The experiment's.
         units: Of the effects' coefficients.
         tied: Names of each explanation that remains, best first.
         simulations: Runs that were asked for, those found in the bank included.
@@ -60,6 +60,7 @@ class Criticism:
     gaps: Mapping[tuple[str, ...], tuple[Gap, ...]]
     suggestions: tuple[Suggestion, ...]
     untested: tuple[str, ...]
+    observed: np.ndarray
     noise: Noise
     units: Mapping[str, str]
     tied: tuple[tuple[str, ...], ...]
@@ -123,12 +124,13 @@ class Criticism:
     @property
     def measurement(self) -> np.ndarray:
         """Covariance of the data's own noise, without what is usual for the simulator [n, n]."""
-        return without_usual(self.noise).covariance(samples(self.base.hypothesis.fit.observed))
+        return without_usual(self.noise).covariance(samples(self.observed))
 
     @property
     def usual(self) -> float:
-        """RMS over the data of what is usual for the simulator, 0 where that is not known."""
-        return usual_rms(self.noise)
+        """RMS over the data of what is usual for the simulator besides what it is known to leave
+        of them, 0 where that is not known."""
+        return usual_rms(self.noise, self.observed)
 
     @property
     def confusion(self) -> np.ndarray:
@@ -203,7 +205,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         laboratory = Laboratory(
             experiment.simulate, prior, extensions, keep, kept.seed, counted, experiment.shape
         )
-        study = Study(laboratory, experiment.observed, experiment.noise, plan or Plan())
+        study = Study(laboratory, experiment.corrected, experiment.noise, plan or Plan())
         base, untested = examine(study, None if earlier is None else laboratory.table(*earlier))
         tried = Tried([], [], {}, ())
         if accept is not None or base.check.p_value < level:
@@ -231,6 +233,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         untested=tuple(
             dict.fromkeys((*untested, *_left_out(tried.candidates), *tried.unpredicted))
         ),
+        observed=experiment.observed,
         noise=experiment.noise,
         units={name: one.unit for name, one in extensions.items()},
         tied=tuple(one.names for one in tied(tried.members)),

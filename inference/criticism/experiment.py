@@ -8,6 +8,7 @@ from ..arguments import check_function, check_kind, check_text, checked_array, c
 from ..types import Simulator
 from .measurement_noise import Noise
 from .misfit import Window
+from .usual_residual import expected_usual
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +56,11 @@ class Experiment:
     def shape(self) -> tuple[int, ...]:
         """Of the output."""
         return self.observed.shape
+
+    @property
+    def corrected(self) -> np.ndarray:
+        """What was observed, less what the simulator is known to leave of it [*signal_shape]."""
+        return self.observed - expected_usual(self.noise, self.observed)
 
 
 @dataclass(frozen=True)

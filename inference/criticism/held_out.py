@@ -7,8 +7,7 @@ import numpy as np
 
 from ..surrogates.output_vectors import MIN_SERIES
 from .experiment import Experiment
-from .hypothesis import samples
-from .measurement_noise import gaussian
+from .measurement_noise import gaussian, samples
 from .misfit import MODES_PER_CHANNEL, exceedance, orthonormal, slow_modes
 from .run_noise import errors_of, smooth_covariance
 from .simulate import Laboratory
@@ -26,9 +25,9 @@ class Gap(NamedTuple):
 
     Attributes:
         label: The experiment's.
-        before, after: RMS of observed less expected.
+        before, after: RMS of observed less expected, what is known to be usual included.
         noise: RMS that measurement and the simulator's own noise would leave of a right model.
-        usual: RMS of what is usual for the simulator.
+        usual: RMS of what is usual for the simulator besides.
         floor: RMS that these exceed once in a hundred times.
         p_value: Of what is left after, by its RMS and by its slow part (Bonferroni), all noise
             and what is usual for the simulator considered.
@@ -93,7 +92,7 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
     Both are judged under one covariance, so that neither wins by being vague: noise, and what
     runs at posterior draws differ by, pooled.
     """
-    observed = experiment.observed[np.isfinite(experiment.observed)]
+    observed = experiment.corrected[np.isfinite(experiment.observed)]
     fewer = 1.0 + 1.0 / min(len(before), len(after))  # the mean of few runs is noisy, too
     at = samples(experiment.observed)
     series = len(experiment.observed) >= MIN_SERIES
@@ -123,7 +122,7 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
         before=sizes[0],
         after=sizes[1],
         noise=float(np.sqrt(np.trace(measured.covariance(at) + simulated) / len(observed))),
-        usual=usual_rms(experiment.noise),
+        usual=usual_rms(experiment.noise, experiment.observed),
         floor=float(np.quantile(np.sqrt(np.mean(noise**2, axis=1)), NOISE_QUANTILE)),
         p_value=min(1.0, 2.0 * float(exceedance(measures(null), left).min())),
         lpd_gain=density(means[1]) - density(means[0]),

@@ -19,7 +19,7 @@ from ..surrogates.families import SignalFamily
 from ..surrogates.measurement_noise import Layout, Reduced
 from ..surrogates.signal import SignalSurrogate
 from ..surrogates.signal_likelihood import SignalState
-from .measurement_noise import Noise
+from .measurement_noise import Noise, samples
 from .prior_boxes import Box
 from .run_noise import own_errors, resized, smooth_covariance
 from .run_table import Runs
@@ -203,13 +203,6 @@ def _squared_distance(state: SignalState, u: jax.Array) -> jax.Array:
     mean, _ = processes.predict(state.gp, u)
     white = small_inverse_cholesky(state.covariance[0]) @ (state.estimate[0] - mean * state.used)
     return 0.5 * white @ white
-
-
-def samples(observed: np.ndarray) -> Layout:
-    """Channel and sample of each finite value, in the flattened order."""
-    at = np.flatnonzero(np.isfinite(observed))
-    channels = int(np.prod(observed.shape[1:]))
-    return Layout(at % channels, at // channels)
 
 
 def values_of(hypothesis: Hypothesis, drawn: np.ndarray) -> np.ndarray:

@@ -95,6 +95,13 @@ class SumOfNoises:
         return np.sum([part.draw(rng, at, count) for part in self.parts], axis=0)
 
 
+def samples(observed: np.ndarray) -> Layout:
+    """Channel and sample of each finite value, in the flattened order."""
+    at = np.flatnonzero(np.isfinite(observed))
+    channels = int(np.prod(observed.shape[1:]))
+    return Layout(at % channels, at // channels)
+
+
 def gaussian(rng: np.random.Generator, covariance: np.ndarray, count: int) -> np.ndarray:
     """Draws [count, n] of mean zero; the covariance [n, n] may be singular."""
     values, vectors = np.linalg.eigh(covariance)

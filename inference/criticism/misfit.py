@@ -7,8 +7,8 @@ import numpy as np
 
 from .._float64 import in_float64
 from ..surrogates.measurement_noise import Layout
-from .hypothesis import Hypothesis, samples, values_of
-from .measurement_noise import Noise, gaussian
+from .hypothesis import Hypothesis, values_of
+from .measurement_noise import Noise, gaussian, samples
 from .signatures import Signature, directions
 
 REPLICATES = 999  # of the parametric bootstrap

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..surrogates.output_vectors import MIN_SERIES
 from .experiment import Proposal
-from .hypothesis import samples
+from .measurement_noise import samples
 from .misfit import MODES_PER_CHANNEL, orthonormal, slow_modes
 from .run_noise import errors_of, smooth_covariance
 from .simulate import AllRunsFailed, Laboratory

@@ -138,7 +138,8 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
             untested.append(name)
             continue
         parts.append(made)
-        singles[name] = study.hypothesis((name,), joined([runs, made]), wide)
+        within = with_coefficient(box, end=0.0)  # neutral may be an end of the prior
+        singles[name] = study.hypothesis((name,), joined([runs, made]), within)
     signatures = {
         name: signature(base, single, laboratory.extensions[name])
         for name, single in singles.items()
@@ -191,7 +192,7 @@ def _unrefined(study: Study, base: Base, names: tuple[str, ...], runs: Runs) -> 
     """Effects that were simulated one by one, as if together."""
     within = base.box
     for _ in names:
-        within = with_coefficient(within)
+        within = with_coefficient(within, end=0.0)
     return study.candidate(base, study.hypothesis(names, runs, within))
 
 

@@ -1,78 +1,148 @@
 """What a simulator usually gets wrong, learned from data believed to be clean."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag, solve
 
 from ..surrogates.measurement_noise import Layout
-from .measurement_noise import Noise, SumOfNoises, gaussian
+from .measurement_noise import Noise, SumOfNoises, gaussian, samples
 
+REPEATED = 0.9  # correlation of a simulator's errors in two repetitions of one experiment
+LEAST_ALIKE = 0.1  # correlation below which a repetition says nothing of where the simulator errs
+LEAST_WEIGHT = 1e-6  # so that a mean over clean data is one
 LEAST_OTHERS = 0.5  # weight of the other clean data by which one of them can be judged
 MIN_FREEDOM = 3  # with fewer, draws have no variance and no effect would be found
+JITTER = 1e-9  # of the largest variance, so that covariances can be inverted
+
+
+class Repeat(NamedTuple):
+    """Clean data of the experiment that is looked at, in a regime that may be another.
+
+    Attributes:
+        residual: Less the calibrated simulator's mean [T, channels]; NaN where missing.
+        noise: Of its measurement.
+        away: Of its regime from that of the data that are looked at, see `usual_residual`.
+        others: Autocovariance of all clean data but these, shape [lags]; None where there are
+            no others.
+        weight: How much it tells of the regime that is looked at; 0 where the others tell next
+            to nothing.
+    """
+
+    residual: np.ndarray
+    noise: Noise
+    away: float
+    others: np.ndarray | None
+    weight: float
+
+    @property
+    def alike(self) -> float:
+        """Correlation of the simulator's error with that on the data that are looked at."""
+        return REPEATED * float(_likeness(self.away))
+
+    def at(self, at: Layout) -> np.ndarray:
+        """The residual at n samples [n]; a missing one is zero."""
+        return np.nan_to_num(self.residual[at.sample, at.channel])
 
 
 @dataclass(frozen=True, eq=False)
 class UsualResidual:
     """A simulator's own residual, as a Gaussian process of uncertain size.
 
-    Its covariance has two parts: a stationary one, the clean data's mean autocovariance, and for
-    data made by the same experiment the clean residuals themselves, each a direction in which the
-    model may be as wrong again (Brynjarsdottir and O'Hagan 2014 on why the shape matters). They
-    are added up, not averaged: averaged, what the simulator leaves of one liquid was found to be
-    beyond what it leaves of the others.
+    Over time it is stationary, of the clean data's mean autocovariance. Over regimes its
+    correlation falls like a Gaussian. So clean data of the same experiment in a near regime tell
+    where the simulator errs: given them, the residual has a mean, and less variance (kriging;
+    Kennedy and O'Hagan 2001 model a simulator's discrepancy so, Brynjarsdottir and O'Hagan 2014
+    say why its shape matters).
 
     Attributes:
         autocovariance: Of clean residuals by lag in samples, shape [lags]; zero beyond.
-        shapes: Clean residuals of the same experiment at each sample, shape [k, T, channels];
-            NaN where missing.
-        freedom: Weight of the clean data of this very experiment, or of all where there are none:
-            the size is known as well as a variance from so many numbers, but never less than from
-            MIN_FREEDOM.
-        others: For each shape the autocovariance of all clean data but it, shape [k, lags]; none
-            where there are no other clean data.
-        weights: Of the shapes, shape [k]; 0 where the others tell next to nothing.
+        freedom: Weight of the clean data: the size is known as well as a variance from so many
+            numbers, but never less than from MIN_FREEDOM.
+        repeats: Clean data of this very experiment.
     """
 
     autocovariance: np.ndarray
-    shapes: np.ndarray
     freedom: float
-    others: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    weights: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    repeats: tuple[Repeat, ...] = ()
+
+    def mean(self, at: Layout) -> np.ndarray:
+        """What the simulator is expected to leave [n]."""
+        return self._given(at)[0]
 
     def covariance(self, at: Layout) -> np.ndarray:
-        apart = np.abs(np.subtract.outer(at.sample, at.sample))
-        missing = max(apart.max() + 1 - len(self.autocovariance), 0)
-        # over more samples than it was learned from, it must be made positive anew
-        known = positive_autocovariance(np.append(self.autocovariance, np.zeros(missing)))
-        stationary = known[apart] * np.equal.outer(at.channel, at.channel)
-        shapes = self.shapes_at(at)
-        return stationary + shapes.T @ shapes
-
-    def leave_one_out(self) -> "list[UsualResidual]":
-        """For each shape, what the other clean data teach."""
-        left = [np.delete(self.shapes, k, axis=0) for k in range(len(self.others))]
-        return [
-            replace(self, autocovariance=autocovariance, shapes=shapes, others=self.others[:0])
-            for autocovariance, shapes in zip(self.others, left, strict=True)
-        ]
+        """Of the residual about that mean [n, n]."""
+        return self._given(at)[1]
 
     def draw(self, rng: np.random.Generator, at: Layout, count: int) -> np.ndarray:
+        """Draws [count, n] about that mean, each of a size that it may have."""
         drawn = gaussian(rng, self.covariance(at), count)
         freedom = max(self.freedom, MIN_FREEDOM)
         return np.sqrt(freedom / rng.chisquare(freedom, count))[:, None] * drawn
 
-    def shapes_at(self, at: Layout) -> np.ndarray:
-        """The clean residuals [k, n] at n samples; missing ones are zero."""
-        flat = self.shapes[:, at.sample, at.channel] if self.shapes.size else None
-        return np.zeros((0, len(at.sample))) if flat is None else np.nan_to_num(flat)
+    def leave_one_out(self) -> "list[UsualResidual | None]":
+        """For each repeat what the other clean data teach of it; None where there are no others."""
+        taught = []
+        for k, one in enumerate(self.repeats):
+            others = self.repeats[:k] + self.repeats[k + 1 :]
+            moved = tuple(other._replace(away=other.away - one.away) for other in others)
+            known = one.others
+            taught.append(
+                None if known is None else replace(self, autocovariance=known, repeats=moved)
+            )
+        return taught
+
+    def _given(self, at: Layout) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and covariance given the repeats: a Gaussian's conditional."""
+        told = [(one, samples(one.residual)) for one in self.repeats if one.alike > LEAST_ALIKE]
+        by_lag = self._over([at, *(there for _, there in told)])
+        alone = _between(by_lag, at, at)
+        if not told:
+            return np.zeros(len(at.sample)), alone
+        across = np.vstack([one.alike * _between(by_lag, there, at) for one, there in told])
+        joint = np.block(
+            [
+                [_alike(one, other) * _between(by_lag, there, where) for other, where in told]
+                for one, there in told
+            ]
+        )
+        joint += block_diag(*(one.noise.covariance(there) for one, there in told))
+        joint += JITTER * joint.max() * np.eye(len(joint))
+        seen = np.concatenate([one.at(there) for one, there in told])
+        weight = solve(joint, across, assume_a="pos")
+        return weight.T @ seen, alone - across.T @ weight
+
+    def _over(self, layouts: Sequence[Layout]) -> np.ndarray:
+        """The autocovariance at all lags that are needed."""
+        longest = 1 + max(int(at.sample.max()) for at in layouts)
+        missing = max(longest - len(self.autocovariance), 0)
+        # over more samples than it was learned from, it must be made positive anew
+        return positive_autocovariance(np.append(self.autocovariance, np.zeros(missing)))
+
+
+def _likeness(away: np.ndarray | float) -> np.ndarray:
+    """How alike a simulator's errors are in two regimes, from 0 to 1."""
+    return np.exp(-0.5 * np.square(away))
+
+
+def _alike(one: Repeat, other: Repeat) -> float:
+    """Correlation of the simulator's errors on two clean data sets."""
+    return 1.0 if one is other else REPEATED * float(_likeness(one.away - other.away))
+
+
+def _between(by_lag: np.ndarray, one: Layout, other: Layout) -> np.ndarray:
+    """Covariance [n, m] of n samples and m others of one stationary process in each channel."""
+    apart = np.abs(np.subtract.outer(one.sample, other.sample))
+    return by_lag[apart] * np.equal.outer(one.channel, other.channel)
 
 
 def usual_residual(
     residuals: Sequence[np.ndarray],
     noises: Sequence[Noise],
     same: Sequence[bool],
-    weights: Sequence[float] | np.ndarray | None = None,
+    away: Sequence[float] | np.ndarray | None = None,
 ) -> UsualResidual:
     """What clean data teach.
 
@@ -81,43 +151,47 @@ def usual_residual(
             samples equally far apart; NaN where missing.
         noises: Of each one's measurement, which is not the simulator's fault.
         same: Which of them repeat the experiment that will be looked at, sample by sample.
-        weights: How much each tells of the system that will be looked at, above 0 and at most 1;
-            None where all tell the same. A simulator may err by much in one regime and by nothing
-            in another.
+        away: How far the regime of each is from that which will be looked at, along an axis on
+            which a simulator's errors change over a distance of 1; None where all are of one
+            regime. A simulator may err by much in one regime and by nothing in another: what is
+            learned of sizes is learned from the nearest.
 
     Raises:
-        ValueError: there are none, or a weight is not above 0 and at most 1.
+        ValueError: there are none, or a distance is not finite.
     """
     if not residuals:
         raise ValueError("a usual residual needs at least one clean data set")
-    weight = np.ones(len(residuals)) if weights is None else np.asarray(weights, float)
-    if weight.shape != (len(residuals),) or not ((weight > 0.0) & (weight <= 1.0)).all():
-        raise ValueError(
-            f"weights must be {len(residuals)} numbers above 0 and at most 1, got {weights}"
-        )
+    apart = np.zeros(len(residuals)) if away is None else np.asarray(away, float)
+    if apart.shape != (len(residuals),) or not np.isfinite(apart).all():
+        raise ValueError(f"away must be {len(residuals)} finite numbers, got {away}")
+    weight = np.maximum(np.exp(-0.5 * (apart**2 - np.min(apart**2))), LEAST_WEIGHT)
     lags = max(len(residual) for residual in residuals)
-    found = [_autocovariance(residual, lags) for residual in residuals]
-    measured = [
-        _expected_of(noise, len(residual), lags)
-        for noise, residual in zip(noises, residuals, strict=True)
-    ]
-    each = np.array(found) - np.array(measured)
-    repeated = [k for k, again in enumerate(same) if again]
-    own = [max(1.0 - measured[k][0] / max(found[k][0], measured[k][0]), 0.0) for k in repeated]
-    kept = [
-        residuals[k] * np.sqrt(weight[k] * share) for k, share in zip(repeated, own, strict=True)
-    ]
-    others = [
-        _mean(np.delete(each, k, axis=0), np.delete(weight, k)) for k in repeated if len(each) > 1
-    ]
+    each = np.array(
+        [
+            _autocovariance(residual, lags) - _expected_of(noise, len(residual), lags)
+            for noise, residual in zip(noises, residuals, strict=True)
+        ]
+    )
+
+    def others(k: int) -> np.ndarray | None:
+        if len(each) == 1:
+            return None
+        return positive_autocovariance(_mean(np.delete(each, k, axis=0), np.delete(weight, k)))
+
     return UsualResidual(
         autocovariance=positive_autocovariance(_mean(each, weight)),
-        shapes=np.stack(kept) if kept else np.zeros((0, 0, 0)),
-        freedom=float(weight[repeated].sum() if kept else weight.sum()),
-        weights=np.array(
-            [weight[k] * (weight.sum() - weight[k] >= LEAST_OTHERS) for k in repeated]
+        freedom=float(weight.sum()),
+        repeats=tuple(
+            Repeat(
+                residual=residuals[k],
+                noise=noises[k],
+                away=float(apart[k]),
+                others=others(k),
+                weight=float(weight[k] * (weight.sum() - weight[k] >= LEAST_OTHERS)),
+            )
+            for k, again in enumerate(same)
+            if again
         ),
-        others=np.reshape([positive_autocovariance(of) for of in others], (len(others), lags)),
     )
 
 
@@ -138,10 +212,24 @@ def usual_in(noise: Noise) -> UsualResidual | None:
     return next((part for part in parts if isinstance(part, UsualResidual)), None)
 
 
-def usual_rms(noise: Noise) -> float:
-    """RMS of what a simulator leaves of clean data, without noise; 0 where that is not known."""
+def usual_rms(noise: Noise, observed: np.ndarray) -> float:
+    """RMS of what a simulator may leave of data about `expected_usual`; 0 where nothing is known.
+
+    Args:
+        observed: [*signal_shape], NaN where missing.
+    """
     usual = usual_in(noise)
-    return 0.0 if usual is None else float(np.sqrt(usual.autocovariance[0]))
+    if usual is None:
+        return 0.0
+    return float(np.sqrt(np.mean(np.diag(usual.covariance(samples(observed))))))
+
+
+def expected_usual(noise: Noise, observed: np.ndarray) -> np.ndarray:
+    """What a simulator is expected to leave of data [*signal_shape]; 0 where nothing is known."""
+    usual, expected = usual_in(noise), np.zeros(observed.shape)
+    if usual is not None:
+        expected[np.isfinite(observed)] = usual.mean(samples(observed))
+    return expected
 
 
 def _autocovariance(residual: np.ndarray, lags: int) -> np.ndarray:

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 from bolfi_liquids.calibration.stir_simulator import stirring_of
-from bolfi_liquids.criticism.baseline import Clean, likeness, usual_elsewhere, usual_for
+from bolfi_liquids.criticism.baseline import Clean, apart, usual_elsewhere, usual_for
 from bolfi_liquids.criticism.inputs import Given, open_inputs
 from bolfi_liquids.criticism.result import finished_criticism
 from bolfi_liquids.criticism.stirs import camera_noise, held_out_noise, stir_experiment
@@ -205,7 +205,7 @@ def test_clean_recordings_of_the_same_path_say_where_it_errs(calibration):
     clean = [Clean(recording, residual, 1.0, 1)]
     stirring = stirring_of([recording], 200)
     same, elsewhere = usual_for(stirring, clean, 0.5), usual_elsewhere(stirring, clean, 0.5)
-    assert len(same.shapes) == 1 and len(elsewhere.shapes) == 0
+    assert len(same.repeats) == 1 and len(elsewhere.repeats) == 0
     cameras = camera_noise([recording])
     noise = stir_experiment(stirring, cameras, same, "stir").noise
     assert [type(part).__name__ for part in noise.parts] == ["AutoregressiveNoise", "UsualResidual"]
@@ -213,22 +213,13 @@ def test_clean_recordings_of_the_same_path_say_where_it_errs(calibration):
     assert stir_experiment(stirring, cameras, None, "stir").noise is cameras
 
 
-def test_recordings_of_the_nearest_liquid_tell_most():
-    """Of water, oil and glycerin: nothing of one another, and all the same of unknown liquids."""
-    known = [0.001, 0.1, 1.0]
-    for nearest, viscosity in enumerate(known):
-        found = likeness(known, viscosity, 0.005)
-        assert found[nearest] == 1.0 and np.delete(found, nearest).max() < 0.01
-    between = likeness(known, 0.4, 0.005)
-    assert between[2] == 1.0 and 0.1 < between[1] < 0.9
-    # beyond all, the nearest one tells all that can be told
-    np.testing.assert_allclose(likeness(known, 20.0, 0.005), [0.0, 0.0, 1.0], atol=1e-3)
-    assert (likeness(known, None, 0.005) == 1.0).all()
-    assert (likeness([None, 1.0], 1.0, 0.005) == 1.0).all()
+def test_liquids_are_as_far_apart_as_their_viscosities():
+    """In doublings; all are alike where one is unknown."""
+    np.testing.assert_allclose(apart([0.1, 0.4, 1.6], 0.4, 0.005), [-2.0, 0.0, 2.0])
+    assert (apart([0.001, 0.1], None, 0.005) == 0.0).all()
+    assert (apart([None, 1.0], 1.0, 0.005) == 0.0).all()
     # water is water, wherever below the least viscosity it was fitted
-    np.testing.assert_allclose(
-        likeness([3e-4, 0.004, 0.1], 0.001, 0.005), [1.0, 1.0, 0.0], atol=1e-3
-    )
+    np.testing.assert_allclose(apart([3e-4, 0.004, 0.01], 0.001, 0.005), [0.0, 0.0, 1.0])
 
 
 @pytest.mark.parametrize("option", ["pours", "held_out_pours"])

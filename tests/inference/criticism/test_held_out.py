@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference.criticism.held_out import NOISE_QUANTILE, gap, holds
-from bolfi_liquids.inference.criticism.hypothesis import samples
+from bolfi_liquids.inference.criticism.measurement_noise import samples
 from scipy.stats import binom, norm
 
 pytestmark = pytest.mark.slow  # the engine compiles for seconds for each shape
@@ -94,9 +94,8 @@ def test_noise_believed_too_small_refuses_the_right_explanation():
 
 def usual_of(freedom):
     """A simulator that is usually wrong by .2, as said by so many clean sets."""
-    shapes = np.zeros((0, 0, 0))
     autocovariance = 0.2**2 * np.exp(-np.arange(N) / 10.0)
-    return criticism.UsualResidual(autocovariance, shapes, freedom)
+    return criticism.UsualResidual(autocovariance, freedom)
 
 
 def test_what_is_usual_for_a_simulator_does_not_make_it_deaf():

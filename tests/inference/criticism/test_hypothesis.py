@@ -4,7 +4,8 @@ import numpy as np
 import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference import criticism
-from bolfi_liquids.inference.criticism.hypothesis import hypothesise, samples, values_of
+from bolfi_liquids.inference.criticism.hypothesis import hypothesise, values_of
+from bolfi_liquids.inference.criticism.measurement_noise import samples
 from bolfi_liquids.inference.criticism.misfit import locate, null_draws
 from bolfi_liquids.inference.criticism.prior_boxes import everywhere, fill
 from bolfi_liquids.inference.criticism.simulate import Laboratory

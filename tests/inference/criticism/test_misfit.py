@@ -8,10 +8,11 @@ import pytest
 from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference._float64 import in_float64
 from bolfi_liquids.inference.criticism.clean_scores import scored_on_clean
-from bolfi_liquids.inference.criticism.hypothesis import samples
+from bolfi_liquids.inference.criticism.measurement_noise import samples
 from bolfi_liquids.inference.criticism.misfit import check, locate, null_draws
 from bolfi_liquids.inference.criticism.search import Study, examine
 from bolfi_liquids.inference.criticism.simulate import Laboratory
+from bolfi_liquids.inference.criticism.usual_residual import REPEATED
 from bolfi_liquids.inference.surrogates.emulator import latent_covariance
 from scipy.stats import binom, kstest, norm
 
@@ -206,14 +207,16 @@ def test_clean_data_are_scored_by_what_the_others_teach(banks):
     for k in range(2):
         left, again = np.delete(clean, k, axis=0), np.delete(repeats, k)
         taught = criticism.usual_residual(list(left), [silent] * 2, list(again))
+        unexpected = shapes[k] - taught.mean(AT)
         weight = np.linalg.inv(
             base.hypothesis.spread + NOISE.covariance(AT) + taught.covariance(AT)
         )
         absorbed = weight @ DESIGN
         weight -= absorbed @ np.linalg.solve(DESIGN.T @ absorbed, absorbed.T)
         change = base.signatures["bump"].change
-        scores.append(change @ weight @ shapes[k] / np.sqrt(change @ weight @ change))
-    size = np.sqrt((1.0 + np.sum(np.square(scores))) / 3.0)
+        scores.append(change @ weight @ unexpected / np.sqrt(change @ weight @ change))
+    # of what the data are expected to show again only the rest counts
+    size = np.sqrt((1.0 + (1.0 - REPEATED**2) * np.sum(np.square(scores))) / 3.0)
     assert size > 1.5
     usual = criticism.usual_residual(clean, [silent] * 3, repeats)
     noise = criticism.SumOfNoises((NOISE, usual))

@@ -1,13 +1,16 @@
 """The noises that criticism reckons with: learned from rest and clean data, drawn as believed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bolfi_liquids.inference import criticism
-from bolfi_liquids.inference.criticism.measurement_noise import CORRELATIONS
+from bolfi_liquids.inference.criticism.measurement_noise import CORRELATIONS, gaussian
+from bolfi_liquids.inference.criticism.usual_residual import REPEATED
 from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
-from scipy.stats import chisquare, norm
+from scipy.stats import chi2, chisquare, norm
 
 ALPHA = 1e-4  # false alarms per test
 DRAWS, RUNS, BINS = 63, 128, 8  # of the rank test; the bins divide DRAWS + 1
@@ -167,29 +170,66 @@ def test_residuals_of_the_same_experiment_say_where_it_errs_again(clean):
     at = Layout(np.repeat([0, 1], 40), np.tile(np.arange(40), 2))
     again = [residual[:40].copy() for residual in clean[:3]]
     again[1][7, 0] = np.nan
-    learned = criticism.usual_residual(again, [NOTHING] * 3, [False, True, True])
+    noises, same = [criticism.KnownNoise(0.2)] * 3, [False, True, True]
+    learned = criticism.usual_residual(again, noises, same)
     stationary = np.kron(np.eye(2), toeplitz(learned.autocovariance))
-    flat = [np.nan_to_num(residual).T.ravel() for residual in again[1:]]
-    shapes = sum(np.outer(residual, residual) for residual in flat)
-    np.testing.assert_allclose(learned.covariance(at), stationary + shapes, atol=1e-12)
-    other = criticism.usual_residual(again, [NOTHING] * 3, [False] * 3)
-    np.testing.assert_allclose(other.covariance(at), stationary, atol=1e-12)
-    assert (learned.freedom, other.freedom) == (2, 3)
+    told = learned.covariance(at)
+    # two repetitions, as alike as they are like these data, leave no less of the variance
+    remains = np.diag(told) / np.diag(stationary)
+    assert 1.0 - 2.0 * REPEATED**2 / (1.0 + REPEATED) < remains.min() and remains.max() < 0.6
+    expected = learned.mean(at).reshape(2, 40).T
+    for residual in again[1:]:
+        seen = np.isfinite(residual)
+        assert np.corrcoef(residual[seen], expected[seen])[0, 1] > 0.5
+    # what repeats another experiment, or this one in another regime, tells nothing of where
+    for other in (
+        criticism.usual_residual(again, noises, [False] * 3),
+        criticism.usual_residual(again, noises, same, [6.0, 6.0, 6.0]),
+    ):
+        np.testing.assert_allclose(other.covariance(at), stationary, atol=1e-12)
+        assert not other.mean(at).any()
+    assert (learned.freedom, other.freedom) == (3, 3)
 
 
-def test_what_tells_little_of_a_system_counts_little(clean):
-    """A regime in which the simulator errs tenfold, weighed by next to nothing."""
+@pytest.mark.parametrize("away", [[0.0, 0.0], [0.5, -1.0]], ids=["one regime", "three regimes"])
+def test_what_is_expected_of_a_simulator_is_right_as_often_as_it_says(away):
+    """Drawn together from the model: misses, whitened as is said, are chi-square."""
+    at, drawn = Layout(np.repeat([0, 1], 30), np.tile(np.arange(30), 2)), 200
+    places = np.array([0.0, *away])
+    over = np.exp(-0.5 * np.subtract.outer(places, places) ** 2)
+    over = REPEATED * over + (1.0 - REPEATED) * np.eye(3)
+    process = np.kron(over, np.kron(np.eye(2), toeplitz(0.8 ** np.arange(30))))
+    rng, measured = np.random.default_rng(0), criticism.KnownNoise(0.3)
+    taught = criticism.usual_residual(list(np.zeros((2, 30, 2))), [measured] * 2, [True] * 2, away)
+    misses = []
+    for truth in gaussian(rng, process, drawn).reshape(drawn, 3, 60):
+        clean = [one.reshape(2, 30).T + 0.3 * rng.normal(size=(30, 2)) for one in truth[1:]]
+        known = replace(
+            taught,
+            autocovariance=0.8 ** np.arange(30),
+            repeats=tuple(
+                one._replace(residual=residual)
+                for one, residual in zip(taught.repeats, clean, strict=True)
+            ),
+        )
+        miss = truth[0] - known.mean(at)
+        misses.append(miss @ np.linalg.solve(known.covariance(at), miss))
+    limits = chi2.ppf([ALPHA / 2, 1.0 - ALPHA / 2], 60 * drawn)
+    assert limits[0] < np.sum(misses) < limits[1]
+    assert np.trace(known.covariance(at)) < 0.75 * 60
+
+
+def test_what_is_learned_in_another_regime_counts_little(clean):
+    """One in which the simulator errs tenfold, far away."""
     two, none = list(clean[:2]), [NOTHING] * 3
-    alone = criticism.usual_residual(two, none[:2], [True, False])
-    beside = criticism.usual_residual(
-        [*two, 10.0 * clean[2]], none, [True, False, True], [1.0, 1.0, 1e-6]
-    )
-    at = Layout(np.repeat([0, 1], 40), np.tile(np.arange(40), 2))
-    expected = alone.covariance(at)
-    np.testing.assert_allclose(beside.covariance(at), expected, atol=1e-3 * expected.max())
-    assert beside.freedom == pytest.approx(1.0, abs=1e-3)
-    with pytest.raises(ValueError, match="weights must be 2 numbers above 0"):
-        criticism.usual_residual(two, none[:2], [True, True], [1.0, 0.0])
+    alone = criticism.usual_residual(two, none[:2], [False] * 2)
+    all_three = [*two, 10.0 * clean[2]]
+    beside = criticism.usual_residual(all_three, none, [False] * 3, [0.0, 0.0, 5.5])
+    expected = alone.autocovariance
+    np.testing.assert_allclose(beside.autocovariance, expected, atol=1e-3 * expected[0])
+    assert beside.freedom == pytest.approx(2.0, abs=1e-3)
+    with pytest.raises(ValueError, match="away must be 2 finite numbers"):
+        criticism.usual_residual(two, none[:2], [True, True], [1.0, np.nan])
 
 
 @pytest.mark.parametrize("longest", [12, 40, 70], ids=["shorter", "as long", "longer"])
