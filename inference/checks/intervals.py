@@ -19,7 +19,7 @@ from .table import table
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-CONFIDENCE = 0.95  # of the intervals shown for each rate
+CONFIDENCE = 0.99  # of the intervals shown for each rate
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class Coverage:
 
     @property
     def low(self) -> np.ndarray:
-        """Lower end of the 95 % interval of the rate (Clopper and Pearson 1934), [k, q]."""
+        """Lower end of the exact 99 % interval of the rate (Clopper and Pearson 1934), [k, q]."""
         n, tail = len(self.replicates), (1 - CONFIDENCE) / 2
         some = beta.ppf(tail, np.maximum(self.covered, 1), n - self.covered + 1)
         return np.where(self.covered > 0, some, 0.0)
@@ -90,11 +90,11 @@ class Coverage:
             ]
             for j, name in enumerate(self.names)
         ]
-        heading = f"Coverage of central intervals: {self.replicates}"
+        heading = f"Coverage of central intervals [exact {CONFIDENCE:.0%}]: {self.replicates}"
         return table(heading, ["", *(f"{level:g}" for level in self.levels)], rows, self.warnings)
 
     def to_dataset(self) -> xr.Dataset:
-        """Rates, their 95 % intervals and p-values by level and quantity."""
+        """Rates, their exact 99 % intervals and p-values by level and quantity."""
         two = ["level", "quantity"]
         return xr.Dataset(
             {
@@ -108,7 +108,7 @@ class Coverage:
         )
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Coverage minus its nominal level, with 95 % intervals at the levels."""
+        """Coverage minus its nominal level, with exact 99 % intervals at the levels."""
         from .plots import Rates, plot_coverage
 
         rates = Rates(self.levels, self.rate, self.low, self.high)

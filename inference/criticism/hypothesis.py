@@ -20,7 +20,8 @@ from ..surrogates.measurement_noise import Layout, Reduced
 from ..surrogates.signal import SignalSurrogate
 from ..surrogates.signal_likelihood import SignalState
 from .measurement_noise import Noise, samples
-from .prior_boxes import Box
+from .near import believed_in
+from .prior_boxes import LATER_HALF_WIDTH, Box, around
 from .run_noise import own_errors, resized, smooth_covariance
 from .run_table import Runs
 
@@ -36,7 +37,7 @@ class Hypothesis:
 
     Attributes:
         names: Effects that act.
-        fit: The engine's; its likelihood takes all noise from here.
+        fit: The engine's; its likelihood takes all noise from here, and holds near `u`.
         within: Where it was simulated.
         u: Where in there the expected output is nearest to what was observed, prior quantiles [d].
         difference: Observed less expected there [m].
@@ -160,7 +161,7 @@ def hypothesise(
     errors = resized(errors, prior.to_unit(theta), near)
     surrogate, own = _with_own_noise(surrogate, known, errors)
     u = minimise_in_box(_squared_distance, surrogate.state, len(prior), *within)
-    return Hypothesis(
+    found = Hypothesis(
         names=names,
         fit=replace(fit, learned=surrogate),
         within=within,
@@ -170,6 +171,8 @@ def hypothesise(
         own=own,
         noise=known,
     )
+    near_best = around(u, found.sd, LATER_HALF_WIDTH, most=np.inf)
+    return replace(found, fit=replace(fit, learned=believed_in(surrogate, near_best)))
 
 
 def _with_own_noise(

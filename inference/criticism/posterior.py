@@ -3,15 +3,12 @@
 from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from .._float64 import in_float64
 from ..sampling.importance import explore
 from ..sampling.mixture import to_unit
-from ..surrogates.signal_likelihood import SignalState, log_likelihood
 from .hypothesis import Hypothesis
-from .prior_boxes import LATER_HALF_WIDTH, around
 
 
 class Interval(NamedTuple):
@@ -47,29 +44,11 @@ class Weighted(NamedTuple):
         return Interval(float(mean), float(low), float(high))
 
 
-class _Near(NamedTuple):
-    state: SignalState
-    low: jax.Array
-    high: jax.Array
-
-
-def _log_likelihood_near(near: _Near, u: jax.Array) -> jax.Array:
-    inside = jnp.all((u >= near.low) & (u <= near.high))
-    return jnp.where(inside, log_likelihood(near.state, u), -jnp.inf)
-
-
 @in_float64
 def weighted_posterior(hypothesis: Hypothesis, seed: int = 0) -> Weighted:
-    """Adaptive importance sampling of a hypothesis's posterior, see `importance.explore`.
-
-    Only near where the expected output is nearest to what was observed. Far from it hardly
-    anything was simulated: there the emulator knows least, and what it does not know counts as
-    noise that explains anything.
-    """
+    """Adaptive importance sampling of a hypothesis's posterior, see `importance.explore`."""
     surrogate, prior = hypothesis.surrogate, hypothesis.fit.prior
-    box = around(hypothesis.u, hypothesis.sd, LATER_HALF_WIDTH, most=np.inf)
-    near = _Near(surrogate.state, jnp.asarray(box.low), jnp.asarray(box.high))
-    found = explore(jax.random.key(seed), _log_likelihood_near, near, len(prior))
+    found = explore(jax.random.key(seed), surrogate.log_likelihood, surrogate.state, len(prior))
     log_weights = np.asarray(found.log_weights)
     used = np.isfinite(log_weights)
     weights = np.exp(log_weights[used] - log_weights[used].max())

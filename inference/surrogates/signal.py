@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -79,8 +80,12 @@ class SignalSurrogate:
 
     @cached_property
     @in_float64
-    def state(self) -> SignalState:
+    def signal_state(self) -> SignalState:
         return state_of(self.emulator, self.reduced)
+
+    @property
+    def state(self) -> Any:
+        return self.signal_state
 
     @property
     def log_likelihood(self) -> LogLikelihood:
@@ -93,7 +98,7 @@ class SignalSurrogate:
     @in_float64
     def minimum(self) -> np.ndarray:
         """Maximiser of the likelihood over the box, u [d]."""
-        return minimise_in_box(_negative, self.state, self.gp.data.u.shape[1])
+        return minimise_in_box(_negative, self.signal_state, self.gp.data.u.shape[1])
 
     @in_float64
     def believe(self, u: np.ndarray) -> "SignalSurrogate":
@@ -106,7 +111,7 @@ class SignalSurrogate:
     @in_float64
     def node_weights(self) -> np.ndarray:
         """Posterior weights of the nodes, given the best parameters."""
-        terms = _node_log_densities(self.state, jnp.asarray(self.minimum()[None]))
+        terms = _node_log_densities(self.signal_state, jnp.asarray(self.minimum()[None]))
         log_weights = np.asarray(terms)[0]
         weights = np.exp(log_weights - log_weights.max())
         return weights / weights.sum()
