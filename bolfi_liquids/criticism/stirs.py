@@ -27,8 +27,8 @@ MIN_REST_SAMPLES = 8
 """Samples at rest from which noise can be learned."""
 
 PATH_TOLERANCE, TIME_TOLERANCE = 3e-3, 0.01
-"""Differences in position [m] and time [s] up to which two paths are the same. In the reference's oil
-the simulator errs by 0.25 deg; on paths that differ by 2 mm these errors differ by 0.07 deg."""
+"""Differences in position [m] and time [s] up to which two paths are the same. In the reference's
+oil the simulator errs by 0.25 deg; on paths that differ by 2 mm these errors differ by 0.07 deg."""
 
 RATE_TOLERANCE = 0.02
 """Relative difference up to which two frame rates are the same."""

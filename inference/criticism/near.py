@@ -1,7 +1,6 @@
 """A fitted signal that is believed only near where it fits best."""
 
 from dataclasses import dataclass, fields
-from functools import cached_property
 from typing import NamedTuple
 
 import jax
@@ -36,7 +35,7 @@ class NearSignal(SignalSurrogate):
 
     box: Box
 
-    @cached_property
+    @property
     @in_float64
     def state(self) -> NearState:
         return NearState(self.signal_state, *map(jnp.asarray, self.box))

@@ -120,7 +120,7 @@ def _values(objective: Objective, state: Any, u: jax.Array) -> jax.Array:
 
 @partial(jax.jit, static_argnums=0)
 def _value_and_grad(
-    objective: Objective, state: Any, low: np.ndarray, size: np.ndarray, x: jax.Array
+    objective: Objective, state: Any, low: jax.Array, size: jax.Array, x: jax.Array
 ) -> tuple[jax.Array, jax.Array]:
     """Over unbounded coordinates x, u = low + size * sigmoid(x)."""
 
@@ -145,20 +145,20 @@ def minimise_in_box(
     Args:
         low, high: The box, in the unit box [dimension].
     """
-    low, high = (np.broadcast_to(np.asarray(end, float), dimension) for end in (low, high))
-    size = high - low
+    first, last = (np.broadcast_to(np.asarray(end, float), dimension) for end in (low, high))
+    start, size = jnp.asarray(first), jnp.asarray(last - first)
     screen = sobol(0, 0, SCREENED_POINTS, dimension)
-    values = np.asarray(_values(objective, state, low + size * screen))
+    values = np.asarray(_values(objective, state, start + size * screen))
     order = np.argsort(values)[:REFINED_POINTS]
     x, value = minimise_many(
-        lambda x, _: _value_and_grad(objective, state, low, size, x),
+        lambda x, _: _value_and_grad(objective, state, start, size, x),
         _logit(screen[order]),
         np.ones(REFINED_POINTS, bool),
         tolerance=1e-6,
     )
     best = x[np.argmin(value)]
-    u = low + size * np.asarray(jax.nn.sigmoid(jnp.asarray(best)))
-    return np.clip(u, BOX_EDGE, 1.0 - BOX_EDGE)
+    u = start + size * jax.nn.sigmoid(jnp.asarray(best))
+    return np.clip(np.asarray(u), BOX_EDGE, 1.0 - BOX_EDGE)
 
 
 def _logit(u: np.ndarray) -> np.ndarray:
