@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 RECORDING, HELD_OUT = "late_oil_v10.nc", "late_oil_v7.nc"  # the cameras were late, and say nothing
 CLEAN = "oil_v10.nc"
+POURS = 24  # that each decision's map is learned from: few, as two are made
 
 
 class Demo(NamedTuple):
@@ -50,7 +51,7 @@ def run_demo(out: Path, *, executor: "Workers | None" = None, timeout: float | N
     ):
         calibration = calibrate(recording, out=out, resume=True, **where)
         # the fit is bad, and without criticism nobody should pour after it
-        before = choose_pour(calibration, force=True, **where)
+        before = choose_pour(calibration, pours=POURS, force=True, **where)
         criticism = criticise(calibration, held_out=held_out, baseline=clean, **where)
-    choose_pour(criticism, **where)
+    choose_pour(criticism, pours=POURS, **where)
     return Demo(report(out, **where), before.chosen)

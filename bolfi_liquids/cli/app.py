@@ -16,7 +16,7 @@ from . import record as cli_record
 from . import rig as cli_rig
 from . import simulate as cli_simulate
 from . import trim as cli_trim
-from .compute import Compute, StudyCompute
+from .compute import Compute
 from .errors import OneLineErrors
 from .examples import examples, session
 from .grouped import grouped
@@ -219,7 +219,7 @@ def report(
 @app.command(epilog=examples("demo --out runs/demo"))
 @grouped
 def demo(
-    compute: StudyCompute,
+    compute: Compute,
     out: Annotated[Path, typer.Option(metavar="RUN", help="Directory of the run.")] = Path(
         "runs/demo"
     ),

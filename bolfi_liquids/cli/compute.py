@@ -15,7 +15,7 @@ WorkersOption = Annotated[
     typer.Option(
         "--workers",
         min=1,
-        help="Processes that simulate; 1 is this process. Studies and the demo use all processors.",
+        help="Processes that simulate; 1 is this process. Studies use all processors.",
     ),
 ]
 DaskOption = Annotated[
