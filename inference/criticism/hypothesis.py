@@ -18,9 +18,9 @@ from ..surrogates.emulator import latent_covariance, predict
 from ..surrogates.families import SignalFamily
 from ..surrogates.measurement_noise import Layout, Reduced
 from ..surrogates.signal import SignalSurrogate
+from ..surrogates.signal_in_box import believed_in
 from ..surrogates.signal_likelihood import SignalState
 from .measurement_noise import Noise, samples
-from .near import believed_in
 from .prior_boxes import LATER_HALF_WIDTH, Box, around
 from .run_noise import own_errors, resized, smooth_covariance
 from .run_table import Runs
@@ -172,7 +172,7 @@ def hypothesise(
         noise=known,
     )
     near_best = around(u, found.sd, LATER_HALF_WIDTH, most=np.inf)
-    return replace(found, fit=replace(fit, learned=believed_in(surrogate, near_best)))
+    return replace(found, fit=replace(fit, learned=believed_in(surrogate, *near_best)))
 
 
 def _with_own_noise(
