@@ -124,6 +124,13 @@ def _dask(address: str) -> Iterator[Executor]:
         yield client.get_executor(pure=False)
 
 
+def workers_of(executor: Executor) -> int:
+    """How many simulations run at the same time; 1 where the executor does not say."""
+    threads = _dask_threads(executor)
+    # there is no public way to ask a pool
+    return sum(threads.values()) or getattr(executor, "_max_workers", 1)
+
+
 def killed_its_worker(error: BaseException) -> bool:
     """Whether Dask gave a simulation up, because each worker that tried it died."""
     distributed = sys.modules.get("distributed")
