@@ -124,11 +124,10 @@ def _dask(address: str) -> Iterator[Executor]:
         yield client.get_executor(pure=False)
 
 
-def workers_of(executor: Executor) -> int:
-    """How many simulations run at the same time; 1 where the executor does not say."""
-    threads = _dask_threads(executor)
-    # there is no public way to ask a pool
-    return sum(threads.values()) or getattr(executor, "_max_workers", 1)
+def workers_of(executor: Executor) -> int | None:
+    """Of a pool on this computer; None of others, such as clusters, whose workers die alone."""
+    pool = isinstance(executor, ProcessPoolExecutor | ThreadPoolExecutor)
+    return getattr(executor, "_max_workers", None) if pool else None  # there is no public way
 
 
 def killed_its_worker(error: BaseException) -> bool:

@@ -36,7 +36,7 @@ class Keep(NamedTuple):
         identity: The simulator's name in the bank.
         batch: Simulations in one call of the simulator, and kept together, where there is no
             executor; None is all of them.
-        executor: Simulates each job in a call of its own, or several if the simulator asks for
+        executor: Simulates each job in a call of its own; a pool several, if the simulator asks for
             it, see `most_together`; None simulates in this process.
         timeout: Seconds that one simulation may take; None sets no limit.
     """
@@ -182,10 +182,11 @@ class Runner:
 
     def _shared_out(self, orders: list[Order], executor: Executor) -> "Iterable[list[Order]]":
         """What goes to the executor in one call: as much as the simulator likes, and no more than
-        leaves work for every worker."""
-        most = most_together(self.simulate)
-        each = min(most, math.ceil(len(orders) / workers_of(executor))) if most > 1 else 1
-        return (orders[start : start + each] for start in range(0, len(orders), max(each, 1)))
+        leaves work for every worker. One by one where a worker may die alone: a call with it."""
+        count, each = workers_of(executor), 1
+        if count is not None and orders:
+            each = min(most_together(self.simulate), math.ceil(len(orders) / count))
+        return (orders[start : start + each] for start in range(0, len(orders), each))
 
     def _submit(self, executor: Executor, orders: list[Order]) -> None:
         batch = [order.job for order in orders]
@@ -197,11 +198,9 @@ class Runner:
                 self._fail(order, self._refused(error))
             return
         self._submitted.add(future)
-        future.add_done_callback(partial(self._receive, executor, orders))
+        future.add_done_callback(partial(self._receive, orders))
 
-    def _receive(
-        self, executor: Executor, orders: list[Order], future: "Future[list[Simulation]]"
-    ) -> None:
+    def _receive(self, orders: list[Order], future: "Future[list[Simulation]]") -> None:
         """Store what an executor finished; called by one of its threads."""
         self._submitted.discard(future)
         try:
@@ -211,11 +210,7 @@ class Runner:
                 for order in orders:
                     self._fail(order, self._explained(error))
                 return
-            if len(orders) > 1:  # only the one to blame shall be lost
-                for order in orders:
-                    self._submit(executor, [order])
-                return
-            made = [Simulation(None, raised(error), 0.0)]
+            made = [Simulation(None, raised(error), 0.0) for _ in orders]
         for order, one in zip(orders, made, strict=True):
             try:
                 self._keep(order, one)

@@ -1,14 +1,11 @@
 """On an executor, a simulator that asks for it gets several simulations in a call."""
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 
-import dask
 import numpy as np
 import pytest
 from bolfi_liquids.inference import SimulationBank
 from bolfi_liquids.inference.simulations import Job, Keep, run_missing
-from distributed import LocalCluster
 
 
 class Marching:
@@ -16,12 +13,10 @@ class Marching:
 
     together = 4
 
-    def __init__(self, fails=None, kills=None):
-        self.fails, self.kills = fails, kills
+    def __init__(self, fails=None):
+        self.fails = fails
 
     def simulate(self, theta, seeds):
-        if self.kills in seeds:
-            os._exit(1)
         if self.fails in seeds:
             raise RuntimeError("went wrong")
         return np.column_stack([seeds, np.full(len(seeds), len(seeds))]).astype(float)
@@ -51,16 +46,3 @@ def test_a_run_that_fails_costs_only_itself():
     assert [one.signal is None for one in found] == [seed == 2 for seed in range(8)]
     assert "went wrong" in found[2].error
     assert [one.signal[1] for one in found if one.signal is not None] == [1.0] * 3 + [4.0] * 4
-
-
-@pytest.mark.slow  # Dask tries a worker several times
-def test_a_run_that_kills_its_worker_costs_only_itself():
-    local = {"processes": True, "n_workers": 2, "threads_per_worker": 1}
-    with (
-        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
-        LocalCluster(**local, dashboard_address=":0", silence_logs=50) as cluster,
-        cluster.get_client() as client,
-    ):
-        found = run(Marching(kills=2), 8, client.get_executor(pure=False))
-    assert [one.signal is None for one in found] == [seed == 2 for seed in range(8)]
-    assert found[2].error.startswith("KilledWorker: ")
