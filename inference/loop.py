@@ -72,10 +72,11 @@ def fit(  # noqa: PLR0913  the one call that most users make
     goes on where it ended.
 
     Rounds of `batch` points are asked together. Without an executor a round is simulated in one
-    call; with one, every simulation is a call of its own. With in_rounds=False `batch`
-    simulations are kept in flight instead: point i is asked as soon as all up to i - batch have
-    been told, while the others still run. Which points are simulated depends on `batch` and
-    `in_rounds`, but neither on the executor nor on what finishes first.
+    call; with one, every simulation is a call of its own, or up to as many as the attribute
+    `together` of the simulator says, where it has one. With in_rounds=False `batch` simulations
+    are kept in flight instead: point i is asked as soon as all up to i - batch have been told,
+    while the others still run. Which points are simulated depends on `batch` and `in_rounds`,
+    but neither on the executor nor on what finishes first.
 
     Args:
         simulate: Callable (theta: name -> [b], seeds: [b]) -> signals [b, *signal_shape]; or,

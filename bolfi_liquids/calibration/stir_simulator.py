@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..inputs.prior import split_parameters
 from ..inputs.recording import Recording
-from ..run.time_limit import TimeLimited
+from ..run.fluid_simulator import FluidSimulator
 
 if TYPE_CHECKING:
     from ..inference.types import Discrepancy
@@ -23,7 +23,7 @@ SAME_DENSITY = 0.02  # relative difference up to which two weighings are of one 
 
 
 @dataclass(frozen=True)
-class Stirring(TimeLimited):
+class Stirring(FluidSimulator):
     """One or several recordings of one liquid; their signals are joined along time.
 
     Attributes:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..inputs.pour_table import PourTable
 from ..inputs.prior import split_parameters
-from ..run.time_limit import TimeLimited
+from ..run.fluid_simulator import FluidSimulator
 from ..seeds import Phase, simulation_seeds
 from .pour_noise import PourNoise
 
@@ -28,7 +28,7 @@ OUTCOMES = ("spilled", "retained")
 
 
 @dataclass(frozen=True)
-class Pouring(TimeLimited):
+class Pouring(FluidSimulator):
     """Pours of one liquid as a simulator.
 
     Attributes:

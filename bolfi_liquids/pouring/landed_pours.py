@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..inputs.prior import split_parameters
 from ..progress import Advance, silent
-from ..run.time_limit import TimeLimited
+from ..run.fluid_simulator import FluidSimulator
 from .design import RATE, Box
 from .parcels import PARCELS, parcels_of
 
@@ -36,7 +36,7 @@ class Poured(NamedTuple):
 
 
 @dataclass(frozen=True)
-class LandedPours(TimeLimited):
+class LandedPours(FluidSimulator):
     """A simulator of pours whose effects may have any coefficient.
 
     Attributes:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..inputs.prior import split_parameters
 from ..progress import Advance
-from ..run.time_limit import TimeLimited
+from ..run.fluid_simulator import FluidSimulator
 
 if TYPE_CHECKING:
     from ..inference.simulations import Keep
@@ -140,7 +140,7 @@ def landed(fractions: NDArray, distances: NDArray, distance: float, off: NDArray
 
 
 @dataclass(frozen=True)
-class Outcomes(TimeLimited):
+class Outcomes(FluidSimulator):
     """The liquids and seeds that every action is tried on.
 
     Actions that meet the same liquids and the same seeds (common random numbers) differ by

@@ -20,7 +20,7 @@ from ..checks.sbc_pipelines import SAMPLING, CameraNoise
 from ..inputs.prior import describe_prior
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from ..progress import Simulate
-from ..run.time_limit import TimeLimited
+from ..run.fluid_simulator import FluidSimulator
 from ..seeds import Phase, generator
 from .truths import DENSITY
 
@@ -86,7 +86,7 @@ class ByStirring:
 
 
 @dataclass(frozen=True)
-class ByPouring(TimeLimited):
+class ByPouring(FluidSimulator):
     """The paper's reference (Lopez-Guevara et al. 2017): a training pour is observed once, and
     Bayesian optimisation seeks the liquid that spills as much.
 

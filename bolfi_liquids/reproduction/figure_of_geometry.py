@@ -13,8 +13,8 @@ from ..drawing import INK, new_figure, styled
 from ..inputs.cups import bundled_cups
 from ..pouring.spillage import DISTANCE_STEP, landing_sd
 from ..progress import progress_bar
+from ..run.fluid_simulator import FluidSimulator
 from ..run.simulations import simulate_kept
-from ..run.time_limit import TimeLimited
 from ..seeds import Phase, simulation_seeds
 from .figure import Drawn
 from .shared_simulations import SharedSimulations
@@ -31,7 +31,7 @@ DISTANCES = np.arange(-0.02, 0.0901, DISTANCE_STEP)  # m
 
 
 @dataclass(frozen=True)
-class Poured(TimeLimited):
+class Poured(FluidSimulator):
     """Pours of all liquids into receivers of all radii at all distances.
 
     Attributes:

@@ -11,7 +11,7 @@ from ..errors import Argument, InputError
 from ..inference.arguments import checked_array
 from ..inputs.described_liquid import Described
 from ..progress import Simulate
-from ..run.time_limit import TimeLimited
+from ..run.fluid_simulator import FluidSimulator
 from ..run.workers import open_workers
 from .movies import failures_raised
 
@@ -113,7 +113,7 @@ def _numbers(name: str, value: ArrayLike) -> NDArray:
 
 
 @dataclass(frozen=True)
-class Raising(TimeLimited):
+class Raising(FluidSimulator):
     """A simulator that raises, in whatever process, where a simulation goes wrong.
 
     Attributes:

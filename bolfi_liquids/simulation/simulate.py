@@ -26,7 +26,7 @@ from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import check_distance, check_rate
 from ..inputs.prior import split_parameters
 from ..inputs.recording import Recording, Trajectory
-from ..run.time_limit import TimeLimited
+from ..run.fluid_simulator import FluidSimulator
 from .batch import Where, batch_of, simulated
 from .files import check_targets, pour_dataset, stir_dataset
 from .movies import film_pour, film_stir
@@ -186,7 +186,7 @@ def _planned(recording: Recording, path: str | TimedPath | None) -> Recording:
 
 
 @dataclass(frozen=True)
-class PourSimulator(TimeLimited):
+class PourSimulator(FluidSimulator):
     """One pour of liquids, as a simulator.
 
     Attributes:

@@ -124,6 +124,12 @@ def _dask(address: str) -> Iterator[Executor]:
         yield client.get_executor(pure=False)
 
 
+def workers_of(executor: Executor) -> int | None:
+    """Of a pool on this computer; None of others, such as clusters, whose workers die alone."""
+    pool = isinstance(executor, ProcessPoolExecutor | ThreadPoolExecutor)
+    return getattr(executor, "_max_workers", None) if pool else None  # there is no public way
+
+
 def killed_its_worker(error: BaseException) -> bool:
     """Whether Dask gave a simulation up, because each worker that tried it died."""
     distributed = sys.modules.get("distributed")

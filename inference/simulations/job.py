@@ -214,6 +214,13 @@ def limit_of(simulate: Simulator | SingleSimulator) -> Limit | None:
     return getattr(getattr(simulate, "__self__", simulate), "time_limit", None)
 
 
+def most_together(simulate: Simulator | SingleSimulator) -> int:
+    """Simulations that one call on an executor may make: the attribute `together` of a simulator,
+    or of the object whose method it is; 1 without it, for then each is stored when it is finished,
+    and a worker that is done takes the next."""
+    return getattr(getattr(simulate, "__self__", simulate), "together", 1)
+
+
 def within(timeout: float | None, call: Callable[[], R], limit: Limit | None = None) -> R:
     """What `call` returns or raises, if it does so in `timeout` seconds.
 

@@ -1,7 +1,8 @@
-"""Simulating what the bank lacks: a batch in one call, or one by one on an executor."""
+"""Simulating what the bank lacks: in batches here, or on an executor."""
 
+import math
 import pickle
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, wait
 from functools import partial
 from typing import NamedTuple
@@ -9,9 +10,9 @@ from typing import NamedTuple
 from ..arguments import check_timeout, checked_integer
 from ..types import Simulator
 from .bank import Simulation, SimulationBank
-from .executors import killed_its_worker
+from .executors import killed_its_worker, workers_of
 from .failures import Failure, NoSignals, kind, raised, unusable
-from .job import BATCH, Job, OneByOne, is_unusable, of_one_shape, run_batch
+from .job import BATCH, Job, OneByOne, is_unusable, most_together, of_one_shape, run_batch
 
 POLL_SECONDS = 0.2  # seconds between looks at what somebody else is simulating
 
@@ -35,7 +36,8 @@ class Keep(NamedTuple):
         identity: The simulator's name in the bank.
         batch: Simulations in one call of the simulator, and kept together, where there is no
             executor; None is all of them.
-        executor: Simulates each job in a call of its own; None simulates in this process.
+        executor: Simulates each job in a call of its own; a pool several, if the simulator asks for
+            it, see `most_together`; None simulates in this process.
         timeout: Seconds that one simulation may take; None sets no limit.
     """
 
@@ -151,8 +153,8 @@ class Runner:
             else:
                 mine.append(order)
         if self.executor is not None:
-            for order in mine:
-                self._submit(self.executor, order)
+            for part in self._shared_out(mine, self.executor):
+                self._submit(self.executor, part)
         elif mine:
             self._simulate_here(mine)
 
@@ -178,30 +180,42 @@ class Runner:
             for order, simulation in zip(part, made, strict=True):
                 self._keep(order, simulation)
 
-    def _submit(self, executor: Executor, order: Order) -> None:
-        work = partial(run_batch, self.simulate, [order.job], order.shape, self.timeout)
+    def _shared_out(self, orders: list[Order], executor: Executor) -> "Iterable[list[Order]]":
+        """What goes to the executor in one call: as much as the simulator likes, and no more than
+        leaves work for every worker. One by one where a worker may die alone: a call with it."""
+        count, each = workers_of(executor), 1
+        if count is not None and orders:
+            each = min(most_together(self.simulate), math.ceil(len(orders) / count))
+        return (orders[start : start + each] for start in range(0, len(orders), each))
+
+    def _submit(self, executor: Executor, orders: list[Order]) -> None:
+        batch = [order.job for order in orders]
+        work = partial(run_batch, self.simulate, batch, orders[0].shape, self.timeout)
         try:
             future = executor.submit(work)
         except Exception as error:
-            self._fail(order, self._refused(error))
+            for order in orders:
+                self._fail(order, self._refused(error))
             return
         self._submitted.add(future)
-        future.add_done_callback(partial(self._receive, order))
+        future.add_done_callback(partial(self._receive, orders))
 
-    def _receive(self, order: Order, future: "Future[list[Simulation]]") -> None:
+    def _receive(self, orders: list[Order], future: "Future[list[Simulation]]") -> None:
         """Store what an executor finished; called by one of its threads."""
         self._submitted.discard(future)
         try:
-            made = future.result()[0]
+            made = future.result()
         except BaseException as error:
             if not killed_its_worker(error):
-                self._fail(order, self._explained(error))
+                for order in orders:
+                    self._fail(order, self._explained(error))
                 return
-            made = Simulation(None, raised(error), 0.0)
-        try:
-            self._keep(order, made)
-        except BaseException as error:  # for `result` to raise: nobody hears this thread
-            self._fail(order, error)
+            made = [Simulation(None, raised(error), 0.0) for _ in orders]
+        for order, one in zip(orders, made, strict=True):
+            try:
+                self._keep(order, one)
+            except BaseException as error:  # for `result` to raise: nobody hears this thread
+                self._fail(order, error)
 
     def _keep(self, order: Order, made: Simulation) -> None:
         if not is_unusable(made):  # which the next call tries again, as it does what raised
