@@ -17,8 +17,7 @@ from ..result import Fit
 from ..surrogates.emulator import latent_covariance, predict
 from ..surrogates.families import SignalFamily
 from ..surrogates.measurement_noise import Layout, Reduced
-from ..surrogates.signal import SignalSurrogate
-from ..surrogates.signal_in_box import believed_in
+from ..surrogates.signal import SignalSurrogate, believed_in
 from ..surrogates.signal_likelihood import SignalState
 from .measurement_noise import Noise, samples
 from .prior_boxes import LATER_HALF_WIDTH, Box, around

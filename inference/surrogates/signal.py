@@ -1,6 +1,6 @@
 """The surrogate that emulates the output itself, and compares it with what was observed."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -33,8 +33,10 @@ from .measurement_noise import (
 )
 from .output_vectors import Output
 from .signal_likelihood import (
+    BoxedState,
     SignalState,
     log_likelihood,
+    log_likelihood_in_box,
     log_second_moment,
     node_log_densities,
 )
@@ -188,6 +190,44 @@ class SignalSurrogate:
             rng = np.random.default_rng(np.asarray(jax.random.key_data(noise_key)))
             values = values + self.known.draw(rng, len(values))
         return {"signal": self.output.restore(values)}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SignalInBox(SignalSurrogate):
+    """Its likelihood vanishes outside of a box.
+
+    Far from where it fits best hardly anything was simulated. There the emulator knows least, and
+    what it does not know counts as noise that explains anything.
+
+    Attributes:
+        low, high: Ends of the box in prior quantiles [d].
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+
+    @property
+    @in_float64
+    def state(self) -> BoxedState:
+        return BoxedState(self.signal_state, jnp.asarray(self.low), jnp.asarray(self.high))
+
+    @property
+    def log_likelihood(self) -> LogLikelihood:
+        return log_likelihood_in_box
+
+    @in_float64
+    def minimum(self) -> np.ndarray:
+        return minimise_in_box(_negative_in_box, self.state, len(self.low), self.low, self.high)
+
+
+def believed_in(surrogate: SignalSurrogate, low: np.ndarray, high: np.ndarray) -> SignalInBox:
+    """The same, believed in a box only."""
+    kept = {field.name: getattr(surrogate, field.name) for field in fields(surrogate)}
+    return SignalInBox(**kept, low=low, high=high)
+
+
+def _negative_in_box(boxed: BoxedState, u: jax.Array) -> jax.Array:
+    return -log_likelihood_in_box(boxed, u)
 
 
 def _negative(state: SignalState, u: jax.Array) -> jax.Array:

@@ -9,6 +9,8 @@ from jax.scipy.special import logsumexp
 from ..gp.linalg import small_inverse_cholesky
 from ..gp.process import GP, predict
 
+WALL = 0.01  # of prior quantiles, beyond a box, over which the likelihood vanishes
+
 
 class SignalState(NamedTuple):
     """What the likelihood depends on: k scores, g nodes of the measurement noise.
@@ -31,6 +33,20 @@ def log_likelihood(state: SignalState, u: jax.Array) -> jax.Array:
     """
     mean, variance = predict(state.gp, u)
     return _mixture(state, mean * state.used, variance * state.used)
+
+
+class BoxedState(NamedTuple):
+    """What the likelihood depends on, and the box."""
+
+    signal: SignalState
+    low: jax.Array
+    high: jax.Array
+
+
+def log_likelihood_in_box(boxed: BoxedState, u: jax.Array) -> jax.Array:
+    """The likelihood with Gaussian walls about the box, which gradients can climb."""
+    outside = jnp.maximum(boxed.low - u, 0.0) + jnp.maximum(u - boxed.high, 0.0)
+    return log_likelihood(boxed.signal, u) - 0.5 * jnp.sum((outside / WALL) ** 2)
 
 
 def log_second_moment(state: SignalState, u: jax.Array, spread: jax.Array | None) -> jax.Array:
