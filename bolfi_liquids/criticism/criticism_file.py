@@ -104,8 +104,7 @@ def _left(hypothesis: "inference.criticism.Hypothesis") -> tuple[np.ndarray, np.
     """Observed less expected, what is known to be usual included, and its sd."""
     output = hypothesis.surrogate.output
     sd = np.sqrt(np.diag(hypothesis.spread + hypothesis.noise))
-    left, sd = (output.restore(row[None])[0] for row in (hypothesis.difference, sd))
-    return left, sd
+    return output.restore(hypothesis.difference[None])[0], output.restore(sd[None])[0]
 
 
 def _where(source: "inference.criticism.Criticism", units: dict[str, str]) -> "Dataset":

@@ -44,9 +44,15 @@ def around(centre: np.ndarray, sd: np.ndarray, least: float, most: float = MAX_H
     return Box(np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0))
 
 
-def with_coefficient(box: Box, end: float = PRIOR_END) -> Box:
+def with_coefficient(box: Box) -> Box:
     """The box of the base parameters, and the prior of a coefficient but for its ends."""
-    return Box(np.append(box.low, end), np.append(box.high, 1.0 - end))
+    return Box(np.append(box.low, PRIOR_END), np.append(box.high, 1.0 - PRIOR_END))
+
+
+def with_whole_priors(box: Box, count: int) -> Box:
+    """The box of the base parameters, and the priors of `count` coefficients, whose neutral values
+    may be at an end."""
+    return Box(np.append(box.low, np.zeros(count)), np.append(box.high, np.ones(count)))
 
 
 def fill(box: Box, prior: Prior, seed: int, count: int) -> dict[str, np.ndarray]:

@@ -22,6 +22,7 @@ from .prior_boxes import (
     fill,
     hull,
     with_coefficient,
+    with_whole_priors,
 )
 from .run_table import Runs, joined
 from .signatures import Signature, signature
@@ -138,7 +139,7 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
             untested.append(name)
             continue
         parts.append(made)
-        within = with_coefficient(box, end=0.0)  # neutral may be an end of the prior
+        within = with_whole_priors(box, 1)
         singles[name] = study.hypothesis((name,), joined([runs, made]), within)
     signatures = {
         name: signature(base, single, laboratory.extensions[name])
@@ -190,9 +191,7 @@ def explain(
 
 def _unrefined(study: Study, base: Base, names: tuple[str, ...], runs: Runs) -> Candidate:
     """Effects that were simulated one by one, as if together."""
-    within = base.box
-    for _ in names:
-        within = with_coefficient(within, end=0.0)
+    within = with_whole_priors(base.box, len(names))
     return study.candidate(base, study.hypothesis(names, runs, within))
 
 

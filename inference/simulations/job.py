@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -211,14 +211,19 @@ def misshapen(
 def limit_of(simulate: Simulator | SingleSimulator) -> Limit | None:
     """How a simulator stops itself: the method `time_limit` of it, or of the object whose method
     it is; None if there is no such method."""
-    return getattr(getattr(simulate, "__self__", simulate), "time_limit", None)
+    return _told_by(simulate, "time_limit", None)
 
 
 def most_together(simulate: Simulator | SingleSimulator) -> int:
     """Simulations that one call on an executor may make: the attribute `together` of a simulator,
     or of the object whose method it is; 1 without it, for then each is stored when it is finished,
     and a worker that is done takes the next."""
-    return getattr(getattr(simulate, "__self__", simulate), "together", 1)
+    return _told_by(simulate, "together", 1)
+
+
+def _told_by(simulate: Simulator | SingleSimulator, name: str, default: Any) -> Any:
+    """An attribute of a simulator, or of the object whose method it is."""
+    return getattr(getattr(simulate, "__self__", simulate), name, default)
 
 
 def within(timeout: float | None, call: Callable[[], R], limit: Limit | None = None) -> R:
