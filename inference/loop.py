@@ -96,12 +96,12 @@ def fit(  # noqa: PLR0913  the one call that most users make
             "tcp://host:8786". Start processes by "spawn" or "forkserver": JAX does not survive
             a fork. Workers import `simulate`, but not JAX.
         bank: A path, or a bank that other runs share; it is left open then. Every simulation
-            is stored when it is finished, and what another run is simulating for the same bank
-            at the same time is waited for.
+            is stored when its call is finished, and what another run is simulating for the same
+            bank at the same time is waited for.
         identity: Names the simulator and its settings in the bank. Anything that changes
             the signals for equal theta and seed must change it.
-        timeout: Seconds that one simulation may take; a round in one call `batch` times as
-            long, and if it fails its runs are tried one by one. `simulate` then runs in a
+        timeout: Seconds that one simulation may take; those of one call together as many times
+            as long, and if it fails they are tried one by one. `simulate` then runs in a
             thread, which is abandoned, not stopped, when it is overdue: see `job.within`.
         earlier: Your own simulations (theta, signals) or (theta, signals, seeds), as
             `SimulationBank.simulations` returns them. They are learned from like the others,

@@ -20,6 +20,7 @@ from .next_experiment import Suggestion as Suggestion
 from .posterior import weighted_posterior as weighted_posterior
 from .search import Plan as Plan
 from .simulate import Keeping as Keeping
+from .usual_residual import CleanData as CleanData
 from .usual_residual import UsualResidual as UsualResidual
 from .usual_residual import usual_residual as usual_residual
 from .verdict import Candidate as Candidate

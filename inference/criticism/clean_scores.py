@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .hypothesis import Hypothesis, values_of
+from .hypothesis import Hypothesis, averaged, values_of
 from .measurement_noise import Noise, samples
 from .signatures import Signature
 from .usual_residual import usual_in, without_usual
@@ -16,30 +16,26 @@ def scored_on_clean(
 ) -> dict[str, Signature]:
     """Signatures with the size of their scores on clean data of the same experiment, at least 1.
 
-    Each clean residual is scored with the other residuals only; a single residual is not scored.
-    Scores of either sign count: what errs one way in one regime may err the other way in
-    another. Of a residual that the data are expected to show again, only the share counts that
-    remains unexpected. The mean square is by the residuals' weights, with a score of 1 besides.
+    Each clean residual is scored with the other residuals only, less what they lead to expect of
+    it; one whose regime they do not tell of is not scored. Scores of either sign count: what errs
+    one way in one regime may err the other way in another. The mean square is by how alike the
+    regimes are, with a score of 1 besides.
     """
     usual = usual_in(noise)
     if usual is None:
         return dict(signatures)
-    at = samples(base.fit.observed)
+    output, at = base.surrogate.output, samples(base.fit.observed)
     measured = without_usual(noise).covariance(at)
     squares = dict.fromkeys(signatures, 1.0)
     counted = 1.0
-    for clean, taught in zip(usual.repeats, usual.leave_one_out(), strict=True):
-        if taught is None or clean.weight == 0.0:
-            continue
-        covariance = values_of(base, values_of(base, measured + taught.covariance(at)).T)
-        others = replace(base, noise=covariance)
-        unexpected = values_of(base, (clean.at(at) - taught.mean(at))[None])
+    for clean, weight, taught in usual.leave_one_out():
+        others = replace(base, noise=averaged(output, measured + taught.covariance(at)))
+        unexpected = values_of(output, (clean.values(at) - taught.mean(at))[None])
         left = others.project(others.whiten(unexpected))[:, 0]
-        share = clean.weight * (1.0 - clean.alike**2)
         for name, of in signatures.items():
             change = others.project(others.whiten(of.change))[:, 0]
             length = max(float(np.linalg.norm(change)), 1e-12)
-            squares[name] += share * float(change @ left / length) ** 2
-        counted += clean.weight
+            squares[name] += weight * float(change @ left / length) ** 2
+        counted += weight
     sizes = {name: max(1.0, (of / counted) ** 0.5) for name, of in squares.items()}
     return {name: of._replace(clean=sizes[name]) for name, of in signatures.items()}

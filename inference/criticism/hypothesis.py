@@ -1,5 +1,6 @@
 """A model, base or extended, fitted to data: what is left, and how large that may be."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,15 +17,18 @@ from ..prior import Prior
 from ..result import Fit
 from ..surrogates.emulator import latent_covariance, predict
 from ..surrogates.families import SignalFamily
-from ..surrogates.measurement_noise import Layout, Reduced
-from ..surrogates.signal import SignalSurrogate, believed_in
+from ..surrogates.measurement_noise import Layout, Nodes, Reduced
+from ..surrogates.output_vectors import Output
+from ..surrogates.signal import SignalSurrogate
 from ..surrogates.signal_likelihood import SignalState
 from .measurement_noise import Noise, samples
-from .prior_boxes import LATER_HALF_WIDTH, Box, around
+from .prior_boxes import LATER_HALF_WIDTH, Box, around, intersection
 from .run_noise import own_errors, resized, smooth_covariance
 from .run_table import Runs
+from .usual_residual import usual_in
 
 COMPONENTS = 10
+SIZES = 7  # of the usual residual, that the likelihood is averaged over
 SLOPE_STEP = 0.02  # of prior quantiles, for slopes
 PRIOR_END = 1e-4  # quantile of a prior from which a parameter is at its end
 INDEPENDENT_SLOPE = 1e-8  # relative size below which a slope adds nothing to those before
@@ -36,7 +40,8 @@ class Hypothesis:
 
     Attributes:
         names: Effects that act.
-        fit: The engine's; its likelihood takes all noise from here, and holds near `u`.
+        fit: The engine's; its likelihood takes all noise from here, but for the usual residual's
+            size, over which it is averaged, and holds near `u`.
         within: Where it was simulated.
         u: Where in there the expected output is nearest to what was observed, prior quantiles [d].
         difference: Observed less expected there [m].
@@ -151,18 +156,20 @@ def hypothesise(
     fit = engine.fit(warn=False)  # that a model cannot reach the data is what is looked for
     surrogate = fit.learned
     assert isinstance(surrogate, SignalSurrogate) and surrogate.known is not None
-    emulator = surrogate.emulator
+    emulator, output = surrogate.emulator, surrogate.output
     known = surrogate.known.covariance
     errors = own_errors(emulator)
-    counting, _ = _with_own_noise(surrogate, known, errors)
+    own = smooth_covariance(errors, output.layout, output.series)
+    counting = replace(surrogate, reduced=_reduced(surrogate, [own + known]))
     near = minimise_in_box(_squared_distance, counting.state, len(prior), *within)
     # now that it is known where it fits best, so is how noisy the simulator is there
     errors = resized(errors, prior.to_unit(theta), near)
-    surrogate, own = _with_own_noise(surrogate, known, errors)
-    u = minimise_in_box(_squared_distance, surrogate.state, len(prior), *within)
+    own = smooth_covariance(errors, output.layout, output.series)
+    counting = replace(surrogate, reduced=_reduced(surrogate, [own + known]))
+    u = minimise_in_box(_squared_distance, counting.state, len(prior), *within)
     found = Hypothesis(
         names=names,
-        fit=replace(fit, learned=surrogate),
+        fit=fit,
         within=within,
         u=u,
         difference=surrogate.observed - predict(emulator, u[None])[0][0],
@@ -171,29 +178,48 @@ def hypothesise(
         noise=known,
     )
     near_best = around(u, found.sd, LATER_HALF_WIDTH, most=np.inf)
-    return replace(found, fit=replace(fit, learned=believed_in(surrogate, *near_best)))
+    sized = [own + one for one in _sizes_of(noise, observed, surrogate)]
+    believed = replace(
+        surrogate,
+        reduced=_reduced(surrogate, sized),
+        nodes=Nodes(*(np.repeat(part, len(sized)) for part in surrogate.nodes)),
+        box=tuple(intersection(near_best, within)),
+    )
+    return replace(found, fit=replace(fit, learned=believed))
 
 
-def _with_own_noise(
-    surrogate: SignalSurrogate, known: np.ndarray, errors: np.ndarray
-) -> tuple[SignalSurrogate, np.ndarray]:
-    """The surrogate that counts the simulator's own noise as well, and that noise [m, m]."""
-    own = smooth_covariance(errors, surrogate.output.layout, surrogate.output.series)
-    return replace(surrogate, reduced=_reduced(surrogate, own + known)), own
+def _sizes_of(noise: Noise, observed: np.ndarray, surrogate: SignalSurrogate) -> list[np.ndarray]:
+    """Covariances [m, m] that the noise may have, equally probable.
+
+    How large the usual residual is, is known from few clean data; what is left of these data
+    says more.
+    """
+    assert surrogate.known is not None
+    known, usual = surrogate.known.covariance, usual_in(noise)
+    if usual is None:
+        return [known]
+    part = averaged(surrogate.output, usual.covariance(samples(observed)))
+    return [known + (size - 1.0) * part for size in usual.sizes(SIZES)]
 
 
-def _reduced(surrogate: SignalSurrogate, covariance: np.ndarray) -> Reduced:
-    """Generalised least-squares estimate of the scores under this noise covariance [m, m]."""
-    basis = surrogate.emulator.basis
+def _reduced(surrogate: SignalSurrogate, covariances: Sequence[np.ndarray]) -> Reduced:
+    """Generalised least-squares estimates of the scores, one for each noise covariance [m, m]."""
+    basis, g = surrogate.emulator.basis, len(covariances)
     used, k = basis.used, basis.vectors.shape[1]
-    estimate, error = np.zeros((1, k)), np.eye(k)[None]
-    if used:
-        vectors = basis.vectors[:, :used]
-        weighted = np.linalg.solve(covariance / np.outer(basis.scale, basis.scale), vectors)
-        error[0, :used, :used] = np.linalg.inv(vectors.T @ weighted)
-        target = basis.standardise(surrogate.observed)
-        estimate[0, :used] = error[0, :used, :used] @ (weighted.T @ target)
-    return Reduced(estimate, error, np.zeros(1))
+    estimate, error = np.zeros((g, k)), np.tile(np.eye(k), (g, 1, 1))
+    log_weight = np.zeros(g)
+    vectors, target = basis.vectors[:, :used], basis.standardise(surrogate.observed)
+    for i, covariance in enumerate(covariances):
+        factor = np.linalg.cholesky(covariance / np.outer(basis.scale, basis.scale))
+        white = solve_triangular(factor, np.column_stack([vectors, target]), lower=True)
+        if used:
+            error[i, :used, :used] = np.linalg.inv(white[:, :used].T @ white[:, :used])
+        estimate[i, :used] = error[i, :used, :used] @ (white[:, :used].T @ white[:, used])
+        left = white[:, used] - white[:, :used] @ estimate[i, :used]
+        # the estimate's own normalisation belongs to N(estimate; scores, error)
+        log_weight[i] = 0.5 * np.linalg.slogdet(error[i])[1] - 0.5 * left @ left
+        log_weight[i] -= np.log(np.diag(factor)).sum()
+    return Reduced(estimate, error, log_weight - log_weight.max())
 
 
 def _squared_distance(state: SignalState, u: jax.Array) -> jax.Array:
@@ -207,8 +233,12 @@ def _squared_distance(state: SignalState, u: jax.Array) -> jax.Array:
     return 0.5 * white @ white
 
 
-def values_of(hypothesis: Hypothesis, drawn: np.ndarray) -> np.ndarray:
+def values_of(output: Output, drawn: np.ndarray) -> np.ndarray:
     """Draws [n, samples] in the flattened order as values [n, m]."""
-    output = hypothesis.surrogate.output
     rank = np.argsort(np.argsort(output.present))
     return output.average(drawn[:, rank].T).T
+
+
+def averaged(output: Output, covariance: np.ndarray) -> np.ndarray:
+    """A covariance [samples, samples] in the flattened order as that of the values [m, m]."""
+    return values_of(output, values_of(output, covariance).T)

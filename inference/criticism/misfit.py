@@ -72,7 +72,7 @@ def null_draws(
     thought to have: so a noise that is badly known makes no discoveries.
     """
     observed = hypothesis.fit.observed
-    measured = values_of(hypothesis, noise.draw(rng, samples(observed), count))
+    measured = values_of(hypothesis.surrogate.output, noise.draw(rng, samples(observed), count))
     simulated = gaussian(rng, hypothesis.spread, count)
     return hypothesis.project(hypothesis.whiten(measured + simulated))
 

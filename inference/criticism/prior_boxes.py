@@ -11,6 +11,7 @@ MIN_POSTERIOR_SDS = 10.0  # posterior sds: narrower boxes make slopes of noise (
 FIRST_HALF_WIDTH = 0.25  # half a box's width to begin with
 LATER_HALF_WIDTH = 0.08  # later
 MAX_HALF_WIDTH = 0.5  # at most
+WALL_SHARE = 0.02  # of a box's width, within which a point lies at its wall
 PRIOR_END = 0.02  # quantile of a coefficient's prior beyond which nothing is simulated
 
 
@@ -20,9 +21,15 @@ class Box(NamedTuple):
     low: np.ndarray
     high: np.ndarray
 
-    def holds(self, u: np.ndarray) -> "np.bool | np.ndarray":
-        """Whether u [..., d] lies inside, bool [...]."""
-        return np.all((u >= self.low) & (u <= self.high), axis=-1)
+    def encloses(self, u: np.ndarray) -> bool:
+        """Whether u [d] lies inside and at no wall but that of the prior.
+
+        What is best at a wall of a box in which the search was held may be better beyond.
+        """
+        margin = WALL_SHARE * (self.high - self.low)
+        low = np.where(self.low > 0.0, self.low + margin, self.low)
+        high = np.where(self.high < 1.0, self.high - margin, self.high)
+        return bool(np.all((u >= low) & (u <= high)))
 
 
 def everywhere(dimension: int) -> Box:
@@ -33,6 +40,11 @@ def everywhere(dimension: int) -> Box:
 def hull(one: Box, other: Box) -> Box:
     """The smallest box that holds both."""
     return Box(np.minimum(one.low, other.low), np.maximum(one.high, other.high))
+
+
+def intersection(one: Box, other: Box) -> Box:
+    """Where both are."""
+    return Box(np.maximum(one.low, other.low), np.minimum(one.high, other.high))
 
 
 def around(centre: np.ndarray, sd: np.ndarray, least: float, most: float = MAX_HALF_WIDTH) -> Box:

@@ -208,16 +208,19 @@ def _refit(
     for attempt in range(REFIT_PASSES):
         if most is not None and len(runs) - base.given + study.plan.refit > most:
             break
-        box = around(candidate.hypothesis.u, candidate.hypothesis.sd, LATER_HALF_WIDTH)
+        fitted = candidate.hypothesis
+        # what is best at the end of what was simulated is looked for well beyond
+        least = LATER_HALF_WIDTH if fitted.within.encloses(fitted.u) else FIRST_HALF_WIDTH
+        box = around(fitted.u, fitted.sd, least)
         phase = f"refit {' '.join(names)} {attempt}"
         try:
             made = study.run(phase, box, names, study.plan.refit)
         except AllRunsFailed:
             break
         runs = joined([runs, made])
-        within = hull(candidate.hypothesis.within, box)
+        within = hull(fitted.within, box)
         candidate = study.candidate(base, study.hypothesis(names, runs, within), refitted=True)
-        if box.holds(candidate.hypothesis.u):
+        if box.encloses(candidate.hypothesis.u):
             break
     return candidate, runs
 

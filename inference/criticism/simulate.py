@@ -41,9 +41,9 @@ class Keeping:
         batch: Simulations in one call of the simulator, where there is no executor.
         seed: All of their seeds derive from it.
         report: Called with the phase and the number of simulations finished in it.
-        executor: Makes each simulation in a call of its own, see `fit`; what is given open stays
-            open. None simulates in this process.
-        timeout: Seconds that one simulation may take; None sets no limit.
+        executor: Makes the simulations, see `fit`; what is given open stays open. None simulates
+            in this process.
+        timeout: Seconds that one simulation may take, see `fit`; None sets no limit.
 
     Raises:
         ValueError: a batch, seed, report or timeout that cannot be used.

@@ -1,11 +1,12 @@
 """What a simulator usually gets wrong, learned from data believed to be clean."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag, solve
+from scipy.stats import invgamma
 
 from ..surrogates.measurement_noise import Layout
 from .measurement_noise import Noise, SumOfNoises, gaussian, samples
@@ -15,38 +16,34 @@ REPEATED = 0.85
 application, filled and tilted a little differently: 0.95 in a damped system, 0.8 in one that hits
 walls."""
 
-LEAST_ALIKE = 0.1  # correlation below which a repetition says nothing of where the simulator errs
-LEAST_WEIGHT = 1e-6  # so that a mean over clean data is one
-LEAST_OTHERS = 0.5  # weight of the other clean data by which one of them can be judged
+MIN_CORRELATION = 0.1  # below it a repetition says nothing of where the simulator errs
+MIN_WEIGHT = 1e-6  # so that a mean over clean data is one
+MIN_OTHERS = 0.5  # weight of the other clean data by which one of them can be judged
 MIN_FREEDOM = 3  # with fewer, draws have no variance and no effect would be found
 JITTER = 1e-9  # of the largest variance, so that covariances can be inverted
 
 
-class Repeat(NamedTuple):
-    """Clean data of the experiment that is looked at, in a regime that may be another.
+class CleanData(NamedTuple):
+    """Data in which no effect is believed to be missing.
 
     Attributes:
         residual: Less the calibrated simulator's mean [T, channels]; NaN where missing.
         noise: Of its measurement.
+        same: Whether it repeats the experiment that is looked at, sample by sample.
         away: Of its regime from that of the data that are looked at, see `usual_residual`.
-        others: Autocovariance of all clean data but these, shape [lags]; None where there are
-            no others.
-        weight: How much it tells of the regime that is looked at; 0 where the others tell next
-            to nothing.
     """
 
     residual: np.ndarray
     noise: Noise
+    same: bool
     away: float
-    others: np.ndarray | None
-    weight: float
 
     @property
-    def alike(self) -> float:
-        """Correlation of the simulator's error with that on the data that are looked at."""
-        return REPEATED * float(_likeness(self.away))
+    def correlation(self) -> float:
+        """Of the simulator's error on it with that on the data that are looked at."""
+        return REPEATED * float(_likeness(self.away)) * self.same
 
-    def at(self, at: Layout) -> np.ndarray:
+    def values(self, at: Layout) -> np.ndarray:
         """The residual at n samples [n]; a missing one is zero."""
         return np.nan_to_num(self.residual[at.sample, at.channel])
 
@@ -65,12 +62,12 @@ class UsualResidual:
         autocovariance: Of clean residuals by lag in samples, shape [lags]; zero beyond.
         freedom: Weight of the clean data: the size is known as well as a variance from so many
             numbers, but never less than from MIN_FREEDOM.
-        repeats: Clean data of this very experiment.
+        clean: What it was learned from.
     """
 
     autocovariance: np.ndarray
     freedom: float
-    repeats: tuple[Repeat, ...] = ()
+    clean: tuple[CleanData, ...] = ()
 
     def mean(self, at: Layout) -> np.ndarray:
         """What the simulator is expected to leave [n]."""
@@ -83,39 +80,52 @@ class UsualResidual:
     def draw(self, rng: np.random.Generator, at: Layout, count: int) -> np.ndarray:
         """Draws [count, n] about that mean, each of a size that it may have."""
         drawn = gaussian(rng, self.covariance(at), count)
-        freedom = max(self.freedom, MIN_FREEDOM)
-        return np.sqrt(freedom / rng.chisquare(freedom, count))[:, None] * drawn
+        return np.sqrt(self._size.rvs(count, random_state=rng))[:, None] * drawn
 
-    def leave_one_out(self) -> "list[UsualResidual | None]":
-        """For each repeat what the other clean data teach of it; None where there are no others."""
-        taught = []
-        for k, one in enumerate(self.repeats):
-            others = self.repeats[:k] + self.repeats[k + 1 :]
-            moved = tuple(other._replace(away=other.away - one.away) for other in others)
-            known = one.others
-            taught.append(
-                None if known is None else replace(self, autocovariance=known, repeats=moved)
-            )
-        return taught
+    def sizes(self, count: int) -> np.ndarray:
+        """Variances that it may have, equally probable, in units of `covariance` [count]."""
+        return self._size.ppf((np.arange(count) + 0.5) / count)
+
+    @property
+    def _size(self):
+        freedom = max(self.freedom, MIN_FREEDOM)
+        return invgamma(freedom / 2.0, scale=freedom / 2.0)
+
+    def leave_one_out(self) -> "Iterator[tuple[CleanData, float, UsualResidual]]":
+        """Each repetition of the experiment, its weight, and what the other clean data teach of it.
+
+        Those are left out of whose regime the others tell next to nothing.
+        """
+        for k, (one, weight) in enumerate(zip(self.clean, _weights(self.clean), strict=True)):
+            others = [
+                other._replace(away=other.away - one.away)
+                for other in self.clean[:k] + self.clean[k + 1 :]
+            ]
+            if one.same and sum(_likeness(other.away) for other in others) >= MIN_OTHERS:
+                yield one, float(weight), _learned(others)
 
     def _given(self, at: Layout) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and covariance given the repeats: a Gaussian's conditional."""
-        told = [(one, samples(one.residual)) for one in self.repeats if one.alike > LEAST_ALIKE]
+        """Mean and covariance given the repetitions: a Gaussian's conditional."""
+        told = [
+            (one, there)
+            for one in self.clean
+            if one.correlation > MIN_CORRELATION and len((there := samples(one.residual)).sample)
+        ]
         by_lag = self._over([at, *(there for _, there in told)])
         alone = _between(by_lag, at, at)
-        if not told:
+        if not told or not by_lag.any():
             return np.zeros(len(at.sample)), alone
-        across = np.vstack([one.alike * _between(by_lag, there, at) for one, there in told])
+        across = np.vstack([one.correlation * _between(by_lag, there, at) for one, there in told])
         errors = np.block(
             [
-                [_alike(one, other) * _between(by_lag, there, where) for other, where in told]
+                [_correlation(one, other) * _between(by_lag, there, where) for other, where in told]
                 for one, there in told
             ]
         )
         measured = np.asarray(block_diag(*(one.noise.covariance(there) for one, there in told)))
         joint = errors + measured
         joint += JITTER * joint.max() * np.eye(len(joint))
-        seen = np.concatenate([one.at(there) for one, there in told])
+        seen = np.concatenate([one.values(there) for one, there in told])
         weight = solve(joint, across, assume_a="pos")
         return weight.T @ seen, alone - across.T @ weight
 
@@ -132,8 +142,8 @@ def _likeness(away: np.ndarray | float) -> np.ndarray:
     return np.exp(-0.5 * np.square(away))
 
 
-def _alike(one: Repeat, other: Repeat) -> float:
-    """Correlation of the simulator's errors on two clean data sets."""
+def _correlation(one: CleanData, other: CleanData) -> float:
+    """Of the simulator's errors on two repetitions."""
     return 1.0 if one is other else REPEATED * float(_likeness(one.away - other.away))
 
 
@@ -162,46 +172,39 @@ def usual_residual(
             learned of sizes is learned from the nearest.
 
     Raises:
-        ValueError: there are none, or a distance is not finite.
+        ValueError: there are none, they are not as many of each, one has no finite value, or a
+            distance is not finite.
     """
     if not residuals:
         raise ValueError("a usual residual needs at least one clean data set")
     apart = np.zeros(len(residuals)) if away is None else np.asarray(away, float)
-    if apart.shape != (len(residuals),) or not np.isfinite(apart).all():
+    for name, given in (("noises", noises), ("same", same), ("away", apart)):
+        if len(given) != len(residuals):
+            raise ValueError(f"{name} must have {len(residuals)} entries, got {len(given)}")
+    if not np.isfinite(apart).all():
         raise ValueError(f"away must be {len(residuals)} finite numbers, got {away}")
-    weight = np.maximum(np.exp(-0.5 * (apart**2 - np.min(apart**2))), LEAST_WEIGHT)
-    lags = max(len(residual) for residual in residuals)
-    each = np.array(
-        [
-            _autocovariance(residual, lags) - _expected_of(noise, len(residual), lags)
-            for noise, residual in zip(noises, residuals, strict=True)
-        ]
-    )
-
-    def others(k: int) -> np.ndarray | None:
-        if len(each) == 1:
-            return None
-        return positive_autocovariance(_mean(np.delete(each, k, axis=0), np.delete(weight, k)))
-
-    return UsualResidual(
-        autocovariance=positive_autocovariance(_mean(each, weight)),
-        freedom=float(weight.sum()),
-        repeats=tuple(
-            Repeat(
-                residual=residuals[k],
-                noise=noises[k],
-                away=float(apart[k]),
-                others=others(k),
-                weight=float(weight[k] * (weight.sum() - weight[k] >= LEAST_OTHERS)),
-            )
-            for k, again in enumerate(same)
-            if again
-        ),
-    )
+    for k, residual in enumerate(residuals):
+        if not np.isfinite(residual).any():
+            raise ValueError(f"the clean data set {k} has no finite value; leave it out")
+    each = zip(residuals, noises, map(bool, same), map(float, apart), strict=True)
+    return _learned([CleanData(*one) for one in each])
 
 
-def _mean(rows: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    return np.average(rows, axis=0, weights=weight)
+def _weights(clean: Sequence[CleanData]) -> np.ndarray:
+    """How much each tells of the regime that is looked at: the nearest counts wholly."""
+    square = np.array([one.away**2 for one in clean])
+    return np.maximum(np.exp(-0.5 * (square - np.min(square, initial=np.inf))), MIN_WEIGHT)
+
+
+def _learned(clean: Sequence[CleanData]) -> UsualResidual:
+    weight = _weights(clean)
+    lags = max(len(one.residual) for one in clean)
+    each = [
+        _autocovariance(one.residual, lags) - _expected_of(one.noise, len(one.residual), lags)
+        for one in clean
+    ]
+    mean = np.average(each, axis=0, weights=weight)
+    return UsualResidual(positive_autocovariance(mean), float(weight.sum()), tuple(clean))
 
 
 def without_usual(noise: Noise) -> Noise:

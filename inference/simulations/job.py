@@ -217,8 +217,12 @@ def limit_of(simulate: Simulator | SingleSimulator) -> Limit | None:
 def most_together(simulate: Simulator | SingleSimulator) -> int:
     """Simulations that one call on an executor may make: the attribute `together` of a simulator,
     or of the object whose method it is; 1 without it, for then each is stored when it is finished,
-    and a worker that is done takes the next."""
-    return _told_by(simulate, "together", 1)
+    and a worker that is done takes the next.
+
+    Raises:
+        ValueError: `together` is not a whole number from 1 on.
+    """
+    return checked_integer("the simulator's `together`", _told_by(simulate, "together", 1))
 
 
 def _told_by(simulate: Simulator | SingleSimulator, name: str, default: Any) -> Any:

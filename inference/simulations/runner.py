@@ -38,7 +38,8 @@ class Keep(NamedTuple):
             executor; None is all of them.
         executor: Simulates each job in a call of its own; a pool several, if the simulator asks for
             it, see `most_together`; None simulates in this process.
-        timeout: Seconds that one simulation may take; None sets no limit.
+        timeout: Seconds that one simulation may take, those of one call together as many times
+            as long; None sets no limit.
     """
 
     bank: SimulationBank
@@ -107,8 +108,11 @@ class Runner:
         """Begin all jobs that the bank lacks; without an executor this also ends them.
 
         Returns:
-            An outcome per job, for `result`. With an executor each is stored the moment it is
-            finished, in whatever order.
+            An outcome per job, for `result`. With an executor those of a call are stored the
+            moment it is finished, in whatever order.
+
+        Raises:
+            ValueError: the simulator's `together` is no number of simulations.
         """
         orders = [Order(job, shape, Future()) for job in batch]
         self._elsewhere += orders
@@ -194,8 +198,9 @@ class Runner:
         try:
             future = executor.submit(work)
         except Exception as error:
+            told = self._refused(error)
             for order in orders:
-                self._fail(order, self._refused(error))
+                self._fail(order, told)
             return
         self._submitted.add(future)
         future.add_done_callback(partial(self._receive, orders))
@@ -207,8 +212,9 @@ class Runner:
             made = future.result()
         except BaseException as error:
             if not killed_its_worker(error):
+                told = self._explained(error)
                 for order in orders:
-                    self._fail(order, self._explained(error))
+                    self._fail(order, told)
                 return
             made = [Simulation(None, raised(error), 0.0) for _ in orders]
         for order, one in zip(orders, made, strict=True):

@@ -1,8 +1,7 @@
 """The surrogate that emulates the output itself, and compares it with what was observed."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -33,10 +32,8 @@ from .measurement_noise import (
 )
 from .output_vectors import Output
 from .signal_likelihood import (
-    BoxedState,
     SignalState,
     log_likelihood,
-    log_likelihood_in_box,
     log_second_moment,
     node_log_densities,
 )
@@ -66,6 +63,9 @@ class SignalSurrogate:
             there is none, or it is known.
         reduced: The observed scores at each, with the scores' run-to-run noise.
         held_back: Errors of the last simulations; None while simulations are being chosen.
+        box: Ends [d], [d] in prior quantiles of the box outside of which the likelihood vanishes;
+            None is everywhere. Where hardly anything was simulated, the emulator knows least, and
+            what it does not know counts as noise that explains anything.
     """
 
     emulator: Emulator
@@ -75,6 +75,7 @@ class SignalSurrogate:
     nodes: Nodes
     reduced: Reduced
     held_back: HeldBack | None = None
+    box: tuple[np.ndarray, np.ndarray] | None = None
 
     @property
     def gp(self):
@@ -82,12 +83,8 @@ class SignalSurrogate:
 
     @cached_property
     @in_float64
-    def signal_state(self) -> SignalState:
-        return state_of(self.emulator, self.reduced)
-
-    @property
-    def state(self) -> Any:
-        return self.signal_state
+    def state(self) -> SignalState:
+        return state_of(self.emulator, self.reduced, self.box)
 
     @property
     def log_likelihood(self) -> LogLikelihood:
@@ -100,7 +97,8 @@ class SignalSurrogate:
     @in_float64
     def minimum(self) -> np.ndarray:
         """Maximiser of the likelihood over the box, u [d]."""
-        return minimise_in_box(_negative, self.signal_state, self.gp.data.u.shape[1])
+        state = self.state
+        return minimise_in_box(_negative, state, len(state.low), *self.box or ())
 
     @in_float64
     def believe(self, u: np.ndarray) -> "SignalSurrogate":
@@ -113,7 +111,7 @@ class SignalSurrogate:
     @in_float64
     def node_weights(self) -> np.ndarray:
         """Posterior weights of the nodes, given the best parameters."""
-        terms = _node_log_densities(self.signal_state, jnp.asarray(self.minimum()[None]))
+        terms = _node_log_densities(self.state, jnp.asarray(self.minimum()[None]))
         log_weights = np.asarray(terms)[0]
         weights = np.exp(log_weights - log_weights.max())
         return weights / weights.sum()
@@ -192,44 +190,6 @@ class SignalSurrogate:
         return {"signal": self.output.restore(values)}
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class SignalInBox(SignalSurrogate):
-    """Its likelihood vanishes outside of a box.
-
-    Far from where it fits best hardly anything was simulated. There the emulator knows least, and
-    what it does not know counts as noise that explains anything.
-
-    Attributes:
-        low, high: Ends of the box in prior quantiles [d].
-    """
-
-    low: np.ndarray
-    high: np.ndarray
-
-    @property
-    @in_float64
-    def state(self) -> BoxedState:
-        return BoxedState(self.signal_state, jnp.asarray(self.low), jnp.asarray(self.high))
-
-    @property
-    def log_likelihood(self) -> LogLikelihood:
-        return log_likelihood_in_box
-
-    @in_float64
-    def minimum(self) -> np.ndarray:
-        return minimise_in_box(_negative_in_box, self.state, len(self.low), self.low, self.high)
-
-
-def believed_in(surrogate: SignalSurrogate, low: np.ndarray, high: np.ndarray) -> SignalInBox:
-    """The same, believed in a box only."""
-    kept = {field.name: getattr(surrogate, field.name) for field in fields(surrogate)}
-    return SignalInBox(**kept, low=low, high=high)
-
-
-def _negative_in_box(boxed: BoxedState, u: jax.Array) -> jax.Array:
-    return -log_likelihood_in_box(boxed, u)
-
-
 def _negative(state: SignalState, u: jax.Array) -> jax.Array:
     return -log_likelihood(state, u)
 
@@ -239,11 +199,15 @@ def _node_log_densities(state: SignalState, u: jax.Array) -> jax.Array:
     return jax.vmap(node_log_densities, (None, 0))(state, u)
 
 
-def state_of(emulator: Emulator, reduced: Reduced) -> SignalState:
+def state_of(
+    emulator: Emulator, reduced: Reduced, box: tuple[np.ndarray, np.ndarray] | None = None
+) -> SignalState:
     """What the likelihood depends on; empty components count as known."""
     full = np.any(emulator.basis.vectors, 0).astype(float)
+    d = emulator.gp.data.u.shape[1]
     parts = full, reduced.estimate, reduced.covariance, reduced.log_weight
-    return SignalState(emulator.gp, *(jnp.asarray(part) for part in parts))
+    ends = box or (np.zeros(d), np.ones(d))
+    return SignalState(emulator.gp, *(jnp.asarray(part) for part in (*parts, *ends)))
 
 
 @in_float64

@@ -23,6 +23,8 @@ class SignalState(NamedTuple):
     estimate: jax.Array  # [g, k], the observed scores
     covariance: jax.Array  # [g, k, k], their error, the simulator's noise included
     log_weight: jax.Array  # [g]
+    low: jax.Array  # [d], ends of the box outside of which the likelihood vanishes
+    high: jax.Array
 
 
 def log_likelihood(state: SignalState, u: jax.Array) -> jax.Array:
@@ -32,21 +34,14 @@ def log_likelihood(state: SignalState, u: jax.Array) -> jax.Array:
     out over nodes.
     """
     mean, variance = predict(state.gp, u)
-    return _mixture(state, mean * state.used, variance * state.used)
+    terms = _terms(state, mean * state.used, variance * state.used)
+    return logsumexp(terms) - _wall(state, u)
 
 
-class BoxedState(NamedTuple):
-    """What the likelihood depends on, and the box."""
-
-    signal: SignalState
-    low: jax.Array
-    high: jax.Array
-
-
-def log_likelihood_in_box(boxed: BoxedState, u: jax.Array) -> jax.Array:
-    """The likelihood with Gaussian walls about the box, which gradients can climb."""
-    outside = jnp.maximum(boxed.low - u, 0.0) + jnp.maximum(u - boxed.high, 0.0)
-    return log_likelihood(boxed.signal, u) - 0.5 * jnp.sum((outside / WALL) ** 2)
+def _wall(state: SignalState, u: jax.Array) -> jax.Array:
+    """What the log likelihood loses outside of the box, Gaussian: gradients can climb it."""
+    outside = jnp.maximum(state.low - u, 0.0) + jnp.maximum(u - state.high, 0.0)
+    return 0.5 * jnp.sum((outside / WALL) ** 2)
 
 
 def log_second_moment(state: SignalState, u: jax.Array, spread: jax.Array | None) -> jax.Array:
@@ -67,17 +62,13 @@ def log_second_moment(state: SignalState, u: jax.Array, spread: jax.Array | None
     half = 0.5 * rest.shape[0] * jnp.log(4.0 * jnp.pi) + 0.5 * _log_det(rest)
     second = _log_density(estimate, mean, rest / 2.0 + jnp.diag(varying)) - half
     first = _log_density(estimate, mean, covariance + jnp.diag(total))
-    return 2.0 * logsumexp(terms) + second - 2.0 * first
+    return 2.0 * (logsumexp(terms) - first - _wall(state, u)) + second
 
 
 def node_log_densities(state: SignalState, u: jax.Array) -> jax.Array:
     """The terms [g] of `log_likelihood`'s sum."""
     mean, variance = predict(state.gp, u)
     return _terms(state, mean * state.used, variance * state.used)
-
-
-def _mixture(state: SignalState, mean: jax.Array, variance: jax.Array) -> jax.Array:
-    return logsumexp(_terms(state, mean, variance))
 
 
 def _terms(state: SignalState, mean: jax.Array, variance: jax.Array) -> jax.Array:

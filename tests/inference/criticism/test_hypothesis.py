@@ -105,7 +105,7 @@ def test_noise_is_averaged_like_the_output(averaged):
     """A draw's place in the flattened output is not that of its value."""
     hypothesis, noise = averaged
     at = samples(hypothesis.fit.observed)
-    drawn = values_of(hypothesis, noise.draw(np.random.default_rng(0), at, 20_000))
+    drawn = values_of(hypothesis.surrogate.output, noise.draw(np.random.default_rng(0), at, 20_000))
     layout, counts = hypothesis.layout, hypothesis.surrogate.output.counts
     assert counts.max() == 3 and set(layout.channel) == {0, 1}
     expected = SD[layout.channel] ** 2 / counts

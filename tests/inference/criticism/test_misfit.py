@@ -8,7 +8,7 @@ import pytest
 from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference._float64 import in_float64
 from bolfi_liquids.inference.criticism.clean_scores import scored_on_clean
-from bolfi_liquids.inference.criticism.measurement_noise import samples
+from bolfi_liquids.inference.criticism.measurement_noise import gaussian, samples
 from bolfi_liquids.inference.criticism.misfit import check, locate, null_draws
 from bolfi_liquids.inference.criticism.search import Study, examine
 from bolfi_liquids.inference.criticism.simulate import Laboratory
@@ -22,6 +22,7 @@ pytestmark = pytest.mark.slow  # compiling takes half a minute on busy cores
 
 ALPHA = 1e-4  # false alarms per test
 BANKS, SETS = 5, 30  # emulators, and data sets for each
+REPEATING = 40  # data sets for each, whose errors repeat
 LEVEL = 0.05
 
 N = 96  # values
@@ -197,32 +198,34 @@ def test_the_window_in_which_the_data_differ_is_found(banks):
     assert not too_many(p_values[:, [0, 1, 5]].min(1))
 
 
-def test_clean_data_are_scored_by_what_the_others_teach(banks):
-    """Against generalised least squares, which knows the design and not the emulator."""
-    base = banks[0]
-    silent = criticism.KnownNoise(0.0)
-    shapes = [1.5 * BUMP, 0.3 * np.cos(STEPS / 5.0) - 0.8 * BUMP, 0.4 * np.sin(STEPS / 9.0)]
-    clean, repeats = [shape[:, None] for shape in shapes], [True, True, False]
-    scores = []
-    for k in range(2):
-        left, again = np.delete(clean, k, axis=0), np.delete(repeats, k)
-        taught = criticism.usual_residual(list(left), [silent] * 2, list(again))
-        unexpected = shapes[k] - taught.mean(AT)
-        weight = np.linalg.inv(
-            base.hypothesis.spread + NOISE.covariance(AT) + taught.covariance(AT)
-        )
-        absorbed = weight @ DESIGN
-        weight -= absorbed @ np.linalg.solve(DESIGN.T @ absorbed, absorbed.T)
-        change = base.signatures["bump"].change
-        scores.append(change @ weight @ unexpected / np.sqrt(change @ weight @ change))
-    # of what the data are expected to show again only the rest counts
-    size = np.sqrt((1.0 + (1.0 - REPEATED**2) * np.sum(np.square(scores))) / 3.0)
-    assert size > 1.5
-    usual = criticism.usual_residual(clean, [silent] * 3, repeats)
-    noise = criticism.SumOfNoises((NOISE, usual))
-    believed = replace(base.hypothesis, noise=noise.covariance(AT))
-    found = scored_on_clean(believed, noise, base.signatures)
-    assert found["bump"].clean == pytest.approx(size, rel=0.02)
+@pytest.fixture(scope="module")
+def repeating(banks):
+    """Checks of right models whose errors, all along the effect's direction, repeat: scored with
+    three clean data sets, and without that."""
+    alike = np.full((4, 4), REPEATED) + (1.0 - REPEATED) * np.eye(4)
+    silent, scored, unscored = criticism.KnownNoise(0.0), [], []
+    for bank, base in enumerate(banks):
+        for number in range(REPEATING):
+            rng = np.random.default_rng([bank, number])
+            *errors, own = 0.6 * gaussian(rng, alike, 1)[0]
+            clean = [(error * BUMP)[:, None] for error in errors]
+            usual = criticism.usual_residual(clean, [silent] * 3, [True] * 3)
+            noise = criticism.SumOfNoises((NOISE, usual))
+            data = observe(noisy, 1000 * (bank + 1) + number) + own * BUMP - usual.mean(AT)
+            model = replace(on(base.hypothesis, data), noise=noise.covariance(AT))
+            null = null_draws(model, noise, rng)
+            signatures = scored_on_clean(model, noise, base.signatures)
+            scored.append(check(model, signatures, null).p_score)
+            unscored.append(check(model, base.signatures, null).p_score)
+    return np.array(scored), np.array(unscored)
+
+
+def test_an_error_that_repeats_is_seldom_taken_for_the_effect_that_it_resembles(repeating):
+    """The usual residual is stationary and the error is not, so that a score alone would be too
+    large."""
+    scored, unscored = repeating
+    assert np.sum(scored < LEVEL) <= binom.isf(ALPHA, len(scored), 2.0 * LEVEL)
+    assert np.sum(unscored < LEVEL) > binom.isf(ALPHA, len(scored), 2.0 * LEVEL)
 
 
 def test_a_clean_set_alone_says_nothing_of_scores(banks):

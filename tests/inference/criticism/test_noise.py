@@ -207,9 +207,9 @@ def test_what_is_expected_of_a_simulator_is_right_as_often_as_it_says(away):
         known = replace(
             taught,
             autocovariance=0.8 ** np.arange(30),
-            repeats=tuple(
+            clean=tuple(
                 one._replace(residual=residual)
-                for one, residual in zip(taught.repeats, clean, strict=True)
+                for one, residual in zip(taught.clean, clean, strict=True)
             ),
         )
         miss = truth[0] - known.mean(at)
@@ -247,6 +247,37 @@ def test_the_covariance_is_positive_semidefinite(longest):
             assert values[0] > -1e-9 * max(values[-1], 1e-12)
 
 
-def test_no_clean_data_teach_nothing():
-    with pytest.raises(ValueError, match="at least one clean data set"):
-        criticism.usual_residual([], [], [])
+def test_what_the_others_teach_is_learned_in_the_regime_of_the_one_left_out(clean):
+    """Two regimes, in one of which the simulator errs tenfold."""
+    sets = [clean[0], clean[1], 10.0 * clean[2], 10.0 * clean[3]]
+    away = [0.0, 0.1, 6.0, 6.1]
+    found = criticism.usual_residual(sets, [NOTHING] * 4, [True] * 4, away)
+    sizes = [taught.autocovariance[0] ** 0.5 for *_, taught in found.leave_one_out()]
+    np.testing.assert_allclose(sizes, [1.0, 1.0, 10.0, 10.0], rtol=0.2)
+    weights = [weight for _, weight, _ in found.leave_one_out()]
+    assert weights[0] == 1.0 and weights[1] > 0.99 and max(weights[2:]) < 1e-3
+
+
+def test_one_whose_regime_the_others_do_not_tell_of_is_not_judged(clean):
+    found = criticism.usual_residual(clean[:3], [NOTHING] * 3, [True] * 3, [0.0, 0.3, 6.0])
+    assert [one.away for one, *_ in found.leave_one_out()] == [0.0, 0.3]
+
+
+def test_a_simulator_that_leaves_nothing_leaves_nothing(clean):
+    at = Layout(np.zeros(20, int), np.arange(20))
+    found = criticism.usual_residual([0.0 * clean[0]] * 2, [NOTHING] * 2, [True] * 2)
+    assert not found.mean(at).any() and not found.covariance(at).any()
+
+
+@pytest.mark.parametrize(
+    ("residuals", "noises", "same", "message"),
+    [
+        ([], [], [], "at least one clean data set"),
+        ([np.ones((9, 1))] * 2, [NOTHING], [True] * 2, "noises must have 2 entries, got 1"),
+        ([np.ones((9, 1))] * 2, [NOTHING] * 2, [True], "same must have 2 entries, got 1"),
+        ([np.full((9, 1), np.nan)], [NOTHING], [True], "data set 0 has no finite value"),
+    ],
+)
+def test_clean_data_that_teach_nothing_are_refused(residuals, noises, same, message):
+    with pytest.raises(ValueError, match=message):
+        criticism.usual_residual(residuals, noises, same)

@@ -1,6 +1,9 @@
 """On an executor, a simulator that asks for it gets several simulations in a call."""
 
-from concurrent.futures import ThreadPoolExecutor
+import importlib
+import multiprocessing
+import time
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -46,3 +49,74 @@ def test_a_run_that_fails_costs_only_itself():
     assert [one.signal is None for one in found] == [seed == 2 for seed in range(8)]
     assert "went wrong" in found[2].error
     assert [one.signal[1] for one in found if one.signal is not None] == [1.0] * 3 + [4.0] * 4
+
+
+@pytest.mark.parametrize("together", [0, 2.5, "four"])
+def test_what_is_no_number_of_simulations_is_refused(together):
+    simulator = Marching()
+    simulator.together = together
+    with ThreadPoolExecutor(2) as pool, pytest.raises(ValueError, match="`together`"):
+        run(simulator, 4, pool)
+
+
+def test_a_call_may_take_as_many_times_as_long_as_it_makes_simulations():
+    """Four that sleep .1 s each."""
+
+    def sleepy(theta, seeds):
+        time.sleep(0.1 * len(seeds))
+        return seeds[:, None].astype(float)
+
+    sleepy.together = 4
+    jobs = [Job({"a": 1.0}, seed) for seed in range(4)]
+    with SimulationBank() as bank, ThreadPoolExecutor(1) as pool:
+        kept = Keep(bank, executor=pool, timeout=0.3)
+        assert all(one.error is None for one in run_missing(sleepy, jobs, kept, (1,)))
+        kept = Keep(bank, "short", executor=pool, timeout=0.05)
+        assert all("no signal after" in one.error for one in run_missing(sleepy, jobs, kept, (1,)))
+
+
+MORTAL = """
+import os
+import numpy as np
+
+class Mortal:
+    together = 4
+
+    def __init__(self, made, mended):
+        self.made, self.mended = made, mended
+
+    def __call__(self, theta, seeds):
+        if 9 in seeds and not os.path.exists(self.mended):
+            os._exit(1)
+        with open(self.made, "a") as file:
+            file.write("".join(f"{seed}\\n" for seed in seeds))
+        return np.array(seeds, float)[:, None]
+"""
+
+
+@pytest.mark.slow
+def test_a_worker_that_is_killed_loses_its_call_and_what_was_stored_is_not_repeated(
+    tmp_path, monkeypatch
+):
+    (tmp_path / "mortal.py").write_text(MORTAL)
+    monkeypatch.syspath_prepend(tmp_path)
+    made, mended = tmp_path / "made", tmp_path / "mended"
+    simulate = importlib.import_module("mortal").Mortal(str(made), str(mended))
+    jobs = [Job({"a": 1.0}, seed) for seed in range(12)]
+
+    def run_all():
+        spawn = multiprocessing.get_context("spawn")
+        with (
+            SimulationBank(tmp_path / "bank.sqlite") as bank,
+            ProcessPoolExecutor(1, mp_context=spawn) as pool,
+        ):
+            return run_missing(simulate, jobs, Keep(bank, executor=pool), (1,))
+
+    with pytest.raises(RuntimeError, match="lost its workers"):
+        run_all()
+    with SimulationBank(tmp_path / "bank.sqlite") as bank:
+        stored = set(bank.simulations("").seeds)
+    assert stored == set(range(8))
+    mended.touch()
+    assert [one.signal[0] for one in run_all()] == list(range(12))
+    assert sorted(map(int, made.read_text().split())) == list(range(12))
