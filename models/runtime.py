@@ -146,6 +146,13 @@ def start() -> None:
     remove_stale_lock(Path(default_cfg().offline_cache_file_path))
     # Fast arithmetic would let the compiler split sums as it likes, and a simulation's bits depend
     # on its company. The banner is a bare print that no log level silences.
+    # Taichi's own optimisations double the time to compile; LLVM's alone make code as fast.
     with contextlib.redirect_stdout(io.StringIO()):
-        ti.init(arch=ti.cpu, default_fp=ti.f32, fast_math=False, log_level=ti.ERROR)
+        ti.init(
+            arch=ti.cpu,
+            default_fp=ti.f32,
+            fast_math=False,
+            advanced_optimization=False,
+            log_level=ti.ERROR,
+        )
     LOCK.own()

@@ -29,10 +29,11 @@ class LiquidState:
         pressure: Times step over density and cell [m/s].
         status: How a lane fares, a code of `faults`.
 
-    A step is `transfer_in`, what a scene does with the velocities, `project`, and how it moves
-    particles. A scene is a subclass with the function `accelerate`, which changes a particle's
-    velocity, and its slope, by what acts on all liquid. If it is SIDED, it has the fields `side` of
-    cells and `face_side` of faces, and the function `side_of` a point.
+    A scene is a subclass with the functions `take_step` of a group, and `accelerate`, which changes
+    a particle's velocity, and its slope, by what acts on all liquid. A step is `transfer_in`, what
+    the scene does with the velocities, `project`, and how it moves particles. If it is
+    SIDED, it has the fields `side` of cells and `face_side` of faces, and the function `side_of` a
+    point.
     """
 
     UPRIGHT = True  # gravity is along -z
@@ -190,27 +191,29 @@ class LiquidState:
         """What a scene does with a group before its particles are accelerated."""
 
     @ti.kernel
-    def transfer_in(self, groups: ti.i32, step: ti.i32):
+    def march(self, groups: ti.i32, start: ti.i32, stop: ti.i32):
+        """Steps start..stop-1 of so many groups, of which none waits for another."""
         for n in range(groups * STRIDE):
             if n % STRIDE == 0:
-                g = n // STRIDE
-                clear(self, g)
-                if ti.static(self.MIRRORED):
-                    clear_images(self, g)
-                self.begin_step(g, step)
-                deposit(self, g)
-                if ti.static(self.MIRRORED):
-                    fold(self, g)
-                list_cells(self, g)
+                for step in range(start, stop):
+                    self.take_step(n // STRIDE, step)
 
-    @ti.kernel
-    def project(self, groups: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                g = n // STRIDE
-                solve_pressure(self, g)
-                push(self, g, self.rise)
-                add_rise(self, g)
-                extend(self, g)
-                if ti.static(self.MIRRORED):
-                    reflect_velocity(self, g)
+    @ti.func
+    def transfer_in(self, g, step):
+        clear(self, g)
+        if ti.static(self.MIRRORED):
+            clear_images(self, g)
+        self.begin_step(g, step)
+        deposit(self, g)
+        if ti.static(self.MIRRORED):
+            fold(self, g)
+        list_cells(self, g)
+
+    @ti.func
+    def project(self, g):
+        solve_pressure(self, g)
+        push(self, g, self.rise)
+        add_rise(self, g)
+        extend(self, g)
+        if ti.static(self.MIRRORED):
+            reflect_velocity(self, g)

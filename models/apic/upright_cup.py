@@ -1,12 +1,11 @@
 # type: ignore  (Taichi compiles this source and gives these names their types)
-"""Liquids in upright cups: what each of their steps begins and ends with."""
+"""Liquids in upright cups: what acts on their particles, and what keeps these inside."""
 
 import taichi as ti
 
 from .filling import OFF_WALL
-from .lanes import STRIDE, vec3
+from .lanes import vec3
 from .liquid_state import LiquidState
-from .transfer import move
 
 
 @ti.data_oriented
@@ -46,9 +45,3 @@ class UprightCups(LiquidState):
             x[2] = top
             v[2] = ti.min(v[2], 0.0)
         return x, v
-
-    @ti.kernel
-    def transfer_out(self, groups: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                move(self, n // STRIDE)

@@ -1,9 +1,9 @@
 # type: ignore  (Taichi compiles this source and gives these names their types)
-"""Liquids whose surface pulls and that wet walls: what each of their steps begins and ends with."""
+"""Liquids whose surface pulls and that wet walls."""
 
 import taichi as ti
 
-from .lanes import LANES, STRIDE
+from .lanes import LANES
 from .liquid_state import LiquidState
 from .mirror import image, images
 from .pressure import push
@@ -14,7 +14,7 @@ from .viscosity import solve_viscosity, weigh_stresses
 
 @ti.data_oriented
 class WettingLiquid(LiquidState):
-    """A scene is a subclass with the kernel `transfer_out` of groups and a step.
+    """A scene is a subclass with the function `transfer_out` of a group in a step.
 
     Attributes:
         tension: Over density [m³/s²].
@@ -61,28 +61,14 @@ class WettingLiquid(LiquidState):
                 self.tension[g][lane] = surface[0, g, lane]
                 self.cosine[g][lane] = surface[1, g, lane]
 
-    @ti.kernel
-    def prepare(self, groups: ti.i32, step: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                g = n // STRIDE
-                find_liquid(self, g)
-                set_up_pressure(self, g)
-                pull_surface(self, g)
-                push(self, g, self.pressure)
-                weigh_stresses(self, g, step)
-
-    @ti.kernel
-    def flow(self, groups: ti.i32, step: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                solve_viscosity(self, n // STRIDE, step)
-
-    def march(self, groups, start, stop):
-        """Steps start..stop-1 of so many groups."""
-        for step in range(start, stop):
-            self.transfer_in(groups, step)
-            self.prepare(groups, step)
-            self.flow(groups, step)
-            self.project(groups)
-            self.transfer_out(groups, step)
+    @ti.func
+    def take_step(self, g, step):
+        self.transfer_in(g, step)
+        find_liquid(self, g)
+        set_up_pressure(self, g)
+        pull_surface(self, g)
+        push(self, g, self.pressure)
+        weigh_stresses(self, g, step)
+        solve_viscosity(self, g, step)
+        self.project(g)
+        self.transfer_out(g, step)

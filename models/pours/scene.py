@@ -7,7 +7,7 @@ import taichi as ti
 from ..apic.filling import OFF_WALL
 from ..apic.geometry import ABOVE, INSIDE, OUTSIDE
 from ..apic.gravity import GRAVITY
-from ..apic.lanes import LANES, STRIDE, vec3
+from ..apic.lanes import LANES, vec3
 from ..apic.transfer import fault_of, motion_of, place_after
 from ..apic.wetting_liquid import WettingLiquid
 from ..faults import SOUND
@@ -248,18 +248,15 @@ class PouringScene(WettingLiquid):
                 self.fly(g, lane, n, step)
         self.count[g, lane] = 0
 
-    @ti.kernel
-    def transfer_out(self, groups: ti.i32, step: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                g = n // STRIDE
-                for lane in range(LANES):
-                    if self.count[g, lane] > 0:
-                        all_of_it = self.count[g, lane] + self.flown[g, lane]
-                        self.move_on(g, lane, step)
-                        few = self.count[g, lane] < LEFT_OVER * all_of_it
-                        if few or step + 1 >= self.last[g, lane]:
-                            self.end(g, lane, step)
+    @ti.func
+    def transfer_out(self, g, step):
+        for lane in range(LANES):
+            if self.count[g, lane] > 0:
+                all_of_it = self.count[g, lane] + self.flown[g, lane]
+                self.move_on(g, lane, step)
+                few = self.count[g, lane] < LEFT_OVER * all_of_it
+                if few or step + 1 >= self.last[g, lane]:
+                    self.end(g, lane, step)
 
     def view(self):
         """The first pour: places of its particles in the cup's frame [m], shape [n, 3], and its

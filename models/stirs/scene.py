@@ -8,6 +8,7 @@ from ..apic.gravity import GRAVITY
 from ..apic.lanes import LANES, STRIDE, vec3
 from ..apic.pressure import push
 from ..apic.surface import find_liquid, set_up_pressure
+from ..apic.transfer import move
 from ..apic.upright_cup import UprightCups
 from ..apic.viscosity import solve_viscosity, weigh_stresses
 from ..faults import SOUND
@@ -19,7 +20,6 @@ class StirringScene(UprightCups):
     """Liquids in upright cups, stirred by sticks.
 
     All velocities are those at the middle of a step, positions and directions those at its start.
-    Five kernels make a step, as each is compiled for itself, in parallel.
     """
 
     def __init__(self, groups, cells, particles, line, effects=()):
@@ -46,29 +46,39 @@ class StirringScene(UprightCups):
         self.sticks.jolt[g, lane] = (after - 2.0 * now + before) / dt**2
 
     @ti.kernel
-    def prepare(self, groups: ti.i32, step: ti.i32, path: ti.types.ndarray(vec3, 3)):
+    def _march(
+        self,
+        groups: ti.i32,
+        start: ti.i32,
+        stop: ti.i32,
+        path: ti.types.ndarray(vec3, 3),
+        directions: ti.types.ndarray(vec3, 3),
+    ):
         for n in range(groups * STRIDE):
             if n % STRIDE == 0:
                 g = n // STRIDE
-                find_liquid(self, g)
-                set_up_pressure(self, g)
-                for lane in range(LANES):
-                    if self.status[g, lane] == SOUND:
-                        self.hold(path, g, lane, step)
-                        start_line(self, self.sticks, g, lane)
-                push(self, g, self.pressure)
-                weigh_stresses(self, g, step)
+                for step in range(start, stop):
+                    self.take_step(g, step, path)
+                    for lane in range(LANES):
+                        directions[g, lane, step + 1] = self.sticks.direction[g, lane]
 
-    @ti.kernel
-    def flow(self, groups: ti.i32, step: ti.i32, directions: ti.types.ndarray(vec3, 3)):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                g = n // STRIDE
-                solve_viscosity(self, g, step)
-                for lane in range(LANES):
-                    if self.status[g, lane] == SOUND:
-                        slip_line(self, self.sticks, g, lane, (step + 0.5) * self.dt[None])
-                    directions[g, lane, step + 1] = self.sticks.direction[g, lane]
+    @ti.func
+    def take_step(self, g, step, path: ti.template()):
+        self.transfer_in(g, step)
+        find_liquid(self, g)
+        set_up_pressure(self, g)
+        for lane in range(LANES):
+            if self.status[g, lane] == SOUND:
+                self.hold(path, g, lane, step)
+                start_line(self, self.sticks, g, lane)
+        push(self, g, self.pressure)
+        weigh_stresses(self, g, step)
+        solve_viscosity(self, g, step)
+        for lane in range(LANES):
+            if self.status[g, lane] == SOUND:
+                slip_line(self, self.sticks, g, lane, (step + 0.5) * self.dt[None])
+        self.project(g)
+        move(self, g)
 
     def begin(self, path, directions, count):
         """Take what the steps read and fill in.
@@ -84,13 +94,7 @@ class StirringScene(UprightCups):
 
     def march(self, start, stop):
         """Steps start..stop-1."""
-        groups = len(self.path)
-        for step in range(start, stop):
-            self.transfer_in(groups, step)
-            self.prepare(groups, step, self.path)
-            self.flow(groups, step, self.directions)
-            self.project(groups)
-            self.transfer_out(groups)
+        self._march(len(self.path), start, stop, self.path, self.directions)
 
     def view(self, step):
         """The first stir at a step's start: particles [n, 3], pivot [3] and direction [3]."""

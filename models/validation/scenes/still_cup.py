@@ -112,7 +112,7 @@ def flow_in_cup(
         seen = []
         for step in range(steps):
             runtime.check_time_limit(step, steps)
-            scene.step(groups, step)
+            scene.march(groups, step, step + 1)
             seen.append(_look(scene, size, look))
         status = scene.status.to_numpy().reshape(-1)[:size]
     found = np.array(seen, float)

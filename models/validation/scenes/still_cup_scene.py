@@ -4,9 +4,10 @@
 import taichi as ti
 
 from ...apic.gravity import GRAVITY
-from ...apic.lanes import LANES, STRIDE, vec3
+from ...apic.lanes import LANES, vec3
 from ...apic.pressure import push
 from ...apic.surface import find_liquid, set_up_pressure
+from ...apic.transfer import move
 from ...apic.upright_cup import UprightCups
 from ...apic.viscosity import solve_viscosity, weigh_stresses
 
@@ -46,25 +47,13 @@ class StillCupScene(UprightCups):
                 for a in ti.static(range(3)):
                     self.speed[g, lane, n][a] = velocity[g, lane, n, a]
 
-    @ti.kernel
-    def prepare(self, groups: ti.i32, step: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                g = n // STRIDE
-                find_liquid(self, g)
-                set_up_pressure(self, g)
-                push(self, g, self.pressure)
-                weigh_stresses(self, g, step)
-
-    @ti.kernel
-    def flow(self, groups: ti.i32, step: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                solve_viscosity(self, n // STRIDE, step)
-
-    def step(self, groups, step):
-        self.transfer_in(groups, step)
-        self.prepare(groups, step)
-        self.flow(groups, step)
-        self.project(groups)
-        self.transfer_out(groups)
+    @ti.func
+    def take_step(self, g, step):
+        self.transfer_in(g, step)
+        find_liquid(self, g)
+        set_up_pressure(self, g)
+        push(self, g, self.pressure)
+        weigh_stresses(self, g, step)
+        solve_viscosity(self, g, step)
+        self.project(g)
+        move(self, g)

@@ -4,7 +4,7 @@
 import taichi as ti
 
 from ...apic.filling import OFF_WALL
-from ...apic.lanes import LANES, STRIDE
+from ...apic.lanes import LANES
 from ...apic.transfer import fault_of, motion_of, place_after
 from ...apic.wetting_liquid import WettingLiquid
 from ...faults import SOUND
@@ -69,12 +69,10 @@ class WetBoxScene(WettingLiquid):
                     x[a] = to
         return x, v
 
-    @ti.kernel
-    def transfer_out(self, groups: ti.i32, step: ti.i32):
-        for n in range(groups * STRIDE):
-            if n % STRIDE == 0:
-                for lane in range(LANES):
-                    self.move(n // STRIDE, lane)
+    @ti.func
+    def transfer_out(self, g, step):
+        for lane in range(LANES):
+            self.move(g, lane)
 
     @ti.func
     def move(self, g, lane):
