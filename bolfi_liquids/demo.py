@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .pouring.result import Judged
 
 RECORDING, HELD_OUT = "late_oil_v10.nc", "late_oil_v7.nc"  # the cameras were late, and say nothing
-CLEAN = "oil_v10.nc"
+CLEAN = "clean_oil_v10.nc"  # the same strokes of an arm whose cameras were in time
 POURS = 24  # that each decision's map is learned from: few, as two are made
 
 
