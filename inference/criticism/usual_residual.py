@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -105,29 +106,8 @@ class UsualResidual:
                 yield one, float(weight), _learned(others)
 
     def _given(self, at: Layout) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and covariance given the repetitions: a Gaussian's conditional."""
-        told = [
-            (one, there)
-            for one in self.clean
-            if one.correlation > MIN_CORRELATION and len((there := samples(one.residual)).sample)
-        ]
-        by_lag = self._over([at, *(there for _, there in told)])
-        alone = _between(by_lag, at, at)
-        if not told or not by_lag.any():
-            return np.zeros(len(at.sample)), alone
-        across = np.vstack([one.correlation * _between(by_lag, there, at) for one, there in told])
-        errors = np.block(
-            [
-                [_correlation(one, other) * _between(by_lag, there, where) for other, where in told]
-                for one, there in told
-            ]
-        )
-        measured = np.asarray(block_diag(*(one.noise.covariance(there) for one, there in told)))
-        joint = errors + measured
-        joint += JITTER * joint.max() * np.eye(len(joint))
-        seen = np.concatenate([one.values(there) for one, there in told])
-        weight = solve(joint, across, assume_a="pos")
-        return weight.T @ seen, alone - across.T @ weight
+        """Mean and covariance given the repetitions."""
+        return _conditional(self, *(np.asarray(part, int).tobytes() for part in at))
 
     def _over(self, layouts: Sequence[Layout]) -> np.ndarray:
         """The autocovariance at all lags that are needed."""
@@ -135,6 +115,38 @@ class UsualResidual:
         missing = max(longest - len(self.autocovariance), 0)
         # over more samples than it was learned from, it must be made positive anew
         return positive_autocovariance(np.append(self.autocovariance, np.zeros(missing)))
+
+
+@lru_cache(maxsize=16)
+def _conditional(
+    usual: UsualResidual, channel: bytes, sample: bytes
+) -> tuple[np.ndarray, np.ndarray]:
+    """A Gaussian's conditional, kept: all hypotheses of an experiment ask for the same."""
+    at = Layout(np.frombuffer(channel, int), np.frombuffer(sample, int))
+    told = [
+        (one, there)
+        for one in usual.clean
+        if one.correlation > MIN_CORRELATION and len((there := samples(one.residual)).sample)
+    ]
+    by_lag = usual._over([at, *(there for _, there in told)])
+    alone = _between(by_lag, at, at)
+    if not told or not by_lag.any():
+        return np.zeros(len(at.sample)), alone
+    across = np.vstack([one.correlation * _between(by_lag, there, at) for one, there in told])
+    errors = np.block(
+        [
+            [_correlation(one, other) * _between(by_lag, there, where) for other, where in told]
+            for one, there in told
+        ]
+    )
+    measured = np.asarray(block_diag(*(one.noise.covariance(there) for one, there in told)))
+    joint = errors + measured
+    joint += JITTER * joint.max() * np.eye(len(joint))
+    seen = np.concatenate([one.values(there) for one, there in told])
+    weight = solve(joint, across, assume_a="pos")
+    mean, covariance = weight.T @ seen, alone - across.T @ weight
+    mean.flags.writeable = covariance.flags.writeable = False
+    return mean, covariance
 
 
 def _likeness(away: np.ndarray | float) -> np.ndarray:
