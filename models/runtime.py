@@ -21,7 +21,7 @@ os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "False")
 os.environ.setdefault("TI_ENABLE_PYBUF", "0")
 
 STALE_S = 60.0  # age of a lock that is held for a moment
-CHUNK = 240  # steps between two looks at the time limit, so that Ctrl-C is prompt
+CHUNK = 40  # steps in one call of a kernel, a quarter of a second: Ctrl-C waits for its end
 
 
 class WrongThread(RuntimeError):

@@ -28,7 +28,7 @@ from .run_table import Runs
 from .usual_residual import usual_in
 
 COMPONENTS = 10
-SIZES = 7  # of the usual residual, that the likelihood is averaged over
+SIZES = 12  # of the usual residual, that the likelihood is averaged over
 SLOPE_STEP = 0.02  # of prior quantiles, for slopes
 PRIOR_END = 1e-4  # quantile of a prior from which a parameter is at its end
 INDEPENDENT_SLOPE = 1e-8  # relative size below which a slope adds nothing to those before
@@ -178,18 +178,21 @@ def hypothesise(
         noise=known,
     )
     near_best = around(u, found.sd, LATER_HALF_WIDTH, most=np.inf)
-    sized = [own + one for one in _sizes_of(noise, observed, surrogate)]
+    sized, log_weight = _sized(noise, observed, surrogate)
+    reduced = _reduced(surrogate, [own + one for one in sized])
     believed = replace(
         surrogate,
-        reduced=_reduced(surrogate, sized),
+        reduced=reduced._replace(log_weight=reduced.log_weight + log_weight),
         nodes=Nodes(*(np.repeat(part, len(sized)) for part in surrogate.nodes)),
         box=tuple(intersection(near_best, within)),
     )
     return replace(found, fit=replace(fit, learned=believed))
 
 
-def _sizes_of(noise: Noise, observed: np.ndarray, surrogate: SignalSurrogate) -> list[np.ndarray]:
-    """Covariances [m, m] that the noise may have, equally probable.
+def _sized(
+    noise: Noise, observed: np.ndarray, surrogate: SignalSurrogate
+) -> tuple[list[np.ndarray], np.ndarray]:
+    """Covariances [m, m] that the noise may have, and their log weights.
 
     How large the usual residual is, is known from few clean data; what is left of these data
     says more.
@@ -197,9 +200,10 @@ def _sizes_of(noise: Noise, observed: np.ndarray, surrogate: SignalSurrogate) ->
     assert surrogate.known is not None
     known, usual = surrogate.known.covariance, usual_in(noise)
     if usual is None:
-        return [known]
+        return [known], np.zeros(1)
     part = averaged(surrogate.output, usual.covariance(samples(observed)))
-    return [known + (size - 1.0) * part for size in usual.sizes(SIZES)]
+    sizes, log_weight = usual.sizes(SIZES)
+    return [known + (size - 1.0) * part for size in sizes], log_weight
 
 
 def _reduced(surrogate: SignalSurrogate, covariances: Sequence[np.ndarray]) -> Reduced:

@@ -29,7 +29,7 @@ from .signatures import Signature, signature
 from .simulate import AllRunsFailed, Laboratory
 from .verdict import Candidate, near_best
 
-REFIT_PASSES = 2  # of a refit, the second only if the first moved the best fit out of its box
+REFIT_PASSES = 2  # of a refit, the second only if the best fit is not well inside the first's box
 SECOND_EFFECT_GAIN = 6.0  # log likelihood that a second effect must gain
 
 
@@ -184,15 +184,25 @@ def explain(
     accepted = [one for one in found.values() if one.accepted]
     singles = [one for one in accepted if len(one.names) == 1]
     if forced and not (forced in found and found[forced].refitted):
-        unrefined = _unrefined(study, base, forced, runs)
+        unrefined = _unrefined(study, base, found, forced, runs)
         found[forced], _ = _refit(study, base, unrefined, runs, most=None)
     return list(found.values()), singles or accepted
 
 
-def _unrefined(study: Study, base: Base, names: tuple[str, ...], runs: Runs) -> Candidate:
-    """Effects that were simulated one by one, as if together."""
-    within = with_whole_priors(base.box, len(names))
-    return study.candidate(base, study.hypothesis(names, runs, within))
+def _unrefined(
+    study: Study,
+    base: Base,
+    found: Mapping[tuple[str, ...], Candidate],
+    names: tuple[str, ...],
+    runs: Runs,
+) -> Candidate:
+    """Effects that were simulated one by one, as if together: wherever any of them was."""
+    d, box = len(base.box.low), base.box
+    for name in names:
+        within = found[(name,)].hypothesis.within
+        box = hull(box, Box(within.low[:d], within.high[:d]))
+    hypothesis = study.hypothesis(names, runs, with_whole_priors(box, len(names)))
+    return study.candidate(base, hypothesis)
 
 
 def _refit(
@@ -200,9 +210,9 @@ def _refit(
 ) -> tuple[Candidate, Runs]:
     """Simulate a candidate near its optimum and fit it again.
 
-    That ends when the optimum lies in the box of the latest runs, after REFIT_PASSES passes,
-    where more than `most` runs would be made, or where none can be made: the candidate is then
-    what it was, and without a first pass not refitted.
+    That ends when the optimum lies well inside the box of the latest runs, after REFIT_PASSES
+    passes, where more than `most` runs would be made, or where none can be made: the candidate is
+    then what it was, and without a first pass not refitted.
     """
     names = candidate.names
     for attempt in range(REFIT_PASSES):
@@ -236,7 +246,7 @@ def _pairs(
         return [], runs
     best = max(found.values(), key=lambda c: c.gain)
     pairs = [
-        _unrefined(study, base, (*best.names, other), runs)
+        _unrefined(study, base, found, (*best.names, other), runs)
         for other in base.singles
         if other not in best.names
     ]

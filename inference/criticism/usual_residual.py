@@ -21,6 +21,7 @@ MIN_CORRELATION = 0.1  # below it a repetition says nothing of where the simulat
 MIN_WEIGHT = 1e-6  # so that a mean over clean data is one
 MIN_OTHERS = 0.5  # weight of the other clean data by which one of them can be judged
 MIN_FREEDOM = 3  # with fewer, draws have no variance and no effect would be found
+SIZE_TAIL = 1e-3  # probability of a size beyond those that are averaged over, on either side
 JITTER = 1e-9  # of the largest variance, so that covariances can be inverted
 
 
@@ -83,9 +84,15 @@ class UsualResidual:
         drawn = gaussian(rng, self.covariance(at), count)
         return np.sqrt(self._size.rvs(count, random_state=rng))[:, None] * drawn
 
-    def sizes(self, count: int) -> np.ndarray:
-        """Variances that it may have, equally probable, in units of `covariance` [count]."""
-        return self._size.ppf((np.arange(count) + 0.5) / count)
+    def sizes(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Variances that it may have, in units of `covariance`, and their log weights.
+
+        Even in the logarithm, [count] each. That all of the covariance is of one size is right
+        where the clean data's own noise is small.
+        """
+        ends = np.log(self._size.ppf([SIZE_TAIL, 1.0 - SIZE_TAIL]))
+        sizes = np.exp(np.linspace(*ends, count))
+        return sizes, self._size.logpdf(sizes) + np.log(sizes)
 
     @property
     def _size(self):
@@ -117,7 +124,7 @@ class UsualResidual:
         return positive_autocovariance(np.append(self.autocovariance, np.zeros(missing)))
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=4)  # the data, those held out, and one that is left out
 def _conditional(
     usual: UsualResidual, channel: bytes, sample: bytes
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -131,7 +138,7 @@ def _conditional(
     by_lag = usual._over([at, *(there for _, there in told)])
     alone = _between(by_lag, at, at)
     if not told or not by_lag.any():
-        return np.zeros(len(at.sample)), alone
+        return _frozen(np.zeros(len(at.sample))), _frozen(alone)
     across = np.vstack([one.correlation * _between(by_lag, there, at) for one, there in told])
     errors = np.block(
         [
@@ -144,9 +151,13 @@ def _conditional(
     joint += JITTER * joint.max() * np.eye(len(joint))
     seen = np.concatenate([one.values(there) for one, there in told])
     weight = solve(joint, across, assume_a="pos")
-    mean, covariance = weight.T @ seen, alone - across.T @ weight
-    mean.flags.writeable = covariance.flags.writeable = False
-    return mean, covariance
+    return _frozen(weight.T @ seen), _frozen(alone - across.T @ weight)
+
+
+def _frozen(array: np.ndarray) -> np.ndarray:
+    """Not to be written to, as all who ask get the same."""
+    array.flags.writeable = False
+    return array
 
 
 def _likeness(away: np.ndarray | float) -> np.ndarray:

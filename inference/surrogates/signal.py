@@ -59,8 +59,9 @@ class SignalSurrogate:
         output: How outputs become values.
         observed: The observed values [m].
         known: Measurement noise that the user gave.
-        nodes: Sizes and correlations of the measurement noise, KEPT_NODES of them; one where
-            there is none, or it is known.
+        nodes: Sizes and correlations of the unknown measurement noise, KEPT_NODES of them. Of
+            size 0 where there is none or it is known: one, or as many as covariances that the
+            noise may have.
         reduced: The observed scores at each, with the scores' run-to-run noise.
         held_back: Errors of the last simulations; None while simulations are being chosen.
         box: Ends [d], [d] in prior quantiles of the box outside of which the likelihood vanishes;
@@ -174,7 +175,8 @@ class SignalSurrogate:
     def predictive(self, key: jax.Array, u: np.ndarray) -> dict[str, np.ndarray]:
         """One new observation, measurement noise included, for each row of u [n, d]: [n, ...].
 
-        NaN where nothing was observed; averaged values are repeated over their samples.
+        Noise that is known is drawn with the covariance `known`. NaN where nothing was observed;
+        averaged values are repeated over their samples.
         """
         simulated_key, node_key, noise_key = jax.random.split(key, 3)
         values = predictive_draws(simulated_key, self.emulator, u)

@@ -13,7 +13,7 @@ WALL = 0.01  # of prior quantiles, beyond a box, over which the likelihood vanis
 
 
 class SignalState(NamedTuple):
-    """What the likelihood depends on: k scores, g nodes of the measurement noise.
+    """What the likelihood depends on: k scores, g nodes of the noise.
 
     Scores that are not in use have `used` 0 and count as known.
     """
@@ -33,9 +33,14 @@ def log_likelihood(state: SignalState, u: jax.Array) -> jax.Array:
     Bayarri et al. (2009) and Higdon et al. (2008) with the discrepancy's covariance integrated
     out over nodes.
     """
-    mean, variance = predict(state.gp, u)
-    terms = _terms(state, mean * state.used, variance * state.used)
-    return logsumexp(terms) - _wall(state, u)
+    mean, variance = _scores(state, u)
+    return logsumexp(_terms(state, mean, variance)) - _wall(state, u)
+
+
+def _scores(state: SignalState, u: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Means and variances [k] of the scores at u; outside of the box, those at its end."""
+    mean, variance = predict(state.gp, jnp.clip(u, state.low, state.high))
+    return mean * state.used, variance * state.used
 
 
 def _wall(state: SignalState, u: jax.Array) -> jax.Array:
@@ -52,8 +57,7 @@ def log_second_moment(state: SignalState, u: jax.Array, spread: jax.Array | None
     |4 pi S|^(-1/2) N(z; mu, S / 2 + T) (Surer et al. 2024). E[L^2] / E[L]^2 is taken from the
     node that speaks loudest at u.
     """
-    mean, variance = predict(state.gp, u)
-    mean, total = mean * state.used, variance * state.used
+    mean, total = _scores(state, u)
     varying = total if spread is None else spread * state.used
     terms = _terms(state, mean, total)
     loudest = jnp.argmax(terms)
@@ -67,8 +71,7 @@ def log_second_moment(state: SignalState, u: jax.Array, spread: jax.Array | None
 
 def node_log_densities(state: SignalState, u: jax.Array) -> jax.Array:
     """The terms [g] of `log_likelihood`'s sum."""
-    mean, variance = predict(state.gp, u)
-    return _terms(state, mean * state.used, variance * state.used)
+    return _terms(state, *_scores(state, u))
 
 
 def _terms(state: SignalState, mean: jax.Array, variance: jax.Array) -> jax.Array:

@@ -20,6 +20,7 @@ class StirringScene(UprightCups):
     """Liquids in upright cups, stirred by sticks.
 
     All velocities are those at the middle of a step, positions and directions those at its start.
+    A step reads the pivots' path, so this scene has a `march` of its own.
     """
 
     def __init__(self, groups, cells, particles, line, effects=()):

@@ -7,6 +7,7 @@ from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference.criticism.hypothesis import hypothesise, values_of
 from bolfi_liquids.inference.criticism.measurement_noise import samples
 from bolfi_liquids.inference.criticism.misfit import locate, null_draws
+from bolfi_liquids.inference.criticism.posterior import weighted_posterior
 from bolfi_liquids.inference.criticism.prior_boxes import everywhere, fill
 from bolfi_liquids.inference.criticism.simulate import Laboratory
 from bolfi_liquids.inference.surrogates import output_vectors
@@ -137,3 +138,31 @@ def test_the_mean_of_a_window_is_over_all_its_channels(averaged):
     expected = weights @ (SD * [first.z, second.z])
     assert abs(first.z) < 4.0 < second.z
     assert both.z == pytest.approx(expected, abs=0.5)
+
+
+# Noise of uncertain size.
+
+
+def level(theta, seeds):
+    return np.tile(theta["level"][:, None], (1, 30))
+
+
+@pytest.mark.parametrize("size", [1.0, 4.0], ids=["as large as usual", "four times as large"])
+def test_a_posterior_allows_for_what_is_not_known_of_the_usual_residuals_size(size):
+    """White residuals whose variance is known as from 3 numbers: the level's posterior is Student's
+    t, and as wide as the residuals that are seen."""
+    rng, n, sd, freedom = np.random.default_rng(0), 30, 0.05, 3
+    prior = inference.Prior({"level": dist.Uniform(-2.0, 2.0)})
+    usual = criticism.UsualResidual(np.append(sd**2, np.zeros(n - 1)), freedom)
+    noise = criticism.SumOfNoises((criticism.KnownNoise(1e-4), usual))
+    observed = 0.3 + size * sd * rng.normal(size=n)
+    with criticism.Keeping(batch=64).opened("") as keep:
+        laboratory = Laboratory(level, prior, EXTENSIONS, keep)
+        runs = laboratory.run("start", fill(everywhere(1), prior, 0, 12))
+    found = weighted_posterior(hypothesise((), prior, runs, observed, noise, everywhere(1)))
+    draws, weights = found.theta["level"], found.weights
+    spread = np.sqrt(np.average((draws - np.average(draws, weights=weights)) ** 2, weights=weights))
+    squares = freedom * sd**2 + np.sum((observed - observed.mean()) ** 2)
+    expected = np.sqrt(squares / (freedom + n - 3) / n)
+    assert spread == pytest.approx(expected, rel=0.1)
+    assert np.average(draws, weights=weights) == pytest.approx(observed.mean(), abs=0.1 * expected)
