@@ -108,6 +108,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         inputs = open_inputs(calibration, settings, given)
         for notice in [*aborted_recordings(inputs.compared), *frame_warnings(inputs.compared)]:
             logger.warning(notice)
+        for name in inputs.left_out:
+            logger.warning("baseline %s: is criticised or held out, so it is not counted", name)
         if finished := finished_criticism(run, inputs.made_from):
             return finished
         with (

@@ -183,6 +183,7 @@ def _check_held_out(stirring: Stirring, held_out: Sequence[Recording]) -> None:
                 where=Argument(f"held_out {recording.path}"),
                 fix="hold out a recording of the same liquid",
             )
+        _check_rig(stirring, recording, Argument(f"held_out {recording.path}"))
 
 
 def _check_effects(settings: CriticismSettings) -> None:
@@ -202,17 +203,21 @@ def _check_effects(settings: CriticismSettings) -> None:
             )
 
 
+def _check_rig(stirring: Stirring, recording: Recording, where: str) -> None:
+    for name in RIG_SIZES:
+        there, here = recording.number(name), stirring.recordings[0].number(name)
+        if abs(there - here) > SIZE_TOLERANCE * abs(here):
+            raise InputError(
+                f"{name} is {there:g}, but {here:g} in the run",
+                where=where,
+                fix="give recordings of the same rig",
+            )
+
+
 def _check_baseline(stirring: Stirring, baseline: Sequence[Recording]) -> None:
     first = stirring.recordings[0]
     for recording in baseline:
-        for name in RIG_SIZES:
-            there, here = recording.number(name), first.number(name)
-            if abs(there - here) > SIZE_TOLERANCE * abs(here):
-                raise InputError(
-                    f"{name} is {there:g}, but {here:g} in the run",
-                    where=Argument(f"baseline {recording.path}"),
-                    fix="give recordings of the same rig",
-                )
+        _check_rig(stirring, recording, Argument(f"baseline {recording.path}"))
         if not same_rate(recording, first):
             there, here = (1.0 / frame_interval(r) for r in (recording, first))
             raise InputError(

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import block_diag, solve
 from scipy.stats import invgamma
 
+from ..arguments import checked_array
 from ..surrogates.measurement_noise import Layout
 from .measurement_noise import Noise, SumOfNoises, gaussian, samples
 
@@ -195,22 +196,50 @@ def usual_residual(
             learned of sizes is learned from the nearest.
 
     Raises:
-        ValueError: there are none, they are not as many of each, one has no finite value, or a
-            distance is not finite.
+        ValueError: there are none, they are not as many of each, one is no [T, channels] of the
+            others' channels, is infinite somewhere or nowhere finite, a noise is none, those of
+            the same experiment are not of one shape, or a distance is not finite.
     """
-    if not residuals:
+    count = len(residuals)
+    if not count:
         raise ValueError("a usual residual needs at least one clean data set")
-    apart = np.zeros(len(residuals)) if away is None else np.asarray(away, float)
+    apart = np.zeros(count) if away is None else checked_array("away", away)
     for name, given in (("noises", noises), ("same", same), ("away", apart)):
-        if len(given) != len(residuals):
-            raise ValueError(f"{name} must have {len(residuals)} entries, got {len(given)}")
+        if np.ndim(given) != 1 or len(given) != count:
+            raise ValueError(f"{name} must have {count} entries, got {given!r:.100}")
     if not np.isfinite(apart).all():
-        raise ValueError(f"away must be {len(residuals)} finite numbers, got {away}")
-    for k, residual in enumerate(residuals):
+        raise ValueError(f"away must be {count} finite numbers, got {away}")
+    clean = [
+        CleanData(checked_array(f"clean data set {k}", one), noise, bool(again), float(distance))
+        for k, (one, noise, again, distance) in enumerate(
+            zip(residuals, noises, same, apart, strict=True)
+        )
+    ]
+    _check_clean(clean)
+    return _learned(clean)
+
+
+def _check_clean(clean: Sequence[CleanData]) -> None:
+    channels = clean[0].residual.shape[1:]
+    shapes = {one.residual.shape for one in clean if one.same}
+    for k, (residual, noise, *_) in enumerate(clean):
+        if residual.ndim != 2 or residual.shape[1:] != channels:
+            raise ValueError(
+                f"clean data set {k} must be of the shape [T, channels], as many channels as the "
+                f"others have, got {residual.shape}"
+            )
+        if np.isinf(residual).any():
+            raise ValueError(f"clean data set {k} must not be infinite; NaN is a missing sample")
         if not np.isfinite(residual).any():
-            raise ValueError(f"the clean data set {k} has no finite value; leave it out")
-    each = zip(residuals, noises, map(bool, same), map(float, apart), strict=True)
-    return _learned([CleanData(*one) for one in each])
+            raise ValueError(f"clean data set {k} has no finite value; leave it out")
+        if not hasattr(noise, "covariance"):
+            raise ValueError(
+                f"noises[{k}] must be a Noise, such as KnownNoise(0.01), got {noise!r:.100}"
+            )
+    if len(shapes) > 1:
+        raise ValueError(
+            f"repetitions of one experiment must be of one shape, got {sorted(shapes)}"
+        )
 
 
 def _weights(clean: Sequence[CleanData]) -> np.ndarray:

@@ -132,7 +132,9 @@ def test_a_recording_is_held_out_once_and_under_its_own_name(calibration, other,
 
 
 def test_a_baseline_of_another_rig_or_frame_rate_is_refused(calibration, other, dataset, tmp_path):
-    refused("cup_radius is 0.05", calibration, baseline=other("wide.nc", cup_radius=0.05))
+    wide = other("wide.nc", cup_radius=0.05)
+    for option in ("baseline", "held_out"):
+        refused("cup_radius is 0.05", calibration, **{option: wide})
     slow = tmp_path / "slow.nc"
     dataset.isel(time=slice(0, None, 2)).to_netcdf(slow)
     refused("samples a second", calibration, baseline=slow)

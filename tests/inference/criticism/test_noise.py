@@ -273,9 +273,17 @@ def test_a_simulator_that_leaves_nothing_leaves_nothing(clean):
     ("residuals", "noises", "same", "message"),
     [
         ([], [], [], "at least one clean data set"),
-        ([np.ones((9, 1))] * 2, [NOTHING], [True] * 2, "noises must have 2 entries, got 1"),
-        ([np.ones((9, 1))] * 2, [NOTHING] * 2, [True], "same must have 2 entries, got 1"),
+        ([np.ones((9, 1))] * 2, [NOTHING], [True] * 2, "noises must have 2 entries, got "),
+        ([np.ones((9, 1))] * 2, [NOTHING] * 2, [True], "same must have 2 entries, got "),
         ([np.full((9, 1), np.nan)], [NOTHING], [True], "data set 0 has no finite value"),
+        ([np.full((9, 1), np.inf)], [NOTHING], [True], "data set 0 must not be infinite"),
+        ([np.ones(9)], [NOTHING], [True], r"data set 0 must be of the shape \[T, channels\]"),
+        ([np.ones((9, 1)), np.ones((9, 2))], [NOTHING] * 2, [False] * 2, "data set 1 must be"),
+        ([np.ones((9, 1)), np.ones((8, 1))], [NOTHING] * 2, [True] * 2, "of one shape, got"),
+        (["abc"], [NOTHING], [True], "data set 0 must be an array of numbers"),
+        ([np.ones((9, 1))], [0.05], [True], r"noises\[0\] must be a Noise"),
+        ([np.ones((9, 1))], NOTHING, [True], "noises must have 1 entries"),
+        ([np.ones((9, 1))], [NOTHING], True, "same must have 1 entries"),
     ],
 )
 def test_clean_data_that_teach_nothing_are_refused(residuals, noises, same, message):
