@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag, solve
@@ -91,12 +91,12 @@ class UsualResidual:
         Even in the logarithm, [count] each. That all of the covariance is of one size is right
         where the clean data's own noise is small.
         """
-        ends = np.log(self._size.ppf([SIZE_TAIL, 1.0 - SIZE_TAIL]))
-        sizes = np.exp(np.linspace(*ends, count))
+        least, most = self._size.ppf([SIZE_TAIL, 1.0 - SIZE_TAIL])
+        sizes = np.geomspace(least, most, count)
         return sizes, self._size.logpdf(sizes) + np.log(sizes)
 
     @property
-    def _size(self):
+    def _size(self) -> Any:
         freedom = max(self.freedom, MIN_FREEDOM)
         return invgamma(freedom / 2.0, scale=freedom / 2.0)
 
@@ -204,7 +204,8 @@ def usual_residual(
     if not count:
         raise ValueError("a usual residual needs at least one clean data set")
     apart = np.zeros(count) if away is None else checked_array("away", away)
-    for name, given in (("noises", noises), ("same", same), ("away", apart)):
+    parts: dict[str, Any] = {"noises": noises, "same": same, "away": apart}
+    for name, given in parts.items():
         if np.ndim(given) != 1 or len(given) != count:
             raise ValueError(f"{name} must have {count} entries, got {given!r:.100}")
     if not np.isfinite(apart).all():
