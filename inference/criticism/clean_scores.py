@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .hypothesis import Hypothesis, averaged, values_of
+from .hypothesis import Hypothesis, values_of
 from .measurement_noise import Noise, samples
 from .signatures import Signature
 from .usual_residual import usual_in, without_usual
@@ -29,7 +29,8 @@ def scored_on_clean(
     squares = dict.fromkeys(signatures, 1.0)
     counted = 1.0
     for clean, weight, taught in usual.leave_one_out():
-        others = replace(base, noise=averaged(output, measured + taught.covariance(at)))
+        covariance = output.average_covariance(measured + taught.covariance(at))
+        others = replace(base, noise=covariance)
         unexpected = values_of(output, (clean.values(at) - taught.mean(at))[None])
         left = others.project(others.whiten(unexpected))[:, 0]
         for name, of in signatures.items():

@@ -156,17 +156,12 @@ def hypothesise(
     fit = engine.fit(warn=False)  # that a model cannot reach the data is what is looked for
     surrogate = fit.learned
     assert isinstance(surrogate, SignalSurrogate) and surrogate.known is not None
-    emulator, output = surrogate.emulator, surrogate.output
-    known = surrogate.known.covariance
+    emulator, known = surrogate.emulator, surrogate.known.covariance
     errors = own_errors(emulator)
-    own = smooth_covariance(errors, output.layout, output.series)
-    counting = replace(surrogate, reduced=_reduced(surrogate, [own + known]))
-    near = minimise_in_box(_squared_distance, counting.state, len(prior), *within)
+    near, _ = _nearest(surrogate, errors, within)
     # now that it is known where it fits best, so is how noisy the simulator is there
     errors = resized(errors, prior.to_unit(theta), near)
-    own = smooth_covariance(errors, output.layout, output.series)
-    counting = replace(surrogate, reduced=_reduced(surrogate, [own + known]))
-    u = minimise_in_box(_squared_distance, counting.state, len(prior), *within)
+    u, own = _nearest(surrogate, errors, within)
     found = Hypothesis(
         names=names,
         fit=fit,
@@ -189,19 +184,30 @@ def hypothesise(
     return replace(found, fit=replace(fit, learned=believed))
 
 
+def _nearest(
+    surrogate: SignalSurrogate, errors: np.ndarray, within: Box
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where in a box the expected output is nearest to what was observed, prior quantiles [d], and
+    the covariance [m, m] of the simulator's own noise, of which there are draws [n, m]."""
+    assert surrogate.known is not None
+    own = smooth_covariance(errors, surrogate.output.layout, surrogate.output.series)
+    reduced = _reduced(surrogate, [own + surrogate.known.covariance])
+    state = replace(surrogate, reduced=reduced).state
+    return minimise_in_box(_squared_distance, state, len(within.low), *within), own
+
+
 def _sized(
     noise: Noise, observed: np.ndarray, surrogate: SignalSurrogate
 ) -> tuple[list[np.ndarray], np.ndarray]:
     """Covariances [m, m] that the noise may have, and their log weights.
 
-    How large the usual residual is, is known from few clean data; what is left of these data
-    says more.
+    Few clean data tell how large the usual residual is; what is left of these data tells more.
     """
     assert surrogate.known is not None
     known, usual = surrogate.known.covariance, usual_in(noise)
     if usual is None:
         return [known], np.zeros(1)
-    part = averaged(surrogate.output, usual.covariance(samples(observed)))
+    part = surrogate.output.average_covariance(usual.covariance(samples(observed)))
     sizes, log_weight = usual.sizes(SIZES)
     return [known + (size - 1.0) * part for size in sizes], log_weight
 
@@ -241,8 +247,3 @@ def values_of(output: Output, drawn: np.ndarray) -> np.ndarray:
     """Draws [n, samples] in the flattened order as values [n, m]."""
     rank = np.argsort(np.argsort(output.present))
     return output.average(drawn[:, rank].T).T
-
-
-def averaged(output: Output, covariance: np.ndarray) -> np.ndarray:
-    """A covariance [samples, samples] in the flattened order as that of the values [m, m]."""
-    return values_of(output, values_of(output, covariance).T)

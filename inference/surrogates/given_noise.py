@@ -51,7 +51,7 @@ def given_noise(noise: ArrayLike, output: Output) -> GivenNoise:
             f"noise of shape {given.shape} may be sds or a covariance; give sds as [{samples}]"
         )
     if given.shape == (samples, samples):
-        return _covariance(given, rank, output)
+        return _covariance(given, output)
     if given.ndim < 2 and given.size == 1:
         sds = np.full(samples, given.item())
     elif given.shape == output.shape:
@@ -76,12 +76,12 @@ def _independent(variances: np.ndarray) -> GivenNoise:
     return GivenNoise(variances, np.zeros((len(variances), 0)))
 
 
-def _covariance(given: np.ndarray, rank: np.ndarray, output: Output) -> GivenNoise:
+def _covariance(given: np.ndarray, output: Output) -> GivenNoise:
     """White noise and factors of the covariance; the white part keeps it well conditioned."""
     refusal = "noise must be a finite, symmetric, positive semidefinite covariance"
     if not (np.isfinite(given).all() and np.allclose(given, given.T)):
         raise ValueError(refusal)
-    averaged = output.average(output.average(given[np.ix_(rank, rank)]).T)
+    averaged = output.average_covariance(given)
     variances = np.diag(averaged).copy()
     if np.array_equal(averaged, np.diag(variances)) and (variances >= 0.0).all():
         return _independent(variances)

@@ -59,6 +59,11 @@ class Output:
         sums = np.add.reduceat(samples, self.starts, axis=0)
         return sums / self.counts.reshape(-1, *[1] * (samples.ndim - 1))
 
+    def average_covariance(self, covariance: np.ndarray) -> np.ndarray:
+        """Of samples in the flattened order [len(present), len(present)] -> of values [m, m]."""
+        rank = np.argsort(np.argsort(self.present))
+        return self.average(self.average(covariance[np.ix_(rank, rank)]).T)
+
     def restore(self, values: np.ndarray) -> np.ndarray:
         """Values [n, m] at their places in the (summarised) output: [n, *shape]; NaN elsewhere."""
         full = np.full((len(values), int(np.prod(self.shape))), np.nan)

@@ -60,18 +60,18 @@ def test_what_is_no_number_of_simulations_is_refused(together):
 
 
 def test_a_call_may_take_as_many_times_as_long_as_it_makes_simulations():
-    """Four that sleep .1 s each: a call that is given less is repeated one by one."""
+    """Four that sleep .25 s each: a call that is given less is repeated one by one."""
     calls = []
 
     def sleepy(theta, seeds):
         calls.append(len(seeds))
-        time.sleep(0.1 * len(seeds))
+        time.sleep(0.25 * len(seeds))
         return seeds[:, None].astype(float)
 
     sleepy.together = 4
     jobs = [Job({"a": 1.0}, seed) for seed in range(4)]
     with SimulationBank() as bank, ThreadPoolExecutor(1) as pool:
-        kept = Keep(bank, executor=pool, timeout=5.0)
+        kept = Keep(bank, executor=pool, timeout=0.6)
         assert all(one.error is None for one in run_missing(sleepy, jobs, kept, (1,)))
         assert calls == [4]
         kept = Keep(bank, "short", executor=pool, timeout=0.05)
