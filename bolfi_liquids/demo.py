@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .calibration.calibrate import calibrate
 from .criticism.criticise import criticise
-from .errors import Argument
+from .errors import Argument, InputError
 from .files import given_path
 from .pouring.choose import choose_pour
 from .reporting.report import report
+from .run.directory import RUN_TOML, read_run
 
 if TYPE_CHECKING:
     from .inference.simulations import Workers
@@ -40,8 +41,12 @@ def run_demo(out: Path, *, executor: "Workers | None" = None, timeout: float | N
     Args:
         out: The RUN directory.
         executor, timeout: See `calibrate`.
+
+    Raises:
+        InputError: `out` holds another run.
     """
     out = given_path(out, Argument("out"))
+    _refuse_other_run(out)
     where: dict[str, Any] = {"executor": executor, "timeout": timeout}
     data = files("bolfi_liquids.data")
     with (
@@ -55,3 +60,12 @@ def run_demo(out: Path, *, executor: "Workers | None" = None, timeout: float | N
         criticism = criticise(calibration, held_out=held_out, baseline=clean, **where)
     choose_pour(criticism, pours=POURS, **where)
     return Demo(report(out, **where), before.chosen)
+
+
+def _refuse_other_run(out: Path) -> None:
+    """`calibrate` would name options that `demo` does not have."""
+    if not (out / RUN_TOML).exists():
+        return
+    record = read_run(out)
+    if record["files"]["recordings"] != [RECORDING]:
+        raise InputError("holds another run", where=str(out), fix="choose another `out`")

@@ -64,6 +64,10 @@ def _plain_integer(value: Any) -> Any:
         return value
 
 
+def _each_once(names: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(names))
+
+
 Integer = Annotated[int, BeforeValidator(_plain_integer)]
 Seed = Annotated[Integer, Field(ge=0, le=LARGEST_SEED)]
 Count = Annotated[Integer, Field(ge=1, le=MAX_COUNT)]
@@ -72,6 +76,7 @@ Particles = Annotated[Integer, Field(ge=0, le=MAX_PARTICLES), AfterValidator(_as
 """0: cells follow the stick, or the cup that pours."""
 Pours = Annotated[Integer, Field(ge=MIN_POURS, le=MAX_POURS)]
 Surrogate = Annotated[str, one_of(SURROGATES)]
+Names = Annotated[tuple[str, ...], AfterValidator(_each_once)]
 
 T = TypeVar("T")
 
@@ -223,8 +228,8 @@ class CriticismSettings:
         batch: Simulations run at the same time.
     """
 
-    effects: tuple[str, ...] | None = None
-    accept: tuple[str, ...] | None = None
+    effects: Names | None = None
+    accept: Names | None = None
     seed: Seed = 0
     batch: Count = 4
 

@@ -97,9 +97,10 @@ def enter_run(
         if others:
             raise _refused(others, held, run, growing)
         return _grow(run, held, record, differing[growing][0]) if grows else []
-    if (run / SIMULATIONS).exists():
+    orphans = [name for name in (SIMULATIONS, *CONCLUSIONS) if (run / name).exists()]
+    if orphans:
         raise InputError(
-            f"holds {SIMULATIONS} without {RUN_TOML}",
+            f"holds {orphans[0]} without {RUN_TOML}",
             where=str(run),
             fix="choose another `out`; nothing was overwritten",
         )

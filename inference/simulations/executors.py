@@ -109,15 +109,14 @@ def _dask(address: str) -> Iterator[Executor]:
         from distributed import Client  # pyright: ignore[reportMissingImports]
     except ModuleNotFoundError as err:
         raise ImportError(
-            f"executor={address!r} is a Dask scheduler, which needs: "
-            "pip install 'bolfi-liquids[dask]'"
+            f"simulating on the Dask scheduler {address!r} needs: pip install 'bolfi-liquids[dask]'"
         ) from err
     try:
         client = Client(address)
     except (OSError, ValueError) as err:
         raise ConnectionError(
-            f"executor={address!r} must be the address of a running Dask scheduler, such as "
-            f"tcp://host:8786: {err}"
+            f"no Dask scheduler answers at {address!r}; give the address of one that runs, such "
+            f"as tcp://host:8786: {err}"
         ) from err
     with client:
         # impure: a simulation that is asked for again failed before, and is to be tried again

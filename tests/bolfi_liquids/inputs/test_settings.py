@@ -87,3 +87,8 @@ def test_settings_are_plain_values():
     assert pickle.loads(pickle.dumps(settings)) == settings
     with pytest.raises(InputError, match="^seed: "):
         replace(settings, seed=-1)
+
+
+def test_an_effect_that_is_named_twice_counts_once():
+    settings = CriticismSettings(effects=("a", "b", "a"), accept=("b", "b"))
+    assert (settings.effects, settings.accept) == (("a", "b"), ("b",))

@@ -146,11 +146,12 @@ def test_resuming_nothing_starts_a_run(tmp_path):
     assert read_run(tmp_path) == RECORD
 
 
-def test_simulations_without_settings_are_left_alone(tmp_path):
-    (tmp_path / SIMULATIONS).write_bytes(b"precious")
-    with pytest.raises(InputError, match="without run.toml"):
+@pytest.mark.parametrize("name", [SIMULATIONS, *CONCLUSIONS])
+def test_results_without_settings_are_left_alone(tmp_path, name):
+    (tmp_path / name).write_bytes(b"precious")
+    with pytest.raises(InputError, match=f"holds {name} without run.toml"):
         enter_run(tmp_path, RECORD, resume=True)
-    assert (tmp_path / SIMULATIONS).read_bytes() == b"precious"
+    assert (tmp_path / name).read_bytes() == b"precious"
 
 
 def test_a_section_is_replaced_and_the_others_kept(tmp_path):

@@ -295,7 +295,7 @@ def test_other_things_are_refused(prior, observed, simulate, executor):
 def test_an_address_where_nobody_answers(prior, observed, simulate):
     with (
         dask.config.set({"distributed.comm.timeouts.connect": "200ms"}),
-        pytest.raises(ConnectionError, match="'tcp://127.0.0.1:9' must be the address of a run"),
+        pytest.raises(ConnectionError, match="no Dask scheduler answers at 'tcp://127.0.0.1:9'"),
     ):
         inference.fit(simulate, prior, observed, executor="tcp://127.0.0.1:9")
 
