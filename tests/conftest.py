@@ -34,6 +34,8 @@ def pytest_configure(config):
         "punctual: alone, and repeated once if it failed on a computer that stood still meanwhile",
     )
     config.stash[REPEATED] = []
+    # several processes with a thread of BLAS for each processor: it solved twenty times as slowly
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # many processes compile the same functions: half of the time of the engine's tests
     if hasattr(config, "cache"):
         os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(config.cache.mkdir("jax")))

@@ -5,12 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from .._float64 import in_float64
 from .hypothesis import Hypothesis, values_of
 from .measurement_noise import Noise, samples
 from .signatures import Signature
 from .usual_residual import usual_in, without_usual
 
 
+@in_float64
 def scored_on_clean(
     base: Hypothesis, noise: Noise, signatures: Mapping[str, Signature]
 ) -> dict[str, Signature]:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .._float64 import in_float64
 from ..surrogates.output_vectors import MIN_SERIES
 from .experiment import Experiment
 from .measurement_noise import gaussian, samples
@@ -86,6 +87,7 @@ def predict(
     return elsewhere.run(f"{phase} {experiment.label}", theta).signals[:, there]
 
 
+@in_float64
 def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int) -> Gap:
     """Compare two models' predictions, [k, n] each.
 

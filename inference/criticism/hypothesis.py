@@ -79,11 +79,13 @@ class Hypothesis:
         return self.latent + self.own
 
     @cached_property
+    @in_float64
     def factor(self) -> np.ndarray:
         """Lower Cholesky factor of the difference's covariance [m, m]."""
         return np.linalg.cholesky(self.spread + self.noise)
 
     @cached_property
+    @in_float64
     def slopes(self) -> np.ndarray:
         """Whitened derivatives of the expected values by the prior quantiles [m, d]."""
         d = len(self.u)
@@ -93,6 +95,7 @@ class Hypothesis:
         return self.whiten(rise / np.diag(above - below)[:, None])
 
     @cached_property
+    @in_float64
     def tangents(self) -> np.ndarray:
         """Orthonormal directions of whitened values that the parameters absorb [m, <= d].
 
@@ -109,6 +112,7 @@ class Hypothesis:
         information = self.slopes.T @ self.slopes + 12.0 * np.eye(len(self.u))
         return np.sqrt(np.diag(np.linalg.inv(information)))
 
+    @in_float64
     def whiten(self, rows: np.ndarray) -> np.ndarray:
         """Values [n, m] -> columns [m, n] of unit covariance."""
         return solve_triangular(self.factor, np.atleast_2d(rows).T, lower=True)

@@ -5,6 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
+from .._float64 import in_float64
 from ..arguments import checked_array
 from ..surrogates.measurement_noise import Layout, Nodes, correlated
 
@@ -109,6 +110,7 @@ def gaussian(rng: np.random.Generator, covariance: np.ndarray, count: int) -> np
     return (white * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
 
 
+@in_float64
 def rest_noise(
     rests: list[np.ndarray], seed: int = 0, *, trend: int = 0, draws: int = DRAWS
 ) -> AutoregressiveNoise:

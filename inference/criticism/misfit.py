@@ -77,6 +77,7 @@ def null_draws(
     return hypothesis.project(hypothesis.whiten(measured + simulated))
 
 
+@in_float64
 def check(hypothesis: Hypothesis, signatures: Mapping[str, Signature], null: np.ndarray) -> Check:
     """Test a model against the data.
 
@@ -108,6 +109,7 @@ def check(hypothesis: Hypothesis, signatures: Mapping[str, Signature], null: np.
     return Check(float(together), float(p_score), float(p_smooth), named)
 
 
+@in_float64
 def locate(hypothesis: Hypothesis, windows: Sequence[Window], null: np.ndarray) -> list[Found]:
     """Where a model and the data disagree, with one error rate for all windows (max statistic).
 

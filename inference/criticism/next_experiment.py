@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .._float64 import in_float64
 from ..surrogates.output_vectors import MIN_SERIES
 from .experiment import Proposal
 from .measurement_noise import samples
@@ -66,6 +67,7 @@ def _separation(
     return Suggestion(proposal.label, worst, snr[worst])
 
 
+@in_float64
 def _distance(proposal: Proposal, signals: Sequence[np.ndarray], a: int, b: int) -> float:
     """Length of the whitened difference of two means in its slow part, less what the noise of
     the runs adds to it."""

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import block_diag, solve
 from scipy.stats import invgamma
 
+from .._float64 import in_float64
 from ..arguments import checked_array
 from ..surrogates.measurement_noise import Layout
 from .measurement_noise import Noise, SumOfNoises, gaussian, samples
@@ -126,6 +127,7 @@ class UsualResidual:
 
 
 @lru_cache(maxsize=4)  # the data, those held out, and one that is left out
+@in_float64
 def _conditional(
     usual: UsualResidual, channel: bytes, sample: bytes
 ) -> tuple[np.ndarray, np.ndarray]:

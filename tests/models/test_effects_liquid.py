@@ -36,15 +36,17 @@ def _effect(name, **changes):
     return models.Effect(name=name, **{**fields, **changes})
 
 
+def start_of(path, seconds):
+    early = path.time < seconds
+    return SimpleNamespace(time=path.time[early], position=path.position[early])
+
+
 @pytest.mark.slow
 def test_a_rheology_from_outside_acts(register, glycerin):
     """Twice half the viscosity is the same stir, but for rounding."""
     register(thicken())
     setup = models.StirSetup.from_recording(glycerin)
-    early = glycerin.gripper.time < 1.5
-    path = SimpleNamespace(
-        time=glycerin.gripper.time[early], position=glycerin.gripper.position[early]
-    )
+    path = start_of(glycerin.gripper, 1.5)
     plain = models.stir(models.Liquid([1.0, 2.0], 0.2, 1260.0), path, setup, [0, 0])
     liquid = models.Liquid([0.5, 1.0], 0.2, 1260.0)
     thickened = models.stir(liquid, path, setup, [0, 0], {"thicken": 2.0})
@@ -56,10 +58,10 @@ def test_a_viscosity_may_vary_by_thousands_within_the_cup(glycerin):
     """A gel of 0.03 Pa s that yields at 30 Pa: at rest 4000 times as thick as where it flows."""
     setup = models.StirSetup.from_recording(glycerin)
     liquid = models.Liquid(0.03, 0.2, 1000.0)
-    gel, again = models.stir(liquid, glycerin.gripper, setup, [0, 1], {"yield_stress": 30.0})
+    path = start_of(glycerin.gripper, 2.5)
+    gel, again = models.stir(liquid, path, setup, [0, 1], {"yield_stress": 30.0})
     assert np.isfinite(gel).all()
-    (thin,) = models.stir(liquid, glycerin.gripper, setup, [0])
-    (held,) = models.stir(models.Liquid(120.0, 0.2, 1000.0), glycerin.gripper, setup, [0])
+    thin, held = models.stir(models.Liquid([0.03, 120.0], 0.2, 1000.0), path, setup, [0, 0])
 
     def apart(one, other):
         return np.sqrt(np.mean((one - other) ** 2))
