@@ -225,13 +225,13 @@ class CriticismSettings:
         effects: Names of those that are considered; None is all.
         accept: Names of those that join the model whatever the verdict.
         seed: Seed of all random draws.
-        batch: Simulations run at the same time.
+        batch: Simulations run at the same time: four in each of two threads.
     """
 
     effects: Names | None = None
     accept: Names | None = None
     seed: Seed = 0
-    batch: Count = 4
+    batch: Count = 8
 
     @property
     def stir_plan(self) -> "Plan":
