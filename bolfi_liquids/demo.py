@@ -1,5 +1,6 @@
 """The whole way on bundled data: stir, learn, find what the simulator lacks, pour, report."""
 
+from dataclasses import asdict
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -8,6 +9,8 @@ from .calibration.calibrate import calibrate
 from .criticism.criticise import criticise
 from .errors import Argument, InputError
 from .files import given_path
+from .inputs.open import open_recording
+from .inputs.settings import CalibrationSettings
 from .pouring.choose import choose_pour
 from .reporting.report import report
 from .run.directory import RUN_TOML, read_run
@@ -46,7 +49,6 @@ def run_demo(out: Path, *, executor: "Workers | None" = None, timeout: float | N
         InputError: `out` holds another run.
     """
     out = given_path(out, Argument("out"))
-    _refuse_other_run(out)
     where: dict[str, Any] = {"executor": executor, "timeout": timeout}
     data = files("bolfi_liquids.data")
     with (
@@ -54,6 +56,7 @@ def run_demo(out: Path, *, executor: "Workers | None" = None, timeout: float | N
         as_file(data / HELD_OUT) as held_out,
         as_file(data / CLEAN) as clean,
     ):
+        _refuse_other_run(out, recording)
         calibration = calibrate(recording, out=out, resume=True, **where)
         # the fit is bad, and without criticism nobody should pour after it
         before = choose_pour(calibration, pours=POURS, force=True, **where)
@@ -62,10 +65,14 @@ def run_demo(out: Path, *, executor: "Workers | None" = None, timeout: float | N
     return Demo(report(out, **where), before.chosen)
 
 
-def _refuse_other_run(out: Path) -> None:
-    """`calibrate` would name options that `demo` does not have."""
+def _refuse_other_run(out: Path, recording: Path) -> None:
+    """Raise `InputError` if `out` holds a run that the demo did not make.
+
+    `calibrate` would name options that the demo does not have, or go on with a smaller run.
+    """
     if not (out / RUN_TOML).exists():
         return
-    record = read_run(out)
-    if record["files"]["recordings"] != [RECORDING]:
+    held, own = read_run(out), asdict(CalibrationSettings())
+    same_data = held.get("inputs") == {"sha256": [open_recording(recording).hash]}
+    if not same_data or {name: held.get("settings", {}).get(name) for name in own} != own:
         raise InputError("holds another run", where=str(out), fix="choose another `out`")

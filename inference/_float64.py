@@ -3,11 +3,12 @@ the like; the caller's global settings stay as they were."""
 
 import functools
 from collections.abc import Callable
+from threading import Lock
 from typing import Any, ParamSpec, TypeVar
 
 import jax
 import numpy as np
-from threadpoolctl import ThreadpoolController
+from threadpoolctl import OpenBLASController, ThreadpoolController
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -26,22 +27,51 @@ def in_float64(function: Callable[P, R]) -> Callable[P, R]:
 
     Gram matrices of smooth kernels have condition numbers near 1e8, beyond float32. Of a few
     hundred rows, they are factored faster by one thread than by several, which wait for each
-    other: a criticism beside another process took 260 s by two threads and 35 s by one. It also
-    gives the same bits on every number of processors. A caller may have made NumPy raise where the
-    engine looks at what is not finite by itself.
+    other: a criticism beside another process took 260 s by two threads and 35 s by one. BLAS also
+    gives the same bits then, however many processors there are. The number of its threads belongs
+    to the whole process: other Python threads have one, too, while the engine computes. A caller
+    may have made NumPy raise where the engine looks at what is not finite by itself.
     """
 
     @functools.wraps(function)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
-        one_thread = _thread_pools().limit(limits=1, user_api="blas")
-        with jax.enable_x64(True), np.errstate(**NUMPY_DEFAULTS), one_thread:
+        with jax.enable_x64(True), np.errstate(**NUMPY_DEFAULTS), _one_blas_thread:
             return function(*args, **kwargs)
 
     return wrapped
 
 
+class _OneBlasThread:
+    """Limits BLAS to one thread from the first Python thread that enters to the last that leaves.
+
+    threadpoolctl alone restores what each thread has found, which may be the limit of another, and
+    lets only the thread that limited OpenBLAS change it back.
+    """
+
+    def __init__(self):
+        self._lock, self._inside = Lock(), 0
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._inside == 0:
+                OpenBLASController.clear_controlling_thread(force=True)
+                self._limit = _blas().limit(limits=1)
+            self._inside += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._inside -= 1
+            if self._inside == 0:
+                OpenBLASController.clear_controlling_thread(force=True)
+                self._limit.restore_original_limits()
+                OpenBLASController.clear_controlling_thread()
+
+
+_one_blas_thread = _OneBlasThread()
+
+
 @functools.cache
-def _thread_pools() -> ThreadpoolController:
+def _blas() -> ThreadpoolController:
     import scipy.linalg  # noqa: F401  its BLAS is another than NumPy's, and known once it is loaded
 
-    return ThreadpoolController()
+    return ThreadpoolController().select(user_api="blas")

@@ -225,7 +225,7 @@ class CriticismSettings:
         effects: Names of those that are considered; None is all.
         accept: Names of those that join the model whatever the verdict.
         seed: Seed of all random draws.
-        batch: Simulations run at the same time: four in each of two threads.
+        batch: Simulations in one call where there is no executor; a thread takes four.
     """
 
     effects: Names | None = None

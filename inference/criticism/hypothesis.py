@@ -106,6 +106,7 @@ class Hypothesis:
         return left[:, size > INDEPENDENT_SLOPE * size.max(initial=1.0)]
 
     @cached_property
+    @in_float64
     def sd(self) -> np.ndarray:
         """Of the parameters in prior quantiles, by Laplace's approximation [d]."""
         # a uniform quantile has the variance 1/12

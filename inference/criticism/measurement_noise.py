@@ -103,6 +103,7 @@ def samples(observed: np.ndarray) -> Layout:
     return Layout(at % channels, at // channels)
 
 
+@in_float64
 def gaussian(rng: np.random.Generator, covariance: np.ndarray, count: int) -> np.ndarray:
     """Draws [count, n] of mean zero; the covariance [n, n] may be singular."""
     values, vectors = np.linalg.eigh(covariance)

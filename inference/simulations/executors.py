@@ -116,7 +116,7 @@ def _dask(address: str) -> Iterator[Executor]:
     except (OSError, ValueError) as err:
         raise ConnectionError(
             f"no Dask scheduler answers at {address!r}; give the address of one that runs, such "
-            f"as tcp://host:8786: {err}"
+            f"as tcp://host:8786, or an executor itself: {err}"
         ) from err
     with client:
         # impure: a simulation that is asked for again failed before, and is to be tried again

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._float64 import in_float64
 from ..arguments import checked_array
 from .output_vectors import Output
 
@@ -76,6 +77,7 @@ def _independent(variances: np.ndarray) -> GivenNoise:
     return GivenNoise(variances, np.zeros((len(variances), 0)))
 
 
+@in_float64
 def _covariance(given: np.ndarray, output: Output) -> GivenNoise:
     """White noise and factors of the covariance; the white part keeps it well conditioned."""
     refusal = "noise must be a finite, symmetric, positive semidefinite covariance"

@@ -1,16 +1,53 @@
 """The demo refuses what is not its own; the README's commands run the whole of it."""
 
-import shutil
+from dataclasses import replace
+from importlib.resources import files
 
 import pytest
+import tomli_w
 
-from bolfi_liquids.demo import run_demo
+from bolfi_liquids.calibration.calibrate import run_record
+from bolfi_liquids.calibration.stir_simulator import stirring_of
+from bolfi_liquids.demo import RECORDING, run_demo
 from bolfi_liquids.errors import InputError
+from bolfi_liquids.inputs.open import open_recording
+from bolfi_liquids.inputs.prior import default_prior
+from bolfi_liquids.inputs.settings import CalibrationSettings
+from bolfi_liquids.run.directory import RUN_TOML
 
 
-def test_another_run_is_left_alone(calibration, tmp_path):
-    run = shutil.copytree(calibration.path, tmp_path / "run")
-    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+def of_the_demo(**changes):
+    """What `calibrate` notes of the demo's recording, with other settings."""
+    recording = open_recording(files("bolfi_liquids.data") / RECORDING)
+    settings = replace(CalibrationSettings(), **changes)
+    return run_record(settings, default_prior(), stirring_of([recording], settings.particles))
+
+
+OTHERS = {
+    "another budget": lambda: of_the_demo(budget=8),
+    "another seed": lambda: of_the_demo(seed=3),
+    "another recording": lambda: of_the_demo() | {"inputs": {"sha256": ["ab"]}},
+    "something else": lambda: {"a": {"b": 1}},
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_another_run_is_left_alone(tmp_path, name):
+    held = tomli_w.dumps(OTHERS[name]())
+    (tmp_path / RUN_TOML).write_text(held)
     with pytest.raises(InputError, match="another run.*`out`"):
-        run_demo(run)
-    assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
+        run_demo(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == [RUN_TOML]
+    assert (tmp_path / RUN_TOML).read_text() == held
+
+
+def test_its_own_run_is_gone_on_with(tmp_path, monkeypatch):
+    (tmp_path / RUN_TOML).write_text(tomli_w.dumps(of_the_demo()))
+
+    def begins(recording, *, out, resume, **_):
+        assert (recording.name, out, resume) == (RECORDING, tmp_path, True)
+        raise InterruptedError
+
+    monkeypatch.setattr("bolfi_liquids.demo.calibrate", begins)
+    with pytest.raises(InterruptedError):
+        run_demo(tmp_path)
