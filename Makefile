@@ -1,9 +1,13 @@
-# Two commands on a fresh machine: `make demo` and `make test`. Both set up .venv first.
+# Two commands on a fresh machine: `make demo` and `make test`. Both set up .venv first, `make demo`
+# with what users need alone.
 # `make peers` is for tests/benchmarks alone.
 
 VENV := .venv
 BIN := $(VENV)/bin
+MADE := $(VENV)/pyvenv.cfg
+RUNS := $(VENV)/.runs
 INSTALLED := $(VENV)/.installed
+PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 PYENV_VERSIONS := $(or $(PYENV_ROOT),$(HOME)/.pyenv)/versions
 # ArviZ 1 needs Python 3.12; pyenv's command `python3.12` fails where that version is not selected
 SUPPORTED := import sys, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
@@ -18,11 +22,13 @@ SHARED := -n logical --maxprocesses 4 --dist worksteal
 PEERS := .venv-peers
 PEERS_SUPPORTED := import sys, ensurepip; sys.exit(not (3, 9) <= sys.version_info[:2] <= (3, 10))
 
+.DELETE_ON_ERROR:
+
 .PHONY: setup demo browser test test-long lint peers clean
 
 setup: $(INSTALLED)
 
-$(INSTALLED): pyproject.toml constraints.txt
+$(MADE): pyproject.toml constraints.txt
 	@python=; \
 	for candidate in $(PYTHON) python3.12 "$(PYENV_VERSIONS)"/3.12.*/bin/python \
 		python3.13 "$(PYENV_VERSIONS)"/3.13.*/bin/python \
@@ -35,10 +41,16 @@ $(INSTALLED): pyproject.toml constraints.txt
 	fi; \
 	echo "Setting up $(VENV) with $$("$$python" --version)"; \
 	"$$python" -m venv --clear $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+
+$(RUNS): $(MADE)
+	$(PIP_INSTALL) -e .
 	@touch $@
 
-demo: setup
+$(INSTALLED): $(MADE)
+	$(PIP_INSTALL) -e '.[dev]'
+	@touch $(RUNS) $@
+
+demo: $(RUNS)
 	$(BIN)/bolfi-liquids demo --out runs/demo
 
 # for the report page's test
