@@ -19,7 +19,12 @@ from bolfi_liquids import inference
 PATIENCE = 30.0  # s
 
 
-BLAS = ThreadpoolController().select(user_api="blas").lib_controllers
+# other packages bring a BLAS along, which the engine does not call
+BLAS = [
+    library
+    for library in ThreadpoolController().select(user_api="blas").lib_controllers
+    if "numpy" in library.filepath or "scipy" in library.filepath
+]
 
 
 def blas_threads():
