@@ -17,6 +17,7 @@ from .run.directory import RUN_TOML, read_run
 
 if TYPE_CHECKING:
     from .inference.simulations import Workers
+    from .inputs.recording import Recording
     from .pouring.result import Judged
 
 RECORDING, HELD_OUT = "late_oil_v10.nc", "late_oil_v7.nc"  # the cameras were late, and say nothing
@@ -56,8 +57,9 @@ def run_demo(out: Path, *, executor: "Workers | None" = None, timeout: float | N
         as_file(data / HELD_OUT) as held_out,
         as_file(data / CLEAN) as clean,
     ):
-        _refuse_other_run(out, recording)
-        calibration = calibrate(recording, out=out, resume=True, **where)
+        stir = open_recording(recording)
+        _refuse_other_run(out, stir)
+        calibration = calibrate(stir, out=out, resume=True, **where)
         # the fit is bad, and without criticism nobody should pour after it
         before = choose_pour(calibration, pours=POURS, force=True, **where)
         criticism = criticise(calibration, held_out=held_out, baseline=clean, **where)
@@ -65,7 +67,7 @@ def run_demo(out: Path, *, executor: "Workers | None" = None, timeout: float | N
     return Demo(report(out, **where), before.chosen)
 
 
-def _refuse_other_run(out: Path, recording: Path) -> None:
+def _refuse_other_run(out: Path, stir: "Recording") -> None:
     """Raise `InputError` if `out` holds a run that the demo did not make.
 
     `calibrate` would name options that the demo does not have, or go on with a smaller run.
@@ -73,6 +75,6 @@ def _refuse_other_run(out: Path, recording: Path) -> None:
     if not (out / RUN_TOML).exists():
         return
     held, own = read_run(out), asdict(CalibrationSettings())
-    same_data = held.get("inputs") == {"sha256": [open_recording(recording).hash]}
+    same_data = held.get("inputs") == {"sha256": [stir.hash]}
     if not same_data or {name: held.get("settings", {}).get(name) for name in own} != own:
         raise InputError("holds another run", where=str(out), fix="choose another `out`")

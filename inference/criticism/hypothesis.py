@@ -206,7 +206,7 @@ def _sized(
 ) -> tuple[list[np.ndarray], np.ndarray]:
     """Covariances [m, m] that the noise may have, and their log weights.
 
-    Few clean data tell how large the usual residual is; what is left of these data tells more.
+    Few clean data tell how large the usual residual is; the residual of these data tells more.
     """
     assert surrogate.known is not None
     known, usual = surrogate.known.covariance, usual_in(noise)

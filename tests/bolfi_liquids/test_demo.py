@@ -45,7 +45,7 @@ def test_its_own_run_is_gone_on_with(tmp_path, monkeypatch):
     (tmp_path / RUN_TOML).write_text(tomli_w.dumps(of_the_demo()))
 
     def begins(recording, *, out, resume, **_):
-        assert (recording.name, out, resume) == (RECORDING, tmp_path, True)
+        assert (recording.path.name, out, resume) == (RECORDING, tmp_path, True)
         raise InterruptedError
 
     monkeypatch.setattr("bolfi_liquids.demo.calibrate", begins)
