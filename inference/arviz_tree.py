@@ -20,7 +20,6 @@ from collections.abc import Mapping
 from importlib.metadata import version
 
 import arviz_base
-import jax
 import numpy as np
 import xarray as xr
 
@@ -103,7 +102,7 @@ def add_surrogate(
     surrogate: Surrogate,
     learned_from: np.ndarray,
     u: np.ndarray,
-    key: jax.Array,
+    rng: np.random.Generator,
 ) -> None:
     """Add what the surrogate says of itself: constant_data, posterior_predictive (at evenly
     spaced draws u [chain, draw, d], whose indices are its coordinate `draw`), emulator_checks.
@@ -117,7 +116,7 @@ def add_surrogate(
         tree["constant_data"] = arviz_base.from_dict({"constant_data": constants})["constant_data"]
     chains, draws, d = u.shape
     rows = np.linspace(0, draws - 1, min(draws, PREDICTED_DRAWS)).round().astype(int)
-    predicted = surrogate.predictive(key, u[:, rows].reshape(-1, d))
+    predicted = surrogate.predictive(rng, u[:, rows].reshape(-1, d))
     groups = {
         name: np.asarray(values).reshape(chains, len(rows), *np.shape(values)[1:])
         for name, values in predicted.items()

@@ -14,7 +14,6 @@ from .acquisition.given import chosen, resolve_acquisition
 from .acquisition.replicates import next_replicate
 from .arguments import Unusable, check_flag, checked_array, checked_integer, checked_mapping
 from .describe import describe
-from .gp.process import padded_rows
 from .history import (
     UNKNOWN,
     History,
@@ -35,7 +34,7 @@ from .simulations.returned import told_signals
 from .sobol import sobol, start_size
 from .surrogates.base import Acquisition
 from .surrogates.families import Family, Learnable, Measured, resolve
-from .surrogates.feasibility import feasibility
+from .surrogates.feasibility import Feasibility
 from .surrogates.outliers import sane
 from .surrogates.warnings import EmulatorWarning
 from .types import Theta
@@ -60,8 +59,6 @@ class Bolfi:
             `Acquisition`), or None for the surrogate's best.
         seed: Fixes the start design and the acquisitions.
         initial: Points of the Sobol start design; None is 2 d + 6.
-        capacity: Simulations for which arrays are reserved, rounded up to a power of two; up
-            to there nothing is compiled anew. Small ones are faster, larger runs double it.
         options: Of the surrogate's family: `summary`, `noise`, `components`, `predicted` and
             `discrepancy` of "signal"; `discrepancy`, `transform`, `threshold` and `hyper_draws`
             of "discrepancy".
@@ -79,7 +76,6 @@ class Bolfi:
         acquisition: str | Acquisition | None = None,
         seed: int = 0,
         initial: int | None = None,
-        capacity: int = 256,
         **options: Any,
     ):
         checked_prior(prior)
@@ -94,7 +90,6 @@ class Bolfi:
             MIN_LEARN,
             MOST_SIMULATIONS,
         )
-        self.capacity = checked_integer("capacity", capacity, 1, MOST_SIMULATIONS)
         self.family = resolve(surrogate, options)
         self._learner = self.family.learner(self.observed)
         self._acquire = resolve_acquisition(acquisition, self.family.name, self.family.acquisition)
@@ -194,13 +189,14 @@ class Bolfi:
         """theta [n, d] of the engine's choice, `designed` [m, d] being asked with them."""
         history = self._state.history
         pending = np.concatenate([self._state.pending, designed])
-        rows = self._rows(len(pending) + n)
-        self._learned = self._learner.learn(self._known(), rows, self._learned)
+        self._learned = self._learner.learn(self._known(), self._learned)
         repeated = next_replicate(history, pending) if self.family.replicates else None
         parts = [] if repeated is None else [repeated[None]]
         if n > len(parts):
-            runs = feasibility(history.u, history.succeeded & sane(history.discrepancy), rows)
-            key = jax.random.fold_in(jax.random.key(self.seed), self._state.asked)
+            runs = Feasibility(history.u, history.succeeded & sane(history.discrepancy))
+            # made by NumPy: JAX would compile for half a second
+            words = np.random.SeedSequence([self.seed, self._state.asked]).generate_state(2)
+            key = jax.random.wrap_key_data(words)
             believing = self._learned.believe(self.prior.to_unit(self.prior.to_dict(pending)))
             shape = n - len(parts), len(self.prior)
             u = chosen(in_float64(self._acquire)(key, believing, shape[0], runs), shape)
@@ -212,10 +208,6 @@ class Bolfi:
         good = history.distinct
         known = history.u[good], history.features[good], history.discrepancy[good]
         return Learnable(*known, self.prior.normal)
-
-    def _rows(self, extra: int) -> int:
-        """Rows of the arrays for what was told and `extra` more."""
-        return padded_rows(max(self.capacity, self.told + extra))
 
     def tell(
         self,
@@ -350,7 +342,7 @@ class Bolfi:
             )
         started = time.perf_counter()
         known, history = self._known(), self._state.history
-        fitted = self._learner.finish(known, self._rows(0), self.seed)
+        fitted = self._learner.finish(known, self.seed)
         learned_from = history.distinct
         learned_from[learned_from] = self._learner.learnable(known.discrepancy)
         spent = self._seconds + time.perf_counter() - started

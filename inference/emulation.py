@@ -5,7 +5,6 @@ from numpy.typing import ArrayLike
 
 from ._float64 import in_float64
 from .arguments import checked_array
-from .gp.process import padded_rows
 from .prior import Prior, checked_prior
 from .regression import MIN_VALUES
 from .surrogates import emulator as vectors
@@ -70,7 +69,7 @@ def emulate(prior: Prior, theta: Theta, outputs: ArrayLike, scale: ArrayLike) ->
         )
     if not prior.contains(rows).all():
         raise ValueError("theta must lie in the support of the prior; leave the other rows out")
-    limits = Limits(COMPONENTS, padded_rows(int(finite.sum())), predicted=None)
+    limits = Limits(COMPONENTS, predicted=None)
     u = prior.to_unit(rows)[finite]
     learned = vectors.emulate(u, known[finite], lambda _: weights, limits, None, prior.normal)
     return Emulation(prior, learned)

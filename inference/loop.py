@@ -157,8 +157,6 @@ def fit(  # noqa: PLR0913  the one call that most users make
         acquisition=acquisition,
         seed=seed,
         initial=initial,
-        # whole rounds are asked
-        capacity=min(max(1, told + -(-budget // batch) * batch), MOST_SIMULATIONS),
         **options,
     )
     if earlier is not None:

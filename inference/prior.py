@@ -146,9 +146,11 @@ class Prior:
 
     @cached_property
     @in_float64
-    def normal(self) -> np.ndarray:
-        """Which parameters, or their logs, are rather normal than uniform, bool [d]."""
-        return np.array([_rather_normal(u) for u in self._univariate.values()])
+    def normal(self) -> np.ndarray | None:
+        """Which parameters, or their logs, are rather normal than uniform, bool [d]; None for
+        none."""
+        found = np.array([_rather_normal(u) for u in self._univariate.values()])
+        return found if found.any() else None
 
     def contains(self, theta: Theta) -> np.ndarray:
         """Whether theta lies in the support, bool [...]."""

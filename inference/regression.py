@@ -5,7 +5,6 @@ from numpy.typing import ArrayLike
 
 from ._float64 import in_float64
 from .arguments import checked_array
-from .gp.process import padded_rows
 from .prior import Prior, checked_prior
 from .result import SurrogateView
 from .surrogates.discrepancy import DiscrepancySurrogate, learn
@@ -68,5 +67,5 @@ def regress(
     if not prior.contains(rows).all():
         raise ValueError("theta must lie in the support of the prior; leave the other rows out")
     u = prior.to_unit(rows)[finite]
-    learned = learn(u, known[finite], padded_rows(n), transform, normal=prior.normal)
+    learned = learn(u, known[finite], transform, normal=prior.normal)
     return Regression(prior, learned)

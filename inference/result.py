@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import jax
 import numpy as np
 
 from ._float64 import in_float64
@@ -254,8 +253,8 @@ class Fit:
         drawn = self.prior.from_unit(rng.random((draws, len(self.prior))))
         tree = results_tree(self.prior, made.chains, drawn, self.observed, self.simulations)
         tree["posterior"].attrs.update(status=made.status, draws_made=made.steps, **made.checks)
-        key = jax.random.key(seed)
-        add_surrogate(tree, self.learned, self.learned_from, made.chains.u, key)
+        rng = np.random.default_rng([seed, *b"predictive"])
+        add_surrogate(tree, self.learned, self.learned_from, made.chains.u, rng)
         attributes: dict[str, object] = {
             **self.settings,
             **{"sampler": sampler, **length._asdict(), "extend": extend, "sampling_seed": seed},

@@ -1,21 +1,19 @@
 """Types that every room of the engine shares. Loads nothing but NumPy, for workers import it."""
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
-
-if TYPE_CHECKING:
-    import jax
 
 Theta = Mapping[str, np.ndarray]
 """Parameter name -> values in natural units; all of shape [n], or all scalars."""
 
-LogLikelihood = Callable[[Any, "jax.Array"], "jax.Array"]
-"""(state, u [d]) -> scalar. A module-level function, so that what it compiles to is cached."""
+LogLikelihood = Callable[[Any, Any], Any]
+"""(state, u [n, d]) -> [n], for arrays of NumPy and of JAX (see `namespaces`). A module-level
+function, so that what it compiles to is cached."""
 
-LogSecondMoment = Callable[[Any, "jax.Array", Any], "jax.Array"]
-"""(state, u [d], spread [k] or None) -> scalar; see `signal_likelihood.log_second_moment`."""
+LogSecondMoment = Callable[[Any, np.ndarray, np.ndarray | None], np.ndarray]
+"""(state, u [n, d], spread [k, n] or None) -> [n]; see `signal_likelihood.log_second_moment`."""
 
 
 class Simulator(Protocol):

@@ -9,7 +9,6 @@ import typer
 
 from .. import __version__
 from ..run.directory import check_resumable
-from ..run.jax_cache import keep_compilations
 from . import check as cli_check
 from . import guide, import_table, reproduce
 from . import record as cli_record
@@ -70,7 +69,6 @@ def _global_options(
     ] = False,
 ) -> None:
     """`--debug` is read by `OneLineErrors`."""
-    keep_compilations()
     print_notices()
 
 

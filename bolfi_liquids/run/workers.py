@@ -14,7 +14,6 @@ from threading import Thread
 from typing import TYPE_CHECKING
 
 from ..errors import Argument, InputError
-from .jax_cache import ignore_torn_entries
 
 if TYPE_CHECKING:
     from ..inference.simulations import Workers
@@ -35,7 +34,7 @@ def processes(count: int | None = None) -> Iterator[Executor | None]:
         yield None
         return
     spawn = get_context("spawn")
-    pool = ProcessPoolExecutor(count, mp_context=spawn, initializer=_begin)
+    pool = ProcessPoolExecutor(count, mp_context=spawn, initializer=_follow_parent)
     try:
         yield pool
     except BaseException:
@@ -81,11 +80,6 @@ def _check_timeout(timeout: float | None) -> None:
             where=Argument("timeout"),
             fix="give a positive number of seconds, or none",
         ) from refused
-
-
-def _begin() -> None:
-    ignore_torn_entries()
-    _follow_parent()
 
 
 def _follow_parent() -> None:

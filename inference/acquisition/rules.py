@@ -6,40 +6,26 @@ point of a batch before it chooses the next (see `believe` of the surrogates).
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, partial
-from typing import Any, NamedTuple
+from functools import partial
+from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from scipy.special import ndtr, ndtri
 
 from .._float64 import in_float64
 from ..arguments import checked_number
 from ..gp.optimise import minimise_in_box
-from ..gp.process import (
-    GP,
-    predict,
-    predict_joint,
-    predict_many,
-)
+from ..gp.process import predict, predict_joint
+from ..namespaces import log_sum_exp
 from ..surrogates.base import Surrogate
 from ..surrogates.feasibility import Feasibility, log_feasible
-from ..types import LogLikelihood, LogSecondMoment
 from .screen import ROUNDS, screen
 
 CANDIDATES = 128  # points among which a rule chooses
 INTEGRATION_NODES = 32  # points over which a variance is integrated
 MIN_EFFECTIVE = 32.0  # candidates that count, effectively
 MIN_POWER = 1e-6
-
-
-class LCBState(NamedTuple):
-    """What the bound depends on."""
-
-    gp: GP
-    width: jax.Array  # []
-    feasibility: Feasibility
 
 
 def exploration_width(t: int, dimension: int, epsilon: float = 0.1) -> float:
@@ -53,13 +39,17 @@ def exploration_width(t: int, dimension: int, epsilon: float = 0.1) -> float:
     return float(np.sqrt(2.0 * np.log(t ** (dimension / 2 + 2) * np.pi**2 / (3.0 * epsilon))))
 
 
-def lower_confidence_bound(state: LCBState, u: jax.Array) -> jax.Array:
-    """mu - eta sqrt(v) at u [d], v the variance of the latent mean (without noise).
+def lower_confidence_bound(
+    surrogate: Surrogate, feasibility: Feasibility, u: np.ndarray
+) -> np.ndarray:
+    """mu - eta_t sqrt(v) at u [n, d], v the variance of the latent mean (without noise).
 
     In standard deviations of the targets, less the log chance that a run at u succeeds.
     """
-    mean, variance = predict(state.gp, u)
-    return jnp.mean(mean - state.width * jnp.sqrt(variance)) - log_feasible(state.feasibility, u)
+    data = surrogate.gp.data
+    mean, variance = predict(surrogate.gp, u)
+    bound = mean - exploration_width(*data.u.shape) * np.sqrt(variance)
+    return np.mean(bound, axis=0) - log_feasible(feasibility, u)
 
 
 @dataclass(frozen=True)
@@ -87,10 +77,8 @@ class LowerConfidenceBound:
         """n points u [n, d]; each is believed before the next is chosen."""
         rng, points = generator(key), []
         while len(points) < n:
-            dimension = surrogate.gp.data.u.shape[1]
-            width = jnp.asarray(exploration_width(int(surrogate.gp.data.used), dimension))
-            state = LCBState(surrogate.gp, width, feasibility)
-            centre = minimise_in_box(lower_confidence_bound, state, dimension)
+            bound = partial(lower_confidence_bound, surrogate, feasibility)
+            centre = minimise_in_box(bound, surrogate.gp.data.u.shape[1])
             points.append(truncated_normal(rng, centre, self.jitter))
             if len(points) < n:
                 surrogate = surrogate.believe(points[-1][None])
@@ -126,8 +114,9 @@ def candidates(
     """
     dimension = surrogate.gp.data.u.shape[1]
     shifts = rng.uniform(size=(ROUNDS, dimension + 1))
-    found = screen(jnp.asarray(shifts), _root(surrogate.log_likelihood), surrogate.state)
-    log_target, log_weights = np.asarray(found.log_target), np.asarray(found.log_weights)
+    log_likelihood, state = surrogate.log_likelihood, surrogate.state
+    found = screen(shifts, lambda u: 0.5 * np.asarray(log_likelihood(state, u)))
+    log_target, log_weights = found.log_target, found.log_weights
     log_base = log_weights - np.where(np.isfinite(log_target), log_target, 0.0)
     power, weights = 1.0, _normalised(log_weights)
     while np.sum(weights**2) > 1.0 / MIN_EFFECTIVE and power > MIN_POWER:
@@ -135,9 +124,8 @@ def candidates(
         weights = _normalised(power * log_target + log_base)
     positions = (np.arange(CANDIDATES) + rng.uniform()) / CANDIDATES
     rows = np.minimum(np.searchsorted(np.cumsum(weights), positions), len(weights) - 1)
-    u = np.asarray(found.u)[rows]
-    feasible = np.asarray(_feasible(feasibility, jnp.asarray(u)))
-    return Candidates(u, power * log_target[rows], feasible)
+    u = found.u[rows]
+    return Candidates(u, power * log_target[rows], log_feasible(feasibility, u))
 
 
 def _normalised(log_weights: np.ndarray) -> np.ndarray:
@@ -145,35 +133,11 @@ def _normalised(log_weights: np.ndarray) -> np.ndarray:
     return weights / weights.sum()
 
 
-@cache
-def _root(log_likelihood: LogLikelihood) -> LogLikelihood:
-    """log sqrt(L), half as steep; one function object for each, so that compilations last."""
-
-    def root(state: Any, u: jax.Array) -> jax.Array:
-        return 0.5 * log_likelihood(state, u)
-
-    return root
-
-
-@jax.jit
-def _feasible(feasibility: Feasibility, u: jax.Array) -> jax.Array:
-    return jax.vmap(log_feasible, (None, 0))(feasibility, u)
-
-
-@partial(jax.jit, static_argnums=(0, 1))
-def _log_moments(
-    log_likelihood: LogLikelihood, log_second_moment: LogSecondMoment, state: Any, u: jax.Array
-) -> tuple[jax.Array, jax.Array]:
-    """log E[L] and log E[L^2] at u [n, d]."""
-    first = jax.vmap(log_likelihood, (None, 0))(state, u)
-    return first, jax.vmap(log_second_moment, (None, 0, None))(state, u, None)
-
-
 @in_float64
 def log_moments(surrogate: Surrogate, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """log E[L] and log Var[L] at u [n, d], L being known only through the surrogate."""
-    functions = surrogate.log_likelihood, surrogate.log_second_moment
-    first, second = map(np.asarray, _log_moments(*functions, surrogate.state, jnp.asarray(u)))
+    first = surrogate.log_likelihood(surrogate.state, u)
+    second = surrogate.log_second_moment(surrogate.state, u, None)
     excess = np.maximum(second - 2.0 * first, 1e-12)
     return first, 2.0 * first + excess + np.log(-np.expm1(-excess))
 
@@ -254,16 +218,12 @@ class PosteriorDraws:
         return log_likelihood - found.log_density + rng.gumbel(size=len(found.u))
 
 
-@partial(jax.jit, static_argnums=0)
-def _log_resolved(
-    log_second_moment: LogSecondMoment, state: Any, u: jax.Array, nodes: jax.Array
-) -> jax.Array:
+def _log_resolved(surrogate: Surrogate, u: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """log E[E[L(node) | a run at u]^2], [m, n] for nodes [m, d] and u [n, d]."""
-    noise = jnp.exp(2.0 * state.gp.hyper.log_noise)[:, None]
-    at_u = predict_many(state.gp, u)[1] + noise
-    spread = predict_joint(state.gp, nodes, u) ** 2 / at_u[:, None, :]  # [k, m, n]
-    of_pair = jax.vmap(log_second_moment, (None, None, 1))
-    return jax.vmap(of_pair, (None, 0, 1))(state, nodes, spread)
+    gp = surrogate.gp
+    at_u = predict(gp, u)[1] + np.exp(2.0 * gp.hyper.log_noise)[:, None]
+    spread = predict_joint(gp, nodes, u) ** 2 / at_u[:, None, :]  # [k, m, n]
+    return surrogate.log_second_moment(surrogate.state, nodes, np.moveaxis(spread, 0, -1))
 
 
 @dataclass(frozen=True)
@@ -283,10 +243,8 @@ class ExpectedIntegratedVariance:
     @staticmethod
     def _score(rng: np.random.Generator, surrogate: Surrogate, found: Candidates) -> np.ndarray:
         rows = rng.permutation(len(found.u))[:INTEGRATION_NODES]
-        u, nodes = jnp.asarray(found.u), jnp.asarray(found.u[rows])
-        resolved = _log_resolved(surrogate.log_second_moment, surrogate.state, u, nodes)
-        weighted = np.asarray(resolved) - found.log_density[rows, None]
-        return np.logaddexp.reduce(weighted, axis=0)
+        resolved = _log_resolved(surrogate, found.u, found.u[rows])
+        return log_sum_exp((resolved - found.log_density[rows, None]).T)
 
 
 RULES = {

@@ -2,16 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
-import jax
 import numpy as np
 from scipy.linalg import solve_triangular
 
 from .._float64 import in_float64
 from ..bolfi import Bolfi
-from ..gp import process as processes
-from ..gp.linalg import small_inverse_cholesky
 from ..gp.optimise import minimise_in_box
 from ..prior import Prior
 from ..result import Fit
@@ -20,7 +17,7 @@ from ..surrogates.families import SignalFamily
 from ..surrogates.measurement_noise import Layout, Nodes, Reduced
 from ..surrogates.output_vectors import Output
 from ..surrogates.signal import SignalSurrogate
-from ..surrogates.signal_likelihood import SignalState
+from ..surrogates.signal_likelihood import SignalState, eliminate, scores
 from .measurement_noise import Noise, samples
 from .prior_boxes import LATER_HALF_WIDTH, Box, around, intersection
 from .run_noise import own_errors, resized, smooth_covariance
@@ -155,7 +152,7 @@ def hypothesise(
     # every component: a small effect may show in one that few runs hardly predict
     covariance = noise.covariance(samples(observed))
     family = SignalFamily(noise=covariance, components=COMPONENTS, predicted=None)
-    engine = Bolfi(prior, observed, surrogate=family, capacity=1)
+    engine = Bolfi(prior, observed, surrogate=family)
     theta = {name: told.theta[name] for name in prior.names}
     engine.tell(theta, told.signals, told.seeds)
     fit = engine.fit(warn=False)  # that a model cannot reach the data is what is looked for
@@ -198,7 +195,7 @@ def _nearest(
     own = smooth_covariance(errors, surrogate.output.layout, surrogate.output.series)
     reduced = _reduced(surrogate, [own + surrogate.known.covariance])
     state = replace(surrogate, reduced=reduced).state
-    return minimise_in_box(_squared_distance, state, len(within.low), *within), own
+    return minimise_in_box(partial(_squared_distance, state), len(within.low), *within), own
 
 
 def _sized(
@@ -237,15 +234,13 @@ def _reduced(surrogate: SignalSurrogate, covariances: Sequence[np.ndarray]) -> R
     return Reduced(estimate, error, log_weight - log_weight.max())
 
 
-def _squared_distance(state: SignalState, u: jax.Array) -> jax.Array:
-    """Half the squared distance of expected from observed scores, by the noise alone.
+def _squared_distance(state: SignalState, u: np.ndarray) -> np.ndarray:
+    """At u [n, d]: half the squared distance of expected from observed scores, by the noise alone.
 
     Not the likelihood, in which the emulator's variance counts as noise: where a model cannot
     reach the data, it is greatest where the emulator knows least.
     """
-    mean, _ = processes.predict(state.gp, u)
-    white = small_inverse_cholesky(state.covariance[0]) @ (state.estimate[0] - mean * state.used)
-    return 0.5 * white @ white
+    return 0.5 * eliminate(state.covariance[0], state.estimate[0] - scores(state, u)[0])[1]
 
 
 def values_of(output: Output, drawn: np.ndarray) -> np.ndarray:

@@ -2,12 +2,12 @@
 
 from typing import NamedTuple
 
-import jax
 import numpy as np
+from scipy.special import ndtr
 
 from .._float64 import in_float64
 from ..sampling.importance import explore
-from ..sampling.mixture import to_unit
+from ..sampling.target import Target
 from .hypothesis import Hypothesis
 
 
@@ -48,9 +48,9 @@ class Weighted(NamedTuple):
 def weighted_posterior(hypothesis: Hypothesis, seed: int = 0) -> Weighted:
     """Adaptive importance sampling of a hypothesis's posterior, see `importance.explore`."""
     surrogate, prior = hypothesis.surrogate, hypothesis.fit.prior
-    found = explore(jax.random.key(seed), surrogate.log_likelihood, surrogate.state, len(prior))
-    log_weights = np.asarray(found.log_weights)
-    used = np.isfinite(log_weights)
-    weights = np.exp(log_weights[used] - log_weights[used].max())
-    theta = prior.from_unit(np.asarray(to_unit(found.x))[used])
+    target = Target(surrogate.log_likelihood, surrogate.state, len(prior))
+    found = explore(np.random.default_rng(seed), target)
+    used = np.isfinite(found.log_weights)
+    weights = np.exp(found.log_weights[used] - found.log_weights[used].max())
+    theta = prior.from_unit(ndtr(found.x[used]))
     return Weighted(theta, weights / weights.sum())

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..gp.condition import leave_one_out
+from ..gp.process import leave_one_out
 from ..surrogates.emulator import Emulator
 from ..surrogates.measurement_noise import Layout
 from .usual_residual import positive_autocovariance
@@ -70,9 +70,10 @@ def own_errors(emulator: Emulator) -> np.ndarray:
     """
     basis, n = emulator.basis, len(emulator.outputs)
     used = basis.used
-    mean, variance = (np.asarray(part)[:used, :n] for part in leave_one_out(emulator.gp))
-    noise = np.exp(2.0 * np.asarray(emulator.gp.hyper.log_noise))[:used, None]
-    left = np.asarray(emulator.gp.data.y)[:used, :n] - mean
+    gp = emulator.gp.only(slice(used))
+    mean, variance = leave_one_out(gp)
+    noise = np.exp(2.0 * gp.hyper.log_noise)[:, None]
+    left = gp.data.y - mean
     left[:, : emulator.learned_at] /= 1.0 - emulator.excess[:used, None]
     scores = left * np.sqrt(np.minimum(noise / variance, 1.0))
     centred = np.sqrt(n / max(n - 1, 1))

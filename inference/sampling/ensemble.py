@@ -1,17 +1,15 @@
 """Affine-invariant ensemble sampling through emcee."""
 
 from collections.abc import Iterator
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import jax
 import numpy as np
 from scipy.special import ndtr
 
-from ..types import LogLikelihood
+from .importance import explore
 from .mixture import UNIFORMS, Mixture, propose
 from .mixture import log_density as log_mixture
-from .starts import look_around, resampled
+from .starts import resampled
 from .target import (
     LOG_ZERO,
     Chains,
@@ -27,20 +25,6 @@ WALKERS = 32
 MAX_THIN = 64  # steps; beyond, R-hat and ESS judge instead
 
 
-@partial(jax.jit, static_argnums=0)
-def _log_densities(log_likelihood: LogLikelihood, state: Any, x: jax.Array) -> jax.Array:
-    return jax.vmap(log_density, in_axes=(None, None, 0))(log_likelihood, state, x)
-
-
-@jax.jit
-def _jumps(
-    mixture: Mixture, x: jax.Array, z: jax.Array, uniforms: jax.Array
-) -> tuple[jax.Array, jax.Array]:
-    """Independent proposals [n, d], and log q(x) - log q(proposal)."""
-    new = propose(mixture, z, uniforms)
-    return new, log_mixture(mixture, x) - log_mixture(mixture, new)
-
-
 def sample_emcee(rng: np.random.Generator, target: Target, length: Length) -> Iterator[Chains]:
     """Stretch, differential-evolution and independence moves; an ensemble of its own per chain.
 
@@ -53,7 +37,7 @@ def sample_emcee(rng: np.random.Generator, target: Target, length: Length) -> It
     Yields:
         `length.draws` more draws of each chain, without end.
     """
-    found = look_around(rng, target)
+    found = explore(rng, target)
     walkers = max(WALKERS, 4 * target.dimension)
     samplers = [_sampler(target, found.mixture, walkers, rng) for _ in range(length.chains)]
     warm = [
@@ -81,16 +65,13 @@ def _sampler(
     d = target.dimension
 
     def log_prob(x: np.ndarray) -> np.ndarray:
-        padded = np.zeros((walkers, d))  # moves ask for half the walkers or all: one shape
-        padded[: len(x)] = x
-        values = _log_densities(target.log_likelihood, target.state, padded)
-        values = np.asarray(values)[: len(x)]
+        values = np.asarray(log_density(target.log_likelihood, target.state, x))
         return np.where(np.isfinite(values), values, LOG_ZERO)
 
     def jump(x: np.ndarray, random: Any) -> tuple[np.ndarray, np.ndarray]:
         uniforms = 1.0 - random.random_sample((len(x), UNIFORMS))
-        new, factors = _jumps(mixture, x, random.standard_normal(x.shape), uniforms)
-        return np.asarray(new), np.asarray(factors)
+        new = propose(mixture, random.standard_normal(x.shape), uniforms)
+        return new, log_mixture(mixture, x) - log_mixture(mixture, new)
 
     import emcee  # loaded on use, as are all that one sampler alone needs
 

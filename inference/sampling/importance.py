@@ -7,34 +7,22 @@ al. 2012, adaptive multiple importance sampling; Veach and Guibas 1995, balance 
 """
 
 import math
-from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax.scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 
 from ..sobol import sobol
-from ..types import LogLikelihood
-from .mixture import (
-    COMPONENTS,
-    UNIFORMS,
-    Mixture,
-    fit_mixture,
-    log_density,
-    log_prior,
-    log_sum_exp,
-    propose,
-    to_unit,
-)
+from .mixture import UNIFORMS, Mixture, fit_mixture, log_density, log_prior, propose
+from .target import NOWHERE_FINITE, Target, log_likelihood
 
 ROUND_POINTS = 256  # points of each round
-SCREEN_ROUNDS = 4  # rounds that fill the prior evenly
-MAX_ROUNDS = 16  # at most; an easy posterior stops after six or seven
+SCREEN_POINTS = 1024  # points that fill the prior evenly
+MAX_ROUNDS = 12  # at most; an easy posterior stops after two or three
 MIN_EFFECTIVE = 400.0  # effective points at which one more round ends it
 BOX_EDGE = 1e-12  # quantile at which the box is cut, so that x = Phi^-1(u) stays finite
 MIN_LOG_POWER = -60.0  # log of the smallest inverse temperature
+HALVINGS = 30  # of the interval of log powers
 SHARPENED_WIDTH = 0.5  # width of half the proposals, while the temperature still has to fall
 
 
@@ -42,207 +30,93 @@ class Population(NamedTuple):
     """Weighted points, and the mixture that proposes more of their kind.
 
     Coordinates x = Phi^-1(u), in which the prior is standard normal. sum_i w_i f(x_i) / sum_i w_i
-    estimates the posterior mean of f; n is constant.
+    estimates the posterior mean of f.
     """
 
-    x: jax.Array  # [n, d]
-    log_likelihood: jax.Array  # [n]
-    log_weights: jax.Array  # [n]; their logsumexp estimates the log evidence; -inf: not used
+    x: np.ndarray  # [n, d]
+    log_likelihood: np.ndarray  # [n]
+    log_weights: np.ndarray  # [n]; their logsumexp estimates the log evidence; -inf: not used
     mixture: Mixture
-    log_proposal: jax.Array  # [n], log density of the mixture
-    effective: jax.Array  # [], effective number of points, (sum w)^2 / sum w^2
-    evaluations: jax.Array  # [], points at which the likelihood was evaluated
+    log_proposal: np.ndarray  # [n], log density of the mixture
+    effective: float  # number of points, (sum w)^2 / sum w^2
 
 
-class _Progress(NamedTuple):
-    round: jax.Array
-    x: jax.Array  # [n, d]; zeros where not yet proposed
-    log_likelihood: jax.Array  # [n]; -inf where not yet proposed
-    log_mass: jax.Array  # [n], log of sum_r n_r q_r(x) over the screen and the rounds so far
-    log_proposal: jax.Array  # [n], log density of the last round's mixture
-    history: Mixture  # of each round after the screen, stacked
-    before: jax.Array  # effective points before the last round
-    effective: jax.Array
+class _Points(NamedTuple):
+    x: np.ndarray  # [n, d]
+    log_likelihood: np.ndarray  # [n]
+    log_mass: np.ndarray  # [n], log of sum_r n_r q_r(x) over the screen and the rounds so far
+
+    def log_weights(self, power: float = 1.0) -> np.ndarray:
+        """Log of likelihood^power times prior over proposals' mass [n]."""
+        return power * self.log_likelihood + log_prior(self.x) - self.log_mass
 
 
-@partial(jax.jit, static_argnames=("log_likelihood", "dimension"))
-def explore(
-    key: jax.Array, log_likelihood: LogLikelihood, state: Any, dimension: int
-) -> Population:
+def explore(rng: np.random.Generator, target: Target) -> Population:
     """Weighted points of the posterior, and what proposes more of them.
 
     About 1500 to 2500 evaluations, in batches of 256; up to 4096 for posteriors so narrow
-    that they must be approached in steps. Compiled once per likelihood and shape of state;
-    to be called under 64-bit types, also from within other compiled functions.
+    that they must be approached in steps. A log likelihood that is not finite counts as zero
+    likelihood.
 
-    Args:
-        key: Fixes the points.
-        log_likelihood: Module-level function (state, u [d]) -> scalar; what is not finite
-            counts as zero likelihood.
-        state: Its first argument, a pytree.
-        dimension: d.
+    Raises:
+        ValueError: the log likelihood was finite nowhere.
     """
-    shifts = _shifts(key, dimension + UNIFORMS)
-    points = jnp.asarray(_quasi_random(dimension))
-
-    def unfinished(now: _Progress) -> jax.Array:
-        return (now.round <= SCREEN_ROUNDS) | (
-            (now.round < MAX_ROUNDS) & (now.before < MIN_EFFECTIVE)
-        )
-
-    def advance(now: _Progress) -> _Progress:
-        screening = now.round < SCREEN_ROUNDS
-        # the screen under one shift, so that its rounds continue one sequence
-        shift = shifts[jnp.where(screening, 0, now.round)]
-        uniforms = jnp.clip(
-            (points[jnp.minimum(now.round, SCREEN_ROUNDS)] + shift) % 1.0, BOX_EDGE, 1 - BOX_EDGE
-        )
-        z = ndtri(uniforms[:, :dimension])
-        fresh = jax.lax.cond(screening, _screened, _proposed, now, z, uniforms[:, dimension:])
-        values = jax.vmap(log_likelihood, in_axes=(None, 0))(state, to_unit(fresh.x))
-        return _weighed(now, fresh, jnp.where(jnp.isfinite(values), values, -jnp.inf))
-
-    last = jax.lax.while_loop(unfinished, advance, _nothing(dimension))
+    d = target.dimension
+    even = sobol(0, 0, SCREEN_POINTS, d) + rng.random(d)
+    cloud = sobol(1, 0, ROUND_POINTS, d + UNIFORMS)
+    x = ndtri(_inside(even))
+    now = _Points(x, _log_likelihoods(target, x), math.log(SCREEN_POINTS) + log_prior(x))
+    if not np.isfinite(now.log_likelihood).any():
+        raise ValueError(NOWHERE_FINITE)
+    mixtures: list[Mixture] = []
+    before = 0.0
+    while len(mixtures) < 1 or (len(mixtures) < MAX_ROUNDS and before < MIN_EFFECTIVE):
+        before = _effective(now.log_weights())
+        mixtures.append(fit_mixture(now.x, *_tempered_weights(now)))
+        uniforms = _inside(cloud + rng.random(d + UNIFORMS))
+        new = propose(mixtures[-1], ndtri(uniforms[:, :d]), uniforms[:, d:])
+        mass = math.log(SCREEN_POINTS) + log_prior(new)
+        for mixture in mixtures[:-1]:
+            mass = np.logaddexp(mass, math.log(ROUND_POINTS) + log_density(mixture, new))
+        joined = _Points(new, _log_likelihoods(target, new), mass)
+        now = _Points(*(np.concatenate(parts) for parts in zip(now, joined, strict=True)))
+        proposed = log_density(mixtures[-1], now.x)
+        mass = np.logaddexp(now.log_mass, math.log(ROUND_POINTS) + proposed)
+        now = now._replace(log_mass=mass)
+    weights = now.log_weights()
     return Population(
-        x=last.x,
-        log_likelihood=last.log_likelihood,
-        log_weights=_log_weights(last, 1.0),
-        mixture=jax.tree.map(lambda leaf: leaf[last.round - SCREEN_ROUNDS - 1], last.history),
-        log_proposal=last.log_proposal,
-        effective=last.effective,
-        evaluations=ROUND_POINTS * last.round,
+        now.x, now.log_likelihood, weights, mixtures[-1], proposed, _effective(weights)
     )
 
 
-def _nothing(dimension: int) -> _Progress:
-    rows, later = ROUND_POINTS * MAX_ROUNDS, MAX_ROUNDS - SCREEN_ROUNDS
-    square = jnp.zeros((later, COMPONENTS, dimension, dimension))
-    history = Mixture(square[..., 0, 0], square[..., 0], square, square, jnp.ones(later))
-    none, zero = jnp.full(rows, -jnp.inf), jnp.asarray(0.0)
-    x = jnp.zeros((rows, dimension))
-    mass = math.log(ROUND_POINTS * SCREEN_ROUNDS) + log_prior(
-        x
-    )  # finite, though these rows are never used
-    return _Progress(jnp.asarray(0), x, none, mass, none, history, zero, zero)
+def _inside(u: np.ndarray) -> np.ndarray:
+    return np.clip(u % 1.0, BOX_EDGE, 1.0 - BOX_EDGE)
 
 
-def _shifts(key: jax.Array, columns: int) -> jax.Array:
-    """Numbers [MAX_ROUNDS, columns] in [0, 1), each uniform over the keys.
-
-    Fixed odd multiples of the key's words, modulo 2^32: jax.random takes a quarter of a
-    second to compile, for a few dozen numbers that only move quasi-random points.
-    """
-    words = jax.random.key_data(key).astype(jnp.uint32).reshape(-1)
-    shape = (len(words), MAX_ROUNDS, columns)
-    odd = 2 * np.random.default_rng(0).integers(2**31, size=shape, dtype=np.uint32) + 1
-    mixed = jnp.sum(words[:, None, None] * odd, axis=0, dtype=jnp.uint32)
-    return mixed / 2.0**32
+def _log_likelihoods(target: Target, x: np.ndarray) -> np.ndarray:
+    values = log_likelihood(target, ndtr(x))
+    return np.where(np.isfinite(values), values, -np.inf)
 
 
-def _quasi_random(dimension: int) -> np.ndarray:
-    """Sobol points in (0, 1), [SCREEN_ROUNDS + 1, ROUND_POINTS, dimension + UNIFORMS].
-
-    Those of the screen continue each other over its first `dimension` columns; the last are
-    shifted anew in each later round.
-    """
-    columns = dimension + UNIFORMS
-    points = np.full((SCREEN_ROUNDS + 1, ROUND_POINTS, columns), 0.5)
-    screen = sobol(0, 0, ROUND_POINTS * SCREEN_ROUNDS, dimension)
-    points[:SCREEN_ROUNDS, :, :dimension] = screen.reshape(SCREEN_ROUNDS, ROUND_POINTS, dimension)
-    points[SCREEN_ROUNDS] = sobol(1, 0, ROUND_POINTS, columns)
-    return points
-
-
-class _Fresh(NamedTuple):
-    """Points to evaluate, and what proposing them changed."""
-
-    x: jax.Array  # [ROUND_POINTS, d]
-    log_mass: jax.Array  # [n], of the points so far
-    log_proposal: jax.Array  # [n]
-    history: Mixture
-
-
-def _screened(now: _Progress, z: jax.Array, uniforms: jax.Array) -> _Fresh:
-    """Points of the prior itself."""
-    return _Fresh(z, now.log_mass, now.log_proposal, now.history)
-
-
-def _proposed(now: _Progress, z: jax.Array, uniforms: jax.Array) -> _Fresh:
-    """Points of a mixture fitted to those so far."""
-    mixture = fit_mixture(now.x, *_tempered_weights(now))
-    density = log_density(mixture, now.x)
-    row = now.round - SCREEN_ROUNDS
-    return _Fresh(
-        propose(mixture, z, uniforms),
-        jnp.logaddexp(now.log_mass, math.log(ROUND_POINTS) + density),
-        density,
-        jax.tree.map(lambda kept, leaf: kept.at[row].set(leaf), now.history, mixture),
-    )
-
-
-def _weighed(now: _Progress, fresh: _Fresh, values: jax.Array) -> _Progress:
-    """Add points and their log likelihoods, and weigh all anew."""
-    rounds = jax.vmap(log_density, in_axes=(0, None))(fresh.history, fresh.x)
-    done = jnp.arange(MAX_ROUNDS - SCREEN_ROUNDS)[:, None] <= now.round - SCREEN_ROUNDS
-    rounds = math.log(ROUND_POINTS) + jnp.where(done, rounds, -jnp.inf)
-    screen = math.log(ROUND_POINTS * SCREEN_ROUNDS) + log_prior(fresh.x)
-    mass = log_sum_exp(jnp.concatenate([screen[:, None], rounds.T], axis=1))
-    last = rounds[jnp.maximum(now.round - SCREEN_ROUNDS, 0)] - math.log(ROUND_POINTS)
-    row = ROUND_POINTS * now.round
-
-    def added(old: jax.Array, new: jax.Array) -> jax.Array:
-        return jax.lax.dynamic_update_slice(old, new, (row, 0)[: old.ndim])
-
-    after = _Progress(
-        round=now.round + 1,
-        x=added(now.x, fresh.x),
-        log_likelihood=added(now.log_likelihood, values),
-        log_mass=added(fresh.log_mass, mass),
-        log_proposal=added(fresh.log_proposal, last),
-        history=fresh.history,
-        before=now.effective,
-        effective=now.effective,
-    )
-    return after._replace(effective=_effective(_log_weights(after, 1.0)))
-
-
-def _tempered_weights(now: _Progress) -> tuple[jax.Array, jax.Array]:
+def _tempered_weights(now: _Points) -> tuple[np.ndarray, float]:
     """Tempered log weights, and the width factor of the next proposals.
 
     The power of the likelihood is the largest that leaves enough effective points (bisection).
     """
     enough = 32.0 + 16.0 * now.x.shape[1]
-
-    def halve(_: int, bounds: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
-        low, high = bounds
+    if _effective(now.log_weights()) >= enough:
+        return now.log_weights(), 1.0
+    low, high = MIN_LOG_POWER, 0.0
+    for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        fits = _effective(_log_weights(now, jnp.exp(middle))) >= enough
-        return jnp.where(fits, middle, low), jnp.where(fits, high, middle)
-
-    cold = now.effective >= enough
-    steps = jnp.where(cold, 0, 30)
-    low, _ = jax.lax.fori_loop(0, steps, halve, (jnp.asarray(MIN_LOG_POWER), jnp.asarray(0.0)))
-    return _log_weights(now, jnp.where(cold, 1.0, jnp.exp(low))), jnp.where(
-        cold, 1.0, SHARPENED_WIDTH
-    )
+        if _effective(now.log_weights(math.exp(middle))) >= enough:
+            low = middle
+        else:
+            high = middle
+    return now.log_weights(math.exp(low)), SHARPENED_WIDTH
 
 
-def _log_weights(now: _Progress, power: jax.Array | float) -> jax.Array:
-    """Log of likelihood^power times prior over proposals' mass; flat where all are zero."""
-    finite = jnp.isfinite(now.log_likelihood)
-    tempered = jnp.where(finite, power * now.log_likelihood, -jnp.inf)
-    return jnp.where(
-        finite.any(),
-        tempered + log_prior(now.x) - now.log_mass,
-        jnp.where(
-            jnp.arange(len(now.x)) < ROUND_POINTS * SCREEN_ROUNDS,
-            -math.log(ROUND_POINTS * SCREEN_ROUNDS),
-            -jnp.inf,
-        ),
-    )
-
-
-def _effective(log_weights: jax.Array) -> jax.Array:
+def _effective(log_weights: np.ndarray) -> float:
     """Kish's effective number of points."""
-    weights = jnp.exp(log_weights - jnp.max(log_weights))
-    return jnp.sum(weights) ** 2 / jnp.sum(weights**2)
+    weights = np.exp(log_weights - np.max(log_weights))
+    return float(np.sum(weights) ** 2 / np.sum(weights**2))

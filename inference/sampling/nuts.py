@@ -8,28 +8,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from numpyro.infer.hmc import HMCState, hmc
+from numpyro.infer.util import ParamInfo
+from scipy.special import ndtr, ndtri
 
+from ..compilation_cache import kept_compilations
 from ..types import LogLikelihood
-from .mixture import (
-    UNIFORMS,
-    Mixture,
-    fit_mixture,
-    propose,
-    to_unit,
-)
+from .importance import explore
+from .mixture import UNIFORMS, Mixture, fit_mixture, propose
 from .mixture import log_density as log_mixture
-from .starts import (
-    local_factor,
-    look_around,
-    resampled,
-    spread_factor,
-)
-from .target import (
-    Chains,
-    Length,
-    Target,
-    log_density,
-)
+from .starts import local_factor, resampled, spread_factor
+from .target import Chains, Length, Target, log_density
 
 BLOCK = 250  # draws of one call of the compiled program, whatever number is asked for
 FIRST_STEP = 0.7  # in whitened coordinates
@@ -51,93 +39,85 @@ STATISTICS = {
 class Guide(NamedTuple):
     """Metric and jump proposal, estimated from the population."""
 
-    factor: jax.Array  # [d, d], x = factor y: the posterior is about as wide in every y
+    factor: np.ndarray  # [d, d], x = factor y: the posterior is about as wide in every y
     mixture: Mixture  # over x, proposes jumps
 
 
-class Block(NamedTuple):
-    """Draws of all chains."""
+class Jumps(NamedTuple):
+    """Proposed jumps of one chain, made by NumPy: they depend on no draw."""
 
-    last: HMCState
-    u: jax.Array  # [chain, BLOCK, d], prior quantiles
-    stats: dict[str, jax.Array]  # name -> [chain, BLOCK]
+    y: np.ndarray  # [n, d]
+    log_proposal: np.ndarray  # [n], log density of the mixture
+    log_uniform: np.ndarray  # [n], with which a jump is accepted; -inf accepts it
 
 
-def _sampler(log_likelihood: LogLikelihood) -> tuple[Any, Any]:
+# compiled within: it is traced and lowered once, though a step and a jump evaluate it
+_log_density = jax.jit(log_density, static_argnums=0)
+
+
+def _sampler() -> tuple[Any, Any]:
     """numpyro's functional interface: its MCMC objects hold model and data in their cache."""
 
-    def potential(state: Any, factor: jax.Array) -> Any:
-        return lambda y: -log_density(log_likelihood, state, factor @ y)
+    def potential(log_likelihood: LogLikelihood, state: Any, factor: jax.Array) -> Any:
+        return lambda y: -_log_density(log_likelihood, state, (factor @ y)[None])[0]
 
     return potential, hmc(potential_fn_gen=potential, algo="NUTS")
 
 
-def _begin_one(
-    y: jax.Array, key: jax.Array, kernel: Any, arguments: tuple[Any, jax.Array], warmup: int
-) -> HMCState:
-    return kernel(
-        y,
-        warmup,
-        step_size=FIRST_STEP,
-        adapt_mass_matrix=False,
-        target_accept_prob=TARGET_ACCEPTANCE,
-        model_args=arguments,
-        rng_key=key,
-    )
+def _settings(y: jax.Array, seed: jax.Array, warmup: int) -> dict[str, Any]:
+    nothing = jnp.zeros(())
+    return {
+        # the first jump, which is accepted, evaluates the start: one copy less of the likelihood
+        "init_params": ParamInfo(y, nothing, jnp.zeros_like(y)),
+        "num_warmup": warmup,
+        "step_size": FIRST_STEP,
+        "adapt_mass_matrix": False,
+        "target_accept_prob": TARGET_ACCEPTANCE,
+        "model_args": (None, None, None),
+        # half a second less to compile than the usual generator
+        "rng_key": jax.random.key(seed, impl="unsafe_rbg"),
+    }
 
 
-@partial(jax.jit, static_argnames=("log_likelihood", "warmup"))
-def _begin(
-    y: jax.Array, keys: jax.Array, state: Any, guide: Guide, *, log_likelihood: Any, warmup: int
-) -> HMCState:
-    """Chains at y [chain, d], about to adapt their step size for `warmup` draws."""
-    _, (kernel, _) = _sampler(log_likelihood)
-    arguments = state, guide.factor
-    return jax.vmap(lambda y, key: _begin_one(y, key, kernel, arguments, warmup))(y, keys)
+@partial(jax.jit, static_argnames="warmup")
+def _begin(y: jax.Array, seed: jax.Array, *, warmup: int) -> HMCState:
+    """A chain at y [d], about to adapt its step size for `warmup` draws."""
+    return _sampler()[1][0](**_settings(y, seed, warmup))
 
 
 @partial(jax.jit, static_argnames=("log_likelihood", "warmup"))
 def _run(
-    last: HMCState, keys: jax.Array, state: Any, guide: Guide, *, log_likelihood: Any, warmup: int
-) -> Block:
-    """BLOCK more draws of each chain.
+    last: HMCState, state: Any, guide: Guide, jumps: Jumps, *, log_likelihood: Any, warmup: int
+) -> tuple[HMCState, Any]:
+    """One more draw for each jump: the last state, prior quantiles [n, d] and statistics [n].
 
     Likelihood state and guide are arguments, so that another fit reuses the compiled program.
+    Chains call it one by one: batched by `vmap` it takes twice as long to compile.
     """
-    potential, (kernel, step) = _sampler(log_likelihood)
-    arguments = state, guide.factor
+    potential, (kernel, step) = _sampler()
+    arguments = log_likelihood, state, guide.factor
+    # numpyro's step knows its settings from the kernel that began; this one is not run
+    kernel(**_settings(last.z, jnp.zeros((), jnp.uint32), warmup))
 
-    def chain(last: HMCState, key: jax.Array) -> Block:
-        # numpyro's step knows its settings from the kernel that began; this one is not run
-        _begin_one(last.z, key, kernel, arguments, warmup)
+    def draw(now: HMCState, jump: Jumps) -> tuple[HMCState, tuple[Any, Any]]:
+        now = step(_jumped(jump, now, potential(*arguments), guide), arguments)
+        stats = {name: read(now) for name, read in STATISTICS.items()}
+        return now, (guide.factor @ now.z, stats)
 
-        def draw(now: HMCState, key: jax.Array) -> tuple[HMCState, tuple[Any, Any]]:
-            now = step(_jumped(key, now, potential(*arguments), guide), arguments)
-            stats = {name: read(now) for name, read in STATISTICS.items()}
-            return now, (to_unit(guide.factor @ now.z), stats)
-
-        end, (u, stats) = jax.lax.scan(draw, last, jax.random.split(key, BLOCK))
-        return Block(end, u, stats)
-
-    return jax.vmap(chain)(last, keys)
+    return jax.lax.scan(draw, last, jumps)
 
 
-def _jumped(key: jax.Array, now: HMCState, potential: Any, guide: Guide) -> HMCState:
+def _jumped(jump: Jumps, now: HMCState, potential: Any, guide: Guide) -> HMCState:
     """An independence step of Metropolis and Hastings, proposed by the mixture.
 
     It keeps the posterior, as the trajectory after it does, and moves chains between modes
     that no path connects.
     """
-    normal, uniform, accept = jax.random.split(key, 3)
-    d = len(now.z)
-    z = jax.random.normal(normal, (1, d))
-    target = propose(guide.mixture, z, jax.random.uniform(uniform, (1, UNIFORMS)))[0]
-    y = jax.scipy.linalg.solve_triangular(guide.factor, target, lower=True)
-    energy, gradient = jax.value_and_grad(potential)(y)
-    old, new = log_mixture(guide.mixture, jnp.stack([guide.factor @ now.z, target]))
-    log_ratio = now.potential_energy - energy + old - new
-    moved = now._replace(z=y, z_grad=gradient, potential_energy=energy)
-    accepted = jnp.log(jax.random.uniform(accept)) < log_ratio
+    energy, gradient = jax.value_and_grad(potential)(jump.y)
+    old = log_mixture(guide.mixture, (guide.factor @ now.z)[None])[0]
+    log_ratio = now.potential_energy - energy + old - jump.log_proposal
+    moved = now._replace(z=jump.y, z_grad=gradient, potential_energy=energy)
+    accepted = jump.log_uniform < log_ratio
     return jax.tree.map(lambda new, old: jnp.where(accepted, new, old), moved, now)
 
 
@@ -151,15 +131,15 @@ def sample_nuts(rng: np.random.Generator, target: Target, length: Length) -> Ite
     Yields:
         `length.draws` more draws of each chain, without end.
     """
-    found = look_around(rng, target)
+    found = explore(rng, target)
     start = resampled(rng, found, length.chains)
-    poor = float(found.effective) < POOR_EFFECTIVE
+    poor = found.effective < POOR_EFFECTIVE
     factor = local_factor(found) if poor else spread_factor(found)
-    guide = Guide(jnp.asarray(factor), found.mixture)
+    guide = Guide(factor, found.mixture)
     blocks = _blocks(rng, target, guide, start, length.warmup)
     if poor:
         first = _take(blocks, length.warmup, [])
-        x = np.asarray(jax.scipy.special.ndtri(first.u[:, length.warmup // 2 :]))
+        x = ndtri(first.u[:, length.warmup // 2 :])
         guide = _mended(guide, x)
         blocks = _blocks(rng, target, guide, x[:, -1], length.warmup)
     left: list[Chains] = []
@@ -172,17 +152,30 @@ def _blocks(
     rng: np.random.Generator, target: Target, guide: Guide, start: np.ndarray, warmup: int
 ) -> Iterator[Chains]:
     """Blocks of draws from x [chain, d], the warm-up's among them, without end."""
-    y = np.linalg.solve(np.asarray(guide.factor), start.T).T
+    whitener = np.linalg.inv(guide.factor)
     fixed = {"log_likelihood": target.log_likelihood, "warmup": warmup}
 
-    def keys() -> jax.Array:
-        return jax.random.split(jax.random.key(int(rng.integers(2**31))), len(y))
+    def jumps(first: np.ndarray | None) -> Jumps:
+        x = propose(guide.mixture, rng.normal(size=(BLOCK, d)), 1.0 - rng.random((BLOCK, UNIFORMS)))
+        log_uniform = np.log(1.0 - rng.random(BLOCK))
+        if first is not None:
+            x[0], log_uniform[0] = first, -np.inf
+        return Jumps(x @ whitener.T, log_mixture(guide.mixture, x), log_uniform)
 
-    last = _begin(y, keys(), target.state, guide, **fixed)
+    d, starts = start.shape[1], list(start)
+    seeds = rng.integers(2**31, size=len(start)).astype(np.uint32)
+    y = start @ whitener.T
+    with kept_compilations():
+        last = [_begin(*one, warmup=warmup) for one in zip(y, seeds, strict=True)]
     while True:
-        block = _run(last, keys(), target.state, guide, **fixed)
-        last = block.last
-        yield Chains(np.asarray(block.u), {n: np.asarray(s) for n, s in block.stats.items()})
+        made = []
+        with kept_compilations():
+            for i, first in enumerate(starts):
+                last[i], drawn = _run(last[i], target.state, guide, jumps(first), **fixed)
+                made.append(jax.tree.map(np.asarray, drawn))
+        starts = [None] * len(starts)
+        x, stats = jax.tree.map(lambda *chains: np.stack(chains), *made)
+        yield Chains(ndtr(x), stats)
 
 
 def _take(blocks: Iterator[Chains], count: int, left: list[Chains]) -> Chains:
@@ -200,11 +193,8 @@ def _mended(guide: Guide, x: np.ndarray) -> Guide:
     """Metric and mixture from warm-up draws x [chain, draw, d]."""
     flat = x.reshape(-1, x.shape[-1])
     rows = np.linspace(0, len(flat) - 1, REFITTED_DRAWS).astype(int)
-    mixture = _refit(flat[rows], np.zeros(REFITTED_DRAWS), 1.0)
+    mixture = fit_mixture(flat[rows], np.zeros(REFITTED_DRAWS), 1.0)
     within = (x - x.mean(1, keepdims=True)).reshape(flat.shape)
     covariance = within.T @ within / len(within)
     floor = 1e-3 * guide.factor @ guide.factor.T
-    return Guide(jnp.asarray(np.linalg.cholesky(covariance + floor)), mixture)
-
-
-_refit = jax.jit(fit_mixture)
+    return Guide(np.linalg.cholesky(covariance + floor), mixture)

@@ -20,8 +20,8 @@ class Surrogate(Protocol):
 
     @property
     def state(self) -> Any:
-        """Pytree of arrays on which the likelihood depends, `gp` among them; data, never a
-        closure, and of few shapes over a run, for each is compiled anew."""
+        """Pytree of NumPy arrays on which the likelihood depends, `gp` among them; data, never a
+        closure, and of few shapes over a run, for NUTS is compiled anew for each."""
         ...
 
     @property
@@ -55,7 +55,7 @@ class Surrogate(Protocol):
         """What these checks complain of, in sentences."""
         ...
 
-    def predictive(self, key: jax.Array, u: np.ndarray) -> dict[str, np.ndarray]:
+    def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
         """One new observation for each row of u [n, d]: name -> [n, ...]."""
         ...
 

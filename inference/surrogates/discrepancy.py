@@ -3,26 +3,21 @@
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from .._float64 import in_float64
-from ..gp.condition import (
-    GROWTH,
-    believe,
-    condition,
-    extend,
-    leave_one_out,
-    predict,
-)
-from ..gp.hyperparameters import maximum_a_posteriori
+from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
 from ..gp.optimise import minimise_in_box
 from ..gp.process import (
     GP,
     Data,
-    pad,
-    predict_many,
+    believe,
+    condition,
+    leave_one_out,
+    padded,
+    padded_rows,
+    predict,
+    predict_points,
 )
 from ..types import LogLikelihood, LogSecondMoment
 from .hyper_draws import posterior_draws
@@ -83,9 +78,9 @@ class DiscrepancySurrogate:
     @property
     @in_float64
     def state(self) -> ThresholdState:
-        return ThresholdState(
-            self.gp, jnp.asarray((self.threshold - self.scale.location) / self.scale.spread)
-        )
+        rows = padded_rows(len(self.gp.data.u))
+        threshold = (self.threshold - self.scale.location) / self.scale.spread
+        return ThresholdState(padded(self.gp, len(self.gp.data.y), rows), np.asarray(threshold))
 
     @property
     def log_likelihood(self) -> LogLikelihood:
@@ -98,8 +93,8 @@ class DiscrepancySurrogate:
     @in_float64
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new g(Delta), its noise included, at quantiles u [n, d]: [n], [n]."""
-        mean, variance = predict(self.gp, u)
-        noisy = variance + np.exp(2.0 * np.asarray(self.gp.hyper.log_noise))[:, None]
+        mean, variance = predict_points(self.gp, u)
+        noisy = variance + np.exp(2.0 * self.gp.hyper.log_noise)[:, None]
         centre = mean.mean(0)
         sd = np.sqrt(noisy.mean(0) + mean.var(0))
         return self.scale.location + self.scale.spread * centre, self.scale.spread * sd
@@ -110,7 +105,12 @@ class DiscrepancySurrogate:
 
         The mean alone may be least in a corner where nothing was simulated.
         """
-        return minimise_in_box(_surely, self.gp, self.gp.data.u.shape[1])
+
+        def surely(u: np.ndarray) -> np.ndarray:
+            mean, variance = predict(self.gp, u)
+            return np.mean(mean + np.sqrt(variance), axis=0)
+
+        return minimise_in_box(surely, self.gp.data.u.shape[1])
 
     @in_float64
     def believe(self, u: np.ndarray) -> "DiscrepancySurrogate":
@@ -124,11 +124,10 @@ class DiscrepancySurrogate:
     @in_float64
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised leave-one-out errors `loo_z` [n, 1]."""
-        mean, variance = (np.asarray(part) for part in leave_one_out(self.gp))
-        n = len(self.discrepancy)
-        error = np.asarray(self.gp.data.y)[0, :n] - mean.mean(0)[:n]
+        mean, variance = leave_one_out(self.gp)
+        error = self.gp.data.y[0] - mean.mean(0)
         total = variance.mean(0) + mean.var(0)  # of the mixture over hyperparameters
-        return {"loo_z": (error / np.sqrt(total[:n]))[:, None]}
+        return {"loo_z": (error / np.sqrt(total))[:, None]}
 
     def warnings(self) -> list[str]:
         """What the leave-one-out errors complain of."""
@@ -137,23 +136,17 @@ class DiscrepancySurrogate:
         return complaints(self.checks()["loo_z"], "discrepancy")
 
     @in_float64
-    def predictive(self, key: jax.Array, u: np.ndarray) -> dict[str, np.ndarray]:
+    def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
         """One new discrepancy for each row of u [n, d]."""
         mean, sd = self.predict(u)
-        drawn = mean + sd * np.asarray(jax.random.normal(key, mean.shape))
+        drawn = mean + sd * rng.normal(size=mean.shape)
         return {"discrepancy": self.transform.inverse(drawn)}
-
-
-def _surely(gp: GP, u: jax.Array) -> jax.Array:
-    mean, variance = predict_many(gp, u[None])
-    return jnp.mean(mean + jnp.sqrt(variance))
 
 
 @in_float64
 def learn(
     u: np.ndarray,
     discrepancy: np.ndarray,
-    rows: int,
     transform: str | None = None,
     previous: DiscrepancySurrogate | None = None,
     normal: np.ndarray | None = None,
@@ -168,7 +161,6 @@ def learn(
     Args:
         u: Prior quantiles [n, d].
         discrepancy: Finite values [n], n >= 2.
-        rows: Reserved for data, at least n.
         transform: A name, or None to choose.
         previous: Learned from the first of these data; its hyperparameters are kept until the
             data have grown by GROWTH, its transform until they have by TRANSFORM_GROWTH.
@@ -187,17 +179,16 @@ def learn(
         and not previous.equal
         and n < TRANSFORM_GROWTH * previous.chosen_at
     ):
-        data = pad(u, previous.scale(values)[None], rows, normal)
-        if n >= GROWTH * previous.learned_at:
-            gp, learned_at = condition(maximum_a_posteriori(data, previous.gp.hyper), data), n
-        else:
-            gp, learned_at = extend(previous.gp, data), previous.learned_at
+        data = Data(u, previous.scale(values)[None], normal)
+        hyper, learned_at = previous.gp.hyper, previous.learned_at
+        if n >= GROWTH * learned_at:
+            hyper, learned_at = maximum_a_posteriori(data, hyper), n
         learned = DiscrepancySurrogate(
-            gp, previous.scale, values, np.nan, learned_at, previous.chosen_at
+            condition(hyper, data), previous.scale, values, np.nan, learned_at, previous.chosen_at
         )
         return with_threshold(learned, None)
     options = [_standardise(option, values) for option in candidates(transform, values)]
-    fitted = [_fit(pad(u, scale(values)[None], rows, normal)) for scale in options]
+    fitted = [_fit(Data(u, scale(values)[None], normal)) for scale in options]
     scores = [_score(gp, scale, values) for gp, scale in zip(fitted, options, strict=True)]
     best = int(np.argmax(scores))
     chosen = DiscrepancySurrogate(fitted[best], options[best], values, np.nan, n, n)
@@ -217,7 +208,7 @@ def with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> Discrepanc
     """
 
     def at_minimum() -> tuple[float, float]:
-        mean, sd = learned.predict(np.asarray(learned.gp.data.u)[: len(learned.discrepancy)])
+        mean, sd = learned.predict(learned.gp.data.u)
         best = np.argmin(mean)
         return float(mean[best]), float(sd[best])
 
@@ -232,7 +223,7 @@ def marginalised(
     """The surrogate with one process for each of `draws` posterior draws of the hyperparameters."""
     hyper = posterior_draws(surrogate.gp.data, draws, seed)
     data = surrogate.gp.data
-    spread = data._replace(y=jnp.tile(data.y, (draws, 1)))
+    spread = data._replace(y=np.tile(data.y, (draws, 1)))
     return with_threshold(replace(surrogate, gp=condition(hyper, spread)), rule)
 
 
@@ -249,9 +240,8 @@ def _standardise(transform: Transform, values: np.ndarray) -> Scale:
 
 def _score(gp: GP, scale: Scale, values: np.ndarray) -> float:
     """Leave-one-out log predictive density of the discrepancy under the scale, summed."""
-    n = len(values)
-    mean, variance = (np.asarray(moment)[0, :n] for moment in leave_one_out(gp))
-    residual = np.asarray(gp.data.y)[0, :n] - mean
+    mean, variance = (moment[0] for moment in leave_one_out(gp))
+    residual = gp.data.y[0] - mean
     density = -0.5 * np.sum(residual**2 / variance + np.log(2.0 * np.pi * variance))
     jacobian = scale.transform.log_jacobian(values) - np.log(scale.spread)
     return float(density + np.sum(jacobian))

@@ -3,27 +3,20 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from .._float64 import in_float64
-from ..gp.condition import (
-    GROWTH,
-    condition,
-    extend,
-    leave_one_out,
-)
-from ..gp.condition import predict as predict_scores
-from ..gp.hyperparameters import maximum_a_posteriori
+from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
 from ..gp.process import (
     GP,
     JITTER,
     Data,
     Hyper,
-    pad,
+    condition,
+    leave_one_out,
     predict_joint,
 )
+from ..gp.process import predict_points as predict_scores
 from .component_noise import absorbed_noise, left_over
 from .components import Basis, principal_components
 from .measurement_noise import Remainder, shrunk_covariance
@@ -32,8 +25,6 @@ EXPLAINED_SHARE = 0.9995  # of the variance, to be explained by components
 PREDICTED_SHARE = 0.3  # see `_predicted`
 PRIOR_RUNS = 5.0  # runs that speak for uncorrelated scores
 ROUNDING_VARIANCE = 1e-24  # variance of standardised outputs that counts as none
-
-_joint = jax.jit(predict_joint)
 
 
 class Emulator(NamedTuple):
@@ -68,13 +59,11 @@ class Limits(NamedTuple):
 
     Attributes:
         components: At most.
-        rows: Reserved for data, at least as many as there are runs.
         predicted: Share of a component's variance that the parameters must predict, lest it
             count as noise; None emulates every component.
     """
 
     components: int
-    rows: int
     predicted: float | None = PREDICTED_SHARE
 
 
@@ -96,23 +85,24 @@ def emulate(
             kept until the data have grown by GROWTH.
         normal: Which parameters the kernels see as normal scores [d], see `gp.process.coordinates`.
     """
-    n, rows = len(u), limits.rows
+    n = len(u)
     if previous is not None and _goes_on(previous, outputs):
         basis, learned_at, excess = previous.basis, previous.learned_at, previous.excess
-        gp = extend(previous.gp, pad(u, _targets(basis, outputs, learned_at, excess), rows, normal))
+        targets = _targets(basis, outputs, learned_at, excess)
+        gp = condition(previous.gp.hyper, Data(u, targets, normal))
         remainder = shrunk_covariance(basis.residuals(outputs), basis.used + 1)
     else:
         components = principal_components(
             outputs, scale(outputs), limits.components, EXPLAINED_SHARE
         )
-        data = pad(u, components.scores(outputs).T, rows, normal)
+        data = Data(u, components.scores(outputs).T, normal)
         basis, hyper = _taught(components, data, limits.predicted)
         learned_at, remainder = n, shrunk_covariance(basis.residuals(outputs), basis.used + 1)
-        excess = absorbed_noise(basis, np.exp(2.0 * np.asarray(hyper.log_noise)), remainder, n)
-        smaller = jnp.log1p(-jnp.asarray(excess))
+        excess = absorbed_noise(basis, np.exp(2.0 * hyper.log_noise), remainder, n)
+        smaller = np.log1p(-excess)
         hyper = Hyper(hyper.log_length, hyper.log_amplitude + smaller, hyper.log_noise + smaller)
-        gp = condition(hyper, pad(u, _targets(basis, outputs, n, excess), rows, normal))
-    remainder = left_over(basis, np.exp(2.0 * np.asarray(gp.hyper.log_noise)), remainder, excess)
+        gp = condition(hyper, Data(u, _targets(basis, outputs, n, excess), normal))
+    remainder = left_over(basis, np.exp(2.0 * gp.hyper.log_noise), remainder, excess)
     noise = run_to_run(gp, basis, remainder.white, n)
     return Emulator(gp, basis, remainder, noise, outputs, learned_at, excess)
 
@@ -141,9 +131,8 @@ def predicted_share(gp: GP) -> np.ndarray:
 
     Not above 0 where the mean of the others would do as well, and 0 for empty components.
     """
-    n = int(gp.data.used)
-    score = np.asarray(gp.data.y)[:, :n]
-    error = score - np.asarray(leave_one_out(gp)[0])[:, :n]
+    score, n = gp.data.y, len(gp.data.u)
+    error = score - leave_one_out(gp)[0]
     from_mean = (score - score.mean(1, keepdims=True)) * n / (n - 1)  # of the other scores
     total = np.sum(from_mean**2, 1)
     return np.where(total > 0, 1.0 - np.sum(error**2, 1) / np.where(total > 0, total, 1.0), 0.0)
@@ -170,9 +159,9 @@ def run_to_run(gp: GP, basis: Basis, white: float, n: int) -> np.ndarray:
     """
     squared = np.sum(basis.vectors**2, 0)
     full = squared > 0
-    variance = np.exp(2.0 * np.asarray(gp.hyper.log_noise)) * full
+    variance = np.exp(2.0 * gp.hyper.log_noise) * full
     variance = np.maximum(variance - white / np.where(full, squared, np.inf), 0.0)
-    residual = np.where(full[:, None], np.asarray(gp.weights)[:, :n], 0.0)
+    residual = np.where(full[:, None], gp.weights, 0.0)
     length = np.sqrt(np.sum(residual**2, 1, keepdims=True))
     residual = residual / np.where(length > 0, length, 1.0)
     correlation = residual @ residual.T * n / (n + PRIOR_RUNS)
@@ -183,24 +172,23 @@ def run_to_run(gp: GP, basis: Basis, white: float, n: int) -> np.ndarray:
 
 def loo_errors(emulator: Emulator) -> np.ndarray:
     """Studentised leave-one-out errors of the scores [n, used]."""
-    n, used = len(emulator.outputs), emulator.basis.used
-    mean, variance = (np.asarray(part)[:used, :n] for part in leave_one_out(emulator.gp))
-    return ((np.asarray(emulator.gp.data.y)[:used, :n] - mean) / np.sqrt(variance)).T
+    gp = emulator.gp.only(slice(emulator.basis.used))
+    mean, variance = leave_one_out(gp)
+    return ((gp.data.y - mean) / np.sqrt(variance)).T
 
 
 def innovations(emulator: Emulator, u: np.ndarray, outputs: np.ndarray) -> np.ndarray:
     """Studentised errors [n, used] in the scores of new outputs [n, m] at u [n, d].
 
     Each output is predicted from all earlier outputs, with components and hyperparameters fixed.
-    n must not exceed the reserved rows.
     """
-    basis, used, n = emulator.basis, emulator.basis.used, len(u)
+    basis, used = emulator.basis, emulator.basis.used
     squared = np.sum(basis.vectors[:, :used] ** 2, 0)
     noise = np.diag(emulator.noise)[:used] + emulator.remainder.white / squared
-    mean = predict_scores(emulator.gp, u)[0][:used]
-    padded = jnp.asarray(np.pad(u, ((0, len(emulator.gp.data.u) - n), (0, 0))))  # one shape
-    joint = np.asarray(_joint(emulator.gp, padded, padded))[:used, :n, :n]
-    factor = np.linalg.cholesky(joint + (noise[:, None, None] + JITTER) * np.eye(n))
+    gp = emulator.gp.only(slice(used))
+    mean = predict_scores(gp, u)[0]
+    total = predict_joint(gp, u, u) + (noise[:, None, None] + JITTER) * np.eye(len(u))
+    factor = np.linalg.cholesky(total)
     error = (basis.scores(outputs)[:, :used].T - mean)[:, :, None]
     return np.linalg.solve(factor, error)[:, :, 0].T
 
@@ -224,7 +212,7 @@ def noise_share(emulator: Emulator) -> float:
     """Share of the outputs' variance that no parameter predicts: run-to-run noise."""
     used, rest = emulator.basis.used, emulator.remainder.total
     weight = np.sum(emulator.basis.vectors[:, :used] ** 2, 0)  # their scores have unit variance
-    noise = np.exp(2.0 * np.asarray(emulator.gp.hyper.log_noise)[:used])
+    noise = np.exp(2.0 * emulator.gp.hyper.log_noise[:used])
     total = weight.sum() + rest
     return float((weight @ np.minimum(noise, 1.0) + rest) / total) if total > 0 else 0.0
 
@@ -238,8 +226,7 @@ def mean(emulator: Emulator, u: np.ndarray) -> np.ndarray:
 @in_float64
 def left_out(emulator: Emulator) -> np.ndarray:
     """What all other runs predict of each run, components and hyperparameters kept: [n, m]."""
-    scores = np.asarray(leave_one_out(emulator.gp)[0])[:, : len(emulator.outputs)]
-    return _outputs(emulator.basis, scores)
+    return _outputs(emulator.basis, leave_one_out(emulator.gp)[0])
 
 
 def _outputs(basis: Basis, scores: np.ndarray) -> np.ndarray:
@@ -257,21 +244,14 @@ def predict(emulator: Emulator, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return basis.centre + basis.scale * (mean @ basis.vectors.T), basis.scale * sd
 
 
-def predictive_draws(key: jax.Array, emulator: Emulator, u: np.ndarray) -> np.ndarray:
+def predictive_draws(rng: np.random.Generator, emulator: Emulator, u: np.ndarray) -> np.ndarray:
     """A new simulated output, run-to-run noise included, for each row of u [n, d]: [n, m]."""
     basis, remainder = emulator.basis, emulator.remainder
     mean, variance = (part.T for part in predict_scores(emulator.gp, u))
     full = np.any(basis.vectors, 0)
-    keys = jax.random.split(key, 4)
-    shapes = (
-        mean.shape,
-        mean.shape,
-        (len(u), remainder.factors.shape[1]),
-        (len(u), len(basis.scale)),
-    )
-    latent, noisy, factor, white = (
-        np.asarray(jax.random.normal(k, shape)) for k, shape in zip(keys, shapes, strict=True)
-    )
+    latent, noisy = rng.normal(size=mean.shape), rng.normal(size=mean.shape)
+    factor = rng.normal(size=(len(u), remainder.factors.shape[1]))
+    white = rng.normal(size=(len(u), len(basis.scale)))
     values, vectors = np.linalg.eigh(emulator.noise)
     noisy = noisy @ (vectors * np.sqrt(np.maximum(values, 0.0))).T
     scores = (mean + np.sqrt(variance) * latent + noisy) * full

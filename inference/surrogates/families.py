@@ -30,7 +30,7 @@ class Learnable(NamedTuple):
     u: np.ndarray  # [n, d]
     features: np.ndarray  # [n, m]
     discrepancy: np.ndarray  # [n]
-    normal: np.ndarray  # bool [d], see `Prior.normal`
+    normal: np.ndarray | None  # bool [d], see `Prior.normal`
 
 
 class Measured(NamedTuple):
@@ -103,15 +103,15 @@ class DiscrepancyLearner:
         return np.ones(len(discrepancy), bool)
 
     def learn(
-        self, known: Learnable, rows: int, previous: DiscrepancySurrogate | None
+        self, known: Learnable, previous: DiscrepancySurrogate | None
     ) -> DiscrepancySurrogate:
         transform, rule = self.family.transform, self.family.threshold
-        learned = learn(known.u, known.discrepancy, rows, transform, previous, known.normal)
+        learned = learn(known.u, known.discrepancy, transform, previous, known.normal)
         return learned if rule is None else with_threshold(learned, rule)
 
-    def finish(self, known: Learnable, rows: int, seed: int) -> Surrogate:
+    def finish(self, known: Learnable, seed: int) -> Surrogate:
         """The surrogate on which a fit rests."""
-        learned = self.learn(known, rows, None)
+        learned = self.learn(known, None)
         draws = self.family.hyper_draws
         if not draws:
             return learned
@@ -205,13 +205,11 @@ class SignalLearner:
         """Which of the successful simulations are learned from, bool [n]: what blew up is not."""
         return sane(discrepancy)
 
-    def learn(
-        self, known: Learnable, rows: int, previous: SignalSurrogate | None
-    ) -> SignalSurrogate:
+    def learn(self, known: Learnable, previous: SignalSurrogate | None) -> SignalSurrogate:
         learnable = self.learnable(known.discrepancy)
         features = known.features[learnable]
         old = None if previous is None else previous.emulator
-        limits = Limits(self.family.components, rows, self.family.predicted)
+        limits = Limits(self.family.components, self.family.predicted)
         emulator = emulate(
             known.u[learnable],
             features,
@@ -223,9 +221,9 @@ class SignalLearner:
         kept = previous if old is not None and emulator.learned_at == old.learned_at else None
         return observe(emulator, self.output, self.values, self.noise, kept)
 
-    def finish(self, known: Learnable, rows: int, seed: int) -> Surrogate:
+    def finish(self, known: Learnable, seed: int) -> Surrogate:
         """The surrogate on which a fit rests."""
-        learned = self.learn(known, rows, None)
+        learned = self.learn(known, None)
         last = held_back(learned.emulator, self.output.scale, self.family.predicted)
         return replace(learned, held_back=last)
 

@@ -52,8 +52,7 @@ def held_back(
     """
     outputs, data = emulator.outputs, emulator.gp.data
     n, k = len(outputs), emulator.basis.vectors.shape[1]
-    rows, d = data.u.shape
-    u = np.asarray(data.u)[:n]
+    u, d = data.u, data.u.shape[1]
     first = round(FIRST_SHARE * n)
     freedom = first - (1 + 2 * d)  # a process's trend has as many coefficients
     errors = np.full((n, k + 1), np.nan)
@@ -61,8 +60,8 @@ def held_back(
     within = np.all((u >= low) & (u <= high), axis=1) & (np.arange(n) >= first)
     if first < MIN_FIRST_RUNS or freedom < 1 or not within.any():
         return HeldBack(errors, freedom)
-    normal = np.asarray(data.normal)
-    early = emulate(u[:first], outputs[:first], scale, Limits(k, rows, predicted), None, normal)
+    limits = Limits(k, predicted)
+    early = emulate(u[:first], outputs[:first], scale, limits, None, data.normal)
     errors[within, : early.basis.used] = innovations(early, u[within], outputs[within])
     errors[within, k] = beyond_components(early, outputs[within])
     return HeldBack(errors, freedom)

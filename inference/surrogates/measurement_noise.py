@@ -5,10 +5,8 @@ leave of the simulations (truncation, and the simulator's run-to-run noise outsi
 noise D, and measurement noise, an AR(1) process in each channel, of unknown sigma and rho.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 NOISE_FACTORS = 16
@@ -117,13 +115,9 @@ def reduce(
     fresh = np.diff(layout.channel, prepend=-1) != 0
     gap = np.where(fresh, 0, np.diff(layout.sample, prepend=0))
     result, log_det = whiten(
-        jnp.asarray(np.column_stack([vectors, observed, factors])),
-        jnp.asarray(white + floor),
-        jnp.asarray(fresh),
-        jnp.asarray(gap),
-        nodes,
+        np.column_stack([vectors, observed, factors]), white + floor, fresh, gap, nodes
     )
-    whitened = np.moveaxis(np.asarray(result), 1, 0)
+    whitened = np.moveaxis(result, 1, 0)
     basis, target = whitened[:, :, :used], whitened[:, :, k : k + 1]
     factors = whitened[:, :, k + 1 :]
     inner = np.eye(factors.shape[2]) + np.swapaxes(factors, 1, 2) @ factors
@@ -138,7 +132,7 @@ def reduce(
     right = product(basis, target)
     estimate = (covariance @ right)[:, :, 0]
     unexplained = product(target, target)[:, 0, 0] - np.sum(estimate * right[:, :, 0], 1)
-    log_det = np.asarray(log_det) + np.linalg.slogdet(inner)[1]
+    log_det = log_det + np.linalg.slogdet(inner)[1]
     # the estimate's own normalisation belongs to N(estimate; scores, covariance)
     log_weight = -0.5 * (log_det + unexplained - np.linalg.slogdet(covariance)[1])
     return Reduced(estimate, covariance, log_weight)
@@ -156,10 +150,9 @@ def correlated(white: np.ndarray, layout: Layout, nodes: Nodes) -> np.ndarray:
     return noise
 
 
-@jax.jit
 def whiten(
-    columns: jax.Array, white: jax.Array, fresh: jax.Array, gap: jax.Array, nodes: Nodes
-) -> tuple[jax.Array, jax.Array]:
+    columns: np.ndarray, white: np.ndarray, fresh: np.ndarray, gap: np.ndarray, nodes: Nodes
+) -> tuple[np.ndarray, np.ndarray]:
     """Multiply by an inverse factor of D + sigma^2 R(rho), node by node.
 
     Kalman's filter for an AR(1) process seen in white noise: its standardised innovations are
@@ -174,20 +167,18 @@ def whiten(
     Returns:
         [m, g, c] and the log determinants [g].
     """
-    variance = jnp.asarray(nodes.sigma) ** 2
-
-    def step(carried: tuple[jax.Array, jax.Array], row: tuple[jax.Array, ...]) -> Any:
-        state, uncertain = carried
-        value, white, fresh, gap = row
-        decay = jnp.where(fresh, 0.0, jnp.asarray(nodes.rho) ** gap)
-        state = decay[:, None] * state
+    variance = nodes.sigma**2
+    decays = np.where(fresh[:, None], 0.0, nodes.rho ** gap[:, None])
+    state, uncertain = np.zeros((len(variance), columns.shape[1])), variance
+    result, log_det = np.empty((len(columns), *state.shape)), np.zeros(len(variance))
+    for i, decay in enumerate(decays):
+        state *= decay[:, None]
         uncertain = decay**2 * uncertain + (1.0 - decay**2) * variance
-        total = uncertain + white
-        innovation = value - state
+        total = uncertain + white[i]
+        innovation = columns[i] - state
         gain = uncertain / total
-        after = state + gain[:, None] * innovation, gain * white
-        return after, (innovation / jnp.sqrt(total)[:, None], jnp.log(total))
-
-    start = jnp.zeros((len(variance), columns.shape[1])), variance
-    _, (result, logs) = jax.lax.scan(step, start, (columns, white, fresh, gap))
-    return result, jnp.sum(logs, 0)
+        np.divide(innovation, np.sqrt(total)[:, None], out=result[i])
+        state += gain[:, None] * innovation
+        uncertain = gain * white[i]
+        log_det += np.log(total)
+    return result, log_det

@@ -3,13 +3,11 @@
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from .._float64 import in_float64
-from ..gp.condition import believe
 from ..gp.optimise import minimise_in_box
+from ..gp.process import GP, believe, padded, padded_rows
 from ..sobol import sobol
 from ..types import LogLikelihood, LogSecondMoment
 from .emulator import (
@@ -46,6 +44,7 @@ from .warnings import (
     noise_warnings,
 )
 
+SCORES_TOGETHER = 4  # components in use are counted in fours, so that few programs are compiled
 KEPT_NODES = 12  # nodes of unknown measurement noise that enter the likelihood
 SCREENED_POINTS = 128
 
@@ -79,7 +78,7 @@ class SignalSurrogate:
     box: tuple[np.ndarray, np.ndarray] | None = None
 
     @property
-    def gp(self):
+    def gp(self) -> GP:
         return self.emulator.gp
 
     @cached_property
@@ -99,7 +98,9 @@ class SignalSurrogate:
     def minimum(self) -> np.ndarray:
         """Maximiser of the likelihood over the box, u [d]."""
         state = self.state
-        return minimise_in_box(_negative, state, len(state.low), *self.box or ())
+        return minimise_in_box(
+            lambda u: -log_likelihood(state, u), len(state.low), *self.box or ()
+        )
 
     @in_float64
     def believe(self, u: np.ndarray) -> "SignalSurrogate":
@@ -112,8 +113,7 @@ class SignalSurrogate:
     @in_float64
     def node_weights(self) -> np.ndarray:
         """Posterior weights of the nodes, given the best parameters."""
-        terms = _node_log_densities(self.state, jnp.asarray(self.minimum()[None]))
-        log_weights = np.asarray(terms)[0]
+        log_weights = node_log_densities(self.state, self.minimum()[None])[0]
         weights = np.exp(log_weights - log_weights.max())
         return weights / weights.sum()
 
@@ -163,53 +163,46 @@ class SignalSurrogate:
     def _outside(self) -> bool:
         """Whether the observed scores are twice as far out as any simulated ones, or what no
         component can make of the output exceeds what simulations differ by."""
-        basis, n = self.emulator.basis, len(self.emulator.outputs)
+        basis = self.emulator.basis
         used = slice(basis.used)
-        reach = np.abs(np.asarray(self.gp.data.y)[used, :n]).max(1)
+        reach = np.abs(self.gp.data.y[used]).max(1)
         error = np.sqrt(np.diagonal(self.reduced.covariance, axis1=1, axis2=2))[:, used]
         far = np.abs(self.reduced.estimate[:, used]) > 2.0 * reach + 3.0 * error
         size = residual_size(basis.standardise(self.observed), basis.vectors[:, used])
         return bool(far.any(1).all()) or (self.output.series and size > 1.0)
 
     @in_float64
-    def predictive(self, key: jax.Array, u: np.ndarray) -> dict[str, np.ndarray]:
+    def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
         """One new observation, measurement noise included, for each row of u [n, d]: [n, ...].
 
         Noise that is known is drawn with the covariance `known`. NaN where nothing was observed;
         averaged values are repeated over their samples.
         """
-        simulated_key, node_key, noise_key = jax.random.split(key, 3)
-        values = predictive_draws(simulated_key, self.emulator, u)
-        weights = jnp.asarray(self.node_weights)
-        which = jax.random.choice(node_key, len(weights), (len(u),), p=weights)
-        nodes = Nodes(*(part[np.asarray(which)] for part in self.nodes))
-        white = np.asarray(jax.random.normal(noise_key, values.shape))
-        noise = correlated(white, self.output.layout, nodes)
+        values = predictive_draws(rng, self.emulator, u)
+        weights = self.node_weights
+        which = rng.choice(len(weights), len(u), p=weights)
+        nodes = Nodes(*(part[which] for part in self.nodes))
+        noise = correlated(rng.normal(size=values.shape), self.output.layout, nodes)
         values = values + self.emulator.basis.scale * noise
         if self.known is not None:
-            rng = np.random.default_rng(np.asarray(jax.random.key_data(noise_key)))
             values = values + self.known.draw(rng, len(values))
         return {"signal": self.output.restore(values)}
-
-
-def _negative(state: SignalState, u: jax.Array) -> jax.Array:
-    return -log_likelihood(state, u)
-
-
-@jax.jit
-def _node_log_densities(state: SignalState, u: jax.Array) -> jax.Array:
-    return jax.vmap(node_log_densities, (None, 0))(state, u)
 
 
 def state_of(
     emulator: Emulator, reduced: Reduced, box: tuple[np.ndarray, np.ndarray] | None = None
 ) -> SignalState:
-    """What the likelihood depends on; empty components count as known."""
-    full = np.any(emulator.basis.vectors, 0).astype(float)
-    d = emulator.gp.data.u.shape[1]
-    parts = full, reduced.estimate, reduced.covariance, reduced.log_weight
+    """What the likelihood depends on, in arrays of few shapes."""
+    gp, used = emulator.gp, emulator.basis.used
+    k = SCORES_TOGETHER * max(1, -(-used // SCORES_TOGETHER))
+    d, g = gp.data.u.shape[1], len(reduced.log_weight)
+    estimate, covariance = np.zeros((g, k)), np.tile(np.eye(k), (g, 1, 1))
+    estimate[:, :used] = reduced.estimate[:, :used]
+    covariance[:, :used, :used] = reduced.covariance[:, :used, :used]
+    flags = (np.arange(k) < used).astype(float)
     ends = box or (np.zeros(d), np.ones(d))
-    return SignalState(emulator.gp, *(jnp.asarray(part) for part in (*parts, *ends)))
+    processes = padded(gp.only(slice(used)), k, padded_rows(len(gp.data.u)))
+    return SignalState(processes, flags, estimate, covariance, reduced.log_weight, *ends)
 
 
 @in_float64
@@ -271,6 +264,6 @@ def _widen(reduced: Reduced, emulator: Emulator) -> Reduced:
 def _keep(emulator: Emulator, reduced: Reduced) -> np.ndarray:
     """The nodes of most evidence, best first, on an even screen of the prior and at the data."""
     data = emulator.gp.data.u
-    points = np.concatenate([sobol(0, 0, SCREENED_POINTS, data.shape[1]), np.asarray(data)])
-    terms = _node_log_densities(state_of(emulator, reduced), jnp.asarray(points))
-    return np.argsort(-np.logaddexp.reduce(np.asarray(terms), 0))[:KEPT_NODES]
+    points = np.concatenate([sobol(0, 0, SCREENED_POINTS, data.shape[1]), data])
+    terms = node_log_densities(state_of(emulator, reduced), points)
+    return np.argsort(-np.logaddexp.reduce(terms, 0))[:KEPT_NODES]

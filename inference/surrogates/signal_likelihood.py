@@ -1,13 +1,12 @@
 """The Gaussian likelihood of an emulated signal."""
 
-from typing import NamedTuple
+import math
+from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
-from jax.scipy.special import logsumexp
+import numpy as np
 
-from ..gp.linalg import small_inverse_cholesky
 from ..gp.process import GP, predict
+from ..namespaces import log_sum_exp, namespace
 
 WALL = 0.01  # of prior quantiles, beyond a box, over which the likelihood vanishes
 
@@ -15,78 +14,94 @@ WALL = 0.01  # of prior quantiles, beyond a box, over which the likelihood vanis
 class SignalState(NamedTuple):
     """What the likelihood depends on: k scores, g nodes of the noise.
 
-    Scores that are not in use have `used` 0 and count as known.
+    Scores that are not in use come last, have `used` 0 and count as known.
     """
 
     gp: GP
-    used: jax.Array  # [k], 1 or 0
-    estimate: jax.Array  # [g, k], the observed scores
-    covariance: jax.Array  # [g, k, k], their error, the simulator's noise included
-    log_weight: jax.Array  # [g]
-    low: jax.Array  # [d], ends of the box outside of which the likelihood vanishes
-    high: jax.Array
+    used: np.ndarray  # [k], 1 or 0
+    estimate: np.ndarray  # [g, k], the observed scores
+    covariance: np.ndarray  # [g, k, k], their error, the simulator's noise included
+    log_weight: np.ndarray  # [g]
+    low: np.ndarray  # [d], ends of the box outside of which the likelihood vanishes
+    high: np.ndarray
 
 
-def log_likelihood(state: SignalState, u: jax.Array) -> jax.Array:
-    """log sum_g w_g N(estimate_g; mu(u), covariance_g + V(u)), V the emulator's variance.
+def log_likelihood(state: SignalState, u: Any) -> Any:
+    """log sum_g w_g N(estimate_g; mu(u), covariance_g + V(u)) [n], V the emulator's variance.
 
     Bayarri et al. (2009) and Higdon et al. (2008) with the discrepancy's covariance integrated
     out over nodes.
     """
-    mean, variance = _scores(state, u)
-    return logsumexp(_terms(state, mean, variance)) - _wall(state, u)
+    return log_sum_exp(node_log_densities(state, u)) - _wall(state, u)
 
 
-def _scores(state: SignalState, u: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Means and variances [k] of the scores at u; outside of the box, those at its end."""
-    mean, variance = predict(state.gp, jnp.clip(u, state.low, state.high))
-    return mean * state.used, variance * state.used
+def node_log_densities(state: SignalState, u: Any) -> Any:
+    """The terms [n, g] of `log_likelihood`'s sum."""
+    mean, variance = scores(state, u)
+    covariance = _with_variances(state.covariance, variance[:, None])
+    log_det, square = eliminate(covariance, state.estimate - mean[:, None])
+    constant = math.log(2.0 * math.pi) * state.used.sum()
+    return state.log_weight - 0.5 * (constant + log_det + square)
 
 
-def _wall(state: SignalState, u: jax.Array) -> jax.Array:
+def scores(state: SignalState, u: Any) -> tuple[Any, Any]:
+    """Means and variances [n, k] of the scores at u; outside of the box, those at its end."""
+    mean, variance = predict(state.gp, namespace(u).clip(u, state.low, state.high))
+    return mean.T * state.used, variance.T * state.used
+
+
+def _wall(state: SignalState, u: Any) -> Any:
     """What the log likelihood loses outside of the box, Gaussian: gradients can climb it."""
-    outside = jnp.maximum(state.low - u, 0.0) + jnp.maximum(u - state.high, 0.0)
-    return 0.5 * jnp.sum((outside / WALL) ** 2)
+    xp = namespace(u)
+    outside = xp.maximum(state.low - u, 0.0) + xp.maximum(u - state.high, 0.0)
+    return 0.5 * xp.sum((outside / WALL) ** 2, axis=-1)
 
 
-def log_second_moment(state: SignalState, u: jax.Array, spread: jax.Array | None) -> jax.Array:
-    """log E[L(u)^2], the expectation over means that vary with variance `spread` [k].
+def log_second_moment(state: SignalState, u: np.ndarray, spread: np.ndarray | None) -> np.ndarray:
+    """log E[L(u)^2], the expectation over means that vary with variance `spread` [n, ..., k].
 
     `spread` is the emulator's variance V (None), or that part of it which further simulations
     will resolve: N(z; m, S)^2 integrates over m ~ N(mu, T), S = C + V - T, to
     |4 pi S|^(-1/2) N(z; mu, S / 2 + T) (Surer et al. 2024). E[L^2] / E[L]^2 is taken from the
     node that speaks loudest at u.
     """
-    mean, total = _scores(state, u)
-    varying = total if spread is None else spread * state.used
-    terms = _terms(state, mean, total)
-    loudest = jnp.argmax(terms)
-    estimate, covariance = state.estimate[loudest], state.covariance[loudest]
-    rest = covariance + jnp.diag(total - varying)
-    half = 0.5 * rest.shape[0] * jnp.log(4.0 * jnp.pi) + 0.5 * _log_det(rest)
-    second = _log_density(estimate, mean, rest / 2.0 + jnp.diag(varying)) - half
-    first = _log_density(estimate, mean, covariance + jnp.diag(total))
-    return 2.0 * (logsumexp(terms) - first - _wall(state, u)) + second
+    used = int(state.used.sum())
+    mean, total = (part[:, :used] for part in scores(state, u))
+    terms = node_log_densities(state, u)
+    loudest = np.argmax(terms, axis=1)
+    varying = total if spread is None else spread[..., :used]
+    ones = [1] * (varying.ndim - 2)  # axes of `spread` beside n and k
+    left = (state.estimate[loudest, :used] - mean).reshape(len(u), *ones, used)
+    covariance = state.covariance[loudest, :used, :used].reshape(len(u), *ones, used, used)
+    total = total.reshape(left.shape)
+    log_det, square = eliminate(_with_variances(covariance, total), left)
+    rest = _with_variances(covariance, total - varying)
+    of_rest = eliminate(rest, np.zeros(used))[0]
+    log_det_both, square_both = eliminate(_with_variances(rest / 2.0, varying), left)
+    # log N(z; mu, S / 2 + T) - log |4 pi S| / 2 - 2 log N(z; mu, C + V)
+    excess = log_det - 0.5 * (log_det_both + of_rest) + square - 0.5 * square_both
+    both = 2.0 * (log_sum_exp(terms) - _wall(state, u))
+    return both.reshape(left.shape[:-1]) + excess - 0.5 * used * np.log(2.0)
 
 
-def node_log_densities(state: SignalState, u: jax.Array) -> jax.Array:
-    """The terms [g] of `log_likelihood`'s sum."""
-    return _terms(state, *_scores(state, u))
+def _with_variances(covariance: Any, variance: Any) -> Any:
+    """Covariances [..., k, k] plus variances [..., k] on their diagonals."""
+    return covariance + variance[..., None] * np.eye(variance.shape[-1])
 
 
-def _terms(state: SignalState, mean: jax.Array, variance: jax.Array) -> jax.Array:
-    covariance = state.covariance + jnp.diag(variance)
-    density = jax.vmap(_log_density, (0, None, 0))(state.estimate, mean, covariance)
-    return state.log_weight + density
+def eliminate(matrix: Any, vector: Any) -> tuple[Any, Any]:
+    """log |C| and v^T C^-1 v for small positive definite C [..., k, k] and v [..., k].
 
-
-def _log_density(z: jax.Array, mean: jax.Array, covariance: jax.Array) -> jax.Array:
-    """log N(z; mean, covariance)."""
-    inverse = small_inverse_cholesky(covariance)
-    white = inverse @ (z - mean)
-    constant = -0.5 * z.shape[0] * jnp.log(2.0 * jnp.pi)
-    return jnp.sum(jnp.log(jnp.diag(inverse))) - 0.5 * white @ white + constant
-
-
-def _log_det(matrix: jax.Array) -> jax.Array:
-    return -2.0 * jnp.sum(jnp.log(jnp.diag(small_inverse_cholesky(matrix))))
+    Gaussian elimination, unrolled: of a few rows it compiles faster than LAPACK's factor and its
+    derivative, and it runs along all other axes at once.
+    """
+    xp = namespace(matrix)
+    log_det, square = 0.0, 0.0
+    for _ in range(matrix.shape[-1]):
+        pivot, row = matrix[..., 0, 0], matrix[..., 0, 1:]
+        log_det = log_det + xp.log(pivot)
+        square = square + vector[..., 0] ** 2 / pivot
+        share = row / pivot[..., None]
+        vector = vector[..., 1:] - share * vector[..., :1]
+        matrix = matrix[..., 1:, 1:] - share[..., :, None] * row[..., None, :]
+    return log_det, square

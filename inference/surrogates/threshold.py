@@ -1,16 +1,14 @@
 """The approximate likelihood of a threshold on the discrepancy."""
 
+import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax.scipy.special import log_ndtr, logsumexp
-from jax.scipy.stats import norm
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 
 from ..gp.process import GP, predict
+from ..namespaces import log_ndtr, log_sum_exp, namespace
 from .transform import Transform
 
 
@@ -18,7 +16,7 @@ class ThresholdState(NamedTuple):
     """What the likelihood depends on; threshold in the standardised units of the GP."""
 
     gp: GP  # k processes, one for each draw of the hyperparameters
-    threshold: jax.Array  # []
+    threshold: np.ndarray  # []
 
 
 class Quantile(NamedTuple):
@@ -35,7 +33,6 @@ class Predicted(NamedTuple):
 
 
 Threshold = str | float | Quantile | Predicted | None
-TAIL_Z = -30.0
 RULES = ("min_mean", "min_observed")
 DEFAULT_THRESHOLD = Predicted(0.2)
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(12)
@@ -43,25 +40,28 @@ LEGENDRE = np.polynomial.legendre.leggauss(12)
 SERIES_Z = -4.0
 
 
-def log_likelihood(state: ThresholdState, u: jax.Array) -> jax.Array:
-    """log Phi((eps - mu(u)) / sigma(u)) at u [d], sigma^2 the variance of a new discrepancy.
+def log_likelihood(state: ThresholdState, u: Any) -> Any:
+    """log Phi((eps - mu(u)) / sigma(u)) at u [n, d], sigma^2 the variance of a new discrepancy.
 
     Gutmann and Corander (2016), eq. for Gaussian-process surrogates; Lopez-Guevara et al.
     (2018), inference. The mean over the processes, where there are several.
     """
     z, _ = _standardised(state, u)
-    return logsumexp(log_cdf(z)) - jnp.log(z.shape[0])
+    return log_sum_exp(log_ndtr(z)) - math.log(z.shape[-1])
 
 
-def _standardised(state: ThresholdState, u: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """(eps - mu) / sigma and sigma^2, [k] each."""
+def _standardised(state: ThresholdState, u: Any) -> tuple[Any, Any]:
+    """(eps - mu) / sigma and sigma^2, [n, k] each."""
+    xp = namespace(u)
     mean, variance = predict(state.gp, u)
-    noisy = variance + jnp.exp(2.0 * state.gp.hyper.log_noise)
-    return (state.threshold - mean) / jnp.sqrt(noisy), noisy
+    noisy = variance.T + xp.exp(2.0 * state.gp.hyper.log_noise)
+    return (state.threshold - mean.T) / xp.sqrt(noisy), noisy
 
 
-def log_second_moment(state: ThresholdState, u: jax.Array, spread: jax.Array | None) -> jax.Array:
-    """log E[L(u)^2], the expectation over a latent mean that varies with variance `spread` [k].
+def log_second_moment(
+    state: ThresholdState, u: np.ndarray, spread: np.ndarray | None
+) -> np.ndarray:
+    """log E[L(u)^2], over a latent mean that varies with variance `spread` [n, ..., k].
 
     `spread` is the latent variance now (None), which gives the second moment of the unknown
     likelihood (Jarvenpaa et al. 2019, MaxVar), or that part of it which further simulations
@@ -71,51 +71,31 @@ def log_second_moment(state: ThresholdState, u: jax.Array, spread: jax.Array | N
     E_w[Phi((z + sqrt(r) w) / sqrt(1 - r))^2] by Gauss and Hermite about the integrand's peak.
     """
     z, noisy = _standardised(state, u)
-    latent = noisy - jnp.exp(2.0 * state.gp.hyper.log_noise)
-    r = jnp.clip((latent if spread is None else spread) / noisy, 1e-12, 1.0 - 1e-6)[:, None]
-    z = z[:, None]
-    peak = 2.0 * jnp.sqrt(r) / (1.0 + r) * jnp.maximum(-z, 0.0)
-    width = jnp.where(z < 0.0, jnp.sqrt((1.0 - r) / (1.0 + r) + r), 1.0)
-    w = peak + width * NODES
-    inside = 2.0 * log_cdf((z + jnp.sqrt(r) * w) / jnp.sqrt(1.0 - r)) + norm.logpdf(w)
-    log_terms = inside - norm.logpdf(NODES) + jnp.log(width * WEIGHTS / jnp.sqrt(2.0 * jnp.pi))
-    tail = logsumexp(log_terms, axis=1)
-    both = jnp.where(z[:, 0] > SERIES_Z, _log_both(z[:, 0], r[:, 0]), tail)
-    return logsumexp(both) - jnp.log(z.shape[0])
+    varying = noisy - np.exp(2.0 * state.gp.hyper.log_noise) if spread is None else spread
+    shape = len(u), *[1] * (varying.ndim - 2), z.shape[1]
+    r = np.clip(varying / noisy.reshape(shape), 1e-12, 1.0 - 1e-6)
+    z = np.broadcast_to(z.reshape(shape), r.shape)
+    both = np.where(z > SERIES_Z, _log_both(z, r), _log_both_in_tail(z[..., None], r[..., None]))
+    return log_sum_exp(both) - math.log(z.shape[-1])
 
 
-def _log_both(z: jax.Array, r: jax.Array) -> jax.Array:
+def _log_both(z: np.ndarray, r: np.ndarray) -> np.ndarray:
     """Log chance that two standard normals of correlation r lie below z, for z > SERIES_Z."""
-    a = jnp.sqrt((1.0 - r) / (1.0 + r))[:, None]
+    a = np.sqrt((1.0 - r) / (1.0 + r))[..., None]
     x = a * (LEGENDRE[0] + 1.0) / 2.0
-    near = jnp.maximum(z, SERIES_Z)[:, None]
-    integrand = jnp.exp(-0.5 * near**2 * (1.0 + x**2)) / (1.0 + x**2)
-    owen = jnp.sum(LEGENDRE[1] * integrand * a / 2.0, axis=1) / (2.0 * jnp.pi)
-    return jnp.log(jnp.maximum(norm.cdf(near[:, 0]) - 2.0 * owen, 1e-30))
+    near = np.maximum(z, SERIES_Z)
+    integrand = np.exp(-0.5 * near[..., None] ** 2 * (1.0 + x**2)) / (1.0 + x**2)
+    owen = np.sum(LEGENDRE[1] * integrand * a / 2.0, axis=-1) / (2.0 * np.pi)
+    return np.log(np.maximum(ndtr(near) - 2.0 * owen, 1e-30))
 
 
-@jax.custom_jvp
-def log_cdf(z: jax.Array) -> jax.Array:
-    """log Phi(z), with value and slope finite where Phi underflows."""
-    return log_ndtr(z)
-
-
-@log_cdf.defjvp
-def _log_cdf_jvp(
-    primals: tuple[jax.Array], tangents: tuple[jax.Array]
-) -> tuple[jax.Array, jax.Array]:
-    """Slope phi / Phi.
-
-    JAX's own exponentiates a difference of two numbers near z^2 / 2: wrong by a third at
-    z = -1e8, by any factor beyond. From TAIL_Z on the asymptotic series is exact to 1e-10.
-    """
-    (z,), (tangent,) = primals, tangents
-    value = log_cdf(z)
-    near, far = jnp.maximum(z, TAIL_Z), jnp.minimum(z, TAIL_Z)  # each finite in its unused branch
-    inverse_square = (1.0 / far) ** 2
-    series = 1.0 - inverse_square * (1.0 - inverse_square * (3.0 - 15.0 * inverse_square))
-    slope = jnp.where(z > TAIL_Z, jnp.exp(norm.logpdf(near) - log_ndtr(near)), -far / series)
-    return value, slope * tangent
+def _log_both_in_tail(z: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """The same at z [..., 1], by Gauss and Hermite."""
+    peak = 2.0 * np.sqrt(r) / (1.0 + r) * np.maximum(-z, 0.0)
+    width = np.where(z < 0.0, np.sqrt((1.0 - r) / (1.0 + r) + r), 1.0)
+    w = peak + width * NODES
+    inside = 2.0 * log_ndtr((z + np.sqrt(r) * w) / np.sqrt(1.0 - r)) - 0.5 * (w**2 - NODES**2)
+    return log_sum_exp(inside + np.log(width * WEIGHTS / np.sqrt(2.0 * np.pi)))
 
 
 def check_rule(rule: Threshold) -> None:

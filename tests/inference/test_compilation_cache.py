@@ -1,4 +1,4 @@
-"""What JAX compiles is kept for the next command."""
+"""What JAX compiles is kept for the next process."""
 
 import os
 import subprocess
@@ -6,22 +6,19 @@ import sys
 
 import pytest
 
-COMMAND = """
-import sys
-from bolfi_liquids.cli.app import main
-assert "jax" not in sys.modules
-sys.argv[1:] = ["guide", "files"]
-main()
-"""
-
 COMPILING = """
-from bolfi_liquids.run.jax_cache import keep_compilations
-keep_compilations()
 import jax, jax.numpy as jnp
+from bolfi_liquids.inference.compilation_cache import kept_compilations
 hits = []
 jax.monitoring.register_event_listener(lambda event, **_: hits.append(event))
-print(float(jax.jit(lambda x: jnp.sin(x).sum())(jnp.arange(5.0))))
+settings = "jax_compilation_cache_dir", "jax_persistent_cache_min_compile_time_secs"
+before = [getattr(jax.config, name) for name in settings]
+jax.jit(lambda x: x + 1)(1)  # JAX has looked at its settings
+with kept_compilations():
+    print(float(jax.jit(lambda x: jnp.sin(x).sum())(jnp.arange(5.0))))
 print(hits.count("/jax/compilation_cache/cache_hits"))
+assert [getattr(jax.config, name) for name in settings] == before
+jax.jit(lambda x: x + 2)(1)
 """
 
 
@@ -48,6 +45,13 @@ def test_the_next_command_finds_what_was_compiled(tmp_path):
     assert found > 0
 
 
+def test_what_is_compiled_outside_is_not_kept(tmp_path):
+    compiled(tmp_path)
+    kept = {entry.name for entry in tmp_path.rglob("*-cache")}
+    assert kept
+    assert not any("lambda_" in name and "sin" not in name for name in kept) or len(kept) <= 4
+
+
 def test_the_environment_has_the_last_word(tmp_path):
     chosen = tmp_path / "chosen"
     places = {
@@ -70,9 +74,3 @@ def test_a_cache_that_cannot_be_used_is_done_without(tmp_path, home):
         for entry in (tmp_path / home).rglob("*-cache"):
             entry.write_bytes(entry.read_bytes()[:20])
     assert compiled(tmp_path / home) == (usual, 0)
-
-
-def test_commands_keep_what_is_compiled(tmp_path):
-    own = elsewhere(tmp_path)
-    subprocess.run([sys.executable, "-c", COMMAND], env=own, stdout=subprocess.DEVNULL, check=True)
-    assert [place.name for place in tmp_path.rglob("jax")] == ["jax"]

@@ -1,0 +1,60 @@
+"""What JAX compiles for the engine is kept for the next process."""
+
+import os
+import platform
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import RLock
+
+import jax
+from jax.experimental.compilation_cache import compilation_cache
+from platformdirs import user_cache_path
+
+_alone = RLock()  # JAX's settings belong to the process
+
+
+@contextmanager
+def kept_compilations() -> Iterator[None]:
+    """Have JAX keep what is compiled within in the user's cache directory.
+
+    A directory that the user chose, by `JAX_COMPILATION_CACHE_DIR` or by JAX's own setting, is used
+    as it is. JAX's settings are afterwards what they were. A cache that cannot be written or read
+    is done without.
+    """
+    place = _directory() if jax.config.jax_compilation_cache_dir is None else None
+    if place is None:
+        yield
+        return
+    ours = {
+        "jax_compilation_cache_dir": str(place),
+        "jax_persistent_cache_min_compile_time_secs": 0.0,
+        "jax_persistent_cache_min_entry_size_bytes": 0,
+    }
+    with _alone, warnings.catch_warnings():
+        # what was cut short is compiled again
+        warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache")
+        before = {name: getattr(jax.config, name) for name in ours}
+        try:
+            _configure(ours)
+            yield
+        finally:
+            _configure(before)
+
+
+def _configure(settings: dict[str, object]) -> None:
+    for name, value in settings.items():
+        jax.config.update(name, value)
+    compilation_cache.reset_cache()  # JAX looks at its settings when it first compiles
+
+
+def _directory() -> Path | None:
+    """A directory for this computer's processor, for a home directory may be shared; None where
+    none can be written."""
+    try:
+        place = user_cache_path("bolfi-liquids") / "jax" / (platform.node() or "here")
+        place.mkdir(parents=True, exist_ok=True)
+    except (OSError, RuntimeError):  # the latter where platformdirs finds no home
+        return None
+    return place if os.access(place, os.W_OK) else None
