@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from ..inference.simulations import Job, Simulation
 
 DRAWS_EACH = 500  # of each of two chains
-SPARE_ROWS = 8  # rows of the engine's arrays beyond the budget, for what is pending
 
 
 class Spread(NamedTuple):
@@ -259,7 +258,6 @@ def _engine(problem: Problem, observed: NDArray, seed: int) -> "Bolfi":
         surrogate=settings.surrogate,
         seed=seed,
         initial=MIN_SIMULATIONS,
-        capacity=settings.budget + SPARE_ROWS,
         discrepancy=problem.stirring.discrepancy(),
         **(paper if settings.surrogate == "discrepancy" else {}),
     )

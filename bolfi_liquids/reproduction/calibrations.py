@@ -72,7 +72,6 @@ class ByStirring:
                 self.prior,
                 CAMERA_NOISE(clean, generator(seed, Phase.CAMERA_NOISE)),
                 seed=seed,
-                capacity=self.budgets[-1],
                 **engine_options(stirring, self.surrogate),
             )
             fits = after_each(engine, simulate, self.budgets)
@@ -123,7 +122,6 @@ class ByPouring(FluidSimulator):
                 self.prior,
                 simulate(truth, np.array([seed]))[0],
                 seed=seed,
-                capacity=self.budgets[-1],
                 initial=MIN_SIMULATIONS,
                 discrepancy=_squared,
                 **rules,

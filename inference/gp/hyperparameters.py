@@ -53,12 +53,14 @@ def log_marginal_likelihood(hyper: Hyper, data: Data) -> tuple[np.ndarray, np.nd
     at = coordinates(data.u, data.normal)
     squared = (at[:, None, :] - at) ** 2  # [n, n, d]
     (n, d), k = at.shape, len(data.y)
-    smooth, basis = smooth_covariance(hyper, squared), trend(hyper, at)
+    basis = trend(hyper, at)
     variance, rate = np.exp(2.0 * hyper.log_noise), np.exp(-2.0 * hyper.log_length)
     fading = 1.0 - relevance(hyper) ** 2  # -d log r / d log length
     values, gradients = np.empty(k), np.empty((k, d + 2))
     for i, y in enumerate(data.y):
-        gram = smooth[i] + TREND_SD**2 * basis[i] @ basis[i].T
+        # one by one: what is found of a process depends on no other, to the last bit
+        smooth = smooth_covariance(Hyper(*(part[i : i + 1] for part in hyper)), squared)[0]
+        gram = smooth + TREND_SD**2 * basis[i] @ basis[i].T
         gram[np.diag_indices(n)] += variance[i] + JITTER
         whitener = inverse_cholesky(gram)
         white = whitener @ y
@@ -66,7 +68,7 @@ def log_marginal_likelihood(hyper: Hyper, data: Data) -> tuple[np.ndarray, np.nd
         values[i] = np.sum(np.log(np.diag(whitener))) - 0.5 * white @ white
         # dL = trace(excess dK) / 2
         excess = np.outer(weights, weights) - whitener.T @ whitener
-        pulled = excess * smooth[i]
+        pulled = excess * smooth
         by_length = 0.5 * rate[i] * (pulled.ravel() @ squared.reshape(-1, d))
         along = np.sum(basis[i] * (excess @ basis[i]), axis=0)
         of_trend = fading[i] * (along[1 : d + 1] + 2.0 * along[d + 1 :])

@@ -98,9 +98,7 @@ class SignalSurrogate:
     def minimum(self) -> np.ndarray:
         """Maximiser of the likelihood over the box, u [d]."""
         state = self.state
-        return minimise_in_box(
-            lambda u: -log_likelihood(state, u), len(state.low), *self.box or ()
-        )
+        return minimise_in_box(lambda u: -log_likelihood(state, u), len(state.low), *self.box or ())
 
     @in_float64
     def believe(self, u: np.ndarray) -> "SignalSurrogate":

@@ -9,14 +9,14 @@ import typing
 from dataclasses import replace
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from bolfi_liquids.inference.acquisition.rules import RULES
+from bolfi_liquids.inference.gp.process import predict
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates import base
 from bolfi_liquids.inference.surrogates.families import FAMILIES, resolve
-from bolfi_liquids.inference.surrogates.feasibility import feasibility
+from bolfi_liquids.inference.surrogates.feasibility import Feasibility
 from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 
 from bolfi_liquids import inference
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.filterwarnings(
     "ignore::bolfi_liquids.inference.SamplingWarning",  # of a handful of draws
 )
 
-RUNS, ROWS = 12, 64
+RUNS = 12
 KEYS = [jax.random.key(0), jax.random.key(1)]
 POINTS = np.array([[0.2, 0.7], [0.5, 0.5], [0.9, 0.1]])
 FACES = (inference, inference.surrogates, inference.checks, inference.criticism)
@@ -144,7 +144,7 @@ def test_a_new_rule_without_a_name_is_noticed(monkeypatch):
 @pytest.fixture(scope="module", params=FAMILIES)
 def learned(request, simulate, prior, observed):
     """The surrogate of a fit, by family."""
-    engine = inference.Bolfi(prior, observed, surrogate=FAMILIES[request.param](), capacity=ROWS)
+    engine = inference.Bolfi(prior, observed, surrogate=FAMILIES[request.param]())
     u = sobol(0, 0, RUNS, len(prior))
     engine.tell(prior.from_unit(u), simulate(prior.from_unit(u), range(RUNS)), range(RUNS))
     return engine.fit().learned
@@ -159,30 +159,32 @@ def same(a, b):
 
 
 def check_gp(of):
-    assert int(of.gp.data.used) == RUNS
-    assert of.gp.data.u.shape == (ROWS, 2)
+    assert of.gp.data.u.shape == (RUNS, 2)
 
 
 def check_state(of):
     """Arrays alone, of float64, `gp` among them."""
     leaves = jax.tree.leaves(of.state)
-    assert leaves and all(isinstance(leaf, jax.Array | np.ndarray) for leaf in leaves)
+    assert leaves and all(isinstance(leaf, np.ndarray) for leaf in leaves)
     kinds = {np.asarray(leaf).dtype.kind for leaf in leaves}
     assert all(leaf.dtype == np.float64 for leaf in leaves if leaf.dtype.kind == "f"), kinds
-    assert same(of.state.gp, of.gp)
+    for one, other in zip(predict(of.state.gp, POINTS), predict(of.gp, POINTS), strict=True):
+        used = int(of.state.used.sum()) if hasattr(of.state, "used") else len(other)
+        np.testing.assert_allclose(one[:used], other[:used], rtol=1e-9)
 
 
 def densities(of):
-    with jax.enable_x64(True):
-        first = jax.vmap(of.log_likelihood, (None, 0))(of.state, jnp.asarray(POINTS))
-        moment = jax.vmap(of.log_second_moment, (None, 0, None))
-        return np.asarray(first), np.asarray(moment(of.state, jnp.asarray(POINTS), None))
+    first = of.log_likelihood(of.state, POINTS)
+    return first, of.log_second_moment(of.state, POINTS, None)
 
 
 def check_log_likelihood(of):
     values = densities(of)[0]
     assert values.shape == (3,) and values.dtype == np.float64 and finite(values)
     assert np.ptp(values) > 0.0
+    with jax.enable_x64(True):  # NUTS evaluates the same function by JAX
+        traced = jax.jit(of.log_likelihood)(of.state, POINTS)
+    np.testing.assert_allclose(traced, values, rtol=1e-9)
 
 
 def check_log_second_moment(of):
@@ -203,7 +205,7 @@ def check_believe(of):
     after = of.believe(POINTS[:2])
     np.testing.assert_allclose(after.predict(POINTS)[0], of.predict(POINTS)[0], atol=1e-6)
     assert (after.predict(POINTS)[1] <= of.predict(POINTS)[1] + 1e-9).all()
-    assert int(after.gp.data.used) == RUNS + 2 and int(of.gp.data.used) == RUNS
+    assert len(after.gp.data.u) == RUNS + 2 and len(of.gp.data.u) == RUNS
 
 
 def check_predict(of):
@@ -229,7 +231,7 @@ def check_warnings(of):
 
 
 def check_predictive(of):
-    first, again, other = (of.predictive(key, POINTS) for key in (KEYS[0], *KEYS))
+    first, again, other = (of.predictive(np.random.default_rng(seed), POINTS) for seed in (0, 0, 1))
     assert first
     for name, values in first.items():
         assert len(values) == 3 and finite(values)
@@ -240,7 +242,6 @@ def check_predictive(of):
 MEMBERS = [name for name in vars(base.Surrogate) if not name.startswith("_")]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("member", MEMBERS)
 def test_a_surrogate_keeps_its_protocol(learned, member):
     """A member without a check fails here."""
@@ -251,8 +252,7 @@ def test_a_surrogate_keeps_its_protocol(learned, member):
 
 
 def successes(surrogate):
-    u = np.asarray(surrogate.gp.data.u)[:RUNS]
-    return feasibility(u, np.ones(RUNS, bool), ROWS)
+    return Feasibility(surrogate.gp.data.u, np.ones(RUNS, bool))
 
 
 @pytest.mark.parametrize("name", RULES)
@@ -333,7 +333,6 @@ def test_a_check_keeps_its_protocol(made, name):
 # Pipelines.
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", exported(is_pipeline))
 def test_a_pipeline_keeps_its_protocol(pipelines, prior, observed, kind):
     pipeline = pipelines[exported(is_pipeline)[kind]]

@@ -246,7 +246,7 @@ VALUES = {
         {"units": ["m"]},
         {"units": "m"},
     ],
-    "Bolfi": [{"capacity": 10**6}, {"initial": 10**6}],
+    "Bolfi": [{"initial": 10**6}],
     "Bolfi.ask": [{"n": 10**6}, {"n": -1}],
     "shared_design": [{"n": 10**6}, {"n": 2}, {"prior": 3}],
     "Prior.sample": [{"key": 0}, {"key": jax.random.split(jax.random.key(0))}, {"n": 0}],

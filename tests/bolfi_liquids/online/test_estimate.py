@@ -118,7 +118,6 @@ def test_missing_samples_equal_a_shorter_recording():
         seen.observed[:samples],
         discrepancy=stirring.discrepancy(),
         threshold="min_mean",
-        capacity=64,
     )
     engine.tell(known.theta, known.signals[:, :samples], known.seeds)
     fit = engine.fit()

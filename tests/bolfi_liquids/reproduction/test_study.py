@@ -18,7 +18,7 @@ def line(theta, seeds):
 def engine():
     prior = inference.Prior({"x": dist.Uniform(0.0, 1.0)})
     observed = 0.6 * np.linspace(0.0, 1.0, 5)
-    return inference.Bolfi(prior, observed, seed=3, capacity=12, initial=MIN_SIMULATIONS,
+    return inference.Bolfi(prior, observed, seed=3, initial=MIN_SIMULATIONS,
                            surrogate="discrepancy", **PAPER_RULES)  # fmt: skip
 
 

@@ -3,11 +3,11 @@
 import warnings
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from arviz_stats.base import array_stats
 from bolfi_liquids.inference._float64 import in_float64
+from bolfi_liquids.inference.namespaces import log_sum_exp, namespace
 from bolfi_liquids.inference.sampling import draw as sampling
 from bolfi_liquids.inference.sampling import nuts, quadrature
 from bolfi_liquids.inference.sampling.convergence import Status, limits
@@ -27,10 +27,11 @@ draw_posterior = in_float64(sampling.draw_posterior)
 def peaks(state, u):
     """Gaussians of weights 0.8 and 0.2, where they coincide one, along a parabola."""
     centres, whiteners, bend = state
-    bent = u.at[-1].add(-bend * (u[0] - 0.5) ** 2)
-    z = jnp.einsum("kij,kj->ki", whiteners, bent - centres)
-    logs = jnp.log(jnp.array([0.8, 0.2])) - 0.5 * jnp.sum(z**2, -1)
-    return jnp.logaddexp(logs[0], logs[1])
+    xp = namespace(u)
+    last = np.eye(u.shape[1])[-1]
+    bent = u - bend * (u[:, :1] - 0.5) ** 2 * last
+    z = xp.einsum("kij,nkj->nki", whiteners, bent[:, None] - centres)
+    return log_sum_exp(np.log([0.8, 0.2]) - 0.5 * xp.sum(z**2, -1))
 
 
 def one(centre, whitener, bend=0.0):
@@ -130,7 +131,8 @@ def test_compiles_once_for_all_fits_and_lengths(line_fit, prior, observed, simul
     traces = []
 
     def counted(state, u):
-        traces.append(None)
+        if not isinstance(u, np.ndarray):  # NumPy evaluates it without compiling
+            traces.append(None)
         return line_fit.learned.log_likelihood(state, u)
 
     counts = []
@@ -245,7 +247,7 @@ def test_a_hole_in_the_likelihood_is_avoided_or_told():
 
 
 def right_half(state, u):
-    return jnp.where(u[0] < 0.45, jnp.nan, peaks(state, u))
+    return namespace(u).where(u[:, 0] < 0.45, np.nan, peaks(state, u))
 
 
 @pytest.mark.parametrize(("chains", "draws"), [(2, 8), (2, 50), (4, 400), (4, 1000)])

@@ -1,15 +1,11 @@
 """The weighted population against posteriors whose moments and evidence are known."""
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
-from bolfi_liquids.inference._float64 import in_float64
 from bolfi_liquids.inference.sampling.importance import explore
-from bolfi_liquids.inference.sampling.mixture import fit_mixture, log_density, to_unit
-from scipy.special import logsumexp
-
-pytestmark = pytest.mark.slow  # the engine compiles for seconds for each shape
+from bolfi_liquids.inference.sampling.mixture import fit_mixture, log_density
+from bolfi_liquids.inference.sampling.target import Target
+from scipy.special import logsumexp, ndtr
 
 SEEDS = 5
 
@@ -17,9 +13,9 @@ SEEDS = 5
 def two_gaussians(state, u):
     """Weight 0.8 at the first centre and 0.2 at the second, normalised over all space."""
     centres, whiteners, logs = state
-    z = jnp.einsum("kij,kj->ki", whiteners, u - centres)
-    volume = jnp.linalg.slogdet(whiteners)[1] - 0.5 * len(u) * jnp.log(2.0 * jnp.pi)
-    return jax.nn.logsumexp(logs + volume - 0.5 * jnp.sum(z**2, -1))
+    z = np.einsum("kij,nkj->nki", whiteners, u[:, None] - centres)
+    volume = np.linalg.slogdet(whiteners)[1] - 0.5 * u.shape[1] * np.log(2.0 * np.pi)
+    return logsumexp(logs + volume - 0.5 * np.sum(z**2, -1), axis=1)
 
 
 def gaussian_state(d, sd):
@@ -36,15 +32,17 @@ def bimodal_state(d, sd):
     return centres, np.stack([np.eye(d) / sd] * 2), np.log([0.8, 0.2])
 
 
-@in_float64
+def explored(seed, state, d):
+    return explore(np.random.default_rng(seed), Target(two_gaussians, state, d))
+
+
 def populations(state, d):
-    """(u, normalised weights, log evidence) for each key."""
+    """(u, normalised weights, log evidence) for each seed."""
     found = []
     for seed in range(SEEDS):
-        made = explore(jax.random.key(seed), two_gaussians, state, d)
+        made = explored(seed, state, d)
         log_evidence = logsumexp(made.log_weights)
-        weights = np.exp(np.asarray(made.log_weights) - log_evidence)
-        found.append((np.asarray(to_unit(made.x)), weights, log_evidence))
+        found.append((ndtr(made.x), np.exp(made.log_weights - log_evidence), log_evidence))
     return found
 
 
@@ -80,46 +78,29 @@ def test_without_any_information_it_is_the_prior(d):
     np.testing.assert_allclose(np.sqrt(weights @ (u - 0.5) ** 2), np.sqrt(1 / 12), atol=0.03)
 
 
-def test_a_likelihood_that_fails_everywhere_leaves_the_prior():
-    nowhere = bimodal_state(2, np.nan)
-    u, weights, _ = populations(nowhere, 2)[0]
-    assert np.isfinite(weights).all()
-    np.testing.assert_allclose(weights @ u, 0.5, atol=0.05)
+def test_a_likelihood_that_fails_everywhere_is_refused():
+    with np.errstate(all="ignore"), pytest.raises(ValueError, match="finite nowhere"):
+        explored(0, bimodal_state(2, np.nan), 2)
 
 
-@in_float64
 def test_a_peak_costs_what_is_stated():
-    costs = [
-        int(explore(jax.random.key(0), two_gaussians, gaussian_state(2, sd), 2).evaluations)
-        for sd in (0.2, 0.003)
-    ]
+    costs = [len(explored(0, gaussian_state(2, sd), 2).x) for sd in (0.2, 0.003)]
     assert costs[0] <= 2048
     assert costs[1] <= 4096
 
 
-@in_float64
-def test_compiles_once_and_repeats():
-    traces = []
-
-    def counted(state, u):
-        traces.append(None)
-        return two_gaussians(state, u)
-
-    results = [
-        explore(jax.random.key(0), counted, bimodal_state(1, sd), 1).x for sd in (0.2, 0.1, 0.2)
-    ]
-    assert len(traces) == 1
+def test_repeats():
+    results = [explored(0, bimodal_state(1, sd), 1).x for sd in (0.2, 0.1, 0.2)]
     np.testing.assert_array_equal(results[0], results[2])
     assert not np.array_equal(results[0], results[1])
 
 
-@in_float64
 def test_the_mixture_integrates_to_one():
     """By importance sampling from the prior, to 4 standard errors (10^5 points)."""
     rng = np.random.default_rng(0)
     x = np.concatenate([rng.normal(-1.0, 0.3, (448, 2)), rng.normal(1.0, 0.2, (64, 2))])
-    mixture = jax.jit(fit_mixture)(x, np.zeros(512), 0.5)
+    mixture = fit_mixture(x, np.zeros(512), 0.5)
     points = rng.normal(size=(100_000, 2))
     prior = -0.5 * (points**2).sum(1) - np.log(2.0 * np.pi)
-    ratio = np.exp(np.asarray(jax.jit(log_density)(mixture, points)) - prior)
+    ratio = np.exp(log_density(mixture, points) - prior)
     assert abs(ratio.mean() - 1.0) < 4.0 * ratio.std() / np.sqrt(len(points))

@@ -1,9 +1,9 @@
 """Adaptive quadrature against closed forms and a dense grid."""
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from bolfi_liquids.inference._float64 import in_float64
+from bolfi_liquids.inference.namespaces import log_sum_exp
 from bolfi_liquids.inference.sampling import quadrature
 from bolfi_liquids.inference.sampling.target import Length, Target
 from scipy.stats import chisquare, norm
@@ -15,21 +15,20 @@ ALPHA = 1e-4  # false alarms per test
 def peaks(state, u):
     """Two Gaussians of weight 0.8 and 0.2."""
     centres, sds = state
-    z = (u - centres) / sds
-    logs = jnp.log(jnp.array([0.8, 0.2])) - jnp.sum(
-        0.5 * z**2 + jnp.log(sds * jnp.sqrt(2.0 * jnp.pi)), -1
-    )
-    return jnp.logaddexp(logs[0], logs[1])
+    z = (u[:, None] - centres) / sds
+    logs = np.log([0.8, 0.2]) - np.sum(0.5 * z**2 + np.log(sds * np.sqrt(2.0 * np.pi)), -1)
+    return log_sum_exp(logs)
 
 
 def banana(state, u):
-    x, y = 8.0 * (u - 0.5)
+    x, y = 8.0 * (u.T - 0.5)
     return -0.5 * (x / 1.5) ** 2 - 0.5 * ((y - 0.5 * x**2 + 1.0) / 0.3) ** 2
 
 
 def holes(state, u):
     """NaN on the left, -inf below."""
-    return jnp.where(u[1] < 0.5, -jnp.inf, jnp.sqrt(u[0] - 0.5) * 0.0)
+    with np.errstate(invalid="ignore"):
+        return np.where(u[:, 1] < 0.5, -np.inf, np.sqrt(u[:, 0] - 0.5) * 0.0)
 
 
 def target(d, sd, apart=True):

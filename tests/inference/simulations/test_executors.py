@@ -70,7 +70,7 @@ def dithering(simulate):
 @pytest.fixture(scope="module")
 def by_hand(prior, observed, simulate):
     """Ask and tell by the documented rule: point i once all up to i - 3 have been told."""
-    engine = inference.Bolfi(prior, observed, initial=INITIAL, capacity=BUDGET)
+    engine = inference.Bolfi(prior, observed, initial=INITIAL)
     asked = [engine.ask(1) for _ in range(3)]
     for told in range(BUDGET):
         seeds = [simulation_seed(0, told)]

@@ -8,8 +8,6 @@ from bolfi_liquids.inference.surrogates.transform import Transform, candidates
 
 pytestmark = pytest.mark.slow  # the engine compiles for seconds for each shape
 
-ROWS = 64
-
 
 def bowl(u, rng, power):
     """A positive surface whose `power` is smooth with even noise."""
@@ -27,7 +25,7 @@ def bowl(u, rng, power):
 )
 def test_the_transform_that_made_the_data_is_found(make, expected):
     u = sobol(0, 0, 40, 2)
-    assert learn(u, make(u, np.random.default_rng(0)), ROWS).transform.name == expected
+    assert learn(u, make(u, np.random.default_rng(0))).transform.name == expected
 
 
 def test_jacobian_and_inverse_are_that_of_the_transform():
@@ -44,7 +42,7 @@ def test_a_discrepancy_of_zero_stays_finite():
     for g in candidates(None, values):
         assert np.isfinite(g(values)).all()
         assert np.isfinite(g.log_jacobian(values)).all()
-    fitted = learn(sobol(0, 0, 6, 1), values, ROWS, "log")
+    fitted = learn(sobol(0, 0, 6, 1), values, "log")
     assert np.isfinite(fitted.threshold)
 
 
@@ -60,7 +58,7 @@ def test_equal_discrepancies_are_learned_as_flat(value):
     """But for rounding, which is not to be learned."""
     u = np.random.default_rng(0).uniform(size=(12, 2))
     almost = value * (1.0 + 1e-15 * np.random.default_rng(1).uniform(size=12))
-    found = learn(u, almost, 64)
+    found = learn(u, almost)
     mean, _ = found.predict(np.random.default_rng(2).uniform(size=(50, 2)))
     assert np.ptp(found.transform.inverse(mean)) < 1e-9 * value
     assert found.warnings() == ["all simulations are equal: the data cannot tell parameters apart"]
@@ -72,7 +70,7 @@ def test_a_discrepancy_outside_the_transform_changes_it():
     rng = np.random.default_rng(3)
     u = rng.uniform(size=(16, 1))
     values = np.exp(6.0 * u[:, 0] + 0.1 * rng.normal(size=16))
-    found = learn(u, values, 64)
+    found = learn(u, values)
     assert found.transform.name == "log"
     values[3] = -1.0
     with warnings.catch_warnings():
@@ -83,7 +81,7 @@ def test_a_discrepancy_outside_the_transform_changes_it():
 def test_minimum_and_threshold_agree_with_a_grid():
     u = sobol(0, 0, 30, 2)
     values = bowl(u, np.random.default_rng(0), 1.0)
-    fitted = with_threshold(learn(u, values, ROWS, "identity"), "min_mean")
+    fitted = with_threshold(learn(u, values, "identity"), "min_mean")
     axis = np.linspace(0.0, 1.0, 101)
     grid = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2)
     mean, sd = fitted.predict(grid)
@@ -98,13 +96,13 @@ def test_the_threshold_is_not_taken_where_nothing_was_simulated():
     """The trend falls off the edge of the data, below anything that a discrepancy can be."""
     u = sobol(0, 0, 40, 2)
     u = u[u.sum(1) < 1.1]
-    fitted = learn(u, 5.0 - 4.0 * u.sum(1), ROWS, "identity")
+    fitted = learn(u, 5.0 - 4.0 * u.sum(1), "identity")
     assert fitted.predict(np.ones((1, 2)))[0] < 0.0 < fitted.threshold
 
 
 def test_believing_keeps_the_mean_and_shrinks_the_variance():
     u = sobol(0, 0, 10, 2)
-    fitted = learn(u, bowl(u, np.random.default_rng(0), 1.0), ROWS)
+    fitted = learn(u, bowl(u, np.random.default_rng(0), 1.0))
     new = np.array([[0.9, 0.1]])
     believing = fitted.believe(new)
     np.testing.assert_allclose(believing.predict(new)[0], fitted.predict(new)[0], rtol=1e-9)
@@ -114,9 +112,9 @@ def test_believing_keeps_the_mean_and_shrinks_the_variance():
 def test_hyperparameters_wait_until_the_data_have_grown_by_a_third():
     u = sobol(0, 0, 26, 2)
     values = bowl(u, np.random.default_rng(0), 1.0)
-    first = learn(u[:20], values[:20], ROWS)
-    soon = learn(u[:23], values[:23], ROWS, previous=first)
-    later = learn(u, values, ROWS, previous=first)
+    first = learn(u[:20], values[:20])
+    soon = learn(u[:23], values[:23], previous=first)
+    later = learn(u, values, previous=first)
     assert (soon.learned_at, later.learned_at) == (20, 26)
     np.testing.assert_array_equal(soon.gp.hyper.log_length, first.gp.hyper.log_length)
     # the three that came since were learned all the same
@@ -127,7 +125,7 @@ def test_a_run_that_blew_up_does_not_drown_the_others():
     u = sobol(0, 0, 30, 2)
     values = bowl(u, np.random.default_rng(0), 1.0)
     values[np.argmax(np.abs(u - 0.4).sum(1))] = 1e100
-    fitted = learn(u, values, ROWS)
+    fitted = learn(u, values)
     assert np.abs(fitted.minimum() - 0.4).max() < 0.15
 
 
@@ -135,7 +133,7 @@ def test_a_run_that_blew_up_does_not_drown_the_others():
 def test_marginalised_hyperparameters_widen_what_few_points_leave_open():
     u = sobol(0, 0, 7, 1)
     values = 1.0 + 3.0 * (u[:, 0] - 0.4) ** 2 + 0.2 * np.random.default_rng(1).normal(size=7)
-    one = learn(u, values, ROWS, "identity")
+    one = learn(u, values, "identity")
     many = marginalised(one, None, 32, seed=0)
     grid = np.linspace(0.05, 0.95, 10)[:, None]
     assert np.log(many.predict(grid)[1] / one.predict(grid)[1]).mean() > 0.0

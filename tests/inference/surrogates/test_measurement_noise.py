@@ -1,6 +1,5 @@
 """The noise model against dense algebra and sampling."""
 
-import jax
 import numpy as np
 import pytest
 from bolfi_liquids.inference.surrogates.measurement_noise import (
@@ -15,12 +14,6 @@ from bolfi_liquids.inference.surrogates.measurement_noise import (
 from scipy.stats import multivariate_normal, norm
 
 ALPHA = 1e-4  # false alarms
-
-
-@pytest.fixture(autouse=True)
-def float64():
-    with jax.enable_x64(True):
-        yield
 
 
 def dense(layout, sigma, rho):
