@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import sys
 import tarfile
 import time
@@ -71,14 +72,21 @@ def importable(monkeypatch):
 
 
 @pytest.fixture
-def poured_run(tmp_path):
-    """A run that has chosen a pour: a small one of version 0.1, without its criticism.
+def poured_run(made_poured_run, tmp_path):
+    """A run that has chosen a pour, to be altered."""
+    return shutil.copytree(made_poured_run, tmp_path / "run_0_1")
+
+
+@pytest.fixture(scope="session")
+def made_poured_run(tmp_path_factory):
+    """A small run of version 0.1, without its criticism.
 
     It names today's model, for a pour over another model's liquid is not executed.
     """
+    folder = tmp_path_factory.mktemp("poured_run")
     with tarfile.open(Path(__file__).parent / "data" / "run_0_1.tar.xz") as archive:
-        archive.extractall(tmp_path, filter="data")
-    run = tmp_path / "run_0_1"
+        archive.extractall(folder, filter="data")
+    run = folder / "run_0_1"
     summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
     del summary["criticise"]
     (run / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
