@@ -14,7 +14,7 @@ import pytest
 from bolfi_liquids.inference.checks.one_replicate import Replicate
 from bolfi_liquids.inference.checks.store import ReplicateStore
 from bolfi_liquids.inference.simulations import Simulation
-from xarray import DataTree, Dataset
+from xarray import Dataset, DataTree
 
 import bolfi_liquids as bl
 from bolfi_liquids import inference
