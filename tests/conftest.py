@@ -20,7 +20,6 @@ POURED = {"pour", "frames"}  # its fixtures that take a minute where nothing is 
 SIMULATED = {"calibration", *POURED}
 SIMULATING = ("models", "simulation")  # folders of tests
 CONTROLLED = {"arm", "emulator", "robot"}  # fixtures of tests that talk to an emulated controller
-ALONE_IN = ("hardware", "properties")  # where Makefile looks for tests that have the computer alone
 MOST_REPEATS = 3  # of a session; with more of them, tests hide what fails
 CALM, MOST_CALM = 1.0, 30.0  # s, without a stall before a repetition; and waited for at most
 REPEATED = pytest.StashKey[list[str]]()
@@ -50,9 +49,6 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if POURED & set(item.fixturenames) and _folders(item)[0] == APPLICATION:
             item.add_marker("slow")
-        alone = item.get_closest_marker("alone") or item.get_closest_marker("punctual")
-        if alone and _folders(item)[0] not in ALONE_IN:
-            raise pytest.UsageError(f"{item.nodeid}: `make test` would miss it, see ALONE_IN")
 
 
 def _folders(item):
