@@ -13,10 +13,10 @@ PYENV_VERSIONS := $(or $(PYENV_ROOT),$(HOME)/.pyenv)/versions
 SUPPORTED := import sys, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
 
 # `make test ALSO=slow` adds the slow tests to the same session, as .ci/run does
-SELECTED := $(if $(filter slow,$(ALSO)),,not slow and )not minutes and not gpu and not hardware and not benchmark
+SELECTED := $(if $(filter slow,$(ALSO)),,not slow and )not minutes and not hardware and not benchmark
 # tests that must keep time have the computer for themselves, the others share its processors
 ALONE := (punctual or alone)
-ALONE_IN := tests/hardware tests/properties
+ALONE_IN = $(shell grep -rlE 'mark\.(punctual|alone)' tests --include='test_*.py')
 SHARED := -n logical --maxprocesses 4 --dist worksteal
 
 PEERS := .venv-peers

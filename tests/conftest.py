@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import sys
 import tarfile
 import time
@@ -19,7 +20,6 @@ POURED = {"pour", "frames"}  # its fixtures that take a minute where nothing is 
 SIMULATED = {"calibration", *POURED}
 SIMULATING = ("models", "simulation")  # folders of tests
 CONTROLLED = {"arm", "emulator", "robot"}  # fixtures of tests that talk to an emulated controller
-ALONE_IN = ("hardware", "properties")  # where Makefile looks for tests that have the computer alone
 MOST_REPEATS = 3  # of a session; with more of them, tests hide what fails
 CALM, MOST_CALM = 1.0, 30.0  # s, without a stall before a repetition; and waited for at most
 REPEATED = pytest.StashKey[list[str]]()
@@ -49,9 +49,6 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if POURED & set(item.fixturenames) and _folders(item)[0] == APPLICATION:
             item.add_marker("slow")
-        alone = item.get_closest_marker("alone") or item.get_closest_marker("punctual")
-        if alone and _folders(item)[0] not in ALONE_IN:
-            raise pytest.UsageError(f"{item.nodeid}: `make test` would miss it, see ALONE_IN")
 
 
 def _folders(item):
@@ -71,14 +68,21 @@ def importable(monkeypatch):
 
 
 @pytest.fixture
-def poured_run(tmp_path):
-    """A run that has chosen a pour: a small one of version 0.1, without its criticism.
+def poured_run(made_poured_run, tmp_path):
+    """A run that has chosen a pour, to be altered."""
+    return shutil.copytree(made_poured_run, tmp_path / "run_0_1")
+
+
+@pytest.fixture(scope="session")
+def made_poured_run(tmp_path_factory):
+    """A small run of version 0.1, without its criticism.
 
     It names today's model, for a pour over another model's liquid is not executed.
     """
+    folder = tmp_path_factory.mktemp("poured_run")
     with tarfile.open(Path(__file__).parent / "data" / "run_0_1.tar.xz") as archive:
-        archive.extractall(tmp_path, filter="data")
-    run = tmp_path / "run_0_1"
+        archive.extractall(folder, filter="data")
+    run = folder / "run_0_1"
     summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
     del summary["criticise"]
     (run / "summary.json").write_text(json.dumps(summary), encoding="utf-8")

@@ -17,7 +17,8 @@ from .flights import Flights
 from .resolution import PER_CELL
 from .vessel import RIM, Vessel
 
-LEAST_CELLS, LEAST_PARTICLES = 12000, 4000
+# the cells of the bundled cups and coarser ones share a scene
+LEAST_CELLS, LEAST_PARTICLES = 12500, 4000
 
 
 class Pours(NamedTuple):

@@ -18,7 +18,8 @@ from ..runtime import Watch
 from ..stir_setup import StirSetup
 from .slip_law import line_of
 
-LEAST_CELLS, LEAST_PARTICLES, LEAST_NODES, LEAST_WIDTH = 16000, 6000, 40, 8
+# the cells of the bundled recordings and coarser ones share a scene
+LEAST_CELLS, LEAST_PARTICLES, LEAST_NODES, LEAST_WIDTH = 16000, 8000, 40, 8
 
 
 class Stirs(NamedTuple):

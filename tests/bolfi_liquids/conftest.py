@@ -1,4 +1,5 @@
 import fcntl
+import hashlib
 import json
 import os
 import shutil
@@ -22,6 +23,23 @@ BUNDLED = Path(str(files("bolfi_liquids.data"))) / "glycerin_v10.nc"
 SHORT = 60  # samples, 2 s: the pause and the first strokes
 SETTINGS = {"budget": 8, "batch": 2, "particles": 200, "seed": 5}
 POUR_SETTINGS = {"pours": 24, "draws": 16}
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _equal_files_are_read_once():
+    """Copies of few trees are read hundreds of times, and each takes half a second."""
+    read, known = xr.open_datatree, {}
+
+    def opened(path, **options):
+        key = hashlib.sha256(Path(path).read_bytes()).digest(), *options.items()
+        if key not in known:
+            with read(path, **options) as tree:
+                known[key] = tree.load()
+        return known[key].copy(deep=True)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(xr, "open_datatree", opened)
+        yield
 
 
 @pytest.fixture

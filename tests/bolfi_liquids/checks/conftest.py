@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from bolfi_liquids.checks import physics_figure
 from bolfi_liquids.checks.reference import open_reference
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -32,6 +33,18 @@ LIQUIDS = {
     "gel_v10": Liquid("12", 1.0),
     "hidden_oil_bubbles_v10": Liquid("0.1", 1.1, "bubbles"),
 }
+
+
+@pytest.fixture
+def drawn():
+    """For tests that look at plots."""
+
+
+@pytest.fixture(autouse=True)
+def _plots_are_drawn_for_those_alone(request, monkeypatch):
+    """To draw takes longer than all else of a check."""
+    if "drawn" not in request.fixturenames:
+        monkeypatch.setattr(physics_figure, "physics_figure", lambda record: record["title"])
 
 
 @pytest.fixture(scope="session")

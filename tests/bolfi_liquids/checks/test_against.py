@@ -35,6 +35,7 @@ def check(grid, shifted, tmp_path):
     return run
 
 
+@pytest.mark.usefixtures("drawn")
 def test_a_check_leaves_records_plots_and_one_results_file(check):
     found = check(seed=3)
     assert found.passed and found.ran == NAMES

@@ -60,6 +60,7 @@ def run(out, registry, names=(), **more):
         return check_physics(out, names, progress=False, **more)
 
 
+@pytest.mark.usefixtures("drawn")
 def test_a_check_leaves_table_rows_plots_and_one_results_file(tmp_path, registry):
     check = run(tmp_path / "out", registry, seed=4)
     assert not check.passed
@@ -76,6 +77,7 @@ def test_a_check_leaves_table_rows_plots_and_one_results_file(tmp_path, registry
         assert f"The {name} one" in "".join(svg.itertext())
 
 
+@pytest.mark.usefixtures("drawn")
 def test_a_finished_case_is_not_repeated(tmp_path, registry, calls):
     first = run(tmp_path, registry)
     plot = (tmp_path / "good.svg").read_text()

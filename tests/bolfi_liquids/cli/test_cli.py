@@ -22,9 +22,9 @@ def bolfi_liquids(*arguments):
 
 
 def test_missing_file_is_one_line_and_debug_shows_where(tmp_path):
-    command = ("calibrate", tmp_path / "none.nc", "--out", tmp_path / "run")
-    plain = bolfi_liquids(*command)
-    assert plain.returncode == 2
+    command = ["calibrate", str(tmp_path / "none.nc"), "--out", str(tmp_path / "run")]
+    plain = CliRunner().invoke(app, command)
+    assert plain.exit_code == 2
     assert plain.stdout == ""
     assert plain.stderr == f"error: {tmp_path}/none.nc: no such file; check the path\n"
     debug = bolfi_liquids("--debug", *command)

@@ -162,19 +162,24 @@ def test_a_run_that_was_not_criticised_or_is_damaged_holds_no_finished_criticism
 # What the recordings themselves tell of their noise.
 
 
-def recorded(calibration, rng, sd=SD):
-    """The run's recording, its samples at rest AR(1) noise and the rest a smooth signal."""
-    recording = given(calibration).stirring.recordings[0]
+@pytest.fixture(scope="module")
+def stirred(calibration):
+    """The run's recording."""
+    return given(calibration).stirring.recordings[0]
+
+
+def recorded(recording, rng, sd=SD):
+    """The recording, its samples at rest AR(1) noise and the rest a smooth signal."""
     noise = sd * rng.normal(size=recording.inclination.shape)
     for i in range(1, len(noise)):
         noise[i] = RHO * noise[i - 1] + np.sqrt(1.0 - RHO**2) * noise[i]
     return replace(recording, inclination=noise)
 
 
-def test_the_cameras_noise_is_that_of_the_rest_and_correlated(calibration):
+def test_the_cameras_noise_is_that_of_the_rest_and_correlated(stirred):
     """On average over recordings: one of them knows it to a third only."""
     rng = np.random.default_rng(0)
-    found = [camera_noise([recorded(calibration, rng)]) for _ in range(40)]
+    found = [camera_noise([recorded(stirred, rng)]) for _ in range(40)]
     assert {one.samples for one in found} == {2 * AT_REST}
     # the median of the posterior's sizes, and of their correlations, on average
     sizes = [np.median(one.sd) / SD for one in found]
@@ -183,26 +188,26 @@ def test_the_cameras_noise_is_that_of_the_rest_and_correlated(calibration):
     assert np.mean([np.mean(one.correlation) for one in found]) > 0.25
 
 
-def test_fitted_recordings_tell_of_the_cameras_that_saw_those_held_out(calibration):
+def test_fitted_recordings_tell_of_the_cameras_that_saw_those_held_out(stirred):
     rng = np.random.default_rng(0)
-    one, other = (recorded(calibration, rng) for _ in range(2))
+    one, other = (recorded(stirred, rng) for _ in range(2))
     assert held_out_noise(one, [other]).samples == 2 * camera_noise([one]).samples
     slower = replace(other, time=1.1 * other.time)
     assert held_out_noise(one, [slower]).samples == camera_noise([one]).samples
 
 
-def test_a_camera_without_any_noise_is_not_believed(calibration):
-    still = recorded(calibration, np.random.default_rng(0), sd=0.0)
+def test_a_camera_without_any_noise_is_not_believed(stirred):
+    still = recorded(stirred, np.random.default_rng(0), sd=0.0)
     with pytest.raises(InputError, match="does not change at all"):
         camera_noise([still])
-    seen = recorded(calibration, np.random.default_rng(0))
+    seen = recorded(stirred, np.random.default_rng(0))
     with pytest.raises(InputError, match="does not change at all"):
         held_out_noise(still, [seen])
 
 
-def test_clean_recordings_of_the_same_path_say_where_it_errs(calibration):
+def test_clean_recordings_of_the_same_path_say_where_it_errs(stirred):
     rng = np.random.default_rng(0)
-    recording = recorded(calibration, rng)
+    recording = recorded(stirred, rng)
     residual = 10.0 * SD * np.sin(np.linspace(0.0, 9.0, len(recording.time)))[:, None] * [1.0, 0.5]
     clean = [Clean(recording, residual, 1.0, 1)]
     stirring = stirring_of([recording], 200)

@@ -53,10 +53,11 @@ def test_numbers_of_samples_are_those_of_their_strokes():
 
 
 def test_stirring_that_ends_early_is_the_beginning_of_the_same_stirring():
-    whole = bundled_recording("water")
-    first = until_stroke(whole, 2)
+    longer = until_stroke(bundled_recording("water"), 3)
+    first = until_stroke(longer, 2)
     theta = {"viscosity": np.array([0.1]), "cohesion": np.array([0.3])}
-    short, full = (stirring_of([one], 0).simulate(theta, np.array([4])) for one in (first, whole))
+    short, full = (stirring_of([one], 0).simulate(theta, np.array([4])) for one in (first, longer))
+    assert short.shape[1] < full.shape[1]
     same = short.shape[1] - 3  # the curve through the samples bends by those that follow
     assert 20 < same < 60
     np.testing.assert_array_equal(short[0, :same], full[0, :same])

@@ -123,16 +123,20 @@ def test_no_draw_that_judges_has_chosen(pour, calibration, pour_settings):
     assert len(pour.chosen.fractions) % (LANDINGS_PER_DRAW * len(drawn.judge["viscosity"])) == 0
 
 
-def test_an_effect_that_does_not_act_in_pours_needs_no_new_ones(made_up, calibration, tmp_path):
+def test_an_effect_that_does_not_act_in_pours_needs_no_new_ones(
+    made_up, calibration, pour_settings, tmp_path
+):
     run = bl.Calibration.open(shutil.copytree(calibration.path, tmp_path / "run"))
-    bl.choose_pour(run, force=True, progress=False)
+    more = {**pour_settings, "force": True, "progress": False}
+    bl.choose_pour(run, **more)
     before = len(made_up.calls)
-    bl.choose_pour(extended(run, "camera_tilt"), force=True, progress=False)
+    bl.choose_pour(extended(run, "camera_tilt"), **more)
     assert len(made_up.calls) == before
-    bl.choose_pour(extended(run, "adhesion"), force=True, progress=False)
-    assert sum(made_up.calls) == 2 * 64
+    bl.choose_pour(extended(run, "adhesion"), **more)
+    count = pour_settings["pours"]
+    assert sum(made_up.calls) == 2 * count
     tree = xr.load_datatree(run.path / "pour.nc")
-    assert (tree["pours"]["adhesion"] == 0.0).sum() == 64 < tree["pours"].sizes["pour"]
+    assert (tree["pours"]["adhesion"] == 0.0).sum() == count < tree["pours"].sizes["pour"]
 
 
 def extended(calibration, effect):
@@ -145,24 +149,27 @@ def extended(calibration, effect):
     return replace(calibration, tree=tree, summary=summary)
 
 
-def test_a_choice_that_was_killed_goes_on_from_its_pours(made_up, calibration, tmp_path):
+def test_a_choice_that_was_killed_goes_on_from_its_pours(
+    made_up, calibration, pour_settings, tmp_path
+):
     """It ends with the same bits, and pours what it lacked alone."""
     runs = [shutil.copytree(calibration.path, tmp_path / name) for name in ("whole", "killed")]
-    whole = bl.choose_pour(runs[0], force=True, progress=False)
+    more = {**pour_settings, "force": True, "progress": False}
+    whole = bl.choose_pour(runs[0], **more)
     made_up.calls.clear()
     landings = models.landings
 
     def dying(*given, **more):
-        if sum(made_up.calls) >= 24:
+        if sum(made_up.calls) >= 8:
             raise KeyboardInterrupt
         return landings(*given, **more)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(models, "landings", dying)
         with pytest.raises(KeyboardInterrupt):
-            bl.choose_pour(runs[1], force=True, progress=False)
-    again = bl.choose_pour(runs[1], force=True, progress=False)
-    assert sum(made_up.calls) == 64
+            bl.choose_pour(runs[1], **more)
+    again = bl.choose_pour(runs[1], **more)
+    assert sum(made_up.calls) == pour_settings["pours"]
     assert again.chosen.equals(whole.chosen) and again.plug_in.equals(whole.plug_in)
 
 

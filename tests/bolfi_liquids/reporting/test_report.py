@@ -95,9 +95,18 @@ def test_a_prior_is_written_as_in_python(described, text):
     assert prior_text(described) == text
 
 
-@pytest.mark.slow
-def test_report_shows_the_priors(calibration):
-    text, _ = read(bl.report(calibration.path, moving=False))
+@pytest.fixture(scope="module")
+def calibrated(calibration, tmp_path_factory):
+    """The report of a run in which no more was done, of as little as it needs."""
+    run = tmp_path_factory.mktemp("calibrated")
+    for name in ("run.toml", "posterior.nc"):
+        shutil.copy(calibration.path / name, run)
+    calibration.summary.write(run)
+    return bl.report(run, moving=False)
+
+
+def test_report_shows_the_priors(calibration, calibrated):
+    text, _ = read(calibrated)
     for described in calibration.record["settings"]["prior"].values():
         assert html.escape(prior_text(described)) in text
     assert html.escape("{'family'") not in text
@@ -152,14 +161,9 @@ def test_report_says_below_which_viscosity_liquids_look_alike(calibration, tmp_p
         assert all(str(sentence) in text for sentence in told_sentences)
 
 
-def test_report_without_a_pour_says_how_to_get_one(calibration, tmp_path):
-    run = tmp_path / "run"
-    run.mkdir()
-    for name in ("run.toml", "posterior.nc"):
-        shutil.copy(calibration.path / name, run)
-    calibration.summary.write(run)
-    text, page = read(bl.report(run, moving=False))
-    assert f"bolfi-liquids pour {run}" in text
+def test_report_without_a_pour_says_how_to_get_one(calibrated):
+    text, page = read(calibrated)
+    assert f"bolfi-liquids pour {calibrated.parent}" in text
     assert page.figures == len(FIGURES) - 1
 
 
@@ -251,7 +255,7 @@ def test_page_shows_the_criticism_before_the_pour(criticised, criticism_summary)
     assert "camera_delay, camera_tilt" in how and "held out" in how
 
 
-def test_page_without_a_criticism_says_how_to_get_one(calibration):
-    page = bl.report(calibration.path, moving=False).read_text(encoding="utf-8")
-    assert f"bolfi-liquids criticise {calibration.path}" in page
+def test_page_without_a_criticism_says_how_to_get_one(calibrated):
+    page, _ = read(calibrated)
+    assert f"bolfi-liquids criticise {calibrated.parent}" in page
     assert "Where they differ" not in page
