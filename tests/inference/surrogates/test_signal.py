@@ -133,10 +133,10 @@ def test_second_moment_agrees_with_sampling():
 def test_likelihood_and_gradient_are_finite_everywhere(design, noise):
     observed = outputs(np.array([[0.4, 0.6]]))[0] + noise
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0], [1.0, 1.0], [1e-12, 0.3]])
+    summed = jax.jit(jax.grad(lambda state, u: log_likelihood(state, u).sum(), 1))
     for shift in (0.0, 1e3, 1e8):  # data that no parameter explains
         found = learned(design, outputs(design), observed + shift * TIME, noise=SD)
         with jax.enable_x64(True):
-            summed = jax.jit(jax.grad(lambda state, u: log_likelihood(state, u).sum(), 1))
             gradient = summed(found.state, jnp.asarray(corners))
         assert np.isfinite(gradient).all()
         assert np.isfinite(log_likelihood(found.state, corners)).all()
