@@ -12,6 +12,7 @@ import taichi as ti
 LANES = 4
 STRIDE = 512  # Taichi gives each CPU thread at least this many consecutive iterations
 lanes = ti.types.vector(LANES, ti.f32)
+quad = ti.types.vector(4, ti.f32)
 vec3 = ti.types.vector(3, ti.f32)
 mat3 = ti.types.matrix(3, 3, ti.f32)
 

@@ -10,7 +10,7 @@ from .lanes import LANES, STRIDE, lanes, mat3, vec3
 from .mirror import clear_images, fold, reflect_velocity
 from .pressure import add_rise, push, solve_pressure
 from .surface import LIQUID
-from .transfer import clear, deposit, list_cells
+from .transfer import CELLS, clear, deposit, empty, list_cells, mark_cell
 from .viscosity import extend
 
 
@@ -31,9 +31,9 @@ class LiquidState:
 
     A scene is a subclass with the functions `take_step` of a group, and `accelerate`, which changes
     a particle's velocity, and its slope, by what acts on all liquid. A step is `transfer_in`, what
-    the scene does with the velocities, `project`, and how it moves particles. If it is
-    SIDED, it has the fields `side` of cells and `face_side` of faces, and the function `side_of` a
-    point.
+    the scene does with the velocities, `project`, and how it moves particles, with `mark_cell` of
+    where each comes to. If it is SIDED, it has the field `side` of the faces along each axis and of
+    cells, with those of the next ones as in `four`, and the function `side_of` a point.
     """
 
     UPRIGHT = True  # gravity is along -z
@@ -67,6 +67,12 @@ class LiquidState:
         self.pressure, self.rise, self.source, self.diagonal = (of_cells() for _ in range(4))
         self.cell_rest, self.cell_search, self.cell_product = (of_cells() for _ in range(3))
         self.normal_weight = of_cells()
+
+        # what particles give to four faces along each axis, and to four cells
+        self.weights, self.momenta = (
+            [ti.Vector.field(4, ti.f32) for _ in range(lattices)] for lattices in (CELLS + 1, 3)
+        )
+        ti.root.dense(ti.ij, (groups, cells)).place(*self.weights, *self.momenta)
 
         # of the vessel
         self.usable, self.open_volume, self.capacity, self.least = (
@@ -155,6 +161,7 @@ class LiquidState:
         """
         for g in range(position.shape[0]):
             clear(self, g)
+            empty(self, g)
             self.arounds[g], self.nears[g], self.wets[g] = 0, 0, 0
             if ti.static(len(self.rheologies) > 0):
                 for m in range(self.thickness.shape[1]):
@@ -172,6 +179,7 @@ class LiquidState:
                         self.position[g, lane, n][a] = position[g, lane, n, a]
                     self.speed[g, lane, n] = vec3(0.0)
                     self.slope[g, lane, n] = mat3(0.0)
+                    mark_cell(self, g, self.position[g, lane, n])
             cell = self.cell[None]
             layer = self.shape[None][0] * self.shape[None][1]
             for m in range(layer * self.shape[None][2]):
@@ -204,10 +212,10 @@ class LiquidState:
         if ti.static(self.MIRRORED):
             clear_images(self, g)
         self.begin_step(g, step)
+        list_cells(self, g)
         deposit(self, g)
         if ti.static(self.MIRRORED):
             fold(self, g)
-        list_cells(self, g)
 
     @ti.func
     def project(self, g):

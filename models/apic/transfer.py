@@ -8,7 +8,7 @@ import taichi as ti
 
 from ..faults import DRIFTED, LARGEST, RUNAWAY, SOUND, UNSOLVED
 from .geometry import INSIDE, OUTSIDE
-from .lanes import LANES, lanes, mat3, vec3
+from .lanes import LANES, lanes, mat3, quad, vec3
 
 LEVEL_GAIN = 4.0
 """A liquid whose mean height is too low by a share x asks for a density less by 4 x: particles that
@@ -18,6 +18,7 @@ TOP_SPEED = 20.0  # m/s, ten times what falls from a cup
 THICKEST = 1e7
 """Viscosity, in squared cells a step, beyond which a velocity that is no number is put down to it.
 Stirs are right up to 1e36 Pa s; beyond, single precision overflows."""
+CELLS = 3  # the lattice of cells, beside those of faces along axes 0 to 2
 STEEPEST = 0.5  # cells a step over a cell: a steeper slope would hold a lone particle in the air
 
 
@@ -35,32 +36,9 @@ def place(s, x):
 
 
 @ti.func
-def share(corner, part):
-    """Trilinear weight of a corner."""
-    w = 1.0
-    for a in ti.static(range(3)):
-        w *= ti.select(corner >> a & 1, part[a], 1.0 - part[a])
-    return w
-
-
-@ti.func
-def off_faces(a):
-    """From the cells' lowest corners to the lattice of faces along an axis, in cells."""
-    return ti.select(vec3(0.0, 1.0, 2.0) == vec3(a), vec3(0.0), vec3(0.5))
-
-
-@ti.func
-def step_to(corner, S):
-    o = 0
-    for a in range(3):
-        o += (corner >> a & 1) * S[a]
-    return o
-
-
-@ti.func
 def passes(side, there):
-    """1 where liquid passes between two sides of a wall, else 0."""
-    return ti.select(side * there == INSIDE * OUTSIDE, 0.0, 1.0)
+    """1 where liquid passes from a side of a wall to those of four places, else 0."""
+    return ti.select(side * there == INSIDE * OUTSIDE, quad(0.0), quad(1.0))
 
 
 @ti.func
@@ -69,7 +47,6 @@ def clear(s, g):
     zero = lanes(0.0)
     for n in range(s.arounds[g]):
         m = s.around[g, n]
-        s.mark[g, m] = 0
         s.volume[g, m] = zero
         s.fraction[g, m] = zero
         s.liquid[g, m] = zero
@@ -89,43 +66,95 @@ def clear(s, g):
 
 
 @ti.func
+def mark_cell(s, g, x):
+    """That a particle is at x [m], in the box: if it is no number, its lane is about to fail."""
+    i = ti.cast(ti.floor((x - s.origin[None]) * (1.0 / s.cell[None])), ti.i32)
+    s.mark[g, ti.max(ti.min(i, s.shape[None] - 2), 1).dot(strides(s))] = 1
+
+
+@ti.func
 def deposit(s, g):
-    """Volumes and momenta of the particles, after the scene's force has acted on them."""
-    S = strides(s)
-    per_cell = 1.0 / s.cell[None]
+    """Volumes and momenta of the particles, after the scene's force has acted on them.
+
+    To write four neighbours of a lane at once takes a scratch, from which each cell collects.
+    """
     for lane in range(LANES):
-        volume = s.particle[g][lane]
         for n in range(s.count[g, lane]):
-            x = (s.position[g, lane, n] - s.origin[None]) * per_cell
             s.accelerate(g, lane, n)
-            side = 0.0
+            give(s, g, lane, n)
+        collect(s, g, lane)
+
+
+@ti.func
+def four(x, y):
+    """Bilinear weights of a cell and its next ones along x, y and both."""
+    return quad((1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y)
+
+
+@ti.func
+def put(field: ti.template(), g, m, w):
+    field[g, m] = field[g, m] + w  # not +=, which is atomic and ten times slower
+
+
+@ti.func
+def give(s, g, lane, n):
+    """Put a particle's volume and momentum into the scratch."""
+    S, per_cell = strides(s), 1.0 / s.cell[None]
+    x = (s.position[g, lane, n] - s.origin[None]) * per_cell
+    low, mid = ti.floor(x), ti.floor(x - 0.5)
+    first = ti.cast(mid, ti.i32).dot(S)
+    up = ti.cast(low - mid, ti.i32)
+    volume, slope = s.particle[g][lane], s.slope[g, lane, n]
+    side = 0.0
+    if ti.static(s.SIDED):
+        side = s.side_of(s.position[g, lane, n])
+    for a in ti.static(range(CELLS + 1)):
+        m, part = first, x - 0.5 - mid
+        if ti.static(a < CELLS):
+            m += up[a] * S[a]
+            part[a] = x[a] - low[a]
+        shares, speeds = volume * four(part[0], part[1]), quad(0.0)
+        if ti.static(a < CELLS):
+            sx, sy = slope[a, 0], slope[a, 1]
+            u = s.speed[g, lane, n][a] - (sx * part[0] + sy * part[1] + slope[a, 2] * part[2])
+            speeds = quad(u, u + sx, u + sy, u + sx + sy)
+        for k in ti.static(range(2)):
+            w = shares * (part[2] if ti.static(k) else 1.0 - part[2])
             if ti.static(s.SIDED):
-                side = s.side_of(s.position[g, lane, n])
-            for a in range(3):
-                m, part = place(s, x - off_faces(a))
-                v = s.speed[g, lane, n][a]
-                slope = vec3(
-                    s.slope[g, lane, n][a, 0], s.slope[g, lane, n][a, 1], s.slope[g, lane, n][a, 2]
-                )
-                for corner in range(8):
-                    o = m + step_to(corner, S)
-                    w = volume * share(corner, part)
-                    if ti.static(s.SIDED):
-                        w *= passes(side, s.face_side[a, o])
-                    u = v
-                    for b in ti.static(range(3)):
-                        u += slope[b] * ((corner >> b & 1) - part[b])
-                    # not +=, which is atomic and ten times slower
-                    s.mass[g, a, o][lane] = s.mass[g, a, o][lane] + w
-                    s.velocity[g, a, o][lane] = s.velocity[g, a, o][lane] + w * u
-            m, part = place(s, x - 0.5)
-            for corner in range(8):
-                o = m + step_to(corner, S)
-                w = volume * share(corner, part)
-                if ti.static(s.SIDED):
-                    w *= passes(side, s.side[o])
-                s.volume[g, o][lane] = s.volume[g, o][lane] + w
-            s.mark[g, place(s, x)[0]] = 1
+                w *= passes(side, s.side[a, m + k * S[2]])
+            put(s.weights[a], g, m + k * S[2], w)
+            if ti.static(a < CELLS):
+                p = w * ((speeds + slope[a, 2]) if ti.static(k) else speeds)
+                put(s.momenta[a], g, m + k * S[2], p)
+
+
+@ti.func
+def take(field: ti.template(), g, m, o):
+    """What a cell was given; the element that it is the last to read is emptied."""
+    given = field[g, m][0] + field[g, m - 1][1] + field[g, o][2] + field[g, o - 1][3]
+    field[g, o - 1] = quad(0.0)
+    return given
+
+
+@ti.func
+def collect(s, g, lane):
+    """Cells come in order, so that each element is emptied after the last that reads it."""
+    for n in range(s.nears[g]):
+        m = s.near[g, n]
+        o = m - strides(s)[1]
+        s.volume[g, m][lane] = take(s.weights[CELLS], g, m, o)
+        for a in ti.static(range(3)):
+            s.mass[g, a, m][lane] = take(s.weights[a], g, m, o)
+            s.velocity[g, a, m][lane] = take(s.momenta[a], g, m, o)
+
+
+@ti.func
+def empty(s, g):
+    """Of what may be left of a liquid that was here before."""
+    for m in range(s.cells):
+        s.mark[g, m] = 0
+        for field in ti.static(s.weights + s.momenta):
+            field[g, m] = quad(0.0)
 
 
 @ti.func
@@ -154,6 +183,7 @@ def list_cells(s, g):
     for m in range(size):
         b = s.spread[g, m]
         if b > 0:
+            s.mark[g, m] = 0
             s.around[g, arounds] = m
             arounds += 1
             if b & 1 and S[2] <= m and m < size - S[2]:
@@ -235,6 +265,7 @@ def move(s, g):
             s.slope[g, lane, n] = slope
             moved = place_after(s, s.position[g, lane, n], v, slope)
             s.position[g, lane, n], s.speed[g, lane, n] = s.keep_inside(moved, v)
+            mark_cell(s, g, s.position[g, lane, n])
             height += s.position[g, lane, n][2]
             energy += v.dot(v)
             fastest = ti.max(fastest, v.dot(v))

@@ -8,7 +8,7 @@ from ..apic.filling import OFF_WALL
 from ..apic.geometry import ABOVE, INSIDE, OUTSIDE
 from ..apic.gravity import GRAVITY
 from ..apic.lanes import LANES, vec3
-from ..apic.transfer import fault_of, motion_of, place_after
+from ..apic.transfer import CELLS, fault_of, mark_cell, motion_of, place_after
 from ..apic.wetting_liquid import WettingLiquid
 from ..faults import SOUND
 from .flights import Flights
@@ -40,7 +40,7 @@ class PouringScene(WettingLiquid):
     def __init__(self, groups, cells, particles, effects=()):
         """The arguments are those of `LiquidState`."""
         super().__init__(groups, cells, particles, effects)
-        self.side, self.face_side = ti.field(ti.f32, cells), ti.field(ti.f32, (3, cells))
+        self.side = ti.Vector.field(4, ti.f32, (CELLS + 1, cells))
         self.rate_of_turn, self.final_angle = (ti.field(ti.f32, (groups, LANES)) for _ in range(2))
         self.turning, self.last, self.flown, self.retained = (
             ti.field(ti.i32, (groups, LANES)) for _ in range(4)
@@ -61,16 +61,11 @@ class PouringScene(WettingLiquid):
         lows, highs = zip(*vessel.corners, strict=True)
         self.lowest[None], self.highest[None] = lows, highs
         self.enter_surfaces(geometry.usable, np.stack([geometry.wall, geometry.area]))
-        self._enter_sides(geometry.side, geometry.face_side)
-
-    @ti.kernel
-    def _enter_sides(
-        self, of_cells: ti.types.ndarray(ti.f32, 1), of_faces: ti.types.ndarray(ti.f32, 2)
-    ):
-        for m in range(of_cells.shape[0]):
-            self.side[m] = of_cells[m]
-            for a in range(3):
-                self.face_side[a, m] = of_faces[a, m]
+        sides = np.zeros((CELLS + 1, self.cells, 4), np.float32)
+        for c, o in enumerate((0, 1, grid.strides[1], 1 + grid.strides[1])):
+            sides[:CELLS, : grid.cells, c] = np.roll(geometry.face_side, -o, 1)
+            sides[CELLS, : grid.cells, c] = np.roll(geometry.side, -o)
+        self.side.from_numpy(sides)
 
     @ti.kernel
     def turn(self, turns: ti.types.ndarray(ti.f32, 3), steps: ti.types.ndarray(ti.i32, 3)):
@@ -230,6 +225,7 @@ class PouringScene(WettingLiquid):
                 self.speed[g, lane, n] = self.speed[g, lane, last]
                 self.slope[g, lane, n] = self.slope[g, lane, last]
             else:
+                mark_cell(self, g, after)
                 n += 1
         self.count[g, lane] = last
         self.status[g, lane] = fault_of(self, g, lane, energy, fastest)

@@ -5,7 +5,7 @@ import taichi as ti
 
 from ...apic.filling import OFF_WALL
 from ...apic.lanes import LANES
-from ...apic.transfer import fault_of, motion_of, place_after
+from ...apic.transfer import fault_of, mark_cell, motion_of, place_after
 from ...apic.wetting_liquid import WettingLiquid
 from ...faults import SOUND
 
@@ -83,6 +83,7 @@ class WetBoxScene(WettingLiquid):
             self.slope[g, lane, n] = slope
             moved = place_after(self, self.position[g, lane, n], v, slope)
             self.position[g, lane, n], self.speed[g, lane, n] = self.keep_inside(moved, v)
+            mark_cell(self, g, self.position[g, lane, n])
             energy += v.dot(v)
             fastest = ti.max(fastest, v.dot(v))
         self.status[g, lane] = fault_of(self, g, lane, energy, fastest)
