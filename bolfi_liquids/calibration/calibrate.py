@@ -23,6 +23,7 @@ from ..progress import after_first, progress_bar
 from ..run.directory import (
     POSTERIOR,
     RUN_TOML,
+    held_error,
     note_timeout,
     open_bank,
     read_run,
@@ -116,6 +117,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     run = (
         Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, Argument("out"))
     )
+    if not resume and (run / RUN_TOML).exists():
+        raise held_error(run)  # before the prior's libraries are loaded
     prior = _usual_prior(run, resume) if prior is None else prior
     record = run_record(settings, prior, stirring)
     with (

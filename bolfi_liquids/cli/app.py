@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from .. import __version__
+from ..inputs.settings import CalibrationSettings
 from ..run.directory import check_resumable
 from ..run.jax_cache import keep_compilations
 from . import check as cli_check
@@ -99,6 +100,7 @@ def calibrate(
     from ..calibration.calibrate import calibrate as run_calibrate
     from ..inputs.open import open_recordings
 
+    settings = CalibrationSettings(**asdict(options))
     if resume:
         check_resumable(out)
     opened = open_recordings(recordings)
@@ -109,7 +111,7 @@ def calibrate(
             resume=resume,
             executor=executor,
             timeout=compute.timeout,
-            **asdict(options),
+            **asdict(settings),
         )
     print_section(out, "calibrate")
     print_warnings(out)

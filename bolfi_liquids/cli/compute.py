@@ -41,6 +41,11 @@ class Compute:
     dask: DaskOption = None
     timeout: TimeoutOption = None
 
+    def __post_init__(self) -> None:
+        from ..run.workers import check_timeout
+
+        check_timeout(self.timeout)
+
     @contextmanager
     def executor(self) -> "Iterator[Executor | None]":
         """The executor that `workers` and `dask` name; it is closed afterwards."""

@@ -13,7 +13,7 @@ from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, stirring_of
 from ..errors import Argument, InputError
 from ..inputs.frame import frame_warnings
-from ..inputs.open import Source
+from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import PourTable
 from ..inputs.recording import Recording, aborted_recordings
 from ..inputs.settings import CriticismSettings
@@ -29,7 +29,7 @@ from .baseline import (
 )
 from .criticism_file import criticism_tree
 from .findings import Findings
-from .inputs import Given, Inputs, Pours, open_inputs
+from .inputs import Given, Inputs, Pours, check_effects, open_inputs
 from .pours import as_prior, pour_experiment
 from .proposals import pour_proposals, stir_proposals
 from .result import Criticism, finished_criticism
@@ -91,15 +91,18 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         ImportError, ConnectionError: `executor` cannot be used.
         RuntimeError: Simulations failed; the message says how.
     """
-    from ..inference.criticism import Keeping
-
     started = time.perf_counter()
     settings = CriticismSettings(
         effects=_names("effects", effects),
         accept=_names("accept", accept),
         seed=seed,
     )
-    given = Given(held_out, baseline, pours, held_out_pours, cups)
+    check_effects(settings)
+    given = Given(
+        open_recordings(held_out, Argument("held_out")),
+        open_recordings(baseline, Argument("baseline")),
+        *(pours, held_out_pours, cups),
+    )
     run = run_path(calibration)
     with working_in_run(run):
         if not isinstance(calibration, Calibration):
@@ -112,6 +115,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
             logger.warning("baseline %s: is criticised or held out, so it is not counted", name)
         if finished := finished_criticism(run, inputs.made_from):
             return finished
+        from ..inference.criticism import Keeping
+
         with (
             open_workers(executor, timeout) as workers,
             open_bank(run) as bank,

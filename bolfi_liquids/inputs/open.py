@@ -98,14 +98,21 @@ def read_fields(path: Path) -> "Dataset":
     Raises:
         InputError: The file is damaged, or lacks a field.
     """
-    import xarray
-
+    if (begins := _begins(path)) != HDF5 and not begins.startswith(CLASSIC_NETCDF):
+        raise InputError(
+            "not a NetCDF file that can be read",
+            where=str(path),
+            fix="if it is a table, bolfi-liquids import makes a recording of it",
+        )
     try:
-        _check_root(path)
+        if begins == HDF5:
+            _check_root(path)
+        import xarray
+
         # times stay numbers: a unit such as "ms" is then seen, not silently converted
         dataset = xarray.load_dataset(path, decode_times=False)
     except DAMAGE as err:
-        raise _unreadable(path) from err
+        raise InputError("damaged, cannot be read", where=str(path), fix="copy it again") from err
     check_fields(dataset, path)
     return dataset
 
@@ -115,24 +122,12 @@ def _check_root(path: Path) -> None:
 
     h5netcdf leaves a half-made file behind there, which complains once more when it is collected.
     """
-    if _begins(path) == HDF5:
-        import h5py
+    import h5py
 
-        with h5py.File(path, "r") as file:
-            list(file.attrs.items())
+    with h5py.File(path, "r") as file:
+        list(file.attrs.items())
 
 
 def _begins(path: Path) -> bytes:
     with path.open("rb") as file:
         return file.read(len(HDF5))
-
-
-def _unreadable(path: Path) -> InputError:
-    """What is no recording, or was one before it was damaged."""
-    if (begins := _begins(path)) == HDF5 or begins.startswith(CLASSIC_NETCDF):
-        return InputError("damaged, cannot be read", where=str(path), fix="copy it again")
-    return InputError(
-        "not a NetCDF file that can be read",
-        where=str(path),
-        fix="if it is a table, bolfi-liquids import makes a recording of it",
-    )

@@ -85,13 +85,13 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         RuntimeError: Too few pours succeeded.
     """
     settings = PourSettings(pours=pours, iterations=iterations, draws=draws, risk=risk, seed=seed)
+    cups = cups_of(cups)
     with working_in_run(run_path(calibration)):
         latest = latest_calibration(calibration)
         refuse_other_model(latest)
         if not force:
             refuse_bad_fit(latest.summary, latest.path)
         drawn = strata(latest, settings.draws, settings.seed)
-        cups = cups_of(cups)
         with open_workers(executor, timeout) as workers:
             learned = _learned(latest, cups, settings, Execution(workers, timeout, progress))
         return _chosen(latest, learned, settings, drawn)

@@ -89,7 +89,7 @@ def enter_run(
         raise InputError("not a directory", where=str(run), fix="choose another `out`")
     if path.exists():
         if not resume:
-            raise _held(run)
+            raise held_error(run)
         held = read_run(run)
         differing = _differences(held, record)
         grows = growing in differing and _larger(*differing[growing])
@@ -108,11 +108,12 @@ def enter_run(
     try:
         write_new_text(path, tomli_w.dumps(record))
     except FileExistsError:  # another call has begun here meanwhile
-        raise _held(run) from None
+        raise held_error(run) from None
     return []
 
 
-def _held(run: Path) -> InputError:
+def held_error(run: Path) -> InputError:
+    """A refusal to begin where a run is."""
     return InputError(
         "holds a run already",
         where=str(run),
