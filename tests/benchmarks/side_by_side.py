@@ -30,9 +30,10 @@ COMMANDS = {  # {bin} of the tree's environment, {out} an empty directory, {kept
     "stirs": CALL.format("simulate_stir(np.geomspace(0.01, 1, 16))"),
     "pours": CALL.format("simulate_pour(np.geomspace(0.01, 1, 16))"),
     "demo": "{bin}/bolfi-liquids demo --out {out}/run",
-    "criticise": f"test -d {{kept}}/run || {{bin}}/bolfi-liquids calibrate {DATA.format('late', 10)}"
-    " --out {kept}/run && cp -r {kept}/run {out}/run && {bin}/bolfi-liquids criticise {out}/run"
-    f" --held-out {DATA.format('late', 7)} --baseline {DATA.format('clean', 10)}",
+    "criticise": "test -d {kept}/run || {bin}/bolfi-liquids calibrate --out {kept}/run"
+    f" {DATA.format('late', 10)} && cp -r {{kept}}/run {{out}}/run && {{bin}}/bolfi-liquids"
+    f" criticise {{out}}/run --held-out {DATA.format('late', 7)}"
+    f" --baseline {DATA.format('clean', 10)}",
     "tests": "make test",
 }
 COLD = "first", "tests"
