@@ -105,6 +105,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     )
     run = run_path(calibration)
     with working_in_run(run):
+        if isinstance(calibration, Criticism):
+            calibration = calibration.base
         if not isinstance(calibration, Calibration):
             calibration = Calibration.open(run)
         refuse_other_model(calibration)
@@ -113,7 +115,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
             logger.warning(notice)
         for name in inputs.left_out:
             logger.warning("baseline %s: is criticised or held out, so it is not counted", name)
-        if finished := finished_criticism(run, inputs.made_from):
+        if finished := finished_criticism(calibration, inputs.made_from):
             return finished
         from ..inference.criticism import Keeping
 
@@ -126,8 +128,9 @@ def criticise(  # noqa: PLR0913  the one call that most users make
             findings = _find(calibration, inputs, keeping)
             tree = criticism_tree(findings)
         write_tree(tree, run / CRITICISM)
-        CriticismSummary.from_findings(findings, tree, time.perf_counter() - started).write(run)
-        return Criticism.open(run)
+        summary = CriticismSummary.from_findings(findings, tree, time.perf_counter() - started)
+        summary.write(run)
+        return Criticism(calibration, tree, summary)
 
 
 def _names(argument: str, given: str | Sequence[str] | None) -> tuple[str, ...] | None:

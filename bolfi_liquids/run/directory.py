@@ -145,15 +145,20 @@ def _run_near(run: Path) -> Path | None:
     return next((beside[name] for name in get_close_matches(run.name, beside, n=1)), None)
 
 
-def note_timeout(run: Path, timeout: float | None) -> None:
+def note_timeout(run: Path, timeout: float | None) -> dict[str, Any]:
     """Add a time limit [s] to those that run.toml lists; None adds nothing.
 
     Runs may go on with another limit, but it decides which simulations were given up.
+
+    Returns:
+        run.toml.
     """
     record = read_run(run)
     listed = record.get(TIMEOUTS, [])
     if timeout is not None and timeout not in listed:
-        write_text(run / RUN_TOML, tomli_w.dumps({**record, TIMEOUTS: [*listed, float(timeout)]}))
+        record = {**record, TIMEOUTS: [*listed, float(timeout)]}
+        write_text(run / RUN_TOML, tomli_w.dumps(record))
+    return record
 
 
 @contextmanager

@@ -163,7 +163,7 @@ def test_pours_need_an_effect_that_acts_in_them(calibration, table):
 
 
 def test_a_run_that_was_not_criticised_or_is_damaged_holds_no_finished_criticism(calibration):
-    assert finished_criticism(calibration.path, {}) is None
+    assert finished_criticism(calibration, {}) is None
 
 
 # What the recordings themselves tell of their noise.
