@@ -5,6 +5,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict
 from importlib.resources import as_file, files
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,6 +16,7 @@ from .files import given_path
 from .inputs.cups import bundled_cups
 from .inputs.open import open_recording
 from .inputs.settings import CalibrationSettings, PourSettings
+from .models import runtime
 from .pouring.choose import choose_pour, decided
 from .reporting.report import CHAPTERS, written
 from .run.directory import RUN_TOML, read_run
@@ -73,7 +75,7 @@ def run_demo(
         InputError: `out` holds another run.
     """
     out = given_path(out, Argument("out"))
-    data, clock = files("bolfi_liquids.data"), _Clock()
+    data, ends = files("bolfi_liquids.data"), {"": time.perf_counter()}
     with (
         as_file(data / RECORDING) as recording,
         as_file(data / HELD_OUT) as held_out,
@@ -90,10 +92,13 @@ def run_demo(
             made.set_result(make(*given))
             return made
 
+        if workers is not None:  # they load Taichi while this process loads JAX
+            for _ in range(2):
+                workers.submit(runtime.start)
         stir = open_recording(recording)
         _refuse_other_run(out, stir)
         calibration = calibrate(stir, out=out, resume=True, **where)
-        clock.ends("calibrate")
+        ends["calibrate"] = time.perf_counter()
         fitted(calibration)
         # the fit is bad, and without criticism nobody should pour after it
         few, quiet = PourSettings(pours=POURS), Execution(workers, timeout, progress=False)
@@ -102,26 +107,15 @@ def run_demo(
         criticism = criticise(calibration, held_out=held_out, baseline=clean, **where)
         found = beside(CHAPTERS["criticism"], criticism)
         pour_before = before.result()
-        clock.ends("criticise, pour before it")
+        ends["criticise, pour before it"] = time.perf_counter()
         pour = choose_pour(criticism, pours=POURS, **where)
-        clock.ends("pour")
+        ends["pour"] = time.perf_counter()
         chapters = {"calibration": chapter.result(), "criticism": found.result()}
         with working_in_run(out):
             page = written(calibration, criticism, pour, chapters=chapters, **where)
-        clock.ends("report")
-    return Demo(calibration, criticism, pour, pour_before, page, clock.seconds)
-
-
-class _Clock:
-    """Seconds of each phase."""
-
-    def __init__(self):
-        self.seconds: dict[str, float] = {}
-        self._began = time.perf_counter()
-
-    def ends(self, phase: str) -> None:
-        now = time.perf_counter()
-        self.seconds[phase], self._began = now - self._began, now
+        ends["report"] = time.perf_counter()
+    seconds = {phase: end - before for (_, before), (phase, end) in pairwise(ends.items())}
+    return Demo(calibration, criticism, pour, pour_before, page, seconds)
 
 
 def _refuse_other_run(out: Path, stir: "Recording") -> None:

@@ -55,8 +55,7 @@ def print_pour(pour: "Pour") -> None:
 
     from . import tables
 
-    if pour.summary is not None:
-        tables.print_pour(pour.summary, Console())
+    tables.print_pour(pour.summary, Console())
 
 
 def print_warnings(results: "Results") -> None:

@@ -117,36 +117,27 @@ class Pour:
 
         Returns:
             The axes.
-
-        Raises:
-            ValueError: Another pour was chosen in the run since.
         """
         from ..drawing import given_or_shown, panels, styled
         from .figures import draw_expected
 
-        tree = self.check_current()
         canvas = given_or_shown(ax)
         with styled():
             drawn = panels(canvas, (1, 1), (4.6, 3.6))
             axes = drawn.grid[0, 0]
-            drawn.figure.colorbar(draw_expected(axes, tree), ax=axes)
+            drawn.figure.colorbar(draw_expected(axes, self.tree), ax=axes)
             drawn.legend(*axes.get_legend_handles_labels())
         return axes
 
-    def check_current(self) -> "DataTree":
-        """pour.nc of the run, which must hold this pour.
-
-        Raises:
-            ValueError: Another pour was chosen in the run since.
-        """
-        tree = read_pour(self.path)
+    def check_current(self) -> None:
+        """Raise `ValueError` if another pour was chosen in the run since."""
+        there = read_pour(self.path)
         pairs = ((self.chosen, "chosen"), (self.plug_in, "plug_in"))
-        if not all(one.equals(judged(tree, name)) for one, name in pairs):
+        if not all(one.equals(judged(there, name)) for one, name in pairs):
             raise ValueError(
                 f"another pour was chosen in {self.path} since; open it by Pour.open, or choose "
                 "this one again"
             )
-        return tree
 
 
 @dataclass(frozen=True)
