@@ -1,13 +1,16 @@
 """The report is one file that shows what the run holds."""
 
 import html
+import os
 import re
 import shutil
+from collections import Counter
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from html.parser import HTMLParser
 from multiprocessing import get_context
 
+import h5py
 import pytest
 
 import bolfi_liquids as bl
@@ -122,6 +125,19 @@ def test_a_report_says_where_its_pictures_are_simulated(unseen, monkeypatch):
     with ThreadPoolExecutor(1) as pool, pytest.raises(RuntimeError, match="60 s"):
         bl.report(unseen, executor=pool, timeout=60.0, progress=False)
     assert seen == [(pool, 60.0, 60.0, False)]
+
+
+def test_no_result_is_opened_twice(pour, frames, monkeypatch):
+    opened, begin = Counter(), h5py.File.__init__
+
+    def counted(self, name, *given, **named):
+        opened[str(name)] += isinstance(name, str | os.PathLike)
+        begin(self, name, *given, **named)
+
+    monkeypatch.setattr(h5py.File, "__init__", counted)
+    bl.report(pour, progress=False)
+    for name in ("posterior.nc", "pour.nc", "frames.nc"):
+        assert opened[str(pour.path / name)] == 1
 
 
 @pytest.mark.slow
