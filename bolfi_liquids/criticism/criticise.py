@@ -32,7 +32,7 @@ from .findings import Findings
 from .inputs import Given, Inputs, Pours, check_effects, open_inputs
 from .pours import as_prior, pour_experiment
 from .proposals import pour_proposals, stir_proposals
-from .result import Criticism, finished_criticism
+from .result import Criticism, base_calibration, finished_criticism
 from .stirs import (
     camera_noise,
     effects_of,
@@ -105,10 +105,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     )
     run = run_path(calibration)
     with working_in_run(run):
-        if isinstance(calibration, Criticism):
-            calibration = calibration.base
-        if not isinstance(calibration, Calibration):
-            calibration = Calibration.open(run)
+        calibration = base_calibration(calibration)
         refuse_other_model(calibration)
         inputs = open_inputs(calibration, settings, given)
         for notice in [*aborted_recordings(inputs.compared), *frame_warnings(inputs.compared)]:

@@ -221,6 +221,15 @@ def _again(run: Path) -> str:
     return f"write it again: {command('criticise', run)}"
 
 
+def base_calibration(given: "Run") -> Calibration:
+    """The calibration of a run, without what a criticism accepted; read if it is not given."""
+    if isinstance(given, Criticism):
+        return given.base
+    if isinstance(given, Calibration) and not given.added:
+        return given
+    return Calibration.open(run_path(given))
+
+
 def latest_calibration(given: "Run") -> Calibration:
     """The calibration of a run, extended by what a criticism accepted.
 
@@ -231,6 +240,6 @@ def latest_calibration(given: "Run") -> Calibration:
         return given
     if isinstance(given, Criticism):
         return given.calibration
-    calibration = Calibration.open(run_path(given))
+    calibration = base_calibration(given)
     found = criticism_of(calibration)
     return calibration if found is None else found.calibration

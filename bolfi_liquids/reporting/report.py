@@ -14,7 +14,7 @@ from ..calibration.posterior_figure import posterior_figure
 from ..calibration.result import Calibration
 from ..calibration.search_figure import search_figure
 from ..calibration.summary import CalibrationSummary
-from ..criticism.result import Criticism, criticism_of
+from ..criticism.result import Criticism, base_calibration, criticism_of
 from ..files import write_text
 from ..hover_labels import script_json
 from ..inputs.prior import Described
@@ -56,7 +56,7 @@ def report(
         RuntimeError: A simulation took longer than `timeout`.
     """
     with working_in_run(run_path(run)):
-        calibration = Calibration.open(run_path(run))
+        calibration = base_calibration(run)
         refuse_other_model(calibration)
         # before anything is simulated: a damaged file is refused
         criticism, pour = criticism_of(calibration), pour_of(calibration.path)
