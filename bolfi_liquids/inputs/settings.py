@@ -98,7 +98,7 @@ def checked(where: str = "") -> Callable[[type[T]], type[T]]:
     """
 
     def decorate(cls: type[T]) -> type[T]:
-        rules = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, defer_build=True)
+        rules = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
         made: Any = validated_dataclass(frozen=True, config=rules)(cls)
         validate, names = made.__init__, tuple(made.__dataclass_fields__)
 
