@@ -59,14 +59,14 @@ class Criticism:
         return html_table("Criticism", rows | {"next": self.verdict.advice})
 
     @classmethod
-    def open(cls, run: "Run") -> "Criticism":
+    def open(cls, run: str | Path) -> "Criticism":
         """Read a finished criticism.
 
         Raises:
             InputError: There is none in the directory, or not one whole of this version's form.
         """
+        run = run_path(run)
         if (found := criticism_of(Calibration.open(run))) is None:
-            run = run_path(run)
             raise InputError(
                 "the calibration in it was not criticised",
                 where=str(run),
