@@ -1,7 +1,7 @@
 """From a posterior to the pour that is expected to spill least."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -109,11 +109,11 @@ def decided(
     drawn = strata(calibration, settings.draws, settings.seed)
     learned = _learned(calibration, cups, settings, execution)
     choice = _search(learned, settings, drawn.search, calibration.best)
-    chosen, plug_in = (
+    both = [
         learned.judge(action, drawn.judge, seed=settings.seed)
         for action in (choice.chosen, choice.plug_in)
-    )
-    return _described(chosen, plug_in, choice, learned, settings, calibration)
+    ]
+    return _described(both, choice, learned, settings, calibration)
 
 
 def _learned(
@@ -193,15 +193,15 @@ def _search(
     return _Choice(liquids, over_posterior, at_best, chosen, plug_in)
 
 
-def _described(  # noqa: PLR0913  all that a pour is made of
-    chosen: Judged,
-    plug_in: Judged,
+def _described(
+    both: Sequence[Judged],
     choice: _Choice,
     learned: LandingMap,
     settings: PourSettings,
     calibration: Calibration,
 ) -> Pour:
     """With what pour.nc and the section "pour" of summary.json hold."""
+    chosen, plug_in = both
     cups, fit_status = learned.cups, calibration.summary.fit_status
     tried = {"actions": choice.over_posterior, "actions_plug_in": choice.at_best}
     least = cups.least_viscosity(calibration.liquid_density)
