@@ -11,7 +11,7 @@ from .errors import Argument, InputError
 from .files import existing_file, given_path, new_netcdf, write_netcdf
 from .inputs.described_liquid import number_of
 from .inputs.fields import check_fields
-from .inputs.open import check_recording, open_recording, read_fields, read_recording
+from .inputs.open import check_recording, open_recording, read_fields
 from .inputs.recording import Recording, as_recording
 from .inputs.start import first_rest
 
@@ -53,15 +53,16 @@ def trim(
     if out.exists():
         raise InputError("exists already", where=str(out), fix="choose another name")
     new_netcdf(out)
-    whole = read_recording(path)
+    content = path.read_bytes()
+    dataset = read_fields(content, path)
+    whole = as_recording(dataset, path, content)
     cut = proposed_cut(whole, start, stop)
-    dataset = read_fields(path)
     kept = (whole.time >= cut.start) & (whole.time <= cut.stop)
     part = dataset.isel(time=np.flatnonzero(kept))
     for name in part.variables:
         part[name].encoding.clear()  # chunks of the whole may be longer than the part
     check_fields(part, path)
-    check_recording(as_recording(part, path))
+    check_recording(as_recording(part, path, content))
     history = [str(dataset.attrs.get("history") or ""), _told(path, whole, cut)]
     write_netcdf(part.assign_attrs(history="\n".join(filter(None, history))), out)
     return open_recording(out)

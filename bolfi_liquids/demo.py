@@ -1,7 +1,11 @@
 """The whole way on bundled data: stir, learn, find what the simulator lacks, pour, report."""
 
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict
 from importlib.resources import as_file, files
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -9,16 +13,23 @@ from .calibration.calibrate import calibrate
 from .criticism.criticise import criticise
 from .errors import Argument, InputError
 from .files import given_path
+from .inputs.cups import bundled_cups
 from .inputs.open import open_recording
-from .inputs.settings import CalibrationSettings
-from .pouring.choose import choose_pour
-from .reporting.report import report
+from .inputs.settings import CalibrationSettings, PourSettings
+from .models import runtime
+from .pouring.choose import choose_pour, decided
+from .reporting.report import CHAPTERS, written
 from .run.directory import RUN_TOML, read_run
+from .run.entering import working_in_run
+from .run.execution import Execution
+from .run.workers import open_workers
 
 if TYPE_CHECKING:
+    from .calibration.result import Calibration
+    from .criticism.result import Criticism
     from .inference.simulations import Workers
     from .inputs.recording import Recording
-    from .pouring.result import Judged
+    from .pouring.result import Pour
 
 RECORDING, HELD_OUT = "late_oil_v10.nc", "late_oil_v7.nc"  # the cameras were late, and say nothing
 CLEAN = "clean_oil_v10.nc"  # the same strokes of an arm whose cameras were in time
@@ -26,45 +37,85 @@ POURS = 24  # that each decision's map is learned from: few, as two are made
 
 
 class Demo(NamedTuple):
-    """What the demo leaves besides the run.
+    """What the demo leaves.
 
     Attributes:
+        calibration, criticism, pour: As the run holds them.
+        pour_before: What would have been poured without criticism; the run does not hold it.
         report: The page.
-        pour_before: What would have been poured without criticism.
+        seconds: That each phase took [s], in order.
     """
 
+    calibration: "Calibration"
+    criticism: "Criticism"
+    pour: "Pour"
+    pour_before: "Pour"
     report: Path
-    pour_before: "Judged"
+    seconds: dict[str, float]
 
 
-def run_demo(out: Path, *, executor: "Workers | None" = None, timeout: float | None = None) -> Demo:
+def run_demo(
+    out: Path,
+    *,
+    executor: "Workers | None" = None,
+    timeout: float | None = None,
+    fitted: "Callable[[Calibration], None]" = lambda _: None,
+) -> Demo:
     """Calibrate on the bundled recording, find what is hidden in it, pour and write the report.
 
-    A second call takes everything that was simulated from the run.
+    With an executor, the pour before criticism and the report's chapters are made in a thread
+    beside the next simulations. A second call takes everything that was simulated from the run.
 
     Args:
         out: The RUN directory.
         executor, timeout: See `calibrate`.
+        fitted: Called with the calibration once there is one.
 
     Raises:
         InputError: `out` holds another run.
     """
     out = given_path(out, Argument("out"))
-    where: dict[str, Any] = {"executor": executor, "timeout": timeout}
-    data = files("bolfi_liquids.data")
+    data, ends = files("bolfi_liquids.data"), {"": time.perf_counter()}
     with (
         as_file(data / RECORDING) as recording,
         as_file(data / HELD_OUT) as held_out,
         as_file(data / CLEAN) as clean,
+        open_workers(executor, timeout) as workers,
+        ThreadPoolExecutor(1) as thread,
     ):
+        where: dict[str, Any] = {"executor": workers, "timeout": timeout}
+
+        def beside(make: Callable[..., Any], *given: Any) -> Future[Any]:
+            if workers is not None:
+                return thread.submit(make, *given)
+            made: Future[Any] = Future()  # Taichi stays in this thread
+            made.set_result(make(*given))
+            return made
+
+        if workers is not None:  # they load Taichi while this process loads JAX
+            for _ in range(2):
+                workers.submit(runtime.start)
         stir = open_recording(recording)
         _refuse_other_run(out, stir)
         calibration = calibrate(stir, out=out, resume=True, **where)
+        ends["calibrate"] = time.perf_counter()
+        fitted(calibration)
         # the fit is bad, and without criticism nobody should pour after it
-        before = choose_pour(calibration, pours=POURS, force=True, **where)
+        few, quiet = PourSettings(pours=POURS), Execution(workers, timeout, progress=False)
+        before = beside(decided, calibration, bundled_cups(), few, quiet)
+        chapter = beside(CHAPTERS["calibration"], calibration)
         criticism = criticise(calibration, held_out=held_out, baseline=clean, **where)
-    choose_pour(criticism, pours=POURS, **where)
-    return Demo(report(out, **where), before.chosen)
+        found = beside(CHAPTERS["criticism"], criticism)
+        pour_before = before.result()
+        ends["criticise, pour before it"] = time.perf_counter()
+        pour = choose_pour(criticism, pours=POURS, **where)
+        ends["pour"] = time.perf_counter()
+        chapters = {"calibration": chapter.result(), "criticism": found.result()}
+        with working_in_run(out):
+            page = written(calibration, criticism, pour, chapters=chapters, **where)
+        ends["report"] = time.perf_counter()
+    seconds = {phase: end - before for (_, before), (phase, end) in pairwise(ends.items())}
+    return Demo(calibration, criticism, pour, pour_before, page, seconds)
 
 
 def _refuse_other_run(out: Path, stir: "Recording") -> None:

@@ -3,7 +3,6 @@
 from typing import Protocol
 
 import numpy as np
-from scipy.interpolate import Akima1DInterpolator
 
 
 class Trajectory(Protocol):
@@ -25,6 +24,8 @@ def step_path(gripper: Trajectory, step: float) -> np.ndarray:
         ValueError: fewer than two finite samples, times that do not rise, positions of another
             shape.
     """
+    from scipy.interpolate import Akima1DInterpolator
+
     time, (seen, position) = np.asarray(gripper.time), finite_samples(gripper)
     steps = int(np.ceil((time[-1] - time[0]) / step - 1e-9))
     edges = time[0] + (np.arange(steps + 2) - 0.5) * step

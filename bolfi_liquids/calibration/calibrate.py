@@ -1,12 +1,13 @@
 """From recordings to a posterior over the simulator's parameters."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import mkdtemp
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from ..progress import after_first, progress_bar
 from ..run.directory import (
     POSTERIOR,
     RUN_TOML,
+    held_error,
     note_timeout,
     open_bank,
     read_run,
@@ -34,7 +36,7 @@ from ..run.recordings import check_names, keep_recordings
 from ..run.simulations import warn_of_failures
 from ..run.workers import open_workers
 from .draws import pick_draws
-from .result import Calibration, is_calibrated
+from .result import Calibration, finished_calibration
 from .stir_simulator import Stirring, stirring_of
 from .summary import CalibrationSummary
 
@@ -116,6 +118,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     run = (
         Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, Argument("out"))
     )
+    if not resume and (run / RUN_TOML).exists():
+        raise held_error(run)  # before the prior's libraries are loaded
     prior = _usual_prior(run, resume) if prior is None else prior
     record = run_record(settings, prior, stirring)
     with (
@@ -128,9 +132,9 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         keep_recordings(run, stirring.recordings)
         for notice in [*aborted_recordings(opened), *frame_warnings(opened)]:
             logger.warning(notice)
-        if not is_calibrated(run):
-            _calibrate(run, stirring, prior, settings, Execution(workers, timeout, progress))
-        return Calibration.open(run)
+        return finished_calibration(run) or _calibrate(
+            run, stirring, prior, settings, Execution(workers, timeout, progress)
+        )
 
 
 def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring) -> dict[str, Any]:
@@ -154,14 +158,14 @@ def _calibrate(
     prior: "Prior",
     settings: CalibrationSettings,
     execution: Execution,
-) -> None:
+) -> Calibration:
     from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES, check_by_simulation
     from .posterior_file import results_tree, write_tree
 
-    note_timeout(run, execution.timeout)
+    record = note_timeout(run, execution.timeout)
     needed = settings.budget + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
     with open_bank(run) as bank, ExitStack() as stack:
-        kept = min(max(needed - _left(run, settings, bank), 0), needed)
+        kept = min(max(needed - _left(record, settings, bank), 0), needed)
         bar = progress_bar("simulating stirs", needed, shown=execution.progress, done=kept)
         advance = after_first(kept, stack.enter_context(bar))
         keep = execution.keep(bank, stirring.identity, settings.batch)
@@ -182,17 +186,19 @@ def _calibrate(
             fix="nothing was written; go on with that budget and `resume`",
         )
     write_tree(tree, run / POSTERIOR)
-    CalibrationSummary.from_fit(tree, fit, stirring, check).write(run)
+    summary = CalibrationSummary.from_fit(tree, fit, stirring, check)
+    summary.write(run)
+    return Calibration(run, tree, MappingProxyType(dict(record)), summary)
 
 
-def _left(run: Path, settings: CalibrationSettings, bank: "SimulationBank") -> int:
+def _left(record: Mapping[str, Any], settings: CalibrationSettings, bank: "SimulationBank") -> int:
     """Simulations that a run still needs; some of those before it grew were judging, or pours.
 
     Negative where the bank holds pours that followed a calibration whose results were deleted.
     """
     from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES
 
-    before = read_run(run).get("grown", [{"learned_from": 0, "simulations": 0}])[-1]
+    before = record.get("grown", [{"learned_from": 0, "simulations": 0}])[-1]
     needed = settings.budget - before["learned_from"] + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
     return needed - (len(bank) - before["simulations"])
 

@@ -12,7 +12,6 @@ from ..errors import InputError
 from ..inputs.prior import read_prior
 from ..inputs.settings import CalibrationSettings
 from ..run.directory import POSTERIOR, read_run, run_path
-from ..run.summary import read_summary
 from ..wording import command, html_table, with_unit
 from .bad_fit import bad_fit
 from .draws import pick_draws
@@ -72,11 +71,9 @@ class Calibration:
         Raises:
             InputError: There is none in the directory, or it was not finished.
         """
-        from .posterior_file import read_tree
-
         run = run_path(run)
-        record = read_run(run)
-        if not is_calibrated(run):
+        if (found := finished_calibration(run)) is None:
+            record = read_run(run)
             raise InputError(
                 "the calibration in it is not finished",
                 where=str(run),
@@ -86,10 +83,7 @@ class Calibration:
                     *given_options(record),
                 ),
             )
-        loaded = read_tree(
-            run / POSTERIOR, fix="delete it and go on with --resume: no simulation is lost"
-        )
-        return cls(run, loaded, MappingProxyType(record), CalibrationSummary.read(run))
+        return found
 
     def __reduce__(self):
         """A mapping proxy cannot be pickled."""
@@ -201,6 +195,12 @@ def given_options(record: Mapping[str, Any]) -> list[str]:
     return [word for name, value in changed.items() for word in (f"--{name}", str(value))]
 
 
-def is_calibrated(run: Path) -> bool:
-    """Whether a run's calibration was finished."""
-    return (run / POSTERIOR).is_file() and CalibrationSummary.SECTION in read_summary(run)
+def finished_calibration(run: Path) -> Calibration | None:
+    """The calibration of a run; None if it was not finished."""
+    from .posterior_file import read_tree
+
+    path = run / POSTERIOR
+    if not path.is_file() or (summary := CalibrationSummary.read(run)) is None:
+        return None
+    tree = read_tree(path, fix="delete it and go on with --resume: no simulation is lost")
+    return Calibration(run, tree, MappingProxyType(read_run(run)), summary)

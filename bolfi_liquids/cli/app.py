@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from .. import __version__
+from ..inputs.settings import CalibrationSettings, PourSettings
 from ..run.directory import check_resumable
 from . import check as cli_check
 from . import guide, import_table, reproduce
@@ -15,7 +16,7 @@ from . import record as cli_record
 from . import rig as cli_rig
 from . import simulate as cli_simulate
 from . import trim as cli_trim
-from .compute import Compute
+from .compute import Compute, StudyCompute
 from .errors import OneLineErrors
 from .examples import examples, session
 from .grouped import grouped
@@ -31,10 +32,12 @@ from .options import (
 )
 from .printed import (
     complaints_among_results,
+    print_calibration,
     print_findings,
     print_next,
     print_next_pour,
-    print_section,
+    print_pour,
+    print_seconds,
     print_warnings,
 )
 
@@ -95,23 +98,28 @@ def calibrate(
 ) -> None:
     """Learn a liquid's parameters from recordings of it being stirred."""
     from ..calibration.calibrate import calibrate as run_calibrate
+    from ..criticism.result import criticism_of
     from ..inputs.open import open_recordings
 
+    settings = CalibrationSettings(**asdict(options))
     if resume:
         check_resumable(out)
     opened = open_recordings(recordings)
     with complaints_among_results(), compute.executor() as executor:
-        run_calibrate(
+        calibration = run_calibrate(
             opened,
             out=out,
             resume=resume,
             executor=executor,
             timeout=compute.timeout,
-            **asdict(options),
+            **asdict(settings),
         )
-    print_section(out, "calibrate")
-    print_warnings(out)
-    print_next_pour(out, "criticise")
+    from ..reporting.warnings import results_of
+
+    criticism = criticism_of(calibration)
+    print_calibration(calibration)
+    print_warnings(results_of(calibration, criticism))
+    print_next_pour(criticism.calibration if criticism else calibration, "criticise")
 
 
 @app.command(
@@ -151,7 +159,7 @@ def criticise(
             timeout=compute.timeout,
         )
     print_findings(criticism)
-    print_next_pour(run)
+    print_next_pour(criticism.calibration)
 
 
 @app.command(
@@ -175,12 +183,21 @@ def pour(
             )
         cli_record.execute(run, execution)
         return
+    from ..calibration.result import Calibration
+    from ..criticism.result import criticism_of
+    from ..inputs.cups import cups_of
     from ..pouring.choose import choose_pour
+    from ..reporting.warnings import results_of
 
+    # refused before anything of the run is read
+    PourSettings(pours=options.pours, iterations=options.iterations, risk=options.risk)
+    cups = cups_of(options.cups)
+    calibration = Calibration.open(run)
+    criticism = criticism_of(calibration)
     with compute.executor() as executor:
-        choose_pour(
-            run,
-            options.cups,
+        chosen = choose_pour(
+            criticism or calibration,
+            cups,
             pours=options.pours,
             iterations=options.iterations,
             risk=options.risk,
@@ -188,8 +205,8 @@ def pour(
             executor=executor,
             timeout=compute.timeout,
         )
-    print_section(run, "pour")
-    print_warnings(run)
+    print_pour(chosen)
+    print_warnings(results_of(calibration, criticism, chosen))
     print_next(run, "report")
 
 
@@ -217,22 +234,22 @@ def report(
 @app.command(epilog=examples("demo --out runs/demo"))
 @grouped
 def demo(
-    compute: Compute,
+    compute: StudyCompute,
     out: Annotated[Path, typer.Option(metavar="RUN", help="Directory of the run.")] = Path(
         "runs/demo"
     ),
 ) -> None:
     """Calibrate on a bundled recording, find what is hidden in it, choose a pour, report."""
-    from ..criticism.result import Criticism
     from ..demo import run_demo
+    from ..reporting.warnings import results_of
 
     with complaints_among_results(), compute.executor() as executor:
-        made = run_demo(out, executor=executor, timeout=compute.timeout)
-    print_section(out, "calibrate")
-    print_findings(Criticism.open(out))
-    typer.echo(f"pour before criticism: {made.pour_before}")
-    print_section(out, "pour")
-    print_warnings(out)
+        made = run_demo(out, executor=executor, timeout=compute.timeout, fitted=print_calibration)
+    print_findings(made.criticism)
+    typer.echo(f"pour before criticism: {made.pour_before.chosen}")
+    print_pour(made.pour)
+    print_warnings(results_of(made.calibration, made.criticism, made.pour))
+    print_seconds(made.seconds)
     typer.echo(f"report: {made.report}")
 
 

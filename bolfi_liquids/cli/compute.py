@@ -15,7 +15,7 @@ WorkersOption = Annotated[
     typer.Option(
         "--workers",
         min=1,
-        help="Processes that simulate; 1 is this process. Studies use all processors.",
+        help="Processes that simulate; 1 is this process. Studies and the demo use all processors.",
     ),
 ]
 DaskOption = Annotated[
@@ -41,6 +41,11 @@ class Compute:
     dask: DaskOption = None
     timeout: TimeoutOption = None
 
+    def __post_init__(self) -> None:
+        from ..run.workers import check_timeout
+
+        check_timeout(self.timeout)
+
     @contextmanager
     def executor(self) -> "Iterator[Executor | None]":
         """The executor that `workers` and `dask` name; it is closed afterwards."""
@@ -50,7 +55,7 @@ class Compute:
 
 @dataclass(frozen=True)
 class StudyCompute(Compute):
-    """`Compute` of a long study, which takes all processors unless told otherwise."""
+    """`Compute` of the demo or a long study, which take all processors unless told otherwise."""
 
     workers: WorkersOption = None
 

@@ -1,7 +1,7 @@
 """What commands print when they are done."""
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +11,10 @@ import typer
 from ..wording import command
 
 if TYPE_CHECKING:
+    from ..calibration.result import Calibration
     from ..criticism.result import Criticism
+    from ..pouring.result import Pour
+    from ..reporting.warnings import Results
 
 
 @contextmanager
@@ -29,38 +32,49 @@ def print_next(run: Path, *commands: str) -> None:
     typer.echo("next: " + " or: ".join(command(one, run) for one in commands))
 
 
-def print_next_pour(run: Path, *others: str) -> None:
-    """The same, and `pour`, or `report` where `pour` would refuse the latest fit."""
+def print_next_pour(calibration: "Calibration", *others: str) -> None:
+    """The same, and `pour`, or `report` where `pour` would refuse this fit."""
     from ..calibration.summary import FitStatus
-    from ..criticism.result import latest_calibration
 
-    fit_is_bad = latest_calibration(run).summary.fit_status == FitStatus.BAD
-    print_next(run, *others, "report" if fit_is_bad else "pour")
+    fit_is_bad = calibration.summary.fit_status == FitStatus.BAD
+    print_next(calibration.path, *others, "report" if fit_is_bad else "pour")
 
 
-def print_section(run: Path, name: str) -> None:
-    """Section "calibrate" or "pour" of a run's summary."""
+def print_calibration(calibration: "Calibration") -> None:
+    """The posterior."""
     from rich.console import Console
 
-    from ..calibration.summary import CalibrationSummary
-    from ..pouring.result import PourSummary
-    from .tables import print_calibration, print_pour
+    from . import tables
 
-    if name == CalibrationSummary.SECTION:
-        print_calibration(CalibrationSummary.read(run), Console())
-    else:
-        print_pour(PourSummary.read(run), Console())
+    tables.print_calibration(calibration.summary, Console())
 
 
-def print_warnings(run: Path) -> None:
+def print_pour(pour: "Pour") -> None:
+    """The chosen pour."""
+    from rich.console import Console
+
+    from . import tables
+
+    tables.print_pour(pour.summary, Console())
+
+
+def print_warnings(results: "Results") -> None:
     """What the report would warn of."""
     from rich.console import Console
 
-    from ..calibration.result import Calibration
-    from ..reporting.warnings import results_of, warnings_of
+    from ..reporting.warnings import warnings_of
     from . import tables
 
-    tables.print_warnings(warnings_of(results_of(Calibration.open(run))), Console())
+    tables.print_warnings(warnings_of(results), Console())
+
+
+def print_seconds(seconds: Mapping[str, float]) -> None:
+    """Where time went, by phase."""
+    from rich.console import Console
+
+    from . import tables
+
+    tables.print_seconds(seconds, Console())
 
 
 def print_findings(criticism: "Criticism") -> None:

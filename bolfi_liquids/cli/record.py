@@ -113,10 +113,12 @@ def record(
     """
     from rich.console import Console
 
+    from ..calibration.result import Calibration
     from ..inputs.rigs import rig_of
     from ..online.record import record_online
+    from ..reporting.warnings import results_of
     from ..robot.record import record as run_record
-    from .printed import print_section, print_warnings
+    from .printed import print_calibration, print_warnings
     from .tables import print_recording
 
     opened = rig_of(rig)
@@ -133,8 +135,9 @@ def record(
             recording = record_online(opened, online=choice, **given)
     print_recording(recording, Console())
     if choice is not None:
-        print_section(Path(choice.run), "calibrate")
-        print_warnings(Path(choice.run))
+        calibration = Calibration.open(Path(choice.run))
+        print_calibration(calibration)
+        print_warnings(results_of(calibration))
     if recording.attrs["status"] == "aborted":
         reason = recording.attrs.get("reason") or "no reason is told"
         raise Aborted(f"{recording.path}: the recording was aborted: {reason}")

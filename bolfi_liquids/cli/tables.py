@@ -1,6 +1,6 @@
 """What the command line prints of a calibration, a criticism, a pour, a rig and a recording."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import astuple
 from typing import TYPE_CHECKING
 
@@ -95,6 +95,15 @@ def print_criticism(
         sentences.append(criticism.suggestion_sentence(summary))
     for sentence in sentences:
         console.print(str(sentence), highlight=False, markup=False)
+
+
+def print_seconds(seconds: Mapping[str, float], console: Console) -> None:
+    """Seconds of each phase, and their share."""
+    total = sum(seconds.values())
+    table = _table("phase", "seconds", "share")
+    for phase, spent in (*seconds.items(), ("all", total)):
+        table.add_row(phase, f"{spent:.1f}", f"{spent / total:.0%}")
+    console.print(table)
 
 
 def _table(label: str, *numbers: str) -> Table:

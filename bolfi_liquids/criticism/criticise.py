@@ -13,7 +13,7 @@ from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, stirring_of
 from ..errors import Argument, InputError
 from ..inputs.frame import frame_warnings
-from ..inputs.open import Source
+from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import PourTable
 from ..inputs.recording import Recording, aborted_recordings
 from ..inputs.settings import CriticismSettings
@@ -29,10 +29,10 @@ from .baseline import (
 )
 from .criticism_file import criticism_tree
 from .findings import Findings
-from .inputs import Given, Inputs, Pours, open_inputs
+from .inputs import Given, Inputs, Pours, check_effects, open_inputs
 from .pours import as_prior, pour_experiment
 from .proposals import pour_proposals, stir_proposals
-from .result import Criticism, finished_criticism
+from .result import Criticism, base_calibration, finished_criticism
 from .stirs import (
     camera_noise,
     effects_of,
@@ -91,27 +91,31 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         ImportError, ConnectionError: `executor` cannot be used.
         RuntimeError: Simulations failed; the message says how.
     """
-    from ..inference.criticism import Keeping
-
     started = time.perf_counter()
     settings = CriticismSettings(
         effects=_names("effects", effects),
         accept=_names("accept", accept),
         seed=seed,
     )
-    given = Given(held_out, baseline, pours, held_out_pours, cups)
+    check_effects(settings)
+    given = Given(
+        open_recordings(held_out, Argument("held_out")),
+        open_recordings(baseline, Argument("baseline")),
+        *(pours, held_out_pours, cups),
+    )
     run = run_path(calibration)
     with working_in_run(run):
-        if not isinstance(calibration, Calibration):
-            calibration = Calibration.open(run)
+        calibration = base_calibration(calibration)
         refuse_other_model(calibration)
         inputs = open_inputs(calibration, settings, given)
         for notice in [*aborted_recordings(inputs.compared), *frame_warnings(inputs.compared)]:
             logger.warning(notice)
         for name in inputs.left_out:
             logger.warning("baseline %s: is criticised or held out, so it is not counted", name)
-        if finished := finished_criticism(run, inputs.made_from):
+        if finished := finished_criticism(calibration, inputs.made_from):
             return finished
+        from ..inference.criticism import Keeping
+
         with (
             open_workers(executor, timeout) as workers,
             open_bank(run) as bank,
@@ -121,8 +125,9 @@ def criticise(  # noqa: PLR0913  the one call that most users make
             findings = _find(calibration, inputs, keeping)
             tree = criticism_tree(findings)
         write_tree(tree, run / CRITICISM)
-        CriticismSummary.from_findings(findings, tree, time.perf_counter() - started).write(run)
-        return Criticism.open(run)
+        summary = CriticismSummary.from_findings(findings, tree, time.perf_counter() - started)
+        summary.write(run)
+        return Criticism(calibration, tree, summary)
 
 
 def _names(argument: str, given: str | Sequence[str] | None) -> tuple[str, ...] | None:

@@ -11,14 +11,13 @@ from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, same_liquid, stirring_of
 from ..errors import Argument, InputError
 from ..inputs.cups import cups_of
-from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import PourTable, check_scene, open_pours
 from ..inputs.recording import Recording
 from ..inputs.settings import FALSE_ALARM_RATE, CriticismSettings
 from ..run.directory import CRITICISM_FORMAT
 from ..run.provenance import generations
 from ..run.recordings import kept_recordings
-from .stirs import effects_of, frame_interval, same_rate
+from .stirs import frame_interval, names_of_effects, same_rate
 
 if TYPE_CHECKING:
     from ..models import Cups
@@ -92,8 +91,8 @@ class Inputs:
 class Given(NamedTuple):
     """Data beside the calibrated recordings; see `criticise`."""
 
-    held_out: Source | Sequence[Source] = ()
-    baseline: Source | Sequence[Source] = ()
+    held_out: list[Recording]
+    baseline: list[Recording]
     pours: Pours | None = None
     held_out_pours: Pours | None = None
     cups: "Cups | str | Path | None" = None
@@ -105,14 +104,12 @@ def open_inputs(calibration: Calibration, settings: CriticismSettings, given: Gi
     Raises:
         InputError: Something cannot be used.
     """
-    _check_effects(settings)
     record = dict(calibration.record)
     stirring = stirring_of(
         kept_recordings(calibration.path, record), int(record["settings"]["particles"])
     )
-    kept_back = open_recordings(given.held_out, Argument("held_out"))
+    kept_back, believed = given.held_out, given.baseline
     _check_held_out(stirring, kept_back)
-    believed = open_recordings(given.baseline, Argument("baseline"))
     others = _others(believed, [*stirring.recordings, *kept_back])
     _check_baseline(stirring, others)
     table = _opened(given.pours, Argument("pours"))
@@ -186,13 +183,14 @@ def _check_held_out(stirring: Stirring, held_out: Sequence[Recording]) -> None:
         _check_rig(stirring, recording, Argument(f"held_out {recording.path}"))
 
 
-def _check_effects(settings: CriticismSettings) -> None:
-    considered = settings.effects or tuple(effects_of("stir") | effects_of("pour"))
-    if not effects_of("stir", settings.effects):
+def check_effects(settings: CriticismSettings) -> None:
+    """Raise `InputError` unless the effects to consider and to accept are there."""
+    considered = settings.effects or (*names_of_effects("stir"), *names_of_effects("pour"))
+    if not names_of_effects("stir", settings.effects):
         raise InputError(
             "none of the effects acts in a stir",
             where=Argument("effects"),
-            fix=f"choose from {', '.join(effects_of('stir'))}",
+            fix=f"choose from {', '.join(names_of_effects('stir'))}",
         )
     for name in settings.accept or ():
         if name not in considered:
@@ -244,9 +242,9 @@ def _check_pours(
             where=Argument(f"held_out_pours {held_out.path}"),
             fix="hold out other pours: nothing can be proved on data that were fitted",
         )
-    if not effects_of("pour", settings.effects):
+    if not names_of_effects("pour", settings.effects):
         raise InputError(
             "none of the effects acts in a pour",
             where=Argument("effects"),
-            fix=f"choose from {', '.join(effects_of('pour'))}, or give no `pours`",
+            fix=f"choose from {', '.join(names_of_effects('pour'))}, or give no `pours`",
         )

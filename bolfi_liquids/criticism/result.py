@@ -66,21 +66,13 @@ class Criticism:
             InputError: There is none in the directory, or not one whole of this version's form.
         """
         run = run_path(run)
-        if not is_criticised(run):
+        if (found := criticism_of(Calibration.open(run))) is None:
             raise InputError(
                 "the calibration in it was not criticised",
                 where=str(run),
                 fix=f"run: {command('criticise', run)}",
             )
-        tree = read_tree(run / CRITICISM, fix=_again(run))
-        summary = CriticismSummary.read(run)
-        if json.loads(tree.attrs.get("made_from", "null")) != summary.made_from:
-            raise InputError(
-                f"is of another criticism than the section in {SUMMARY_FILE}: a call was killed",
-                where=str(run / CRITICISM),
-                fix=_again(run),
-            )
-        return cls(Calibration.open(run), tree, summary)
+        return found
 
     @property
     def verdict(self) -> Verdict:
@@ -187,36 +179,55 @@ class Criticism:
         return pour_residual_plot(self.tree.children["pours"], given_or_shown(axes)).grid
 
 
-def is_criticised(run: Path) -> bool:
-    """Whether a run holds a finished criticism.
+def criticism_of(base: Calibration) -> Criticism | None:
+    """What was found out about a calibration; None if its run holds no finished criticism.
 
     Raises:
-        InputError: It does, but in the form of another version.
+        InputError: It does, but damaged, in part, or in the form of another version.
     """
+    run = base.path
     section = read_summary(run).get(CriticismSummary.SECTION)
     if section is None:
-        return False
+        return None
     if (section.get("made_from") or {}).get("format") != CRITICISM_FORMAT:
         raise InputError(
             f"its criticism has the form of {made_by(section)}",
             where=str(run),
             fix=f"{_again(run)}, or use that version",
         )
-    return (run / CRITICISM).is_file()
+    if not (run / CRITICISM).is_file():
+        return None
+    tree = read_tree(run / CRITICISM, fix=_again(run))
+    summary = CriticismSummary.from_json(section, str(run / SUMMARY_FILE))
+    if json.loads(tree.attrs.get("made_from", "null")) != summary.made_from:
+        raise InputError(
+            f"is of another criticism than the section in {SUMMARY_FILE}: a call was killed",
+            where=str(run / CRITICISM),
+            fix=_again(run),
+        )
+    return Criticism(base, tree, summary)
 
 
-def finished_criticism(run: Path, made_from: Mapping[str, Any]) -> Criticism | None:
-    """The criticism in a run if it was finished and made from just this; else None."""
-    read_summary(run)  # a damaged one is refused now, not after the simulations
+def finished_criticism(base: Calibration, made_from: Mapping[str, Any]) -> Criticism | None:
+    """The criticism of a calibration if it was finished and made from just this; else None."""
     try:
-        found = Criticism.open(run)
+        found = criticism_of(base)
     except InputError:  # of another version, damaged or unfinished: it is made again
         return None
-    return found if found.summary.made_from == made_from else None
+    return found if found and found.summary.made_from == made_from else None
 
 
 def _again(run: Path) -> str:
     return f"write it again: {command('criticise', run)}"
+
+
+def base_calibration(given: "Run") -> Calibration:
+    """The calibration of a run, without what a criticism accepted; read if it is not given."""
+    if isinstance(given, Criticism):
+        return given.base
+    if isinstance(given, Calibration) and not given.added:
+        return given
+    return Calibration.open(run_path(given))
 
 
 def latest_calibration(given: "Run") -> Calibration:
@@ -229,5 +240,6 @@ def latest_calibration(given: "Run") -> Calibration:
         return given
     if isinstance(given, Criticism):
         return given.calibration
-    run = run_path(given)
-    return Criticism.open(run).calibration if is_criticised(run) else Calibration.open(run)
+    calibration = base_calibration(given)
+    found = criticism_of(calibration)
+    return calibration if found is None else found.calibration

@@ -101,6 +101,20 @@ def effects_of(scene: str, names: Sequence[str] | None = None) -> dict[str, "Ext
     from ..inference.criticism import Extension
     from ..models import EFFECTS
 
+    acting = {name: EFFECTS[name] for name in names_of_effects(scene, names)}
+    return {
+        name: Extension(one.prior, one.neutral, one.unit, one.text) for name, one in acting.items()
+    }
+
+
+def names_of_effects(scene: str, names: Sequence[str] | None = None) -> list[str]:
+    """Those of `effects_of`, without loading the engine.
+
+    Raises:
+        InputError: A name that is not registered.
+    """
+    from ..models import EFFECTS
+
     unknown = [name for name in names or () if name not in EFFECTS]
     if unknown:
         raise InputError(
@@ -108,11 +122,11 @@ def effects_of(scene: str, names: Sequence[str] | None = None) -> dict[str, "Ext
             where=Argument("effects"),
             fix=f"choose from {', '.join(EFFECTS)}",
         )
-    return {
-        name: Extension(effect.prior, effect.neutral, effect.unit, effect.text)
+    return [
+        name
         for name, effect in EFFECTS.items()
         if scene in effect.scenes and (names is None or name in names)
-    }
+    ]
 
 
 def same_rate(one: Recording, other: Recording) -> bool:

@@ -1,11 +1,12 @@
 """A liquid that a person describes by numbers, rather than by a recording."""
 
 import json
+import math
 from collections.abc import Iterable, Mapping
 from importlib.metadata import version
+from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 from pydantic import Field
 
 from ..errors import Argument, InputError
@@ -81,8 +82,7 @@ def number_of(value: Any, where: str) -> float:
     Raises:
         InputError: It is something else; `where` is named.
     """
-    numbers = int | float | np.integer | np.floating
-    if isinstance(value, bool) or not isinstance(value, numbers) or not np.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
         raise InputError(f"{value!r:.80}", where=where, fix="give one finite number")
     return float(value)
 
@@ -106,10 +106,10 @@ def read_effects(given: Iterable[str], scene: str) -> dict[str, float]:
         try:
             number = parse_number(value)
         except ValueError:
-            number = np.nan
+            number = math.nan
         if name not in EFFECTS:
             raise _unknown(where)
-        if not np.isfinite(number):
+        if not math.isfinite(number):
             raise _out_of_range(name, value, where)
         if name in read:
             raise InputError("given twice", where=where, fix="give it once")

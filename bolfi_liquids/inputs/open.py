@@ -1,5 +1,6 @@
 """Recordings are read from their files and checked."""
 
+import io
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -59,8 +60,8 @@ def read_recording(path: str | Path) -> Recording:
     Raises:
         InputError: The file is missing or damaged, or lacks a field.
     """
-    path = existing_file(path)
-    return as_recording(read_fields(path), path)
+    content = existing_file(path).read_bytes()
+    return as_recording(read_fields(content, Path(path)), Path(path), content)
 
 
 def open_recordings(
@@ -92,47 +93,37 @@ def _opened(source: object, option: str) -> Recording:
     )
 
 
-def read_fields(path: Path) -> "Dataset":
-    """All variables and attributes of a recording's file.
+def read_fields(content: bytes, path: Path) -> "Dataset":
+    """All variables and attributes of a recording's file, from its bytes.
 
     Raises:
         InputError: The file is damaged, or lacks a field.
     """
-    import xarray
-
+    if not content.startswith((HDF5, CLASSIC_NETCDF)):
+        raise InputError(
+            "not a NetCDF file that can be read",
+            where=str(path),
+            fix="if it is a table, bolfi-liquids import makes a recording of it",
+        )
     try:
-        _check_root(path)
+        if content.startswith(HDF5):
+            _check_root(content)
+        import xarray
+
         # times stay numbers: a unit such as "ms" is then seen, not silently converted
-        dataset = xarray.load_dataset(path, decode_times=False)
+        dataset = xarray.load_dataset(io.BytesIO(content), decode_times=False)
     except DAMAGE as err:
-        raise _unreadable(path) from err
+        raise InputError("damaged, cannot be read", where=str(path), fix="copy it again") from err
     check_fields(dataset, path)
     return dataset
 
 
-def _check_root(path: Path) -> None:
+def _check_root(content: bytes) -> None:
     """Raise what `DAMAGE` lists where the root of an HDF5 file is damaged.
 
     h5netcdf leaves a half-made file behind there, which complains once more when it is collected.
     """
-    if _begins(path) == HDF5:
-        import h5py
+    import h5py
 
-        with h5py.File(path, "r") as file:
-            list(file.attrs.items())
-
-
-def _begins(path: Path) -> bytes:
-    with path.open("rb") as file:
-        return file.read(len(HDF5))
-
-
-def _unreadable(path: Path) -> InputError:
-    """What is no recording, or was one before it was damaged."""
-    if (begins := _begins(path)) == HDF5 or begins.startswith(CLASSIC_NETCDF):
-        return InputError("damaged, cannot be read", where=str(path), fix="copy it again")
-    return InputError(
-        "not a NetCDF file that can be read",
-        where=str(path),
-        fix="if it is a table, bolfi-liquids import makes a recording of it",
-    )
+    with h5py.File(io.BytesIO(content), "r") as file:
+        list(file.attrs.items())

@@ -4,8 +4,6 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
-
 from ..errors import InputError
 
 if TYPE_CHECKING:
@@ -103,6 +101,8 @@ def check_prior(prior: "Prior") -> None:
 
 def _check_kept(name: str, distribution: "Distribution") -> None:
     """Raise `InputError` unless a distribution is the same after it was written down and read."""
+    import numpy as np
+
     from ..inference import Prior
 
     u = np.linspace(0.01, 0.99, 9)[:, None]

@@ -136,12 +136,13 @@ def along_path(recording: Recording, inclination: NDArray) -> dict[str, NDArray]
     return dict(zip(("time", *AXES, *PLANES), columns, strict=True))
 
 
-def as_recording(dataset: "Dataset", path: Path) -> Recording:
+def as_recording(dataset: "Dataset", path: Path, content: bytes) -> Recording:
     """What the variables and attributes of a recording's file mean; nothing is checked.
 
     Args:
         dataset: With the fields and units that `bolfi-liquids guide recordings` lists.
         path: The file that it was read from.
+        content: Its bytes.
     """
 
     def stack(names: tuple[str, ...]) -> NDArray[np.float64]:
@@ -154,7 +155,7 @@ def as_recording(dataset: "Dataset", path: Path) -> Recording:
         inclination=stack(PLANES),
         attrs=MappingProxyType({str(k): _plain(v) for k, v in dataset.attrs.items()}),
         path=path,
-        hash=hashlib.sha256(path.read_bytes()).hexdigest(),
+        hash=hashlib.sha256(content).hexdigest(),
     )
 
 

@@ -35,6 +35,10 @@ LARGEST_SEED = 2**31 - 1
 """That every random number generator takes."""
 MIN_POURS, MAX_POURS = 24, 100
 """Of one decision: with fewer its map is coarse, and with more it is hardly finer."""
+MIN_MAP_POURS = 16
+"""From fewer, a map of three inputs learns next to nothing."""
+PRIOR_POURS = 192
+"""For a map of all liquids, which then misses pours left out by .02."""
 MIN_PARTICLES = 100
 """With fewer, the stick is thinner than the gaps between them."""
 

@@ -72,7 +72,7 @@ def import_table(table: str | Path, columns: str | Path | TableMap, out: str | P
         table, delimiter=meaning.delimiter, decimal=meaning.decimal, skip=meaning.skip
     )
     dataset, told = _dataset(read, meaning)
-    made = as_recording(dataset, read.path)
+    made = as_recording(dataset, read.path, b"")
     try:
         check_values(made)
         check_hangs(made)

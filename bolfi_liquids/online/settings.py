@@ -5,8 +5,17 @@ from typing import Annotated
 from pydantic import Field
 
 from ..errors import InputError
-from ..inputs.settings import Count, Particles, Seed, Simulations, Surrogate, checked, one_of
-from ..pouring.landing_map import MIN_POURS, PRIOR_POURS
+from ..inputs.settings import (
+    MIN_MAP_POURS,
+    PRIOR_POURS,
+    Count,
+    Particles,
+    Seed,
+    Simulations,
+    Surrogate,
+    checked,
+    one_of,
+)
 
 STOPS = ("bound", "mean")
 WHERE = "online setting {}"
@@ -39,7 +48,7 @@ class OnlineSettings:
     in_flight: Count = 1
     surrogate: Surrogate = "discrepancy"
     particles: Particles = 0
-    pours: Annotated[int, Field(ge=MIN_POURS)] = PRIOR_POURS
+    pours: Annotated[int, Field(ge=MIN_MAP_POURS)] = PRIOR_POURS
     seed: Seed = 0
 
     def __post_init__(self):

@@ -1,7 +1,7 @@
 """From a posterior to the pour that is expected to spill least."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -27,7 +27,7 @@ from .design import acting_in_pours, box_around, joint_prior
 from .landed_pours import LandedPours, pours_in
 from .landing_map import LandingMap, learn_map
 from .pour_file import pour_tree
-from .result import Pour, PourSummary
+from .result import Judged, Pour, PourSummary
 from .spillage import Surface, landing_sd
 
 if TYPE_CHECKING:
@@ -85,16 +85,35 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         RuntimeError: Too few pours succeeded.
     """
     settings = PourSettings(pours=pours, iterations=iterations, draws=draws, risk=risk, seed=seed)
+    cups = cups_of(cups)
     with working_in_run(run_path(calibration)):
         latest = latest_calibration(calibration)
         refuse_other_model(latest)
         if not force:
             refuse_bad_fit(latest.summary, latest.path)
-        drawn = strata(latest, settings.draws, settings.seed)
-        cups = cups_of(cups)
         with open_workers(executor, timeout) as workers:
-            learned = _learned(latest, cups, settings, Execution(workers, timeout, progress))
-        return _chosen(latest, learned, settings, drawn)
+            pour = decided(latest, cups, settings, Execution(workers, timeout, progress))
+        write_tree(pour.tree, pour.path / POUR)
+        pour.summary.write(pour.path)
+        return pour
+
+
+def decided(
+    calibration: Calibration, cups: "Cups", settings: PourSettings, execution: Execution
+) -> Pour:
+    """The pour of a posterior; pours are kept in the run's bank, and nothing else is written.
+
+    Raises:
+        InputError, RuntimeError: See `choose_pour`.
+    """
+    drawn = strata(calibration, settings.draws, settings.seed)
+    learned = _learned(calibration, cups, settings, execution)
+    choice = _search(learned, settings, drawn.search, calibration.best)
+    both = [
+        learned.judge(action, drawn.judge, seed=settings.seed)
+        for action in (choice.chosen, choice.plug_in)
+    ]
+    return _described(both, choice, learned, settings, calibration)
 
 
 def _learned(
@@ -111,20 +130,6 @@ def _learned(
     ):
         poured = pours_in(box, pours, settings.pours, execution.keep(bank), advance)
     return learn_map(box, cups, poured)
-
-
-def _chosen(
-    calibration: Calibration, learned: LandingMap, settings: PourSettings, drawn: "Drawn"
-) -> Pour:
-    """Search the map, judge, and write what was found into the run."""
-    choice = _search(learned, settings, drawn.search, calibration.best)
-    chosen, plug_in = (
-        learned.judge(action, drawn.judge, seed=settings.seed)
-        for action in (choice.chosen, choice.plug_in)
-    )
-    pour = Pour(calibration.path, chosen, plug_in)
-    _keep(pour, choice, learned, settings, calibration)
-    return pour
 
 
 class Drawn(NamedTuple):
@@ -188,18 +193,19 @@ def _search(
     return _Choice(liquids, over_posterior, at_best, chosen, plug_in)
 
 
-def _keep(
-    pour: Pour,
+def _described(
+    both: Sequence[Judged],
     choice: _Choice,
     learned: LandingMap,
     settings: PourSettings,
     calibration: Calibration,
-) -> None:
-    """Write pour.nc and the section "pour" of summary.json."""
+) -> Pour:
+    """With what pour.nc and the section "pour" of summary.json hold."""
+    chosen, plug_in = both
     cups, fit_status = learned.cups, calibration.summary.fit_status
     tried = {"actions": choice.over_posterior, "actions_plug_in": choice.at_best}
     least = cups.least_viscosity(calibration.liquid_density)
-    tree = pour_tree(pour, tried, choice.liquids, learned, settings.risk)
+    tree = pour_tree(chosen, plug_in, tried, choice.liquids, learned, settings.risk)
     tree.attrs.update(
         asdict(settings),
         cups=json.dumps(cups.settings()),
@@ -208,12 +214,13 @@ def _keep(
         map_error=learned.rms_error,
         fit_status=str(fit_status),  # a bad fit was poured by force
     )
-    write_tree(tree, pour.path / POUR)
-    PourSummary.from_pour(
-        pour,
+    summary = PourSummary.from_judged(
+        chosen,
+        plug_in,
         settings,
         n_simulations=learned.pours,
         map_error=learned.rms_error,
         least_viscosity=least,
         fit_status=fit_status,
-    ).write(pour.path)
+    )
+    return Pour(calibration.path, chosen, plug_in, tree, summary)

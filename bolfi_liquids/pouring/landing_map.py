@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..inputs.settings import MIN_MAP_POURS
 from ..progress import Advance, silent
 from ..seeds import Phase, generator
 from .design import RATE, Box, joint_prior, whole
@@ -36,8 +37,6 @@ if TYPE_CHECKING:
     from ..inference.simulations import Keep
     from ..models import Cups
 
-MIN_POURS = 16  # from fewer a map of three inputs learns next to nothing
-PRIOR_POURS = 192  # for a map of all liquids, which then misses pours left out by .02
 RATES = 31  # angular velocities that are tried
 MIN_OUTCOMES = 64  # of an action, however few the draws
 BEST_DRAWS = 384  # posterior draws at most that choose and judge the best action
@@ -202,10 +201,10 @@ def learn_map(box: Box, cups: "Cups", poured: Poured) -> LandingMap:
 
     from ..inference import Prior, emulate
 
-    if len(poured.rows) < MIN_POURS:
+    if len(poured.rows) < MIN_MAP_POURS:
         raise RuntimeError(
-            f"{len(poured.rows)} pours succeeded, and a map needs {MIN_POURS}; allow more time, "
-            "or more pours, and repeat the call: nothing that has finished is lost"
+            f"{len(poured.rows)} pours succeeded, and a map needs {MIN_MAP_POURS}; allow more "
+            "time, or more pours, and repeat the call: nothing that has finished is lost"
         )
     sides = zip(box.prior.names, box.low, box.high, strict=True)
     within = Prior({name: dist.Uniform(low, high) for name, low, high in sides})

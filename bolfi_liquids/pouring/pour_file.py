@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .result import Judged, Pour
+from .result import Judged
 from .spillage import ACTION, FRACTIONS, RISK, Surface
 
 if TYPE_CHECKING:
@@ -24,7 +24,8 @@ ACTION_UNITS = {"angular_velocity": "rad s-1", "distance": "m"}
 
 
 def pour_tree(
-    pour: Pour,
+    chosen: Judged,
+    plug_in: Judged,
     tried: Mapping[str, Surface],
     liquids: Mapping[str, NDArray],
     learned: "LandingMap",
@@ -33,7 +34,7 @@ def pour_tree(
     """Everything that a report shows of a pour.
 
     Args:
-        pour: The chosen one.
+        chosen, plug_in: The two actions that were judged.
         tried: What actions may be expected to spill, by the name of the group.
         liquids: The posterior draws of the choice, name -> (draws,).
         learned: The map that it was made with.
@@ -43,8 +44,8 @@ def pour_tree(
 
     groups = {
         **{name: _actions(surface, risk) for name, surface in tried.items()},
-        "chosen": _outcomes(pour.chosen),
-        "plug_in": _outcomes(pour.plug_in),
+        "chosen": _outcomes(chosen),
+        "plug_in": _outcomes(plug_in),
         "liquids": Dataset({name: ("draw", values) for name, values in liquids.items()}),
         "pours": _pours(learned),
     }

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from ..calibration.summary import FitStatus
 from ..errors import InputError
 from ..inputs.settings import PourSettings
 from ..run.directory import POUR, run_path
-from ..run.summary import Number, Section
+from ..run.summary import SUMMARY_FILE, Number, Section
 from ..wording import command, html_table, spilled
 from .spillage import ACTION, FRACTIONS
 
@@ -75,11 +75,15 @@ class Pour:
         path: The RUN directory.
         chosen: Found over the posterior draws.
         plug_in: Found at theta* alone, judged over the same draws as `chosen`.
+        tree: pour.nc; its groups are listed in `pouring.pour_file`.
+        summary: The section "pour" of summary.json.
     """
 
     path: Path
     chosen: Judged
     plug_in: Judged
+    tree: "DataTree"
+    summary: "PourSummary"
 
     def __repr__(self) -> str:
         return f"Pour({str(self.path)!r}: {self.chosen})"
@@ -89,16 +93,21 @@ class Pour:
         return html_table("Pour", rows)
 
     @classmethod
-    def open(cls, run: str | Path) -> Self:
+    def open(cls, run: str | Path) -> "Pour":
         """Read the pour that a run has chosen.
 
         Raises:
-            InputError: There is none in the directory, or its file is damaged.
+            InputError: There is none in the directory, or a file is damaged.
         """
         run = run_path(run)
         check_poured(run)
-        tree = read_pour(run)
-        return cls(run, *(judged(tree, name) for name in ("chosen", "plug_in")))
+        if (found := pour_of(run)) is None:
+            raise InputError(
+                f"has no section pour, though there is a {POUR}",
+                where=str(run / SUMMARY_FILE),
+                fix=f"choose the pour again: {command('pour', run)}",
+            )
+        return found
 
     def plot_map(self, ax: "Axes | None" = None) -> "Axes":
         """Expected spillage over angular velocity and distance, with both actions.
@@ -108,36 +117,27 @@ class Pour:
 
         Returns:
             The axes.
-
-        Raises:
-            ValueError: Another pour was chosen in the run since.
         """
         from ..drawing import given_or_shown, panels, styled
         from .figures import draw_expected
 
-        tree = self.check_current()
         canvas = given_or_shown(ax)
         with styled():
             drawn = panels(canvas, (1, 1), (4.6, 3.6))
             axes = drawn.grid[0, 0]
-            drawn.figure.colorbar(draw_expected(axes, tree), ax=axes)
+            drawn.figure.colorbar(draw_expected(axes, self.tree), ax=axes)
             drawn.legend(*axes.get_legend_handles_labels())
         return axes
 
-    def check_current(self) -> "DataTree":
-        """pour.nc of the run, which must hold this pour.
-
-        Raises:
-            ValueError: Another pour was chosen in the run since.
-        """
-        tree = read_pour(self.path)
+    def check_current(self) -> None:
+        """Raise `ValueError` if another pour was chosen in the run since."""
+        there = read_pour(self.path)
         pairs = ((self.chosen, "chosen"), (self.plug_in, "plug_in"))
-        if not all(one.equals(judged(tree, name)) for one, name in pairs):
+        if not all(one.equals(judged(there, name)) for one, name in pairs):
             raise ValueError(
                 f"another pour was chosen in {self.path} since; open it by Pour.open, or choose "
                 "this one again"
             )
-        return tree
 
 
 @dataclass(frozen=True)
@@ -200,27 +200,36 @@ class PourSummary(ActionSummary, Section):
     map_error: Number | None = None
 
     @classmethod
-    def from_pour(
-        cls,
-        pour: Pour,
-        settings: PourSettings,
-        *,
-        n_simulations: int,
-        map_error: float,
-        least_viscosity: float,
-        fit_status: FitStatus,
+    def from_judged(
+        cls, chosen: Judged, plug_in: Judged, settings: PourSettings, **more: Any
     ) -> Self:
-        """From a pour, its settings, and the fields that neither has."""
+        """From two actions, the settings of the choice, and the fields that neither has."""
         return cls.of(
-            pour.chosen,
+            chosen,
             risk=settings.risk,
             seed=settings.seed,
-            plug_in=ActionSummary.of(pour.plug_in),
-            n_simulations=n_simulations,
-            map_error=map_error,
-            least_viscosity=least_viscosity,
-            fit_status=fit_status,
+            plug_in=ActionSummary.of(plug_in),
+            **more,
         )
+
+
+def pour_of(run: Path) -> Pour | None:
+    """The pour that a run has chosen; None if it has none, or no section on it.
+
+    Raises:
+        InputError: A file is damaged.
+    """
+    if not (run / POUR).is_file() or (summary := PourSummary.read(run)) is None:
+        return None
+    tree = read_pour(run)
+    try:
+        return Pour(run, judged(tree, "chosen"), judged(tree, "plug_in"), tree, summary)
+    except (KeyError, TypeError, ValueError) as err:
+        raise InputError(
+            "damaged, it holds no whole pour",
+            where=str(run / POUR),
+            fix=f"choose the pour again: {command('pour', run)}",
+        ) from err
 
 
 def check_poured(run: Path) -> None:

@@ -5,8 +5,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..calibration.posterior_file import read_tree
-from ..calibration.result import Calibration
 from ..calibration.summary import CalibrationSummary
 from ..criticism.effect_figures import (
     any_fitted,
@@ -20,12 +18,11 @@ from ..criticism.figures import (
     residual_plot,
     stroke_plot,
 )
-from ..criticism.result import is_criticised
+from ..criticism.result import Criticism
 from ..criticism.summary import CriticismSummary
 from ..drawing import to_svg
 from ..hover_labels import lines_of, to_chart
-from ..run.directory import CRITICISM
-from ..wording import Sentence, command, spoken, unit_of
+from ..wording import Sentence, spoken, unit_of
 from . import criticism_sentences as sentences
 
 if TYPE_CHECKING:
@@ -34,14 +31,11 @@ if TYPE_CHECKING:
 SOURCES = ("stirs", "pours")
 
 
-def criticism_context(calibration: Calibration) -> dict[str, Any] | None:
-    """What the template needs; None if the run was not criticised."""
-    run = calibration.path
-    if not is_criticised(run):
-        return None
-    summary = CriticismSummary.read(run)
-    tree = read_tree(run / CRITICISM, fix=f"write it again: {command('criticise', run)}")
-    return {"summary": summary, **criticism_chapter(summary, tree, calibration.summary)}
+def criticism_context(criticism: Criticism) -> dict[str, Any]:
+    """What the template needs."""
+    summary = criticism.summary
+    of = criticism_chapter(summary, criticism.tree, criticism.base.summary)
+    return {"summary": summary, **of}
 
 
 def criticism_chapter(

@@ -17,14 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.posterior_file import read_tree, write_tree
-from ..criticism.result import latest_calibration
 from ..inputs.cups import kept_cups
 from ..inputs.prior import split_parameters
 from ..inputs.recording import Recording
-from ..pouring.result import read_pour
 from ..progress import Advance, progress_bar
-from ..run.directory import FRAMES, POUR
-from ..run.recordings import kept_recordings
+from ..run.directory import FRAMES
 from ..seeds import Phase, simulation_seeds
 from ..wording import unit_of
 from .scenes import FRAME_RATE, Draw, PourScene, PourShown, StirScene, StirShown
@@ -34,6 +31,7 @@ if TYPE_CHECKING:
 
     from ..calibration.result import Calibration
     from ..inference.simulations import Workers
+    from ..pouring.result import Pour
 
 N_DRAWS_SHOWN = 3
 """Posterior draws that are shown."""
@@ -48,8 +46,29 @@ FRAMES_FORMAT = 1
 T = TypeVar("T")
 
 
+class Shown(NamedTuple):
+    """What is shown of a run.
+
+    Attributes:
+        calibration: The latest.
+        recording: The first that was calibrated on.
+        pour: The chosen one; None where there is none.
+    """
+
+    calibration: "Calibration"
+    recording: Recording
+    pour: "Pour | None"
+
+    @property
+    def action(self) -> dict[str, Any] | None:
+        """The chosen pour: its angular velocity, distance and cups."""
+        if self.pour is None:
+            return None
+        return {**self.pour.chosen.action, "cups": json.loads(self.pour.tree.attrs["cups"])}
+
+
 def frames_of(
-    run: str | Path,
+    shown: Shown,
     *,
     executor: "Workers | None" = None,
     timeout: float | None = None,
@@ -58,21 +77,18 @@ def frames_of(
     """The run's frames; simulated if there are none of this calibration and pour.
 
     Args:
-        run: A RUN directory with a finished calibration.
+        shown: What they are of.
         executor: Where draws are simulated, see `calibrate`; the result has the same bits.
         timeout: Seconds that one simulation may take; None sets no limit.
         progress: Whether to show a bar on stderr.
 
     Raises:
-        InputError: The directory holds no finished calibration, or its recording is missing.
         RuntimeError: A simulation took longer than `timeout`; nothing was written.
     """
-    calibration = latest_calibration(run)
-    whole = kept_recordings(calibration.path, dict(calibration.record))[0]
+    calibration, whole, pour = shown.calibration, shown.recording, shown.action
     recording = whole.first(int(np.sum(whole.time - whole.time[0] <= MAX_STIR_SECONDS)))
     seed = int(calibration.record["settings"]["seed"])
     theta = calibration.draws(N_DRAWS_SHOWN, seed)
-    pour = _chosen(calibration.path)
     seeds = simulation_seeds(seed, Phase.MOVING_PICTURES, N_DRAWS_SHOWN)
     made_from = _digest(theta, seeds, recording, calibration.record["settings"], pour)
     path = calibration.path / FRAMES
@@ -162,15 +178,6 @@ def _unit(name: str) -> dict[str, str]:
     """Attributes of a parameter."""
     unit = unit_of(name)
     return {"units": unit} if unit else {}
-
-
-def _chosen(run: Path) -> dict[str, Any] | None:
-    """The chosen pour: its angular velocity, distance and cups."""
-    if not (run / POUR).is_file():
-        return None
-    tree = read_pour(run)
-    action = {str(name): float(value) for name, value in tree["chosen"].attrs.items()}
-    return {**action, "cups": json.loads(tree.attrs["cups"])}
 
 
 def _digest(

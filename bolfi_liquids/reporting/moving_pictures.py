@@ -5,44 +5,40 @@ least 5 kB, with nothing to pause, to turn back, or to follow in the figures bes
 """
 
 import base64
-import json
-from pathlib import Path
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration.result import Calibration
 from ..hover_labels import short
 from ..inputs.cups import kept_cups
-from ..pouring.result import read_pour
-from ..run.recordings import kept_recordings
 from ..wording import sentence, with_unit
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
+    from .frames import Shown
+
 BYTE_LEVELS = 254
 """Values of a byte that a coordinate is rounded to; 255 marks a particle that is gone."""
 
 
-def moving_context(calibration: Calibration, frames: "Dataset") -> dict[str, Any] | None:
+def moving_context(shown: "Shown", frames: "Dataset") -> dict[str, Any] | None:
     """What the template and the script need of `frames.frames_of`; None if all of them failed.
 
     Args:
-        calibration: The run's.
+        shown: What they are of.
         frames: Its frames.
     """
-    run = calibration.path
     frames = frames.isel(draw=np.flatnonzero(_sound(frames)))
     if frames.sizes["draw"] == 0:
         return None
-    scenes = {"stir": _stir_scene(calibration, frames)}
-    if "poured" in frames:
-        scenes["pour"] = _pour_scene(run, frames)
+    scenes = {"stir": _stir_scene(shown, frames)}
+    if "poured" in frames and shown.action is not None:
+        scenes["pour"] = _pour_scene(shown.action, frames)
     draws = [_draw(frames.isel(draw=at)) for at in range(frames.sizes["draw"])]
-    extended = set(draws[0]["theta"]) != set(calibration.summary.parameters)
-    return {"draws": draws, "scenes": scenes, "extended": extended}
+    return {"draws": draws, "scenes": scenes, "extended": bool(shown.calibration.added)}
 
 
 def _sound(frames: "Dataset") -> NDArray[np.bool_]:
@@ -75,11 +71,10 @@ def _outcome(one: "Dataset") -> str:
     return str(sentence("pour.outcome", spilled=spilled, retained=retained))
 
 
-def _stir_scene(calibration: Calibration, frames: "Dataset") -> dict[str, Any]:
+def _stir_scene(shown: "Shown", frames: "Dataset") -> dict[str, Any]:
     from ..models import StirSetup
 
-    recording = kept_recordings(calibration.path, dict(calibration.record))[0]
-    particles = int(calibration.record["settings"]["particles"])
+    recording, particles = shown.recording, int(shown.calibration.record["settings"]["particles"])
     setup = StirSetup.from_recording(recording, particles=particles)
     radius, top = setup.cup.radius, float(frames["pivot"][..., 2].max())
     return {
@@ -94,11 +89,10 @@ def _stir_scene(calibration: Calibration, frames: "Dataset") -> dict[str, Any]:
     }
 
 
-def _pour_scene(run: Path, frames: "Dataset") -> dict[str, Any]:
-    tree = read_pour(run)
-    cups = kept_cups(json.loads(tree.attrs["cups"]))
+def _pour_scene(pour: Mapping[str, Any], frames: "Dataset") -> dict[str, Any]:
+    cups = kept_cups(pour["cups"])
     source, receiver, lip = cups.source, cups.receiver, cups.pour.lip_height
-    distance = float(tree["chosen"].attrs["distance"])
+    distance = float(pour["distance"])
     reach = float(np.hypot(2.0 * source.radius, source.height))
     wide = max(source.radius, receiver.radius)
     low = [-max(2.0 * source.radius, receiver.radius - distance) - 0.005, -wide, -lip]

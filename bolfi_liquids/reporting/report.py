@@ -1,10 +1,11 @@
 """report.html: one file that shows a run, without anything from outside it."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import astuple
 from importlib.resources import files
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from ..calibration.fit_figures import inclination_figure, stroke_figure
@@ -13,10 +14,11 @@ from ..calibration.posterior_figure import posterior_figure
 from ..calibration.result import Calibration
 from ..calibration.search_figure import search_figure
 from ..calibration.summary import CalibrationSummary
+from ..criticism.result import Criticism, base_calibration, criticism_of
 from ..files import write_text
 from ..hover_labels import script_json
 from ..inputs.prior import Described
-from ..pouring.result import PourSummary
+from ..pouring.result import Pour, pour_of
 from ..run.directory import REPORT, Run, run_path
 from ..run.entering import working_in_run
 from ..wording import LIQUID_UNITS, sentence
@@ -25,8 +27,6 @@ from .criticism_chapter import criticism_context
 from .warnings import Results, results_of, warnings_of
 
 if TYPE_CHECKING:
-    from xarray import DataTree
-
     from ..inference.simulations import Workers
 
 PAGE_TEMPLATE = "report.html.jinja"
@@ -55,21 +55,47 @@ def report(
             command works in it.
         RuntimeError: A simulation took longer than `timeout`.
     """
-    how = {"executor": executor, "timeout": timeout, "progress": progress}
     with working_in_run(run_path(run)):
-        calibration = Calibration.open(run_path(run))
+        calibration = base_calibration(run)
         refuse_other_model(calibration)
         # before anything is simulated: a damaged file is refused
-        results, criticism = results_of(calibration), criticism_context(calibration)
-        pictures = _moving(calibration, how) if moving else None
-        page = _page(calibration, results, criticism, pictures)
-        return write_text(calibration.path / REPORT, page)
+        criticism, pour = criticism_of(calibration), pour_of(calibration.path)
+        how = {"executor": executor, "timeout": timeout, "progress": progress}
+        return written(calibration, criticism, pour, moving=moving, **how)
+
+
+def written(
+    calibration: Calibration,
+    criticism: Criticism | None,
+    pour: Pour | None,
+    *,
+    moving: bool = True,
+    chapters: Mapping[str, Any] = MappingProxyType({}),
+    **how: Any,
+) -> Path:
+    """Write RUN/report.html from what was read or made, as its arguments.
+
+    Args:
+        calibration: Without what a criticism accepted.
+        criticism, pour: Of its run.
+        moving: See `report`.
+        chapters: What is drawn already, by the names of `CHAPTERS`.
+        how: Further arguments of `frames_of`.
+    """
+    latest = calibration if criticism is None else criticism.calibration
+    pictures = _moving(latest, pour, how) if moving else None
+    given = {"calibration": calibration, "criticism": criticism, "pour": pour}
+    drawn = {
+        name: chapters.get(name) or (one and CHAPTERS[name](one)) for name, one in given.items()
+    }
+    page = _page(calibration, drawn, results_of(calibration, criticism, pour), pictures)
+    return write_text(calibration.path / REPORT, page)
 
 
 def _page(
     calibration: Calibration,
+    chapters: Mapping[str, Any],
     results: Results,
-    criticism: dict[str, Any] | None,
     pictures: dict[str, Any] | None,
 ) -> str:
     """The page of a run, with moving pictures if there are any."""
@@ -83,9 +109,7 @@ def _page(
         lstrip_blocks=True,
     )
     return environment.get_template(PAGE_TEMPLATE).render(
-        calibration=_calibration_context(calibration),
-        criticism=criticism,
-        pour=_pour_context(results.poured, results.pour),
+        **chapters,
         warnings=warnings_of(results),
         moving=pictures,
         moving_json=script_json(pictures),
@@ -96,7 +120,7 @@ def _page(
     )
 
 
-def _calibration_context(calibration: Calibration) -> dict[str, Any]:
+def calibration_context(calibration: Calibration) -> dict[str, Any]:
     summary, tree = calibration.summary, calibration.tree
     prior = tree["prior"]
     return {
@@ -145,11 +169,10 @@ def _row(name: str, summary: CalibrationSummary) -> dict[str, Any]:
     }
 
 
-def _pour_context(summary: PourSummary | None, tree: "DataTree | None") -> dict[str, Any] | None:
-    if summary is None or tree is None:
-        return None
+def _pour_context(pour: Pour) -> dict[str, Any]:
     from .pour_figure import pour_figure
 
+    summary, tree = pour.summary, pour.tree
     return {
         "summary": summary,
         "chosen": sentences.pour_sentence(summary),
@@ -163,17 +186,29 @@ def _pour_context(summary: PourSummary | None, tree: "DataTree | None") -> dict[
     }
 
 
-def _moving(calibration: Calibration, how: Mapping[str, Any]) -> dict[str, Any] | None:
+CHAPTERS: dict[str, Callable[[Any], dict[str, Any]]] = {
+    "calibration": calibration_context,
+    "criticism": criticism_context,
+    "pour": _pour_context,
+}
+"""What the template needs of each result."""
+
+
+def _moving(
+    calibration: Calibration, pour: Pour | None, how: Mapping[str, Any]
+) -> dict[str, Any] | None:
     """Moving pictures, simulated by the arguments `how` of `frames_of`."""
-    from ..run.recordings import RECORDINGS_FOLDER
-    from .frames import frames_of
+    from ..run.recordings import RECORDINGS_FOLDER, kept_recordings
+    from .frames import Shown, frames_of
     from .moving_pictures import moving_context
 
     if not (
         calibration.path / RECORDINGS_FOLDER
     ).is_dir():  # of a run that was made before they were kept
         return None
-    return moving_context(calibration, frames_of(calibration.path, **how))
+    first, *_ = kept_recordings(calibration.path, dict(calibration.record))
+    shown = Shown(calibration, first, pour)
+    return moving_context(shown, frames_of(shown, **how))
 
 
 def _text(name: str) -> str:

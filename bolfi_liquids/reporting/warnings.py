@@ -11,13 +11,11 @@ import numpy as np
 from ..calibration.bad_fit import bad_fit
 from ..calibration.result import Calibration
 from ..calibration.summary import CalibrationSummary
-from ..criticism.result import is_criticised, latest_calibration
+from ..criticism.result import Criticism, criticism_of
 from ..criticism.summary import CriticismSummary
 from ..criticism.verdict import Verdict
-from ..pouring.result import PourSummary, read_pour
+from ..pouring.result import Pour, PourSummary, pour_of
 from ..pouring.spillage import ACTION
-from ..run.directory import POUR
-from ..run.summary import read_summary
 from ..wording import LEAST_SPILLED, Sentence, sentence
 from .criticism_sentences import verdict_sentence
 from .sentences import (
@@ -69,22 +67,27 @@ class Results:
     searched: int
 
 
-def results_of(calibration: Calibration) -> Results:
+def results_of(
+    calibration: Calibration, criticism: Criticism | None = None, pour: Pour | None = None
+) -> Results:
     """What the run of a calibration holds.
+
+    Args:
+        calibration: Without what a criticism accepted.
+        criticism, pour: Of its run; read if they are not given, where there are any.
 
     Raises:
         InputError: A file is damaged, or of another version.
     """
-    run, summary = calibration.path, calibration.summary
-    poured = PourSummary.SECTION in read_summary(run) and (run / POUR).is_file()
-    criticised = is_criticised(run)
-    latest = latest_calibration(run if criticised else calibration)
+    criticism, pour = criticism or criticism_of(calibration), pour or pour_of(calibration.path)
+    summary = calibration.summary
+    latest = calibration if criticism is None else criticism.calibration
     return Results(
         calibrated=summary,
         latest=latest.summary,
-        criticised=CriticismSummary.read(run) if criticised else None,
-        poured=PourSummary.read(run) if poured else None,
-        pour=read_pour(run) if poured else None,
+        criticised=None if criticism is None else criticism.summary,
+        poured=None if pour is None else pour.summary,
+        pour=None if pour is None else pour.tree,
         posterior=latest.posterior,
         searched=summary.n_simulations - int(calibration.tree.attrs["initial"]),
     )

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from ..drawing import INK, new_figure, styled
 from ..inputs.cups import bundled_cups
@@ -115,6 +114,8 @@ def _regrets(shared: SharedSimulations, lips: NDArray) -> NDArray[np.float64]:
 
 def _regret(spilled: NDArray, cups: "Cups") -> NDArray[np.float64]:
     """By radius, from fractions (rates, radii, liquids, distances)."""
+    from scipy.ndimage import gaussian_filter1d
+
     blurred = gaussian_filter1d(spilled, landing_sd(cups) / DISTANCE_STEP, axis=-1, mode="nearest")
     low, high = cups.distance_range
     inside = (DISTANCES >= low - DISTANCE_STEP / 2) & (DISTANCES <= high + DISTANCE_STEP / 2)

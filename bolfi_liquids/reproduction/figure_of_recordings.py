@@ -1,6 +1,5 @@
 """From recordings of stirs to what the chosen pours spill in the reference solver."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +8,6 @@ from ..drawing import GREY, INK, PALETTE, new_figure, styled
 from ..inputs.bundled import POURED_LIQUIDS, bundled_pours
 from ..inputs.prior import default_prior
 from ..pouring.choose import choose_pour
-from ..pouring.result import read_pour
 from ..pouring.spillage import ACTION, Surface
 from .decisions import RULES, Action, decide_unknowing
 from .figure import Drawn
@@ -20,6 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from xarray import DataArray, Dataset
+
+    from ..pouring.result import Pour
 
 OTHER_CHOICES = {
     "plug_in": ("x", "best at θ* alone"),
@@ -88,13 +88,13 @@ def _chosen(
     return {
         "plug_in": pour.plug_in.action,
         "mean": pour.chosen.action,
-        "cvar": _least(pour.path, "cvar"),
+        "cvar": _least(pour, "cvar"),
     }
 
 
-def _least(run: Path, risk: str) -> dict[str, float]:
+def _least(pour: "Pour", risk: str) -> dict[str, float]:
     """The action at which another measure of risk is least, over the same draws."""
-    actions = read_pour(run)["actions"]
+    actions = pour.tree["actions"]
     return Surface(*(actions[name].to_numpy() for name in Surface._fields)).least(risk)
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ..pouring.landing_map import PRIOR_POURS
+from ..inputs.settings import PRIOR_POURS
 
 
 @dataclass(frozen=True)

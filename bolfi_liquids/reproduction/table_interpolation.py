@@ -4,7 +4,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 if TYPE_CHECKING:
     from ..inputs.pour_table import PourTable
@@ -28,6 +27,8 @@ class Row(NamedTuple):
 
     def at(self, distance: float) -> float:
         """Monotone cubics (Fritsch and Carlson 1980); beyond the row, its end."""
+        from scipy.interpolate import PchipInterpolator
+
         inside = np.clip(distance, self.distance[0], self.distance[-1])
         return float(PchipInterpolator(self.distance, self.spilled)(inside))
 

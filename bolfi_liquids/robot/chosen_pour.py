@@ -14,7 +14,7 @@ from ..calibration.result import Calibration
 from ..calibration.summary import FitStatus
 from ..errors import InputError
 from ..inputs.cups import kept_cups
-from ..pouring.result import ActionSummary, Judged, PourSummary, check_poured, judged
+from ..pouring.result import ActionSummary, Judged, Pour, PourSummary, check_poured, judged
 from ..reporting.warnings import results_of, stale_sentences, warnings_of
 from ..run.directory import POUR, RUN_TOML
 from ..run.summary import SUMMARY_FILE
@@ -120,20 +120,15 @@ def chosen_pour(run: Path) -> ChosenPour:
     check_poured(run)
     calibration = Calibration.open(run)
     refuse_other_model(calibration)
-    results = results_of(calibration)
-    if results.pour is None or results.poured is None:
-        raise InputError(
-            f"has no section pour, though there is a {POUR}",
-            where=str(run / SUMMARY_FILE),
-            fix=_again(run),
-        )
-    chosen, cups = _kept(run, results.pour)
-    _check_summary(run, results.poured, chosen)
+    pour = Pour.open(run)
+    results = results_of(calibration, None, pour)
+    chosen, cups = _kept(run, pour.tree)
+    _check_summary(run, pour.summary, chosen)
     _check_ranges(run, chosen, cups)
     stale = stale_sentences(results)
     worries = [one for one in warnings_of(results) if one not in stale]
     # older versions wrote no status; the pour is of the latest fit, or stale anyway
-    was_bad = results.pour.attrs.get("fit_status") == FitStatus.BAD
+    was_bad = pour.tree.attrs.get("fit_status") == FitStatus.BAD
     is_bad = was_bad or bad_fit(results.latest) is not None
     return ChosenPour(run, chosen, cups, tuple(stale), is_bad, tuple(worries))
 

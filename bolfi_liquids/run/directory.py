@@ -89,7 +89,7 @@ def enter_run(
         raise InputError("not a directory", where=str(run), fix="choose another `out`")
     if path.exists():
         if not resume:
-            raise _held(run)
+            raise held_error(run)
         held = read_run(run)
         differing = _differences(held, record)
         grows = growing in differing and _larger(*differing[growing])
@@ -108,11 +108,12 @@ def enter_run(
     try:
         write_new_text(path, tomli_w.dumps(record))
     except FileExistsError:  # another call has begun here meanwhile
-        raise _held(run) from None
+        raise held_error(run) from None
     return []
 
 
-def _held(run: Path) -> InputError:
+def held_error(run: Path) -> InputError:
+    """A refusal to begin where a run is."""
     return InputError(
         "holds a run already",
         where=str(run),
@@ -144,15 +145,20 @@ def _run_near(run: Path) -> Path | None:
     return next((beside[name] for name in get_close_matches(run.name, beside, n=1)), None)
 
 
-def note_timeout(run: Path, timeout: float | None) -> None:
+def note_timeout(run: Path, timeout: float | None) -> dict[str, Any]:
     """Add a time limit [s] to those that run.toml lists; None adds nothing.
 
     Runs may go on with another limit, but it decides which simulations were given up.
+
+    Returns:
+        run.toml.
     """
     record = read_run(run)
     listed = record.get(TIMEOUTS, [])
     if timeout is not None and timeout not in listed:
-        write_text(run / RUN_TOML, tomli_w.dumps({**record, TIMEOUTS: [*listed, float(timeout)]}))
+        record = {**record, TIMEOUTS: [*listed, float(timeout)]}
+        write_text(run / RUN_TOML, tomli_w.dumps(record))
+    return record
 
 
 @contextmanager

@@ -8,8 +8,8 @@ from typing import Any
 
 from ..errors import InputError
 from ..files import existing_file, write_whole
-from ..inputs.open import read_recording
-from ..inputs.recording import Recording
+from ..inputs.open import read_fields
+from ..inputs.recording import Recording, as_recording
 
 RECORDINGS_FOLDER = "recordings"
 
@@ -56,14 +56,16 @@ def kept_recordings(run: Path, record: dict[str, Any]) -> list[Recording]:
     opened = []
     names, hashes = record["files"]["recordings"], record["inputs"]["sha256"]
     for number, (name, digest) in enumerate(zip(names, hashes, strict=True), start=1):
-        path = run / RECORDINGS_FOLDER / _name(number, name)
-        if hashlib.sha256(existing_file(path).read_bytes()).hexdigest() != digest:
+        path = existing_file(run / RECORDINGS_FOLDER / _name(number, name))
+        content = path.read_bytes()
+        if hashlib.sha256(content).hexdigest() != digest:
             raise InputError(
                 "is not the recording that this run was calibrated on",
                 where=str(path),
                 fix="put the original back, or calibrate again",
             )
-        opened.append(read_recording(path))  # with these bytes it has been checked
+        # with these bytes it has been checked
+        opened.append(as_recording(read_fields(content, path), path, content))
     return opened
 
 

@@ -48,14 +48,14 @@ class Section:
         return _adapter(type(self)).dump_python(self, mode="json", by_alias=True)
 
     @classmethod
-    def read(cls, run: Path) -> Self:
-        """The section of a run.
+    def read(cls, run: Path) -> Self | None:
+        """The section of a run; None if it has none.
 
         Raises:
             InputError: The file is damaged.
-            KeyError: The run has no such section.
         """
-        return cls.from_json(read_summary(run)[cls.SECTION], str(run / SUMMARY_FILE))
+        section = read_summary(run).get(cls.SECTION)
+        return None if section is None else cls.from_json(section, str(run / SUMMARY_FILE))
 
     def write(self, run: Path) -> None:
         """Replace the section of a run."""

@@ -64,16 +64,17 @@ def open_workers(
     """
     from ..inference.simulations import open_executor
 
-    _check_timeout(timeout)
+    check_timeout(timeout)
     with open_executor(executor, one_thread=True) as workers:
         yield workers
 
 
-def _check_timeout(timeout: float | None) -> None:
-    from ..inference.arguments import check_timeout
+def check_timeout(timeout: float | None) -> None:
+    """Raise `InputError` unless it is a positive number of seconds, or None."""
+    from ..inference import arguments
 
     try:
-        check_timeout(timeout)
+        arguments.check_timeout(timeout)
     except ValueError as refused:
         raise InputError(
             f"{timeout!r:.80}",

@@ -101,18 +101,23 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
     """
     from ..models import StirSetup
 
-    targets = check_targets(movie, out)
+    targets, effects = check_targets(movie, out), check_effects(effects, "stir")
+    given = DENSITY if density is None else _density(density)
+    # refused before a file is read
+    batch_of(
+        {"viscosity": viscosity, "cohesion": cohesion, "density": given}, effects, particles, seed
+    )
     (opened,) = open_recordings(bundled_recording("glycerin") if recording is None else recording)
     if targets.out is not None and targets.out.exists() and targets.out.samefile(opened.path):
         raise InputError(
             "is the recording itself", where=str(targets.out), fix="choose another name"
         )
-    density = opened.number("liquid_density") if density is None else _density(density)
+    density = opened.number("liquid_density") if density is None else given
     liquid = {"viscosity": viscosity, "cohesion": cohesion, "density": density}
     of_another = _with_rig(opened.attrs, rig) | {"liquid_density": density}
     plan = _planned(replace(opened, attrs=MappingProxyType(of_another)), path)
     count = particles or StirSetup.from_recording(plan).particles
-    batch = batch_of(liquid, check_effects(effects, "stir"), count, seed)
+    batch = batch_of(liquid, effects, count, seed)
     targets.check_single(batch.single)
     setup = StirSetup.from_recording(plan, particles=batch.one.particles)
     angles = simulated(Stirring((plan,), (setup,)).simulate, batch, Where(executor, timeout))

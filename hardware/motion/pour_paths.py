@@ -5,7 +5,6 @@ upright and leaves upwards, as in "To Stir or Not to Stir" (angular velocity and
 """
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..rig import Rig
 from .cup_frame import cup_frame
@@ -109,6 +108,8 @@ def upright_again(rig: Rig, path: PosePath, at: float) -> PosePath:
         path: What is given up.
         at: Time since its start [s].
     """
+    from scipy.spatial.transform import Rotation
+
     dt = float(path.time[1] - path.time[0])
     here = path.pose[min(int(at / dt), len(path.pose) - 1)]
     first, now = Rotation.from_rotvec(path.pose[0, 3:]), Rotation.from_rotvec(here[3:])
@@ -140,5 +141,7 @@ def _samples(duration: float, dt: float) -> np.ndarray:
 
 def _tilted(pose: np.ndarray, axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """A pose turned about its own position by angles [rad], shape (T, 6)."""
+    from scipy.spatial.transform import Rotation
+
     turned = Rotation.from_rotvec(angle[:, None] * axis) * Rotation.from_rotvec(pose[3:])
     return np.column_stack([np.tile(pose[:3], (len(angle), 1)), turned.as_rotvec()])

@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
 
 from ..rig import Rig, checked_cycles
 from .patterns import circle, star_vertices, travelled
@@ -169,6 +168,8 @@ def turn_rate(rig: Rig, most: float) -> float:
 
 
 def _line(start: np.ndarray, end: np.ndarray, speed: float, rig: Rig, dt: float) -> np.ndarray:
+    from scipy.spatial.transform import Rotation, Slerp
+
     turns = Rotation.from_rotvec(np.stack([start[3:], end[3:]]))
     turn = float((turns[0].inv() * turns[1]).magnitude())
     shift = float(np.linalg.norm(end[:3] - start[:3]))

@@ -7,7 +7,6 @@ from collections.abc import Generator
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..errors import MotionRejected
 from ..motion.cup_frame import cup_frame
@@ -195,6 +194,8 @@ class TargetCheck:
 
 def turn_between(first: np.ndarray, second: np.ndarray) -> float:
     """Angle between two orientations [rad], given as rotation vectors."""
+    from scipy.spatial.transform import Rotation
+
     if np.array_equal(first, second):
         return 0.0
     turns = Rotation.from_rotvec(np.stack([first, second]))
@@ -226,6 +227,8 @@ def _check_rates(part: _Part, limits: Limits) -> None:
 
 
 def _check_turns(part: _Part, space: Workspace, limits: Limits) -> None:
+    from scipy.spatial.transform import Rotation
+
     turns = Rotation.from_rotvec(part.pose[:, 3:])
     tilt = (Rotation.from_rotvec(space.orientation).inv() * turns).magnitude()
     _bound(part.time, np.degrees(tilt), float(np.degrees(space.tilt)), "tilt", "deg")

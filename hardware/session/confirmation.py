@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from ipaddress import ip_address
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..emulator.admin_client import Admin, AdminError
 from ..errors import RigError
@@ -119,6 +118,8 @@ def describe(paths: Sequence[PosePath], rig: Rig, tool: Tool) -> str:
 
 def _turning(path: PosePath) -> tuple[float, float]:
     """Greatest turn from a path's first pose [deg], and how fast it turns [deg/s]."""
+    from scipy.spatial.transform import Rotation
+
     turns = Rotation.from_rotvec(path.pose[:, 3:])
     turn = (turns[0].inv() * turns).magnitude().max()
     rate = (turns[:-1].inv() * turns[1:]).magnitude().max() / (path.time[1] - path.time[0])

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from .opencv import opencv
 
@@ -121,6 +120,8 @@ class CameraModel:
 
     def turned(self, rotation_vector: np.ndarray, shift: np.ndarray) -> "CameraModel":
         """The camera turned about its own axes [rad] and moved in the cup frame [m]."""
+        from scipy.spatial.transform import Rotation
+
         return replace(
             self,
             rotation=Rotation.from_rotvec(-np.asarray(rotation_vector)).as_matrix() @ self.rotation,
@@ -140,6 +141,8 @@ def look_at(position: np.ndarray, target: np.ndarray, roll: float = 0.0) -> np.n
     Raises:
         CameraModelError: the line of sight is vertical or has no length.
     """
+    from scipy.spatial.transform import Rotation
+
     forward = np.asarray(target, dtype=float) - np.asarray(position, dtype=float)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     if not np.linalg.norm(right) > 1e-9:

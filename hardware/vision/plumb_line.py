@@ -4,7 +4,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from .camera_model import CameraModel
 from .coarse_search import Ray, Rows, sampled_rows, search_rays
@@ -53,6 +52,8 @@ def level_camera(
     Raises:
         PlumbLineError: there is no thread, or too little of it.
     """
+    from scipy.spatial.transform import Rotation
+
     if image.shape != camera.size[::-1]:
         raise PlumbLineError(
             f"the picture has shape {image.shape}, the camera model {camera.size[::-1]}"

@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.special import gammaln, xlogy
-from scipy.stats import binom
+
+from .._lazy import stats
 
 BISECTIONS = 30
 SMALLEST_LEVEL = 1e-9
@@ -69,7 +70,7 @@ def _grid(draws: int) -> np.ndarray:
 def _tails(n: int, draws: int) -> np.ndarray:
     """The smaller binomial tail, the count itself included, of count c at point i: [k, n + 1]."""
     count, z = np.arange(n + 1), _grid(draws)[:, None]
-    return np.minimum(binom.cdf(count, n, z), binom.sf(count - 1, n, z))
+    return np.minimum(stats.binom.cdf(count, n, z), stats.binom.sf(count - 1, n, z))
 
 
 def _limits(n: int, draws: int, gamma: float) -> tuple[np.ndarray, np.ndarray]:

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from arviz_stats.base.array import array_stats
 
 from ..arguments import checked_array
 
@@ -54,6 +53,8 @@ def effective_size(draws: np.ndarray) -> float:
     Rank-normalised, split chains (Vehtari et al. 2021). A parameter that never moves counts as
     one draw; chains shorter than `MIN_DRAWS` show no autocorrelation and count in full.
     """
+    from arviz_stats.base.array import array_stats  # with it come pandas and Matplotlib
+
     total = draws.shape[0] * draws.shape[1]
     if draws.shape[1] < MIN_DRAWS:
         return float(total)

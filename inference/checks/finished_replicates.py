@@ -5,8 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
 
+from .._lazy import xr
 from ..arguments import check_function, checked_array, checked_mapping
 from ..prior import Prior
 from .one_replicate import Replicate, as_theta
@@ -139,7 +139,7 @@ class Replicates:
         text = f"{len(self)} replicates, up to {self.most} independent draws each"
         return f"{text}; {len(self.failed)} more failed" if self.failed else text
 
-    def to_dataset(self) -> xr.Dataset:
+    def to_dataset(self) -> "xr.Dataset":
         """Truths and independent draws by parameter, effective sample sizes and seconds."""
         variables: dict[str, tuple[list[str], np.ndarray]] = {
             "effective_size": (["replicate"], np.array([r.effective for r in self.finished])),

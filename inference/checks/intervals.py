@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
-from scipy.stats import beta, binom
 
+from .._lazy import stats, xr
 from ..arguments import checked_array
 from ..prior import Prior
 from ..types import Simulator
@@ -55,14 +54,14 @@ class Coverage:
     def low(self) -> np.ndarray:
         """Lower end of the exact 99 % interval of the rate (Clopper and Pearson 1934), [k, q]."""
         n, tail = len(self.replicates), (1 - CONFIDENCE) / 2
-        some = beta.ppf(tail, np.maximum(self.covered, 1), n - self.covered + 1)
+        some = stats.beta.ppf(tail, np.maximum(self.covered, 1), n - self.covered + 1)
         return np.where(self.covered > 0, some, 0.0)
 
     @property
     def high(self) -> np.ndarray:
         """Upper end, [k, q]."""
         n, tail = len(self.replicates), (1 - CONFIDENCE) / 2
-        some = beta.ppf(1 - tail, self.covered + 1, np.maximum(n - self.covered, 1))
+        some = stats.beta.ppf(1 - tail, self.covered + 1, np.maximum(n - self.covered, 1))
         return np.where(self.covered < n, some, 1.0)
 
     @property
@@ -93,7 +92,7 @@ class Coverage:
         heading = f"Coverage of central intervals [exact {CONFIDENCE:.0%}]: {self.replicates}"
         return table(heading, ["", *(f"{level:g}" for level in self.levels)], rows, self.warnings)
 
-    def to_dataset(self) -> xr.Dataset:
+    def to_dataset(self) -> "xr.Dataset":
         """Rates, their exact 99 % intervals and p-values by level and quantity."""
         two = ["level", "quantity"]
         return xr.Dataset(
@@ -154,7 +153,7 @@ def coverage(
     values = made.values(quantities)
     quantiles = made.quantiles(values)
     covered = np.sum(2 * np.abs(quantiles - 0.5) <= nominal[:, None, None], axis=1)
-    few = binom.cdf(covered, len(made), nominal[:, None])
-    many = binom.sf(covered - 1, len(made), nominal[:, None])
+    few = stats.binom.cdf(covered, len(made), nominal[:, None])
+    many = stats.binom.sf(covered - 1, len(made), nominal[:, None])
     p_values = few if conservative else np.minimum(1.0, 2 * np.minimum(few, many))
     return Coverage(made, tuple(values), nominal, covered, quantiles, p_values, conservative, alpha)

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-import xarray as xr
 
+from .._lazy import xr
 from ..arguments import (
     check_flag,
     check_function,
@@ -99,7 +99,7 @@ class FitPipeline:
         object.__setattr__(self, "simulate", simulate)
         object.__setattr__(self, "options", options)
 
-    def __call__(self, observed: np.ndarray, seed: int) -> tuple[xr.DataTree, LogDensity]:
+    def __call__(self, observed: np.ndarray, seed: int) -> "tuple[xr.DataTree, LogDensity]":
         options = {"progress": False, "warn": self.warn, **self.options}
         made = fit(self.simulate, self.prior, observed, budget=self.budget, seed=seed, **options)
         sampling = {"warn": self.warn, **self.sampling}
@@ -134,7 +134,7 @@ class SharedDesign:
         n, *shape = self.signals.shape
         return f"SharedDesign({self.prior}, {n} simulations of shape {tuple(shape)})"
 
-    def __call__(self, observed: np.ndarray, seed: int) -> tuple[xr.DataTree, LogDensity]:
+    def __call__(self, observed: np.ndarray, seed: int) -> "tuple[xr.DataTree, LogDensity]":
         engine = Bolfi(self.prior, observed, seed=seed, **self.options)
         engine.tell(self.prior.to_dict(self.theta), self.signals, self.seeds)
         made = engine.fit(warn=self.warn)

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import PercentFormatter
-from scipy.stats import binom
 
+from .._lazy import stats
 from ..figures import COLOURS, GREY, INK, bare, check_axes
 from . import bands
 from .ranks import bin_count
@@ -76,7 +76,7 @@ def plot_histograms(
     if len(panels) < q:
         raise ValueError(f"axes must hold one for each of {q} quantities, got {len(panels)}")
     bins = bin_count(n, draws)
-    low, high = binom.interval(level, n, 1 / bins)
+    low, high = stats.binom.interval(level, n, 1 / bins)
     for j, (name, ax) in enumerate(zip(names, panels, strict=False)):
         counts = np.bincount(ranks[:, j] * bins // (draws + 1), minlength=bins)
         ax.axhspan(low, high, color=BAND, lw=0)

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
-from scipy.stats import kstest
 
+from .._lazy import stats, xr
 from ..prior import Prior
 from ..types import Simulator
 from . import bands
@@ -79,7 +78,7 @@ class Tarp:
         columns = ["", "p ECDF", "p Kolmogorov-Smirnov", "area to diagonal"]
         return table(heading, columns, [["joint posterior", *row]], self.warnings)
 
-    def to_dataset(self) -> xr.Dataset:
+    def to_dataset(self) -> "xr.Dataset":
         """The curve, its band and the ranks."""
         return xr.Dataset(
             {
@@ -151,7 +150,7 @@ def tarp(
         high=high,
         ranks=ranks,
         ecdf=bands.p_value(ranks, made.most),
-        kolmogorov_smirnov=float(kstest(u, "uniform").pvalue),
+        kolmogorov_smirnov=float(stats.kstest(u, "uniform").pvalue),
         alpha=alpha,
     )
 

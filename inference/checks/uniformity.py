@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
-from scipy.stats import chisquare
 
+from .._lazy import stats, xr
 from ..prior import Prior
 from ..types import Simulator
 from . import bands
@@ -72,7 +71,7 @@ class SBC:
         heading = f"Simulation-based calibration: {self.replicates}"
         return table(heading, ["", "p chi-square", "p ECDF"], rows, self.warnings)
 
-    def to_dataset(self) -> xr.Dataset:
+    def to_dataset(self) -> "xr.Dataset":
         """Ranks and p-values."""
         return xr.Dataset(
             {
@@ -152,7 +151,7 @@ def sbc(
         replicates=made,
         names=tuple(values),
         ranks=ranks,
-        chi_square=np.array([chisquare(counts).pvalue for counts in binned]),
+        chi_square=np.array([stats.chisquare(counts).pvalue for counts in binned]),
         ecdf=np.array([bands.p_value(column, made.most) for column in ranks.T]),
         alpha=alpha,
     )

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag, solve
-from scipy.stats import invgamma
 
 from .._float64 import in_float64
+from .._lazy import stats
 from ..arguments import checked_array
 from ..surrogates.measurement_noise import Layout
 from .measurement_noise import Noise, SumOfNoises, gaussian, samples
@@ -99,7 +99,7 @@ class UsualResidual:
     @property
     def _size(self) -> Any:
         freedom = max(self.freedom, MIN_FREEDOM)
-        return invgamma(freedom / 2.0, scale=freedom / 2.0)
+        return stats.invgamma(freedom / 2.0, scale=freedom / 2.0)
 
     def leave_one_out(self) -> "Iterator[tuple[CleanData, float, UsualResidual]]":
         """Each repetition of the experiment, its weight, and what the other clean data teach of it.

@@ -16,8 +16,9 @@ from bolfi_liquids.calibration.summary import ParameterSummary
 from bolfi_liquids.criticism.source_summary import Gap, SourceVerdict, Window
 from bolfi_liquids.criticism.summary import CameraNoise, CriticismSummary
 from bolfi_liquids.criticism.verdict import Verdict
-from bolfi_liquids.reporting.frames import frames_of
+from bolfi_liquids.reporting.frames import Shown, frames_of
 from bolfi_liquids.run.directory import CRITICISM_FORMAT
+from bolfi_liquids.run.recordings import kept_recordings
 
 BUNDLED = Path(str(files("bolfi_liquids.data"))) / "glycerin_v10.nc"
 SHORT = 60  # samples, 2 s: the pause and the first strokes
@@ -113,9 +114,17 @@ def pour_settings():
 
 
 @pytest.fixture(scope="session")
-def frames(pour):
+def shown(pour):
+    """What a report shows of the pour's run, which was not criticised."""
+    calibration = bl.Calibration.open(pour.path)
+    (recording,) = kept_recordings(pour.path, dict(calibration.record))
+    return Shown(calibration, recording, pour)
+
+
+@pytest.fixture(scope="session")
+def frames(shown):
     """What draws of the calibration look like, stirred and poured."""
-    return frames_of(pour.path, progress=False)
+    return frames_of(shown, progress=False)
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from resource import RUSAGE_CHILDREN, getrusage
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +23,14 @@ FULL = 8  # stirs that march together
 MOST = {"up to 0.2 Pa s": ((1e-3, 1e-2, 0.05, 0.2), 0.45), "above": ((0.5, 1.0, 6.0, 12.0), 0.6)}
 REPEATS = 3
 TRIALS = 6  # of each of the processes that run at once
-START = Path(__file__).parents[1] / "first_result.py"
+START = """
+import sys
+from bolfi_liquids.inputs.open import open_recording
+from bolfi_liquids.models import Liquid, StirSetup, stir
+recording = open_recording(sys.argv[1])
+path, setup = recording.first(10).gripper, StirSetup.from_recording(recording)
+stir(Liquid(0.1, 0.0, 1000.0), path, setup, [0])
+"""
 
 
 def stirring_seconds(recording: Path) -> Iterator[Line]:
@@ -121,13 +129,15 @@ def _work(recording: Path, start, ends) -> None:
 
 
 def start_up(recording: Path) -> Iterator[Line]:
-    """Seconds from import to the first angles, in processes that find a warm cache."""
-    command = [sys.executable, str(START), str(recording)]
-    runs = [
-        subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
-        for _ in range(REPEATS + 1)
-    ]
+    """Seconds from a process's start to its first angles, in processes that find a warm cache."""
+    runs = []
+    for _ in range(REPEATS + 1):
+        began, before = time.perf_counter(), getrusage(RUSAGE_CHILDREN)
+        subprocess.run([sys.executable, "-c", START, str(recording)], check=True)
+        after = getrusage(RUSAGE_CHILDREN)
+        cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        runs.append((time.perf_counter() - began, cpu))
     # the first warms the cache; the least of the others is least disturbed
-    wall, cpu = np.array(runs[1:], dtype=float).min(axis=0)
+    wall, cpu = np.min(runs[1:], axis=0)
     yield Line("import to first result, warm cache [s]", float(wall), 3.0)
     yield Line("the same [CPU s]", float(cpu))

@@ -167,8 +167,7 @@ def test_an_aborted_recording_is_logged(short_recording, tmp_path, monkeypatch, 
     with xr.open_dataset(short_recording, decode_times=False) as whole:
         whole.assign_attrs(status="aborted", reason="protective stop").to_netcdf(aborted)
     monkeypatch.setattr(calibrating, "_calibrate", lambda *_: None)
-    with pytest.raises(ValueError, match="not finished"):
-        bl.calibrate([short_recording, aborted], out=tmp_path / "run", progress=False)
+    bl.calibrate([short_recording, aborted], out=tmp_path / "run", progress=False)
     (notice,) = caplog.records
     assert str(aborted) in notice.getMessage() and "protective stop" in notice.getMessage()
 
@@ -219,8 +218,7 @@ def test_without_a_directory_a_run_is_among_the_temporary_files(short_recording,
         found.append((run, (run / "run.toml").is_file()))
 
     monkeypatch.setattr(calibrating, "_calibrate", begun)
-    with pytest.raises(ValueError, match="not finished"):
-        bl.calibrate(short_recording, progress=False)
+    bl.calibrate(short_recording, progress=False)
     ((run, has_begun),) = found
     assert has_begun
     assert str(run).startswith(tempfile.gettempdir())

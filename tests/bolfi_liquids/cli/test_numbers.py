@@ -107,7 +107,7 @@ def test_the_terminal_warns_of_what_the_report_warns_of(calibration, tmp_path, c
     far = {"fit_rms_deg": 2.0, "noise_deg": 0.5, "below_least_viscosity": share}
     summary = replace(calibration.summary, **far)
     summary.write(run)
-    print_warnings(run)
+    print_warnings(results_of(bl.Calibration.open(run)))
     told = capsys.readouterr().out.splitlines()
     assert told == [
         f"warning: {sentence}" for sentence in warnings_of(results_of(bl.Calibration.open(run)))

@@ -9,11 +9,12 @@ import xarray as xr
 
 from bolfi_liquids.calibration.stir_simulator import stirring_of
 from bolfi_liquids.criticism.baseline import Clean, apart, usual_elsewhere, usual_for
-from bolfi_liquids.criticism.inputs import Given, open_inputs
+from bolfi_liquids.criticism.inputs import Given, check_effects, open_inputs
 from bolfi_liquids.criticism.result import finished_criticism
 from bolfi_liquids.criticism.stirs import camera_noise, held_out_noise, stir_experiment
-from bolfi_liquids.errors import InputError
+from bolfi_liquids.errors import Argument, InputError
 from bolfi_liquids.inputs.cups import open_cups
+from bolfi_liquids.inputs.open import open_recordings
 from bolfi_liquids.inputs.settings import CriticismSettings
 
 HEADER = "angular_velocity_deg_s,distance_cm,spilled,received,retained"
@@ -22,7 +23,13 @@ AT_REST, RHO, SD = 16, 0.6, np.radians(0.2)
 
 
 def given(calibration, settings=None, **some):
-    return open_inputs(calibration, settings or CriticismSettings(), Given(**some))
+    settings, unopened = settings or CriticismSettings(), {"held_out": (), "baseline": ()} | some
+    check_effects(settings)
+    opened = {
+        name: open_recordings(paths, Argument(name)) if name in ("held_out", "baseline") else paths
+        for name, paths in unopened.items()
+    }
+    return open_inputs(calibration, settings, Given(**opened))
 
 
 @pytest.fixture
@@ -156,7 +163,7 @@ def test_pours_need_an_effect_that_acts_in_them(calibration, table):
 
 
 def test_a_run_that_was_not_criticised_or_is_damaged_holds_no_finished_criticism(calibration):
-    assert finished_criticism(calibration.path, {}) is None
+    assert finished_criticism(calibration, {}) is None
 
 
 # What the recordings themselves tell of their noise.

@@ -11,7 +11,7 @@ import bolfi_liquids as bl
 from bolfi_liquids.calibration.bad_fit import bad_fit
 from bolfi_liquids.calibration.posterior_file import write_tree
 from bolfi_liquids.criticism.criticise import _learned_from
-from bolfi_liquids.criticism.result import finished_criticism, is_criticised, latest_calibration
+from bolfi_liquids.criticism.result import finished_criticism, latest_calibration
 from bolfi_liquids.drawing import new_figure
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.settings import CriticismSettings
@@ -106,14 +106,16 @@ def test_results_travel(extended, criticised, pour):
         again.record["settings"] = {}
 
 
-@pytest.mark.parametrize("read", [is_criticised, latest_calibration, bl.Criticism.open])
+@pytest.mark.parametrize("read", [latest_calibration, bl.Criticism.open])
 def test_a_criticism_of_another_form_is_refused_by_its_version(criticised, read):
     changed(criticised, format=99, version="7.8.9")
     with pytest.raises(InputError) as refused:
         read(criticised)
     assert "7.8.9" in str(refused.value) and "\n" not in str(refused.value)
     made_from = read_summary(criticised)["criticise"]["made_from"]
-    assert finished_criticism(criticised, made_from) is None  # it is made again
+    assert (
+        finished_criticism(bl.Calibration.open(criticised), made_from) is None
+    )  # it is made again
 
 
 def test_no_pour_is_chosen_from_half_of_what_is_known(criticised):
@@ -130,7 +132,7 @@ def test_a_tree_beside_the_section_of_another_criticism_is_seen(criticised):
             read(criticised)
         assert refused.value.where == str(criticised / CRITICISM)
     made_from = read_summary(criticised)["criticise"]["made_from"]
-    assert finished_criticism(criticised, made_from) is None
+    assert finished_criticism(bl.Calibration.open(criticised), made_from) is None
 
 
 def test_a_section_that_lacks_a_field_says_its_version(criticised):

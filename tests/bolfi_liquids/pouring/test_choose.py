@@ -250,7 +250,7 @@ def test_the_map_marks_both_actions_among_the_risks(pour, given):
         np.testing.assert_allclose(marked[label], at)
 
 
-def test_the_map_of_another_pour_is_not_drawn(pour):
+def test_a_pour_that_is_not_the_run_s_own_is_refused(pour):
     chosen = pour.chosen
     others = (
         replace(chosen, distance=chosen.distance + 1e-3),
@@ -258,7 +258,7 @@ def test_the_map_of_another_pour_is_not_drawn(pour):
     )
     for other in others:
         with pytest.raises(ValueError, match="another pour"):
-            replace(pour, chosen=other).plot_map()
+            replace(pour, chosen=other).check_current()
 
 
 def test_a_run_without_a_pour_says_how_to_choose_one(tmp_path):

@@ -10,9 +10,10 @@ from scipy.special import ndtr
 from bolfi_liquids import inference, models
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.prior import default_prior
+from bolfi_liquids.inputs.settings import PRIOR_POURS
 from bolfi_liquids.pouring.design import Box, joint_prior, whole
 from bolfi_liquids.pouring.landed_pours import LandedPours, Poured, pours_in
-from bolfi_liquids.pouring.landing_map import PRIOR_POURS, learn_map, map_of_prior
+from bolfi_liquids.pouring.landing_map import learn_map, map_of_prior
 from bolfi_liquids.pouring.parcels import PARCELS
 from bolfi_liquids.pouring.spillage import landing_sd
 

@@ -1,13 +1,16 @@
 """The report is one file that shows what the run holds."""
 
 import html
+import os
 import re
 import shutil
+from collections import Counter
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from html.parser import HTMLParser
 from multiprocessing import get_context
 
+import h5py
 import pytest
 
 import bolfi_liquids as bl
@@ -133,6 +136,19 @@ def test_a_report_says_where_its_pictures_are_simulated(unseen, monkeypatch):
     assert seen == [(pool, 60.0, 60.0, False)]
 
 
+def test_no_result_is_opened_twice(pour, frames, monkeypatch):
+    opened, begin = Counter(), h5py.File.__init__
+
+    def counted(self, name, *given, **named):
+        opened[str(name)] += isinstance(name, str | os.PathLike)
+        begin(self, name, *given, **named)
+
+    monkeypatch.setattr(h5py.File, "__init__", counted)
+    bl.report(pour, progress=False)
+    for name in ("posterior.nc", "pour.nc", "frames.nc"):
+        assert opened[str(pour.path / name)] == 1
+
+
 @pytest.mark.slow
 def test_pictures_that_take_too_long_leave_nothing(unseen):
     with pytest.raises(RuntimeError, match="moving=False"):
@@ -141,10 +157,13 @@ def test_pictures_that_take_too_long_leave_nothing(unseen):
 
 
 @pytest.mark.minutes
-def test_pictures_by_processes_have_the_same_bits(unseen, pour):
+def test_pictures_by_processes_have_the_same_bits(unseen, shown):
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        there = frames.frames_of(unseen, executor=pool, progress=False)
-    assert there.identical(frames.frames_of(pour.path, progress=False))
+        elsewhere = replace(shown.calibration, path=unseen)
+        there = frames.frames_of(
+            shown._replace(calibration=elsewhere), executor=pool, progress=False
+        )
+    assert there.identical(frames.frames_of(shown, progress=False))
 
 
 @pytest.mark.slow

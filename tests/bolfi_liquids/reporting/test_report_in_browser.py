@@ -158,16 +158,15 @@ def test_both_halves_of_the_cup_are_shown(frames):
     assert across.sizes["pour_particle"] <= MOST_SHOWN
 
 
-def test_a_draw_that_failed_is_not_shown(pour, frames):
+def test_a_draw_that_failed_is_not_shown(shown, frames):
     broken = frames.copy(deep=True)
     broken["tip"][1] = np.nan
-    calibration = bl.Calibration.open(pour.path)
-    shown = moving_context(calibration, broken)
-    kept = [draw["theta"]["viscosity"] for draw in shown["draws"]]
+    moving = moving_context(shown, broken)
+    kept = [draw["theta"]["viscosity"] for draw in moving["draws"]]
     assert kept == frames["viscosity"].to_numpy()[[0, 2]].tolist()
-    assert len(shown["scenes"]["stir"]["positions"]) == 2
+    assert len(moving["scenes"]["stir"]["positions"]) == 2
     broken["spilled"][:] = np.nan
-    assert moving_context(calibration, broken) is None
+    assert moving_context(shown, broken) is None
 
 
 def test_draws_of_unlike_fills_are_stacked():
