@@ -26,11 +26,6 @@ def ensure_home() -> None:
                     os.makedirs(os.environ[name], exist_ok=True)
 
 
-def is_temporary(path: str) -> bool:
-    """Whether a directory is among those that were made for a user without a home."""
-    return os.path.commonpath([temporary_home(), os.path.abspath(path)]) == temporary_home()
-
-
 def temporary_home() -> str:
     """The directory that serves a user without a home."""
     return os.path.join(tempfile.gettempdir(), f"bolfi-liquids-{os.getuid()}")

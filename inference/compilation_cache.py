@@ -1,4 +1,4 @@
-"""What JAX compiles for the engine is kept for the next process."""
+"""Keep JAX's compiled programs in the user's cache directory."""
 
 import os
 import platform
@@ -6,13 +6,13 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from threading import RLock
+from threading import Lock
 
 import jax
 from jax.experimental.compilation_cache import compilation_cache
 from platformdirs import user_cache_path
 
-_alone = RLock()  # JAX's settings belong to the process
+_alone = Lock()  # JAX's settings belong to the process
 
 
 @contextmanager
@@ -23,18 +23,18 @@ def kept_compilations() -> Iterator[None]:
     as it is. JAX's settings are afterwards what they were. A cache that cannot be written or read
     is done without.
     """
-    place = _directory() if jax.config.jax_compilation_cache_dir is None else None
-    if place is None:
-        yield
-        return
-    ours = {
-        "jax_compilation_cache_dir": str(place),
-        "jax_persistent_cache_min_compile_time_secs": 0.0,
-        "jax_persistent_cache_min_entry_size_bytes": 0,
-    }
     with _alone, warnings.catch_warnings():
-        # what was cut short is compiled again
+        # JAX recompiles truncated entries
         warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache")
+        place = _directory() if jax.config.jax_compilation_cache_dir is None else None
+        if place is None:
+            yield
+            return
+        ours = {
+            "jax_compilation_cache_dir": str(place),
+            "jax_persistent_cache_min_compile_time_secs": 0.0,
+            "jax_persistent_cache_min_entry_size_bytes": 0,
+        }
         before = {name: getattr(jax.config, name) for name in ours}
         try:
             _configure(ours)
@@ -50,8 +50,8 @@ def _configure(settings: dict[str, object]) -> None:
 
 
 def _directory() -> Path | None:
-    """A directory for this computer's processor, for a home directory may be shared; None where
-    none can be written."""
+    """A directory for this computer, for a home directory may be shared; None where none can be
+    written."""
     try:
         place = user_cache_path("bolfi-liquids") / "jax" / (platform.node() or "here")
         place.mkdir(parents=True, exist_ok=True)

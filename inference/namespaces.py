@@ -1,5 +1,4 @@
-"""What lets one function serve arrays of NumPy, which most of the engine computes with, and of JAX,
-by which NUTS finds gradients."""
+"""Dispatch between NumPy and JAX. NUTS traces the likelihood; all else is NumPy."""
 
 import math
 from typing import Any
@@ -16,15 +15,17 @@ def namespace(array: Any) -> Any:
 
 
 def log_sum_exp(a: Any) -> Any:
-    """Over the last axis, along which something must be finite."""
+    """Over the last axis; -inf where all of it is."""
     xp = namespace(a)
     top = xp.max(a, axis=-1, keepdims=True)
-    return top[..., 0] + xp.log(xp.sum(xp.exp(a - top), axis=-1))
+    top = xp.where(xp.isfinite(top), top, 0.0)
+    with np.errstate(divide="ignore"):
+        return top[..., 0] + xp.log(xp.sum(xp.exp(a - top), axis=-1))
 
 
 def ndtr(x: Any) -> Any:
     """Standard normal distribution function, to an absolute 1e-16."""
-    if isinstance(x, np.ndarray):
+    if isinstance(x, np.ndarray | np.generic):
         return special.ndtr(x)
     import jax
 
@@ -34,7 +35,7 @@ def ndtr(x: Any) -> Any:
 
 def ndtri(u: Any) -> Any:
     """The inverse of `ndtr`."""
-    if isinstance(u, np.ndarray):
+    if isinstance(u, np.ndarray | np.generic):
         return special.ndtri(u)
     from jax.scipy.special import ndtri as traced
 
@@ -43,7 +44,7 @@ def ndtri(u: Any) -> Any:
 
 def log_ndtr(z: Any) -> Any:
     """log Phi(z), with value and slope finite where Phi underflows."""
-    if isinstance(z, np.ndarray):
+    if isinstance(z, np.ndarray | np.generic):
         return special.log_ndtr(z)
     import jax
     import jax.numpy as jnp

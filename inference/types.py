@@ -13,7 +13,8 @@ LogLikelihood = Callable[[Any, Any], Any]
 function, so that what it compiles to is cached."""
 
 LogSecondMoment = Callable[[Any, np.ndarray, np.ndarray | None], np.ndarray]
-"""(state, u [n, d], spread [k, n] or None) -> [n]; see `signal_likelihood.log_second_moment`."""
+"""(state, u [n, d], spread None or [n, ..., k]) -> [n] or [n, ...]; see
+`signal_likelihood.log_second_moment`."""
 
 
 class Simulator(Protocol):

@@ -88,7 +88,7 @@ def smooth_covariance(hyper: Hyper, squared: Any) -> Any:
     rate = xp.exp(-2.0 * hyper.log_length)
     distance = rate @ squared.reshape(-1, squared.shape[-1]).T  # [k, m n]
     exponent = 2.0 * hyper.log_amplitude[:, None] - 0.5 * distance
-    return xp.exp(exponent).reshape(-1, *squared.shape[:2])
+    return xp.exp(exponent).reshape(len(rate), *squared.shape[:2])
 
 
 def trend(hyper: Hyper, a: Any) -> Any:

@@ -48,19 +48,18 @@ def log_prior(x: Any) -> Any:
     return -0.5 * namespace(x).sum(x**2, axis=-1) - 0.5 * x.shape[-1] * math.log(2.0 * math.pi)
 
 
-def propose(mixture: Mixture, z: Any, uniforms: Any) -> Any:
+def propose(mixture: Mixture, z: np.ndarray, uniforms: np.ndarray) -> np.ndarray:
     """Draws x [n, d] made from normals z [n, d] and `uniforms` [n, UNIFORMS] in (0, 1)."""
-    xp = namespace(z)
     choice, half = uniforms[:, 0], uniforms[:, 1]
     # chi^2 of an even number of degrees is twice a sum of exponentials
-    chi_square = -2.0 * xp.sum(xp.log(uniforms[:, 2:]), axis=-1)
-    scale = xp.sqrt(DEGREES_OF_FREEDOM / chi_square) * xp.where(half < 0.5, 1.0, mixture.sharpness)
+    chi_square = -2.0 * np.sum(np.log(uniforms[:, 2:]), axis=-1)
+    scale = np.sqrt(DEGREES_OF_FREEDOM / chi_square) * np.where(half < 0.5, 1.0, mixture.sharpness)
     within = (choice - PRIOR_SHARE) / (1.0 - PRIOR_SHARE)
-    edges = xp.tril(xp.ones((COMPONENTS, COMPONENTS))) @ xp.exp(mixture.log_share)
-    component = xp.sum(within[:, None] > edges[:-1], axis=-1)
+    edges = np.cumsum(np.exp(mixture.log_share))[:-1]
+    component = np.sum(within[:, None] > edges, axis=-1)
     shift = (mixture.factor[component] @ z[:, :, None])[:, :, 0]
     fitted = mixture.mean[component] + scale[:, None] * shift
-    return xp.where(choice[:, None] < PRIOR_SHARE, z, fitted)
+    return np.where(choice[:, None] < PRIOR_SHARE, z, fitted)
 
 
 def fit_mixture(x: np.ndarray, log_weights: np.ndarray, sharpness: float) -> Mixture:

@@ -1,6 +1,6 @@
 """numpyro's NUTS with jumps between modes, compiled once per shape instead of once per fit."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -74,8 +74,7 @@ def _settings(y: jax.Array, seed: jax.Array, warmup: int) -> dict[str, Any]:
         "adapt_mass_matrix": False,
         "target_accept_prob": TARGET_ACCEPTANCE,
         "model_args": (None, None, None),
-        # half a second less to compile than the usual generator
-        "rng_key": jax.random.key(seed, impl="unsafe_rbg"),
+        "rng_key": jax.random.key(seed, impl="threefry2x32"),
     }
 
 
@@ -114,10 +113,11 @@ def _jumped(jump: Jumps, now: HMCState, potential: Any, guide: Guide) -> HMCStat
     that no path connects.
     """
     energy, gradient = jax.value_and_grad(potential)(jump.y)
+    energy = jnp.where(jnp.isnan(energy), jnp.inf, energy)
     old = log_mixture(guide.mixture, (guide.factor @ now.z)[None])[0]
     log_ratio = now.potential_energy - energy + old - jump.log_proposal
     moved = now._replace(z=jump.y, z_grad=gradient, potential_energy=energy)
-    accepted = jump.log_uniform < log_ratio
+    accepted = (jump.log_uniform == -jnp.inf) | (jump.log_uniform < log_ratio)
     return jax.tree.map(lambda new, old: jnp.where(accepted, new, old), moved, now)
 
 
@@ -162,20 +162,26 @@ def _blocks(
             x[0], log_uniform[0] = first, -np.inf
         return Jumps(x @ whitener.T, log_mixture(guide.mixture, x), log_uniform)
 
-    d, starts = start.shape[1], list(start)
+    d = start.shape[1]
     seeds = rng.integers(2**31, size=len(start)).astype(np.uint32)
+    # padded, so that another number of simulations reuses the compiled program
+    state = target.state.padded() if hasattr(target.state, "padded") else target.state
     y = start @ whitener.T
-    with kept_compilations():
-        last = [_begin(*one, warmup=warmup) for one in zip(y, seeds, strict=True)]
-    while True:
+
+    def block(starts: Sequence[np.ndarray | None]) -> Chains:
         made = []
-        with kept_compilations():
-            for i, first in enumerate(starts):
-                last[i], drawn = _run(last[i], target.state, guide, jumps(first), **fixed)
-                made.append(jax.tree.map(np.asarray, drawn))
-        starts = [None] * len(starts)
+        for i, first in enumerate(starts):
+            last[i], drawn = _run(last[i], state, guide, jumps(first), **fixed)
+            made.append(jax.tree.map(np.asarray, drawn))
         x, stats = jax.tree.map(lambda *chains: np.stack(chains), *made)
-        yield Chains(ndtr(x), stats)
+        return Chains(ndtr(x), stats)
+
+    with kept_compilations():  # later blocks compile nothing
+        last = [_begin(*one, warmup=warmup) for one in zip(y, seeds, strict=True)]
+        first = block(list(start))
+    yield first
+    while True:
+        yield block([None] * len(start))
 
 
 def _take(blocks: Iterator[Chains], count: int, left: list[Chains]) -> Chains:

@@ -20,8 +20,9 @@ class Surrogate(Protocol):
 
     @property
     def state(self) -> Any:
-        """Pytree of NumPy arrays on which the likelihood depends, `gp` among them; data, never a
-        closure, and of few shapes over a run, for NUTS is compiled anew for each."""
+        """NamedTuple of NumPy arrays on which the likelihood depends, `gp` among them; data, never
+        a closure. Its method `padded` gives the same likelihood in arrays of few shapes: NUTS is
+        compiled for each."""
         ...
 
     @property

@@ -14,8 +14,6 @@ from ..gp.process import (
     believe,
     condition,
     leave_one_out,
-    padded,
-    padded_rows,
     predict,
     predict_points,
 )
@@ -78,9 +76,8 @@ class DiscrepancySurrogate:
     @property
     @in_float64
     def state(self) -> ThresholdState:
-        rows = padded_rows(len(self.gp.data.u))
         threshold = (self.threshold - self.scale.location) / self.scale.spread
-        return ThresholdState(padded(self.gp, len(self.gp.data.y), rows), np.asarray(threshold))
+        return ThresholdState(self.gp, np.asarray(threshold))
 
     @property
     def log_likelihood(self) -> LogLikelihood:

@@ -8,7 +8,7 @@ from ..gp.process import Data, Hyper
 from ..sampling.ensemble import sample_emcee
 from ..sampling.target import Length, Target
 
-CHAINS, WARMUP = 2, 300
+CHAINS, WARMUP = 2, 50
 
 
 def log_evidence(data: Data, v: np.ndarray) -> np.ndarray:

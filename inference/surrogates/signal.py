@@ -7,7 +7,7 @@ import numpy as np
 
 from .._float64 import in_float64
 from ..gp.optimise import minimise_in_box
-from ..gp.process import GP, believe, padded, padded_rows
+from ..gp.process import GP, believe
 from ..sobol import sobol
 from ..types import LogLikelihood, LogSecondMoment
 from .emulator import (
@@ -44,7 +44,6 @@ from .warnings import (
     noise_warnings,
 )
 
-SCORES_TOGETHER = 4  # components in use are counted in fours, so that few programs are compiled
 KEPT_NODES = 12  # nodes of unknown measurement noise that enter the likelihood
 SCREENED_POINTS = 128
 
@@ -190,17 +189,16 @@ class SignalSurrogate:
 def state_of(
     emulator: Emulator, reduced: Reduced, box: tuple[np.ndarray, np.ndarray] | None = None
 ) -> SignalState:
-    """What the likelihood depends on, in arrays of few shapes."""
-    gp, used = emulator.gp, emulator.basis.used
-    k = SCORES_TOGETHER * max(1, -(-used // SCORES_TOGETHER))
-    d, g = gp.data.u.shape[1], len(reduced.log_weight)
-    estimate, covariance = np.zeros((g, k)), np.tile(np.eye(k), (g, 1, 1))
-    estimate[:, :used] = reduced.estimate[:, :used]
-    covariance[:, :used, :used] = reduced.covariance[:, :used, :used]
-    flags = (np.arange(k) < used).astype(float)
-    ends = box or (np.zeros(d), np.ones(d))
-    processes = padded(gp.only(slice(used)), k, padded_rows(len(gp.data.u)))
-    return SignalState(processes, flags, estimate, covariance, reduced.log_weight, *ends)
+    """What the likelihood depends on: of the components in use."""
+    used, d = emulator.basis.used, emulator.gp.data.u.shape[1]
+    return SignalState(
+        emulator.gp.only(slice(used)),
+        np.ones(used),
+        reduced.estimate[:, :used],
+        reduced.covariance[:, :used, :used],
+        reduced.log_weight,
+        *(box or (np.zeros(d), np.ones(d))),
+    )
 
 
 @in_float64

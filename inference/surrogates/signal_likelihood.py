@@ -5,16 +5,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..gp.process import GP, predict
+from ..gp.process import GP, padded, padded_rows, predict
 from ..namespaces import log_sum_exp, namespace
 
+SCORES_TOGETHER = 4  # scores of padded states are counted in fours
 WALL = 0.01  # of prior quantiles, beyond a box, over which the likelihood vanishes
 
 
 class SignalState(NamedTuple):
     """What the likelihood depends on: k scores, g nodes of the noise.
 
-    Scores that are not in use come last, have `used` 0 and count as known.
+    Scores that only fill an array come last, have `used` 0 and count as known.
     """
 
     gp: GP
@@ -24,6 +25,20 @@ class SignalState(NamedTuple):
     log_weight: np.ndarray  # [g]
     low: np.ndarray  # [d], ends of the box outside of which the likelihood vanishes
     high: np.ndarray
+
+    def padded(self) -> "SignalState":
+        """The same likelihood in arrays of few shapes."""
+        g, k = self.estimate.shape
+        total = SCORES_TOGETHER * max(1, -(-k // SCORES_TOGETHER))
+        covariance = np.tile(np.eye(total), (g, 1, 1))
+        covariance[:, :k, :k] = self.covariance
+        more = (0, total - k)
+        return self._replace(
+            gp=padded(self.gp, total, padded_rows(len(self.gp.data.u))),
+            used=np.pad(self.used, more),
+            estimate=np.pad(self.estimate, ((0, 0), more)),
+            covariance=covariance,
+        )
 
 
 def log_likelihood(state: SignalState, u: Any) -> Any:
@@ -63,25 +78,25 @@ def log_second_moment(state: SignalState, u: np.ndarray, spread: np.ndarray | No
     `spread` is the emulator's variance V (None), or that part of it which further simulations
     will resolve: N(z; m, S)^2 integrates over m ~ N(mu, T), S = C + V - T, to
     |4 pi S|^(-1/2) N(z; mu, S / 2 + T) (Surer et al. 2024). E[L^2] / E[L]^2 is taken from the
-    node that speaks loudest at u.
+    node of largest weight at u.
     """
-    used = int(state.used.sum())
-    mean, total = (part[:, :used] for part in scores(state, u))
+    k = len(state.used)
+    mean, total = scores(state, u)
     terms = node_log_densities(state, u)
     loudest = np.argmax(terms, axis=1)
-    varying = total if spread is None else spread[..., :used]
+    varying = total if spread is None else spread[..., :k]
     ones = [1] * (varying.ndim - 2)  # axes of `spread` beside n and k
-    left = (state.estimate[loudest, :used] - mean).reshape(len(u), *ones, used)
-    covariance = state.covariance[loudest, :used, :used].reshape(len(u), *ones, used, used)
+    left = (state.estimate[loudest] - mean).reshape(len(u), *ones, k)
+    covariance = state.covariance[loudest].reshape(len(u), *ones, k, k)
     total = total.reshape(left.shape)
     log_det, square = eliminate(_with_variances(covariance, total), left)
     rest = _with_variances(covariance, total - varying)
-    of_rest = eliminate(rest, np.zeros(used))[0]
+    of_rest = eliminate(rest, np.zeros(k))[0]
     log_det_both, square_both = eliminate(_with_variances(rest / 2.0, varying), left)
     # log N(z; mu, S / 2 + T) - log |4 pi S| / 2 - 2 log N(z; mu, C + V)
     excess = log_det - 0.5 * (log_det_both + of_rest) + square - 0.5 * square_both
     both = 2.0 * (log_sum_exp(terms) - _wall(state, u))
-    return both.reshape(left.shape[:-1]) + excess - 0.5 * used * np.log(2.0)
+    return both.reshape(left.shape[:-1]) + excess - 0.5 * k * np.log(2.0)
 
 
 def _with_variances(covariance: Any, variance: Any) -> Any:
@@ -96,7 +111,7 @@ def eliminate(matrix: Any, vector: Any) -> tuple[Any, Any]:
     derivative, and it runs along all other axes at once.
     """
     xp = namespace(matrix)
-    log_det, square = 0.0, 0.0
+    log_det, square = xp.zeros(matrix.shape[:-2]), xp.zeros(vector.shape[:-1])
     for _ in range(matrix.shape[-1]):
         pivot, row = matrix[..., 0, 0], matrix[..., 0, 1:]
         log_det = log_det + xp.log(pivot)

@@ -5,9 +5,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtr, ndtri, owens_t
 
-from ..gp.process import GP, predict
+from ..gp.process import GP, padded, padded_rows, predict
 from ..namespaces import log_ndtr, log_sum_exp, namespace
 from .transform import Transform
 
@@ -17,6 +17,11 @@ class ThresholdState(NamedTuple):
 
     gp: GP  # k processes, one for each draw of the hyperparameters
     threshold: np.ndarray  # []
+
+    def padded(self) -> "ThresholdState":
+        """The same likelihood in arrays of few shapes."""
+        k, n = self.gp.weights.shape
+        return self._replace(gp=padded(self.gp, k, padded_rows(n)))
 
 
 class Quantile(NamedTuple):
@@ -35,9 +40,8 @@ class Predicted(NamedTuple):
 Threshold = str | float | Quantile | Predicted | None
 RULES = ("min_mean", "min_observed")
 DEFAULT_THRESHOLD = Predicted(0.2)
-NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(12)
-LEGENDRE = np.polynomial.legendre.leggauss(12)
-SERIES_Z = -4.0
+NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(48)
+MIN_EXACT_SHARE = 1e-6  # of Phi(z), below which the difference with Owen's T has lost its digits
 
 
 def log_likelihood(state: ThresholdState, u: Any) -> Any:
@@ -67,7 +71,7 @@ def log_second_moment(
     likelihood (Jarvenpaa et al. 2019, MaxVar), or that part of it which further simulations
     will resolve (their expected integrated variance). Both are the chance that two variables
     of correlation r = spread / sigma^2 lie below z: Phi(z) - 2 T(z, sqrt((1 - r) / (1 + r))),
-    Owen's T by Gauss and Legendre; below SERIES_Z, where that cancels,
+    T Owen's; where that cancels, which takes a small r,
     E_w[Phi((z + sqrt(r) w) / sqrt(1 - r))^2] by Gauss and Hermite about the integrand's peak.
     """
     z, noisy = _standardised(state, u)
@@ -75,22 +79,19 @@ def log_second_moment(
     shape = len(u), *[1] * (varying.ndim - 2), z.shape[1]
     r = np.clip(varying / noisy.reshape(shape), 1e-12, 1.0 - 1e-6)
     z = np.broadcast_to(z.reshape(shape), r.shape)
-    both = np.where(z > SERIES_Z, _log_both(z, r), _log_both_in_tail(z[..., None], r[..., None]))
-    return log_sum_exp(both) - math.log(z.shape[-1])
+    return log_sum_exp(log_both_below(z, r)) - math.log(z.shape[-1])
 
 
-def _log_both(z: np.ndarray, r: np.ndarray) -> np.ndarray:
-    """Log chance that two standard normals of correlation r lie below z, for z > SERIES_Z."""
-    a = np.sqrt((1.0 - r) / (1.0 + r))[..., None]
-    x = a * (LEGENDRE[0] + 1.0) / 2.0
-    near = np.maximum(z, SERIES_Z)
-    integrand = np.exp(-0.5 * near[..., None] ** 2 * (1.0 + x**2)) / (1.0 + x**2)
-    owen = np.sum(LEGENDRE[1] * integrand * a / 2.0, axis=-1) / (2.0 * np.pi)
-    return np.log(np.maximum(ndtr(near) - 2.0 * owen, 1e-30))
+def log_both_below(z: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """Log chance that two standard normals of correlation r lie below z, both [...]."""
+    exact = ndtr(z) - 2.0 * owens_t(z, np.sqrt((1.0 - r) / (1.0 + r)))
+    kept = exact > MIN_EXACT_SHARE * ndtr(z)
+    both = np.log(np.where(kept, exact, 1.0))
+    return np.where(kept, both, _log_both_by_quadrature(z[..., None], r[..., None]))
 
 
-def _log_both_in_tail(z: np.ndarray, r: np.ndarray) -> np.ndarray:
-    """The same at z [..., 1], by Gauss and Hermite."""
+def _log_both_by_quadrature(z: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """`log_both_below` at z and r [..., 1]."""
     peak = 2.0 * np.sqrt(r) / (1.0 + r) * np.maximum(-z, 0.0)
     width = np.where(z < 0.0, np.sqrt((1.0 - r) / (1.0 + r) + r), 1.0)
     w = peak + width * NODES

@@ -67,7 +67,7 @@ def clear(s, g):
 
 @ti.func
 def mark_cell(s, g, x):
-    """That a particle is at x [m], in the box: if it is no number, its lane is about to fail."""
+    """Mark the cell at x [m], clamped to the box. NaN is clamped too; its lane fails later."""
     i = ti.cast(ti.floor((x - s.origin[None]) * (1.0 / s.cell[None])), ti.i32)
     s.mark[g, ti.max(ti.min(i, s.shape[None] - 2), 1).dot(strides(s))] = 1
 
@@ -130,7 +130,7 @@ def give(s, g, lane, n):
 
 @ti.func
 def take(field: ti.template(), g, m, o):
-    """What a cell was given; the element that it is the last to read is emptied."""
+    """Sum a cell's four shares. Empty the element that no later cell reads."""
     given = field[g, m][0] + field[g, m - 1][1] + field[g, o][2] + field[g, o - 1][3]
     field[g, o - 1] = quad(0.0)
     return given
@@ -150,7 +150,7 @@ def collect(s, g, lane):
 
 @ti.func
 def empty(s, g):
-    """Of what may be left of a liquid that was here before."""
+    """Clear the marks and the scratch of an earlier liquid."""
     for m in range(s.cells):
         s.mark[g, m] = 0
         for field in ti.static(s.weights + s.momenta):

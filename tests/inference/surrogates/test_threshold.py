@@ -7,7 +7,7 @@ import pytest
 from bolfi_liquids.inference.namespaces import log_ndtr
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.discrepancy import learn, with_threshold
-from bolfi_liquids.inference.surrogates.threshold import log_likelihood
+from bolfi_liquids.inference.surrogates.threshold import log_both_below, log_likelihood
 from scipy.special import erfcx
 from scipy.stats import norm
 
@@ -51,6 +51,18 @@ def test_log_ndtr_by_jax_is_that_of_scipy_and_its_slope_the_mills_ratio():
     np.testing.assert_allclose(values, norm.logcdf(z), rtol=1e-9, atol=1e-15)
     expected = np.sqrt(2.0 / np.pi) / erfcx(-z / np.sqrt(2.0))
     np.testing.assert_allclose(slopes, expected, rtol=1e-8)
+
+
+@pytest.mark.parametrize("r", [1e-6, 0.01, 0.5, 0.9, 0.999])
+def test_the_chance_that_both_pass_is_right_in_the_tail_too(r):
+    """Against a dense sum over what the two have in common, about the integrand's peak."""
+    for z in (2.0, -1.0, -3.999, -4.001, -8.0, -20.0, -30.0):
+        peak = 2.0 * np.sqrt(r) / (1.0 + r) * max(-z, 0.0)
+        w = np.linspace(peak - 12.0, peak + 12.0, 400_001)
+        logs = 2.0 * norm.logcdf((z + np.sqrt(r) * w) / np.sqrt(1.0 - r)) + norm.logpdf(w)
+        expected = np.logaddexp.reduce(logs) + np.log(w[1] - w[0])
+        found = log_both_below(np.array([z]), np.array([r]))[0]
+        assert found == pytest.approx(expected, abs=0.01)
 
 
 @pytest.mark.parametrize(
