@@ -10,7 +10,7 @@ from .model_extension import Extensions
 from .search import Plan, Study, fit_base
 from .simulate import Keeping, Laboratory
 
-CLEAN_RUNS = 4  # runs where the model fits best, whose mean is free of the emulator's error
+CLEAN_RUNS = 2  # runs where the model fits best, whose mean is free of the emulator's error
 
 
 class OwnResidual(NamedTuple):
