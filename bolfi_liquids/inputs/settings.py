@@ -235,10 +235,13 @@ class CriticismSettings:
 
     @property
     def stir_plan(self) -> "Plan":
-        """Runs of each step for stirs."""
+        """Runs of each step for stirs.
+
+        Of twelve effects and three baselines, some 100 in all.
+        """
         from ..inference.criticism import Plan
 
-        return Plan(most=90)
+        return Plan(most=48)
 
     @property
     def pour_plan(self) -> "Plan":
@@ -252,4 +255,4 @@ class CriticismSettings:
         """Runs of each step for each clean recording."""
         from ..inference.criticism import Plan
 
-        return Plan(start=4, base=2)
+        return Plan(start=4)

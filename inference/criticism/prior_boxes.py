@@ -14,7 +14,6 @@ LATER_HALF_WIDTH = 0.08  # later
 MAX_HALF_WIDTH = 0.5  # at most
 WALL_SHARE = 0.02  # of a box's width, within which a point lies at its wall
 PRIOR_END = 0.02  # quantiles from an end of a prior to neutral, within which it is one-sided
-SIDE_SHARE = 0.7
 
 
 class Box(NamedTuple):
@@ -58,17 +57,17 @@ def around(centre: np.ndarray, sd: np.ndarray, least: float, most: float = MAX_H
     return Box(np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0))
 
 
-def sides(extension: Extension, count: int) -> np.ndarray:
+def sides(extension: Extension, count: int, share: float) -> np.ndarray:
     """Coefficients on alternate sides of neutral, or on its only one, ever nearer to it [count].
 
-    The first lies as far as SIDE_SHARE of the prior quantiles from neutral to its end.
+    The first lies at a share of the prior quantiles from neutral to the end.
     """
     prior = Prior({"coefficient": extension.prior})
     neutral = float(prior.to_unit({"coefficient": np.asarray(extension.neutral)})[-1])
     ends = [end for end in (0.0, 1.0) if abs(end - neutral) > PRIOR_END]
-    share = SIDE_SHARE / (1.0 + np.arange(count) // len(ends))
+    shares = share / (1.0 + np.arange(count) // len(ends))
     end = np.resize(ends, count)
-    return prior.from_unit((neutral + share * (end - neutral))[:, None])["coefficient"]
+    return prior.from_unit((neutral + shares * (end - neutral))[:, None])["coefficient"]
 
 
 def with_whole_priors(box: Box, count: int) -> Box:

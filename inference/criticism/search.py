@@ -30,6 +30,8 @@ from .verdict import TIE_MARGIN, Candidate, near_best
 
 BASE_PASSES = 2  # of runs of the base model, the second only if the first changed the fit
 REFIT_PASSES = 4  # and of an explanation
+SIDE_SHARES = (0.7, 0.35)  # of the prior quantiles from neutral to an end: where effects are tried
+MIN_EFFECT_RUNS = 2
 SECOND_EFFECT_GAIN = 6.0  # log likelihood that a second effect must gain
 
 
@@ -45,17 +47,17 @@ class Plan:
         refit: Near the best parameters of a near-best explanation, once or twice.
         refits: Explanations that are refitted, and pairs of effects after them.
         held_out: Of each model for each held-out data set.
-        most: Of all these but the held-out ones; refits beyond are left out.
+        most: Of looks and refits together; those beyond are left out.
     """
 
-    base: int = 6
+    base: int = 4
     start: int = 16
     extension: int = 2
     look: int = 2
     refit: int = 4
     refits: int = 3
     held_out: int = 4
-    most: int = 400
+    most: int = 100
 
     def __post_init__(self) -> None:
         for name, count in vars(self).items():
@@ -108,7 +110,6 @@ class Base(NamedTuple):
     singles: dict[str, Hypothesis]
     box: Box  # in which effects were simulated
     runs: Runs
-    given: int  # of the runs, made before
 
 
 def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Box]:
@@ -141,26 +142,16 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
     is their doing.
 
     Returns:
-        What was found, and the effects of which no simulation succeeded.
+        What was found, and the effects of which too few simulations succeeded to learn from.
     """
-    laboratory, plan = study.laboratory, study.plan
+    laboratory = study.laboratory
     base, runs, box = fit_base(study, earlier)
-    best = {name: np.full(plan.extension, value) for name, value in base.best.items()}
-    acting = [
-        best | {name: sides(one, plan.extension)} for name, one in laboratory.extensions.items()
-    ]
-    neutral, *made = laboratory.run_each("effects", [best, *acting])
-    parts = [runs] if isinstance(neutral, AllRunsFailed) else [runs, neutral]
-    runs = joined(parts)
+    neutral, known = _screen(study, base.best)
+    runs = joined([runs, *neutral])
     base = study.hypothesis((), runs, base.within)
     within = with_whole_priors(box, 1)
-    known = {
-        name: of
-        for name, of in zip(laboratory.extensions, made, strict=True)
-        if isinstance(of, Runs)
-    }
     singles = {
-        name: study.hypothesis((name,), joined([runs, of]), within) for name, of in known.items()
+        name: study.hypothesis((name,), joined([runs, *of]), within) for name, of in known.items()
     }
     signatures = {
         name: signature(base, single, laboratory.extensions[name])
@@ -168,10 +159,31 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
     }
     signatures = scored_on_clean(base, study.noise, signatures)
     tested, null = study.check(base, signatures)
-    given = 0 if earlier is None else len(earlier)
-    every = joined([runs, *known.values()])
-    found = Base(base, tested, null, signatures, singles, box, every, given)
+    every = joined([runs, *sum(known.values(), [])])
+    found = Base(base, tested, null, signatures, singles, box, every)
     return found, tuple(name for name in laboratory.extensions if name not in known)
+
+
+def _screen(study: Study, best: Mapping[str, float]) -> tuple[list[Runs], dict[str, list[Runs]]]:
+    """Runs of the base model at its best parameters, and beside them of each effect of which at
+    least two succeed; where some fail, others are made nearer to neutral."""
+    laboratory, count = study.laboratory, study.plan.extension
+    at_best = {name: np.full(count, value) for name, value in best.items()}
+    found: dict[str, list[Runs]] = {name: [] for name in ("", *laboratory.extensions)}
+    for attempt, share in enumerate(SIDE_SHARES):
+        lacking = [name for name, of in found.items() if sum(map(len, of)) < count]
+        if attempt and not any(lacking):
+            break
+        asked = [
+            at_best | ({name: sides(laboratory.extensions[name], count, share)} if name else {})
+            for name in lacking
+        ]
+        for name, made in zip(
+            lacking, laboratory.run_each(f"effects {attempt}", asked), strict=True
+        ):
+            found[name] += [made] if isinstance(made, Runs) else []
+    neutral = found.pop("")
+    return neutral, {name: of for name, of in found.items() if sum(map(len, of)) >= MIN_EFFECT_RUNS}
 
 
 def explain(
@@ -193,8 +205,8 @@ def explain(
     unknown = [name for name in forced if name not in base.singles]
     if unknown:
         raise AllRunsFailed(
-            f"{', '.join(unknown)} cannot be accepted: none of its {plan.extension} simulations "
-            "succeeded; mend the simulator, or accept another effect"
+            f"{', '.join(unknown)} cannot be accepted: of its simulations fewer than "
+            f"{MIN_EFFECT_RUNS} succeeded; mend the simulator, or accept another effect"
         )
     search = Search(study, base)
     if plan.look:
@@ -238,9 +250,9 @@ class Search:
             # what is best at the end of what was simulated is looked for well beyond
             least = LATER_HALF_WIDTH if fitted.within.encloses(fitted.u) else FIRST_HALF_WIDTH
             boxes[one.names] = around(fitted.u, fitted.sd, least)
-        left = study.plan.most - (len(self.runs) - self.base.given)
+        left = study.plan.most - (len(self.runs) - len(self.base.runs))
         if self.limited:
-            boxes = dict(list(boxes.items())[: left // count])
+            boxes = dict(list(boxes.items())[: max(left // count, 0)])
         asked = [study.points(box, names, count) for names, box in boxes.items()]
         made = dict(zip(boxes, study.laboratory.run_each(phase, asked), strict=True))
         boxes = {names: box for names, box in boxes.items() if isinstance(made[names], Runs)}
@@ -253,16 +265,19 @@ class Search:
         return boxes
 
     def refit(self, candidates: Sequence[Candidate]) -> None:
-        """Visit candidates until their fits stay."""
+        """Visit candidates until their fits stay, or seem not to reach an accepted one's."""
         for attempt in range(REFIT_PASSES):
-            before = {one.names: one.hypothesis for one in candidates}
+            before = {one.names: one for one in candidates}
             boxes = self.visit(f"refit {attempt}", candidates, self.study.plan.refit)
             for names in boxes:
                 self.found[names] = replace(self.found[names], refitted=True)
+            accepted = [one.gain for one in self.found.values() if one.accepted]
+            due = max(accepted, default=-np.inf) - TIE_MARGIN
             candidates = [
-                self.found[names]
-                for names, box in boxes.items()
-                if not stays(before[names], self.found[names].hypothesis, box)
+                one
+                for one in map(self.found.__getitem__, boxes)
+                if not stays(before[one.names].hypothesis, one.hypothesis, boxes[one.names])
+                and one.gain + abs(one.gain - before[one.names].gain) > due
             ]
 
     def together(self, names: tuple[str, ...]) -> Candidate:
