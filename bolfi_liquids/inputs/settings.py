@@ -241,7 +241,7 @@ class CriticismSettings:
         """
         from ..inference.criticism import Plan
 
-        return Plan(most=48)
+        return Plan(most=72)
 
     @property
     def pour_plan(self) -> "Plan":

@@ -29,9 +29,11 @@ from .simulate import AllRunsFailed, Laboratory
 from .verdict import TIE_MARGIN, Candidate, near_best
 
 BASE_PASSES = 2  # of runs of the base model, the second only if the first changed the fit
-REFIT_PASSES = 4  # and of an explanation
+REFIT_PASSES = 6  # and of an explanation
 SIDE_SHARES = (0.7, 0.35)  # of the prior quantiles from neutral to an end: where effects are tried
 MIN_EFFECT_RUNS = 2
+FAR_BEHIND = 0.5  # of the best gain, below which a refit ends
+LOOK = "look"  # phase in which effects act all over the box of their base parameters
 SECOND_EFFECT_GAIN = 6.0  # log likelihood that a second effect must gain
 
 
@@ -57,7 +59,7 @@ class Plan:
     refit: int = 4
     refits: int = 3
     held_out: int = 4
-    most: int = 100
+    most: int = 150
 
     def __post_init__(self) -> None:
         for name, count in vars(self).items():
@@ -123,16 +125,11 @@ def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Box]
         made = laboratory.run(f"base {attempt}", study.points(box, (), study.plan.base))
         runs = joined([runs, made])
         before, fitted = fitted, study.hypothesis((), runs, whole)
-        if stays(before, fitted, box):
+        moved = 0.5 * abs(before.misfit(fitted) - fitted.misfit(fitted))
+        if moved <= TIE_MARGIN and box.encloses(fitted.u):
             break
         box = around(fitted.u, fitted.sd, LATER_HALF_WIDTH)
     return fitted, runs, first
-
-
-def stays(before: Hypothesis, after: Hypothesis, box: Box) -> bool:
-    """Whether the runs in a box left a fit as good as it seemed before, and inside of them."""
-    moved = 0.5 * abs(before.misfit(after) - after.misfit(after))
-    return moved <= TIE_MARGIN and box.encloses(after.u)
 
 
 def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
@@ -210,7 +207,7 @@ def explain(
         )
     search = Search(study, base)
     if plan.look:
-        search.visit("look", near_best(search.singles, 2 * plan.refits), plan.look)
+        search.visit(LOOK, near_best(search.singles, 2 * plan.refits), plan.look)
     search.refit(near_best(search.singles, plan.refits))
     if not any(one.accepted for one in search.singles):
         search.try_pairs()
@@ -248,7 +245,9 @@ class Search:
         for one in candidates:
             fitted = one.hypothesis
             # what is best at the end of what was simulated is looked for well beyond
-            least = LATER_HALF_WIDTH if fitted.within.encloses(fitted.u) else FIRST_HALF_WIDTH
+            near = one.refitted or phase != LOOK
+            near = near and fitted.within.encloses(fitted.u)
+            least = LATER_HALF_WIDTH if near else FIRST_HALF_WIDTH
             boxes[one.names] = around(fitted.u, fitted.sd, least)
         left = study.plan.most - (len(self.runs) - len(self.base.runs))
         if self.limited:
@@ -265,20 +264,22 @@ class Search:
         return boxes
 
     def refit(self, candidates: Sequence[Candidate]) -> None:
-        """Visit candidates until their fits stay, or seem not to reach an accepted one's."""
+        """Visit candidates until their fits stay and pass, or are behind those that do."""
         for attempt in range(REFIT_PASSES):
-            before = {one.names: one for one in candidates}
+            before = {one.names: one.gain for one in candidates}
             boxes = self.visit(f"refit {attempt}", candidates, self.study.plan.refit)
             for names in boxes:
                 self.found[names] = replace(self.found[names], refitted=True)
+            tried = sorted((self.found[names] for names in boxes), key=lambda one: -one.gain)
             accepted = [one.gain for one in self.found.values() if one.accepted]
-            due = max(accepted, default=-np.inf) - TIE_MARGIN
-            candidates = [
-                one
-                for one in map(self.found.__getitem__, boxes)
-                if not stays(before[one.names].hypothesis, one.hypothesis, boxes[one.names])
-                and one.gain + abs(one.gain - before[one.names].gain) > due
-            ]
+            best = max((one.gain for one in tried), default=0.0)
+            due = max(accepted) - TIE_MARGIN if accepted else FAR_BEHIND * best
+            candidates = []
+            for one in tried:
+                moved = abs(one.gain - before[one.names])
+                stays = moved <= TIE_MARGIN and boxes[one.names].encloses(one.hypothesis.u)
+                if one.gain + moved > due and not (stays and one.passes):
+                    candidates.append(one)
 
     def together(self, names: tuple[str, ...]) -> Candidate:
         """Effects that were simulated one by one, as if together: wherever any of them was."""
