@@ -28,8 +28,9 @@ from .signatures import Signature, signature
 from .simulate import AllRunsFailed, Laboratory
 from .verdict import TIE_MARGIN, Candidate, near_best
 
-BASE_PASSES = 2  # of runs of the base model, the second only if the first changed the fit
+BASE_PASSES = 6  # of runs of the base model, those after the first only until the fit is settled
 REFIT_PASSES = 6  # and of an explanation
+MAX_DOUBT = 1.0  # of a settled fit: emulator's variance over all variance, summed over the data
 SIDE_SHARES = (0.7, 0.35)  # of the prior quantiles from neutral to an end: where effects are tried
 MIN_EFFECT_RUNS = 2
 FAR_BEHIND = 0.5  # of the best gain, below which a refit ends
@@ -125,11 +126,16 @@ def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Box]
         made = laboratory.run(f"base {attempt}", study.points(box, (), study.plan.base))
         runs = joined([runs, made])
         before, fitted = fitted, study.hypothesis((), runs, whole)
-        moved = 0.5 * abs(before.misfit(fitted) - fitted.misfit(fitted))
-        if moved <= TIE_MARGIN and box.encloses(fitted.u):
+        if settled(0.5 * (before.misfit(fitted) - fitted.misfit(fitted)), fitted, box):
             break
         box = around(fitted.u, fitted.sd, LATER_HALF_WIDTH)
     return fitted, runs, first
+
+
+def settled(gained: float, fitted: Hypothesis, box: Box) -> bool:
+    """Whether the runs in a box left a fit as good as it was, well known and inside of them."""
+    doubt = np.trace(fitted.whiten(fitted.whiten(fitted.latent)))
+    return abs(gained) <= TIE_MARGIN and doubt <= MAX_DOUBT and box.encloses(fitted.u)
 
 
 def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
@@ -264,7 +270,7 @@ class Search:
         return boxes
 
     def refit(self, candidates: Sequence[Candidate]) -> None:
-        """Visit candidates until their fits stay and pass, or are behind those that do."""
+        """Visit candidates until their fits are settled and pass, or are behind those that do."""
         for attempt in range(REFIT_PASSES):
             before = {one.names: one.gain for one in candidates}
             boxes = self.visit(f"refit {attempt}", candidates, self.study.plan.refit)
@@ -276,9 +282,9 @@ class Search:
             due = max(accepted) - TIE_MARGIN if accepted else FAR_BEHIND * best
             candidates = []
             for one in tried:
-                moved = abs(one.gain - before[one.names])
-                stays = moved <= TIE_MARGIN and boxes[one.names].encloses(one.hypothesis.u)
-                if one.gain + moved > due and not (stays and one.passes):
+                gained = one.gain - before[one.names]
+                done = one.passes and settled(gained, one.hypothesis, boxes[one.names])
+                if one.gain + abs(gained) > due and not done:
                     candidates.append(one)
 
     def together(self, names: tuple[str, ...]) -> Candidate:
