@@ -241,14 +241,14 @@ class CriticismSettings:
         """
         from ..inference.criticism import Plan
 
-        return Plan(most=72)
+        return Plan(base=4, refit=4, most=72)
 
     @property
     def pour_plan(self) -> "Plan":
         """Runs of each step for pours, of which each makes the whole table."""
         from ..inference.criticism import Plan
 
-        return Plan(start=12)
+        return Plan(start=12, refit=4)
 
     @property
     def clean_plan(self) -> "Plan":

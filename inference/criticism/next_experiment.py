@@ -16,7 +16,7 @@ from .run_table import Runs
 from .simulate import Laboratory
 from .verdict import Candidate
 
-RUNS_EACH = 2  # of each explanation in each proposed experiment
+RUNS_EACH = 3  # of each explanation in each proposed experiment
 
 
 class Suggestion(NamedTuple):

@@ -53,14 +53,14 @@ class Plan:
         most: Of looks and refits together; those beyond are left out.
     """
 
-    base: int = 4
+    base: int = 8
     start: int = 16
     extension: int = 2
     look: int = 2
-    refit: int = 4
+    refit: int = 8
     refits: int = 3
     held_out: int = 4
-    most: int = 150
+    most: int = 160
 
     def __post_init__(self) -> None:
         for name, count in vars(self).items():
