@@ -235,28 +235,28 @@ class CriticismSettings:
     effects: Names | None = None
     accept: Names | None = None
     seed: Seed = 0
-    batch: Count = 8
+    batch: Count = 32
 
     @property
     def stir_plan(self) -> "Plan":
         """Runs of each step for stirs.
 
-        With held-out runs of four models, proposals and six baselines, at most 350 in all.
+        Of twelve effects and three baselines, some 100 in all.
         """
         from ..inference.criticism import Plan
 
-        return Plan(base=24, extension=8, refit=12, held_out=6, most=168)
+        return Plan(base=4, refit=4, most=72)
 
     @property
     def pour_plan(self) -> "Plan":
         """Runs of each step for pours, of which each makes the whole table."""
         from ..inference.criticism import Plan
 
-        return Plan(start=12, base=12, extension=8, refit=10)
+        return Plan(start=12, refit=4)
 
     @property
     def clean_plan(self) -> "Plan":
         """Runs of each step for each clean recording."""
         from ..inference.criticism import Plan
 
-        return Plan(start=8, base=8)
+        return Plan(start=4)

@@ -1,5 +1,6 @@
 """What the engine should know of simulators of the fluid."""
 
+from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from typing import ClassVar
 
@@ -18,3 +19,10 @@ class FluidSimulator:
         from ..models import time_limit
 
         return time_limit(seconds)
+
+    @property
+    def neutral(self) -> Mapping[str, float]:
+        """Coefficients that change nothing: runs with other effects share a call."""
+        from ..models import EFFECTS
+
+        return {name: effect.neutral for name, effect in EFFECTS.items()}

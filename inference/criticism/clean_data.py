@@ -7,10 +7,13 @@ import numpy as np
 from ..prior import Prior
 from .experiment import Experiment
 from .model_extension import Extensions
-from .search import Plan, Study, fit_base
+from .prior_boxes import everywhere
+from .run_table import joined
+from .search import Plan, Study
 from .simulate import Keeping, Laboratory
 
-CLEAN_RUNS = 4  # runs where the model fits best, whose mean is free of the emulator's error
+CLEAN_PASSES = 2  # of runs where the model fits best: so far, and with what the first taught
+CLEAN_RUNS = 2  # of each; the mean of the last is free of the emulator's error
 
 
 class OwnResidual(NamedTuple):
@@ -44,7 +47,16 @@ def own_residual(
             shape=experiment.shape,
         )
         study = Study(laboratory, experiment.observed, experiment.noise, plan)
-        best = fit_base(study, None)[0].best
-        at_best = {name: np.full(CLEAN_RUNS, value) for name, value in best.items()}
-        mean = laboratory.run("repeat", at_best).signals.mean(0)
-    return OwnResidual(experiment.observed - mean, dict(best))
+        whole = everywhere(len(prior))
+        made = laboratory.run("start", study.points(whole, (), plan.start))
+        runs = [made]
+        fitted = study.hypothesis((), made, whole)
+        for attempt in range(CLEAN_PASSES):
+            before = fitted.u
+            at_best = {name: np.full(CLEAN_RUNS, value) for name, value in fitted.best.items()}
+            made = laboratory.run(f"best {attempt}", at_best)
+            runs.append(made)
+            fitted = study.hypothesis((), joined(runs), whole)
+        now, then = fitted.expected(np.stack([fitted.u, before]))
+        moved = fitted.surrogate.output.restore((now - then)[None])[0]
+    return OwnResidual(experiment.observed - made.signals.mean(0) - moved, fitted.best)

@@ -1,7 +1,6 @@
 """Find where a calibrated simulator and data disagree, and which effect explains it."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, NamedTuple
@@ -300,21 +299,22 @@ def _gaps(
     study: Study, base: Base, chosen: Sequence[Candidate], held_out: Sequence[Experiment]
 ) -> dict[tuple[str, ...], tuple[Gap, ...]]:
     """Names -> gaps, of those that can be simulated for the held-out data."""
-    count, laboratory, seed = study.plan.held_out, study.laboratory, study.seed
-    if not held_out or not chosen:
+    count, seed = study.plan.held_out, study.seed
+    if not chosen:
         return {}
-    theta = weighted_posterior(base.hypothesis, seed).draw(seed, count)
-    usual = [predict(laboratory, one, "held out, base", theta) for one in held_out]
-    gaps = {}
-    for candidate in chosen:
-        theta = weighted_posterior(candidate.hypothesis, seed).draw(seed, count)
-        phase = f"held out, {' '.join(candidate.names)}"
-        with suppress(AllRunsFailed):
-            gaps[candidate.names] = tuple(
-                gap(one, before, predict(laboratory, one, phase, theta), seed)
-                for one, before in zip(held_out, usual, strict=True)
-            )
-    return gaps
+    models = [base.hypothesis, *(candidate.hypothesis for candidate in chosen)]
+    drawn = [weighted_posterior(model, seed).draw(seed, count) for model in models]
+    gaps: dict[tuple[str, ...], tuple[Gap, ...]] = {model.names: () for model in models[1:]}
+    for one in held_out:
+        before, *after = predict(study.laboratory, one, drawn)
+        if before is None:
+            raise AllRunsFailed(f"the base model cannot be simulated for {one.label!r}")
+        gaps = {
+            model.names: (*gaps[model.names], gap(one, before, made, seed))
+            for model, made in zip(models[1:], after, strict=True)
+            if made is not None and model.names in gaps
+        }
+    return gaps if held_out else {}
 
 
 def _judged(candidate: Candidate, gaps: Mapping[tuple[str, ...], tuple[Gap, ...]]) -> Candidate:

@@ -11,6 +11,7 @@ from .experiment import Experiment
 from .measurement_noise import gaussian, samples
 from .misfit import MODES_PER_CHANNEL, exceedance, orthonormal, slow_modes
 from .run_noise import errors_of, smooth_covariance
+from .run_table import Runs
 from .simulate import Laboratory
 from .usual_residual import usual_rms, without_usual
 from .verdict import ACCEPTANCE_LEVEL
@@ -79,12 +80,13 @@ def holds(gaps: Sequence[Gap]) -> bool:
 
 
 def predict(
-    laboratory: Laboratory, experiment: Experiment, phase: str, theta: Mapping[str, np.ndarray]
-) -> np.ndarray:
-    """Simulated outputs of another experiment at posterior draws, finite samples only [k, n]."""
-    elsewhere = laboratory.of(experiment)
+    laboratory: Laboratory, experiment: Experiment, thetas: Sequence[Mapping[str, np.ndarray]]
+) -> list[np.ndarray | None]:
+    """Simulated outputs of another experiment at each model's posterior draws, finite samples only
+    [k, n]; None where all runs failed."""
+    made = laboratory.of(experiment).run_each(f"held out {experiment.label}", thetas)
     there = np.isfinite(experiment.observed)
-    return elsewhere.run(f"{phase} {experiment.label}", theta).signals[:, there]
+    return [of.signals[:, there] if isinstance(of, Runs) else None for of in made]
 
 
 @in_float64

@@ -162,7 +162,7 @@ def hypothesise(
     errors = own_errors(emulator)
     near, _ = _nearest(surrogate, errors, within)
     # now that it is known where it fits best, so is how noisy the simulator is there
-    errors = resized(errors, prior.to_unit(theta), near)
+    errors = resized(errors, prior.to_unit(theta)[fit.learned_from], near)
     u, own = _nearest(surrogate, errors, within)
     found = Hypothesis(
         names=names,

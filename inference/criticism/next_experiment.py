@@ -1,7 +1,6 @@
 """Which further experiment would tell explanations apart."""
 
 from collections.abc import Sequence
-from contextlib import suppress
 from itertools import combinations
 from typing import NamedTuple
 
@@ -13,7 +12,8 @@ from .experiment import Proposal
 from .measurement_noise import samples
 from .misfit import MODES_PER_CHANNEL, orthonormal, slow_modes
 from .run_noise import errors_of, smooth_covariance
-from .simulate import AllRunsFailed, Laboratory
+from .run_table import Runs
+from .simulate import Laboratory
 from .verdict import Candidate
 
 RUNS_EACH = 3  # of each explanation in each proposed experiment
@@ -42,23 +42,22 @@ def suggest(
     """
     if len(rivals) < 2:
         return []
-    made = []
-    for proposal in proposals:
-        with suppress(AllRunsFailed):
-            made.append(_separation(laboratory, proposal, rivals))
-    return sorted(made, key=lambda suggestion: -suggestion.snr)
+    found = [_separation(laboratory, proposal, rivals) for proposal in proposals]
+    return sorted(filter(None, found), key=lambda suggestion: -suggestion.snr)
 
 
 def _separation(
     laboratory: Laboratory, proposal: Proposal, rivals: Sequence[Candidate]
-) -> Suggestion:
-    elsewhere = laboratory.of(proposal)
+) -> Suggestion | None:
     names = [" with ".join(rival.names) for rival in rivals]
-    signals = []
-    for name, rival in zip(names, rivals, strict=True):
-        theta = {key: np.full(RUNS_EACH, value) for key, value in rival.hypothesis.best.items()}
-        made = elsewhere.run(f"next {proposal.label} {name}", theta).signals
-        signals.append(made.reshape(len(made), -1))
+    best = [
+        {key: np.full(RUNS_EACH, value) for key, value in rival.hypothesis.best.items()}
+        for rival in rivals
+    ]
+    made = laboratory.of(proposal).run_each(f"next {proposal.label}", best)
+    signals = [of.signals.reshape(len(of), -1) for of in made if isinstance(of, Runs)]
+    if len(signals) < len(rivals):
+        return None
     snr = {
         (names[a], names[b]): _distance(proposal, signals, a, b)
         for a, b in combinations(range(len(rivals)), 2)

@@ -6,13 +6,14 @@ import numpy as np
 
 from ..prior import Prior
 from ..sobol import sobol
+from .model_extension import Extension
 
 MIN_POSTERIOR_SDS = 10.0  # posterior sds: narrower boxes make slopes of noise (errors in variables)
 FIRST_HALF_WIDTH = 0.25  # half a box's width to begin with
 LATER_HALF_WIDTH = 0.08  # later
 MAX_HALF_WIDTH = 0.5  # at most
 WALL_SHARE = 0.02  # of a box's width, within which a point lies at its wall
-PRIOR_END = 0.02  # quantile of a coefficient's prior beyond which nothing is simulated
+PRIOR_END = 0.02  # quantiles from an end of a prior to neutral, within which it is one-sided
 
 
 class Box(NamedTuple):
@@ -56,9 +57,17 @@ def around(centre: np.ndarray, sd: np.ndarray, least: float, most: float = MAX_H
     return Box(np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0))
 
 
-def with_coefficient(box: Box) -> Box:
-    """The box of the base parameters, and the prior of a coefficient but for its ends."""
-    return Box(np.append(box.low, PRIOR_END), np.append(box.high, 1.0 - PRIOR_END))
+def sides(extension: Extension, count: int, share: float) -> np.ndarray:
+    """Coefficients on alternate sides of neutral, or on its only one, ever nearer to it [count].
+
+    The first lies at a share of the prior quantiles from neutral to the end.
+    """
+    prior = Prior({"coefficient": extension.prior})
+    neutral = float(prior.to_unit({"coefficient": np.asarray(extension.neutral)})[-1])
+    ends = [end for end in (0.0, 1.0) if abs(end - neutral) > PRIOR_END]
+    shares = share / (1.0 + np.arange(count) // len(ends))
+    end = np.resize(ends, count)
+    return prior.from_unit((neutral + shares * (end - neutral))[:, None])["coefficient"]
 
 
 def with_whole_priors(box: Box, count: int) -> Box:

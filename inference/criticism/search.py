@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import checked_integer
-from ..bolfi import MIN_LEARN
 from .clean_scores import scored_on_clean
 from .hypothesis import Hypothesis, hypothesise
 from .measurement_noise import Noise
@@ -21,15 +20,21 @@ from .prior_boxes import (
     everywhere,
     fill,
     hull,
-    with_coefficient,
+    sides,
     with_whole_priors,
 )
 from .run_table import Runs, joined
 from .signatures import Signature, signature
 from .simulate import AllRunsFailed, Laboratory
-from .verdict import Candidate, near_best
+from .verdict import TIE_MARGIN, Candidate, near_best
 
-REFIT_PASSES = 2  # of a refit, the second only if the best fit is not well inside the first's box
+BASE_PASSES = 6  # of runs of the base model, those after the first only until the fit is settled
+REFIT_PASSES = 6  # and of an explanation
+MAX_DOUBT = 1.0  # of a settled fit: emulator's variance over all variance, summed over the data
+SIDE_SHARES = (0.7, 0.35)  # of the prior quantiles from neutral to an end: where effects are tried
+MIN_EFFECT_RUNS = 2
+FAR_BEHIND = 0.5  # of the best gain, below which a refit ends
+LOOK = "look"  # phase in which effects act all over the box of their base parameters
 SECOND_EFFECT_GAIN = 6.0  # log likelihood that a second effect must gain
 
 
@@ -40,24 +45,26 @@ class Plan:
     Attributes:
         base: Of the base model, near where it fits best, beside those there are already.
         start: Of the base model all over the prior, where there are none yet.
-        extension: Of each effect.
-        refit: Near the best parameters of a near-best explanation.
+        extension: Of each effect, and of the base model with the same parameters and seeds.
+        look: Of each of twice as many effects as are refitted, where they seem to fit best.
+        refit: Near the best parameters of a near-best explanation, once or twice.
         refits: Explanations that are refitted, and pairs of effects after them.
         held_out: Of each model for each held-out data set.
-        most: Of all these but the held-out ones; refits beyond are left out.
+        most: Of looks and refits together; those beyond are left out.
     """
 
-    base: int = 24
+    base: int = 8
     start: int = 16
-    extension: int = 10
-    refit: int = 16
+    extension: int = 2
+    look: int = 2
+    refit: int = 8
     refits: int = 3
-    held_out: int = 8
-    most: int = 400
+    held_out: int = 4
+    most: int = 160
 
     def __post_init__(self) -> None:
         for name, count in vars(self).items():
-            checked_integer(name, count, 0 if name in ("refits", "most") else 1)
+            checked_integer(name, count, 0 if name in ("look", "refits", "most") else 1)
 
 
 class Study(NamedTuple):
@@ -77,10 +84,10 @@ class Study(NamedTuple):
         prior = extended(self.laboratory.prior, self.laboratory.extensions, names)
         return hypothesise(names, prior, runs, self.observed, self.noise, within)
 
-    def run(self, phase: str, box: Box, names: tuple[str, ...], count: int) -> Runs:
-        """Runs all over a box."""
+    def points(self, box: Box, names: tuple[str, ...], count: int) -> dict[str, np.ndarray]:
+        """Parameters all over a box, name -> [count]."""
         prior = extended(self.laboratory.prior, self.laboratory.extensions, names)
-        return self.laboratory.run(phase, fill(box, prior, self.seed, count))
+        return fill(box, prior, self.seed, count)
 
     def check(
         self, hypothesis: Hypothesis, signatures: Mapping[str, Signature]
@@ -106,50 +113,80 @@ class Base(NamedTuple):
     singles: dict[str, Hypothesis]
     box: Box  # in which effects were simulated
     runs: Runs
-    given: int  # of the runs, made before
 
 
 def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Box]:
-    """Fit the base model near its optimum. Return the fit, its runs and their box."""
-    whole = everywhere(len(study.laboratory.prior))
-    runs = study.run("start", whole, (), study.plan.start) if earlier is None else earlier
-    first = study.hypothesis((), runs, whole)
-    box = around(first.u, first.sd, FIRST_HALF_WIDTH)
-    runs = joined([runs, study.run("base", box, (), study.plan.base)])
-    return study.hypothesis((), runs, whole), runs, box
+    """Fit the base model near its optimum. Return the fit, its runs and the box of the first."""
+    whole, laboratory = everywhere(len(study.laboratory.prior)), study.laboratory
+    start = study.points(whole, (), study.plan.start)
+    runs = laboratory.run("start", start) if earlier is None else earlier
+    fitted = study.hypothesis((), runs, whole)
+    box = first = around(fitted.u, fitted.sd, FIRST_HALF_WIDTH)
+    for attempt in range(BASE_PASSES):
+        made = laboratory.run(f"base {attempt}", study.points(box, (), study.plan.base))
+        runs = joined([runs, made])
+        before, fitted = fitted, study.hypothesis((), runs, whole)
+        if settled(0.5 * (before.misfit(fitted) - fitted.misfit(fitted)), fitted, box):
+            break
+        box = around(fitted.u, fitted.sd, LATER_HALF_WIDTH)
+    return fitted, runs, first
+
+
+def settled(gained: float, fitted: Hypothesis, box: Box) -> bool:
+    """Whether the runs in a box left a fit as good as it was, well known and inside of them."""
+    doubt = np.trace(fitted.whiten(fitted.whiten(fitted.latent)))
+    return abs(gained) <= TIE_MARGIN and doubt <= MAX_DOUBT and box.encloses(fitted.u)
 
 
 def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
     """Fit the base model, learn every effect's signature, and test the model.
 
+    The effects act where the base model fits best, with the same seeds: so what runs differ by
+    is their doing.
+
     Returns:
         What was found, and the effects of which too few simulations succeeded to learn from.
     """
-    laboratory, plan = study.laboratory, study.plan
+    laboratory = study.laboratory
     base, runs, box = fit_base(study, earlier)
-    parts = [runs]
-    singles, untested = {}, []
-    for name in laboratory.extensions:
-        wide = with_coefficient(box)
-        try:
-            made = study.run(f"effect {name}", wide, (name,), plan.extension)
-        except AllRunsFailed:
-            made = runs.rows(np.zeros(len(runs), bool))
-        if len(made) < MIN_LEARN:
-            untested.append(name)
-            continue
-        parts.append(made)
-        within = with_whole_priors(box, 1)
-        singles[name] = study.hypothesis((name,), joined([runs, made]), within)
+    neutral, known = _screen(study, base.best)
+    runs = joined([runs, *neutral])
+    base = study.hypothesis((), runs, base.within)
+    within = with_whole_priors(box, 1)
+    singles = {
+        name: study.hypothesis((name,), joined([runs, *of]), within) for name, of in known.items()
+    }
     signatures = {
         name: signature(base, single, laboratory.extensions[name])
         for name, single in singles.items()
     }
     signatures = scored_on_clean(base, study.noise, signatures)
     tested, null = study.check(base, signatures)
-    given = 0 if earlier is None else len(earlier)
-    found = Base(base, tested, null, signatures, singles, box, joined(parts), given)
-    return found, tuple(untested)
+    every = joined([runs, *sum(known.values(), [])])
+    found = Base(base, tested, null, signatures, singles, box, every)
+    return found, tuple(name for name in laboratory.extensions if name not in known)
+
+
+def _screen(study: Study, best: Mapping[str, float]) -> tuple[list[Runs], dict[str, list[Runs]]]:
+    """Runs of the base model at its best parameters, and beside them of each effect of which at
+    least two succeed; where some fail, others are made nearer to neutral."""
+    laboratory, count = study.laboratory, study.plan.extension
+    at_best = {name: np.full(count, value) for name, value in best.items()}
+    found: dict[str, list[Runs]] = {name: [] for name in ("", *laboratory.extensions)}
+    for attempt, share in enumerate(SIDE_SHARES):
+        lacking = [name for name, of in found.items() if sum(map(len, of)) < count]
+        if attempt and not any(lacking):
+            break
+        asked = [
+            at_best | ({name: sides(laboratory.extensions[name], count, share)} if name else {})
+            for name in lacking
+        ]
+        for name, made in zip(
+            lacking, laboratory.run_each(f"effects {attempt}", asked), strict=True
+        ):
+            found[name] += [made] if isinstance(made, Runs) else []
+    neutral = found.pop("")
+    return neutral, {name: of for name, of in found.items() if sum(map(len, of)) >= MIN_EFFECT_RUNS}
 
 
 def explain(
@@ -166,99 +203,120 @@ def explain(
     Raises:
         AllRunsFailed: an effect to be accepted cannot be simulated.
     """
-    plan, runs = study.plan, base.runs
+    plan = study.plan
     forced = tuple(accept or ())
     unknown = [name for name in forced if name not in base.singles]
     if unknown:
         raise AllRunsFailed(
-            f"{', '.join(unknown)} cannot be accepted: of its {plan.extension} simulations fewer "
-            f"than {MIN_LEARN} succeeded; mend the simulator, or accept another effect"
+            f"{', '.join(unknown)} cannot be accepted: of its simulations fewer than "
+            f"{MIN_EFFECT_RUNS} succeeded; mend the simulator, or accept another effect"
         )
-    first = [study.candidate(base, single) for single in base.singles.values()]
-    found = {candidate.names: candidate for candidate in first}
-    for one in near_best(first, plan.refits):
-        found[one.names], runs = _refit(study, base, one, runs, plan.most)
-    if not any(one.accepted for one in found.values()):
-        pairs, runs = _pairs(study, base, found, runs)
-        found |= {pair.names: pair for pair in pairs}
-    accepted = [one for one in found.values() if one.accepted]
-    singles = [one for one in accepted if len(one.names) == 1]
-    if forced and not (forced in found and found[forced].refitted):
-        unrefined = _unrefined(study, base, found, forced, runs)
-        found[forced], _ = _refit(study, base, unrefined, runs, most=None)
-    return list(found.values()), singles or accepted
+    search = Search(study, base)
+    if plan.look:
+        search.visit(LOOK, near_best(search.singles, 2 * plan.refits), plan.look)
+    search.refit(near_best(search.singles, plan.refits))
+    if not any(one.accepted for one in search.singles):
+        search.try_pairs()
+    if forced and not (forced in search.found and search.found[forced].refitted):
+        search.limited = False
+        search.refit([search.together(forced)])
+    accepted = [one for one in search.found.values() if one.accepted]
+    return list(search.found.values()), [one for one in accepted if len(one.names) == 1] or accepted
 
 
-def _unrefined(
-    study: Study,
-    base: Base,
-    found: Mapping[tuple[str, ...], Candidate],
-    names: tuple[str, ...],
-    runs: Runs,
-) -> Candidate:
-    """Effects that were simulated one by one, as if together: wherever any of them was."""
-    d, box = len(base.box.low), base.box
-    for name in names:
-        within = found[(name,)].hypothesis.within
-        box = hull(box, Box(within.low[:d], within.high[:d]))
-    hypothesis = study.hypothesis(names, runs, with_whole_priors(box, len(names)))
-    return study.candidate(base, hypothesis)
+class Search:
+    """The explanations that were fitted so far, and the runs that they were learned from."""
 
+    def __init__(self, study: Study, base: Base):
+        self.study, self.base = study, base
+        self.runs = base.runs
+        self.limited = True
+        first = (study.candidate(base, single) for single in base.singles.values())
+        self.found = {one.names: one for one in first}
 
-def _refit(
-    study: Study, base: Base, candidate: Candidate, runs: Runs, most: int | None
-) -> tuple[Candidate, Runs]:
-    """Simulate a candidate near its optimum and fit it again.
+    @property
+    def singles(self) -> list[Candidate]:
+        return [one for one in self.found.values() if len(one.names) == 1]
 
-    That ends when the optimum lies well inside the box of the latest runs, after REFIT_PASSES
-    passes, where more than `most` runs would be made, or where none can be made: the candidate is
-    then what it was, and without a first pass not refitted.
-    """
-    names = candidate.names
-    for attempt in range(REFIT_PASSES):
-        if most is not None and len(runs) - base.given + study.plan.refit > most:
-            break
-        fitted = candidate.hypothesis
-        # what is best at the end of what was simulated is looked for well beyond
-        least = LATER_HALF_WIDTH if fitted.within.encloses(fitted.u) else FIRST_HALF_WIDTH
-        box = around(fitted.u, fitted.sd, least)
-        phase = f"refit {' '.join(names)} {attempt}"
-        try:
-            made = study.run(phase, box, names, study.plan.refit)
-        except AllRunsFailed:
-            break
-        runs = joined([runs, made])
-        within = hull(fitted.within, box)
-        candidate = study.candidate(base, study.hypothesis(names, runs, within), refitted=True)
-        if box.encloses(candidate.hypothesis.u):
-            break
-    return candidate, runs
+    def visit(
+        self, phase: str, candidates: Sequence[Candidate], count: int
+    ) -> dict[tuple[str, ...], Box]:
+        """Simulate each of them near its optimum, all in one call, and fit it again.
 
+        Returns:
+            The boxes in which that succeeded. No more runs than planned are made: of candidates
+            for which they do not suffice none is made.
+        """
+        study, boxes = self.study, {}
+        for one in candidates:
+            fitted = one.hypothesis
+            # what is best at the end of what was simulated is looked for well beyond
+            near = one.refitted or phase != LOOK
+            near = near and fitted.within.encloses(fitted.u)
+            least = LATER_HALF_WIDTH if near else FIRST_HALF_WIDTH
+            boxes[one.names] = around(fitted.u, fitted.sd, least)
+        left = study.plan.most - (len(self.runs) - len(self.base.runs))
+        if self.limited:
+            boxes = dict(list(boxes.items())[: max(left // count, 0)])
+        asked = [study.points(box, names, count) for names, box in boxes.items()]
+        made = dict(zip(boxes, study.laboratory.run_each(phase, asked), strict=True))
+        boxes = {names: box for names, box in boxes.items() if isinstance(made[names], Runs)}
+        self.runs = joined([self.runs, *(of for of in made.values() if isinstance(of, Runs))])
+        for one in candidates:
+            if one.names in boxes:
+                within = hull(one.hypothesis.within, boxes[one.names])
+                fitted = study.hypothesis(one.names, self.runs, within)
+                self.found[one.names] = study.candidate(self.base, fitted, one.refitted)
+        return boxes
 
-def _pairs(
-    study: Study, base: Base, found: dict[tuple[str, ...], Candidate], runs: Runs
-) -> tuple[list[Candidate], Runs]:
-    """Fit the best effect with each other one; a pair counts if it gains more than either alone.
+    def refit(self, candidates: Sequence[Candidate]) -> None:
+        """Visit candidates until their fits are settled and pass, or are behind those that do."""
+        for attempt in range(REFIT_PASSES):
+            before = {one.names: one.gain for one in candidates}
+            boxes = self.visit(f"refit {attempt}", candidates, self.study.plan.refit)
+            for names in boxes:
+                self.found[names] = replace(self.found[names], refitted=True)
+            tried = sorted((self.found[names] for names in boxes), key=lambda one: -one.gain)
+            accepted = [one.gain for one in self.found.values() if one.accepted]
+            best = max((one.gain for one in tried), default=0.0)
+            due = max(accepted) - TIE_MARGIN if accepted else FAR_BEHIND * best
+            candidates = []
+            for one in tried:
+                gained = one.gain - before[one.names]
+                done = one.passes and settled(gained, one.hypothesis, boxes[one.names])
+                if one.gain + abs(gained) > due and not done:
+                    candidates.append(one)
 
-    Single effects of an accepted pair are refitted in `found`.
-    """
-    if not found:  # no effect could be simulated
-        return [], runs
-    best = max(found.values(), key=lambda c: c.gain)
-    pairs = [
-        _unrefined(study, base, found, (*best.names, other), runs)
-        for other in base.singles
-        if other not in best.names
-    ]
-    tried = []
-    for pair in sorted(pairs, key=lambda c: -c.gain)[: study.plan.refits]:
-        again, runs = _refit(study, base, pair, runs, study.plan.most)
-        if again.accepted:
-            for name in again.names:
-                if not found[(name,)].refitted:
-                    alone = found[(name,)]
-                    found[(name,)], runs = _refit(study, base, alone, runs, study.plan.most)
-            best_alone = max(found[(name,)].gain for name in again.names)
-            again = replace(again, needed=again.gain > best_alone + SECOND_EFFECT_GAIN)
-        tried.append(again)
-    return tried, runs
+    def together(self, names: tuple[str, ...]) -> Candidate:
+        """Effects that were simulated one by one, as if together: wherever any of them was."""
+        study, base, box = self.study, self.base, self.base.box
+        for name in names:
+            within = self.found[(name,)].hypothesis.within
+            box = hull(box, Box(*(end[: len(box.low)] for end in within)))
+        hypothesis = study.hypothesis(names, self.runs, with_whole_priors(box, len(names)))
+        return study.candidate(base, hypothesis)
+
+    def try_pairs(self) -> None:
+        """Fit the best effect with those that its residual seems to need most; a pair counts if
+        it gains more than either alone. Single effects of an accepted pair are refitted."""
+        if not self.found:  # no effect could be simulated
+            return
+        best = max(self.singles, key=lambda c: c.gain)
+        signatures = self.base.signatures
+
+        def wanted(name: str) -> float:
+            score, side = best.check.scores[name], signatures[name].side
+            return side * score if side else abs(score)
+
+        others = sorted(best.check.scores, key=wanted, reverse=True)[: 2 * self.study.plan.refits]
+        pairs = [self.together((*best.names, other)) for other in others]
+        pairs = sorted(pairs, key=lambda c: -c.gain)[: self.study.plan.refits]
+        self.found |= {one.names: one for one in pairs}
+        self.refit(pairs)
+        tried = [self.found[one.names] for one in pairs]
+        alone = [self.found[(name,)] for one in tried if one.accepted for name in one.names]
+        self.refit([one for one in alone if not one.refitted])
+        for one in tried:
+            best_alone = max(self.found[(name,)].gain for name in one.names)
+            needed = one.gain > best_alone + SECOND_EFFECT_GAIN
+            self.found[one.names] = replace(one, needed=needed)

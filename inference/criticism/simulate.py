@@ -1,6 +1,6 @@
 """Runs of a simulator and of its extensions, kept in a bank."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arguments import check_function, check_kind, checked_integer
 from ..prior import Prior
-from ..simulations.bank import SimulationBank
+from ..simulations.bank import Simulation, SimulationBank
 from ..simulations.executors import Workers, check_executor, open_executor
 from ..simulations.failures import NoSignals
 from ..simulations.job import BATCH, jobs, succeeded
@@ -116,20 +116,56 @@ class Laboratory:
             AllRunsFailed: all of them did.
             RuntimeError: the executor lost its workers.
         """
-        seeds = phase_seeds(self.seed, phase, len(next(iter(theta.values()))))
-        asked = jobs(theta, seeds)
-        advance = partial(self.report, phase)
+        (made,) = self.run_each(phase, [theta])
+        if isinstance(made, AllRunsFailed):
+            raise made
+        return made
+
+    def run_each(
+        self, phase: str, thetas: Sequence[Mapping[str, np.ndarray]]
+    ) -> "list[Runs | AllRunsFailed]":
+        """The same at several theta in one call; the k-th run of each has the same seed.
+
+        So what they differ by is not chance.
+
+        Raises:
+            RuntimeError: the executor lost its workers.
+        """
+        counts = [len(next(iter(theta.values()))) for theta in thetas]
+        seeds = phase_seeds(self.seed, phase, max(counts, default=0))
+        asked = [jobs(theta, seeds[:n]) for theta, n in zip(thetas, counts, strict=True)]
         try:
-            results = run_missing(self.simulate, asked, self.keep, self.shape, advance=advance)
+            results = run_missing(
+                self.simulate,
+                sum(asked, []),
+                self.keep,
+                self.shape,
+                advance=partial(self.report, phase),
+            )
         except NoSignals as error:
-            raise AllRunsFailed(
-                f"no simulation of the phase {phase!r} returned a signal: {error}"
-            ) from error
+            if len(thetas) > 1:  # those of others may return some
+                return [self.run_each(phase, [theta])[0] for theta in thetas]
+            told = f"no simulation of the phase {phase!r} returned a signal: {error}"
+            return [AllRunsFailed(told)]
+        ends = np.cumsum(counts)
+        return [
+            self._succeeded(phase, theta, seeds[:n], results[end - n : end])
+            for theta, n, end in zip(thetas, counts, ends, strict=True)
+        ]
+
+    def _succeeded(
+        self,
+        phase: str,
+        theta: Mapping[str, np.ndarray],
+        seeds: np.ndarray,
+        results: Sequence[Simulation],
+    ) -> "Runs | AllRunsFailed":
         good = succeeded(results)
         if not good:
-            raise AllRunsFailed(
-                f"all {len(asked)} simulations of the phase {phase!r} failed, the first at "
-                f"{asked[0].theta}: {results[0].error or 'its output is not finite'}"
+            first = {name: float(column[0]) for name, column in theta.items()}
+            return AllRunsFailed(
+                f"all {len(results)} simulations of the phase {phase!r} failed, the first at "
+                f"{first}: {results[0].error or 'its output is not finite'}"
             )
         rows = list(good)
         kept = {name: np.asarray(column, float)[rows] for name, column in theta.items()}

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -57,9 +58,15 @@ def jobs(theta: Mapping[str, np.ndarray], seeds: Sequence[int] | np.ndarray) -> 
     ]
 
 
-def columns(batch: Sequence[Job]) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """theta (name -> [n]) and seeds (int64 [n]) of n jobs."""
-    theta = {name: np.array([job.theta[name] for job in batch]) for name in batch[0].theta}
+def columns(
+    batch: Sequence[Job], neutral: Mapping[str, float] = MappingProxyType({})
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """theta (name -> [n]) and seeds (int64 [n]) of n jobs; what one lacks is neutral in it."""
+    names = dict.fromkeys(name for job in batch for name in job.theta)
+    theta = {
+        name: np.array([job.theta[name] if name in job.theta else neutral[name] for job in batch])
+        for name in names
+    }
     return theta, np.array([job.seed for job in batch], np.int64)
 
 
@@ -151,7 +158,8 @@ def run_batch(
     shape: tuple[int, ...] | None,
     timeout: float | None = None,
 ) -> list[Simulation]:
-    """Simulate all jobs in one call.
+    """Simulate all jobs in one call; in several where they name other parameters than those of
+    which the simulator's `neutral` has the values that change nothing.
 
     An exception, taking too long, or returning other than one signal per job costs only the run
     to blame: the batch is then repeated one by one. Seconds are shared out evenly.
@@ -160,7 +168,16 @@ def run_batch(
         shape: Of one signal; None accepts any.
         timeout: Seconds per job that the call may take, see `within`.
     """
-    theta, seeds = columns(batch)
+    neutral = _told_by(simulate, "neutral", {})
+    named = [frozenset(job.theta.keys() - neutral.keys()) for job in batch]
+    if len(set(named)) > 1:
+        found: dict[int, Simulation] = {}
+        for names in dict.fromkeys(named):
+            places = [place for place, own in enumerate(named) if own == names]
+            part = run_batch(simulate, [batch[place] for place in places], shape, timeout)
+            found.update(zip(places, part, strict=True))
+        return [found[place] for place in range(len(batch))]
+    theta, seeds = columns(batch, neutral)
     started = time.perf_counter()
     try:
         signals = within(

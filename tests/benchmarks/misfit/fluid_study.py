@@ -12,7 +12,6 @@ import json
 import sys
 import time
 import warnings
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
@@ -122,8 +121,7 @@ def examine(one: Set, bank: inference.SimulationBank) -> dict:
 def _criticised_stirs(
     truth: dict, rng: np.random.Generator, bank: inference.SimulationBank
 ) -> criticism.Criticism:
-    usual, stir_plan = _clean(bank), CriticismSettings().stir_plan
-
+    usual = _clean(bank)
     star, circle = (_record(path, truth, rng) for path in PATHS)
 
     def experiment(recording: Recording, cameras: criticism.AutoregressiveNoise):
@@ -136,7 +134,7 @@ def _criticised_stirs(
         default_prior(),
         effects_of("stir"),
         held_out=[experiment(circle, held_out_noise(circle, [star]))],
-        plan=replace(stir_plan, most=stir_plan.most + stir_plan.start),
+        plan=CriticismSettings().stir_plan,
         keeping=criticism.Keeping(bank),
     )
 

@@ -69,6 +69,18 @@ def test_a_coarse_emulators_error_is_reckoned_with(coarse):
     assert alarms(coarse, spread=False) > limit
 
 
+def test_a_run_that_blew_up_is_left_out():
+    def seldom(theta, seeds):
+        signals = oscillate(theta, seeds)
+        signals[0] += 1e9
+        return signals
+
+    observed = oscillate({"rate": np.array([4.0])}, [0])[0]
+    found = fitted(seldom, observed, NOISE, 0, count=12)
+    assert found.fit.learned_from.sum() == 11
+    assert found.best["rate"] == pytest.approx(4.0, abs=0.1)
+
+
 # Two channels, neighbouring samples averaged as in a long series.
 
 SHAPE = (60, 2)

@@ -6,7 +6,7 @@ import pytest
 from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference.criticism.hypothesis import hypothesise
 from bolfi_liquids.inference.criticism.posterior import weighted_posterior
-from bolfi_liquids.inference.criticism.prior_boxes import Box, fill, hull, intersection
+from bolfi_liquids.inference.criticism.prior_boxes import Box, fill, hull, intersection, sides
 from bolfi_liquids.inference.criticism.search import Study, examine, explain
 from bolfi_liquids.inference.criticism.simulate import Laboratory
 
@@ -47,6 +47,20 @@ def test_a_hull_holds_both_boxes_and_an_intersection_is_in_both():
     one, other = Box(np.zeros(2), np.full(2, 0.5)), Box(np.array([0.2, 0.4]), np.ones(2))
     np.testing.assert_array_equal(hull(one, other), [[0.0, 0.0], [1.0, 1.0]])
     np.testing.assert_array_equal(intersection(one, other), [[0.2, 0.4], [0.5, 0.5]])
+
+
+@pytest.mark.parametrize(
+    ("prior", "neutral", "expected"),
+    [
+        (dist.Uniform(-1.0, 1.0), 0.0, [-0.6, 0.6, -0.3, 0.3]),
+        (dist.Uniform(0.0, 1.0), 0.0, [0.6, 0.3, 0.2, 0.15]),
+        (dist.Uniform(-1.0, 0.0), 0.0, [-0.6, -0.3, -0.2, -0.15]),
+        (dist.Uniform(-1.0, 3.0), 0.0, [-0.6, 1.8, -0.3, 0.9]),
+    ],
+)
+def test_effects_are_tried_on_both_sides_of_neutral_or_on_the_only_one(prior, neutral, expected):
+    found = sides(criticism.Extension(prior, neutral), 4, 0.6)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 @pytest.mark.slow

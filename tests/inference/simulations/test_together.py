@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.inference import SimulationBank
 from bolfi_liquids.inference.simulations import Job, Keep, run_missing
+from bolfi_liquids.inference.simulations.job import run_batch
 
 
 class Marching:
@@ -124,3 +125,38 @@ def test_a_worker_that_is_killed_loses_its_call_and_what_was_stored_is_not_repea
     mended.touch()
     assert [one.signal[0] for one in run_all()] == list(range(12))
     assert sorted(map(int, made.read_text().split())) == list(range(12))
+
+
+class Told:
+    """Adds up its parameters, and keeps what it was called with."""
+
+    def __init__(self):
+        self.calls = []
+
+    def simulate(self, theta, seeds):
+        self.calls.append({name: column.tolist() for name, column in theta.items()})
+        return np.stack(list(theta.values()), axis=1).sum(axis=1, keepdims=True)
+
+
+MIXED = [Job({"a": 1.0, "drag": 2.0}, 0), Job({"a": 3.0}, 1), Job({"a": 5.0, "lag": 1.0}, 2)]
+
+
+def test_runs_of_other_parameters_share_a_call_where_the_simulator_has_their_neutral_values():
+    simulator = Told()
+    simulator.neutral = {"drag": 0.0, "lag": -1.0}
+    found = run_batch(simulator.simulate, MIXED, (1,))
+    assert simulator.calls == [
+        {"a": [1.0, 3.0, 5.0], "drag": [2.0, 0.0, 0.0], "lag": [-1.0, -1.0, 1.0]}
+    ]
+    assert [one.signal[0] for one in found] == [2.0, 2.0, 6.0]
+
+
+def test_elsewhere_each_is_called_with_its_own_parameters_alone():
+    simulator = Told()
+    found = run_batch(simulator.simulate, MIXED[::-1], (1,))
+    assert simulator.calls == [
+        {"a": [5.0], "lag": [1.0]},
+        {"a": [3.0]},
+        {"a": [1.0], "drag": [2.0]},
+    ]
+    assert [one.signal[0] for one in found] == [6.0, 3.0, 3.0]
