@@ -245,14 +245,14 @@ class CriticismSettings:
         """
         from ..inference.criticism import Plan
 
-        return Plan(base=4, refit=4, most=72)
+        return Plan(base=4, look=2, refit=4, refits=3, most=72)
 
     @property
     def pour_plan(self) -> "Plan":
         """Runs of each step for pours, of which each makes the whole table."""
         from ..inference.criticism import Plan
 
-        return Plan(start=12, refit=4)
+        return Plan(start=12, look=2, refit=4, refits=3)
 
     @property
     def clean_plan(self) -> "Plan":

@@ -56,9 +56,9 @@ class Plan:
     base: int = 8
     start: int = 16
     extension: int = 2
-    look: int = 2
+    look: int = 4
     refit: int = 8
-    refits: int = 3
+    refits: int = 4
     held_out: int = 4
     most: int = 160
 
