@@ -3,7 +3,7 @@
 import os
 import platform
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
@@ -12,6 +12,11 @@ import jax
 from jax.experimental.compilation_cache import compilation_cache
 from platformdirs import user_cache_path
 
+PLACE = "jax_compilation_cache_dir"
+LEAST = {  # everything is kept
+    "jax_persistent_cache_min_compile_time_secs": 0.0,
+    "jax_persistent_cache_min_entry_size_bytes": 0,
+}
 _alone = Lock()  # JAX's settings belong to the process
 
 
@@ -26,24 +31,19 @@ def kept_compilations() -> Iterator[None]:
     with _alone, warnings.catch_warnings():
         # JAX recompiles truncated entries
         warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache")
-        place = _directory() if jax.config.jax_compilation_cache_dir is None else None
+        before = {name: getattr(jax.config, name) for name in (PLACE, *LEAST)}
+        place = _directory() if before[PLACE] is None else None
         if place is None:
             yield
             return
-        ours = {
-            "jax_compilation_cache_dir": str(place),
-            "jax_persistent_cache_min_compile_time_secs": 0.0,
-            "jax_persistent_cache_min_entry_size_bytes": 0,
-        }
-        before = {name: getattr(jax.config, name) for name in ours}
         try:
-            _configure(ours)
+            _configure({PLACE: str(place), **LEAST})
             yield
         finally:
             _configure(before)
 
 
-def _configure(settings: dict[str, object]) -> None:
+def _configure(settings: Mapping[str, object]) -> None:
     for name, value in settings.items():
         jax.config.update(name, value)
     compilation_cache.reset_cache()  # JAX looks at its settings when it first compiles

@@ -51,6 +51,7 @@ def own_residual(
         made = laboratory.run("start", study.points(whole, (), plan.start))
         runs = [made]
         fitted = study.hypothesis((), made, whole)
+        before = fitted.u
         for attempt in range(CLEAN_PASSES):
             before = fitted.u
             at_best = {name: np.full(CLEAN_RUNS, value) for name, value in fitted.best.items()}

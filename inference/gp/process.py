@@ -8,7 +8,7 @@ follows its gradient by JAX.
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import lapack
+from scipy.linalg import get_lapack_funcs
 
 from ..arguments import checked_points
 from ..namespaces import namespace, ndtri
@@ -22,6 +22,7 @@ SCORE_EDGE = 1e-9  # quantile beyond which normal scores end
 MIN_VARIANCE = 1e-10  # latent variance, which rounding may make negative
 MIN_ROWS = 32  # of padded processes
 BATCH = 256  # points of one product, which fits a processor's cache
+POTRF, TRTRI = get_lapack_funcs(("potrf", "trtri"), dtype=np.float64)
 
 
 class Data(NamedTuple):
@@ -107,8 +108,8 @@ def relevance(hyper: Hyper) -> Any:
 
 def inverse_cholesky(matrix: np.ndarray) -> np.ndarray:
     """L^-1 [n, n] for a positive definite matrix L L^T; NaN if it is not."""
-    factor, failed = lapack.dpotrf(matrix.T, lower=True, clean=True)
-    inverse, singular = lapack.dtrtri(factor, lower=True)
+    factor, failed = POTRF(matrix.T, lower=True, clean=True)
+    inverse, singular = TRTRI(factor, lower=True)
     return np.full_like(matrix, np.nan) if failed or singular else inverse
 
 

@@ -80,10 +80,10 @@ def explore(rng: np.random.Generator, target: Target) -> Population:
             mass = np.logaddexp(mass, math.log(ROUND_POINTS) + log_density(mixture, new))
         joined = _Points(new, _log_likelihoods(target, new), mass)
         now = _Points(*(np.concatenate(parts) for parts in zip(now, joined, strict=True)))
-        proposed = log_density(mixtures[-1], now.x)
-        mass = np.logaddexp(now.log_mass, math.log(ROUND_POINTS) + proposed)
-        now = now._replace(log_mass=mass)
+        log_share = math.log(ROUND_POINTS) + log_density(mixtures[-1], now.x)
+        now = now._replace(log_mass=np.logaddexp(now.log_mass, log_share))
     weights = now.log_weights()
+    proposed = log_density(mixtures[-1], now.x)
     return Population(
         now.x, now.log_likelihood, weights, mixtures[-1], proposed, _effective(weights)
     )

@@ -76,11 +76,12 @@ def fit_mixture(x: np.ndarray, log_weights: np.ndarray, sharpness: float) -> Mix
     drawn = np.searchsorted(cumulated, positions * cumulated[-1])
     points = x[np.minimum(drawn, len(x) - 1)]
     shares = np.eye(COMPONENTS)[_nearest_seed(points / (np.std(points, axis=0) + 1e-12))]
-    for _ in range(EM_STEPS):
-        fitted = _maximised(points, shares, effective, sharpness)
+    fitted = _maximised(points, shares, effective, sharpness)
+    for _ in range(EM_STEPS - 1):
         square, volume = _distances(fitted, points)
         logs = fitted.log_share + volume - 0.5 * square
         shares = np.exp(logs - log_sum_exp(logs)[:, None])
+        fitted = _maximised(points, shares, effective, sharpness)
     even = (1.0 - EVEN_SHARE) * np.exp(fitted.log_share) + EVEN_SHARE / COMPONENTS
     return fitted._replace(log_share=np.log(even))
 
