@@ -196,7 +196,7 @@ class Bolfi:
             runs = Feasibility(history.u, history.succeeded & sane(history.discrepancy))
             # made by NumPy: JAX would compile for half a second
             words = np.random.SeedSequence([self.seed, self._state.asked]).generate_state(2)
-            key = jax.random.wrap_key_data(jax.numpy.asarray(words), impl="threefry2x32")
+            key = jax.random.wrap_key_data(jax.device_put(words), impl="threefry2x32")
             believing = self._learned.believe(self.prior.to_unit(self.prior.to_dict(pending)))
             shape = n - len(parts), len(self.prior)
             u = chosen(in_float64(self._acquire)(key, believing, shape[0], runs), shape)
