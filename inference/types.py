@@ -9,7 +9,7 @@ Theta = Mapping[str, np.ndarray]
 """Parameter name -> values in natural units; all of shape [n], or all scalars."""
 
 LogLikelihood = Callable[[Any, Any], Any]
-"""(state, u [n, d]) -> [n], for arrays of NumPy and of JAX (see `namespaces`). A module-level
+"""(state, u [n, d]) -> [n], for arrays of NumPy and of JAX (see `gp.namespaces`). A module-level
 function, so that what it compiles to is cached."""
 
 LogSecondMoment = Callable[[Any, np.ndarray, np.ndarray | None], np.ndarray]

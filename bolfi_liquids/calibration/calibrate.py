@@ -29,7 +29,7 @@ from ..run.directory import (
     open_bank,
     read_run,
 )
-from ..run.entering import entered
+from ..run.entering import entered, working_in
 from ..run.execution import Execution
 from ..run.provenance import LIBRARIES, versions
 from ..run.recordings import check_names, keep_recordings
@@ -119,7 +119,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, Argument("out"))
     )
     if not resume and (run / RUN_TOML).exists():
-        raise held_error(run)  # before the prior's libraries are loaded
+        with working_in(run):  # unless another command works there
+            raise held_error(run)  # before the prior's libraries are loaded
     prior = _usual_prior(run, resume) if prior is None else prior
     record = run_record(settings, prior, stirring)
     with (

@@ -10,6 +10,7 @@ import typer
 from .. import __version__
 from ..inputs.settings import CalibrationSettings, PourSettings
 from ..run.directory import check_resumable
+from ..run.entering import working_in_run
 from . import check as cli_check
 from . import guide, import_table, reproduce
 from . import record as cli_record
@@ -192,8 +193,9 @@ def pour(
     # refused before anything of the run is read
     PourSettings(pours=options.pours, iterations=options.iterations, risk=options.risk)
     cups = cups_of(options.cups)
-    calibration = Calibration.open(run)
-    criticism = criticism_of(calibration)
+    with working_in_run(run):
+        calibration = Calibration.open(run)
+        criticism = criticism_of(calibration)
     with compute.executor() as executor:
         chosen = choose_pour(
             criticism or calibration,

@@ -15,9 +15,9 @@ from scipy.special import ndtr, ndtri
 
 from .._float64 import in_float64
 from ..arguments import checked_number
+from ..gp.namespaces import log_sum_exp
 from ..gp.optimise import minimise_in_box
 from ..gp.process import predict, predict_joint
-from ..namespaces import log_sum_exp
 from ..surrogates.base import Surrogate
 from ..surrogates.feasibility import Feasibility, log_feasible
 from .screen import ROUNDS, screen

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import ndtr, ndtri
 
-from ..namespaces import log_sum_exp
+from ..gp.namespaces import log_sum_exp
 from ..sampling.mixture import log_prior
 from ..sobol import sobol
 

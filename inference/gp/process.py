@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import get_lapack_funcs
 
 from ..arguments import checked_points
-from ..namespaces import namespace, ndtri
+from .namespaces import namespace, ndtri
 
 TREND_SD = 3.0
 """Prior sd of a trend's coefficient, in units of the targets' sd: broad, yet proper."""

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..namespaces import log_sum_exp, namespace
+from ..gp.namespaces import log_sum_exp, namespace
 
 COMPONENTS = 8
 DEGREES_OF_FREEDOM = 6  # even: tails heavier than a posterior's, at little cost near it

@@ -11,8 +11,8 @@ from numpyro.infer.hmc import HMCState, hmc
 from numpyro.infer.util import ParamInfo
 from scipy.special import ndtr, ndtri
 
-from ..compilation_cache import kept_compilations
 from ..types import LogLikelihood
+from .compilation_cache import kept_compilations
 from .importance import explore
 from .mixture import UNIFORMS, Mixture, fit_mixture, propose
 from .mixture import log_density as log_mixture

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..namespaces import ndtr
+from ..gp.namespaces import ndtr
 from ..types import LogLikelihood
 from .mixture import log_prior
 

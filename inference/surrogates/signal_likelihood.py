@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..gp.namespaces import log_sum_exp, namespace
 from ..gp.process import GP, padded, padded_rows, predict
-from ..namespaces import log_sum_exp, namespace
 
 SCORES_TOGETHER = 4  # scores of padded states are counted in fours
 WALL = 0.01  # of prior quantiles, beyond a box, over which the likelihood vanishes

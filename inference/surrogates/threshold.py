@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.special import ndtr, ndtri, owens_t
 
+from ..gp.namespaces import log_ndtr, log_sum_exp, namespace
 from ..gp.process import GP, padded, padded_rows, predict
-from ..namespaces import log_ndtr, log_sum_exp, namespace
 from .transform import Transform
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from arviz_stats.base import array_stats
 from bolfi_liquids.inference._float64 import in_float64
-from bolfi_liquids.inference.namespaces import log_sum_exp, namespace
+from bolfi_liquids.inference.gp.namespaces import log_sum_exp, namespace
 from bolfi_liquids.inference.sampling import draw as sampling
 from bolfi_liquids.inference.sampling import nuts, quadrature
 from bolfi_liquids.inference.sampling.convergence import Status, limits

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bolfi_liquids.inference._float64 import in_float64
-from bolfi_liquids.inference.namespaces import log_sum_exp
+from bolfi_liquids.inference.gp.namespaces import log_sum_exp
 from bolfi_liquids.inference.sampling import quadrature
 from bolfi_liquids.inference.sampling.target import Length, Target
 from scipy.stats import chisquare, norm

@@ -62,7 +62,7 @@ def test_equal_discrepancies_are_learned_as_flat(value):
     mean, _ = found.predict(np.random.default_rng(2).uniform(size=(50, 2)))
     assert np.ptp(found.transform.inverse(mean)) < 1e-9 * value
     assert found.warnings() == ["all simulations are equal: the data cannot tell parameters apart"]
-    other = learn(u, u.sum(1), 64, previous=found)  # and then they are not
+    other = learn(u, u.sum(1), previous=found)  # and then they are not
     assert np.ptp(other.predict(u)[0]) > 0.1
 
 
@@ -75,7 +75,7 @@ def test_a_discrepancy_outside_the_transform_changes_it():
     values[3] = -1.0
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert learn(u, values, 64, previous=found).transform.name == "identity"
+        assert learn(u, values, previous=found).transform.name == "identity"
 
 
 def test_minimum_and_threshold_agree_with_a_grid():

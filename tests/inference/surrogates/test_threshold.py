@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from bolfi_liquids.inference.namespaces import log_ndtr
+from bolfi_liquids.inference.gp.namespaces import log_ndtr
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.discrepancy import learn, with_threshold
 from bolfi_liquids.inference.surrogates.threshold import log_both_below, log_likelihood
