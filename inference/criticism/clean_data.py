@@ -50,14 +50,13 @@ def own_residual(
         whole = everywhere(len(prior))
         made = laboratory.run("start", study.points(whole, (), plan.start))
         runs = [made]
-        fitted = study.hypothesis((), made, whole)
-        before = fitted.u
+        fits = [study.hypothesis((), made, whole)]
         for attempt in range(CLEAN_PASSES):
-            before = fitted.u
-            at_best = {name: np.full(CLEAN_RUNS, value) for name, value in fitted.best.items()}
+            at_best = {name: np.full(CLEAN_RUNS, value) for name, value in fits[-1].best.items()}
             made = laboratory.run(f"best {attempt}", at_best)
             runs.append(made)
-            fitted = study.hypothesis((), joined(runs), whole)
-        now, then = fitted.expected(np.stack([fitted.u, before]))
+            fits.append(study.hypothesis((), joined(runs), whole))
+        before, fitted = fits[-2:]
+        now, then = fitted.expected(np.stack([fitted.u, before.u]))
         moved = fitted.surrogate.output.restore((now - then)[None])[0]
     return OwnResidual(experiment.observed - made.signals.mean(0) - moved, fitted.best)
