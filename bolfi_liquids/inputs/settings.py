@@ -245,7 +245,7 @@ class CriticismSettings:
         """
         from ..inference.criticism import Plan
 
-        return Plan(base=4, look=2, refit=4, refits=3, most=72)
+        return Plan(base=4, look=2, refit=4, refits=3, held_out=3, most=72)
 
     @property
     def pour_plan(self) -> "Plan":

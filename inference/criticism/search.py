@@ -26,14 +26,13 @@ from .prior_boxes import (
 from .run_table import Runs, joined
 from .signatures import Signature, signature
 from .simulate import AllRunsFailed, Laboratory
-from .verdict import TIE_MARGIN, Candidate, near_best
+from .verdict import FAR_BEHIND, TIE_MARGIN, Candidate, near_best
 
 BASE_PASSES = 6  # of runs of the base model, those after the first only until the fit is settled
-REFIT_PASSES = 6  # and of an explanation
+REFIT_PASSES = 4  # and of an explanation
 MAX_DOUBT = 1.0  # of a settled fit: emulator's variance over all variance, summed over the data
 SIDE_SHARES = (0.7, 0.35)  # of the prior quantiles from neutral to an end: where effects are tried
 MIN_EFFECT_RUNS = 2
-FAR_BEHIND = 0.5  # of the best gain, below which a refit ends
 LOOK = "look"  # phase in which effects act all over the box of their base parameters
 SECOND_EFFECT_GAIN = 6.0  # log likelihood that a second effect must gain
 
@@ -286,6 +285,8 @@ class Search:
                 done = one.passes and settled(gained, one.hypothesis, boxes[one.names])
                 if one.gain + abs(gained) > due and not done:
                     candidates.append(one)
+            if not candidates:
+                break
 
     def together(self, names: tuple[str, ...]) -> Candidate:
         """Effects that were simulated one by one, as if together: wherever any of them was."""

@@ -10,6 +10,7 @@ from .misfit import Check
 REJECTION_LEVEL = 0.05  # p-value below which the base model is rejected
 ACCEPTANCE_LEVEL = 0.01  # p-value above which an extended model is not
 MIN_GAIN = 2.0  # log likelihood below which an effect explains nothing
+FAR_BEHIND = 0.5  # of the best gain, below which one that does not pass is not worth more runs
 TIE_MARGIN = 4.0  # log likelihood by which one explanation must excel another
 
 
@@ -90,8 +91,10 @@ class Verdict:
 
 def near_best(candidates: Sequence[Candidate], count: int) -> list[Candidate]:
     """Those worth a refit, best first."""
-    ranked = [c for c in sorted(candidates, key=lambda c: -c.gain) if c.gain > 0.0]
-    # after the best, one that passes already must be looked at, however far behind
+    least = FAR_BEHIND * max((c.gain for c in candidates), default=0.0)
+    # one that passes already must be looked at, however far behind
+    worth = [c for c in candidates if c.gain > max(least, 0.0) or c.passes]
+    ranked = sorted(worth, key=lambda c: -c.gain)
     return ranked[:1] + sorted(ranked[1:], key=lambda c: (not c.passes, -c.gain))[: count - 1]
 
 

@@ -27,33 +27,6 @@ PRIOR_RUNS = 5.0  # runs that speak for uncorrelated scores
 ROUNDING_VARIANCE = 1e-24  # variance of standardised outputs that counts as none
 
 
-class Emulator(NamedTuple):
-    """What simulations teach of the output, whatever was observed.
-
-    Attributes:
-        gp: One process for each of k scores; the empty ones are flat.
-        basis: Of the outputs.
-        remainder: Covariance of what the components leave.
-        noise: Covariance [k, k] of the scores' run-to-run noise, beyond the remainder's.
-        outputs: What was learned from [n, m].
-        learned_at: Simulations known when components and hyperparameters were found.
-        excess: Of those simulations' scores, see `absorbed_noise` [k].
-    """
-
-    gp: GP
-    basis: Basis
-    remainder: Remainder
-    noise: np.ndarray
-    outputs: np.ndarray
-    learned_at: int
-    excess: np.ndarray
-
-    @property
-    def equal(self) -> bool:
-        """Whether all outputs are the same."""
-        return self.basis.used == 0 and self.remainder.total == 0.0
-
-
 class Limits(NamedTuple):
     """How much an emulator may hold.
 
@@ -65,6 +38,35 @@ class Limits(NamedTuple):
 
     components: int
     predicted: float | None = PREDICTED_SHARE
+
+
+class Emulator(NamedTuple):
+    """What simulations teach of the output, whatever was observed.
+
+    Attributes:
+        gp: One process for each of k scores; the empty ones are flat.
+        basis: Of the outputs.
+        remainder: Covariance of what the components leave.
+        noise: Covariance [k, k] of the scores' run-to-run noise, beyond the remainder's.
+        outputs: What was learned from [n, m].
+        learned_at: Simulations known when components and hyperparameters were found.
+        excess: Of those simulations' scores, see `absorbed_noise` [k].
+        limits: How much it may hold.
+    """
+
+    gp: GP
+    basis: Basis
+    remainder: Remainder
+    noise: np.ndarray
+    outputs: np.ndarray
+    learned_at: int
+    excess: np.ndarray
+    limits: Limits
+
+    @property
+    def equal(self) -> bool:
+        """Whether all outputs are the same."""
+        return self.basis.used == 0 and self.remainder.total == 0.0
 
 
 @in_float64
@@ -104,7 +106,7 @@ def emulate(
         gp = condition(hyper, Data(u, _targets(basis, outputs, n, excess), normal))
     remainder = left_over(basis, np.exp(2.0 * gp.hyper.log_noise), remainder, excess)
     noise = run_to_run(gp, basis, remainder.white, n)
-    return Emulator(gp, basis, remainder, noise, outputs, learned_at, excess)
+    return Emulator(gp, basis, remainder, noise, outputs, learned_at, excess, limits)
 
 
 def _taught(basis: Basis, data: Data, predicted: float | None) -> tuple[Basis, Hyper]:

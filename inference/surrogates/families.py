@@ -1,7 +1,7 @@
 """The families of surrogates: what a user may choose of each, and how it learns."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -13,7 +13,6 @@ from .base import Surrogate
 from .discrepancy import DiscrepancySurrogate, learn, marginalised, with_threshold
 from .emulator import PREDICTED_SHARE, Limits, emulate
 from .given_noise import GivenNoise, given_noise
-from .held_back import held_back
 from .outliers import sane
 from .output_vectors import Output, Summary, describe, summarise
 from .signal import SignalSurrogate, observe
@@ -223,9 +222,7 @@ class SignalLearner:
 
     def finish(self, known: Learnable, seed: int) -> Surrogate:
         """The surrogate on which a fit rests."""
-        learned = self.learn(known, None)
-        last = held_back(learned.emulator, self.output.scale, self.family.predicted)
-        return replace(learned, held_back=last)
+        return self.learn(known, None)
 
 
 Family = DiscrepancyFamily | SignalFamily

@@ -6,13 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .._float64 import in_float64
-from .emulator import (
-    Emulator,
-    Limits,
-    beyond_components,
-    emulate,
-    innovations,
-)
+from .emulator import Emulator, beyond_components, emulate, innovations
 
 FIRST_SHARE = 2.0 / 3.0  # share of the runs from which the others are predicted
 # First runs: with fewer the hyperparameters are unreliable.
@@ -35,9 +29,7 @@ class HeldBack(NamedTuple):
 
 
 @in_float64
-def held_back(
-    emulator: Emulator, scale: Callable[[np.ndarray], np.ndarray], predicted: float | None
-) -> HeldBack:
+def held_back(emulator: Emulator, scale: Callable[[np.ndarray], np.ndarray]) -> HeldBack:
     """Errors of the last runs, predicted from those before them.
 
     Leave-one-out errors keep the components and hyperparameters that all runs gave, so they are
@@ -48,7 +40,7 @@ def held_back(
 
     Args:
         emulator: Of all runs, in the order in which they became known.
-        scale, predicted: As for `emulate`.
+        scale: As for `emulate`.
     """
     outputs, data = emulator.outputs, emulator.gp.data
     n, k = len(outputs), emulator.basis.vectors.shape[1]
@@ -60,8 +52,7 @@ def held_back(
     within = np.all((u >= low) & (u <= high), axis=1) & (np.arange(n) >= first)
     if first < MIN_FIRST_RUNS or freedom < 1 or not within.any():
         return HeldBack(errors, freedom)
-    limits = Limits(k, predicted)
-    early = emulate(u[:first], outputs[:first], scale, limits, None, data.normal)
+    early = emulate(u[:first], outputs[:first], scale, emulator.limits, None, data.normal)
     errors[within, : early.basis.used] = innovations(early, u[within], outputs[within])
     errors[within, k] = beyond_components(early, outputs[within])
     return HeldBack(errors, freedom)

@@ -18,7 +18,7 @@ from .emulator import (
     predictive_draws,
 )
 from .given_noise import GivenNoise
-from .held_back import HeldBack
+from .held_back import HeldBack, held_back
 from .measurement_noise import (
     NO_MEASUREMENT_NOISE,
     Nodes,
@@ -61,7 +61,6 @@ class SignalSurrogate:
             size 0 where there is none or it is known: one, or as many as covariances that the
             noise may have.
         reduced: The observed scores at each, with the scores' run-to-run noise.
-        held_back: Errors of the last simulations; None while simulations are being chosen.
         box: Ends [d], [d] in prior quantiles of the box outside of which the likelihood vanishes;
             None is everywhere. Where hardly anything was simulated, the emulator knows least, and
             what it does not know counts as noise that explains anything.
@@ -73,7 +72,6 @@ class SignalSurrogate:
     known: GivenNoise | None
     nodes: Nodes
     reduced: Reduced
-    held_back: HeldBack | None = None
     box: tuple[np.ndarray, np.ndarray] | None = None
 
     @property
@@ -84,6 +82,11 @@ class SignalSurrogate:
     @in_float64
     def state(self) -> SignalState:
         return state_of(self.emulator, self.reduced, self.box)
+
+    @cached_property
+    def held_back(self) -> HeldBack:
+        """Errors of the last simulations."""
+        return held_back(self.emulator, self.output.scale)
 
     @property
     def log_likelihood(self) -> LogLikelihood:
@@ -142,19 +145,15 @@ class SignalSurrogate:
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised errors: leave-one-out ones `loo_z` [n, components in use], and `foretold_z`
         [n, components + 1], see `HeldBack`."""
-        loo = {"loo_z": loo_errors(self.emulator)}
-        return loo if self.held_back is None else {**loo, "foretold_z": self.held_back.errors}
+        return {"loo_z": loo_errors(self.emulator), "foretold_z": self.held_back.errors}
 
     @in_float64
     def warnings(self) -> list[str]:
         """What the emulator's own checks complain of."""
         if self.emulator.basis.used == 0:
             return [EQUAL if self.emulator.equal else UNPREDICTED]
-        said = complaints(loo_errors(self.emulator), "output") + noise_warnings(
-            noise_share(self.emulator)
-        )
-        if self.held_back is not None:
-            said += held_back_warnings(self.held_back)
+        said = complaints(loo_errors(self.emulator), "output")
+        said += noise_warnings(noise_share(self.emulator)) + held_back_warnings(self.held_back)
         return [OUTSIDE, *said] if self._outside() else said
 
     def _outside(self) -> bool:

@@ -35,7 +35,7 @@ def gathered(seed, n=20):
 
 
 def errors(u, outputs, predicted=0.3):
-    return held_back(emulate(u, outputs, scale, Limits(COMPONENTS)), scale, predicted)
+    return held_back(emulate(u, outputs, scale, Limits(COMPONENTS, predicted)), scale)
 
 
 def test_a_smooth_simulator_hardly_ever_surprises():
