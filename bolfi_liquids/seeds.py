@@ -32,7 +32,6 @@ class Phase(Enum):
     TRUTHS = "liquids of the study"
     TRUTH_STIRS = "stirs and pours of a liquid of the study"
     UNKNOWING = "draws of the prior"
-    WARM_UP = "signals that compile"
 
 
 def generator(seed: int, phase: Phase, *numbers: int) -> np.random.Generator:

@@ -209,8 +209,6 @@ class Fit:
         quadrature differ by more than chance explains, a `SamplingWarning` says so, and so
         does `status`.
 
-        A second fit whose arrays have equal shapes compiles nothing anew.
-
         Args:
             sampler: "nuts", "emcee" or "quadrature".
             chains: Independent chains, at least 2, for R-hat needs them, and at most 1000.

@@ -23,7 +23,6 @@ CONTROLLED = {"arm", "emulator", "robot"}  # fixtures of tests that talk to an e
 MOST_REPEATS = 3  # of a session; with more of them, tests hide what fails
 CALM, MOST_CALM = 1.0, 30.0  # s, without a stall before a repetition; and waited for at most
 REPEATED = pytest.StashKey[list[str]]()
-MOST_MEMORY = 2.5e9  # bytes, beyond which a process forgets what JAX has compiled
 STALL = 0.03  # s; a watchdog of 0.1 s and several processes wait for each other
 
 
@@ -36,7 +35,7 @@ def pytest_configure(config):
     config.stash[REPEATED] = []
     # several processes with a thread of BLAS for each processor: it solved twenty times as slowly
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # many processes compile the same functions: half of the time of the engine's tests
+    # many processes compile the same functions
     if hasattr(config, "cache"):
         os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(config.cache.mkdir("jax")))
         os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
@@ -99,14 +98,6 @@ def _figures_are_closed():
     yield
     if "matplotlib.pyplot" in sys.modules:
         sys.modules["matplotlib.pyplot"].close("all")
-
-
-def pytest_runtest_teardown(item, nextitem):
-    """Compiled functions of all tests together take several gigabytes in each process."""
-    if nextitem is not None and nextitem.path == item.path:
-        return
-    if "jax" in sys.modules and psutil.Process().memory_info().rss > MOST_MEMORY:
-        sys.modules["jax"].clear_caches()
 
 
 def pytest_runtest_protocol(item, nextitem):

@@ -15,8 +15,9 @@ from .stirs import camera_noise, same_experiment, stir_experiment
 if TYPE_CHECKING:
     from ..calibration.stir_simulator import Stirring
     from ..inference import Prior
-    from ..inference.criticism import Extension, Keeping, Plan, UsualResidual
+    from ..inference.criticism import Extension, Keeping, UsualResidual
 
+STARTING_RUNS = 4  # of each clean recording, all over the prior; as many follow near the best
 VISCOSITY_FACTOR = 2.0  # over which the simulator's error changes
 
 
@@ -43,7 +44,6 @@ def clean_residuals(
     prior: "Prior",
     extensions: "dict[str, Extension]",
     *,
-    plan: "Plan",
     keeping: "Keeping",
 ) -> list[Clean]:
     """Calibrate the simulator on each of them in turn.
@@ -64,7 +64,7 @@ def clean_residuals(
         experiment = stir_experiment(stirring_of([recording], particles), cameras, None, name)
         # with one seed for all, no criticism in this run simulates what another did
         own = replace(keeping, seed=0, report=report)
-        left = own_residual(experiment, prior, extensions, own, plan)
+        left = own_residual(experiment, prior, extensions, own, STARTING_RUNS)
         return Clean(recording, left.residual, left.best.get("viscosity"), sum(made))
 
     return [learn(recording) for recording in recordings]

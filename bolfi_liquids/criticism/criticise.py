@@ -156,7 +156,6 @@ def _find(
         inputs.stirring.setups[0].particles,
         calibration.prior,
         effects_of("stir"),
-        plan=inputs.settings.clean_plan,
         keeping=keeping,
     )
     cameras = camera_noise(inputs.stirring.recordings)

@@ -210,6 +210,7 @@ def criticism_of(base: Calibration) -> Criticism | None:
 
 def finished_criticism(base: Calibration, made_from: Mapping[str, Any]) -> Criticism | None:
     """The criticism of a calibration if it was finished and made from just this; else None."""
+    read_summary(base.path)  # a damaged one is refused now, not after the simulations
     try:
         found = criticism_of(base)
     except InputError:  # of another version, damaged or unfinished: it is made again

@@ -239,10 +239,7 @@ class CriticismSettings:
 
     @property
     def stir_plan(self) -> "Plan":
-        """Runs of each step for stirs.
-
-        Of twelve effects and three baselines, some 100 in all.
-        """
+        """Runs of each step for stirs: usually 70 to 100 in all, three baselines included."""
         from ..inference.criticism import Plan
 
         return Plan(base=4, look=2, refit=4, refits=3, held_out=3, most=72)
@@ -253,10 +250,3 @@ class CriticismSettings:
         from ..inference.criticism import Plan
 
         return Plan(start=12, look=2, refit=4, refits=3)
-
-    @property
-    def clean_plan(self) -> "Plan":
-        """Runs of each step for each clean recording."""
-        from ..inference.criticism import Plan
-
-        return Plan(start=4)

@@ -2,7 +2,7 @@
 
 Every simulation is of the whole plan and made once. After a stroke, what was observed is NaN from
 there on, so that the discrepancy is the paper's integral up to that time,
-Delta(t) = int_0^t (y - y~)^2 dt, and no array changes its shape: nothing is compiled anew.
+Delta(t) = int_0^t (y - y~)^2 dt.
 """
 
 import time
@@ -20,7 +20,7 @@ from ..inputs.frame import frame_faults
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from ..models import stirring_error
 from ..pouring.landing_map import LandingMap
-from ..seeds import Phase, generator, simulation_seeds
+from ..seeds import Phase, simulation_seeds
 from .plan import Followed
 from .settings import OnlineSettings
 
@@ -228,23 +228,6 @@ def enough(estimate: OnlineEstimate, settings: OnlineSettings) -> bool:
     bound = settings.stop == "bound"
     spillage = estimate.spillage_q95 if bound else estimate.expected_spillage
     return estimate.strokes >= settings.least_strokes and spillage < settings.target
-
-
-def warm_up(problem: Problem, landing_map: LandingMap) -> None:
-    """Compile all that estimates and proposals need, on signals made up for that."""
-    rng = generator(0, Phase.WARM_UP)
-    n = problem.settings.design
-    theta = problem.prior.from_unit(rng.random((n, len(problem.prior))))
-    time_ = problem.stirring.time
-    rate = 1.0 + theta[problem.prior.names[0]] ** 0.1
-    waves = 0.1 * np.sin(np.outer(rate, time_))[..., None] * np.ones(problem.shape[1])
-    made = Made(theta, waves + rng.normal(0.0, 0.01, waves.shape), np.arange(n))
-    for part in (len(time_) // 2, len(time_)):
-        observed = made.signals[0].copy()
-        observed[part:] = np.nan
-        followed = Followed(observed, 1, float(time_[part - 1]), 0.0, 0.0, "")
-        estimate(problem, made, followed, landing_map, 0.0)
-        proposals(problem, made, observed, n, problem.settings.in_flight)
 
 
 def _engine(problem: Problem, observed: NDArray, seed: int) -> "Bolfi":

@@ -58,12 +58,12 @@ class _Learner:
         self.followed: Followed | None = None
 
     def prepare(self) -> bool:
-        """Simulate the design; meanwhile learn the map and compile. Whether all went well."""
+        """Simulate the design; meanwhile learn the map. Whether all went well."""
         from ..inference import SimulationBank
         from ..inference.simulations import Keep
         from ..pouring.landed_pours import LandedPours
         from ..pouring.landing_map import map_of_prior
-        from .estimate import design, warm_up
+        from .estimate import design
 
         settings, jobs = self.request.settings, design(self.problem)
         side_by_side = os.cpu_count() or 1  # nothing is urgent before the robot moves
@@ -73,8 +73,6 @@ class _Learner:
         pours = LandedPours(self.request.cups, self.plan.number("liquid_density"))
         with SimulationBank(self.request.bank) as bank:
             self.landing_map = map_of_prior(self.problem.prior, pours, settings.pours, Keep(bank))
-        self._tell(OnlinePhase.PREPARING, "compiling")
-        warm_up(self.problem, self.landing_map)
         while self.flying:
             self._tell(OnlinePhase.PREPARING, "simulating the plan")
             self._land()

@@ -86,8 +86,7 @@ class OnlineCalibration:
 
         The first time the pours take minutes, in this process; everything after that happens in
         two others (they are spawned: a script needs `if __name__ == "__main__":`). Let the robot
-        move when `wait_until_ready` says so: then a design all over the prior is simulated, and
-        everything is compiled.
+        move when `wait_until_ready` says so: then a design all over the prior is simulated.
 
         Args:
             path: Planned: times [s] and gripper positions [m], sampled about as often as the

@@ -36,8 +36,8 @@ class OnlinePhase(StrEnum):
 
 
 _ADVICE = {
-    OnlinePhase.PREPARING: "The design is simulated and everything is compiled. Let the robot move "
-    "after `wait_until_ready`.",
+    OnlinePhase.PREPARING: "The design is simulated and the map of landings learned. Let the robot "
+    "move after `wait_until_ready`.",
     OnlinePhase.READY: "Hand over the recording so far by `update` after each stroke.",
     OnlinePhase.REFUSED: "The last data cannot be used; `status.detail` says why. Earlier "
     "estimates hold, and later data may be used again.",

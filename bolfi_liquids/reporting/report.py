@@ -59,7 +59,8 @@ def report(
         calibration = base_calibration(run)
         refuse_other_model(calibration)
         # before anything is simulated: a damaged file is refused
-        criticism, pour = criticism_of(calibration), pour_of(calibration.path)
+        criticism = run if isinstance(run, Criticism) else criticism_of(calibration)
+        pour = run if isinstance(run, Pour) else pour_of(calibration.path)
         how = {"executor": executor, "timeout": timeout, "progress": progress}
         return written(calibration, criticism, pour, moving=moving, **how)
 

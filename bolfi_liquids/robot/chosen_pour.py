@@ -14,7 +14,7 @@ from ..calibration.result import Calibration
 from ..calibration.summary import FitStatus
 from ..errors import InputError
 from ..inputs.cups import kept_cups
-from ..pouring.result import ActionSummary, Judged, Pour, PourSummary, check_poured, judged
+from ..pouring.result import ActionSummary, Judged, Pour, PourSummary, check_poured
 from ..reporting.warnings import results_of, stale_sentences, warnings_of
 from ..run.directory import POUR, RUN_TOML
 from ..run.summary import SUMMARY_FILE
@@ -122,7 +122,7 @@ def chosen_pour(run: Path) -> ChosenPour:
     refuse_other_model(calibration)
     pour = Pour.open(run)
     results = results_of(calibration, None, pour)
-    chosen, cups = _kept(run, pour.tree)
+    chosen, cups = pour.chosen, _kept_cups(run, pour.tree)
     _check_summary(run, pour.summary, chosen)
     _check_ranges(run, chosen, cups)
     stale = stale_sentences(results)
@@ -133,12 +133,12 @@ def chosen_pour(run: Path) -> ChosenPour:
     return ChosenPour(run, chosen, cups, tuple(stale), is_bad, tuple(worries))
 
 
-def _kept(run: Path, tree: "DataTree") -> "tuple[Judged, Cups]":
-    """The action of pour.nc and the cups that it was chosen for."""
+def _kept_cups(run: Path, tree: "DataTree") -> "Cups":
+    """The cups that the action of pour.nc was chosen for."""
     try:
         for group in GROUPS:
             tree[group]  # KeyError, if it is not there
-        return judged(tree, "chosen"), kept_cups(json.loads(tree.attrs["cups"]))
+        return kept_cups(json.loads(tree.attrs["cups"]))
     except (KeyError, TypeError, ValueError) as err:
         raise InputError(
             "damaged, it holds no whole pour", where=str(run / POUR), fix=_again(run)

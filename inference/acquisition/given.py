@@ -61,7 +61,7 @@ def _check_called(acquisition: Any) -> None:
 def chosen(u: object, shape: tuple[int, int]) -> np.ndarray:
     """The points to ask for, prior quantiles float64 [n, d], from what an acquisition returned.
 
-    They are coarser than rounding errors, so that arrays of another size ask the same.
+    They are coarser than rounding errors, so that another processor asks for the same.
 
     Raises:
         ValueError: of another shape, or not prior quantiles.

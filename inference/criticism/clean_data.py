@@ -29,9 +29,16 @@ class OwnResidual(NamedTuple):
 
 
 def own_residual(
-    experiment: Experiment, prior: Prior, extensions: Extensions, keeping: Keeping, plan: Plan
+    experiment: Experiment,
+    prior: Prior,
+    extensions: Extensions,
+    keeping: Keeping,
+    start: int = Plan.start,
 ) -> OwnResidual:
     """What the calibrated base model leaves of data in which no effect is expected.
+
+    Args:
+        start: Runs all over the prior, before those where the model fits best.
 
     Raises:
         RuntimeError: every simulation failed, or the executor lost its workers.
@@ -46,9 +53,9 @@ def own_residual(
             report=keeping.report,
             shape=experiment.shape,
         )
-        study = Study(laboratory, experiment.observed, experiment.noise, plan)
+        study = Study(laboratory, experiment.observed, experiment.noise, Plan(start=start))
         whole = everywhere(len(prior))
-        made = laboratory.run("start", study.points(whole, (), plan.start))
+        made = laboratory.run("start", study.points(whole, (), start))
         runs = [made]
         fits = [study.hypothesis((), made, whole)]
         for attempt in range(CLEAN_PASSES):

@@ -307,12 +307,12 @@ def _gaps(
     gaps: dict[tuple[str, ...], tuple[Gap, ...]] = {model.names: () for model in models[1:]}
     for one in held_out:
         before, *after = predict(study.laboratory, one, drawn)
-        if before is None:
-            raise AllRunsFailed(f"the base model cannot be simulated for {one.label!r}")
+        if isinstance(before, AllRunsFailed):
+            raise before
         gaps = {
             model.names: (*gaps[model.names], gap(one, before, made, seed))
             for model, made in zip(models[1:], after, strict=True)
-            if made is not None and model.names in gaps
+            if not isinstance(made, AllRunsFailed) and model.names in gaps
         }
     return gaps if held_out else {}
 

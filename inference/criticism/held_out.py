@@ -12,7 +12,7 @@ from .measurement_noise import gaussian, samples
 from .misfit import MODES_PER_CHANNEL, exceedance, orthonormal, slow_modes
 from .run_noise import errors_of, smooth_covariance
 from .run_table import Runs
-from .simulate import Laboratory
+from .simulate import AllRunsFailed, Laboratory
 from .usual_residual import usual_rms, without_usual
 from .verdict import ACCEPTANCE_LEVEL
 
@@ -81,12 +81,12 @@ def holds(gaps: Sequence[Gap]) -> bool:
 
 def predict(
     laboratory: Laboratory, experiment: Experiment, thetas: Sequence[Mapping[str, np.ndarray]]
-) -> list[np.ndarray | None]:
+) -> list[np.ndarray | AllRunsFailed]:
     """Simulated outputs of another experiment at each model's posterior draws, finite samples only
-    [k, n]; None where all runs failed."""
+    [k, n]; why there are none where all runs failed."""
     made = laboratory.of(experiment).run_each(f"held out {experiment.label}", thetas)
     there = np.isfinite(experiment.observed)
-    return [of.signals[:, there] if isinstance(of, Runs) else None for of in made]
+    return [of.signals[:, there] if isinstance(of, Runs) else of for of in made]
 
 
 @in_float64

@@ -1,6 +1,7 @@
 """Which further experiment would tell explanations apart."""
 
 from collections.abc import Sequence
+from functools import reduce
 from itertools import combinations
 from typing import NamedTuple
 
@@ -55,9 +56,11 @@ def _separation(
         for rival in rivals
     ]
     made = laboratory.of(proposal).run_each(f"next {proposal.label}", best)
-    signals = [of.signals.reshape(len(of), -1) for of in made if isinstance(of, Runs)]
-    if len(signals) < len(rivals):
+    runs = [of for of in made if isinstance(of, Runs)]
+    common = reduce(np.intersect1d, [of.seeds for of in runs]) if len(runs) == len(rivals) else []
+    if not len(common):
         return None
+    signals = [of.signals[np.isin(of.seeds, common)].reshape(len(common), -1) for of in runs]
     snr = {
         (names[a], names[b]): _distance(proposal, signals, a, b)
         for a, b in combinations(range(len(rivals)), 2)
@@ -69,7 +72,12 @@ def _separation(
 @in_float64
 def _distance(proposal: Proposal, signals: Sequence[np.ndarray], a: int, b: int) -> float:
     """Length of the whitened difference of two means in its slow part, less what the noise of
-    the runs adds to it."""
+    the runs adds to it.
+
+    Args:
+        signals: Of each rival [k, n], the k-th of all with the same seed: so what they differ by may
+            be less noisy than each.
+    """
     at = samples(np.zeros(proposal.shape))
     series = proposal.shape[0] >= MIN_SERIES
     runs = smooth_covariance(errors_of(signals), at, series)
@@ -77,8 +85,9 @@ def _distance(proposal: Proposal, signals: Sequence[np.ndarray], a: int, b: int)
     factor = np.linalg.cholesky(covariance)
     modes = slow_modes(at, MODES_PER_CHANNEL) if series else np.eye(len(at.sample))
     span = orthonormal(np.linalg.solve(factor, modes))
-    difference = signals[a].mean(0) - signals[b].mean(0)
-    length = np.sum((span.T @ np.linalg.solve(factor, difference)) ** 2)
-    white = np.linalg.solve(factor, np.linalg.solve(factor, runs).T)
-    own = np.trace(span.T @ white @ span) * (1.0 / len(signals[a]) + 1.0 / len(signals[b]))
+    difference = signals[a] - signals[b]
+    length = np.sum((span.T @ np.linalg.solve(factor, difference.mean(0))) ** 2)
+    noise = smooth_covariance(errors_of([difference]), at, series)
+    white = np.linalg.solve(factor, np.linalg.solve(factor, noise).T)
+    own = np.trace(span.T @ white @ span) / len(difference)
     return float(np.sqrt(max(length - own, 0.0)))

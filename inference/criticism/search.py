@@ -33,7 +33,7 @@ REFIT_PASSES = 4  # and of an explanation
 MAX_DOUBT = 1.0  # of a settled fit: emulator's variance over all variance, summed over the data
 SIDE_SHARES = (0.7, 0.35)  # of the prior quantiles from neutral to an end: where effects are tried
 MIN_EFFECT_RUNS = 2
-LOOK = "look"  # phase in which effects act all over the box of their base parameters
+LOOK = "look"  # phase of the first runs of effects where they seem to fit best
 SECOND_EFFECT_GAIN = 6.0  # log likelihood that a second effect must gain
 
 
@@ -42,11 +42,12 @@ class Plan:
     """How many runs each step may make.
 
     Attributes:
-        base: Of the base model, near where it fits best, beside those there are already.
+        base: Of the base model, near where it fits best, in each of up to six passes, beside
+            those there are already.
         start: Of the base model all over the prior, where there are none yet.
         extension: Of each effect, and of the base model with the same parameters and seeds.
         look: Of each of twice as many effects as are refitted, where they seem to fit best.
-        refit: Near the best parameters of a near-best explanation, once or twice.
+        refit: Near the best parameters of a near-best explanation, in each of up to four passes.
         refits: Explanations that are refitted, and pairs of effects after them.
         held_out: Of each model for each held-out data set.
         most: Of looks and refits together; those beyond are left out.
@@ -63,7 +64,8 @@ class Plan:
 
     def __post_init__(self) -> None:
         for name, count in vars(self).items():
-            checked_integer(name, count, 0 if name in ("look", "refits", "most") else 1)
+            least = {"look": 0, "refits": 0, "most": 0, "extension": MIN_EFFECT_RUNS}
+            checked_integer(name, count, least.get(name, 1))
 
 
 class Study(NamedTuple):
@@ -216,10 +218,9 @@ def explain(
     search.refit(near_best(search.singles, plan.refits))
     if not any(one.accepted for one in search.singles):
         search.try_pairs()
-    if forced and not (forced in search.found and search.found[forced].refitted):
-        search.limited = False
-        search.refit([search.together(forced)])
-    accepted = [one for one in search.found.values() if one.accepted]
+    accepted = [one for one in search.found.values() if one.accepted]  # whatever is forced
+    if forced:
+        search.force(forced)
     return list(search.found.values()), [one for one in accepted if len(one.names) == 1] or accepted
 
 
@@ -288,6 +289,14 @@ class Search:
             if not candidates:
                 break
 
+    def force(self, names: tuple[str, ...]) -> None:
+        """Refit the explanation by just these effects, whatever its rank."""
+        known = (one for one in self.found.values() if set(one.names) == set(names))
+        one = next(known, None) or self.together(names)
+        if not one.refitted:
+            self.found[one.names], self.limited = one, False
+            self.refit([one])
+
     def together(self, names: tuple[str, ...]) -> Candidate:
         """Effects that were simulated one by one, as if together: wherever any of them was."""
         study, base, box = self.study, self.base, self.base.box
@@ -315,7 +324,8 @@ class Search:
         self.found |= {one.names: one for one in pairs}
         self.refit(pairs)
         tried = [self.found[one.names] for one in pairs]
-        alone = [self.found[(name,)] for one in tried if one.accepted for name in one.names]
+        named = dict.fromkeys(name for one in tried if one.accepted for name in one.names)
+        alone = [self.found[(name,)] for name in named]
         self.refit([one for one in alone if not one.refitted])
         for one in tried:
             best_alone = max(self.found[(name,)].gain for name in one.names)

@@ -95,7 +95,8 @@ def near_best(candidates: Sequence[Candidate], count: int) -> list[Candidate]:
     # one that passes already must be looked at, however far behind
     worth = [c for c in candidates if c.gain > max(least, 0.0) or c.passes]
     ranked = sorted(worth, key=lambda c: -c.gain)
-    return ranked[:1] + sorted(ranked[1:], key=lambda c: (not c.passes, -c.gain))[: count - 1]
+    others = sorted(ranked[1:], key=lambda c: (not c.passes, -c.gain))
+    return (ranked[:1] + others)[:count]
 
 
 def tied(candidates: Sequence[Candidate]) -> list[Candidate]:

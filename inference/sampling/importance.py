@@ -34,7 +34,6 @@ class Population(NamedTuple):
     """
 
     x: np.ndarray  # [n, d]
-    log_likelihood: np.ndarray  # [n]
     log_weights: np.ndarray  # [n]; their logsumexp estimates the log evidence; -inf: not used
     mixture: Mixture
     log_proposal: np.ndarray  # [n], log density of the mixture
@@ -54,9 +53,9 @@ class _Points(NamedTuple):
 def explore(rng: np.random.Generator, target: Target) -> Population:
     """Weighted points of the posterior, and what proposes more of them.
 
-    About 1500 to 2500 evaluations, in batches of 256; up to 4096 for posteriors so narrow
-    that they must be approached in steps. A log likelihood that is not finite counts as zero
-    likelihood.
+    About 1500 to 2500 evaluations, the first 1024 in one call, then 256 a round; up to 4096 for
+    posteriors so narrow that they must be approached in steps. A log likelihood that is not finite
+    counts as zero likelihood.
 
     Raises:
         ValueError: the log likelihood was finite nowhere.
@@ -84,9 +83,7 @@ def explore(rng: np.random.Generator, target: Target) -> Population:
         now = now._replace(log_mass=np.logaddexp(now.log_mass, log_share))
     weights = now.log_weights()
     proposed = log_density(mixtures[-1], now.x)
-    return Population(
-        now.x, now.log_likelihood, weights, mixtures[-1], proposed, _effective(weights)
-    )
+    return Population(now.x, weights, mixtures[-1], proposed, _effective(weights))
 
 
 def _inside(u: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ..arguments import Unusable, checked_integer, float64
+from ..arguments import Unusable, checked_integer, checked_mapping, float64
 from ..types import Simulator, SingleSimulator
 from .bank import Simulation
 from .failures import Failure, kind, raised, timed_out, unusable
@@ -168,7 +168,7 @@ def run_batch(
         shape: Of one signal; None accepts any.
         timeout: Seconds per job that the call may take, see `within`.
     """
-    neutral = _told_by(simulate, "neutral", {})
+    neutral = neutral_of(simulate)
     named = [frozenset(job.theta.keys() - neutral.keys()) for job in batch]
     if len(set(named)) > 1:
         found: dict[int, Simulation] = {}
@@ -240,6 +240,18 @@ def most_together(simulate: Simulator | SingleSimulator) -> int:
         ValueError: `together` is not a whole number from 1 on.
     """
     return checked_integer("the simulator's `together`", _told_by(simulate, "together", 1))
+
+
+def neutral_of(simulate: Simulator | SingleSimulator) -> Mapping[str, float]:
+    """Values at which parameters change nothing: the attribute `neutral` of a simulator, or of the
+    object whose method it is; none without it.
+
+    Raises:
+        ValueError: `neutral` does not map names to numbers.
+    """
+    return checked_mapping(
+        "the simulator's `neutral`", _told_by(simulate, "neutral", {}), "numbers"
+    )
 
 
 def _told_by(simulate: Simulator | SingleSimulator, name: str, default: Any) -> Any:

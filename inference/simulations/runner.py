@@ -12,7 +12,16 @@ from ..types import Simulator
 from .bank import Simulation, SimulationBank
 from .executors import killed_its_worker, workers_of
 from .failures import Failure, NoSignals, kind, raised, unusable
-from .job import BATCH, Job, OneByOne, is_unusable, most_together, of_one_shape, run_batch
+from .job import (
+    BATCH,
+    Job,
+    OneByOne,
+    is_unusable,
+    most_together,
+    neutral_of,
+    of_one_shape,
+    run_batch,
+)
 
 POLL_SECONDS = 0.2  # seconds between looks at what somebody else is simulating
 
@@ -65,11 +74,13 @@ class Runner:
         keep: Where simulations are made and kept; the caller decides on batches.
 
     Raises:
-        ValueError: a batch or timeout that is not positive.
+        ValueError: a batch or timeout that is not positive, or the simulator's `neutral` maps no
+            names.
     """
 
     def __init__(self, simulate: Simulator, keep: Keep):
         check_keep(keep.batch, keep.timeout)
+        neutral_of(simulate)  # refused now, not by a worker
         self.simulate = simulate
         self._misshapen_until = BATCH  # results, whatever the batch; 0 once another came
         self._misshapen = 0

@@ -124,7 +124,7 @@ class DiscrepancySurrogate:
         mean, variance = leave_one_out(self.gp)
         error = self.gp.data.y[0] - mean.mean(0)
         total = variance.mean(0) + mean.var(0)  # of the mixture over hyperparameters
-        return {"loo_z": (error / np.sqrt(total))[:, None]}
+        return {"loo_z": (error / np.sqrt(total))[: len(self.discrepancy), None]}
 
     def warnings(self) -> list[str]:
         """What the leave-one-out errors complain of."""

@@ -173,10 +173,10 @@ def run_to_run(gp: GP, basis: Basis, white: float, n: int) -> np.ndarray:
 
 
 def loo_errors(emulator: Emulator) -> np.ndarray:
-    """Studentised leave-one-out errors of the scores [n, used]."""
+    """Studentised leave-one-out errors of the scores [n, used], of what was simulated."""
     gp = emulator.gp.only(slice(emulator.basis.used))
     mean, variance = leave_one_out(gp)
-    return ((gp.data.y - mean) / np.sqrt(variance)).T
+    return ((gp.data.y - mean) / np.sqrt(variance)).T[: len(emulator.outputs)]
 
 
 def innovations(emulator: Emulator, u: np.ndarray, outputs: np.ndarray) -> np.ndarray:

@@ -44,7 +44,7 @@ def held_back(emulator: Emulator, scale: Callable[[np.ndarray], np.ndarray]) -> 
     """
     outputs, data = emulator.outputs, emulator.gp.data
     n, k = len(outputs), emulator.basis.vectors.shape[1]
-    u, d = data.u, data.u.shape[1]
+    u, d = data.u[:n], data.u.shape[1]
     first = round(FIRST_SHARE * n)
     freedom = first - (1 + 2 * d)  # a process's trend has as many coefficients
     errors = np.full((n, k + 1), np.nan)

@@ -8,7 +8,7 @@ import pytest
 
 from bolfi_liquids import inference
 
-pytestmark = pytest.mark.slow  # one fit compiles for ten seconds
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture

@@ -174,7 +174,6 @@ def _clean(bank: inference.SimulationBank) -> list[Clean]:
         MODEL,
         default_prior(),
         effects_of("stir"),
-        plan=CriticismSettings().clean_plan,
         keeping=criticism.Keeping(bank),
     )
 

@@ -94,8 +94,7 @@ def test_signal_surrogate_is_calibrated(run, task):
 
 @every_task
 def test_signal_surrogate_of_a_shared_design_is_calibrated(toys, task):
-    """One design for all data sets: no acquisition is involved. The fits run here, one by one:
-    each process of a pool would compile the engine for itself."""
+    """One design for all data sets: no acquisition is involved."""
     simulate, prior = toys.TASKS[task]
     options = {"surrogate": "signal"}
     pipeline = inference.shared_design(simulate, prior, BUDGET, options=options, sampling=SAMPLING)

@@ -7,7 +7,7 @@ from bolfi_liquids.inference.criticism.held_out import NOISE_QUANTILE, gap, hold
 from bolfi_liquids.inference.criticism.measurement_noise import samples
 from scipy.stats import binom, norm
 
-pytestmark = pytest.mark.slow  # the engine compiles for seconds for each shape
+pytestmark = pytest.mark.slow
 
 ALPHA = 1e-4  # false alarms per test
 SETS, RUNS, N = 100, 8, 60

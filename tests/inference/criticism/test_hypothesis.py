@@ -15,7 +15,7 @@ from scipy.stats import binom, chi2, norm
 
 from bolfi_liquids import inference
 
-pytestmark = pytest.mark.slow  # one fit compiles for ten seconds
+pytestmark = pytest.mark.slow
 
 ALPHA = 1e-4  # false alarms per test
 EMULATORS, RUNS = 20, 8

@@ -18,7 +18,7 @@ from scipy.stats import binom, kstest, norm
 
 from bolfi_liquids import inference
 
-pytestmark = pytest.mark.slow  # compiling takes half a minute on busy cores
+pytestmark = pytest.mark.slow
 
 ALPHA = 1e-4  # false alarms per test
 BANKS, SETS = 5, 30  # emulators, and data sets for each

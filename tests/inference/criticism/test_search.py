@@ -16,7 +16,7 @@ from bolfi_liquids.inference.criticism.simulate import AllRunsFailed, Laboratory
 
 from bolfi_liquids import inference
 
-pytestmark = pytest.mark.slow  # compiling takes half a minute on busy cores
+pytestmark = pytest.mark.slow
 
 TIME = np.linspace(0.0, 6.0, 60)
 PRIOR = inference.Prior({"frequency": dist.Uniform(2.0, 4.0)})

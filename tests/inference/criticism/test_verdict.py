@@ -196,8 +196,7 @@ class Client:
 
 
 def own_residual(keeping):
-    plan = criticism.Plan()
-    return criticism.own_residual(experiment(np.arange(20.0)), PRIOR, DRAG, keeping, plan)
+    return criticism.own_residual(experiment(np.arange(20.0)), PRIOR, DRAG, keeping)
 
 
 def criticise(keeping):

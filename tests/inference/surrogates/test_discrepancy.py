@@ -6,7 +6,7 @@ from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.discrepancy import learn, marginalised, with_threshold
 from bolfi_liquids.inference.surrogates.transform import Transform, candidates
 
-pytestmark = pytest.mark.slow  # the engine compiles for seconds for each shape
+pytestmark = pytest.mark.slow
 
 
 def bowl(u, rng, power):

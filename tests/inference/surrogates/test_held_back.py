@@ -9,7 +9,7 @@ from bolfi_liquids.inference.surrogates.held_back import MIN_FIRST_RUNS, held_ba
 from bolfi_liquids.inference.surrogates.warnings import held_back_warnings
 from scipy.stats import binom
 
-pytestmark = pytest.mark.slow  # the engine compiles for seconds for each shape
+pytestmark = pytest.mark.slow
 
 TIME = np.linspace(0.0, 2.0, 40)
 NOISE = 0.03
