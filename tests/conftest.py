@@ -10,7 +10,6 @@ import tomllib
 from pathlib import Path
 from threading import Event, Thread
 
-import psutil
 import pytest
 import tomli_w
 from _pytest.runner import runtestprotocol
