@@ -75,8 +75,7 @@ def _distance(proposal: Proposal, signals: Sequence[np.ndarray], a: int, b: int)
     the runs adds to it.
 
     Args:
-        signals: Of each rival [k, n], the k-th of all with the same seed: so what they differ by may
-            be less noisy than each.
+        signals: Of each rival [k, n], the k-th of all with one seed: they may share their noise.
     """
     at = samples(np.zeros(proposal.shape))
     series = proposal.shape[0] >= MIN_SERIES

@@ -207,6 +207,11 @@ def check_believe(of):
     np.testing.assert_allclose(after.predict(POINTS)[0], of.predict(POINTS)[0], atol=1e-6)
     assert (after.predict(POINTS)[1] <= of.predict(POINTS)[1] + 1e-9).all()
     assert len(after.gp.data.u) == RUNS + 2 and len(of.gp.data.u) == RUNS
+    checks = after.checks()
+    assert {len(found) for found in checks.values()} == {
+        RUNS
+    } and checks.keys() == of.checks().keys()
+    assert isinstance(after.warnings(), list)
 
 
 def check_predict(of):

@@ -162,8 +162,15 @@ def test_pours_need_an_effect_that_acts_in_them(calibration, table):
     )
 
 
-def test_a_run_that_was_not_criticised_or_is_damaged_holds_no_finished_criticism(calibration):
+def test_a_run_that_was_not_criticised_holds_no_finished_criticism(calibration):
     assert finished_criticism(calibration, {}) is None
+
+
+def test_a_damaged_summary_is_refused_before_anything_is_simulated(calibration, tmp_path):
+    damaged = replace(calibration, path=tmp_path)
+    (tmp_path / "summary.json").write_text('{"criticise": ')
+    with pytest.raises(InputError, match=r"summary\.json"):
+        finished_criticism(damaged, {})
 
 
 # What the recordings themselves tell of their noise.

@@ -61,6 +61,7 @@ def test_a_criticism_refuses_what_makes_no_sense(argument, value):
         (lambda: criticism.Extension(dist.HalfNormal(1.0), "0"), "neutral"),
         (lambda: criticism.Extension(dist.HalfNormal(1.0), unit=3), "unit"),
         (lambda: criticism.Plan(base=-1), "base"),
+        (lambda: criticism.Plan(extension=1), "extension"),
         (lambda: criticism.Plan(most=None), "most"),
         (lambda: criticism.Keeping(bank="runs.sqlite"), "bank"),
         (lambda: criticism.Keeping(executor=3), "executor"),

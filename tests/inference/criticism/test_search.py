@@ -198,6 +198,23 @@ def test_a_user_may_accept_another_effect_than_is_named(criticised):
     assert found.coefficients["offset"].q05 > 0.0
 
 
+@pytest.mark.parametrize("names", [("offset", "drift"), ("drift", "offset")])
+def test_what_a_user_accepts_changes_no_verdict(criticised, names):
+    found = criticised(experiment(drift=0.06), accept=names)
+    assert found.verdict == criticised(experiment(drift=0.06)).verdict
+    assert found.accepted == names == tuple(found.coefficients)
+    assert found.extended is not None and set(found.extended.names) == set(names)
+
+
+def test_effects_that_fail_together_are_accepted_as_they_are_alone(criticised):
+    def apart(theta, seeds):
+        return None if theta.keys() >= {"drift", "offset"} else oscillate(theta, seeds)
+
+    fitted = replace(experiment(drift=0.06), simulate=apart, identity="apart")
+    found = criticised(fitted, accept=["drift", "offset"])
+    assert found.verdict.effects == ("drift",) and "offset" in repr(found)
+
+
 def test_data_that_lack_nothing_are_let_alone(criticised):
     found = criticised(experiment(seed=2))
     assert found.verdict.kind == "none" and found.accepted == () and found.candidates == ()

@@ -94,7 +94,9 @@ def test_the_best_and_what_fits_already_are_refitted():
     passing = replace(fits, gain=2.5)
     again = near_best([worst, *others, passing], 3)
     assert [one.names for one in again] == [("0",), ("fits",), ("1",)]
-    assert near_best([worst], 3) == []
+    assert near_best([worst], 3) == near_best(others, 0) == []
+    behind = candidate("behind", gain=4.0, p_value=0.001)
+    assert behind not in near_best([*others, behind], 9)
 
 
 # What makes no sense is refused before anything is simulated.

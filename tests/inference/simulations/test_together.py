@@ -60,6 +60,14 @@ def test_what_is_no_number_of_simulations_is_refused(together):
         run(simulator, 4, pool)
 
 
+@pytest.mark.parametrize("neutral", [3, "drag", ["drag"]])
+def test_neutral_values_without_names_are_refused(neutral):
+    simulator = Marching()
+    simulator.neutral = neutral
+    with ThreadPoolExecutor(2) as pool, pytest.raises(ValueError, match="`neutral`"):
+        run(simulator, 4, pool)
+
+
 def test_a_call_may_take_as_many_times_as_long_as_it_makes_simulations():
     """Four that sleep .25 s each: a call that is given less is repeated one by one."""
     calls = []
