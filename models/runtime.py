@@ -20,6 +20,7 @@ import numpy as np
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "False")
 os.environ.setdefault("TI_ENABLE_PYBUF", "0")
 
+THREADS = "TI_CPU_MAX_NUM_THREADS"  # Taichi's variable
 STALE_S = 60.0  # age of a lock that is held for a moment
 CHUNK = 40  # steps in one call of a kernel, a quarter of a second: Ctrl-C waits for its end
 

@@ -14,6 +14,7 @@ from threading import Thread
 from typing import TYPE_CHECKING
 
 from ..errors import Argument, InputError
+from ..models.runtime import THREADS
 
 if TYPE_CHECKING:
     from ..inference.simulations import Workers
@@ -29,12 +30,17 @@ def processes(count: int | None = None) -> Iterator[Executor | None]:
     Args:
         count: How many; None is one for each processor.
     """
-    count = count or os.cpu_count() or 1
+    processors = os.cpu_count() or 1
+    count = count or processors
     if count == 1:
         yield None
         return
-    spawn = get_context("spawn")
-    pool = ProcessPoolExecutor(count, mp_context=spawn, initializer=_follow_parent)
+    pool = ProcessPoolExecutor(
+        count,
+        mp_context=get_context("spawn"),
+        initializer=_begin,
+        initargs=(max(1, processors // count),),
+    )
     try:
         yield pool
     except BaseException:
@@ -83,9 +89,11 @@ def check_timeout(timeout: float | None) -> None:
         ) from refused
 
 
-def _follow_parent() -> None:
-    """Exit silently on Ctrl-C, unless SIGINT is ignored, and when the parent process ends, even by
-    `kill -9`."""
+def _begin(threads: int) -> None:
+    """Simulate by so many threads, and exit silently on Ctrl-C, unless SIGINT is ignored, and when
+    the parent process ends, even by `kill -9`."""
+    # a process that takes all processors spreads few simulations over all, half of its lanes empty
+    os.environ.setdefault(THREADS, str(threads))
 
     def follow(parent: BaseProcess) -> None:
         parent.join()

@@ -8,15 +8,17 @@ from functools import cached_property
 import numpy as np
 
 from ..faults import ABSENT
+from ..runtime import THREADS
 
 GROWTH = 1.5  # of the room from one scene to the next
 
 
 def processors() -> int:
-    """That this process may use."""
+    """That this process may use: at most as many as Taichi's threads."""
+    there = os.cpu_count() or 1
     if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+        there = len(os.sched_getaffinity(0))
+    return max(1, min(there, int(os.environ.get(THREADS, there))))
 
 
 GROUPS = processors()  # that march at the same time, each on its own processor
