@@ -1,15 +1,15 @@
 """Where the particles are while they are stirred or poured: for pictures, and for measuring."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any, TypeVar
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .liquid import Liquid
 from .number_checks import check_numbers, checked_seeds
-from .pouring import PourBatch, watched_landings
+from .pouring import Landings, PourBatch, watched_landings
 from .pours.vessel import turned
 from .runtime import Watch
 from .stir_setup import StirSetup
@@ -28,12 +28,14 @@ class StirFrames:
         position: Of the particles [m], float32 of shape [F, n, 3].
         pivot: Where the gripper holds the stick [m], shape [F, 3].
         tip: Lower end of the stick's axis [m], shape [F, 3].
+        inclination: What `stir` returns [rad], shape [T, 2].
     """
 
     time: np.ndarray
     position: np.ndarray
     pivot: np.ndarray
     tip: np.ndarray
+    inclination: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -45,14 +47,13 @@ class PourFrames:
         position: Of the particles of both halves [m], float32 of shape [F, n, 3]; NaN for what has
             passed the receiver's rim. A row is not the same particle in every frame.
         angle: By which the source has turned [rad], shape [F].
+        landed: What `landings` returns, of one pour.
     """
 
     time: np.ndarray
     position: np.ndarray
     angle: np.ndarray
-
-
-Frames = TypeVar("Frames", StirFrames, PourFrames)
+    landed: Landings
 
 
 def stir_frames(
@@ -80,18 +81,18 @@ def stir_frames(
         FailedSimulation: the simulation went wrong; positions and tips are NaN.
     """
     check_numbers("frames", rate=rate)
-    start, seen = float(np.asarray(gripper.time)[0]), list[StirFrames]()
+    start, seen = float(np.asarray(gripper.time)[0]), list[tuple[Any, ...]]()
 
     def look(scene: Any, step: int) -> None:
         position, pivot, direction = scene.view(step)
         tip = pivot + setup.stick.length * direction.astype(np.float64)
-        seen.append(StirFrames(np.array(start + step / scene.rate), position, pivot, tip))
+        seen.append((start + step / scene.rate, position, pivot, tip))
 
     angles = watched_stir(liquid, gripper, setup, [seed], effects, Watch(rate, look))
-    frames = _joined(seen)
+    time, position, pivot, tip = map(np.stack, zip(*seen, strict=True))
     if np.isnan(angles).any():
-        frames.position[:], frames.tip[:] = np.nan, np.nan
-    return frames
+        position[:], tip[:] = np.nan, np.nan
+    return StirFrames(time, position, pivot, tip, angles[0])
 
 
 def pour_frames(batch: PourBatch, *, rate: float = FRAME_RATE) -> PourFrames:
@@ -112,7 +113,7 @@ def pour_frames(batch: PourBatch, *, rate: float = FRAME_RATE) -> PourFrames:
     pours = checked_seeds(batch.seeds).size
     if pours > 1:
         raise ValueError(f"frames: seeds must be one integer, got {pours}; take one pour at a time")
-    seen, turning = list[PourFrames](), float(np.ravel(batch.angular_velocity)[0])
+    seen, turning = list[tuple[Any, ...]](), float(np.ravel(batch.angular_velocity)[0])
     drop = batch.cups.pour.lip_height - batch.cups.receiver.height
 
     def look(scene: Any, step: int) -> None:
@@ -122,19 +123,10 @@ def pour_frames(batch: PourBatch, *, rate: float = FRAME_RATE) -> PourFrames:
         half = np.concatenate([turned(held, angle), flights.before(time, drop)])
         whole = np.full((flights.particles, 2, 3), np.nan, np.float32)
         whole[: len(half), 0], whole[: len(half), 1] = half, half * [1.0, -1.0, 1.0]
-        seen.append(PourFrames(np.array(time), whole.reshape(-1, 3), np.array(angle)))
+        seen.append((time, whole.reshape(-1, 3), angle))
 
-    watch = Watch(rate, look)
-    landed = watched_landings(batch, watch)
-    frames = _joined(seen)
+    landed = watched_landings(batch, Watch(rate, look))
+    time, position, angle = map(np.stack, zip(*seen, strict=True))
     if np.isnan(landed.retained).any():
-        frames.position[:] = np.nan
-    return frames
-
-
-def _joined(seen: list[Frames]) -> Frames:
-    """Single frames as one series."""
-    kind = type(seen[0])
-    return kind(
-        **{f.name: np.stack([getattr(frame, f.name) for frame in seen]) for f in fields(kind)}
-    )
+        position[:] = np.nan
+    return PourFrames(time, position, angle, landed)

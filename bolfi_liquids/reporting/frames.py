@@ -24,13 +24,14 @@ from ..progress import Advance, progress_bar
 from ..run.directory import FRAMES
 from ..seeds import Phase, simulation_seeds
 from ..wording import unit_of
-from .scenes import FRAME_RATE, Draw, PourScene, PourShown, StirScene, StirShown
+from .scenes import FRAME_RATE, Draw, PourScene, PourShown, StirScene
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
     from ..calibration.result import Calibration
     from ..inference.simulations import Workers
+    from ..models import StirFrames
     from ..pouring.result import Pour
 
 N_DRAWS_SHOWN = 3
@@ -208,8 +209,7 @@ def _draws(theta: Mapping[str, NDArray], seeds: list[int]) -> list[Draw]:
     ]
 
 
-def _stirred(shown: list[StirShown], time: NDArray) -> dict[str, Any]:
-    made = [one.frames for one in shown]
+def _stirred(made: list["StirFrames"], time: NDArray) -> dict[str, Any]:
     metres, frame = {"units": "m"}, ("draw", "stir_frame")
     return {
         "stir_time": ("stir_frame", made[0].time, {"units": "s"}),
@@ -219,7 +219,7 @@ def _stirred(shown: list[StirShown], time: NDArray) -> dict[str, Any]:
         "time": ("frame", time, {"units": "s"}),
         "inclination": (
             ("draw", "frame", "plane"),
-            np.stack([one.inclination for one in shown]),
+            np.stack([one.inclination for one in made]),
             {"units": "rad"},
         ),
     }

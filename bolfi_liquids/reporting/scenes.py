@@ -37,26 +37,15 @@ class StirScene(NamedTuple):
     stirring: "Stirring"
     timeout: float | None
 
-    def __call__(self, draw: Draw) -> "StirShown":
+    def __call__(self, draw: Draw) -> "StirFrames":
         from .. import models
 
         (recording,), (setup,) = self.stirring.recordings, self.stirring.setups
         liquid = models.Liquid(**draw.liquid, density=recording.number("liquid_density"))
         with _limited(self.timeout):
-            frames = models.stir_frames(
+            return models.stir_frames(
                 liquid, recording.gripper, setup, draw.seed, rate=FRAME_RATE, effects=draw.effects
             )
-        theta = {name: np.array([x]) for name, x in {**draw.liquid, **draw.effects}.items()}
-        with _limited(self.timeout):
-            seen = self.stirring.simulate(theta, np.array([draw.seed]))
-        return StirShown(frames, seen[0])
-
-
-class StirShown(NamedTuple):
-    """What a stir looks like, and its inclination (frame, plane) as the cameras would see it."""
-
-    frames: "StirFrames"
-    inclination: NDArray[np.float64]
 
 
 class PourScene(NamedTuple):
@@ -78,13 +67,13 @@ class PourScene(NamedTuple):
     def __call__(self, draw: Draw) -> "PourShown":
         from .. import models
 
-        liquid, effects = models.Liquid(**draw.liquid, density=self.density), draw.effects
+        liquid = models.Liquid(**draw.liquid, density=self.density)
         action = liquid, self.angular_velocity, self.cups, [draw.seed]
         with _limited(self.timeout):
-            frames = models.pour_frames(models.PourBatch(*action, effects=effects), rate=FRAME_RATE)
-        with _limited(self.timeout):
-            landed = models.landings(*action, effects=effects)
-        radius = self.cups.receiver.radius
+            frames = models.pour_frames(
+                models.PourBatch(*action, effects=draw.effects), rate=FRAME_RATE
+            )
+        landed, radius = frames.landed, self.cups.receiver.radius
         caught = _caught(frames.position, landed.inside(self.distance, radius)[0])
         result = landed.into(self.distance, radius)
         frames = replace(frames, position=_fewer(frames.position))

@@ -30,6 +30,7 @@ from .verdict import FAR_BEHIND, TIE_MARGIN, Candidate, near_best
 
 BASE_PASSES = 6  # of runs of the base model, those after the first only until the fit is settled
 REFIT_PASSES = 4  # and of an explanation
+FULL_PASS = 8  # runs of a pass of refits, at least: fewer passes, and fuller calls
 MAX_DOUBT = 1.0  # of a settled fit: emulator's variance over all variance, summed over the data
 SIDE_SHARES = (0.7, 0.35)  # of the prior quantiles from neutral to an end: where effects are tried
 MIN_EFFECT_RUNS = 2
@@ -47,7 +48,8 @@ class Plan:
         start: Of the base model all over the prior, where there are none yet.
         extension: Of each effect, and of the base model with the same parameters and seeds.
         look: Of each of twice as many effects as are refitted, where they seem to fit best.
-        refit: Near the best parameters of a near-best explanation, in each of up to four passes.
+        refit: Near the best parameters of a near-best explanation, in each of up to four passes; up
+            to eight where few are refitted.
         refits: Explanations that are refitted, and pairs of effects after them.
         held_out: Of each model for each held-out data set.
         most: Of looks and refits together; those beyond are left out.
@@ -213,8 +215,9 @@ def explain(
             f"{MIN_EFFECT_RUNS} succeeded; mend the simulator, or accept another effect"
         )
     search = Search(study, base)
-    if plan.look:
-        search.visit(LOOK, near_best(search.singles, 2 * plan.refits), plan.look)
+    near = near_best(search.singles, 2 * plan.refits)
+    if plan.look and len(near) > plan.refits:  # else all of them are refitted
+        search.visit(LOOK, near, plan.look)
     search.refit(near_best(search.singles, plan.refits))
     if not any(one.accepted for one in search.singles):
         search.try_pairs()
@@ -273,7 +276,8 @@ class Search:
         """Visit candidates until their fits are settled and pass, or are behind those that do."""
         for attempt in range(REFIT_PASSES):
             before = {one.names: one.gain for one in candidates}
-            boxes = self.visit(f"refit {attempt}", candidates, self.study.plan.refit)
+            count = max(self.study.plan.refit, FULL_PASS // max(len(candidates), 1))
+            boxes = self.visit(f"refit {attempt}", candidates, count)
             for names in boxes:
                 self.found[names] = replace(self.found[names], refitted=True)
             tried = sorted((self.found[names] for names in boxes), key=lambda one: -one.gain)

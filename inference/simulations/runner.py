@@ -196,11 +196,13 @@ class Runner:
                 self._keep(order, simulation)
 
     def _shared_out(self, orders: list[Order], executor: Executor) -> "Iterable[list[Order]]":
-        """What goes to the executor in one call: as much as the simulator likes, and no more than
-        leaves work for every worker. One by one where a worker may die alone: a call with it."""
+        """What goes to the executor in one call: as much as the simulator likes, at least half of
+        it, and no more than leaves work for every worker. One by one where a worker may die alone:
+        a call with it."""
         count, each = workers_of(executor), 1
         if count is not None and orders:
-            each = min(most_together(self.simulate), math.ceil(len(orders) / count))
+            most = most_together(self.simulate)
+            each = min(most, max(math.ceil(most / 2), math.ceil(len(orders) / count)))
         return (orders[start : start + each] for start in range(0, len(orders), each))
 
     def _submit(self, executor: Executor, orders: list[Order]) -> None:

@@ -4,8 +4,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bolfi_liquids.models import runtime
-from bolfi_liquids.models.pouring import PourBatch, watched_landings
-from bolfi_liquids.models.runtime import Watch
+from bolfi_liquids.models.pouring import PourBatch
 
 from bolfi_liquids import models
 
@@ -45,6 +44,7 @@ def test_the_stick_in_the_frames_inclines_as_stir_says(oil, setup, path):
     inclination = np.arctan2(stick[:, :2], -stick[:, 2:])
     assert np.ptp(signal) > np.radians(2.0)
     np.testing.assert_allclose(inclination, signal, rtol=0.0, atol=1e-6)
+    np.testing.assert_array_equal(frames.inclination, signal)
 
 
 def test_frames_of_a_stir_hold_all_particles_in_the_cup(oil, setup, path):
@@ -75,9 +75,8 @@ def test_looking_changes_no_bit(oil, cups):
     )
     landed = models.landings(oil, RATE, cups, [2], PARTICLES)
     np.testing.assert_array_equal(some.position[-1], many.position[-1])
-    watch = Watch(10.0, lambda scene, step: None)
-    watched = watched_landings(PourBatch(oil, RATE, cups, [2], PARTICLES, None), watch)
-    np.testing.assert_array_equal(watched.position, landed.position)
+    np.testing.assert_array_equal(some.landed.position, landed.position)
+    np.testing.assert_array_equal(many.landed.retained, landed.retained)
 
 
 @pytest.mark.slow

@@ -167,6 +167,7 @@ def test_pictures_of_a_stir_show_the_liquid_where_it_is(setup):
         position=np.stack([half[:count] for half in halves]),
         pivot=np.tile([0.0, 0.0, 0.235], (2, 1)),
         tip=np.tile([0.0, 0.0, 0.1], (2, 1)),
+        inclination=np.zeros((2, 2)),
     )
     pictures = list(stir_pictures(frames, setup, ["a liquid"]))
     assert all(p.shape == (480, 640, 3) and p.dtype == np.uint8 for p in pictures)
@@ -182,9 +183,9 @@ def test_pictures_of_a_pour_show_what_was_received(cups):
     count, distance = 200, 0.03
     position = np.full((3, count, 3), np.nan, np.float32)
     position[0] = lattice((-0.04, -0.01, -0.05), (-0.01, 0.02, 0.0))[:count]
-    frames = models.PourFrames(np.arange(3.0), position, np.array([0.0, 1.5, 1.5]))
     spots = np.tile([[distance, 0.0]], (1, count, 1)).astype(np.float32)
     landings = models.Landings(spots, np.zeros(1))
+    frames = models.PourFrames(np.arange(3.0), position, np.array([0.0, 1.5, 1.5]), landings)
     empty, _, full = pour_pictures(frames, landings, cups, distance, ["a liquid"])
     view, glass = pour_view(cups, distance), receiver_glass(cups, distance)
     changed = np.abs(full.astype(int) - empty.astype(int)).sum(axis=-1) > 60

@@ -35,7 +35,7 @@ def run(simulator, count, pool):
 
 
 @pytest.mark.parametrize(
-    ("count", "calls"), [(10, [4, 4, 2]), (8, [4, 4]), (5, [3, 2]), (2, [1, 1]), (1, [1])]
+    ("count", "calls"), [(10, [4, 4, 2]), (8, [4, 4]), (5, [3, 2]), (3, [2, 1]), (2, [2])]
 )
 def test_calls_are_as_large_as_leaves_work_for_every_worker(count, calls):
     with ThreadPoolExecutor(2) as pool:
