@@ -1,6 +1,5 @@
 """Simulating what the bank lacks: in batches here, or on an executor."""
 
-import math
 import pickle
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, wait
@@ -196,13 +195,10 @@ class Runner:
                 self._keep(order, simulation)
 
     def _shared_out(self, orders: list[Order], executor: Executor) -> "Iterable[list[Order]]":
-        """What goes to the executor in one call: as much as the simulator likes, at least half of
-        it, and no more than leaves work for every worker. One by one where a worker may die alone:
-        a call with it."""
-        count, each = workers_of(executor), 1
-        if count is not None and orders:
-            most = most_together(self.simulate)
-            each = min(most, max(math.ceil(most / 2), math.ceil(len(orders) / count)))
+        """What goes to the executor in one call: as much as the simulator likes, even if a worker
+        then idles: half a call takes nearly as long. One by one where a worker may die alone: a
+        call with it."""
+        each = 1 if workers_of(executor) is None else most_together(self.simulate)
         return (orders[start : start + each] for start in range(0, len(orders), each))
 
     def _submit(self, executor: Executor, orders: list[Order]) -> None:
