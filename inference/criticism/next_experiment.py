@@ -1,7 +1,7 @@
 """Which further experiment would tell explanations apart."""
 
 from collections.abc import Sequence
-from functools import reduce
+from contextlib import suppress
 from itertools import combinations
 from typing import NamedTuple
 
@@ -13,8 +13,7 @@ from .experiment import Proposal
 from .measurement_noise import samples
 from .misfit import MODES_PER_CHANNEL, orthonormal, slow_modes
 from .run_noise import errors_of, smooth_covariance
-from .run_table import Runs
-from .simulate import Laboratory
+from .simulate import AllRunsFailed, Laboratory
 from .verdict import Candidate
 
 RUNS_EACH = 3  # of each explanation in each proposed experiment
@@ -43,24 +42,23 @@ def suggest(
     """
     if len(rivals) < 2:
         return []
-    found = [_separation(laboratory, proposal, rivals) for proposal in proposals]
-    return sorted(filter(None, found), key=lambda suggestion: -suggestion.snr)
+    made = []
+    for proposal in proposals:
+        with suppress(AllRunsFailed):
+            made.append(_separation(laboratory, proposal, rivals))
+    return sorted(made, key=lambda suggestion: -suggestion.snr)
 
 
 def _separation(
     laboratory: Laboratory, proposal: Proposal, rivals: Sequence[Candidate]
-) -> Suggestion | None:
+) -> Suggestion:
+    elsewhere = laboratory.of(proposal)
     names = [" with ".join(rival.names) for rival in rivals]
-    best = [
-        {key: np.full(RUNS_EACH, value) for key, value in rival.hypothesis.best.items()}
-        for rival in rivals
-    ]
-    made = laboratory.of(proposal).run_each(f"next {proposal.label}", best)
-    runs = [of for of in made if isinstance(of, Runs)]
-    common = reduce(np.intersect1d, [of.seeds for of in runs]) if len(runs) == len(rivals) else []
-    if not len(common):
-        return None
-    signals = [of.signals[np.isin(of.seeds, common)].reshape(len(common), -1) for of in runs]
+    signals = []
+    for name, rival in zip(names, rivals, strict=True):
+        theta = {key: np.full(RUNS_EACH, value) for key, value in rival.hypothesis.best.items()}
+        made = elsewhere.run(f"next {proposal.label} {name}", theta).signals
+        signals.append(made.reshape(len(made), -1))
     snr = {
         (names[a], names[b]): _distance(proposal, signals, a, b)
         for a, b in combinations(range(len(rivals)), 2)
@@ -72,11 +70,7 @@ def _separation(
 @in_float64
 def _distance(proposal: Proposal, signals: Sequence[np.ndarray], a: int, b: int) -> float:
     """Length of the whitened difference of two means in its slow part, less what the noise of
-    the runs adds to it.
-
-    Args:
-        signals: Of each rival [k, n], the k-th of all with one seed: they may share their noise.
-    """
+    the runs adds to it."""
     at = samples(np.zeros(proposal.shape))
     series = proposal.shape[0] >= MIN_SERIES
     runs = smooth_covariance(errors_of(signals), at, series)
@@ -84,9 +78,8 @@ def _distance(proposal: Proposal, signals: Sequence[np.ndarray], a: int, b: int)
     factor = np.linalg.cholesky(covariance)
     modes = slow_modes(at, MODES_PER_CHANNEL) if series else np.eye(len(at.sample))
     span = orthonormal(np.linalg.solve(factor, modes))
-    difference = signals[a] - signals[b]
-    length = np.sum((span.T @ np.linalg.solve(factor, difference.mean(0))) ** 2)
-    noise = smooth_covariance(errors_of([difference]), at, series)
-    white = np.linalg.solve(factor, np.linalg.solve(factor, noise).T)
-    own = np.trace(span.T @ white @ span) / len(difference)
+    difference = signals[a].mean(0) - signals[b].mean(0)
+    length = np.sum((span.T @ np.linalg.solve(factor, difference)) ** 2)
+    white = np.linalg.solve(factor, np.linalg.solve(factor, runs).T)
+    own = np.trace(span.T @ white @ span) * (1.0 / len(signals[a]) + 1.0 / len(signals[b]))
     return float(np.sqrt(max(length - own, 0.0)))
