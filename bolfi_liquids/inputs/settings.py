@@ -242,7 +242,7 @@ class CriticismSettings:
         """Runs of each step for stirs: usually 70 to 100 in all, three baselines included."""
         from ..inference.criticism import Plan
 
-        return Plan(base=4, look=2, refit=4, refits=3, held_out=3, most=72)
+        return Plan(base=4, look=2, refit=4, refits=3, held_out=3, most=32)
 
     @property
     def pour_plan(self) -> "Plan":

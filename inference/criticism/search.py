@@ -52,7 +52,8 @@ class Plan:
             to eight where few are refitted.
         refits: Explanations that are refitted, and pairs of effects after them.
         held_out: Of each model for each held-out data set.
-        most: Of looks and refits together; those beyond are left out.
+        most: Of looks and refits of single effects together, and as many of pairs of them; those
+            beyond are left out.
     """
 
     base: int = 8
@@ -233,6 +234,7 @@ class Search:
     def __init__(self, study: Study, base: Base):
         self.study, self.base = study, base
         self.runs = base.runs
+        self.counted = len(base.runs)  # those before are none of `Plan.most`
         self.limited = True
         first = (study.candidate(base, single) for single in base.singles.values())
         self.found = {one.names: one for one in first}
@@ -258,7 +260,7 @@ class Search:
             near = near and fitted.within.encloses(fitted.u)
             least = LATER_HALF_WIDTH if near else FIRST_HALF_WIDTH
             boxes[one.names] = around(fitted.u, fitted.sd, least)
-        left = study.plan.most - (len(self.runs) - len(self.base.runs))
+        left = study.plan.most - (len(self.runs) - self.counted)
         if self.limited:
             boxes = dict(list(boxes.items())[: max(left // count, 0)])
         asked = [study.points(box, names, count) for names, box in boxes.items()]
@@ -315,6 +317,7 @@ class Search:
         it gains more than either alone. Single effects of an accepted pair are refitted."""
         if not self.found:  # no effect could be simulated
             return
+        self.counted = len(self.runs)
         best = max(self.singles, key=lambda c: c.gain)
         signatures = self.base.signatures
 
