@@ -185,7 +185,8 @@ def _check_held_out(stirring: Stirring, held_out: Sequence[Recording]) -> None:
 
 def check_effects(settings: CriticismSettings) -> None:
     """Raise `InputError` unless the effects to consider and to accept are there."""
-    considered = settings.effects or (*names_of_effects("stir"), *names_of_effects("pour"))
+    both = (*names_of_effects("stir"), *names_of_effects("pour"))
+    considered = settings.effects or tuple(dict.fromkeys(both))
     if not names_of_effects("stir", settings.effects):
         raise InputError(
             "none of the effects acts in a stir",

@@ -263,8 +263,8 @@ def resolve(surrogate: str | Family | None, options: dict) -> Family:
     unknown = options.keys() - _options(surrogate)
     if unknown:
         raise ValueError(
-            f"surrogate {surrogate!r} has the options {tuple(sorted(_options(surrogate)))}, "
-            f"got {tuple(sorted(unknown))}"
+            f"there is no argument {', '.join(sorted(unknown))}; the surrogate {surrogate!r} has the "
+            f"options {tuple(sorted(_options(surrogate)))}"
         )
     return FAMILIES[surrogate](**options)
 

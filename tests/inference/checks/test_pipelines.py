@@ -92,7 +92,7 @@ def test_pipelines_travel_to_spawned_processes(monkeypatch):
     [
         ({"budget": -2}, "budget must be an integer from 3"),
         ({"simulate": 3}, "simulate must be a function, got 3"),
-        ({"options": {"nosie": 1}}, "surrogate 'signal' has the options"),
+        ({"options": {"nosie": 1}}, "nosie; the surrogate 'signal' has the options"),
         ({"options": {"budget": 9}}, r"options must be among .*, got \['budget'\]"),
         ({"options": {"seed": 9}}, r"options must be among .*, got \['seed'\]"),
         ({"sampling": {"chain": 2}}, r"sampling must be among .*, got \['chain'\]"),
