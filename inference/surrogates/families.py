@@ -263,8 +263,8 @@ def resolve(surrogate: str | Family | None, options: dict) -> Family:
     unknown = options.keys() - _options(surrogate)
     if unknown:
         raise ValueError(
-            f"there is no argument {', '.join(sorted(unknown))}; the surrogate {surrogate!r} has the "
-            f"options {tuple(sorted(_options(surrogate)))}"
+            f"there is no argument {', '.join(sorted(unknown))}; the surrogate {surrogate!r} has "
+            f"the options {tuple(sorted(_options(surrogate)))}"
         )
     return FAMILIES[surrogate](**options)
 
