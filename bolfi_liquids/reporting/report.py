@@ -24,7 +24,7 @@ from ..run.entering import working_in_run
 from ..wording import LIQUID_UNITS, sentence
 from . import sentences
 from .criticism_chapter import criticism_context
-from .warnings import Results, results_of, warnings_of
+from .warnings import Results, results_of, stale_sentences, warnings_of
 
 if TYPE_CHECKING:
     from ..inference.simulations import Workers
@@ -112,6 +112,7 @@ def _page(
     return environment.get_template(PAGE_TEMPLATE).render(
         **chapters,
         warnings=warnings_of(results),
+        stale=stale_sentences(results),
         moving=pictures,
         moving_json=script_json(pictures),
         style=_text("report.css"),
