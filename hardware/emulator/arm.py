@@ -1,5 +1,6 @@
 """The moving arm: one motion after the other, within its limits."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -39,7 +40,7 @@ class Arm:
 
     @property
     def resting(self) -> bool:
-        return float(np.abs(self.state.speed).max()) < RESTING_RATE
+        return max(map(abs, self.state.speed.tolist())) < RESTING_RATE
 
     def begin(self, plans: Sequence[Plan], *, brake: float | None = None) -> None:
         """Go on with `plans` instead; with `brake` [rad/s2] the arm first comes to rest."""
@@ -117,18 +118,19 @@ class Arm:
         self.index += 1
 
     def _check(self, state: ArmState) -> None:
-        model = self.tool.arm
-        if not np.isfinite(state.joints).all():
+        # in plain floats: every tick, a fifth of what NumPy's functions take for six numbers
+        model, joints, speed = self.tool.arm, state.joints.tolist(), state.speed.tolist()
+        if not all(map(math.isfinite, joints)):
             raise MotionError("joints are not finite")
         # a stop begins from whatever speed and wherever it has to
         if isinstance(self._motion, Reactive) and self._motion.ends:
             return
-        if (np.abs(state.joints) > model.joint_limit).any():
-            raise MotionError(f"joints {np.round(state.joints, 3).tolist()} are beyond the limits")
-        share = np.abs(state.speed) / model.joint_speed
-        if (share > 1.0 + 1e-6).any():
-            raise MotionError(f"joint {int(share.argmax()) + 1} would be too fast")
-        if np.linalg.norm(self.velocity[:3]) > self.tcp_speed:
+        if max(map(abs, joints)) > model.joint_limit:
+            raise MotionError(f"joints {np.round(joints, 3).tolist()} are beyond the limits")
+        share = [abs(one) / most for one, most in zip(speed, model.joint_speed, strict=True)]
+        if max(share) > 1.0 + 1e-6:
+            raise MotionError(f"joint {share.index(max(share)) + 1} would be too fast")
+        if math.hypot(*self.velocity[:3]) > self.tcp_speed:
             raise MotionError(f"the TCP is faster than {self.tcp_speed} m/s")
 
     def _look(self) -> None:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -53,13 +52,7 @@ class Tool(NamedTuple):
         return found.joints
 
     def jacobian(self, joints: Numbers) -> np.ndarray:
-        return _jacobian(self.arm, tuple(map(float, joints)), tuple(map(float, self.tcp)))
-
-
-@lru_cache(maxsize=1)
-def _jacobian(arm: DhArm, joints: tuple[float, ...], tcp: tuple[float, ...]) -> np.ndarray:
-    """The last one is kept: a step begins where the arm was looked at after the step before."""
-    return jacobian(arm, joints, tcp=tcp)
+        return jacobian(self.arm, joints, tcp=self.tcp)
 
 
 class Trapezoid(NamedTuple):

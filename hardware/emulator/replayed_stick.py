@@ -7,6 +7,8 @@ at a low `PACE`, which lets the phase go on by the clock while the table rests o
 """
 
 import math
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -57,7 +59,7 @@ def advance(motion: StickMotion, state: Replay, pivot: Numbers, dt: float) -> Re
         pivot: Where the arm is at its end, in the table's frame [m], shape (3,).
         dt: Of the tick [s].
     """
-    phase, distance = _nearest(motion, state.phase, np.asarray(pivot, dtype=float), dt)
+    phase, distance = _nearest(motion, state.phase, pivot, dt)
     if distance > NEAR:
         if (near := state.near - dt / FADE) > 0.0:
             return state._replace(near=near)
@@ -91,40 +93,44 @@ def _lean(motion: StickMotion, time: float) -> complex:
 
 def _heading(motion: StickMotion, time: float) -> complex:
     """Direction of the way before a time of the table, of length 1; 0 where it rests."""
-    x, y, _ = _between(motion.time, motion.pivot, time) - _between(
-        motion.time, motion.pivot, time - HEADING
-    )
-    way = abs(complex(x, y))
-    return complex(x, y) / way if way > AT_REST else 0j
+    x, y, _ = _between(motion.time, motion.pivot, time)
+    before_x, before_y, _ = _between(motion.time, motion.pivot, time - HEADING)
+    way = complex(x - before_x, y - before_y)
+    return way / abs(way) if abs(way) > AT_REST else 0j
 
 
-def _between(times: np.ndarray, rows: np.ndarray, time: float) -> np.ndarray:
+# in plain floats: these few numbers, every tick, cost NumPy's functions three times as much
+
+
+def _between(times: np.ndarray, rows: np.ndarray, time: float) -> list[float]:
     """A row between two; a table may be so long that looking at all of it takes a tick."""
-    after = min(max(int(np.searchsorted(times, time)), 1), len(times) - 1)
-    share = (time - times[after - 1]) / (times[after] - times[after - 1])
-    share = min(max(share, 0.0), 1.0)
-    return rows[after - 1] + share * (rows[after] - rows[after - 1])
+    after = min(max(int(times.searchsorted(time)), 1), len(times) - 1)
+    before, then = times[after - 1 : after + 1].tolist()
+    first, last = rows[after - 1 : after + 1].tolist()
+    share = min(max((time - before) / (then - before), 0.0), 1.0)
+    return [a + share * (b - a) for a, b in zip(first, last, strict=True)]
 
 
-def _nearest(
-    motion: StickMotion, phase: float, pivot: np.ndarray, dt: float
-) -> tuple[float, float]:
+def _nearest(motion: StickMotion, phase: float, pivot: Numbers, dt: float) -> tuple[float, float]:
     """Phase of the nearest point from `phase` on, and the pivot's distance from it [m]."""
-    first = int(np.searchsorted(motion.time, phase, side="right"))
-    last = int(np.searchsorted(motion.time, phase + AHEAD, side="right"))
-    here = _between(motion.time, motion.pivot, phase)
-    time = np.array([phase, *motion.time[first:last]])
-    place = np.vstack([here, motion.pivot[first:last]])
-    if len(time) == 1:
-        return phase, float(np.linalg.norm(pivot - place[0]))
-    points = np.column_stack([place, PACE * time])
-    start, way = points[:-1], np.diff(points, axis=0)
-    target = np.array([*pivot, PACE * (phase + dt)])
-    share = np.clip(((target - start) * way).sum(1) / (way * way).sum(1), 0.0, 1.0)
-    off = start + share[:, None] * way - target
-    best = int((off * off).sum(1).argmin())
-    found = float(time[best] + share[best] * (time[best + 1] - time[best]))
-    return found, float(np.linalg.norm(off[best, :3]))
+    first = int(motion.time.searchsorted(phase, side="right"))
+    last = int(motion.time.searchsorted(phase + AHEAD, side="right"))
+    places = zip(motion.pivot[first:last].tolist(), motion.time[first:last].tolist(), strict=True)
+    here = (*_between(motion.time, motion.pivot, phase), PACE * phase)
+    points = [here, *((*place, PACE * time) for place, time in places)]
+    target = (*pivot, PACE * (phase + dt))
+    feet = [_foot(target, start, end) for start, end in pairwise(points)]
+    best = min(feet, key=lambda foot: math.dist(foot, target), default=here)
+    return max(best[3] / PACE, phase), math.dist(best[:3], target[:3])
+
+
+def _foot(point: Sequence[float], start: Sequence[float], end: Sequence[float]) -> list[float]:
+    """The point of the segment from `start` to `end` that is nearest to `point`."""
+    way = [b - a for a, b in zip(start, end, strict=True)]
+    along = sum((p - a) * w for p, a, w in zip(point, start, way, strict=True))
+    length = sum(w * w for w in way)
+    share = min(max(along / length, 0.0), 1.0) if length > 0.0 else 0.0
+    return [a + share * w for a, w in zip(start, way, strict=True)]
 
 
 class ReplayedStick:

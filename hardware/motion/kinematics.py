@@ -14,7 +14,20 @@ import numpy as np
 
 from .poses import Numbers, matrix_pose, pose_matrix
 
-_ALPHA = (0.5 * math.pi, 0.0, 0.0, 0.5 * math.pi, -0.5 * math.pi, 0.0)
+_TURNS = (1, 0, 0, 1, -1, 0)  # alpha, in right angles
+_Vector = tuple[float, float, float]
+
+
+class _Frame(NamedTuple):
+    """Axes and origin of a frame, in the base frame."""
+
+    x: _Vector
+    y: _Vector
+    z: _Vector
+    origin: _Vector
+
+
+_BASE = _Frame((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
 
 
 class DhArm(NamedTuple):
@@ -100,27 +113,33 @@ def forward(arm: DhArm, joints: Numbers, *, tcp: Numbers | None = None) -> np.nd
 
 def forward_matrix(arm: DhArm, joints: Numbers, *, tcp: Numbers | None = None) -> np.ndarray:
     """The same as `forward`, as a homogeneous transform, shape [4, 4]."""
-    flange = _frames(arm, joints)[-1]
+    flange = np.eye(4)
+    flange[:3] = np.array(_frames(arm, joints)[-1]).T
     return flange if tcp is None else flange @ pose_matrix(tcp)
 
 
-def _frames(arm: DhArm, joints: Numbers) -> list[np.ndarray]:
-    """The base and the six frames behind the joints, as transforms."""
-    frames = [np.eye(4)]
-    for i, joint in enumerate(joints):
+def _frames(arm: DhArm, joints: Numbers) -> list[_Frame]:
+    """The base and the six frames behind the joints.
+
+    In plain floats, since the emulator asks for them every tick: 6 us, and 50 us as a product of
+    six matrices.
+    """
+    frames = [_BASE]
+    for joint, shift, reach, turn in zip(joints, arm.d, arm.a, _TURNS, strict=True):
+        (xx, xy, xz), (yx, yy, yz), z, (px, py, pz) = frames[-1]
         cos, sin = math.cos(joint), math.sin(joint)
-        # alpha is a multiple of a right angle: its cosine and sine are exactly 0 or +-1
-        cos_alpha = 1.0 if _ALPHA[i] == 0.0 else 0.0
-        sin_alpha = 0.0 if _ALPHA[i] == 0.0 else math.copysign(1.0, _ALPHA[i])
-        step = np.array(
-            [
-                [cos, -sin * cos_alpha, sin * sin_alpha, arm.a[i] * cos],
-                [sin, cos * cos_alpha, -cos * sin_alpha, arm.a[i] * sin],
-                [0.0, sin_alpha, cos_alpha, arm.d[i]],
-                [0.0, 0.0, 0.0, 1.0],
-            ]
+        x = (cos * xx + sin * yx, cos * xy + sin * yy, cos * xz + sin * yz)
+        y = (cos * yx - sin * xx, cos * yy - sin * xy, cos * yz - sin * xz)
+        origin = (
+            px + shift * z[0] + reach * x[0],
+            py + shift * z[1] + reach * x[1],
+            pz + shift * z[2] + reach * x[2],
         )
-        frames.append(frames[-1] @ step)
+        if turn == 1:
+            y, z = z, (-y[0], -y[1], -y[2])
+        elif turn == -1:
+            y, z = (-z[0], -z[1], -z[2]), y
+        frames.append(_Frame(x, y, z, origin))
     return frames
 
 
@@ -135,17 +154,15 @@ def jacobian(arm: DhArm, joints: Numbers, *, tcp: Numbers | None = None) -> np.n
     Returns:
         Shape [6, 6]: rows vx, vy, vz, wx, wy, wz; columns the joints.
     """
-    frames = _frames(arm, joints)
-    end = frames[-1] if tcp is None else frames[-1] @ pose_matrix(tcp)
-    stacked = np.array(frames[:6])
-    axes = stacked[:, :3, 2]
-    arms = end[:3, 3] - stacked[:, :3, 3]
-    columns = np.empty((6, 6))
-    columns[0] = axes[:, 1] * arms[:, 2] - axes[:, 2] * arms[:, 1]
-    columns[1] = axes[:, 2] * arms[:, 0] - axes[:, 0] * arms[:, 2]
-    columns[2] = axes[:, 0] * arms[:, 1] - axes[:, 1] * arms[:, 0]
-    columns[3:] = axes.T
-    return columns
+    *frames, flange = _frames(arm, joints)
+    ex, ey, ez = flange.origin
+    if tcp is not None:
+        ex, ey, ez = (np.array(flange).T @ (tcp[0], tcp[1], tcp[2], 1.0)).tolist()
+    columns = []
+    for _, _, (zx, zy, zz), (px, py, pz) in frames:
+        rx, ry, rz = ex - px, ey - py, ez - pz
+        columns.append((zy * rz - zz * ry, zz * rx - zx * rz, zx * ry - zy * rx, zx, zy, zz))
+    return np.array(columns).T
 
 
 def inverse(arm: DhArm, pose: Numbers, near: Numbers, *, tcp: Numbers | None = None) -> Inverse:
