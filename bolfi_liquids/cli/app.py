@@ -10,7 +10,6 @@ import typer
 from .. import __version__
 from ..inputs.settings import CalibrationSettings, PourSettings
 from ..run.directory import check_resumable
-from ..run.entering import working_in_run
 from . import check as cli_check
 from . import guide, import_table, reproduce
 from . import record as cli_record
@@ -52,7 +51,7 @@ app = typer.Typer(
         then="Without a recording, try `bolfi-liquids demo`; `bolfi-liquids guide` explains files, "
         "priors and messages.",
     ),
-    rich_markup_mode="markdown",
+    rich_markup_mode=None,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
@@ -97,7 +96,7 @@ def calibrate(
         ),
     ] = False,
 ) -> None:
-    """Learn a liquid's parameters from recordings of it being stirred."""
+    """Learn a liquid's parameters from recordings of stirs."""
     from ..calibration.calibrate import calibrate as run_calibrate
     from ..criticism.result import criticism_of
     from ..inputs.open import open_recordings
@@ -137,7 +136,7 @@ def criticise(
     options: EffectOptions,
     compute: Compute,
 ) -> None:
-    """Find where simulation and recording disagree, and which effect is missing."""
+    """Find which effect the model lacks, where it misses the data."""
     from ..criticism.criticise import criticise as run_criticise
     from ..inputs.pour_table import open_pours
 
@@ -170,7 +169,7 @@ def criticise(
 def pour(
     run: RunArgument, options: PourOptions, execution: ExecutionOptions, compute: Compute
 ) -> None:
-    """Choose the pour that spills least over all that the liquid might be.
+    """Choose the pour that spills least over the posterior.
 
     What a criticism accepted is part of the liquid. With --execute nothing is chosen anew: it is
     a dry run of the chosen pour, unless armed.
@@ -189,6 +188,7 @@ def pour(
     from ..inputs.cups import cups_of
     from ..pouring.choose import choose_pour
     from ..reporting.warnings import results_of
+    from ..run.entering import working_in_run
 
     # refused before anything of the run is read
     PourSettings(pours=options.pours, iterations=options.iterations, risk=options.risk)
@@ -241,7 +241,7 @@ def demo(
         "runs/demo"
     ),
 ) -> None:
-    """Calibrate on a bundled recording, find what is hidden in it, choose a pour, report."""
+    """Calibrate, criticise, pour and report on bundled recordings."""
     from ..demo import run_demo
     from ..reporting.warnings import results_of
 

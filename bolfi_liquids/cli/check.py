@@ -54,7 +54,7 @@ def physics(
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the initial packings.")] = 0,
 ) -> None:
-    """Compare the fluid with analytic solutions and measurements, or with another solver.
+    """Compare the fluid with known solutions, or another solver.
 
     The exit status is 1 when a case is out of its tolerance or failed. What has finished in the
     directory of results before, with the same seed, simulator and case, is not run again.
@@ -106,7 +106,7 @@ def sbc(
         typer.Option(metavar="FILE", help="Whose path and rig are used; else bundled ones."),
     ] = None,
 ) -> None:
-    """Simulation-based calibration of the whole pipeline, with the particle fluid.
+    """Simulation-based calibration of the whole pipeline.
 
     Stirs of liquids drawn from the prior are calibrated, and the truths compared with the
     posteriors. The exit status is 1 when ranks or coverage fail their test. What has finished in

@@ -15,7 +15,7 @@ def guide(
         str | None, typer.Argument(metavar="|".join(PAGES), help="Which; without it, a list.")
     ] = None,
 ) -> None:
-    """Show a page of the guide: what files hold, how to choose a prior, what errors mean."""
+    """Show a page of the guide: files, priors, messages and more."""
     if page is None:
         width = max(map(len, PAGES))
         for name, about in PAGES.items():

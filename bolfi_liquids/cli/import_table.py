@@ -25,7 +25,7 @@ def import_table(
         Path | None, typer.Option(metavar="FILE", help="Only write a columns.toml to change.")
     ] = None,
 ) -> None:
-    """Make a recording of a table of numbers, whatever its columns and units.
+    """Make a recording of a table, whatever its columns and units.
 
     First write a template; change it to say what stands where in your table; then import.
     """

@@ -37,7 +37,7 @@ app = typer.Typer(help="The robot and the cameras.", no_args_is_help=True)
 
 @app.command(epilog=examples("rig check --rig rig.toml"))
 def check(rig: RigOption = None) -> None:
-    """Tell what of the rig works and what is missing; moves nothing.
+    """Tell what works and what is missing; moves nothing.
 
     The exit status is 1 when something is missing.
     """
@@ -57,7 +57,7 @@ def check(rig: RigOption = None) -> None:
 def template(
     out: Annotated[Path, typer.Argument(metavar="FILE", help="To be written.")] = Path("rig.toml"),
 ) -> None:
-    """Write the bundled rig.toml, to be changed into your own."""
+    """Write the bundled rig.toml, to make it your own."""
     from ..inputs.rigs import write_template
 
     then = command("rig", "check", "--rig", out)
@@ -80,7 +80,7 @@ def calibrate_cameras(
         Path | None, typer.Option(metavar="PNG", help="Only write the board, to be printed.")
     ] = None,
 ) -> None:
-    """Learn a camera's lens from a printed board, and its roll from a plumb line."""
+    """Learn a camera's lens from a board and a plumb line."""
     from ..robot.camera_calibration import Pictures, calibrate_view, write_board
 
     if print_board is not None:
@@ -99,7 +99,7 @@ def emulate(
     ] = None,
     viscosity: Annotated[float, typer.Option(help="Of the liquid in the cup [Pa s].")] = 1.0,
 ) -> None:
-    """Run an emulator of the robot's controller, the stick over the cup, until Ctrl-C.
+    """Emulate the robot's controller until Ctrl-C.
 
     Any client of a real controller may connect to it, ours by `host` under `robot` in rig.toml.
     """

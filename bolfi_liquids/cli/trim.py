@@ -28,7 +28,7 @@ def trim(
         typer.Option(metavar="FILE", help="To be written; without it, only tell what would stay."),
     ] = None,
 ) -> None:
-    """Cut a recording, so that it starts at rest and ends where the stick was seen.
+    """Cut a recording to where the stick was seen, from rest on.
 
     Times are those of the recording. A simulation starts from rest: a recording that starts in
     motion, or with the stick above the liquid, is refused until it is cut. Of the directory of a
