@@ -3,7 +3,8 @@
     side_by_side.py COMMIT NAME... [--into DIR] [--turns N] [-- ARGUMENTS OF first_result.py]
 
 The other commit becomes a git worktree with its own environment under DIR, and is used again if it
-is there. JAX's compilations are kept for each tree; all but `first` and `tests` run once before.
+is there. JAX's compilations are kept for each tree; all but `first`, `tests` and `nothing` run once
+before. `nothing` is `make demo` in a fresh clone, without a cache.
 """
 
 import argparse
@@ -34,9 +35,11 @@ COMMANDS = {  # {bin} of the tree's environment, {out} an empty directory, {kept
     f" {DATA.format('late', 10)} && cp -r {{kept}}/run {{out}}/run && {{bin}}/bolfi-liquids"
     f" criticise {{out}}/run --held-out {DATA.format('late', 7)}"
     f" --baseline {DATA.format('clean', 10)}",
+    "nothing": "git clone -q . {out}/clone && cd {out}/clone"
+    " && env -u JAX_COMPILATION_CACHE_DIR HOME={out} make demo",
     "tests": "make test",
 }
-COLD = "first", "tests"
+COLD = "first", "nothing", "tests"
 
 
 def tree_of(commit: str, into: Path) -> Path:
