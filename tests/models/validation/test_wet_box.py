@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from bolfi_liquids.models.apic.places import GROUPS
 from bolfi_liquids.models.validation.scenes.wet_box import Body, WetBox, WetLiquid, flow_in_box
 
 BOX = WetBox((0.04, 0.0, 0.04), block=((0.012, 0.0, 0.008), (0.02, 0.0, 1.0)))
@@ -64,3 +65,13 @@ def test_what_flowed_before_changes_no_bit():
     flow_in_box(BOX, [wet._replace(viscosity=1.0)], [splash], 0.1, look)
     _, again = flow_in_box(BOX, [wet], [body], 0.3, look)
     np.testing.assert_array_equal(first, again)
+
+
+def test_more_boxes_than_march_at_a_time_take_turns():
+    from bolfi_liquids.models.apic.lanes import LANES
+
+    wet, body = WetLiquid(0.01), columns(0)
+    count = GROUPS * LANES + 1
+    _, seen = flow_in_box(BOX, [wet] * count, [body] * count, 0.02, look)
+    assert seen.shape[1] == count
+    np.testing.assert_array_equal(seen, np.repeat(seen[:, :1], count, axis=1))
