@@ -59,8 +59,8 @@ def test_a_person_may_insist(far_off, pour, pour_settings):
         assert PourSummary.read(run).fit_status == read_pour(run).attrs["fit_status"] == status
 
 
-def test_fractions_add_up_and_the_action_is_allowed(pour):
-    cups = bundled_cups()
+def test_fractions_add_up_and_the_action_is_allowed(pour, pour_settings):
+    cups = pour_settings["cups"]
     for judged in (pour.chosen, pour.plug_in):
         np.testing.assert_allclose(judged.fractions.sum(axis=1), 1.0)
         assert (judged.fractions >= 0).all()
@@ -87,12 +87,12 @@ def test_chosen_is_among_the_better_actions(pour):
 
 
 @pytest.mark.slow
-def test_new_pours_agree_with_the_judgement(pour, calibration):
+def test_new_pours_agree_with_the_judgement(pour, calibration, pour_settings):
     """Of other draws, with other seeds and the landing off as much: no map is asked."""
     tree = xr.load_datatree(pour.path / "pour.nc")
     known = calibration.posterior["viscosity"].to_numpy()
     assert np.isin(tree["liquids"]["viscosity"], known).all()
-    cups, count, rng = bundled_cups(), 64, np.random.default_rng(0)
+    cups, count, rng = pour_settings["cups"], 32, np.random.default_rng(0)
     liquid = models.Liquid(**calibration.draws(count, 99), density=calibration.liquid_density)
     landed = models.landings(liquid, pour.chosen.angular_velocity, cups, np.arange(count))
     off = rng.normal(0.0, tree.attrs["landing_sd"], (40, 1))
