@@ -24,8 +24,11 @@ def emulator_until_interrupted(
         MotionRejected: The rig's stir breaks one of its limits.
     """
     from ..hardware import HiddenLiquid, emulated
+    from ..hardware.emulator import check_address
     from ..hardware.motion import above_cup
 
+    if address is not None:
+        check_address(address)  # before the stir is simulated
     liquid = with_stir(rig, plan_stir(rig), HiddenLiquid(viscosity=viscosity))
     with emulated(rig, above_cup(rig), address=address, liquid=liquid) as running:
         at = running.emulator.address

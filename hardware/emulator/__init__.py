@@ -10,5 +10,6 @@ test of a robot.
 
 from .admin_client import Admin, State
 from .process import EmulatorProcess
+from .servers.network import check_address
 
-__all__ = ["Admin", "EmulatorProcess", "State"]
+__all__ = ["Admin", "EmulatorProcess", "State", "check_address"]

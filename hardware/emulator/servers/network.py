@@ -77,7 +77,7 @@ class Network:
         sessions: dict[int, Callable[[Connection], Session]],
         clock: HostClock = REAL_CLOCK,
     ):
-        _check_address(address)
+        check_address(address)
         self._clock = clock
         self._factories = sessions
         self._selector = selectors.SelectSelector()
@@ -185,7 +185,8 @@ class Network:
         connection.socket.close()
 
 
-def _check_address(address: str) -> None:
+def check_address(address: str) -> None:
+    """Raise `RigError` unless it is one of this computer alone."""
     try:
         inside = ipaddress.ip_address(address) in ipaddress.ip_network("127.0.0.0/8")
     except ValueError:
