@@ -1,6 +1,8 @@
 """The Gaussian likelihood of an emulated signal."""
 
 import math
+from collections.abc import Callable
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,7 +10,7 @@ import numpy as np
 from ..gp.namespaces import log_sum_exp, namespace
 from ..gp.process import GP, padded, padded_rows, predict
 
-SCORES_TOGETHER = 4  # scores of padded states are counted in fours
+SCORES_TOGETHER = 8  # by which the scores of padded states are counted
 WALL = 0.01  # of prior quantiles, beyond a box, over which the likelihood vanishes
 
 
@@ -107,16 +109,56 @@ def _with_variances(covariance: Any, variance: Any) -> Any:
 def eliminate(matrix: Any, vector: Any) -> tuple[Any, Any]:
     """log |C| and v^T C^-1 v for small positive definite C [..., k, k] and v [..., k].
 
-    Gaussian elimination, unrolled: of a few rows it compiles faster than LAPACK's factor and its
-    derivative, and it runs along all other axes at once.
+    Gaussian elimination, unrolled: it runs along all other axes at once.
     """
-    xp = namespace(matrix)
-    log_det, square = xp.zeros(matrix.shape[:-2]), xp.zeros(vector.shape[:-1])
+    if namespace(matrix) is not np:
+        return _differentiable()(matrix, vector)
+    log_det, square = np.zeros(matrix.shape[:-2]), np.zeros(vector.shape[:-1])
     for _ in range(matrix.shape[-1]):
         pivot, row = matrix[..., 0, 0], matrix[..., 0, 1:]
-        log_det = log_det + xp.log(pivot)
+        log_det = log_det + np.log(pivot)
         square = square + vector[..., 0] ** 2 / pivot
         share = row / pivot[..., None]
         vector = vector[..., 1:] - share * vector[..., :1]
         matrix = matrix[..., 1:, 1:] - share[..., :, None] * row[..., None, :]
     return log_det, square
+
+
+@cache
+def _differentiable() -> Callable[[Any, Any], tuple[Any, Any]]:
+    """`eliminate` of JAX's arrays, whose derivative is told: XLA compiles half as much, and
+    sooner than LAPACK's factor and its derivative."""
+    import jax
+    from jax import numpy as jnp
+
+    def inverted(matrix: Any) -> tuple[Any, Any]:
+        """log |C| and C^-1, by the sweep operator (Goodnight 1979) as k changes of rank one."""
+        k = matrix.shape[-1]
+        scale = 1.0 / jnp.sqrt(jnp.diagonal(matrix, axis1=-2, axis2=-1))
+        swept = matrix * scale[..., :, None] * scale[..., None, :]
+        pivots = []
+        for i in range(k):
+            row = swept[..., i, :]
+            pivots.append(row[..., i])
+            row = row - np.eye(k)[i]
+            swept = swept - row[..., :, None] * row[..., None, :] / pivots[i][..., None, None]
+        log_det = jnp.log(jnp.stack(pivots)).sum(0) - 2.0 * jnp.log(scale).sum(-1)
+        return log_det, (2.0 * np.eye(k) - swept) * scale[..., :, None] * scale[..., None, :]
+
+    @jax.custom_jvp
+    def eliminated(matrix: Any, vector: Any) -> tuple[Any, Any]:
+        log_det, inverse = inverted(matrix)
+        return log_det, (vector * (inverse * vector[..., None, :]).sum(-1)).sum(-1)
+
+    @eliminated.defjvp
+    def _(at: Any, along: Any) -> Any:
+        (matrix, vector), (of_matrix, of_vector) = at, along
+        log_det, inverse = inverted(matrix)
+        solved = (inverse * vector[..., None, :]).sum(-1)
+        of_log_det = (inverse * of_matrix).sum((-2, -1))
+        of_square = 2.0 * (solved * of_vector).sum(-1) - (
+            solved[..., :, None] * solved[..., None, :] * of_matrix
+        ).sum((-2, -1))
+        return (log_det, (vector * solved).sum(-1)), (of_log_det, of_square)
+
+    return eliminated
