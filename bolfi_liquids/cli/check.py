@@ -54,7 +54,7 @@ def physics(
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the initial packings.")] = 0,
 ) -> None:
-    """Compare the fluid with known solutions, or another solver.
+    """Compare the fluid with theory, measurements or another solver.
 
     The exit status is 1 when a case is out of its tolerance or failed. What has finished in the
     directory of results before, with the same seed, simulator and case, is not run again.

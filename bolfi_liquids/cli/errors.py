@@ -47,7 +47,10 @@ class OneLineErrors(TyperGroup):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         ctx.meta[GIVEN] = list(args)
-        return super().parse_args(ctx, args)
+        try:
+            return super().parse_args(ctx, args)
+        except TyperException as err:
+            raise _misused(err) from None
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -59,9 +62,7 @@ class OneLineErrors(TyperGroup):
         except (typer.Exit, typer.Abort):  # RuntimeErrors by descent, but no errors
             raise
         except TyperException as err:
-            if told := _one_line(err.format_message()):  # a group without a command shows its help
-                _say(f"error: {told.rstrip('.')}; see --help")
-            raise typer.Exit(USAGE_ERROR) from None
+            raise _misused(err) from None
         except BrokenPipeError:  # who reads has read enough, as `head` does: typer ends quietly
             raise
         except (ValueError, OSError, RuntimeError, ImportError, sqlite3.Error) as err:
@@ -83,6 +84,16 @@ class OneLineErrors(TyperGroup):
             for parameter in typed.params
             if parameter.opts[0].startswith("--")
         }
+
+
+def _misused(err: TyperException) -> typer.Exit:
+    """How a mistyped command ends, which is said; a group without a command shows its help."""
+    message = err.format_message()
+    if message.startswith("Usage:"):
+        typer.echo(message)
+    else:
+        _say(f"error: {_one_line(message).rstrip('.')}; see --help")
+    return typer.Exit(USAGE_ERROR)
 
 
 def _status(err: Exception) -> int:

@@ -29,8 +29,9 @@ def reproduce(
         bool, typer.Option("--quick", help="Fewer truths, coarser stirs: a quarter of an hour.")
     ] = False,
 ) -> None:
-    """Draw the paper's figures, and those of what it left open.
+    r"""Draw the paper's figures, and those of what it left open.
 
+    \b
     - `inclination`: recorded stirs, and what the calibrated simulator predicts
     - `posterior`: what stirring teaches, on recordings of a reference solver
     - `recordings`: what is poured after those of water and glycerin, and the reference spilled

@@ -120,8 +120,8 @@ class Arm:
     def _check(self, state: ArmState) -> None:
         # in plain floats: every tick, a fifth of what NumPy's functions take for six numbers
         model, joints, speed = self.tool.arm, state.joints.tolist(), state.speed.tolist()
-        if not all(map(math.isfinite, joints)):
-            raise MotionError("joints are not finite")
+        if not all(map(math.isfinite, (*joints, *speed))):
+            raise MotionError("joints or their speeds are not finite")
         # a stop begins from whatever speed and wherever it has to
         if isinstance(self._motion, Reactive) and self._motion.ends:
             return

@@ -118,7 +118,7 @@ def _nearest(motion: StickMotion, phase: float, pivot: Numbers, dt: float) -> tu
     places = zip(motion.pivot[first:last].tolist(), motion.time[first:last].tolist(), strict=True)
     here = (*_between(motion.time, motion.pivot, phase), PACE * phase)
     points = [here, *((*place, PACE * time) for place, time in places)]
-    target = (*pivot, PACE * (phase + dt))
+    target = (*map(float, pivot), PACE * (phase + dt))
     feet = [_foot(target, start, end) for start, end in pairwise(points)]
     best = min(feet, key=lambda foot: math.dist(foot, target), default=here)
     return max(best[3] / PACE, phase), math.dist(best[:3], target[:3])

@@ -25,6 +25,7 @@ TARGET_ACCEPTANCE = 0.9  # share that the step size aims at; at 0.8 more than 1 
 POOR_EFFECTIVE = 60.0  # effective points below which a population is mended by a first warm-up
 REFITTED_DRAWS = 512  # draws to which the mixture is fitted then
 
+XLA_OPTIONS = {"xla_cpu_use_fusion_emitters": False}
 STATISTICS = {
     "lp": lambda s: -s.potential_energy,
     "diverging": lambda s: s.diverging,
@@ -109,7 +110,7 @@ def _run(
 def _compiled_run() -> Any:
     """`_run`, without XLA's fusion emitters: with them it takes half as long again to compile, and
     runs no faster."""
-    options: dict[str, Any] | None = {"xla_cpu_use_fusion_emitters": False}
+    options: dict[str, bool] | None = XLA_OPTIONS
     try:
         jax.jit(lambda x: x + 1, compiler_options=options)(0)
     except jax.errors.JaxRuntimeError:  # an XLA that knows no such option

@@ -109,7 +109,7 @@ def _with_variances(covariance: Any, variance: Any) -> Any:
 def eliminate(matrix: Any, vector: Any) -> tuple[Any, Any]:
     """log |C| and v^T C^-1 v for small positive definite C [..., k, k] and v [..., k].
 
-    Gaussian elimination, unrolled: it runs along all other axes at once.
+    NumPy: Gaussian elimination, unrolled, along all other axes at once. JAX: `_differentiable`.
     """
     if namespace(matrix) is not np:
         return _differentiable()(matrix, vector)
@@ -126,8 +126,7 @@ def eliminate(matrix: Any, vector: Any) -> tuple[Any, Any]:
 
 @cache
 def _differentiable() -> Callable[[Any, Any], tuple[Any, Any]]:
-    """`eliminate` of JAX's arrays, whose derivative is told: XLA compiles half as much, and
-    sooner than LAPACK's factor and its derivative."""
+    """`eliminate` for JAX's arrays, with an analytic derivative: XLA compiles half as much."""
     import jax
     from jax import numpy as jnp
 

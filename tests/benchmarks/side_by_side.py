@@ -4,7 +4,7 @@
 
 The other commit becomes a git worktree with its own environment under DIR, and is used again if it
 is there. JAX's compilations are kept for each tree; all but `first`, `tests` and `nothing` run once
-before. `nothing` is `make demo` in a fresh clone, without a cache.
+before. `nothing` is `make demo` in a fresh clone of the commit, without a cache.
 """
 
 import argparse
@@ -36,7 +36,7 @@ COMMANDS = {  # {bin} of the tree's environment, {out} an empty directory, {kept
     f" criticise {{out}}/run --held-out {DATA.format('late', 7)}"
     f" --baseline {DATA.format('clean', 10)}",
     "nothing": "git clone -q . {out}/clone && cd {out}/clone"
-    " && env -u JAX_COMPILATION_CACHE_DIR HOME={out} make demo",
+    " && env -u JAX_COMPILATION_CACHE_DIR -u XDG_CACHE_HOME HOME={out} make demo",
     "tests": "make test",
 }
 COLD = "first", "nothing", "tests"

@@ -191,25 +191,24 @@ def flow_in_box(
         runtime.start()
         from ...apic.lanes import LANES
 
+        filled = list(zip(liquids, bodies, strict=True))
         together = GROUPS * LANES
         found = [
-            _seen(
-                box, liquids[low : low + together], bodies[low : low + together], steps, look, every
-            )
-            for low in range(0, len(liquids), together)
+            _seen(box, filled[low : low + together], steps, look, every)
+            for low in range(0, len(filled), together)
         ]
     return box.dt * np.arange(every, steps + 1, every), np.concatenate(found, axis=1)
 
 
 def _seen(
     box: WetBox,
-    liquids: Sequence[WetLiquid],
-    bodies: Sequence[Body],
+    filled: Sequence[tuple[WetLiquid, Body]],
     steps: int,
     look: Look,
     every: int,
 ) -> np.ndarray:
     """What one sees of liquids that march together; see `flow_in_box`."""
+    liquids, bodies = zip(*filled, strict=True)
     scene, places = _started(box, liquids, bodies)
     seen = []
     for step in range(0, steps, every):

@@ -63,6 +63,13 @@ def test_help_is_no_error(command):
     assert "Usage" in result.stdout
 
 
+@pytest.mark.parametrize("group", [[], ["rig"], ["check"], ["simulate"]])
+def test_a_group_without_a_command_shows_its_help(group):
+    result = CliRunner().invoke(app, group)
+    assert (result.exit_code, result.stderr) == (2, "")
+    assert result.stdout == CliRunner().invoke(app, [*group, "--help"]).stdout
+
+
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [(["--budget", "ten"], "--budget"), (["--frobnicate"], "--frobnicate"), ([], "--out")],

@@ -7,7 +7,7 @@ from importlib.resources import files
 import pytest
 
 HEAVY = "jax numpyro taichi matplotlib pandas xarray cv2 scipy.spatial scipy.stats arviz_stats"
-MAX_MODULES = 700
+MAX_MODULES = 600
 CODE = f"""
 import atexit, sys
 from bolfi_liquids.cli.app import main

@@ -92,7 +92,7 @@ def test_new_pours_agree_with_the_judgement(pour, calibration, pour_settings):
     tree = xr.load_datatree(pour.path / "pour.nc")
     known = calibration.posterior["viscosity"].to_numpy()
     assert np.isin(tree["liquids"]["viscosity"], known).all()
-    cups, count, rng = pour_settings["cups"], 32, np.random.default_rng(0)
+    cups, count, rng = pour_settings["cups"], 64, np.random.default_rng(0)
     liquid = models.Liquid(**calibration.draws(count, 99), density=calibration.liquid_density)
     landed = models.landings(liquid, pour.chosen.angular_velocity, cups, np.arange(count))
     off = rng.normal(0.0, tree.attrs["landing_sd"], (40, 1))

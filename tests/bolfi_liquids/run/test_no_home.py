@@ -87,8 +87,8 @@ def test_libraries_load_and_draw(tmp_path, home):
 
 # Taichi, which compiles the fluid, would abort or end by a signal
 COMPILE = """
-import taichi as ti
 from bolfi_liquids.models import runtime
+import taichi as ti
 
 @ti.kernel
 def twice(x: ti.f32) -> ti.f32:

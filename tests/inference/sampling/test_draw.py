@@ -126,6 +126,11 @@ def test_a_posterior_at_the_border_and_an_open_direction():
     assert_means(made.chains.u**2, [0.02**2, 1 / 3])
 
 
+def test_an_option_that_xla_does_not_know_is_left_out(monkeypatch):
+    monkeypatch.setattr(nuts, "XLA_OPTIONS", {"xla_cpu_of_another_version": False})
+    assert callable(nuts._compiled_run.__wrapped__())
+
+
 @pytest.mark.slow
 def test_compiles_once_for_all_fits_and_lengths(line_fit, prior, observed, simulate):
     traces = []

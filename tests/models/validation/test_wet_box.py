@@ -1,8 +1,10 @@
 """Boxes of liquid: what they hold, and that they say so when it is too much."""
 
+from functools import cache
+
 import numpy as np
 import pytest
-from bolfi_liquids.models.apic.places import GROUPS
+from bolfi_liquids.models.validation.scenes import wet_box
 from bolfi_liquids.models.validation.scenes.wet_box import Body, WetBox, WetLiquid, flow_in_box
 
 BOX = WetBox((0.04, 0.0, 0.04), block=((0.012, 0.0, 0.008), (0.02, 0.0, 1.0)))
@@ -67,11 +69,14 @@ def test_what_flowed_before_changes_no_bit():
     np.testing.assert_array_equal(first, again)
 
 
-def test_more_boxes_than_march_at_a_time_take_turns():
+def test_more_boxes_than_march_at_a_time_take_turns(monkeypatch):
     from bolfi_liquids.models.apic.lanes import LANES
 
-    wet, body = WetLiquid(0.01), columns(0)
-    count = GROUPS * LANES + 1
-    _, seen = flow_in_box(BOX, [wet] * count, [body] * count, 0.02, look)
-    assert seen.shape[1] == count
-    np.testing.assert_array_equal(seen, np.repeat(seen[:, :1], count, axis=1))
+    monkeypatch.setattr(wet_box, "GROUPS", 1)
+    monkeypatch.setattr(wet_box, "_scene", cache(wet_box._scene.__wrapped__))
+    liquids = [WetLiquid(10.0 ** -(2 + n % 2)) for n in range(LANES + 1)]
+    bodies = [columns(n) for n in range(LANES + 1)]
+    _, seen = flow_in_box(BOX, liquids, bodies, 0.02, look)
+    for n in (0, LANES - 1, LANES):
+        _, alone = flow_in_box(BOX, liquids[n : n + 1], bodies[n : n + 1], 0.02, look)
+        np.testing.assert_array_equal(seen[:, n], alone[:, 0])
