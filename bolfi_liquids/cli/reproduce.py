@@ -29,7 +29,7 @@ def reproduce(
         bool, typer.Option("--quick", help="Fewer truths, coarser stirs: a quarter of an hour.")
     ] = False,
 ) -> None:
-    r"""Draw the paper's figures, and those of what it left open.
+    """Draw the paper's figures, and those of what it left open.
 
     \b
     - `inclination`: recorded stirs, and what the calibrated simulator predicts
