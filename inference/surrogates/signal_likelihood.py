@@ -130,8 +130,9 @@ def _differentiable() -> Callable[[Any, Any], tuple[Any, Any]]:
     import jax
     from jax import numpy as jnp
 
-    def inverted(matrix: Any) -> tuple[Any, Any]:
-        """log |C| and C^-1, by the sweep operator (Goodnight 1979) as k changes of rank one."""
+    def solved(matrix: Any, vector: Any) -> tuple[Any, Any, Any]:
+        """log |C|, C^-1 and C^-1 v, by the sweep operator (Goodnight 1979) as k changes of rank
+        one."""
         k = matrix.shape[-1]
         scale = 1.0 / jnp.sqrt(jnp.diagonal(matrix, axis1=-2, axis2=-1))
         swept = matrix * scale[..., :, None] * scale[..., None, :]
@@ -142,22 +143,21 @@ def _differentiable() -> Callable[[Any, Any], tuple[Any, Any]]:
             row = row - np.eye(k)[i]
             swept = swept - row[..., :, None] * row[..., None, :] / pivots[i][..., None, None]
         log_det = jnp.log(jnp.stack(pivots)).sum(0) - 2.0 * jnp.log(scale).sum(-1)
-        return log_det, (2.0 * np.eye(k) - swept) * scale[..., :, None] * scale[..., None, :]
+        inverse = (2.0 * np.eye(k) - swept) * scale[..., :, None] * scale[..., None, :]
+        return log_det, inverse, (inverse * vector[..., None, :]).sum(-1)
 
     @jax.custom_jvp
     def eliminated(matrix: Any, vector: Any) -> tuple[Any, Any]:
-        log_det, inverse = inverted(matrix)
-        return log_det, (vector * (inverse * vector[..., None, :]).sum(-1)).sum(-1)
+        log_det, _, solution = solved(matrix, vector)
+        return log_det, (vector * solution).sum(-1)
 
     @eliminated.defjvp
     def _(at: Any, along: Any) -> Any:
         (matrix, vector), (of_matrix, of_vector) = at, along
-        log_det, inverse = inverted(matrix)
-        solved = (inverse * vector[..., None, :]).sum(-1)
+        log_det, inverse, solution = solved(matrix, vector)
         of_log_det = (inverse * of_matrix).sum((-2, -1))
-        of_square = 2.0 * (solved * of_vector).sum(-1) - (
-            solved[..., :, None] * solved[..., None, :] * of_matrix
-        ).sum((-2, -1))
-        return (log_det, (vector * solved).sum(-1)), (of_log_det, of_square)
+        outer = solution[..., :, None] * solution[..., None, :]
+        of_square = 2.0 * (solution * of_vector).sum(-1) - (outer * of_matrix).sum((-2, -1))
+        return (log_det, (vector * solution).sum(-1)), (of_log_det, of_square)
 
     return eliminated

@@ -31,8 +31,9 @@ COMMANDS = {  # {bin} of the tree's environment, {out} an empty directory, {kept
     "stirs": CALL.format("simulate_stir(np.geomspace(0.01, 1, 16))"),
     "pours": CALL.format("simulate_pour(np.geomspace(0.01, 1, 16))"),
     "demo": "{bin}/bolfi-liquids demo --out {out}/run",
-    "criticise": "test -d {kept}/run || {bin}/bolfi-liquids calibrate --out {kept}/run"
-    f" {DATA.format('late', 10)} && cp -r {{kept}}/run {{out}}/run && {{bin}}/bolfi-liquids"
+    "criticise": "test -d {kept}/run || ({bin}/bolfi-liquids calibrate --out {out}/made"
+    f" {DATA.format('late', 10)} && mv {{out}}/made {{kept}}/run)"
+    " && cp -r {kept}/run {out}/run && {bin}/bolfi-liquids"
     f" criticise {{out}}/run --held-out {DATA.format('late', 7)}"
     f" --baseline {DATA.format('clean', 10)}",
     "nothing": "git clone -q . {out}/clone && cd {out}/clone"

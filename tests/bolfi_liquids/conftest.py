@@ -98,7 +98,7 @@ def alone_with(path):
 
 @pytest.fixture(scope="session")
 def pour_settings():
-    """Of `pour`: few cells of liquid, turned fast, which takes a fifth of their time."""
+    """Of `pour`: less liquid than the bundled cups hold, turned faster: a third of their time."""
     bundled = bundled_cups()
     source = bundled.source.model_copy(update={"fill": 0.02})
     turned = {"angular_velocity_deg_s": (90.0, 180.0), "hold": 0.4}

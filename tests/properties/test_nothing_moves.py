@@ -190,8 +190,12 @@ def test_one_file_knows_the_library_that_moves_arms():
 )
 def test_unarmed_command_moves_nothing(words, rig_file, poured_run, boards, emulator):
     before = emulator.admin.motions()
-    names = {"RUN": poured_run, "BOARDS": boards, "CALIBRATED": rig_file.parent / "c"}
-    names["TAKEN"] = emulator.address
+    names = {
+        "RUN": poured_run,
+        "BOARDS": boards,
+        "CALIBRATED": rig_file.parent / "c",
+        "TAKEN": emulator.address,
+    }
     arguments = [names.get(one, one) for one in OF_A_RIG[words]]
     # the sentence is typed all the same
     result = bolfi_liquids(*words.split(), *arguments, "--rig", rig_file, typed=f"{CONFIRMATION}\n")
