@@ -193,7 +193,7 @@ class Bolfi:
         repeated = next_replicate(history, pending) if self.family.replicates else None
         parts = [] if repeated is None else [repeated[None]]
         if n > len(parts):
-            runs = Feasibility(history.u, history.succeeded & sane(history.discrepancy))
+            runs = self._runs()
             # made by NumPy: JAX would compile for half a second
             words = np.random.SeedSequence([self.seed, self._state.asked]).generate_state(2)
             key = jax.random.wrap_key_data(jax.device_put(words), impl="threefry2x32")
@@ -203,11 +203,16 @@ class Bolfi:
             parts.append(self.prior.to_array(self.prior.from_unit(u)))
         return np.concatenate(parts)
 
+    def _runs(self) -> Feasibility:
+        """Where runs succeeded; those that blew up did not."""
+        history = self._state.history
+        return Feasibility(history.u, history.succeeded & sane(history.discrepancy))
+
     def _known(self) -> Learnable:
         history = self._state.history
         good = history.distinct
         known = history.u[good], history.features[good], history.discrepancy[good]
-        return Learnable(*known, self.prior.normal)
+        return Learnable(*known, self.prior.normal, self._runs())
 
     def tell(
         self,

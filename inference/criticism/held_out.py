@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .._float64 import in_float64
-from ..surrogates.output_vectors import MIN_SERIES
+from ..surrogates.output_vectors import MIN_LONG
 from .experiment import Experiment
 from .measurement_noise import gaussian, samples
 from .misfit import MODES_PER_CHANNEL, exceedance, orthonormal, slow_modes
@@ -99,7 +99,7 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
     observed = experiment.corrected[np.isfinite(experiment.observed)]
     fewer = 1.0 + 1.0 / min(len(before), len(after))  # the mean of few runs is noisy, too
     at = samples(experiment.observed)
-    series = len(experiment.observed) >= MIN_SERIES
+    series = len(experiment.observed) >= MIN_LONG
     simulated = fewer * smooth_covariance(errors_of([before, after]), at, series)
     covariance = experiment.noise.covariance(at) + simulated
     measured = without_usual(experiment.noise)

@@ -151,7 +151,7 @@ def hypothesise(
     told = runs.of(names)
     # every component: a small effect may show in one that few runs hardly predict
     covariance = noise.covariance(samples(observed))
-    family = SignalFamily(noise=covariance, components=COMPONENTS, predicted=None)
+    family = SignalFamily(noise=covariance, misfit=0, components=COMPONENTS, predicted=None)
     engine = Bolfi(prior, observed, surrogate=family)
     theta = {name: told.theta[name] for name in prior.names}
     engine.tell(theta, told.signals, told.seeds)
@@ -180,7 +180,8 @@ def hypothesise(
     believed = replace(
         surrogate,
         reduced=reduced._replace(log_weight=reduced.log_weight + log_weight),
-        nodes=Nodes(*(np.repeat(part, len(sized)) for part in surrogate.nodes)),
+        nodes=Nodes(*(np.zeros(len(sized)) for part in Nodes._fields)),
+        log_prior=log_weight,
         box=tuple(intersection(near_best, within)),
     )
     return replace(found, fit=replace(fit, learned=believed))
@@ -192,7 +193,7 @@ def _nearest(
     """Where in a box the expected output is nearest to what was observed, prior quantiles [d], and
     the covariance [m, m] of the simulator's own noise, of which there are draws [n, m]."""
     assert surrogate.known is not None
-    own = smooth_covariance(errors, surrogate.output.layout, surrogate.output.series)
+    own = smooth_covariance(errors, surrogate.output.layout, surrogate.output.long)
     reduced = _reduced(surrogate, [own + surrogate.known.covariance])
     state = replace(surrogate, reduced=reduced).state
     return minimise_in_box(partial(_squared_distance, state), len(within.low), *within), own

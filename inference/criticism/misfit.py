@@ -89,7 +89,7 @@ def check(hypothesis: Hypothesis, signatures: Mapping[str, Signature], null: np.
         null: Residuals [m, n] if it were right, see `null_draws`.
     """
     residual = hypothesis.project(hypothesis.whiten(hypothesis.difference))
-    series = hypothesis.surrogate.output.series
+    series = hypothesis.surrogate.output.long
     modes = slow_modes(hypothesis.layout, MODES_PER_CHANNEL) if series else np.eye(len(residual))
     span = orthonormal(hypothesis.project(hypothesis.whiten(modes.T)))
     unused = directions(hypothesis, signatures)
@@ -125,7 +125,7 @@ def locate(hypothesis: Hypothesis, windows: Sequence[Window], null: np.ndarray) 
         if not inside.any():
             first = np.argmax(window.samples.ravel()[output.present])
             inside[np.searchsorted(output.starts, first, "right") - 1] = True
-        count = WINDOW_MODES if output.series else 1
+        count = WINDOW_MODES if output.long else 1
         modes = slow_modes(hypothesis.layout, count, inside)
         span = orthonormal(hypothesis.project(hypothesis.whiten(modes.T)))
         sizes.append(float(np.sum((span.T @ residual) ** 2)))

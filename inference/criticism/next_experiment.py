@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .._float64 import in_float64
-from ..surrogates.output_vectors import MIN_SERIES
+from ..surrogates.output_vectors import MIN_LONG
 from .experiment import Proposal
 from .measurement_noise import samples
 from .misfit import MODES_PER_CHANNEL, orthonormal, slow_modes
@@ -72,7 +72,7 @@ def _distance(proposal: Proposal, signals: Sequence[np.ndarray], a: int, b: int)
     """Length of the whitened difference of two means in its slow part, less what the noise of
     the runs adds to it."""
     at = samples(np.zeros(proposal.shape))
-    series = proposal.shape[0] >= MIN_SERIES
+    series = proposal.shape[0] >= MIN_LONG
     runs = smooth_covariance(errors_of(signals), at, series)
     covariance = proposal.noise.covariance(at) + runs
     factor = np.linalg.cholesky(covariance)

@@ -55,6 +55,7 @@ class DiscrepancySurrogate:
         threshold: eps on the scale of g(Delta).
         learned_at: Simulations known when the hyperparameters were found.
         chosen_at: Simulations known when the transform was chosen.
+        success: Where runs succeed, see `success.learn_success`.
     """
 
     gp: GP
@@ -63,6 +64,7 @@ class DiscrepancySurrogate:
     threshold: float
     learned_at: int
     chosen_at: int
+    success: GP | None = None
 
     @property
     def equal(self) -> bool:
@@ -77,7 +79,7 @@ class DiscrepancySurrogate:
     @in_float64
     def state(self) -> ThresholdState:
         threshold = (self.threshold - self.scale.location) / self.scale.spread
-        return ThresholdState(self.gp, np.asarray(threshold))
+        return ThresholdState(self.gp, np.asarray(threshold), self.success)
 
     @property
     def log_likelihood(self) -> LogLikelihood:

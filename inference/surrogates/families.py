@@ -1,7 +1,7 @@
 """The families of surrogates: what a user may choose of each, and how it learns."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -12,11 +12,13 @@ from ..types import Discrepancy
 from .base import Surrogate
 from .discrepancy import DiscrepancySurrogate, learn, marginalised, with_threshold
 from .emulator import PREDICTED_SHARE, Limits, emulate
+from .feasibility import Feasibility
 from .given_noise import GivenNoise, given_noise
 from .outliers import sane
 from .output_vectors import Output, Summary, describe, summarise
-from .signal import SignalSurrogate, observe
+from .signal import Noise, SignalSurrogate, observe
 from .squared_difference import evaluate, failed_on, squared_difference
+from .success import learn_success
 from .threshold import Threshold, check_rule
 from .transform import TRANSFORMS
 
@@ -30,6 +32,7 @@ class Learnable(NamedTuple):
     features: np.ndarray  # [n, m]
     discrepancy: np.ndarray  # [n]
     normal: np.ndarray | None  # bool [d], see `Prior.normal`
+    runs: Feasibility  # all, failed ones too
 
 
 class Measured(NamedTuple):
@@ -106,6 +109,7 @@ class DiscrepancyLearner:
     ) -> DiscrepancySurrogate:
         transform, rule = self.family.transform, self.family.threshold
         learned = learn(known.u, known.discrepancy, transform, previous, known.normal)
+        learned = replace(learned, success=learn_success(known.runs, known.normal))
         return learned if rule is None else with_threshold(learned, rule)
 
     def finish(self, known: Learnable, seed: int) -> Surrogate:
@@ -126,9 +130,10 @@ class SignalFamily:
             takes the output as it is.
         noise: Measurement noise that the simulator does not make: its sd, a number or an array
             shaped like the observed (summarised) output; or sds [n], or a covariance [n, n], of
-            that output's n finite values, flattened; 0 for none. None estimates it, as an AR(1)
-            process, where the output is a series of at least 16 samples without a summary, and
-            takes none elsewhere.
+            that output's n finite values, flattened; 0 for none. None estimates it: as an AR(1)
+            process where the output is a series, of at least 5 samples without a summary.
+        misfit: Prior probability that the data are missed by more than the given noise, because
+            the simulator errs or the noise is larger; its size is integrated out. 0 for never.
         components: At most.
         predicted: Share of a component's variance that the parameters must predict where its
             run is left out; what they predict less counts as run-to-run noise. None emulates
@@ -143,6 +148,7 @@ class SignalFamily:
 
     summary: Summary | None = None
     noise: ArrayLike | None = None
+    misfit: float = 0.1
     components: int = MAX_COMPONENTS
     predicted: float | None = PREDICTED_SHARE
     discrepancy: Discrepancy | None = None
@@ -153,6 +159,7 @@ class SignalFamily:
         checked_integer("components", self.components)
         if self.noise is not None:  # its shape is looked at beside the output's
             checked_array("noise", self.noise)
+        checked_number("misfit", self.misfit, lambda p: 0.0 <= p < 1.0, "from 0 to below 1")
         if self.predicted is not None:
             due = "None or from 0 to below 1"
             checked_number("predicted", self.predicted, lambda share: 0.0 <= share < 1.0, due)
@@ -218,7 +225,9 @@ class SignalLearner:
             known.normal,
         )
         kept = previous if old is not None and emulator.learned_at == old.learned_at else None
-        return observe(emulator, self.output, self.values, self.noise, kept)
+        noise = Noise(self.noise, self.family.misfit)
+        observed = observe(emulator, self.output, self.values, noise, kept)
+        return replace(observed, success=learn_success(known.runs, known.normal))
 
     def finish(self, known: Learnable, seed: int) -> Surrogate:
         """The surrogate on which a fit rests."""

@@ -2,7 +2,8 @@
 
 In standardised values its covariance is F F^T + D + sigma^2 R(rho): what the emulator's components
 leave of the simulations (truncation, and the simulator's run-to-run noise outside them), white
-noise D, and measurement noise, an AR(1) process in each channel, of unknown sigma and rho.
+noise D, and measurement noise or a misfit, an AR(1) process in each channel, of unknown sigma and
+rho.
 """
 
 from typing import NamedTuple
@@ -11,7 +12,12 @@ import numpy as np
 
 NOISE_FACTORS = 16
 CORRELATIONS = np.tanh([0.0, 0.3, 0.6, 0.9, 1.2, 1.6, 2.0, 2.5])  # of neighbouring samples
-SIZES = 2.0 ** np.arange(-3.0, 1.4, 1.0 / 3.0)  # sigma over the sd of the residual
+FEW_CORRELATIONS, NO_CORRELATION = np.array([0.0, 0.6, 0.95]), np.zeros(1)
+STEP = 2.0 ** (1.0 / 3.0)  # from one sigma to the next
+LEAST_OF_RESIDUAL = 1.0 / 8.0  # least sigma over the sd of a residual of many values
+LEAST_OF_MISFIT = 1.0 / 32.0  # least sigma over the smallest expected misfit, where they are few
+MOST = 2.0  # largest sigma over the larger of the two
+UNIT = 1e-3  # of the outputs' sd, added to the given noise: the misfit of one that is 0
 
 MIN_SIZE = 1e-4  # of a residual, in units of the outputs' sd: data are never without noise
 
@@ -83,10 +89,32 @@ def shrunk_covariance(residuals: np.ndarray, lost: int) -> Remainder:
     return Remainder(factors, max(mean - np.sum(factors**2) / m, 0.0))
 
 
-def candidates(size: float) -> Nodes:
-    """The grid of nodes for a residual of sd `size`."""
-    sigma, rho = np.meshgrid(size * SIZES, CORRELATIONS, indexing="ij")
+def candidates(low: float, high: float, correlations: np.ndarray) -> Nodes:
+    """The grid of nodes with sigmas from `low` to `high`, evenly in their logarithm."""
+    count = max(int(np.ceil(np.log(high / low) / np.log(STEP))) + 1, 1)
+    sigma, rho = np.meshgrid(np.geomspace(low, high, count), correlations, indexing="ij")
     return Nodes(sigma.ravel(), rho.ravel())
+
+
+def correlation_weights(nodes: Nodes) -> np.ndarray:
+    """Log weights by which nodes even in arctanh(rho) stand for a prior even in rho."""
+    return np.log1p(-(nodes.rho**2))
+
+
+def with_misfit(nodes: Nodes, given: float, share: float) -> tuple[Nodes, np.ndarray]:
+    """Nodes of a misfit beside noise that is given, none in front, and their log weights.
+
+    The prior of the size is half-Cauchy in units of the noise, evenly spread where that is more.
+
+    Args:
+        nodes: Sizes evenly spaced in their logarithm.
+        given: Sd of the given noise, standardised.
+        share: Prior probability of a misfit, 0 < share < 1.
+    """
+    ratio = nodes.sigma / (given + UNIT)
+    slab = ratio / (1.0 + ratio**2) * np.exp(correlation_weights(nodes))
+    weights = np.append(1.0 - share, share * slab / slab.sum())
+    return Nodes(*(np.append(0.0, part) for part in nodes)), np.log(weights)
 
 
 def residual_size(target: np.ndarray, vectors: np.ndarray) -> float:

@@ -8,7 +8,8 @@ import numpy as np
 from ..arguments import checked_array
 from .measurement_noise import Layout
 
-MIN_SERIES = 16  # samples from which an output counts as a series, whose noise can be estimated
+MIN_SERIES = 5  # samples from which an output counts as a series, whose values share a scale
+MIN_LONG = 16  # samples of a series from which their residual tells the size of the noise
 MAX_VALUES = 2000  # values; neighbouring samples of longer series are averaged
 
 Summary = Callable[[np.ndarray], np.ndarray]
@@ -34,6 +35,11 @@ class Output:
     layout: Layout
     starts: np.ndarray
     series: bool
+
+    @property
+    def long(self) -> bool:
+        """Whether it is a series of which what is left over can be seen to be noise."""
+        return self.series and len(np.unique(self.layout.sample)) >= MIN_LONG
 
     @property
     def counts(self) -> np.ndarray:

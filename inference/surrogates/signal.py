@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from .._float64 import in_float64
 from ..gp.optimise import minimise_in_box
-from ..gp.process import GP, believe
+from ..gp.process import GP, believe, predict_points
 from ..sobol import sobol
 from ..types import LogLikelihood, LogSecondMoment
 from .emulator import (
@@ -20,13 +21,22 @@ from .emulator import (
 from .given_noise import GivenNoise
 from .held_back import HeldBack, held_back
 from .measurement_noise import (
+    CORRELATIONS,
+    FEW_CORRELATIONS,
+    LEAST_OF_MISFIT,
+    LEAST_OF_RESIDUAL,
+    MIN_SIZE,
+    MOST,
+    NO_CORRELATION,
     NO_MEASUREMENT_NOISE,
     Nodes,
     Reduced,
     candidates,
     correlated,
+    correlation_weights,
     reduce,
     residual_size,
+    with_misfit,
 )
 from .output_vectors import Output
 from .signal_likelihood import (
@@ -37,6 +47,7 @@ from .signal_likelihood import (
 )
 from .warnings import (
     EQUAL,
+    MISFIT,
     OUTSIDE,
     UNPREDICTED,
     complaints,
@@ -46,6 +57,8 @@ from .warnings import (
 
 KEPT_NODES = 12  # nodes of unknown measurement noise that enter the likelihood
 SCREENED_POINTS = 128
+MISFIT_POINTS = 1024  # among which the smallest misfit is looked for
+NEEDED = 0.95  # posterior probability of a misfit from which it is said
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,13 +70,14 @@ class SignalSurrogate:
         output: How outputs become values.
         observed: The observed values [m].
         known: Measurement noise that the user gave.
-        nodes: Sizes and correlations of the unknown measurement noise, KEPT_NODES of them. Of
-            size 0 where there is none or it is known: one, or as many as covariances that the
-            noise may have.
+        nodes: Sizes and correlations of the unknown measurement noise, or of a misfit beside noise
+            that is given; KEPT_NODES of them. Size 0 is no misfit.
+        log_prior: Log weights of the nodes before anything is compared [g].
         reduced: The observed scores at each, with the scores' run-to-run noise.
         box: Ends [d], [d] in prior quantiles of the box outside of which the likelihood vanishes;
             None is everywhere. Where hardly anything was simulated, the emulator knows least, and
             what it does not know counts as noise that explains anything.
+        success: Where runs succeed, see `success.learn_success`.
     """
 
     emulator: Emulator
@@ -71,8 +85,10 @@ class SignalSurrogate:
     observed: np.ndarray
     known: GivenNoise | None
     nodes: Nodes
+    log_prior: np.ndarray
     reduced: Reduced
     box: tuple[np.ndarray, np.ndarray] | None = None
+    success: GP | None = None
 
     @property
     def gp(self) -> GP:
@@ -81,7 +97,7 @@ class SignalSurrogate:
     @cached_property
     @in_float64
     def state(self) -> SignalState:
-        return state_of(self.emulator, self.reduced, self.box)
+        return state_of(self.emulator, self.reduced, self.box)._replace(success=self.success)
 
     @cached_property
     def held_back(self) -> HeldBack:
@@ -117,19 +133,24 @@ class SignalSurrogate:
         weights = np.exp(log_weights - log_weights.max())
         return weights / weights.sum()
 
+    @property
+    def misfit_probability(self) -> float:
+        """Posterior probability of a misfit beside noise that is given."""
+        return float(self.node_weights[self.nodes.sigma > 0.0].sum())
+
     @in_float64
     def constants(self) -> dict[str, np.ndarray]:
         """What a reader of the posterior must know of the likelihood."""
         weights = self.node_weights
-        sd = weights @ self.nodes.sigma * self.emulator.basis.scale[0]
+        variance = weights @ self.nodes.sigma**2 * self.emulator.basis.scale[0] ** 2
         if self.known is not None:
-            sd = np.sqrt(self.known.variance[0])
+            variance = variance + self.known.variance[0]
         return {
             "components": np.asarray(self.emulator.basis.used),
             "explained_variance": np.asarray(self.emulator.basis.explained),
             "run_to_run_noise_share": np.asarray(noise_share(self.emulator)),
             # of the output's first value; a channel's noise is in proportion to its scale
-            "measurement_noise_sd": np.asarray(sd),
+            "measurement_noise_sd": np.sqrt(variance),
             "measurement_noise_correlation": weights @ self.nodes.rho,
         }
 
@@ -154,6 +175,8 @@ class SignalSurrogate:
             return [EQUAL if self.emulator.equal else UNPREDICTED]
         said = complaints(loo_errors(self.emulator), "output")
         said += noise_warnings(noise_share(self.emulator)) + held_back_warnings(self.held_back)
+        if self.known is not None and self.misfit_probability > NEEDED:
+            said.append(MISFIT)
         return [OUTSIDE, *said] if self._outside() else said
 
     def _outside(self) -> bool:
@@ -165,7 +188,7 @@ class SignalSurrogate:
         error = np.sqrt(np.diagonal(self.reduced.covariance, axis1=1, axis2=2))[:, used]
         far = np.abs(self.reduced.estimate[:, used]) > 2.0 * reach + 3.0 * error
         size = residual_size(basis.standardise(self.observed), basis.vectors[:, used])
-        return bool(far.any(1).all()) or (self.output.series and size > 1.0)
+        return bool(far.any(1).all()) or (self.output.long and size > 1.0)
 
     @in_float64
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
@@ -200,48 +223,91 @@ def state_of(
     )
 
 
+class Noise(NamedTuple):
+    """What is believed of the noise between the simulator and the data.
+
+    Attributes:
+        given: The measurement noise; None where it is unknown.
+        misfit: Prior probability that the data are missed by more than the given noise explains;
+            0 for none.
+    """
+
+    given: GivenNoise | None
+    misfit: float
+
+
 @in_float64
 def observe(
     emulator: Emulator,
     output: Output,
     observed: np.ndarray,
-    noise: GivenNoise | None,
+    noise: Noise,
     previous: SignalSurrogate | None = None,
 ) -> SignalSurrogate:
     """Compare with the observed values [m].
 
-    The measurement noise is unknown unless given: its size and correlation are integrated out
-    over nodes, under a prior even in the logarithm of the size, centred on what no
-    combination of the components explains.
+    Noise that is not given, and a misfit beside noise that is, have an unknown size and
+    correlation, which are integrated out over nodes. Without them a place where the emulator knows
+    nothing would explain what no run explains.
 
     Args:
-        noise: The measurement noise; None to estimate it where the output is a series, and for
-            none where it is not.
+        noise: What is believed of it.
         previous: Its nodes are kept.
     """
     basis, remainder = emulator.basis, emulator.remainder
-    target, used = basis.standardise(observed), emulator.basis.used
+    target, given = basis.standardise(observed), noise.given
     vectors, factors = basis.vectors, remainder.factors
     white = np.full(len(target), remainder.white)
-    if noise is not None:
-        white = white + noise.white / basis.scale**2
-        factors = np.column_stack([factors, noise.factors / basis.scale[:, None]])
+    if given is not None:
+        white = white + given.white / basis.scale**2
+        factors = np.column_stack([factors, given.factors / basis.scale[:, None]])
     if previous is not None:
-        nodes = previous.nodes
-    elif noise is not None or not output.series or emulator.equal:
-        nodes = NO_MEASUREMENT_NOISE
+        nodes, log_weight = previous.nodes, previous.log_prior
     else:
-        nodes = candidates(residual_size(target, vectors[:, :used]))
+        nodes, log_weight = _nodes(emulator, output, observed, noise)
     if emulator.equal:  # nothing to compare
-        reduced = Reduced(np.zeros((1, 0)), np.zeros((1, 0, 0)), np.zeros(1))
+        reduced = Reduced(*(np.zeros((len(log_weight), *[0] * axes)) for axes in (1, 2, 0)))
     else:
         reduced = reduce((vectors, target, factors), white, output.layout, nodes)
-    reduced = _widen(reduced, emulator)
-    if len(reduced.log_weight) > KEPT_NODES:
+    reduced = _widen(reduced._replace(log_weight=reduced.log_weight + log_weight), emulator)
+    if len(log_weight) > KEPT_NODES:
         kept = _keep(emulator, reduced)
         reduced = Reduced(*(part[kept] for part in reduced))
-        nodes = Nodes(*(part[kept] for part in nodes))
-    return SignalSurrogate(emulator, output, observed, noise, nodes, reduced)
+        nodes, log_weight = Nodes(*(part[kept] for part in nodes)), log_weight[kept]
+    return SignalSurrogate(emulator, output, observed, given, nodes, log_weight, reduced)
+
+
+def _nodes(
+    emulator: Emulator, output: Output, observed: np.ndarray, noise: Noise
+) -> tuple[Nodes, np.ndarray]:
+    """Sizes and correlations that the unknown noise or misfit may have, and their log weights."""
+    if emulator.equal or (noise.given is not None and not noise.misfit):
+        return NO_MEASUREMENT_NOISE, np.zeros(1)
+    basis = emulator.basis
+    correlations = FEW_CORRELATIONS if output.series else NO_CORRELATION
+    miss = _smallest_misfit(emulator, observed)
+    low, high = LEAST_OF_MISFIT * miss, MOST * miss
+    if noise.given is not None:
+        sd = float(np.sqrt(np.mean(noise.given.variance / basis.scale**2)))
+        return with_misfit(candidates(low, high, correlations), sd, noise.misfit)
+    if output.long:
+        left = residual_size(basis.standardise(observed), basis.vectors[:, : basis.used])
+        low, high, correlations = LEAST_OF_RESIDUAL * left, max(MOST * left, high), CORRELATIONS
+    nodes = candidates(low, high, correlations)
+    return nodes, correlation_weights(nodes)
+
+
+def _smallest_misfit(emulator: Emulator, observed: np.ndarray) -> float:
+    """Root of the least expected mean square by which the emulated output misses the observed
+    values [m], standardised, over an even screen of the prior and the runs."""
+    basis, data = emulator.basis, emulator.gp.data.u
+    points = np.concatenate([sobol(0, 0, MISFIT_POINTS, data.shape[1]), data])
+    mean, variance = (part.T for part in predict_points(emulator.gp, points))
+    near = (mean - basis.scores(observed[None])) ** 2 + variance
+    # components are orthogonal, so what they miss adds to what they cannot make
+    beyond = np.sum(basis.residuals(observed[None]) ** 2)
+    total = (near @ np.sum(basis.vectors**2, 0)).min() + beyond
+    return float(max(np.sqrt(total / len(observed)), MIN_SIZE))
 
 
 def _widen(reduced: Reduced, emulator: Emulator) -> Reduced:

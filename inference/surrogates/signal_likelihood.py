@@ -9,6 +9,7 @@ import numpy as np
 
 from ..gp.namespaces import log_sum_exp, namespace
 from ..gp.process import GP, padded, padded_rows, predict
+from .success import log_success, padded_success
 
 SCORES_TOGETHER = 8  # by which the scores of padded states are counted
 WALL = 0.01  # of prior quantiles, beyond a box, over which the likelihood vanishes
@@ -27,6 +28,7 @@ class SignalState(NamedTuple):
     log_weight: np.ndarray  # [g]
     low: np.ndarray  # [d], ends of the box outside of which the likelihood vanishes
     high: np.ndarray
+    success: GP | None = None  # see `success.learn_success`
 
     def padded(self) -> "SignalState":
         """The same likelihood in arrays of few shapes."""
@@ -40,16 +42,19 @@ class SignalState(NamedTuple):
             used=np.pad(self.used, more),
             estimate=np.pad(self.estimate, ((0, 0), more)),
             covariance=covariance,
+            success=padded_success(self.success),
         )
 
 
 def log_likelihood(state: SignalState, u: Any) -> Any:
-    """log sum_g w_g N(estimate_g; mu(u), covariance_g + V(u)) [n], V the emulator's variance.
+    """log P(success) sum_g w_g N(estimate_g; mu(u), covariance_g + V(u)) [n], V the emulator's
+    variance.
 
     Bayarri et al. (2009) and Higdon et al. (2008) with the discrepancy's covariance integrated
     out over nodes.
     """
-    return log_sum_exp(node_log_densities(state, u)) - _wall(state, u)
+    densities = log_sum_exp(node_log_densities(state, u))
+    return densities + log_success(state.success, u) - _wall(state, u)
 
 
 def node_log_densities(state: SignalState, u: Any) -> Any:
@@ -97,7 +102,7 @@ def log_second_moment(state: SignalState, u: np.ndarray, spread: np.ndarray | No
     log_det_both, square_both = eliminate(_with_variances(rest / 2.0, varying), left)
     # log N(z; mu, S / 2 + T) - log |4 pi S| / 2 - 2 log N(z; mu, C + V)
     excess = log_det - 0.5 * (log_det_both + of_rest) + square - 0.5 * square_both
-    both = 2.0 * (log_sum_exp(terms) - _wall(state, u))
+    both = 2.0 * (log_sum_exp(terms) + log_success(state.success, u) - _wall(state, u))
     return both.reshape(left.shape[:-1]) + excess - 0.5 * k * np.log(2.0)
 
 

@@ -9,6 +9,7 @@ from scipy.special import ndtr, ndtri, owens_t
 
 from ..gp.namespaces import log_ndtr, log_sum_exp, namespace
 from ..gp.process import GP, padded, padded_rows, predict
+from .success import log_success, padded_success
 from .transform import Transform
 
 
@@ -17,11 +18,13 @@ class ThresholdState(NamedTuple):
 
     gp: GP  # k processes, one for each draw of the hyperparameters
     threshold: np.ndarray  # []
+    success: GP | None = None  # see `success.learn_success`
 
     def padded(self) -> "ThresholdState":
         """The same likelihood in arrays of few shapes."""
         k, n = self.gp.weights.shape
-        return self._replace(gp=padded(self.gp, k, padded_rows(n)))
+        success = padded_success(self.success)
+        return self._replace(gp=padded(self.gp, k, padded_rows(n)), success=success)
 
 
 class Quantile(NamedTuple):
@@ -45,13 +48,14 @@ MIN_EXACT_SHARE = 1e-6  # of Phi(z), below which the difference with Owen's T ha
 
 
 def log_likelihood(state: ThresholdState, u: Any) -> Any:
-    """log Phi((eps - mu(u)) / sigma(u)) at u [n, d], sigma^2 the variance of a new discrepancy.
+    """log P(success) Phi((eps - mu(u)) / sigma(u)) at u [n, d], sigma^2 the variance of a new
+    discrepancy.
 
     Gutmann and Corander (2016), eq. for Gaussian-process surrogates; Lopez-Guevara et al.
     (2018), inference. The mean over the processes, where there are several.
     """
     z, _ = _standardised(state, u)
-    return log_sum_exp(log_ndtr(z)) - math.log(z.shape[-1])
+    return log_sum_exp(log_ndtr(z)) - math.log(z.shape[-1]) + log_success(state.success, u)
 
 
 def _standardised(state: ThresholdState, u: Any) -> tuple[Any, Any]:
@@ -79,7 +83,8 @@ def log_second_moment(
     shape = len(u), *[1] * (varying.ndim - 2), z.shape[1]
     r = np.clip(varying / noisy.reshape(shape), 1e-12, 1.0 - 1e-6)
     z = np.broadcast_to(z.reshape(shape), r.shape)
-    return log_sum_exp(log_both_below(z, r)) - math.log(z.shape[-1])
+    both = log_sum_exp(log_both_below(z, r)) - math.log(z.shape[-1])
+    return both + 2.0 * log_success(state.success, u).reshape(shape[:-1])
 
 
 def log_both_below(z: np.ndarray, r: np.ndarray) -> np.ndarray:

@@ -13,6 +13,12 @@ OUTSIDE = (
     "what was observed lies far outside of what was simulated: compare units, scales and offsets, "
     "or widen the prior; the posterior says little"
 )
+MISFIT = (
+    "the simulator misses what was observed by more than the given noise, wherever it was run: the "
+    "noise is larger than given, the simulator lacks something, or what fits was not found; the "
+    "posterior allows for a misfit of that size: look at what is left over at the closest run, "
+    "correct noise=, or simulate more"
+)
 EQUAL = "all simulations are equal: the data cannot tell parameters apart"
 UNPREDICTED = (
     "the parameters predict nothing of what was simulated, as far as so few runs can tell from "

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from bolfi_liquids.inference.surrogates.measurement_noise import (
+    CORRELATIONS,
     Layout,
     Nodes,
     candidates,
@@ -65,7 +66,8 @@ def test_evidence_finds_size_and_correlation_of_the_noise():
     truth = Nodes(np.array([0.3]), np.array([0.6]))
     noise = correlated(np.random.default_rng(1).normal(size=(1, m)), layout, truth)[0]
     observed = vectors @ [1.0, 2.0] + noise
-    nodes = candidates(residual_size(observed, vectors))
+    size = residual_size(observed, vectors)
+    nodes = candidates(size / 8.0, 2.5 * size, CORRELATIONS)
     found = reduce((vectors, observed, np.zeros((m, 1))), np.zeros(m), layout, nodes)
     evidence = found.log_weight + 0.5 * np.linalg.slogdet(found.covariance)[1]
     weight = np.exp(evidence - evidence.max())

@@ -12,6 +12,7 @@ from bolfi_liquids.inference.gp.process import predict
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.emulator import Limits, emulate, noise_share
 from bolfi_liquids.inference.surrogates.families import Learnable, SignalFamily
+from bolfi_liquids.inference.surrogates.feasibility import Feasibility
 from bolfi_liquids.inference.surrogates.signal_likelihood import log_likelihood, log_second_moment
 from scipy.stats import binom, multivariate_normal
 
@@ -35,7 +36,9 @@ def outputs(u, seeds=None):
 def learned(u, signals, observed, **options):
     learner = SignalFamily(**options).learner(observed)
     measured = learner.measure(signals)
-    return learner.learn(Learnable(u, measured.features, measured.discrepancy, None), None)
+    runs = Feasibility(u, np.isfinite(measured.discrepancy))
+    known = Learnable(u, measured.features, measured.discrepancy, None, runs)
+    return learner.learn(known, None)
 
 
 def posterior(surrogate):
@@ -76,9 +79,14 @@ def test_estimated_measurement_noise_comes_near_it(design, noise):
     found = learned(design, outputs(design), observed)
     assert total_variation(posterior(found), exact(observed, SD**2 * np.eye(40))) < 0.2
     assert abs(np.log(found.constants()["measurement_noise_sd"] / SD)) < 0.4
-    # the same data taken as iid of a tenth of the noise are far off
-    bold = learned(design, outputs(design), observed, noise=SD / 10)
+    # the same data taken as iid of a tenth of the noise are far off, unless they may be missed
+    doubting, bold = (
+        learned(design, outputs(design), observed, noise=SD / 10, misfit=p) for p in (0.1, 0.0)
+    )
     assert total_variation(posterior(bold), exact(observed, SD**2 * np.eye(40))) > 0.5
+    assert total_variation(posterior(doubting), exact(observed, SD**2 * np.eye(40))) < 0.2
+    assert doubting.misfit_probability > 0.99
+    assert len(doubting.warnings()) == 1 and not bold.warnings()
 
 
 def test_correlated_noise_widens_the_posterior(design):
@@ -114,7 +122,7 @@ def test_the_simulators_own_noise_is_learned_and_not_counted_twice(design, noise
 
 def test_second_moment_agrees_with_sampling():
     u = sobol(0, 0, 6, 2)
-    found = learned(u, outputs(u), outputs(np.array([[0.5, 0.5]]))[0], noise=0.5)
+    found = learned(u, outputs(u), outputs(np.array([[0.5, 0.5]]))[0], noise=0.5, misfit=0)
     point = np.array([[0.9, 0.2]])
     mean, variance = (part[:, 0] for part in predict(found.gp, point))
     k = found.emulator.basis.used
