@@ -16,6 +16,7 @@ from .types import Theta
 RESERVED = frozenset(
     {"chain", "draw", "simulation", "seed", "discrepancy", "failed", "error", "round", "signal"}
 )
+QUANTILES = np.array([0.01, 0.1, 0.5, 0.9, 0.99])  # at which quantile functions are tried
 TAIL_QUANTILE = 1e-12  # at which an unbounded prior is cut, so that u = 0 and 1 stay finite
 
 
@@ -245,10 +246,15 @@ def _checked(name: str, distribution: object) -> Univariate:
             f"prior of {name!r} must be univariate with shape (), got {shape}; "
             "give one distribution per parameter"
         )
+    if distribution.is_discrete:
+        raise ValueError(
+            f"prior of {name!r} must be continuous, got {describe(distribution)}; give a Uniform "
+            "from half below the least number to half above the largest, and round in the simulator"
+        )
     try:
         with np.errstate(invalid="ignore", divide="ignore"):
             univariate = Univariate(distribution)
-            middle = univariate.cdf(univariate.icdf(np.array(0.5)))
+            returned = univariate.cdf(univariate.icdf(QUANTILES))
     except (NotImplementedError, ImportError) as error:  # numpyro asks for TFP in some icdf
         raise ValueError(
             f"prior of {name!r} needs cdf and icdf, which {type(distribution).__name__} lacks; "
@@ -265,9 +271,10 @@ def _checked(name: str, distribution: object) -> Univariate:
             f"prior of {name!r} must begin below its end, got {describe(distribution)}; "
             "exchange its bounds, or leave a fixed parameter out"
         )
-    if not np.isclose(middle, 0.5):
+    if not np.allclose(returned, QUANTILES):
         raise ValueError(
             f"prior of {name!r} must be continuous, with finite arguments, got "
-            f"{describe(distribution)}, whose cdf(icdf(0.5)) is {middle}"
+            f"{describe(distribution)}, whose cdf(icdf(q)) is {returned} at q = {QUANTILES}: a "
+            "bound may lie too far out in a tail"
         )
     return univariate
