@@ -26,7 +26,7 @@ from .history import (
     told_seeds,
 )
 from .notebook_display import as_html, as_text
-from .prior import Prior, checked_prior
+from .prior import Prior, check_support, checked_prior
 from .result import Fit
 from .simulations.failures import Failure, incomparable, kind, unusable
 from .simulations.job import BATCH
@@ -239,10 +239,7 @@ class Bolfi:
         self._check_number(len(natural))
         rows = self.prior.to_dict(natural)
         told_rows, faults = self._signals(len(natural), signals)
-        outside = np.flatnonzero(~self.prior.contains(rows))
-        if outside.size:
-            first = {name: float(column[outside[0]]) for name, column in rows.items()}
-            raise ValueError(f"theta must lie in the support of the prior, got {first}")
+        check_support(self.prior, rows)
         given_errors, given_seeds = (
             told_errors(errors, len(natural)),
             told_seeds(seeds, len(natural)),

@@ -9,7 +9,7 @@ import numpyro.distributions as dist
 from scipy.special import ndtri
 
 from ._float64 import in_float64
-from .arguments import checked_array, checked_integer
+from .arguments import checked_array, checked_integer, is_table
 from .distributions import Univariate, describe
 from .types import Theta
 
@@ -89,8 +89,8 @@ class Prior:
         Raises:
             ValueError: names or shapes differ from the prior's, or a value is not finite.
         """
-        if not isinstance(theta, Mapping) or set(theta) != set(self.names):
-            got = tuple(theta) if isinstance(theta, Mapping) else repr(theta)[:100]
+        if not is_table(theta) or set(theta.keys()) != set(self.names):
+            got = tuple(theta.keys()) if is_table(theta) else repr(theta)[:100]
             raise ValueError(f"theta must map the parameters {self.names} to values, got {got}")
         columns = [checked_array(f"theta[{name!r}]", theta[name]) for name in self.names]
         if len({c.shape for c in columns}) > 1 or columns[0].ndim > 1:
@@ -98,7 +98,8 @@ class Prior:
             raise ValueError(f"theta must hold scalars or [n] arrays of one length, got {shapes}")
         stacked = np.stack(columns, -1)
         if not np.isfinite(stacked).all():
-            raise ValueError(f"theta must be finite, got {dict(theta)}")
+            found = _first_of(~np.isfinite(stacked).all(-1), stacked, self.names)
+            raise ValueError(f"theta must be finite, got {found}")
         return stacked
 
     def to_dict(self, array: np.ndarray) -> dict[str, np.ndarray]:
@@ -199,6 +200,24 @@ def checked_prior(prior: object) -> Prior:
             "make one of name -> distribution by inference.Prior({...})"
         )
     return prior
+
+
+def check_support(prior: Prior, theta: Theta) -> None:
+    """Raise ValueError unless theta, name -> [n], lies in the prior's support."""
+    outside = ~prior.contains(theta)
+    if outside.any():
+        found = _first_of(outside, prior.to_array(theta), prior.names)
+        raise ValueError(
+            f"theta must lie in the support of the prior, got {found}; leave these rows out, or "
+            "widen the prior"
+        )
+
+
+def _first_of(wrong: np.ndarray, theta: np.ndarray, names: tuple[str, ...]) -> str:
+    """The first row of theta [n, d] that is wrong, bool [n], and how many are, in words."""
+    rows, at = np.atleast_2d(theta), np.flatnonzero(wrong)
+    point = {name: float(rows[at[0], j]) for j, name in enumerate(names)}
+    return f"{point} in row {at[0]}, the first of {at.size} such rows of {len(rows)}"
 
 
 def _rather_normal(univariate: Univariate) -> bool:

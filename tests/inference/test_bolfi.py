@@ -226,8 +226,18 @@ def test_bad_calls_are_refused(prior, observed):
         engine.tell(theta, "loud")
     with pytest.raises(ValueError, match="observed must be an array of numbers"):
         inference.Bolfi(prior, [[1.0], [1.0, 2.0]])
-    with pytest.raises(ValueError, match="support of the prior"):
-        engine.tell({"slope": [5.0], "offset": [0.5]}, np.zeros((1, 30)))
+    outside = {"slope": [0.1, 5.0, 0.2, -7.0], "offset": [0.5] * 4}
+    for use in (
+        lambda: engine.tell(outside, np.zeros((4, 30))),
+        lambda: inference.regress(prior, outside, np.arange(4.0)),
+        lambda: inference.emulate(prior, outside, np.zeros((4, 2)), np.ones(2)),
+    ):
+        with pytest.raises(
+            ValueError,
+            match=r"support of the prior, got {'slope': 5.0, 'offset': 0.5} in row 1, the first of "
+            "2 such rows of 4",
+        ):
+            use()
     with pytest.raises(ValueError, match="seeds must have shape"):
         engine.tell(theta, np.zeros((2, 30)), seeds=[1])
     for seeds in ([0.5, 1.5], [1.0, 2.0], ["1", "2"], [True, False], [2**63, 0], [[1], [2, 3]]):

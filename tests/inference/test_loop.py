@@ -8,6 +8,7 @@ from pathlib import Path
 
 import jax
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from bolfi_liquids.inference.simulations.job import simulation_seed
@@ -250,6 +251,44 @@ def test_earlier_simulations_of_another_form_are_refused(prior, observed, simula
         inference.fit(simulate, prior, observed, earlier=earlier)
     with pytest.raises(ValueError, match="earlier's signals must be an array of numbers"):
         inference.fit(simulate, prior, observed, earlier=({"slope": [0]}, "loud"))
+
+
+class Columns:
+    """What has names and columns, and is no mapping."""
+
+    def __init__(self, columns):
+        self.columns = columns
+
+    def keys(self):
+        return self.columns.keys()
+
+    def __getitem__(self, name):
+        return self.columns[name]
+
+
+@pytest.mark.parametrize(
+    "table", [Columns, xr.Dataset, lambda columns: pd.DataFrame(columns, index=range(7, 17))]
+)
+def test_earlier_simulations_may_come_as_a_table(prior, observed, simulate, table):
+    theta = prior.from_unit(np.random.default_rng(0).random((10, 2)))
+    signals, quiet = simulate(theta, np.arange(10)), {"budget": 0, "progress": False, "warn": False}
+    given = {name: ("run", column) for name, column in theta.items()}
+    made = table(given if table is xr.Dataset else theta)
+    fit = inference.fit(None, prior, observed, earlier=(made, signals), **quiet)
+    np.testing.assert_array_equal(fit.history.theta, prior.to_array(theta))
+    frames = made, pd.DataFrame(signals), pd.Series(np.arange(10), index=range(3, 13))
+    again = inference.fit(None, prior, observed, earlier=frames, **quiet)
+    np.testing.assert_array_equal(again.log_prob(made), fit.log_prob(theta))
+    with pytest.raises(ValueError, match=r"must map .* got \('slope',\)$"):
+        fit.log_prob(Columns({"slope": [0.1]}))
+
+
+def test_a_table_that_is_not_finite_names_its_row(prior, observed):
+    frame = pd.DataFrame({"slope": [0.1, np.nan, 0.3], "offset": [0.5, 0.5, np.inf]})
+    with pytest.raises(
+        ValueError, match=r"finite, got {'slope': nan, .*} in row 1, the first of 2"
+    ):
+        inference.fit(None, prior, observed, earlier=(frame, np.zeros((3, 30))), budget=0)
 
 
 @pytest.mark.parametrize("fixture", ["line_fit", "signal_fit"])
