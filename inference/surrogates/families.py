@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -160,7 +161,7 @@ class SignalFamily:
     def learner(self, observed: np.ndarray) -> "SignalLearner":
         output = describe(observed, self.summary)
         values = output.values(observed)
-        distance = self.discrepancy or _of_summaries(self.summary)
+        distance = self.discrepancy or partial(_of_summaries, self.summary)
         noise = None if self.noise is None else given_noise(self.noise, output)
         return SignalLearner(self, output, distance, observed, values, noise)
 
@@ -281,15 +282,11 @@ def _distance(discrepancy: Discrepancy | None, observed: np.ndarray) -> Discrepa
     return distance
 
 
-def _of_summaries(summary: Summary | None) -> Discrepancy:
+def _of_summaries(summary: Summary | None, observed: np.ndarray, simulated: np.ndarray) -> float:
     """Sum of squared differences of (summarised) outputs, missing samples left out."""
-
-    def distance(observed: np.ndarray, simulated: np.ndarray) -> float:
-        a, b = (summarise(summary, output) for output in (observed, simulated))
-        if a.shape != b.shape:
-            raise ValueError(f"expected an output of shape {a.shape}, as observed, got {b.shape}")
-        there = np.isfinite(a)
-        with np.errstate(all="ignore"):  # of a run that blew up
-            return float(np.sum((a[there] - b[there]) ** 2))
-
-    return distance
+    a, b = (summarise(summary, output) for output in (observed, simulated))
+    if a.shape != b.shape:
+        raise ValueError(f"expected an output of shape {a.shape}, as observed, got {b.shape}")
+    there = np.isfinite(a)
+    with np.errstate(all="ignore"):  # of a run that blew up
+        return float(np.sum((a[there] - b[there]) ** 2))

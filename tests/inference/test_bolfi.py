@@ -1,3 +1,5 @@
+import pickle
+
 import jax
 import numpy as np
 import numpyro.distributions as dist
@@ -207,6 +209,33 @@ def test_bad_options_are_refused(prior, observed, options, message):
 def test_bad_data_are_refused(prior, observed, message):
     with pytest.raises(ValueError, match=message):
         inference.Bolfi(prior, observed)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"noise": 0.05, "summary": np.sort},
+        {"surrogate": "discrepancy"},
+        {"discrepancy": inference.squared_difference(np.arange(30.0)), "threshold": 0.3},
+    ],
+)
+def test_a_run_and_its_fit_can_be_pickled(prior, observed, simulate, options):
+    engine = inference.Bolfi(prior, observed, **options)
+    theta = engine.ask(10)
+    engine.tell(theta, simulate(theta, np.arange(10)))
+    fit = engine.fit(warn=False)
+    again, fit_again = pickle.loads(pickle.dumps((engine, fit)))
+    np.testing.assert_array_equal(fit_again.log_prob(theta), fit.log_prob(theta))
+    assert (fit_again.warnings, fit_again.best) == (fit.warnings, fit.best)
+    left, right = engine.ask(2), again.ask(2)
+    for name in prior.names:
+        np.testing.assert_array_equal(left[name], right[name])
+
+
+def test_what_cannot_be_pickled_is_named(prior, observed):
+    with pytest.raises((AttributeError, pickle.PicklingError), match="lambda"):
+        pickle.dumps(inference.Bolfi(prior, observed, summary=lambda signal: signal))
 
 
 def test_a_mask_is_a_missing_sample(prior, observed):
