@@ -129,7 +129,9 @@ def fit(  # noqa: PLR0913  the one call that most users make
         ImportError, ConnectionError: Dask is not installed, or does not answer.
 
     Warns:
-        EmulatorWarning: for each of the surrogate's complaints, unless warn=False.
+        EmulatorWarning: for each of the surrogate's complaints, unless warn=False. Where warnings
+            are errors (`python -W error`), the first ends the call: a bank on disk has every
+            simulation then, and warn=False returns the fit.
     """
     batch = checked_integer("batch", batch, 1, MOST_SIMULATIONS)
     least = MIN_LEARN if earlier is None else 0

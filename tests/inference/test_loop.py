@@ -362,6 +362,21 @@ def test_a_simulator_of_single_runs_is_recognised_by_its_shape(prior, observed):
         inference.fit(one, prior, observed, budget=9, progress=False)
 
 
+def test_a_warning_that_is_an_error_loses_no_simulation(tmp_path, prior, observed):
+    """Warnings are errors here, as under `python -W error`."""
+    calls = []
+
+    def constant(theta, seeds):
+        calls.extend(seeds)
+        return np.ones((len(seeds), 30))
+
+    given = {"budget": 12, "bank": tmp_path / "b.sqlite", "progress": False}
+    with pytest.raises(inference.EmulatorWarning, match="all simulations are equal"):
+        inference.fit(constant, prior, observed, **given)
+    fit = inference.fit(constant, prior, observed, warn=False, **given)
+    assert len(calls) == len(fit.history.theta) == 12
+
+
 def test_complaints_are_kept_without_a_warning(prior, observed):
     """Warnings are errors here, so that one would fail the test."""
     fit = inference.fit(
