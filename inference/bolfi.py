@@ -226,8 +226,8 @@ class Bolfi:
             theta: Name -> [n], in the prior's support.
             signals: [n, *signal_shape], or a list of n signals; these may be of any shapes where
                 a discrepancy or summary of the user's own compares them.
-            seeds: Seeds of the runs [n], to be kept with the results. Of runs with equal theta
-                and seed one is learned from.
+            seeds: Seeds of the runs [n], to be kept with the results. Of runs with equal theta,
+                seed and signal one is learned from.
             errors: Why a run failed [n], to be kept for rows of NaN; "" elsewhere.
 
         Raises:

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_callable, checked_array, checked_integer, checked_number
+from ..simulations.failures import not_finite
 from ..types import Discrepancy
 from .base import Surrogate
 from .discrepancy import DiscrepancySurrogate, learn, marginalised, with_threshold
 from .emulator import PREDICTED_SHARE, Limits, emulate
 from .given_noise import GivenNoise, given_noise
 from .outliers import sane
-from .output_vectors import Output, Summary, describe, summarise
+from .output_vectors import Output, Summary, describe, infinities, summarise
 from .signal import SignalSurrogate, observe
 from .squared_difference import evaluate, failed_on, squared_difference
 from .threshold import Threshold, check_rule
@@ -193,6 +194,7 @@ class SignalLearner:
         features = np.full((len(signals), len(self.values)), np.nan)
         for i, signal in enumerate(signals):
             if signal is None or not np.isfinite(discrepancy[i]):
+                errors[i] = errors[i] or self._infinite_summary(signal)
                 continue
             try:
                 features[i] = self.output.values(signal)
@@ -200,6 +202,16 @@ class SignalLearner:
                 errors[i] = failed_on("summary", signal, self.observed, error)
         failed = ~np.isfinite(features).all(1)
         return Measured(features, np.where(failed, np.nan, discrepancy), errors)
+
+    def _infinite_summary(self, signal: np.ndarray | None) -> str:
+        """What is kept of a finite signal whose summary is not; "" of any other."""
+        compared = self.family.summary is not None and self.family.discrepancy is None
+        if not compared or signal is None or not np.isfinite(signal).all():
+            return ""
+        values = summarise(self.family.summary, signal)
+        return (
+            "" if np.isfinite(values).all() else not_finite(f"summary returns {infinities(values)}")
+        )
 
     def learnable(self, discrepancy: np.ndarray) -> np.ndarray:
         """Which of the successful simulations are learned from, bool [n]: what blew up is not."""

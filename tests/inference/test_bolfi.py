@@ -66,7 +66,7 @@ def test_foreign_simulations_replace_the_start_design(prior, observed, simulate)
 
 @pytest.mark.slow
 def test_a_copy_teaches_nothing(prior, observed, simulate):
-    """Copies have equal theta and seed; a replicate, or a run of unknown seed, is none."""
+    """Copies have equal theta, seed and signal; a replicate, or a run of unknown seed, is none."""
     engine, plain = inference.Bolfi(prior, observed), inference.Bolfi(prior, observed)
     theta = engine.ask(6)
     signals = simulate(theta, np.arange(6))
