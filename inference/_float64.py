@@ -2,7 +2,8 @@
 the like; the caller's global settings stay as they were."""
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from threading import Lock
 from typing import Any, ParamSpec, TypeVar
 
@@ -22,23 +23,35 @@ NUMPY_DEFAULTS: dict[str, Any] = {
 
 
 def in_float64(function: Callable[P, R]) -> Callable[P, R]:
-    """Run `function` with 64-bit JAX types, one thread of BLAS, and NumPy's default handling of
-    numerical errors.
+    """Run `function` with 64-bit JAX types, one thread of BLAS, and the default handling of
+    numerical errors by NumPy and JAX.
 
     Gram matrices of smooth kernels have condition numbers near 1e8, beyond float32. Of a few
     hundred rows, they are factored faster by one thread than by several, which wait for each
     other: a criticism beside another process took 260 s by two threads and 35 s by one. BLAS also
     gives the same bits then, however many processors there are. The number of its threads belongs
     to the whole process: other Python threads have one, too, while the engine computes. A caller
-    may have made NumPy raise where the engine looks at what is not finite by itself.
+    may have made NumPy or JAX raise where the engine looks at what is not finite by itself, and JAX
+    stricter about shapes and types than it and NumPyro are.
     """
 
     @functools.wraps(function)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
-        with jax.enable_x64(True), np.errstate(**NUMPY_DEFAULTS), _one_blas_thread:
+        with jax.enable_x64(True), _jax_defaults(), np.errstate(**NUMPY_DEFAULTS), _one_blas_thread:
             return function(*args, **kwargs)
 
     return wrapped
+
+
+@contextmanager
+def _jax_defaults() -> Iterator[None]:
+    with (
+        jax.numpy_rank_promotion("allow"),
+        jax.numpy_dtype_promotion("standard"),
+        jax.debug_nans(False),
+        jax.debug_infs(False),
+    ):
+        yield
 
 
 class _OneBlasThread:

@@ -1,6 +1,7 @@
 """Libraries loaded on first use: importing either takes as long as importing NumPyro."""
 
-from typing import TYPE_CHECKING
+import sys
+from typing import TYPE_CHECKING, Any
 
 import lazy_loader
 
@@ -10,3 +11,12 @@ if TYPE_CHECKING:
 else:
     stats = lazy_loader.load("scipy.stats", suppress_warning=True)
     xr = lazy_loader.load("xarray")
+
+
+def array_stats() -> Any:
+    """ArviZ's statistics of arrays; with them come pandas and Matplotlib."""
+    from arviz_stats.base import array, stats_utils
+
+    if sys.flags.optimize > 1:  # it would append to docstrings that `python -OO` leaves out
+        stats_utils.update_docstring = lambda *_: None
+    return array.array_stats

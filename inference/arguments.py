@@ -186,6 +186,11 @@ def checked_mapping(name: str, value: object, due: str) -> dict[str, Any]:
     return dict(value)
 
 
+def is_table(value: object) -> bool:
+    """Whether `value` has columns by name: a mapping, a data frame, a dataset."""
+    return hasattr(value, "keys") and hasattr(value, "__getitem__")
+
+
 def check_kind(name: str, value: object, kind: Any) -> None:
     """Raise ValueError unless `value` is of a kind, or of one of a union of kinds."""
     if not isinstance(value, kind):

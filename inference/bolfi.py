@@ -26,7 +26,7 @@ from .history import (
     told_seeds,
 )
 from .notebook_display import as_html, as_text
-from .prior import Prior, checked_prior
+from .prior import Prior, check_support, checked_prior
 from .result import Fit
 from .simulations.failures import Failure, incomparable, kind, unusable
 from .simulations.job import BATCH
@@ -231,8 +231,8 @@ class Bolfi:
             theta: Name -> [n], in the prior's support.
             signals: [n, *signal_shape], or a list of n signals; these may be of any shapes where
                 a discrepancy or summary of the user's own compares them.
-            seeds: Seeds of the runs [n], to be kept with the results. Of runs with equal theta
-                and seed one is learned from.
+            seeds: Seeds of the runs [n], to be kept with the results. Of runs with equal theta,
+                seed and signal one is learned from.
             errors: Why a run failed [n], to be kept for rows of NaN; "" elsewhere.
 
         Raises:
@@ -244,10 +244,7 @@ class Bolfi:
         self._check_number(len(natural))
         rows = self.prior.to_dict(natural)
         told_rows, faults = self._signals(len(natural), signals)
-        outside = np.flatnonzero(~self.prior.contains(rows))
-        if outside.size:
-            first = {name: float(column[outside[0]]) for name, column in rows.items()}
-            raise ValueError(f"theta must lie in the support of the prior, got {first}")
+        check_support(self.prior, rows)
         given_errors, given_seeds = (
             told_errors(errors, len(natural)),
             told_seeds(seeds, len(natural)),

@@ -16,6 +16,8 @@ SCIPY: dict[type, Callable[[Any], Any]] = {
     dist.HalfNormal: lambda d: stats.halfnorm(scale=d.scale),
     dist.Exponential: lambda d: stats.expon(scale=1.0 / d.rate),
     dist.Cauchy: lambda d: stats.cauchy(d.loc, d.scale),
+    dist.Laplace: lambda d: stats.laplace(d.loc, d.scale),
+    dist.Logistic: lambda d: stats.logistic(d.loc, d.scale),
     dist.Beta: lambda d: stats.beta(d.concentration1, d.concentration0),
     dist.Gamma: lambda d: stats.gamma(d.concentration, scale=1.0 / d.rate),
     dist.InverseGamma: lambda d: stats.invgamma(d.concentration, scale=d.rate),
@@ -28,6 +30,52 @@ the usual ones: the engine works in quantiles and differentiates none of these, 
 compiled function each of JAX's operations would be compiled by itself."""
 
 
+class Truncated:
+    """What is left of a distribution between two bounds.
+
+    Probabilities are counted from the tail in which the bounds lie: from the other end, those
+    beyond some eight standard deviations of a normal one are 1 to the last digit.
+
+    Args:
+        base: Of SciPy, frozen.
+        low, high: Bounds, which may be infinite.
+    """
+
+    def __init__(self, base: Any, low: float, high: float):
+        self.base = base
+        self.tail, self.inverse = (
+            (base.sf, base.isf) if low > base.median() else (base.cdf, base.ppf)
+        )
+        self.start, self.mass = self.tail(low), self.tail(high) - self.tail(low)
+
+    def cdf(self, value: np.ndarray) -> np.ndarray:
+        return (self.tail(value) - self.start) / self.mass
+
+    def ppf(self, q: np.ndarray) -> np.ndarray:
+        return self.inverse(self.start + q * self.mass)
+
+    def logpdf(self, value: np.ndarray) -> np.ndarray:
+        """Within the bounds."""
+        return self.base.logpdf(value) - np.log(np.abs(self.mass))
+
+
+TRUNCATED = (
+    dist.LeftTruncatedDistribution,
+    dist.RightTruncatedDistribution,
+    dist.TwoSidedTruncatedDistribution,
+)
+
+
+def _frozen(distribution: Any, bounds: tuple[float, float]) -> Any:
+    """SciPy's equal of a distribution, or None."""
+    truncated = isinstance(distribution, TRUNCATED)
+    whole = distribution.base_dist if truncated else distribution
+    make = SCIPY.get(type(whole))
+    if make is None:
+        return None
+    return Truncated(make(whole), *bounds) if truncated else make(whole)
+
+
 class Univariate:
     """cdf, icdf, log density and bounds of a scalar distribution, on NumPy arrays.
 
@@ -37,13 +85,12 @@ class Univariate:
 
     def __init__(self, distribution: dist.Distribution):
         self.distribution = distribution
-        frozen = SCIPY.get(type(distribution))
-        self._scipy = None if frozen is None else frozen(distribution)
         support: Any = distribution.support
         self.bounds = (
             float(getattr(support, "lower_bound", -np.inf)),
             float(getattr(support, "upper_bound", np.inf)),
         )
+        self._scipy = _frozen(distribution, self.bounds)
         self._inner = self.icdf(np.asarray(0.5))
 
     def cdf(self, value: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from ._float64 import in_float64
 from .arguments import checked_array
-from .prior import Prior, checked_prior
+from .prior import Prior, check_support, checked_prior
 from .regression import MIN_VALUES
 from .surrogates import emulator as vectors
 from .surrogates.emulator import Emulator, Limits
@@ -67,8 +67,7 @@ def emulate(prior: Prior, theta: Theta, outputs: ArrayLike, scale: ArrayLike) ->
         raise ValueError(
             f"outputs must hold {MIN_VALUES} finite rows, got {finite.sum()} of {n}; make more"
         )
-    if not prior.contains(rows).all():
-        raise ValueError("theta must lie in the support of the prior; leave the other rows out")
+    check_support(prior, rows)
     limits = Limits(COMPONENTS, predicted=None)
     u = prior.to_unit(rows)[finite]
     learned = vectors.emulate(u, known[finite], lambda _: weights, limits, None, prior.normal)

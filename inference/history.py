@@ -35,13 +35,25 @@ class History(NamedTuple):
 
     @property
     def distinct(self) -> np.ndarray:
-        """Which succeeded and copy no run before: one of equal theta and seed tells nothing new."""
+        """Which succeeded and copy no run before, in theta, seed and signal: a copy tells nothing
+        new."""
         distinct, seen = self.succeeded, set()
         for i in np.flatnonzero(distinct & (self.seeds != UNKNOWN)):
-            run = self.theta[i].tobytes(), int(self.seeds[i])
+            run = *self._run(i), self.signal(i).tobytes()
             distinct[i] = run not in seen
             seen.add(run)
         return distinct
+
+    @property
+    def contradicting(self) -> int:
+        """Runs that succeeded and whose signal differs from that of a run before, of the same theta
+        and seed."""
+        rows = np.flatnonzero(self.distinct & (self.seeds != UNKNOWN))
+        return len(rows) - len({self._run(i) for i in rows})
+
+    def _run(self, row: int) -> tuple[bytes, int]:
+        """What a run's signal should follow from: theta and seed."""
+        return self.theta[row].tobytes(), int(self.seeds[row])
 
     @property
     def failures(self) -> dict[str, int]:

@@ -1,7 +1,7 @@
 """The usual loop: ask, simulate, store, tell."""
 
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import ExitStack
 from pathlib import Path
@@ -18,6 +18,7 @@ from .arguments import (
     check_timeout,
     checked_array,
     checked_integer,
+    is_table,
 )
 from .bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi
 from .prior import Prior
@@ -104,9 +105,9 @@ def fit(  # noqa: PLR0913  the one call that most users make
             as long, and if it fails they are tried one by one. `simulate` then runs in a
             thread, which is abandoned, not stopped, when it is overdue: see `job.within`.
         earlier: Your own simulations (theta, signals) or (theta, signals, seeds), as
-            `SimulationBank.simulations` returns them. They are learned from like the others,
-            take the place of the start design's points, and count beside the budget, which may
-            then be 0.
+            `SimulationBank.simulations` returns them; theta may be a data frame. They are learned
+            from like the others, take the place of the start design's points, and count beside
+            the budget, which may then be 0.
         vectorised: Whether `simulate` makes a batch of runs in one call; False calls it once
             for each run, such as `simulate({"a": 1.0}, seed)`.
         in_rounds: Whether points are asked a round at a time. False asks the next one as soon as
@@ -128,7 +129,9 @@ def fit(  # noqa: PLR0913  the one call that most users make
         ImportError, ConnectionError: Dask is not installed, or does not answer.
 
     Warns:
-        EmulatorWarning: for each of the surrogate's complaints, unless warn=False.
+        EmulatorWarning: for each of the surrogate's complaints, unless warn=False. Where warnings
+            are errors (`python -W error`), the first ends the call: a bank on disk has every
+            simulation then, and warn=False returns the fit.
     """
     batch = checked_integer("batch", batch, 1, MOST_SIMULATIONS)
     least = MIN_LEARN if earlier is None else 0
@@ -244,7 +247,7 @@ def _length(earlier: Any) -> int:
     if earlier is None:
         return 0
     pair = isinstance(earlier, tuple | list) and len(earlier) in (2, 3)
-    if not (pair and isinstance(earlier[0], Mapping)):
+    if not (pair and is_table(earlier[0])):
         raise ValueError(
             "earlier must be (theta, signals) or (theta, signals, seeds), theta a mapping of "
             f"names to values, or None, got {earlier!r:.100}"

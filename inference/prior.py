@@ -9,13 +9,14 @@ import numpyro.distributions as dist
 from scipy.special import ndtri
 
 from ._float64 import in_float64
-from .arguments import checked_array, checked_integer
+from .arguments import checked_array, checked_integer, is_table
 from .distributions import Univariate, describe
 from .types import Theta
 
 RESERVED = frozenset(
     {"chain", "draw", "simulation", "seed", "discrepancy", "failed", "error", "round", "signal"}
 )
+QUANTILES = np.array([0.01, 0.1, 0.5, 0.9, 0.99])  # at which quantile functions are tried
 TAIL_QUANTILE = 1e-12  # at which an unbounded prior is cut, so that u = 0 and 1 stay finite
 
 
@@ -88,8 +89,8 @@ class Prior:
         Raises:
             ValueError: names or shapes differ from the prior's, or a value is not finite.
         """
-        if not isinstance(theta, Mapping) or set(theta) != set(self.names):
-            got = tuple(theta) if isinstance(theta, Mapping) else repr(theta)[:100]
+        if not is_table(theta) or set(theta.keys()) != set(self.names):
+            got = tuple(theta.keys()) if is_table(theta) else repr(theta)[:100]
             raise ValueError(f"theta must map the parameters {self.names} to values, got {got}")
         columns = [checked_array(f"theta[{name!r}]", theta[name]) for name in self.names]
         if len({c.shape for c in columns}) > 1 or columns[0].ndim > 1:
@@ -97,7 +98,8 @@ class Prior:
             raise ValueError(f"theta must hold scalars or [n] arrays of one length, got {shapes}")
         stacked = np.stack(columns, -1)
         if not np.isfinite(stacked).all():
-            raise ValueError(f"theta must be finite, got {dict(theta)}")
+            found = _first_of(~np.isfinite(stacked).all(-1), stacked, self.names)
+            raise ValueError(f"theta must be finite, got {found}")
         return stacked
 
     def to_dict(self, array: np.ndarray) -> dict[str, np.ndarray]:
@@ -200,6 +202,24 @@ def checked_prior(prior: object) -> Prior:
     return prior
 
 
+def check_support(prior: Prior, theta: Theta) -> None:
+    """Raise ValueError unless theta, name -> [n], lies in the prior's support."""
+    outside = ~prior.contains(theta)
+    if outside.any():
+        found = _first_of(outside, prior.to_array(theta), prior.names)
+        raise ValueError(
+            f"theta must lie in the support of the prior, got {found}; leave these rows out, or "
+            "widen the prior"
+        )
+
+
+def _first_of(wrong: np.ndarray, theta: np.ndarray, names: tuple[str, ...]) -> str:
+    """The first row of theta [n, d] that is wrong, bool [n], and how many are, in words."""
+    rows, at = np.atleast_2d(theta), np.flatnonzero(wrong)
+    point = {name: float(rows[at[0], j]) for j, name in enumerate(names)}
+    return f"{point} in row {at[0]}, the first of {at.size} such rows of {len(rows)}"
+
+
 def _rather_normal(univariate: Univariate) -> bool:
     q = np.linspace(0.01, 0.99, 99)
     value = univariate.icdf(q)
@@ -245,10 +265,15 @@ def _checked(name: str, distribution: object) -> Univariate:
             f"prior of {name!r} must be univariate with shape (), got {shape}; "
             "give one distribution per parameter"
         )
+    if distribution.is_discrete:
+        raise ValueError(
+            f"prior of {name!r} must be continuous, got {describe(distribution)}; give a Uniform "
+            "from half below the least number to half above the largest, and round in the simulator"
+        )
     try:
         with np.errstate(invalid="ignore", divide="ignore"):
             univariate = Univariate(distribution)
-            middle = univariate.cdf(univariate.icdf(np.array(0.5)))
+            returned = univariate.cdf(univariate.icdf(QUANTILES))
     except (NotImplementedError, ImportError) as error:  # numpyro asks for TFP in some icdf
         raise ValueError(
             f"prior of {name!r} needs cdf and icdf, which {type(distribution).__name__} lacks; "
@@ -265,9 +290,10 @@ def _checked(name: str, distribution: object) -> Univariate:
             f"prior of {name!r} must begin below its end, got {describe(distribution)}; "
             "exchange its bounds, or leave a fixed parameter out"
         )
-    if not np.isclose(middle, 0.5):
+    if not np.allclose(returned, QUANTILES):
         raise ValueError(
             f"prior of {name!r} must be continuous, with finite arguments, got "
-            f"{describe(distribution)}, whose cdf(icdf(0.5)) is {middle}"
+            f"{describe(distribution)}, whose cdf(icdf(q)) is {returned} at q = {QUANTILES}: a "
+            "bound may lie too far out in a tail"
         )
     return univariate

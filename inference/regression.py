@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from ._float64 import in_float64
 from .arguments import checked_array
-from .prior import Prior, checked_prior
+from .prior import Prior, check_support, checked_prior
 from .result import SurrogateView
 from .surrogates.discrepancy import DiscrepancySurrogate, learn
 from .surrogates.transform import TRANSFORMS, Transform
@@ -64,8 +64,7 @@ def regress(
         raise ValueError(
             f"values must hold {MIN_VALUES} finite numbers, got {finite.sum()} of {n}; make more"
         )
-    if not prior.contains(rows).all():
-        raise ValueError("theta must lie in the support of the prior; leave the other rows out")
+    check_support(prior, rows)
     u = prior.to_unit(rows)[finite]
     learned = learn(u, known[finite], transform, normal=prior.normal)
     return Regression(prior, learned)

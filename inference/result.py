@@ -8,16 +8,22 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from scipy.special import ndtr
 
 from ._float64 import in_float64
 from .arguments import check_flag, checked_integer
+from .gp.process import predict
 from .history import History
+from .input_warnings import censored_warnings, history_warnings, unreached_warnings
 from .notebook_display import as_html, as_text
 from .prior import Prior
 from .sampling.convergence import SamplingWarning
 from .sampling.draw import SAMPLERS, draw_posterior
+from .sampling.importance import explore
 from .sampling.target import Length, Target, log_likelihood
 from .surrogates.base import Surrogate
+from .surrogates.signal import SignalSurrogate
+from .surrogates.warnings import UNLEARNED
 from .types import Theta
 
 if TYPE_CHECKING:
@@ -25,7 +31,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-MAX_FAILED_SHARE = 0.5  # of the simulations, beyond which a fit warns
+UNLEARNED_VARIANCE = 0.1  # of targets of variance 1, beyond which little is known of them
+MAX_UNLEARNED_SHARE = 0.2  # of the posterior, from which that is said
 MOST_CHAINS, MOST_DRAWS = 1000, 1_000_000  # of one call: more would take days, or all memory
 
 
@@ -117,13 +124,12 @@ class Fit:
 
     @cached_property
     def warnings(self) -> list[str]:
-        """What the surrogate's own checks complain of; that more than half of the simulations
-        failed; and that fewer were learned from than the 2 d + 2 that d parameters need: a level
+        """What the surrogate's own checks complain of; what `input_warnings` says of what was
+        given; and that fewer were learned from than the 2 d + 2 that d parameters need: a level
         and a slope and a curvature along each parameter, and one more that could contradict."""
-        said = self.learned.warnings()
-        failed, told = int((~self.history.succeeded).sum()), len(self.history.succeeded)
-        if failed > MAX_FAILED_SHARE * told:
-            said.append(f"{failed} of {told} simulations failed: the fit rests on {told - failed}")
+        said = self.learned.warnings() + history_warnings(self.history) + self._data_warnings()
+        if self._unlearned() > MAX_UNLEARNED_SHARE:
+            said.append(UNLEARNED)
         learned, needed = int(self.learned_from.sum()), 2 * len(self.prior) + 2
         if learned < needed:
             said.append(
@@ -131,6 +137,30 @@ class Fit:
                 f"that {len(self.prior)} parameters need: simulate more; until then the posterior "
                 "may be far off"
             )
+        return said
+
+    @in_float64
+    def _unlearned(self) -> float:
+        """Posterior probability of places where the surrogate knows little of its targets."""
+        gp = self.learned.state.gp
+        if not len(gp.weights):  # nothing is predicted, which is said
+            return 0.0
+        population = explore(np.random.default_rng(0), self._target)
+        weights = np.exp(population.log_weights - population.log_weights.max())
+        variance = predict(gp, ndtr(population.x))[1][0]
+        return float(weights @ (variance > UNLEARNED_VARIANCE) / weights.sum())
+
+    def _data_warnings(self) -> list[str]:
+        """What the observed output itself shows where it is compared."""
+        said = []
+        own = (self.settings.get(name, "None") for name in ("summary", "discrepancy"))
+        if all(function == "None" for function in own):
+            said += censored_warnings(self.observed, self.closest.signal)
+        if isinstance(self.learned, SignalSurrogate):
+            known = self.learned.known
+            noise = 0.0 if known is None else float(np.sqrt(known.variance[0]))
+            learned = self.history.features[self.learned_from]
+            said += unreached_warnings(self.learned.observed, learned, noise)
         return said
 
     @property

@@ -1,4 +1,9 @@
-"""Particle fluid: stirring and pouring scenes. Taichi loads with the first simulation."""
+"""Particle fluid: stirring and pouring scenes. Taichi loads with the first simulation.
+
+Taichi has one state in a process. From the first simulation on it is the simulator's: code of your
+own that uses Taichi belongs into another process. What is simulated after a `ti.init` of another's
+raises `runtime.ForeignTaichi`.
+"""
 
 import lazy_loader
 

@@ -29,16 +29,22 @@ class WrongThread(RuntimeError):
     """A thread wants to simulate that did not start Taichi."""
 
 
+class ForeignTaichi(RuntimeError):
+    """Other code has started Taichi in this process."""
+
+
 class OneThread:
-    """A lock that, once it has an owner, only this thread may take."""
+    """A lock that, once it has an owner, only this thread may take, and only while Taichi runs as
+    the owner found it."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._owner: threading.Thread | None = None
+        self._taichi: Any = None
 
     def own(self) -> None:
         """Make the calling thread the owner."""
-        self._owner = threading.current_thread()
+        self._owner, self._taichi = threading.current_thread(), _taichi()
 
     def __enter__(self) -> None:
         self._lock.acquire()
@@ -50,9 +56,28 @@ class OneThread:
                 "simulate in processes of one thread each, such as ProcessPoolExecutor's or those "
                 "of `dask worker ADDRESS --nthreads 1`"
             )
+        if self._owner is not None and self._taichi is not _taichi():
+            self._lock.release()
+            raise ForeignTaichi(
+                "Taichi was started or reset by other code after a simulation, which has deleted "
+                f"the simulator's fields; {APART}"
+            )
 
     def __exit__(self, *_: object) -> None:
         self._lock.release()
+
+
+APART = (
+    "Taichi has one state in a process: simulate in another process than code that calls ti.init, "
+    "such as one of a ProcessPoolExecutor with the start method 'spawn'"
+)
+
+
+def _taichi() -> Any:
+    """Taichi's state in this process: another object after each ti.init or ti.reset."""
+    from taichi.lang import impl
+
+    return impl.get_runtime()
 
 
 LOCK = OneThread()
@@ -140,9 +165,15 @@ def start() -> None:
     """Start Taichi on the CPU; later calls in the same process do nothing.
 
     Taichi keeps its settings for the life of a process, so other settings need another process.
+
+    Raises:
+        ForeignTaichi: other code has started it, whose fields this would delete.
     """
     import taichi as ti
     from taichi.lang.impl import default_cfg
+
+    if _taichi().prog is not None:
+        raise ForeignTaichi(f"Taichi was started by other code before the simulator; {APART}")
 
     remove_stale_lock(Path(default_cfg().offline_cache_file_path))
     # Fast arithmetic would let the compiler split sums as it likes, and a simulation's bits depend

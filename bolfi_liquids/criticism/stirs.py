@@ -52,9 +52,9 @@ def camera_noise(recordings: Sequence[Recording]) -> "AutoregressiveNoise":
             fix="let the gripper rest for a second before it stirs",
         )
     for name, rest in rests:
-        if not rest.std(axis=0).any():
+        if not np.ptp(rest, axis=0).all():
             raise InputError(
-                "the inclination does not change at all before the gripper moves",
+                "an inclination does not change at all before the gripper moves",
                 where=name,
                 fix="record what the cameras see, noise included",
             )

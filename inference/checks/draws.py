@@ -1,11 +1,12 @@
 """A pipeline's draws, whatever they come in, and how many of them are independent."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from ..arguments import checked_array
+from .._lazy import array_stats
+from ..arguments import checked_array, is_table
 
 DRAW_SPACING = 2  # autocorrelation times between kept draws: an AR(1) chain keeps exp(-4) = 0.02
 MIN_DRAWS = 4  # draws per chain that an effective sample size can be estimated from
@@ -15,8 +16,8 @@ def posterior_array(drawn: Any, names: Sequence[str]) -> np.ndarray:
     """Stack posterior draws.
 
     Args:
-        drawn: Mapping of name -> [chain, draw] or [draw], or an object with such a mapping as
-            `.posterior` (DataTree, InferenceData). Other names are ignored.
+        drawn: Mapping or data frame of name -> [chain, draw] or [draw], or an object with such a
+            mapping as `.posterior` (DataTree, InferenceData). Other names are ignored.
         names: The parameters wanted.
 
     Returns:
@@ -26,7 +27,7 @@ def posterior_array(drawn: Any, names: Sequence[str]) -> np.ndarray:
         ValueError: a parameter is missing, or shapes are not as above and equal.
     """
     posterior = getattr(drawn, "posterior", drawn)
-    if not isinstance(posterior, Mapping):
+    if not is_table(posterior):
         raise ValueError(
             "a pipeline must return name -> draws or a tree with a posterior group, "
             f"got {type(drawn).__name__}"
@@ -53,8 +54,6 @@ def effective_size(draws: np.ndarray) -> float:
     Rank-normalised, split chains (Vehtari et al. 2021). A parameter that never moves counts as
     one draw; chains shorter than `MIN_DRAWS` show no autocorrelation and count in full.
     """
-    from arviz_stats.base.array import array_stats  # with it come pandas and Matplotlib
-
     total = draws.shape[0] * draws.shape[1]
     if draws.shape[1] < MIN_DRAWS:
         return float(total)
@@ -62,8 +61,8 @@ def effective_size(draws: np.ndarray) -> float:
     for column in np.moveaxis(draws, -1, 0):
         if np.ptp(column) == 0.0:
             return 1.0
-        bulk = array_stats.ess(column, method="bulk")
-        tail = array_stats.ess(column, method="tail", prob=(0.1, 0.9))
+        bulk = array_stats().ess(column, method="bulk")
+        tail = array_stats().ess(column, method="tail", prob=(0.1, 0.9))
         sizes += [np.asarray(bulk).item(), np.asarray(tail).item()]
     return max(1.0, float(np.nanmin(sizes)))
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import check_kind, checked_number
+from ..arguments import check_kind, checked_number, is_table
 from ..notebook_display import as_html, as_text
 from ..prior import Prior, checked_prior
 from .experiment import Experiment, Proposal
@@ -339,7 +339,7 @@ def _check_experiments(
 
 def _check_earlier(earlier: Any) -> None:
     three = isinstance(earlier, tuple | list) and len(earlier) == 3
-    if earlier is not None and not (three and isinstance(earlier[0], Mapping)):
+    if earlier is not None and not (three and is_table(earlier[0])):
         raise ValueError(
             "earlier must be (theta, signals, seeds), theta a mapping of names to values, or None, "
             f"got {earlier!r:.100}"

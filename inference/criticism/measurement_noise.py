@@ -11,6 +11,7 @@ from ..surrogates.measurement_noise import Layout, Nodes, correlated
 
 CORRELATIONS = np.linspace(0.0, 0.97, 40)  # of neighbouring samples
 DRAWS = 400
+ROUNDING = 1e-12  # of the largest value: what varies less does not vary
 
 
 class Noise(Protocol):
@@ -122,20 +123,23 @@ def rest_noise(
     correlation up to .97.
 
     Args:
-        rests: Stretches [samples, channels].
+        rests: Stretches [samples, channels], without missing samples.
         seed: Fixes the draws.
         trend: Degree of the polynomial.
         draws: From the posterior.
 
     Raises:
-        ValueError: fewer than eight samples are left to learn from.
+        ValueError: stretches of another shape, not finite, or such as leave fewer than eight
+            samples to learn from; a channel in which nothing varies, which measures no noise.
     """
+    rests = [_checked_rest(rest) for rest in rests]
     freedom = sum((len(rest) - trend - 1) * rest.shape[1] for rest in rests)
     if freedom < 8:
         raise ValueError(
             f"the stretches at rest leave {freedom} samples to learn the noise from, of 8 needed; "
             "give longer ones"
         )
+    _check_varying(rests, trend)
     log_weight, squares = np.transpose([_restricted(rests, rho, trend) for rho in CORRELATIONS])
     log_weight = log_weight - 0.5 * freedom * np.log(squares)
     weight = np.exp(log_weight - log_weight.max())
@@ -143,6 +147,40 @@ def rest_noise(
     which = rng.choice(len(weight), draws, p=weight / weight.sum())
     sd = np.sqrt(squares[which] / rng.chisquare(freedom, draws))
     return AutoregressiveNoise(sd, CORRELATIONS[which], sum(rest.size for rest in rests))
+
+
+def _checked_rest(rest: np.ndarray) -> np.ndarray:
+    """A stretch [samples, channels] of finite numbers, or ValueError."""
+    array = checked_array("each of rests", rest)
+    if array.ndim != 2:
+        raise ValueError(
+            f"each of rests must have shape [samples, channels], got {array.shape}; one channel "
+            "is rest[:, None]"
+        )
+    if not np.isfinite(array).all():
+        raise ValueError(
+            f"rests must be finite, got {np.sum(~np.isfinite(array))} missing samples of "
+            f"{array.size}; give the stretches between them"
+        )
+    return array
+
+
+def _check_varying(rests: list[np.ndarray], trend: int) -> None:
+    """Raise ValueError if the polynomials leave nothing but rounding errors of some channel."""
+    whole, left = np.concatenate(rests), [_detrended(rest, trend) for rest in rests]
+    still = np.abs(np.concatenate(left)).max(0) <= ROUNDING * np.abs(whole).max(0)
+    if still.any():
+        channel = int(np.argmax(still))
+        raise ValueError(
+            f"rests do not vary in channel {channel}, got {whole[:3, channel]} and so on: that "
+            "measures no noise; leave the channel out, or give noise of known size"
+        )
+
+
+def _detrended(rest: np.ndarray, degree: int) -> np.ndarray:
+    """What polynomials leave of a stretch [samples, channels]."""
+    powers = np.linspace(-1.0, 1.0, len(rest))[:, None] ** np.arange(degree + 1)
+    return rest - powers @ np.linalg.lstsq(powers, rest)[0]
 
 
 def _restricted(rests: list[np.ndarray], rho: float, trend: int) -> tuple[float, float]:

@@ -177,7 +177,7 @@ class Laboratory:
         """Simulations made elsewhere, coefficients that theta lacks being neutral."""
         count, effects = len(seeds), tuple(self.extensions)
         neutral = {name: np.full(count, self.extensions[name].neutral) for name in effects}
-        whole = {**neutral, **theta}
+        whole = {**neutral, **{name: np.asarray(theta[name], float) for name in theta.keys()}}
         acting = np.stack([whole[name] != neutral[name] for name in effects], axis=1)
         return Runs(whole, acting, signals, seeds, effects)
 

@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .._lazy import array_stats
+
 RHAT_LIMIT = 1.01
 ESS_PER_CHAIN = 100.0
 DIVERGENT_SHARE = 0.01
@@ -54,18 +56,17 @@ def diagnose(draws: np.ndarray) -> dict[str, float]:
 
     Draws that do not vary at all have an infinite R-hat and no effective draws.
     """
-    from arviz_stats.base.array import array_stats  # with it come pandas and Matplotlib
-
     if np.ptp(draws) == 0.0:
         constant = {"rhat": np.inf, "ess_bulk": 0.0, "ess_tail": 0.0}
         return {**constant, "mcse_mean": 0.0, "mcse_q05": 0.0, "mcse_q95": 0.0}
+    stats = array_stats()
     measures = {
-        "rhat": array_stats.rhat(draws),
-        "ess_bulk": array_stats.ess(draws, method="bulk"),
-        "ess_tail": array_stats.ess(draws, method="tail", prob=(0.05, 0.95)),
-        "mcse_mean": array_stats.mcse(draws, method="mean"),
-        "mcse_q05": array_stats.mcse(draws, method="quantile", prob=0.05),
-        "mcse_q95": array_stats.mcse(draws, method="quantile", prob=0.95),
+        "rhat": stats.rhat(draws),
+        "ess_bulk": stats.ess(draws, method="bulk"),
+        "ess_tail": stats.ess(draws, method="tail", prob=(0.05, 0.95)),
+        "mcse_mean": stats.mcse(draws, method="mean"),
+        "mcse_q05": stats.mcse(draws, method="quantile", prob=0.05),
+        "mcse_q95": stats.mcse(draws, method="quantile", prob=0.95),
     }
     return {name: np.asarray(value).item() for name, value in measures.items()}
 

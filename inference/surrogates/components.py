@@ -57,8 +57,9 @@ def principal_components(
     # what varies by rounding error alone does not vary
     standard = np.where(np.abs(outputs - centre) > 1e-12 * np.abs(outputs), standard, 0.0)
     n, m = standard.shape
-    # from the smaller side: n simulations of m >> n values
-    values, left = np.linalg.eigh(standard @ standard.T / n)
+    # from the smaller side: simulations are usually fewer than values, earlier ones may be more
+    smaller = standard if n <= m else standard.T
+    values, left = np.linalg.eigh(smaller @ smaller.T / n)
     values, left = np.maximum(values[::-1], 0.0), left[:, ::-1]
     total = values.sum()
     capacity = min(capacity, m)
@@ -67,6 +68,9 @@ def principal_components(
     # directions of no more than rounding error are none
     used = int(min(enough, capacity, np.sum(values > 1e-12 * total)))
     vectors = np.zeros((m, capacity))
-    vectors[:, :used] = standard.T @ left[:, :used] / np.sqrt(n)
+    if n <= m:
+        vectors[:, :used] = standard.T @ left[:, :used] / np.sqrt(n)
+    else:
+        vectors[:, :used] = left[:, :used] * np.sqrt(values[:used])
     explained = float(1.0 - tail[used - 1] / total) if used else 1.0
     return Basis(centre, scale, vectors, used, explained)

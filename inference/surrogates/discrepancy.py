@@ -28,8 +28,9 @@ from .threshold import (
     log_second_moment,
 )
 from .transform import Transform, candidates
-from .warnings import EQUAL, complaints
+from .warnings import EQUAL, LOW_THRESHOLD, complaints
 
+LOW = 3.0  # sds of a new discrepancy by which a threshold lies too low
 TRANSFORM_GROWTH = 2.0  # the transform is chosen anew when data have grown by this factor
 
 
@@ -132,7 +133,9 @@ class DiscrepancySurrogate:
         """What the leave-one-out errors complain of."""
         if self.equal:
             return [EQUAL]
-        return complaints(self.checks()["loo_z"], "discrepancy")
+        said = complaints(self.checks()["loo_z"], "discrepancy")
+        mean, sd = self.predict(self.gp.data.u)
+        return [*said, LOW_THRESHOLD] if (self.threshold < mean - LOW * sd).all() else said
 
     @in_float64
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:

@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_callable, checked_array, checked_integer, checked_number
+from ..simulations.failures import not_finite
 from ..types import Discrepancy
 from .base import Surrogate
 from .discrepancy import DiscrepancySurrogate, learn, marginalised, with_threshold
@@ -15,7 +17,7 @@ from .emulator import PREDICTED_SHARE, Limits, emulate
 from .feasibility import Feasibility
 from .given_noise import GivenNoise, given_noise
 from .outliers import sane
-from .output_vectors import Output, Summary, describe, summarise
+from .output_vectors import Output, Summary, describe, infinities, summarise
 from .signal import Noise, SignalSurrogate, observe
 from .squared_difference import evaluate, failed_on, squared_difference
 from .success import learn_success
@@ -167,7 +169,7 @@ class SignalFamily:
     def learner(self, observed: np.ndarray) -> "SignalLearner":
         output = describe(observed, self.summary)
         values = output.values(observed)
-        distance = self.discrepancy or _of_summaries(self.summary)
+        distance = self.discrepancy or partial(_of_summaries, self.summary)
         noise = None if self.noise is None else given_noise(self.noise, output)
         return SignalLearner(self, output, distance, observed, values, noise)
 
@@ -199,6 +201,7 @@ class SignalLearner:
         features = np.full((len(signals), len(self.values)), np.nan)
         for i, signal in enumerate(signals):
             if signal is None or not np.isfinite(discrepancy[i]):
+                errors[i] = errors[i] or self._infinite_summary(signal)
                 continue
             try:
                 features[i] = self.output.values(signal)
@@ -206,6 +209,16 @@ class SignalLearner:
                 errors[i] = failed_on("summary", signal, self.observed, error)
         failed = ~np.isfinite(features).all(1)
         return Measured(features, np.where(failed, np.nan, discrepancy), errors)
+
+    def _infinite_summary(self, signal: np.ndarray | None) -> str:
+        """What is kept of a finite signal whose summary is not; "" of any other."""
+        compared = self.family.summary is not None and self.family.discrepancy is None
+        if not compared or signal is None or not np.isfinite(signal).all():
+            return ""
+        values = summarise(self.family.summary, signal)
+        return (
+            "" if np.isfinite(values).all() else not_finite(f"summary returns {infinities(values)}")
+        )
 
     def learnable(self, discrepancy: np.ndarray) -> np.ndarray:
         """Which of the successful simulations are learned from, bool [n]: what blew up is not."""
@@ -290,15 +303,11 @@ def _distance(discrepancy: Discrepancy | None, observed: np.ndarray) -> Discrepa
     return distance
 
 
-def _of_summaries(summary: Summary | None) -> Discrepancy:
+def _of_summaries(summary: Summary | None, observed: np.ndarray, simulated: np.ndarray) -> float:
     """Sum of squared differences of (summarised) outputs, missing samples left out."""
-
-    def distance(observed: np.ndarray, simulated: np.ndarray) -> float:
-        a, b = (summarise(summary, output) for output in (observed, simulated))
-        if a.shape != b.shape:
-            raise ValueError(f"expected an output of shape {a.shape}, as observed, got {b.shape}")
-        there = np.isfinite(a)
-        with np.errstate(all="ignore"):  # of a run that blew up
-            return float(np.sum((a[there] - b[there]) ** 2))
-
-    return distance
+    a, b = (summarise(summary, output) for output in (observed, simulated))
+    if a.shape != b.shape:
+        raise ValueError(f"expected an output of shape {a.shape}, as observed, got {b.shape}")
+    there = np.isfinite(a)
+    with np.errstate(all="ignore"):  # of a run that blew up
+        return float(np.sum((a[there] - b[there]) ** 2))

@@ -95,14 +95,25 @@ def summarise(summary: Summary | None, output: np.ndarray) -> np.ndarray:
     return np.atleast_1d(checked_array(name, raw))
 
 
+def infinities(values: np.ndarray) -> str:
+    """What in an array is not finite, such as "-inf in 3 of 60 values"."""
+    found = zip(*np.unique(values[~np.isfinite(values)], return_counts=True), strict=True)
+    return f"{', '.join(f'{value} in {n}' for value, n in found)} of {values.size} values"
+
+
 def describe(observed: np.ndarray, summary: Summary | None) -> Output:
     """How outputs like `observed` become values; NaN is a missing sample.
 
     Raises:
-        ValueError: nothing is finite.
+        ValueError: nothing is finite, or something infinite.
     """
     summarised = summarise(summary, observed)
     finite = np.isfinite(summarised)
+    if np.isinf(summarised).any():
+        raise ValueError(
+            f"summary must not return infinite values, got {infinities(summarised)} of observed; "
+            "leave them out, or choose another summary, such as np.log1p for np.log of zeros"
+        )
     if not finite.any():
         raise ValueError("observed must have a finite value, got none")
     filled = finite.reshape(len(finite), -1).any(1).sum()

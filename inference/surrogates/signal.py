@@ -47,6 +47,7 @@ from .signal_likelihood import (
 )
 from .warnings import (
     EQUAL,
+    FEW_NUMBERS,
     MISFIT,
     OUTSIDE,
     UNPREDICTED,
@@ -58,6 +59,7 @@ from .warnings import (
 KEPT_NODES = 12  # nodes of unknown measurement noise that enter the likelihood
 SCREENED_POINTS = 128
 MISFIT_POINTS = 1024  # among which the smallest misfit is looked for
+MIN_FREEDOM = 3  # numbers more than parameters, from which the size of the noise can be told
 NEEDED = 0.95  # posterior probability of a misfit from which it is said
 
 
@@ -177,6 +179,8 @@ class SignalSurrogate:
         said += noise_warnings(noise_share(self.emulator)) + held_back_warnings(self.held_back)
         if self.known is not None and self.misfit_probability > NEEDED:
             said.append(MISFIT)
+        if self.known is None and len(self.observed) - self.gp.data.u.shape[1] < MIN_FREEDOM:
+            said.append(FEW_NUMBERS)
         return [OUTSIDE, *said] if self._outside() else said
 
     def _outside(self) -> bool:

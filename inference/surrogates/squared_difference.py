@@ -1,6 +1,7 @@
 """Discrepancies between an observed and a simulated signal."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,17 +32,18 @@ def squared_difference(time: ArrayLike | None = None) -> Discrepancy:
     if grid is not None and (grid.ndim != 1 or not (np.diff(grid) > 0).all()):
         raise ValueError(f"time must be strictly increasing with shape [t], got {grid.shape}")
 
-    def distance(observed: np.ndarray, simulated: np.ndarray) -> float:
-        observed = np.asarray(observed, np.float64)
-        simulated = np.asarray(simulated, np.float64)
-        if observed.shape != simulated.shape:
-            raise ValueError(f"expected a signal of {observed.shape}, got {simulated.shape}")
-        weights = trapezoid_weights(np.isfinite(observed), grid)
-        used = weights > 0
-        with np.errstate(all="ignore"):  # of a run that blew up
-            return float(np.sum(weights[used] * (observed[used] - simulated[used]) ** 2))
+    return partial(_integrated, grid)  # a closure could not be pickled
 
-    return distance
+
+def _integrated(grid: np.ndarray | None, observed: np.ndarray, simulated: np.ndarray) -> float:
+    observed = np.asarray(observed, np.float64)
+    simulated = np.asarray(simulated, np.float64)
+    if observed.shape != simulated.shape:
+        raise ValueError(f"expected a signal of {observed.shape}, got {simulated.shape}")
+    weights = trapezoid_weights(np.isfinite(observed), grid)
+    used = weights > 0
+    with np.errstate(all="ignore"):  # of a run that blew up
+        return float(np.sum(weights[used] * (observed[used] - simulated[used]) ** 2))
 
 
 def trapezoid_weights(present: np.ndarray, time: np.ndarray | None) -> np.ndarray:

@@ -19,6 +19,18 @@ MISFIT = (
     "posterior allows for a misfit of that size: look at what is left over at the closest run, "
     "correct noise=, or simulate more"
 )
+FEW_NUMBERS = (
+    "no noise was given, and so few numbers cannot tell its size from a misfit of the parameters': "
+    "the posterior's width rests on a guess; give noise="
+)
+UNLEARNED = (
+    "much of the posterior lies where hardly anything was simulated: what is not known there "
+    "counts as agreement; simulate more, or narrow the prior"
+)
+LOW_THRESHOLD = (
+    "the threshold lies below all that a simulation can be expected to come to: where the "
+    "posterior lies is chance; give a larger threshold, or none"
+)
 EQUAL = "all simulations are equal: the data cannot tell parameters apart"
 UNPREDICTED = (
     "the parameters predict nothing of what was simulated, as far as so few runs can tell from "

@@ -1,3 +1,5 @@
+import pickle
+
 import jax
 import numpy as np
 import numpyro.distributions as dist
@@ -64,7 +66,7 @@ def test_foreign_simulations_replace_the_start_design(prior, observed, simulate)
 
 @pytest.mark.slow
 def test_a_copy_teaches_nothing(prior, observed, simulate):
-    """Copies have equal theta and seed; a replicate, or a run of unknown seed, is none."""
+    """Copies have equal theta, seed and signal; a replicate, or a run of unknown seed, is none."""
     engine, plain = inference.Bolfi(prior, observed), inference.Bolfi(prior, observed)
     theta = engine.ask(6)
     signals = simulate(theta, np.arange(6))
@@ -209,6 +211,33 @@ def test_bad_data_are_refused(prior, observed, message):
         inference.Bolfi(prior, observed)
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"noise": 0.05, "summary": np.sort},
+        {"surrogate": "discrepancy"},
+        {"discrepancy": inference.squared_difference(np.arange(30.0)), "threshold": 0.3},
+    ],
+)
+def test_a_run_and_its_fit_can_be_pickled(prior, observed, simulate, options):
+    engine = inference.Bolfi(prior, observed, **options)
+    theta = engine.ask(10)
+    engine.tell(theta, simulate(theta, np.arange(10)))
+    fit = engine.fit(warn=False)
+    again, fit_again = pickle.loads(pickle.dumps((engine, fit)))
+    np.testing.assert_array_equal(fit_again.log_prob(theta), fit.log_prob(theta))
+    assert (fit_again.warnings, fit_again.best) == (fit.warnings, fit.best)
+    left, right = engine.ask(2), again.ask(2)
+    for name in prior.names:
+        np.testing.assert_array_equal(left[name], right[name])
+
+
+def test_what_cannot_be_pickled_is_named(prior, observed):
+    with pytest.raises((AttributeError, pickle.PicklingError), match="lambda"):
+        pickle.dumps(inference.Bolfi(prior, observed, summary=lambda signal: signal))
+
+
 def test_a_mask_is_a_missing_sample(prior, observed):
     masked = np.ma.masked_array(np.where(np.arange(30) == 4, 1e36, observed), np.arange(30) == 4)
     engine = inference.Bolfi(prior, masked)
@@ -226,8 +255,18 @@ def test_bad_calls_are_refused(prior, observed):
         engine.tell(theta, "loud")
     with pytest.raises(ValueError, match="observed must be an array of numbers"):
         inference.Bolfi(prior, [[1.0], [1.0, 2.0]])
-    with pytest.raises(ValueError, match="support of the prior"):
-        engine.tell({"slope": [5.0], "offset": [0.5]}, np.zeros((1, 30)))
+    outside = {"slope": [0.1, 5.0, 0.2, -7.0], "offset": [0.5] * 4}
+    for use in (
+        lambda: engine.tell(outside, np.zeros((4, 30))),
+        lambda: inference.regress(prior, outside, np.arange(4.0)),
+        lambda: inference.emulate(prior, outside, np.zeros((4, 2)), np.ones(2)),
+    ):
+        with pytest.raises(
+            ValueError,
+            match=r"support of the prior, got {'slope': 5.0, 'offset': 0.5} in row 1, the first of "
+            "2 such rows of 4",
+        ):
+            use()
     with pytest.raises(ValueError, match="seeds must have shape"):
         engine.tell(theta, np.zeros((2, 30)), seeds=[1])
     for seeds in ([0.5, 1.5], [1.0, 2.0], ["1", "2"], [True, False], [2**63, 0], [[1], [2, 3]]):

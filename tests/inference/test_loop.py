@@ -8,6 +8,7 @@ from pathlib import Path
 
 import jax
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from bolfi_liquids.inference.simulations.job import simulation_seed
@@ -252,6 +253,44 @@ def test_earlier_simulations_of_another_form_are_refused(prior, observed, simula
         inference.fit(simulate, prior, observed, earlier=({"slope": [0]}, "loud"))
 
 
+class Columns:
+    """What has names and columns, and is no mapping."""
+
+    def __init__(self, columns):
+        self.columns = columns
+
+    def keys(self):
+        return self.columns.keys()
+
+    def __getitem__(self, name):
+        return self.columns[name]
+
+
+@pytest.mark.parametrize(
+    "table", [Columns, xr.Dataset, lambda columns: pd.DataFrame(columns, index=range(7, 17))]
+)
+def test_earlier_simulations_may_come_as_a_table(prior, observed, simulate, table):
+    theta = prior.from_unit(np.random.default_rng(0).random((10, 2)))
+    signals, quiet = simulate(theta, np.arange(10)), {"budget": 0, "progress": False, "warn": False}
+    given = {name: ("run", column) for name, column in theta.items()}
+    made = table(given if table is xr.Dataset else theta)
+    fit = inference.fit(None, prior, observed, earlier=(made, signals), **quiet)
+    np.testing.assert_array_equal(fit.history.theta, prior.to_array(theta))
+    frames = made, pd.DataFrame(signals), pd.Series(np.arange(10), index=range(3, 13))
+    again = inference.fit(None, prior, observed, earlier=frames, **quiet)
+    np.testing.assert_array_equal(again.log_prob(made), fit.log_prob(theta))
+    with pytest.raises(ValueError, match=r"must map .* got \('slope',\)$"):
+        fit.log_prob(Columns({"slope": [0.1]}))
+
+
+def test_a_table_that_is_not_finite_names_its_row(prior, observed):
+    frame = pd.DataFrame({"slope": [0.1, np.nan, 0.3], "offset": [0.5, 0.5, np.inf]})
+    with pytest.raises(
+        ValueError, match=r"finite, got {'slope': nan, .*} in row 1, the first of 2"
+    ):
+        inference.fit(None, prior, observed, earlier=(frame, np.zeros((3, 30))), budget=0)
+
+
 @pytest.mark.parametrize("fixture", ["line_fit", "signal_fit"])
 def test_predictions_at_points_of_another_shape_are_refused(fixture, request, prior):
     fit = request.getfixturevalue(fixture)
@@ -321,6 +360,21 @@ def test_a_simulator_of_single_runs_is_recognised_by_its_shape(prior, observed):
 
     with pytest.raises(ValueError, match="vectorised=False"):
         inference.fit(one, prior, observed, budget=9, progress=False)
+
+
+def test_a_warning_that_is_an_error_loses_no_simulation(tmp_path, prior, observed):
+    """Warnings are errors here, as under `python -W error`."""
+    calls = []
+
+    def constant(theta, seeds):
+        calls.extend(seeds)
+        return np.ones((len(seeds), 30))
+
+    given = {"budget": 12, "bank": tmp_path / "b.sqlite", "progress": False}
+    with pytest.raises(inference.EmulatorWarning, match="all simulations are equal"):
+        inference.fit(constant, prior, observed, **given)
+    fit = inference.fit(constant, prior, observed, warn=False, **given)
+    assert len(calls) == len(fit.history.theta) == 12
 
 
 def test_complaints_are_kept_without_a_warning(prior, observed):

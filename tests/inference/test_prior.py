@@ -2,6 +2,7 @@ import jax
 import numpy as np
 import numpyro.distributions as dist
 import pytest
+from numpyro.distributions.transforms import ExpTransform
 from scipy import stats
 
 from bolfi_liquids import inference
@@ -77,6 +78,53 @@ def test_distributions_agree_with_scipy_and_their_ends_are_finite(distribution, 
     assert np.isfinite(theta["a"]).all() and np.isfinite(prior.log_prob(theta)).all()
 
 
+EDGES = np.array([1e-6, 1e-3, 0.1, 0.5, 0.9, 1.0 - 1e-3, 1.0 - 1e-6])[:, None]
+
+
+@pytest.mark.parametrize(
+    "distribution",
+    [
+        dist.Uniform(2.0, 3.0),
+        dist.LogUniform(1e-9, 1e3),
+        dist.Normal(5.0, 0.1),
+        dist.LogNormal(0.0, 3.0),
+        dist.Gamma(0.5, 3.0),
+        dist.Beta(0.5, 0.5),
+        dist.Cauchy(1.0, 2.0),
+        dist.StudentT(3.0, 1.0, 2.0),
+        dist.Laplace(1.0, 2.0),
+        dist.Logistic(1.0, 2.0),
+        dist.HalfCauchy(2.0),
+        dist.Gumbel(1.0, 2.0),
+        dist.Pareto(1.0, 2.0),
+        dist.TruncatedNormal(0.0, 1.0, low=8.0),
+        dist.TruncatedNormal(0.0, 1.0, high=-8.0),
+        dist.TruncatedNormal(5.0, 2.0, low=30.0, high=31.0),
+        dist.TruncatedNormal(0.0, 1.0, low=-30.0, high=-29.0),
+        dist.TruncatedNormal(0.0, 1.0, low=-9.0),
+        dist.TruncatedCauchy(0.0, 1.0, low=50.0),
+        dist.TruncatedDistribution(dist.StudentT(3.0, 1.0, 2.0), low=4.0),
+        dist.TruncatedDistribution(dist.Laplace(0.0, 1.0), low=40.0),
+        dist.TruncatedDistribution(dist.SoftLaplace(0.0, 1.0), low=4.0),
+        dist.TransformedDistribution(dist.Normal(0.0, 1.0), ExpTransform()),
+    ],
+)
+def test_quantiles_return_from_both_tails(distribution):
+    prior = inference.Prior({"a": distribution})
+    theta = prior.from_unit(EDGES)
+    np.testing.assert_allclose(prior.to_unit(theta), EDGES, atol=1e-9)
+    assert (np.diff(theta["a"]) > 0.0).all() and np.isfinite(prior.log_prob(theta)).all()
+
+
+@pytest.mark.parametrize(("low", "high"), [(8.0, np.inf), (7.0, 8.0), (-np.inf, -8.0), (-1.0, 2.0)])
+def test_truncated_tails_agree_with_scipy(low, high):
+    ends = {name: end for name, end in {"low": low, "high": high}.items() if np.isfinite(end)}
+    prior = inference.Prior({"a": dist.TruncatedNormal(0.0, 1.0, **ends)})
+    theta, exact = prior.from_unit(EDGES), stats.truncnorm(low, high)
+    np.testing.assert_allclose(theta["a"], exact.ppf(EDGES[:, 0]), rtol=1e-9)
+    np.testing.assert_allclose(prior.log_prob(theta), exact.logpdf(theta["a"]), atol=1e-8)
+
+
 def test_outside_the_support_the_density_vanishes():
     prior = inference.Prior({"a": dist.LogNormal(0.0, 1.0), "b": dist.Gamma(2.0, 1.0)})
     theta = {"a": [0.0, -1.0, 1.0], "b": [1.0, 1.0, 0.0]}
@@ -121,6 +169,12 @@ def test_bad_units_are_refused(units):
         ({"a": dist.Uniform(0.0, np.inf)}, r"finite arguments, got Uniform\(low=0, high=inf\)"),
         ({"a": dist.Uniform(np.nan, 1.0)}, r"finite arguments, got Uniform\(low=nan, high=1\)"),
         ({"a": dist.Normal(0.0, np.inf)}, r"finite arguments, got Normal\(loc=0, scale=inf\)"),
+        (
+            {"offspring": dist.DiscreteUniform(1, 20)},
+            r"'offspring' must be continuous, got DiscreteUniform\(low=1, high=20\)",
+        ),
+        ({"a": dist.Poisson(3.0)}, r"'a' must be continuous, got Poisson\(rate=3\)"),
+        ({"a": dist.TruncatedNormal(0.0, 1.0, low=50.0)}, "too far out in a tail"),
         ({"a": 1.0}, "numpyro distribution, got float"),
         ({"a": dist.Normal(np.zeros(2), 1.0)}, r"univariate with shape \(\), got \(2,\)"),
         ({"a": dist.MultivariateNormal(np.zeros(2), np.eye(2))}, "univariate"),

@@ -214,6 +214,12 @@ def test_a_camera_without_any_noise_is_not_believed(stirred):
     still = recorded(stirred, np.random.default_rng(0), sd=0.0)
     with pytest.raises(InputError, match="does not change at all"):
         camera_noise([still])
+    half = replace(
+        still, inclination=0.3 + still.inclination
+    )  # its mean is not 0.3 to the last bit
+    half.inclination[:, 0] += np.random.default_rng(0).normal(size=len(still.time))
+    with pytest.raises(InputError, match="does not change at all"):
+        camera_noise([half])
     seen = recorded(stirred, np.random.default_rng(0))
     with pytest.raises(InputError, match="does not change at all"):
         held_out_noise(still, [seen])

@@ -2,6 +2,7 @@
 
 import arviz_base
 import numpy as np
+import pandas as pd
 import pytest
 from bolfi_liquids.inference.checks import draws, ranks
 from scipy.stats import chisquare
@@ -25,7 +26,8 @@ def test_reads_mappings_and_trees_alike():
     for given in (made, tree, tree["posterior"], tree["posterior"].to_dataset()):
         np.testing.assert_array_equal(draws.posterior_array(given, ("a", "b")), wanted)
     flat = {name: column.ravel() for name, column in made.items()}
-    assert draws.posterior_array(flat, ("a", "b")).shape == (1, 6, 2)
+    for given in (flat, pd.DataFrame(flat)):
+        assert draws.posterior_array(given, ("a", "b")).shape == (1, 6, 2)
 
 
 @pytest.mark.parametrize(

@@ -91,6 +91,29 @@ def test_stretches_too_short_to_learn_from_are_refused(samples, channels, trend)
     assert criticism.rest_noise([more], trend=trend).samples == more.size
 
 
+REST = np.random.default_rng(0).normal(size=(40, 2))
+
+
+@pytest.mark.parametrize("trend", [0, 1])
+@pytest.mark.parametrize("still", [0.0, 0.3, -7e5])
+def test_a_channel_that_stands_still_measures_no_noise(still, trend):
+    """Nor is it taken for a measurement beside one that varies."""
+    constant = np.full((40, 2), still)
+    beside = np.column_stack([REST[:, 0], constant[:, 1]])
+    for rest, channel in ((constant, 0), (beside, 1)):
+        with pytest.raises(ValueError, match=f"rests do not vary in channel {channel}"):
+            criticism.rest_noise([rest, rest[:9]], trend=trend)
+    varying = criticism.rest_noise([still + 1e-6 * REST], trend=trend)
+    assert abs(varying.sd.mean() / 1e-6 - 1.0) < 0.3
+
+
+def test_stretches_of_another_form_are_refused():
+    with pytest.raises(ValueError, match=r"must have shape \[samples, channels\], got \(40,\)"):
+        criticism.rest_noise([REST[:, 0]])
+    with pytest.raises(ValueError, match="rests must be finite, got 1 missing samples of 80"):
+        criticism.rest_noise([np.where(np.arange(80).reshape(40, 2) == 5, np.nan, REST)])
+
+
 # Drawn as believed.
 
 
