@@ -38,7 +38,7 @@ class History(NamedTuple):
         """Which succeeded and copy no run before, in theta, seed and signal: a copy tells nothing
         new."""
         distinct, seen = self.succeeded, set()
-        for i in np.flatnonzero(distinct & (self.seeds != UNKNOWN)):
+        for i in np.flatnonzero(distinct & (self.seeds != UNKNOWN)).tolist():
             run = *self._run(i), self.signal(i).tobytes()
             distinct[i] = run not in seen
             seen.add(run)
@@ -48,7 +48,7 @@ class History(NamedTuple):
     def contradicting(self) -> int:
         """Runs that succeeded and whose signal differs from that of a run before, of the same theta
         and seed."""
-        rows = np.flatnonzero(self.distinct & (self.seeds != UNKNOWN))
+        rows = np.flatnonzero(self.distinct & (self.seeds != UNKNOWN)).tolist()
         return len(rows) - len({self._run(i) for i in rows})
 
     def _run(self, row: int) -> tuple[bytes, int]:

@@ -6,6 +6,7 @@ from functools import cached_property
 import jax
 import numpy as np
 import numpyro.distributions as dist
+from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
 from ._float64 import in_float64
@@ -213,7 +214,7 @@ def check_support(prior: Prior, theta: Theta) -> None:
         )
 
 
-def _first_of(wrong: np.ndarray, theta: np.ndarray, names: tuple[str, ...]) -> str:
+def _first_of(wrong: ArrayLike, theta: np.ndarray, names: tuple[str, ...]) -> str:
     """The first row of theta [n, d] that is wrong, bool [n], and how many are, in words."""
     rows, at = np.atleast_2d(theta), np.flatnonzero(wrong)
     point = {name: float(rows[at[0], j]) for j, name in enumerate(names)}

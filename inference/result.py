@@ -14,7 +14,6 @@ from ._float64 import in_float64
 from .arguments import check_flag, checked_integer
 from .gp.process import predict
 from .history import History
-from .input_warnings import censored_warnings, history_warnings, unreached_warnings
 from .notebook_display import as_html, as_text
 from .prior import Prior
 from .sampling.convergence import SamplingWarning
@@ -23,7 +22,12 @@ from .sampling.importance import explore
 from .sampling.target import Length, Target, log_likelihood
 from .surrogates.base import Surrogate
 from .surrogates.signal import SignalSurrogate
-from .surrogates.warnings import UNLEARNED
+from .surrogates.warnings import (
+    UNLEARNED,
+    censored_warnings,
+    history_warnings,
+    unreached_warnings,
+)
 from .types import Theta
 
 if TYPE_CHECKING:
@@ -124,9 +128,10 @@ class Fit:
 
     @cached_property
     def warnings(self) -> list[str]:
-        """What the surrogate's own checks complain of; what `input_warnings` says of what was
-        given; and that fewer were learned from than the 2 d + 2 that d parameters need: a level
-        and a slope and a curvature along each parameter, and one more that could contradict."""
+        """What the surrogate's own checks complain of; what was given wrongly; that more than half
+        of the simulations failed; and that fewer were learned from than the 2 d + 2 that d
+        parameters need: a level and a slope and a curvature along each parameter, and one more
+        that could contradict."""
         said = self.learned.warnings() + history_warnings(self.history) + self._data_warnings()
         if self._unlearned() > MAX_UNLEARNED_SHARE:
             said.append(UNLEARNED)

@@ -3,7 +3,7 @@
 import numpy as np
 import numpyro.distributions as dist
 import pytest
-from bolfi_liquids.inference.input_warnings import censored_warnings, unreached_warnings
+from bolfi_liquids.inference.surrogates.warnings import censored_warnings, unreached_warnings
 
 from bolfi_liquids import inference
 
