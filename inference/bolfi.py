@@ -34,8 +34,8 @@ from .simulations.returned import told_signals
 from .sobol import sobol, start_size
 from .surrogates.base import Acquisition
 from .surrogates.families import Family, Learnable, Measured, resolve
-from .surrogates.feasibility import Feasibility
 from .surrogates.outliers import sane
+from .surrogates.success import Feasibility
 from .surrogates.warnings import EmulatorWarning
 from .types import Theta
 

@@ -19,7 +19,7 @@ from ..gp.namespaces import log_sum_exp
 from ..gp.optimise import minimise_in_box
 from ..gp.process import predict, predict_joint
 from ..surrogates.base import Surrogate
-from ..surrogates.feasibility import Feasibility, log_feasible
+from ..surrogates.success import Feasibility, log_feasible
 from .screen import ROUNDS, screen
 
 CANDIDATES = 128  # points among which a rule chooses

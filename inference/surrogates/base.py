@@ -7,7 +7,7 @@ import numpy as np
 
 from ..gp.process import GP
 from ..types import LogLikelihood, LogSecondMoment
-from .feasibility import Feasibility
+from .success import Feasibility
 
 
 class Surrogate(Protocol):
@@ -73,6 +73,6 @@ class Acquisition(Protocol):
             key: Fixes the choice.
             surrogate: A `Surrogate` that already believes what is pending.
             n: Points wanted.
-            feasibility: Where runs succeeded and failed; see `feasibility.log_feasible`.
+            feasibility: Where runs succeeded and failed; see `success.log_feasible`.
         """
         ...

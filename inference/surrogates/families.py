@@ -14,13 +14,12 @@ from ..types import Discrepancy
 from .base import Surrogate
 from .discrepancy import DiscrepancySurrogate, learn, marginalised, with_threshold
 from .emulator import PREDICTED_SHARE, Limits, emulate
-from .feasibility import Feasibility
 from .given_noise import GivenNoise, given_noise
 from .outliers import sane
 from .output_vectors import Output, Summary, describe, infinities, summarise
 from .signal import Noise, SignalSurrogate, observe
 from .squared_difference import evaluate, failed_on, squared_difference
-from .success import learn_success
+from .success import Feasibility, learn_success
 from .threshold import Threshold, check_rule
 from .transform import TRANSFORMS
 

@@ -1,13 +1,30 @@
 """Where runs succeed: the probability of it is a factor of the likelihood."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..gp.hyperparameters import maximum_a_posteriori
 from ..gp.namespaces import log_ndtr, namespace
 from ..gp.process import GP, Data, condition, padded, padded_rows, predict
-from .feasibility import Feasibility
+
+KERNEL_WIDTH = 0.1  # in prior quantiles
+PRIOR_SUCCESSES = 0.05  # successes that are assumed everywhere
+
+
+class Feasibility(NamedTuple):
+    """Runs so far."""
+
+    u: np.ndarray  # [p, d]
+    succeeded: np.ndarray  # bool [p]
+
+
+def log_feasible(runs: Feasibility, u: np.ndarray) -> np.ndarray:
+    """Log of the share of successes around u [..., d] (Nadaraya and Watson) [...]; 0 if nothing
+    failed."""
+    near = np.exp(-0.5 * np.sum(((runs.u - u[..., None, :]) / KERNEL_WIDTH) ** 2, axis=-1))
+    good, bad = near @ runs.succeeded + PRIOR_SUCCESSES, near @ ~runs.succeeded
+    return np.log(good) - np.log(good + bad)
 
 
 def learn_success(runs: Feasibility, normal: np.ndarray | None) -> GP | None:

@@ -16,8 +16,8 @@ from bolfi_liquids.inference.gp.process import predict
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates import base
 from bolfi_liquids.inference.surrogates.families import FAMILIES, resolve
-from bolfi_liquids.inference.surrogates.feasibility import Feasibility
 from bolfi_liquids.inference.surrogates.measurement_noise import Layout
+from bolfi_liquids.inference.surrogates.success import Feasibility
 
 from bolfi_liquids import inference
 

@@ -14,7 +14,7 @@ from bolfi_liquids.inference.acquisition.rules import (
 from bolfi_liquids.inference.gp.process import predict
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.discrepancy import learn, with_threshold
-from bolfi_liquids.inference.surrogates.feasibility import Feasibility, log_feasible
+from bolfi_liquids.inference.surrogates.success import Feasibility, log_feasible
 from scipy.stats import kstest, multivariate_normal, norm, qmc, truncnorm
 
 from bolfi_liquids import inference

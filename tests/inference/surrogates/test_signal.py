@@ -12,8 +12,8 @@ from bolfi_liquids.inference.gp.process import predict
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.emulator import Limits, emulate, noise_share
 from bolfi_liquids.inference.surrogates.families import Learnable, SignalFamily
-from bolfi_liquids.inference.surrogates.feasibility import Feasibility
 from bolfi_liquids.inference.surrogates.signal_likelihood import log_likelihood, log_second_moment
+from bolfi_liquids.inference.surrogates.success import Feasibility
 from scipy.stats import binom, multivariate_normal
 
 from bolfi_liquids import inference

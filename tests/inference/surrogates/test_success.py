@@ -3,8 +3,7 @@
 import numpy as np
 import numpyro.distributions as dist
 from bolfi_liquids.inference.sobol import sobol
-from bolfi_liquids.inference.surrogates.feasibility import Feasibility
-from bolfi_liquids.inference.surrogates.success import learn_success, log_success
+from bolfi_liquids.inference.surrogates.success import Feasibility, learn_success, log_success
 
 from bolfi_liquids import inference
 
