@@ -31,7 +31,7 @@ compiled function each of JAX's operations would be compiled by itself."""
 
 
 class Truncated:
-    """What is left of a distribution between two bounds.
+    """A distribution truncated to an interval.
 
     Probabilities are counted from the tail in which the bounds lie: from the other end, those
     beyond some eight standard deviations of a normal one are 1 to the last digit.

@@ -38,7 +38,7 @@ class Output:
 
     @property
     def long(self) -> bool:
-        """Whether it is a series of which what is left over can be seen to be noise."""
+        """Whether it is a series so long that its residual tells the size of the noise."""
         return self.series and len(np.unique(self.layout.sample)) >= MIN_LONG
 
     @property

@@ -304,8 +304,8 @@ def _nodes(
 def _smallest_misfit(emulator: Emulator, observed: np.ndarray) -> float:
     """Root of the least expected mean square by which the emulated output misses the observed
     values [m], standardised, over an even screen of the prior and the runs."""
-    basis, data = emulator.basis, emulator.gp.data.u
-    points = np.concatenate([sobol(0, 0, MISFIT_POINTS, data.shape[1]), data])
+    basis = emulator.basis
+    points = _screen(emulator, MISFIT_POINTS)
     mean, variance = (part.T for part in predict_points(emulator.gp, points))
     near = (mean - basis.scores(observed[None])) ** 2 + variance
     # components are orthogonal, so what they miss adds to what they cannot make
@@ -328,7 +328,12 @@ def _widen(reduced: Reduced, emulator: Emulator) -> Reduced:
 
 def _keep(emulator: Emulator, reduced: Reduced) -> np.ndarray:
     """The nodes of most evidence, best first, on an even screen of the prior and at the data."""
-    data = emulator.gp.data.u
-    points = np.concatenate([sobol(0, 0, SCREENED_POINTS, data.shape[1]), data])
+    points = _screen(emulator, SCREENED_POINTS)
     terms = node_log_densities(state_of(emulator, reduced), points)
     return np.argsort(-np.logaddexp.reduce(terms, 0))[:KEPT_NODES]
+
+
+def _screen(emulator: Emulator, count: int) -> np.ndarray:
+    """`count` points that fill the prior evenly, and the runs: prior quantiles [n, d]."""
+    data = emulator.gp.data.u
+    return np.concatenate([sobol(0, 0, count, data.shape[1]), data])

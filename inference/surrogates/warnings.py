@@ -18,7 +18,7 @@ OUTSIDE = (
 MISFIT = (
     "the simulator misses what was observed by more than the given noise, wherever it was run: the "
     "noise is larger than given, the simulator lacks something, or what fits was not found; the "
-    "posterior allows for a misfit of that size: look at what is left over at the closest run, "
+    "posterior allows for a misfit of that size: look at the residual of the closest run, "
     "correct noise=, or simulate more"
 )
 FEW_NUMBERS = (
