@@ -141,7 +141,7 @@ def test_compiles_once_for_all_fits_and_lengths(line_fit, prior, observed, simul
         return line_fit.learned.log_likelihood(state, u)
 
     counts = []
-    short = inference.fit(simulate, prior, observed, budget=7, surrogate="discrepancy")
+    short = inference.fit(simulate, prior, observed, budget=7, surrogate="discrepancy", warn=False)
     for fit, draws in ((short, 30), (line_fit, 30), (line_fit, 400)):  # data and padding differ
         target = Target(counted, fit.learned.state, 2)
         source = in_float64(nuts.sample_nuts)(
