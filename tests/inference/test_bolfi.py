@@ -83,7 +83,7 @@ def test_a_copy_teaches_nothing(prior, observed, simulate):
 
 
 @pytest.mark.slow
-def test_failed_runs_count_and_teach_nothing(prior, observed, simulate):
+def test_failed_runs_count_and_teach_the_emulator_nothing(prior, observed, simulate):
     engine = inference.Bolfi(prior, observed)
     theta = engine.ask(6)
     signals = simulate(theta, np.arange(6))
@@ -95,7 +95,11 @@ def test_failed_runs_count_and_teach_nothing(prior, observed, simulate):
     assert (engine.told, engine.succeeded) == (6, 4)
     fit = engine.fit(warn=False)  # of four runs
     np.testing.assert_array_equal(fit.simulations["failed"], [0, 1, 0, 0, 1, 0])
-    assert fit.best == other.fit(warn=False).best
+    at = np.array([[0.2, 0.3], [0.7, 0.6]])
+    for one, without in zip(
+        fit.learned.predict(at), other.fit(warn=False).learned.predict(at), strict=True
+    ):
+        np.testing.assert_array_equal(one, without)
 
 
 @pytest.mark.slow
@@ -165,7 +169,7 @@ def test_a_discrepancy_may_compare_unlike_shapes(prior):
     engine.tell(theta, np.full((6, 1), np.nan))  # failed runs fix no shape
     theta = engine.ask(6)
     engine.tell(theta, theta["offset"][:, None, None] + np.zeros((6, 4, 3)))
-    assert engine.fit().closest.signal.shape == (4, 3)
+    assert engine.fit(warn=False).closest.signal.shape == (4, 3)
     assert engine.told == 12
 
 

@@ -123,9 +123,8 @@ def test_a_summary_may_take_any_shape_and_fail_on_one_run(prior, observed, simul
         cut = {simulation_seed(0, 0): 3, simulation_seed(0, 1): 25}.get(seed, 30)
         return spoilt(simulate, [])(theta, seed)[:cut]
 
-    fit = inference.fit(
-        uneven, prior, observed, budget=BUDGET, batch=1, vectorised=False, summary=summary
-    )
+    options = {"budget": BUDGET, "batch": 1, "vectorised": False, "warn": False}
+    fit = inference.fit(uneven, prior, observed, summary=summary, **options)
     assert fit.failures == {"incomparable": 1}
     assert not fit.history.succeeded[0] and fit.history.signal(1).shape == (25,)
     assert "too short" in str(fit.simulations["error"][0].item())
@@ -162,7 +161,7 @@ def test_a_user_s_function_may_write_into_what_it_is_given(prior, observed, simu
         return signal[:2]
 
     for options in ({"discrepancy": greedy}, {"summary": centred}):
-        fit = inference.fit(simulate, prior, observed, budget=BUDGET, **options)
+        fit = inference.fit(simulate, prior, observed, budget=BUDGET, warn=False, **options)
         theta = prior.to_dict(fit.history.theta)
         np.testing.assert_array_equal(fit.observed, observed)
         np.testing.assert_array_equal(fit.history.signals, simulate(theta, fit.history.seeds))
