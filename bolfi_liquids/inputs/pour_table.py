@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import Argument, InputError
+from .cups import cups_of
 from .table import Table, is_number, read_table
 
 if TYPE_CHECKING:
@@ -149,6 +150,29 @@ def table_of(given: Pours | None, where: str) -> PourTable | None:
             fix="give the path of a CSV file, or what open_pours returns",
         )
     return open_pours(given) if isinstance(given, str | Path) else given
+
+
+def table_and_cups(
+    pours: Pours | None, cups: "Cups | str | Path | None"
+) -> "tuple[PourTable | None, Cups]":
+    """Pours of a liquid, and the cups that they were made with.
+
+    Args:
+        pours: A table, or its path; None for none.
+        cups: Or a TOML file of them; None takes the bundled ones.
+
+    Raises:
+        InputError: Something cannot be used, or cups were given without pours.
+    """
+    table = table_of(pours, Argument("pours"))
+    if cups is not None and table is None:
+        raise InputError(
+            "there are no pours from them", where=Argument("cups"), fix="give `pours`, too"
+        )
+    opened = cups_of(cups)
+    if table is not None:
+        check_scene(table, opened)
+    return table, opened
 
 
 def check_scene(table: PourTable, cups: "Cups") -> None:

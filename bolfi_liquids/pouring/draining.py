@@ -3,13 +3,14 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..inputs.prior import split_parameters
 from ..run.fluid_simulator import FluidSimulator
+from ..run.summary import Number
 from ..seeds import Phase, simulation_seeds
 from .design import RATE
 
@@ -22,7 +23,8 @@ HELD_S = np.arange(0.0, 10.01, 0.1)  # that a pour is simulated for
 LIQUIDS = 4  # that one pair of lanes pours at once
 
 
-class Hold(NamedTuple):
+@dataclass(frozen=True)
+class Hold:
     """How the source empties; see `hold_of`.
 
     Attributes:
@@ -32,9 +34,9 @@ class Hold(NamedTuple):
         retained_then: Share that stays after it.
     """
 
-    until_tenth_s: float
-    simulated_s: float
-    retained_then: float
+    until_tenth_s: Number
+    simulated_s: Number
+    retained_then: Number
 
 
 @dataclass(frozen=True)
@@ -69,16 +71,13 @@ class Draining(FluidSimulator):
         return json.dumps(["draining", *made_of], sort_keys=True)
 
 
-def hold_of(
-    draining: Draining, rate: float, liquids: Mapping[str, NDArray], seed: int, keep: "Keep"
-) -> Hold:
+def hold_of(draining: Draining, rate: float, liquids: Mapping[str, NDArray], keep: "Keep") -> Hold:
     """How a source that is turned at a rate [rad/s] empties.
 
     Args:
         draining: The simulator.
         rate: At which the source turns.
         liquids: Posterior draws, name -> (draws,); a few of them are poured, thin to thick.
-        seed: Of their packings.
         keep: Where pours are made and kept; its identity and batch are not used, and its timeout
             is that of a pour that is held as the cups say.
 
@@ -91,7 +90,7 @@ def hold_of(
     some = thick[(2 * np.arange(LIQUIDS) + 1) * len(thick) // (2 * LIQUIDS)]
     names = ("viscosity", "cohesion", *draining.effects)
     theta = {name: liquids[name][some] for name in names} | {RATE: np.full(LIQUIDS, rate)}
-    seeds = simulation_seeds(seed, Phase.DRAINING, LIQUIDS)
+    seeds = simulation_seeds(0, Phase.DRAINING, LIQUIDS)
     plan = draining.cups.pour
     longer = (plan.final_angle / rate + HELD_S[-1]) / (plan.final_angle / rate + plan.hold)
     timeout = None if keep.timeout is None else longer * keep.timeout

@@ -1,6 +1,6 @@
 """Pours that were made of the liquid, between a map of pours and the decision."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,7 @@ from ..criticism.pour_noise import CORRELATION_LENGTH, SIMULATOR_ERROR_SD
 from ..inputs.pour_table import PourTable
 from ..seeds import Phase, generator
 from .residual import Residual, angle, coordinates, expected_share, learn_residual, share
+from .result import Judged
 from .spillage import Surface, normal_scores
 
 
@@ -42,34 +43,35 @@ class GivenPours:
         moved = self.spilled.moved(angle(here), angle(flat), at)
         return there._replace(spilled=expected_share(*moved).reshape(there.spilled.shape))
 
-    def outcomes(
-        self, action: tuple[float, float], there: NDArray, here: NDArray, seed: int
-    ) -> NDArray[np.float64]:
-        """Fractions (n, 3) of outcomes of one action.
+    def outcomes(self, there: Judged, here: NDArray, seed: int) -> Judged:
+        """What becomes of the liquid in the n outcomes of an action.
 
         Args:
-            action: Angular velocity [rad/s] and distance [m].
-            there: Its fractions on the map, shape (n, 3).
+            there: What the map says of them.
             here: Spilled and retained fractions of the given pours in the same outcomes, shape
                 (n, A, 2).
             seed: Of how far each outcome is from what is expected of it.
         """
-        rng = generator(seed, Phase.GIVEN_POURS)
-        at = coordinates(*np.array(action)[:, None])
-        scores = normal_scores(len(there))
+        rng, at = generator(seed, Phase.GIVEN_POURS), _coordinates_of(there)
+        scores = normal_scores(len(there.fractions))
         fractions = []
         for k, (residual, column) in enumerate(((self.spilled, 0), (self.retained, 2))):
-            mean, sd = residual.moved(angle(here[..., k]), angle(there[:, [column]]), at)
+            mean, sd = residual.moved(angle(here[..., k]), angle(there.fractions[:, [column]]), at)
             fractions.append(share(mean[:, 0] + sd * rng.permutation(scores)))
         spilled, retained = fractions
         received = np.maximum(1.0 - spilled - retained, 0.0)
         whole = np.column_stack([spilled, received, retained])
-        return whole / whole.sum(axis=1, keepdims=True)
+        return replace(there, fractions=whole / whole.sum(axis=1, keepdims=True))
 
-    def nearest(self, action: tuple[float, float]) -> NDArray[np.int64]:
-        """The given pours by how like an action they are, most first, shape (A,)."""
-        at = coordinates(*np.array(action)[:, None])
-        return np.argsort(np.sum((self.spilled.at - at) ** 2, axis=1), kind="stable")
+    def nearest(self, chosen: Judged) -> NDArray[np.int64]:
+        """The given pours by how like an action they are, the likest first, shape (A,)."""
+        apart = np.sum((self.spilled.at - _coordinates_of(chosen)) ** 2, axis=1)
+        return np.argsort(apart, kind="stable")
+
+
+def _coordinates_of(judged: Judged) -> NDArray[np.float64]:
+    """Shape (1, 2)."""
+    return coordinates(np.array([judged.angular_velocity]), np.array([judged.distance]))
 
 
 def learn_given(table: PourTable, spilled: NDArray, retained: NDArray) -> GivenPours:

@@ -120,12 +120,12 @@ class LandingMap:
         outcomes = repeated(liquids, MIN_OUTCOMES)
         misses = self.misses(number_of(outcomes), seed)
         fractions = self._landed(np.array([rate]), np.array([distance]), outcomes, misses)[0]
-        if self.given is not None:
-            table = self.given.table
-            here = self._landed(table.angular_velocity, table.distance, outcomes, misses)
-            observed = np.moveaxis(here[..., [0, 2]], 0, 1)
-            fractions = self.given.outcomes((rate, distance), fractions, observed, seed)
-        return Judged(rate, distance, fractions)
+        found = Judged(rate, distance, fractions)
+        if self.given is None:
+            return found
+        table = self.given.table
+        here = self._landed(table.angular_velocity, table.distance, outcomes, misses)
+        return self.given.outcomes(found, np.moveaxis(here[..., [0, 2]], 0, 1), seed)
 
     def best(self, liquids: Mapping[str, NDArray]) -> Judged:
         """The action that is expected to spill least, judged on draws that did not choose it.

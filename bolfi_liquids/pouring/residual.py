@@ -1,11 +1,12 @@
 """What pours that were made say of a map of pours: a Gaussian process of what the map misses.
 
-A share s is an angle arcsin √s here: so a pour that is repeated varies alike whatever it spills, and
-no correction leads below nothing or beyond all. What becomes of the liquid is the angle that one of
-many outcomes of the map predicts, plus a process of the action that is the same for all outcomes; a
-given pour is that plus its own repeatability. Given pours move each outcome by the rule of Matheron
-(Wilson et al., Pathwise conditioning, JMLR 2021, eq. 7): by what separates this very outcome from
-them, as far as the process or the spread of the outcomes connects them with the action.
+A share s is an angle arcsin √s here: so a pour that is repeated varies alike whatever it spills,
+and no correction leads below nothing or beyond all. What becomes of the liquid is the angle that
+one of many outcomes of the map predicts, plus a process of the action that is the same for all
+outcomes; a given pour is that plus its own repeatability. Given pours move each outcome by
+Matheron's rule (Wilson et al., Pathwise conditioning of Gaussian processes, JMLR 2021): by what
+separates this very outcome from them, as far as the process or the spread of the outcomes connects
+them with the action.
 """
 
 from collections.abc import Sequence

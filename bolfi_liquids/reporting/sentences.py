@@ -4,6 +4,7 @@ Their wording is in `data/calibration_sentences.jinja` and `data/pour_sentences.
 """
 
 from collections.abc import Mapping
+from math import isnan
 from typing import Any
 
 import numpy as np
@@ -81,6 +82,21 @@ def least_viscosity_sentences(summary: CalibrationSummary) -> list[Sentence]:
 def pour_sentence(summary: PourSummary) -> Sentence:
     """The chosen pour, and what it is expected to spill."""
     return sentence("pour.chosen", summary=summary)
+
+
+def fate_sentences(summary: PourSummary) -> list[Sentence]:
+    """What arrives and what stays; older versions did not keep it."""
+    return [] if isnan(summary.expected_received) else [sentence("pour.fate", summary=summary)]
+
+
+def given_sentences(summary: PourSummary) -> list[Sentence]:
+    """Which given pours count, and how they have moved the choice."""
+    given = summary.given
+    if given is None:
+        return []
+    moved = given.without.action != summary.action
+    more = [sentence("pour.given_moved", without=given.without)] if moved else []
+    return [sentence("pour.given", given=given), *more]
 
 
 def plug_in_sentence(summary: PourSummary) -> Sentence:

@@ -39,7 +39,8 @@ class ChosenPour:
         run: The RUN directory.
         judged: The action and what it spills, as pour.nc has them.
         cups: For which it was chosen.
-        stale: That it was chosen over another posterior than the latest; empty if it was not.
+        stale: That it was chosen over another posterior than the latest, or with other given pours;
+            empty if it was not.
         fit_is_bad: Whether the fit was, or is, so bad that the pour could only be chosen by force.
         worries: The report's other warnings.
     """
@@ -52,14 +53,14 @@ class ChosenPour:
     worries: tuple[Sentence, ...]
 
     def check_fresh(self) -> None:
-        """Refuse a pour of another posterior than the latest.
+        """Refuse a pour of another posterior than the latest, or of other given pours.
 
         Raises:
             InputError: It is one.
         """
         if self.stale:
             raise InputError(
-                "its pour is out of date: it was chosen over another posterior than the latest",
+                "its pour is out of date: posterior or given pours have changed since it was chosen",
                 where=str(self.run),
                 fix=_again(self.run),
             )

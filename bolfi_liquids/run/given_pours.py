@@ -16,6 +16,8 @@ from ..inputs.pour_table import PourTable
 from .directory import GIVEN_POURS
 
 if TYPE_CHECKING:
+    from xarray import Dataset
+
     from ..models import Cups
 
 FRACTIONS = ("spilled", "received", "retained")
@@ -47,6 +49,31 @@ def kept_pours(run: Path, cups: "Cups") -> PourTable | None:
     Raises:
         InputError: The file is damaged.
     """
+    held = _held(run)
+    if held is None or json.loads(held.attrs["cups"]) != _scene(cups):
+        return None
+    return PourTable(
+        path=Path(held.attrs["file"]),
+        liquid=held.attrs["liquid"],
+        angular_velocity=held["angular_velocity"].to_numpy(),
+        distance=held["distance"].to_numpy(),
+        fractions=np.column_stack([held[name] for name in FRACTIONS]),
+        lines=held["line"].to_numpy(),
+        hash=held.attrs["sha256"],
+    )
+
+
+def digest_of_pours(run: Path) -> str:
+    """Digest of the table that the run was given, and the name of its liquid; "" without one.
+
+    Raises:
+        InputError: The file is damaged.
+    """
+    held = _held(run)
+    return "" if held is None else f"{held.attrs['sha256']} {held.attrs['liquid']}".strip()
+
+
+def _held(run: Path) -> "Dataset | None":
     import xarray
 
     path = run / GIVEN_POURS
@@ -54,18 +81,7 @@ def kept_pours(run: Path, cups: "Cups") -> PourTable | None:
         return None
     try:
         with xarray.open_dataset(path, engine="h5netcdf") as held:
-            held.load()
-        if json.loads(held.attrs["cups"]) != _scene(cups):
-            return None
-        return PourTable(
-            path=Path(held.attrs["file"]),
-            liquid=held.attrs["liquid"],
-            angular_velocity=held["angular_velocity"].to_numpy(),
-            distance=held["distance"].to_numpy(),
-            fractions=np.column_stack([held[name] for name in FRACTIONS]),
-            lines=held["line"].to_numpy(),
-            hash=held.attrs["sha256"],
-        )
+            return held.load()
     except (OSError, ValueError, KeyError) as err:
         fix = "delete it, and give the table of pours again"
         raise InputError("damaged, cannot be read", where=str(path), fix=fix) from err
