@@ -60,7 +60,7 @@ class ChosenPour:
         """
         if self.stale:
             raise InputError(
-                "its pour is out of date: posterior or given pours have changed since it was chosen",
+                "its pour is out of date: posterior or given pours have changed since",
                 where=str(self.run),
                 fix=_again(self.run),
             )
