@@ -206,7 +206,6 @@ def test_how_long_the_source_must_be_held(monkeypatch, empties, until):
 
 
 def test_what_stays_is_told_with_the_hold_where_it_is_much(chosen, monkeypatch):
-    """Of the posterior's liquid little stays; of a thick one, in which nothing else differs, much."""
     assert chosen.summary.hold is None
     assert chosen.summary.expected_retained == chosen.chosen.fractions[:, 2].mean() < 0.1
     monkeypatch.setattr("bolfi_liquids.pouring.choose.TENTH", 0.01)
