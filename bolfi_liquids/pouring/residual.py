@@ -70,14 +70,17 @@ class Residual(NamedTuple):
             at: `coordinates` of the actions, shape (m, 2).
 
         Returns:
-            Mean angles, shape (n, m); the sd of a pour about each, shape (m,).
+            Mean angles, shape (n, m), none beyond nothing or all; the sd of a pour about each,
+            shape (m,).
         """
         cross = self.covariance(at, self.at)
         process = self.given_covariance
         weights = np.linalg.solve(process + _spread(here, here), (cross + _spread(there, here)).T).T
         left = self.sd**2 - 2.0 * np.sum(weights * cross, axis=1)
         left += np.sum((weights @ process) * weights, axis=1) + REPEATABILITY_SD**2
-        return there + (self.observed - here) @ weights.T, np.sqrt(left)
+        # what lies below nothing for a smooth process is not known to be nothing
+        mean = np.clip(there + (self.observed - here) @ weights.T, 0.0, np.pi / 2.0)
+        return mean, np.sqrt(left)
 
     @property
     def given_covariance(self) -> NDArray[np.float64]:

@@ -27,7 +27,10 @@ SHIFT = 0.012  # m, of the truth beyond or short of its simulator
 STREAM_SD = 0.008  # m
 RETAINED = 0.02  # share
 RADIUS = 0.022  # m, of the receiver
-REPEATABILITY_SD = 0.02  # of a given pour's fractions
+JITTER_SD = (
+    0.0004  # m, of where a given pour lands: .02 of the liquid where the rim cuts the stream
+)
+GRAMS = 83  # of the liquid, weighed by the gram
 GIVEN = np.array([(w, d) for w in (35.0, 70.0, 140.0) for d in (0.5, 2.5, 4.5, 6.5)])  # deg/s, cm
 PARTICLES = 400
 
@@ -58,12 +61,12 @@ class Truth(NamedTuple):
     def table(self, rng):
         """The pours of `GIVEN`, as a person weighs them."""
         rate, distance = np.radians(GIVEN[:, 0]), GIVEN[:, 1] / 100.0
-        fractions = np.column_stack([self.spilled(rate, distance), np.full(len(GIVEN), RETAINED)])
-        noisy = np.abs(fractions + REPEATABILITY_SD * rng.standard_normal(fractions.shape))
-        three = np.insert(noisy, 1, np.maximum(1.0 - noisy.sum(axis=1), 0.0), axis=1)
-        three /= three.sum(axis=1, keepdims=True)
+        spilled = self.spilled(rate, distance + JITTER_SD * rng.standard_normal(len(GIVEN)))
+        retained = np.full(len(GIVEN), RETAINED)
+        grams = np.round(GRAMS * np.column_stack([spilled, 1.0 - spilled - retained, retained]))
+        fractions = grams / grams.sum(axis=1, keepdims=True)
         lines = np.arange(2, 2 + len(GIVEN))
-        return PourTable(Path("given.csv"), "", rate, distance, three, lines, "0")
+        return PourTable(Path("given.csv"), "", rate, distance, fractions, lines, "0")
 
 
 def simulator() -> LandingMap:

@@ -206,13 +206,12 @@ def test_how_long_the_source_must_be_held(monkeypatch, empties, until):
 
 
 def test_what_stays_is_told_with_the_hold_where_it_is_much(chosen, monkeypatch):
-    assert chosen.summary.hold is None
-    assert chosen.summary.expected_retained == chosen.chosen.fractions[:, 2].mean() < 0.1
-    monkeypatch.setattr("bolfi_liquids.pouring.choose.TENTH", 0.01)
-    monkeypatch.setattr("bolfi_liquids.reporting.warnings.TENTH", 0.01)
-    again = bl.choose_pour(chosen.path, **MORE)
-    assert again.chosen.equals(chosen.chosen)
-    told = {one.key: one for one in warnings_of(results_of(bl.Calibration.open(again.path)))}
+    share, hold = chosen.chosen.fractions[:, 2].mean(), chosen.summary.hold
+    assert chosen.summary.expected_retained == share > 0.1
+    told = {one.key: one for one in warnings_of(results_of(bl.Calibration.open(chosen.path)))}
     text = str(told["warning.much_retained"])
-    held = again.summary.hold.until_tenth_s
-    assert f"{held:.2g} s" in text and "0.9 s" in text
+    assert f"{100.0 * share:.0f} %" in text
+    assert f"{hold.until_tenth_s:.2g} s" in text and "0.9 s" in text
+    monkeypatch.setattr("bolfi_liquids.pouring.choose.TENTH", share + 0.01)  # little, then
+    again = bl.choose_pour(chosen.path, **MORE)
+    assert again.summary.hold is None and again.chosen.equals(chosen.chosen)
