@@ -27,7 +27,7 @@ from ..run.execution import Execution
 from ..run.given_pours import digest_of_pours, keep_pours, kept_pours
 from ..run.workers import open_workers
 from .design import acting_in_pours, box_around, joint_prior
-from .draining import TENTH, Draining, Hold, hold_of
+from .draining import LIQUIDS, TENTH, Draining, Hold, hold_of
 from .landed_pours import LandedPours, pours_in
 from .landing_map import LandingMap, learn_map
 from .pour_file import pour_tree
@@ -182,8 +182,12 @@ def _hold(
     if chosen.fractions[:, 2].mean() <= TENTH:
         return None
     draining = Draining(learned.cups, calibration.liquid_density, learned.box.effects)
-    with open_bank(calibration.path) as bank:
-        return hold_of(draining, chosen.angular_velocity, choice.liquids, execution.keep(bank))
+    with (
+        open_bank(calibration.path) as bank,
+        progress_bar("holding the source", LIQUIDS, shown=execution.progress) as advance,
+    ):
+        rate, keep = chosen.angular_velocity, execution.keep(bank)
+        return hold_of(draining, rate, choice.liquids, keep, advance)
 
 
 def _learned(

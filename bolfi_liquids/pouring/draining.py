@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..inputs.prior import split_parameters
+from ..progress import Advance, silent
 from ..run.fluid_simulator import FluidSimulator
 from ..run.summary import Number
 from ..seeds import Phase, simulation_seeds
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 TENTH = 0.1  # share of the liquid that may stay in the source
 HELD_S = np.arange(0.0, 10.01, 0.1)  # that a pour is simulated for
+LONGEST_HOLD_S = 60.0  # that cups may ask for
 LIQUIDS = 4  # that one pair of lanes pours at once
 
 
@@ -29,7 +31,8 @@ class Hold:
 
     Attributes:
         until_tenth_s: Time after which a tenth of the liquid stays, in the mean over the posterior
-            [s]; NaN if more stays after all that was simulated.
+            [s]; beyond `simulated_s` by the power law of the last half of it; NaN beyond
+            `LONGEST_HOLD_S`.
         simulated_s: Time that was simulated [s].
         retained_then: Share that stays after it.
     """
@@ -71,7 +74,13 @@ class Draining(FluidSimulator):
         return json.dumps(["draining", *made_of], sort_keys=True)
 
 
-def hold_of(draining: Draining, rate: float, liquids: Mapping[str, NDArray], keep: "Keep") -> Hold:
+def hold_of(
+    draining: Draining,
+    rate: float,
+    liquids: Mapping[str, NDArray],
+    keep: "Keep",
+    advance: Advance = silent,
+) -> Hold:
     """How a source that is turned at a rate [rad/s] empties.
 
     Args:
@@ -80,6 +89,7 @@ def hold_of(draining: Draining, rate: float, liquids: Mapping[str, NDArray], kee
         liquids: Posterior draws, name -> (draws,); a few of them are poured, thin to thick.
         keep: Where pours are made and kept; its identity and batch are not used, and its timeout
             is that of a pour that is held as the cups say.
+        advance: Called with 1 for each of these pours.
 
     Raises:
         RuntimeError: All pours failed.
@@ -95,7 +105,17 @@ def hold_of(draining: Draining, rate: float, liquids: Mapping[str, NDArray], kee
     longer = (plan.final_angle / rate + HELD_S[-1]) / (plan.final_angle / rate + plan.hold)
     timeout = None if keep.timeout is None else longer * keep.timeout
     keep = keep._replace(identity=draining.identity, batch=LIQUIDS, timeout=timeout)
-    left = simulate_kept(draining.simulate, theta, seeds, keep).signals.mean(axis=0)
-    enough = np.flatnonzero(left <= TENTH)
-    until = float(HELD_S[enough[0]]) if len(enough) else np.nan
-    return Hold(until, float(HELD_S[-1]), float(left[-1]))
+    made = simulate_kept(draining.simulate, theta, seeds, keep, advance=advance)
+    left = made.signals.mean(axis=0)
+    return Hold(_until_tenth(left), float(HELD_S[-1]), float(left[-1]))
+
+
+def _until_tenth(left: NDArray) -> float:
+    """See `Hold`; `left` are shares at `HELD_S`, shape (T,)."""
+    if (enough := np.flatnonzero(left <= TENTH)).size:
+        return float(HELD_S[enough[0]])
+    # a film thins as a power of time: Jeffreys, Proc. Camb. Phil. Soc. 26, 204 (1930)
+    half = len(left) // 2
+    power = np.log(left[half] / left[-1]) / np.log(HELD_S[-1] / HELD_S[half])
+    until = HELD_S[-1] * (left[-1] / TENTH) ** (1.0 / max(power, 1e-2))
+    return float(until) if until <= LONGEST_HOLD_S else np.nan

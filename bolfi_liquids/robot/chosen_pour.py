@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -149,11 +149,12 @@ def _kept_cups(run: Path, tree: "DataTree") -> "Cups":
 def _check_summary(run: Path, told: PourSummary, chosen: Judged) -> None:
     """Refuse a pour that a person has read about otherwise."""
     held = ActionSummary.of(chosen)
-    for name in ActionSummary.__dataclass_fields__:
-        written, kept = getattr(told, name), getattr(held, name)
-        if not math.isclose(written, kept, rel_tol=ROUNDING, abs_tol=ROUNDING):
+    for field in fields(ActionSummary):
+        written, kept = getattr(told, field.name), getattr(held, field.name)
+        unwritten = field.default is not MISSING and math.isnan(written)  # by an older version
+        if not unwritten and not math.isclose(written, kept, rel_tol=ROUNDING, abs_tol=ROUNDING):
             raise InputError(
-                f"pour.{name} is {written:g}, but {kept:g} in {POUR}",
+                f"pour.{field.name} is {written:g}, but {kept:g} in {POUR}",
                 where=str(run / SUMMARY_FILE),
                 fix=_again(run),
             )

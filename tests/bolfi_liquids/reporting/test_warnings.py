@@ -127,7 +127,8 @@ def test_each_warning_of_the_chosen_action(fine, action, key, values):
 @pytest.mark.parametrize(
     ("hold", "said"),
     [
-        (Hold(6.3, 10.0, 0.08), "Hold it for 6.3 s to leave a tenth"),
+        (Hold(6.3, 10.0, 0.08), "Hold it for 6.3 s to leave a tenth: write"),
+        (Hold(41.0, 10.0, 0.25), "Hold it for 41 s to leave a tenth (extrapolated from 10 s)"),
         (Hold(np.nan, 10.0, 0.31), "Held for 10 s it still keeps 31 %"),
     ],
 )
