@@ -1,6 +1,5 @@
 """A chosen pour: the action, what it spills, and where it lies among the actions."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -164,7 +163,7 @@ class ActionSummary:
         expected_spillage: Mean spilled fraction.
         spillage_q95: Fraction that one outcome in twenty exceeds.
         expected_received, received_q05, received_q95: Mean and quantiles of the fraction that
-            arrives in the receiver; NaN where an older version chose.
+            arrives in the receiver; None where an older version chose.
         expected_retained, retained_q05, retained_q95: Likewise, of what stays in the source.
     """
 
@@ -172,12 +171,12 @@ class ActionSummary:
     distance_cm: Number
     expected_spillage: Number
     spillage_q95: Number
-    expected_received: Number = math.nan
-    received_q05: Number = math.nan
-    received_q95: Number = math.nan
-    expected_retained: Number = math.nan
-    retained_q05: Number = math.nan
-    retained_q95: Number = math.nan
+    expected_received: Number | None = None
+    received_q05: Number | None = None
+    received_q95: Number | None = None
+    expected_retained: Number | None = None
+    retained_q05: Number | None = None
+    retained_q95: Number | None = None
 
     @classmethod
     def of(cls, judged: Judged, **more) -> Self:

@@ -4,7 +4,6 @@ Their wording is in `data/calibration_sentences.jinja` and `data/pour_sentences.
 """
 
 from collections.abc import Mapping
-from math import isnan
 from typing import Any
 
 import numpy as np
@@ -86,7 +85,7 @@ def pour_sentence(summary: PourSummary) -> Sentence:
 
 def fate_sentences(summary: PourSummary) -> list[Sentence]:
     """What arrives and what stays; older versions did not keep it."""
-    return [] if isnan(summary.expected_received) else [sentence("pour.fate", summary=summary)]
+    return [] if summary.expected_received is None else [sentence("pour.fate", summary=summary)]
 
 
 def given_sentences(summary: PourSummary) -> list[Sentence]:

@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -151,8 +151,9 @@ def _check_summary(run: Path, told: PourSummary, chosen: Judged) -> None:
     held = ActionSummary.of(chosen)
     for field in fields(ActionSummary):
         written, kept = getattr(told, field.name), getattr(held, field.name)
-        unwritten = field.default is not MISSING and math.isnan(written)  # by an older version
-        if not unwritten and not math.isclose(written, kept, rel_tol=ROUNDING, abs_tol=ROUNDING):
+        if written is None:  # by an older version
+            continue
+        if not math.isclose(written, kept, rel_tol=ROUNDING, abs_tol=ROUNDING):
             raise InputError(
                 f"pour.{field.name} is {written:g}, but {kept:g} in {POUR}",
                 where=str(run / SUMMARY_FILE),
