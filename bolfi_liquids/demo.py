@@ -101,14 +101,14 @@ def run_demo(
         ends["calibrate"] = time.perf_counter()
         fitted(calibration)
         # the fit is bad, and without criticism nobody should pour after it
-        few, quiet = PourSettings(pours=POURS), Execution(workers, timeout, progress=False)
+        few, quiet = PourSettings(budget=POURS), Execution(workers, timeout, progress=False)
         before = beside(decided, calibration, bundled_cups(), few, quiet)
         chapter = beside(CHAPTERS["calibration"], calibration)
         criticism = criticise(calibration, held_out=held_out, baseline=clean, **where)
         found = beside(CHAPTERS["criticism"], criticism)
         pour_before = before.result()
         ends["criticise, pour before it"] = time.perf_counter()
-        pour = choose_pour(criticism, pours=POURS, **where)
+        pour = choose_pour(criticism, budget=POURS, **where)
         ends["pour"] = time.perf_counter()
         chapters = {"calibration": chapter.result(), "criticism": found.result()}
         with working_in_run(out):

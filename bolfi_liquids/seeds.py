@@ -10,8 +10,10 @@ class Phase(Enum):
 
     BOOTSTRAP = "bootstrap"
     CAMERA_NOISE = "camera noise"
+    DRAINING = "pours whose source is held for long"
     EXECUTION = "execution of a chosen pour"
     GEOMETRY = "pours of other cups"
+    GIVEN_POURS = "errors of given pours that outcomes meet"
     MOVING_PICTURES = "moving pictures"
     MAP_DESIGN = "design of the map of landings"
     MAP_MISSES = "misses of the map that draws meet"

@@ -16,6 +16,7 @@ from .pouring import Landings as Landings
 from .pouring import PourAction as PourAction
 from .pouring import PourBatch as PourBatch
 from .pouring import PourResult as PourResult
+from .pouring import draining as draining
 from .pouring import landings as landings
 from .pouring import pour as pour
 from .rig import Rig as Rig

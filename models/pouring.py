@@ -151,6 +151,39 @@ class PourBatch(NamedTuple):
 
 def watched_landings(batch: PourBatch, watch: Watch | None = None) -> Landings:
     """What `landings` returns, while `watch` looks at each of its scenes."""
+    found, cups = _flights(batch, watch), batch.cups
+    drop = cups.pour.lip_height - cups.receiver.height
+    position = np.stack([landing_of(flights, drop) for flights in found])
+    return Landings(position, np.array([flights.retained for flights in found]))
+
+
+def draining(
+    liquid: Liquid,
+    angular_velocity: ArrayLike,
+    cups: Cups,
+    seeds: ArrayLike,
+    held: ArrayLike,
+    effects: Mapping[str, ArrayLike] | None = None,
+) -> np.ndarray:
+    """Share that is left in the source and at its lip when it has been held for some time.
+
+    Args:
+        liquid, angular_velocity, cups, seeds, effects: Of `landings`.
+        held: Times since the source has come to its final angle [s], up to the hold of `cups`,
+            shape [T].
+
+    Returns:
+        Shape [B, T]; NaN of a pour that went wrong.
+    """
+    found = _flights(PourBatch(liquid, angular_velocity, cups, seeds, effects=effects))
+    turned = cups.pour.final_angle / _checked_rate(angular_velocity, len(found))
+    return np.stack(
+        [flights.left(at + np.asarray(held)) for flights, at in zip(found, turned, strict=True)]
+    )
+
+
+def _flights(batch: PourBatch, watch: Watch | None = None) -> list[Flights]:
+    """What leaves the source in each pour."""
     cups, seeds = batch.cups, checked_seeds(batch.seeds)
     acting = acting_in("pour", with_adhesion(batch.liquid, batch.effects, len(seeds)), len(seeds))
     rate = _checked_rate(batch.angular_velocity, len(seeds))
@@ -168,9 +201,7 @@ def watched_landings(batch: PourBatch, watch: Watch | None = None) -> Landings:
                 alike = pours._replace(coefficients=coefficients).rows(part)
                 for at, flights in zip(part, march(vessel, alike, turn, kinds, watch), strict=True):
                     found[at] = flights
-    drop = cups.pour.lip_height - cups.receiver.height
-    position = np.stack([landing_of(flights, drop) for flights in found])
-    return Landings(position, np.array([flights.retained for flights in found]))
+    return found
 
 
 def _pours(

@@ -16,6 +16,7 @@ from ..errors import Argument, InputError
 from ..files import given_path
 from ..inputs.frame import frame_warnings
 from ..inputs.open import Source, open_recordings
+from ..inputs.pour_table import Pours, table_and_cups
 from ..inputs.prior import check_prior, default_prior, describe_prior, read_prior
 from ..inputs.recording import Recording, aborted_recordings
 from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
@@ -31,6 +32,7 @@ from ..run.directory import (
 )
 from ..run.entering import entered, working_in
 from ..run.execution import Execution
+from ..run.given_pours import keep_pours
 from ..run.provenance import LIBRARIES, versions
 from ..run.recordings import check_names, keep_recordings
 from ..run.simulations import warn_of_failures
@@ -43,6 +45,7 @@ from .summary import CalibrationSummary
 if TYPE_CHECKING:
     from ..inference import Fit, Prior, SimulationBank
     from ..inference.simulations import Keep, Workers
+    from ..models import Cups
 
 logger = logging.getLogger(__name__)
 
@@ -52,6 +55,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     *,
     out: str | Path | None = None,
     prior: "Prior | None" = None,
+    pours: Pours | None = None,
+    cups: "Cups | str | Path | None" = None,
     budget: int = 20,
     seed: int = 0,
     surrogate: str = "discrepancy",
@@ -77,6 +82,9 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
             added up.
         out: The RUN directory; None is a new one among the computer's temporary files.
         prior: Over `viscosity` [Pa s] and `cohesion` [1]; None is `default_prior()`.
+        pours: A table of pours of the liquid that were made, or its path: the posterior does not
+            depend on it, but `choose_pour` does.
+        cups: With which they were made, or a TOML file of them; None takes the bundled ones.
         budget: Simulations that the engine may learn from. A dozen more judge the result, anew
             where a run grew.
         seed: Seed of all random draws.
@@ -111,6 +119,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         draws=draws,
     )
     opened = _open_all(recordings)
+    table, made_with = table_and_cups(pours, cups)
     if prior is not None:
         check_prior(prior)
     stirring = stirring_of(opened, settings.particles)
@@ -131,6 +140,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
             what = f"removed {', '.join(removed)}, concluded from fewer simulations"
             logger.warning("%s: %s; every simulation is kept", run, what)
         keep_recordings(run, stirring.recordings)
+        if table is not None:
+            keep_pours(run, table, made_with)
         for notice in [*aborted_recordings(opened), *frame_warnings(opened)]:
             logger.warning(notice)
         return finished_calibration(run) or _calibrate(

@@ -26,6 +26,7 @@ from .options import (
     CriticismData,
     EffectOptions,
     ExecutionOptions,
+    GivenPours,
     PourData,
     PourOptions,
     RunArgument,
@@ -88,6 +89,7 @@ def calibrate(
     ],
     out: Annotated[Path, typer.Option(metavar="RUN", help="Directory of the run.")],
     options: CalibrationOptions,
+    given: GivenPours,
     compute: Compute,
     resume: Annotated[
         bool,
@@ -104,11 +106,13 @@ def calibrate(
     settings = CalibrationSettings(**asdict(options))
     if resume:
         check_resumable(out)
-    opened = open_recordings(recordings)
+    opened, table = open_recordings(recordings), given.table
     with complaints_among_results(), compute.executor() as executor:
         calibration = run_calibrate(
             opened,
             out=out,
+            pours=table,
+            cups=given.cups,
             resume=resume,
             executor=executor,
             timeout=compute.timeout,
@@ -138,19 +142,15 @@ def criticise(
 ) -> None:
     """Find which effect the model lacks, where it misses the data."""
     from ..criticism.criticise import criticise as run_criticise
-    from ..inputs.pour_table import open_pours
 
-    tables = [
-        None if path is None else open_pours(path, poured.liquid)
-        for path in (poured.pours, poured.held_out_pours)
-    ]
+    table, held_out_table = poured.table, poured.held_out_table
     with compute.executor() as executor:
         criticism = run_criticise(
             run,
             held_out=data.held_out or (),
             baseline=data.baseline or (),
-            pours=tables[0],
-            held_out_pours=tables[1],
+            pours=table,
+            held_out_pours=held_out_table,
             cups=poured.cups,
             effects=options.effects or None,
             accept=options.accept or None,
@@ -163,7 +163,11 @@ def criticise(
 
 
 @app.command(
-    epilog=examples("pour runs/mine --cups cups.toml", "pour runs/mine --execute --emulator")
+    epilog=examples(
+        "pour runs/mine --cups cups.toml",
+        "pour runs/mine --given pours.csv",
+        "pour runs/mine --execute --emulator",
+    )
 )
 @grouped
 def pour(
@@ -171,15 +175,15 @@ def pour(
 ) -> None:
     """Choose the pour that spills least over the posterior.
 
-    What a criticism accepted is part of the liquid. With --execute nothing is chosen anew: it is
-    a dry run of the chosen pour, unless armed.
+    What a criticism accepted is part of the liquid, and pours that were made correct the choice.
+    With --execute nothing is chosen anew: it is a dry run of the chosen pour, unless armed.
     """
     if execution.execute:
         if options != PourOptions():
             raise typer.BadParameter(
-                "--execute carries out the pour that RUN has chosen already; --cups, --pours, "
-                "--iterations, --risk and --force belong to the choice, which is made without "
-                "--execute"
+                "--execute carries out the pour that RUN has chosen already; --cups, --given, "
+                "--liquid, --budget, --iterations, --risk and --force belong to the choice, which "
+                "is made without --execute"
             )
         cli_record.execute(run, execution)
         return
@@ -191,8 +195,8 @@ def pour(
     from ..run.entering import working_in_run
 
     # refused before anything of the run is read
-    PourSettings(pours=options.pours, iterations=options.iterations, risk=options.risk)
-    cups = cups_of(options.cups)
+    PourSettings(budget=options.budget, iterations=options.iterations, risk=options.risk)
+    cups, table = cups_of(options.cups), options.table
     with working_in_run(run):
         calibration = Calibration.open(run)
         criticism = criticism_of(calibration)
@@ -200,7 +204,8 @@ def pour(
         chosen = choose_pour(
             criticism or calibration,
             cups,
-            pours=options.pours,
+            given=table,
+            budget=options.budget,
             iterations=options.iterations,
             risk=options.risk,
             force=options.force,

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -15,6 +15,9 @@ from ..inputs.settings import (
     PourSettings,
     SbcSettings,
 )
+
+if TYPE_CHECKING:
+    from ..inputs.pour_table import PourTable
 
 RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="Directory of a run.")]
 RigOption = Annotated[
@@ -53,6 +56,32 @@ class CalibrationOptions:
     )
 
 
+LiquidOption = Annotated[
+    str | None,
+    typer.Option("--liquid", metavar="NAME", help="Whose pours count, if the table has several."),
+]
+
+
+@dataclass(frozen=True)
+class GivenPours:
+    """Pours of the liquid that were made, and the cups."""
+
+    pours: Annotated[
+        Path | None,
+        typer.Option(metavar="TABLE", help="What pours of the liquid spilled: they count in pour."),
+    ] = None
+    liquid: LiquidOption = None
+    cups: CupsOption = None
+
+    def __post_init__(self) -> None:
+        _need(self, "--pours", self.pours, ("liquid", "cups"))
+
+    @property
+    def table(self) -> "PourTable | None":
+        """The pours."""
+        return opened_pours(self.pours, self.liquid)
+
+
 @dataclass(frozen=True)
 class CriticismData:
     """Data that a criticism compares besides the calibrated recordings."""
@@ -70,28 +99,21 @@ class CriticismData:
 
 
 @dataclass(frozen=True)
-class PourData:
-    """Tables of pours, of which liquid, and from which cups."""
+class PourData(GivenPours):
+    """The same, and pours that nothing is fitted to."""
 
-    pours: Annotated[
-        Path | None, typer.Option(metavar="CSV", help="What pours of the liquid spilled.")
-    ] = None
     held_out_pours: Annotated[
-        Path | None, typer.Option(metavar="CSV", help="Other pours of the liquid: the proof.")
+        Path | None, typer.Option(metavar="TABLE", help="Other pours of the liquid: the proof.")
     ] = None
-    liquid: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Liquid of the table's pours, if it has several."),
-    ] = None
-    cups: CupsOption = None
 
     def __post_init__(self) -> None:
-        if self.pours is not None:
-            return
-        for name in ("liquid", "cups", "held_out_pours"):
-            if getattr(self, name):
-                option = name.replace("_", "-")
-                raise typer.BadParameter(f"--{option} needs --pours, which is missing")
+        super().__post_init__()
+        _need(self, "--pours", self.pours, ("held_out_pours",))
+
+    @property
+    def held_out_table(self) -> "PourTable | None":
+        """Pours that nothing is fitted to."""
+        return opened_pours(self.held_out_pours, self.liquid)
 
 
 @dataclass(frozen=True)
@@ -113,9 +135,17 @@ class PourOptions:
     """What decides the choice of a pour."""
 
     cups: CupsOption = None
-    pours: Annotated[int, typer.Option(help="Pours simulated at most, 24 to 100.")] = (
-        PourSettings.pours
+    given: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="TABLE", help="What pours of the liquid spilled; RUN keeps it for later pours."
+        ),
+    ] = None
+    liquid: LiquidOption = None
+    budget: Annotated[int, typer.Option(help="Pours simulated at most, 24 to 100.")] = (
+        PourSettings.budget
     )
+    pours: Annotated[str | None, typer.Option(hidden=True)] = None
     iterations: Annotated[int, typer.Option(help="Angular velocities tried.")] = (
         PourSettings.iterations
     )
@@ -128,6 +158,19 @@ class PourOptions:
     force: Annotated[
         bool, typer.Option("--force", help="Choose a pour even though the fit is bad.")
     ] = False
+
+    def __post_init__(self) -> None:
+        if self.pours is not None:
+            raise typer.BadParameter(
+                "--pours is no option of pour: --given is a table of pours that were made, "
+                "--budget the number of pours to simulate"
+            )
+        _need(self, "--given", self.given, ("liquid",))
+
+    @property
+    def table(self) -> "PourTable | None":
+        """The pours that were made."""
+        return opened_pours(self.given, self.liquid)
 
 
 @dataclass(frozen=True)
@@ -150,12 +193,7 @@ class ExecutionOptions:
     ] = False
 
     def __post_init__(self) -> None:
-        if self.execute:
-            return
-        for name in ("arm", "emulator", "rig", "despite_bad_fit"):
-            if getattr(self, name):
-                option = name.replace("_", "-")
-                raise typer.BadParameter(f"--{option} needs --execute, which is missing")
+        _need(self, "--execute", self.execute, ("arm", "emulator", "rig", "despite_bad_fit"))
 
 
 @dataclass(frozen=True)
@@ -179,3 +217,18 @@ class SbcOptions:
     )
     particles: ParticlesOption = SbcSettings.particles
     seed: SeedOption = SbcSettings.seed
+
+
+def _need(options: object, needed: str, given: object, names: tuple[str, ...]) -> None:
+    """Refuse options `names` of a group where the option `needed` is not `given`."""
+    for name in names:
+        if getattr(options, name) and not given:
+            option = name.replace("_", "-")
+            raise typer.BadParameter(f"--{option} needs {needed}, which is missing")
+
+
+def opened_pours(path: Path | None, liquid: str | None) -> "PourTable | None":
+    """The pours of one liquid in a table; None without one."""
+    from ..inputs.pour_table import open_pours
+
+    return None if path is None else open_pours(path, liquid)

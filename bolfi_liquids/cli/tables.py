@@ -11,7 +11,8 @@ from rich.table import Column, Table
 
 from ..criticism.verdict import Verdict
 from ..reporting import criticism_sentences as criticism
-from ..wording import LIQUID_UNITS, Sentence, spilled
+from ..reporting.sentences import fate_sentences, given_sentences
+from ..wording import LIQUID_UNITS, Sentence, percent, spilled
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from ..criticism.summary import CriticismSummary
     from ..hardware import Check
     from ..inputs.recording import Recording
-    from ..pouring.result import PourSummary
+    from ..pouring.result import GivenSummary, PourSummary
 
 
 def print_calibration(summary: "CalibrationSummary", console: Console) -> None:
@@ -60,8 +61,26 @@ def print_pour(summary: "PourSummary", console: Console) -> None:
             spilled(action.spillage_q95),
         )
     console.print(table)
+    if summary.given is not None:
+        console.print(_given(summary.given))
+    for sentence in (*fate_sentences(summary), *given_sentences(summary)):
+        console.print(str(sentence), highlight=False, markup=False)
     error = "" if summary.map_error is None else f", error of their map {summary.map_error:.2%}"
     console.print(f"simulations: {summary.n_simulations} pours{error}", highlight=False)
+
+
+def _given(given: "GivenSummary") -> Table:
+    """The given pours that are most like the choice, beside what the simulator expects of them."""
+    table = _table("given pour", "deg/s", "cm", "spilled", "expected by simulator alone")
+    for pour in given.nearest:
+        table.add_row(
+            f"line {pour.line}",
+            f"{pour.angular_velocity_deg_s:.1f}",
+            f"{pour.distance_cm:.2f}",
+            percent(pour.spilled),
+            spilled(pour.expected_spillage),
+        )
+    return table
 
 
 def print_criticism(

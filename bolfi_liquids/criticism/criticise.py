@@ -14,12 +14,13 @@ from ..calibration.stir_simulator import Stirring, stirring_of
 from ..errors import Argument, InputError
 from ..inputs.frame import frame_warnings
 from ..inputs.open import Source, open_recordings
-from ..inputs.pour_table import PourTable
+from ..inputs.pour_table import Pours, PourTable
 from ..inputs.recording import Recording, aborted_recordings
 from ..inputs.settings import CriticismSettings
 from ..progress import phases
 from ..run.directory import CRITICISM, Run, open_bank, run_path
 from ..run.entering import working_in_run
+from ..run.given_pours import keep_pours
 from ..run.workers import open_workers
 from .baseline import (
     Clean,
@@ -29,7 +30,7 @@ from .baseline import (
 )
 from .criticism_file import criticism_tree
 from .findings import Findings
-from .inputs import Given, Inputs, Pours, check_effects, open_inputs
+from .inputs import Given, Inputs, check_effects, open_inputs
 from .pours import as_prior, pour_experiment
 from .proposals import pour_proposals, stir_proposals
 from .result import Criticism, base_calibration, finished_criticism
@@ -75,7 +76,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
             fitted, and an effect that is named must hold on them.
         baseline: Clean recordings of the same rig, of any liquid, in which no effect is believed
             to be missing: their residuals count as simulator error.
-        pours: A table of pours of the liquid, or its path; a second source.
+        pours: A table of pours of the liquid, or its path; a second source. Whatever is found,
+            they count in `choose_pour`.
         held_out_pours: Another, to which nothing is fitted.
         cups: With which they were poured, or a TOML file of them; None takes the bundled ones.
         effects: Names in `models.EFFECTS` to consider; None is all of them.
@@ -108,6 +110,8 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         calibration = base_calibration(calibration)
         refuse_other_model(calibration)
         inputs = open_inputs(calibration, settings, given)
+        if inputs.table is not None:
+            keep_pours(run, inputs.table, inputs.cups)
         for notice in [*aborted_recordings(inputs.compared), *frame_warnings(inputs.compared)]:
             logger.warning(notice)
         for name in inputs.left_out:

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, same_liquid, stirring_of
 from ..errors import Argument, InputError
-from ..inputs.cups import cups_of
-from ..inputs.pour_table import PourTable, check_scene, open_pours
+from ..inputs.pour_table import Pours, PourTable, check_scene, table_and_cups, table_of
 from ..inputs.recording import Recording
 from ..inputs.settings import FALSE_ALARM_RATE, CriticismSettings
 from ..run.directory import CRITICISM_FORMAT
@@ -22,7 +21,6 @@ from .stirs import frame_interval, names_of_effects, same_rate
 if TYPE_CHECKING:
     from ..models import Cups
 
-Pours = PourTable | str | Path
 RIG_SIZES = ("cup_radius", "stick_radius", "stick_length")
 """Attributes of a recording that make two rigs the same."""
 
@@ -112,16 +110,11 @@ def open_inputs(calibration: Calibration, settings: CriticismSettings, given: Gi
     _check_held_out(stirring, kept_back)
     others = _others(believed, [*stirring.recordings, *kept_back])
     _check_baseline(stirring, others)
-    table = _opened(given.pours, Argument("pours"))
-    held_out_table = _opened(given.held_out_pours, Argument("held_out_pours"))
+    table, cups = table_and_cups(given.pours, given.cups)
+    held_out_table = table_of(given.held_out_pours, Argument("held_out_pours"))
     _check_pours(table, held_out_table, settings)
-    if given.cups is not None and table is None:
-        raise InputError(
-            "there are no pours from them", where=Argument("cups"), fix="give `pours`, too"
-        )
-    cups = cups_of(given.cups)
-    for one in filter(None, (table, held_out_table)):
-        check_scene(one, cups)
+    if held_out_table is not None:
+        check_scene(held_out_table, cups)
     return Inputs(
         stirring=stirring,
         held_out=tuple(kept_back),
@@ -137,16 +130,6 @@ def open_inputs(calibration: Calibration, settings: CriticismSettings, given: Gi
 def _names_of(recordings: Iterable[Recording]) -> tuple[str, ...]:
     """Each once."""
     return tuple(dict.fromkeys(recording.path.name for recording in recordings))
-
-
-def _opened(pours: Pours | None, option: str) -> PourTable | None:
-    if pours is not None and not isinstance(pours, Pours):
-        raise InputError(
-            f"{pours!r:.80} is no table of pours",
-            where=option,
-            fix="give the path of a CSV file, or what open_pours returns",
-        )
-    return open_pours(pours) if isinstance(pours, str | Path) else pours
 
 
 def _others(baseline: list[Recording], used: Sequence[Recording]) -> tuple[Recording, ...]:

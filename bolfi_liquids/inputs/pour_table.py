@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import Argument, InputError
+from .cups import cups_of
 from .table import Table, is_number, read_table
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ WORDS_FOR_A_NUMBER = ("id", "no", "nr", "num", "number", "index", "idx", "code",
 FIX_LINE = "mend or remove the line"
 MAX_TIMES_BEYOND = 4.0  # that a pour may be faster or slower than the cups' range
 MAX_TIMES_TOTAL = 10.0  # that a pour may be more or less than the usual one of its table
+ROUNDING = 1e-9  # relative, of an action at an end of the cups' range
 MIN_DISTANCE_SHARE = 0.02  # of the cups' longest; a table whose distances all are shorter is in m
 
 
@@ -41,6 +43,7 @@ class PourTable:
         angular_velocity: Of the source [rad/s], shape (A,).
         distance: From the lip to the receiver's axis [m], shape (A,).
         fractions: Spilled, received and retained, shape (A, 3); rows sum to 1.
+        lines: Of the file, shape (A,).
         hash: SHA-256 of the file's bytes, in hexadecimal.
         unused: Columns of the file that nobody reads.
     """
@@ -50,6 +53,7 @@ class PourTable:
     angular_velocity: NDArray[np.float64]
     distance: NDArray[np.float64]
     fractions: NDArray[np.float64]
+    lines: NDArray[np.int64]
     hash: str
     unused: tuple[str, ...] = ()
 
@@ -57,6 +61,25 @@ class PourTable:
     def observed(self) -> NDArray[np.float64]:
         """Spilled and retained fractions, shape (2, A); what was received is the rest."""
         return self.fractions[:, [0, 2]].T
+
+    def within(self, cups: "Cups") -> "PourTable":
+        """Those of the pours whose action is in the range of these cups."""
+        inside = np.ones(len(self.lines), bool)
+        ranges = cups.angular_velocity_range, cups.distance_range
+        for values, ends in zip((self.angular_velocity, self.distance), ranges, strict=True):
+            low, high = np.array(ends) + np.array([-1.0, 1.0]) * ROUNDING * np.abs(ends)
+            inside &= (values >= low) & (values <= high)
+        return replace(
+            self,
+            angular_velocity=self.angular_velocity[inside],
+            distance=self.distance[inside],
+            fractions=self.fractions[inside],
+            lines=self.lines[inside],
+        )
+
+
+Pours = PourTable | str | Path
+"""A table of pours, or its path."""
 
 
 def open_pours(path: str | Path, liquid: str | None = None, *, told: bool = True) -> PourTable:
@@ -108,9 +131,48 @@ def open_pours(path: str | Path, liquid: str | None = None, *, told: bool = True
         angular_velocity=np.radians(actions[:, 0]),
         distance=actions[:, 1] / 100.0,
         fractions=amounts / total,
+        lines=np.asarray(table.lines),
         hash=hashlib.sha256(table.path.read_bytes()).hexdigest(),
         unused=unused,
     )
+
+
+def table_of(given: Pours | None, where: str) -> PourTable | None:
+    """A table as it is, that of a file, or None.
+
+    Raises:
+        InputError: Something else was given, or the file cannot be used.
+    """
+    if given is not None and not isinstance(given, Pours):
+        raise InputError(
+            f"{given!r:.80} is no table of pours",
+            where=where,
+            fix="give the path of a CSV file, or what open_pours returns",
+        )
+    return open_pours(given) if isinstance(given, str | Path) else given
+
+
+def table_and_cups(
+    pours: Pours | None, cups: "Cups | str | Path | None"
+) -> "tuple[PourTable | None, Cups]":
+    """Pours of a liquid, and the cups that they were made with.
+
+    Args:
+        pours: A table, or its path; None for none.
+        cups: Or a TOML file of them; None takes the bundled ones.
+
+    Raises:
+        InputError: Something cannot be used, or cups were given without pours.
+    """
+    table = table_of(pours, Argument("pours"))
+    if cups is not None and table is None:
+        raise InputError(
+            "there are no pours from them", where=Argument("cups"), fix="give `pours`, too"
+        )
+    opened = cups_of(cups)
+    if table is not None:
+        check_scene(table, opened)
+    return table, opened
 
 
 def check_scene(table: PourTable, cups: "Cups") -> None:

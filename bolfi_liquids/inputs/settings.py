@@ -207,14 +207,14 @@ class PourSettings:
     """What decides the choice of a pour besides the posterior and the cups.
 
     Attributes:
-        pours: Simulated at most; a map of landings is learned from them.
+        budget: Pours that are simulated at most; a map of landings is learned from them.
         iterations: Angular velocities that are tried on the map, each with every distance.
         draws: Posterior draws over which spillage is averaged.
         risk: "mean", or "cvar": the mean over the worst tenth of the draws.
         seed: Seed of all random draws.
     """
 
-    pours: Pours = 64
+    budget: Pours = 64
     iterations: Simulations = 31
     draws: Count = 128
     risk: Annotated[str, one_of(RISKS)] = "mean"

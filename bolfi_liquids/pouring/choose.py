@@ -1,10 +1,11 @@
 """From a posterior to the pour that is expected to spill least."""
 
 import json
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,25 +15,30 @@ from ..calibration.former_model import refuse_other_model
 from ..calibration.posterior_file import write_tree
 from ..calibration.result import Calibration
 from ..criticism.result import latest_calibration
-from ..errors import InputError
+from ..errors import Argument, InputError
 from ..inputs.cups import cups_of
+from ..inputs.pour_table import Pours, PourTable, check_scene, table_of
 from ..inputs.prior import PARAMETERS
 from ..inputs.settings import PourSettings
 from ..progress import progress_bar
-from ..run.directory import POUR, Run, open_bank, run_path
+from ..run.directory import GIVEN_POURS, POUR, Run, open_bank, run_path
 from ..run.entering import working_in_run
 from ..run.execution import Execution
+from ..run.given_pours import digest_of_pours, keep_pours, kept_pours
 from ..run.workers import open_workers
 from .design import acting_in_pours, box_around, joint_prior
+from .draining import LIQUIDS, TENTH, Draining, Hold, hold_of
 from .landed_pours import LandedPours, pours_in
 from .landing_map import LandingMap, learn_map
 from .pour_file import pour_tree
-from .result import Judged, Pour, PourSummary
+from .result import GivenSummary, Judged, Pour, PourSummary
 from .spillage import Surface, landing_sd
 
 if TYPE_CHECKING:
     from ..inference.simulations import Workers
     from ..models import Cups
+
+logger = logging.getLogger(__name__)
 
 JUDGE_DRAWS_FACTOR = 2
 """How many times as many draws judge the two actions as search for them."""
@@ -45,7 +51,8 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     calibration: Run,
     cups: "Cups | str | Path | None" = None,
     *,
-    pours: int = PourSettings.pours,
+    given: Pours | None = None,
+    budget: int = PourSettings.budget,
     iterations: int = PourSettings.iterations,
     draws: int = PourSettings.draws,
     risk: str = "mean",
@@ -61,14 +68,17 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     where the liquid lands (see `landing_map`). On the map every action is tried over posterior
     draws; the one whose risk is least is chosen, averaged over where the liquid may land, and
     judged on draws that it was not chosen by. How far the map is from pours that were left out
-    counts in both. Finished pours are kept in the run, and another posterior of it uses them again.
+    counts in both. Pours that were made of the liquid correct the map in both (see `residual`).
+    Finished pours are kept in the run, and another posterior of it uses them again.
 
     Args:
         calibration: A calibration; a criticism, or a RUN directory, whose latest posterior is
             poured.
         cups: Source, receiver and ranges of the action, or a TOML file of them; None takes the
             bundled ones.
-        pours: Simulated at most, 24 to 100; those that the run holds already count.
+        given: A table of pours of the liquid that were made with these cups, or its path. The run
+            keeps it; None takes the one that was given last, here or to `calibrate` or `criticise`.
+        budget: Pours that are simulated at most, 24 to 100; those that the run holds already count.
         iterations: Angular velocities tried on the map, which costs next to nothing.
         draws: Posterior draws that each action is tried on; twice as many judge.
         risk: "mean", or "cvar": the mean over the worst tenth of the draws.
@@ -84,36 +94,100 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         ValueError, ImportError, ConnectionError: `executor` cannot be used.
         RuntimeError: Too few pours succeeded.
     """
-    settings = PourSettings(pours=pours, iterations=iterations, draws=draws, risk=risk, seed=seed)
+    settings = PourSettings(budget=budget, iterations=iterations, draws=draws, risk=risk, seed=seed)
     cups = cups_of(cups)
+    table = table_of(given, Argument("given"))
+    if table is not None:
+        check_scene(table, cups)
     with working_in_run(run_path(calibration)):
         latest = latest_calibration(calibration)
         refuse_other_model(latest)
         if not force:
             refuse_bad_fit(latest.summary, latest.path)
+        if table is not None:
+            keep_pours(latest.path, table, cups)
+        counted = _counted(latest.path, cups)
         with open_workers(executor, timeout) as workers:
-            pour = decided(latest, cups, settings, Execution(workers, timeout, progress))
+            pour = decided(latest, cups, settings, Execution(workers, timeout, progress), counted)
         write_tree(pour.tree, pour.path / POUR)
         pour.summary.write(pour.path)
         return pour
 
 
+def _counted(run: Path, cups: "Cups") -> PourTable | None:
+    """The pours that a run was given and that count with these cups; what does not, is said.
+
+    Raises:
+        InputError: They were made with these cups, but by none of the actions that may be chosen.
+    """
+    if (table := kept_pours(run, cups)) is None:
+        if (run / GIVEN_POURS).is_file():
+            logger.warning("%s: its pours were made with other cups; not used", run / GIVEN_POURS)
+        return None
+    inside, there = table.within(cups), len(table.lines)
+    if not len(inside.lines):
+        raise InputError(
+            f"none of its {there} pours is in the range of actions that the cups allow",
+            where=str(table.path),
+            fix="widen the range in the cups file, or give other pours",
+        )
+    if outside := there - len(inside.lines):
+        what = "%s: %d of %d pours are outside of the actions that the cups allow; not used"
+        logger.warning(what, table.path, outside, there)
+    return inside
+
+
 def decided(
-    calibration: Calibration, cups: "Cups", settings: PourSettings, execution: Execution
+    calibration: Calibration,
+    cups: "Cups",
+    settings: PourSettings,
+    execution: Execution,
+    given: PourTable | None = None,
 ) -> Pour:
     """The pour of a posterior; pours are kept in the run's bank, and nothing else is written.
+
+    Args:
+        calibration, cups, settings, execution: See `choose_pour`.
+        given: Pours of the liquid that were made, all of them within the range of the cups.
 
     Raises:
         InputError, RuntimeError: See `choose_pour`.
     """
     drawn = strata(calibration, settings.draws, settings.seed)
-    learned = _learned(calibration, cups, settings, execution)
+    simulated = _learned(calibration, cups, settings, execution)
+    learned = simulated
+    if given is not None:
+        learned = simulated.corrected(given, drawn.search, seed=settings.seed)
     choice = _search(learned, settings, drawn.search, calibration.best)
-    both = [
+    chosen, plug_in = (
         learned.judge(action, drawn.judge, seed=settings.seed)
         for action in (choice.chosen, choice.plug_in)
-    ]
-    return _described(both, choice, learned, settings, calibration)
+    )
+    more: dict[str, Any] = {"hold": _hold(calibration, chosen, choice, simulated, execution)}
+    if learned.given is not None:
+        otherwise = simulated.surface(drawn.search, rates=settings.iterations, seed=settings.seed)
+        without = learned.judge(otherwise.least(settings.risk), drawn.judge, seed=settings.seed)
+        more["given"] = GivenSummary.of(learned.given, chosen, without)
+    return _described((chosen, plug_in), choice, learned, settings, calibration, **more)
+
+
+def _hold(
+    calibration: Calibration,
+    chosen: Judged,
+    choice: "_Choice",
+    learned: LandingMap,
+    execution: Execution,
+) -> Hold | None:
+    """How the source of the chosen pour empties, where much stays in it."""
+    if chosen.fractions[:, 2].mean() <= TENTH:
+        return None
+    draining = Draining(learned.cups, calibration.liquid_density, learned.box.effects)
+    with (
+        open_bank(calibration.path) as bank,
+        progress_bar("holding the source", LIQUIDS, shown=execution.progress) as advance,
+    ):
+        rate, keep = chosen.angular_velocity, execution.keep(bank)
+        return hold_of(draining, rate, choice.liquids, keep, advance)
 
 
 def _learned(
@@ -126,9 +200,9 @@ def _learned(
     pours = LandedPours(cups, calibration.liquid_density, effects)
     with (
         open_bank(calibration.path) as bank,
-        progress_bar("pouring", settings.pours, shown=execution.progress) as advance,
+        progress_bar("pouring", settings.budget, shown=execution.progress) as advance,
     ):
-        poured = pours_in(box, pours, settings.pours, execution.keep(bank), advance)
+        poured = pours_in(box, pours, settings.budget, execution.keep(bank), advance)
     return learn_map(box, cups, poured)
 
 
@@ -199,8 +273,10 @@ def _described(
     learned: LandingMap,
     settings: PourSettings,
     calibration: Calibration,
+    **more: Any,
 ) -> Pour:
-    """With what pour.nc and the section "pour" of summary.json hold."""
+    """With what pour.nc and the section "pour" of summary.json hold, some fields of which are
+    `more`."""
     chosen, plug_in = both
     cups, fit_status = learned.cups, calibration.summary.fit_status
     tried = {"actions": choice.over_posterior, "actions_plug_in": choice.at_best}
@@ -213,6 +289,7 @@ def _described(
         landing_sd=landing_sd(cups),
         map_error=learned.rms_error,
         fit_status=str(fit_status),  # a bad fit was poured by force
+        given_pours=digest_of_pours(calibration.path),
     )
     summary = PourSummary.from_judged(
         chosen,
@@ -222,5 +299,6 @@ def _described(
         map_error=learned.rms_error,
         least_viscosity=least,
         fit_status=fit_status,
+        **more,
     )
     return Pour(calibration.path, chosen, plug_in, tree, summary)

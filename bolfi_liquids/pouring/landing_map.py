@@ -7,17 +7,19 @@ figures that rest on the map count it.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..inputs.pour_table import PourTable
 from ..inputs.settings import MIN_MAP_POURS
 from ..progress import Advance, silent
 from ..seeds import Phase, generator
 from .design import RATE, Box, joint_prior, whole
+from .given import GivenPours, learn_given
 from .landed_pours import LandedPours, Poured, pours_in
 from .parcels import fractions_of, scale
 from .result import Judged
@@ -53,12 +55,15 @@ class LandingMap:
         cups: From and into which is poured.
         poured: What was learned from.
         emulation: Of the parcels, over quantiles within the box.
+        given: Pours that were made of the liquid, which correct what `surface` and `judge` say;
+            None where there are none.
     """
 
     box: Box
     cups: "Cups"
     poured: Poured
     emulation: "Emulation"
+    given: GivenPours | None = None
 
     @property
     def pours(self) -> int:
@@ -96,7 +101,11 @@ class LandingMap:
         outcomes = repeated(liquids, MIN_OUTCOMES)
         tried = np.geomspace(*self.cups.angular_velocity_range, rates)
         misses = self.misses(number_of(outcomes), seed)
-        return surface(self.profiles(tried, outcomes, misses), self.cups)
+        found = surface(self.profiles(tried, outcomes, misses), self.cups)
+        if self.given is None:
+            return found
+        here = self._spilled(self.given.table, outcomes, misses)
+        return self.given.surface(found, here)
 
     def judge(
         self, action: Mapping[str, float], liquids: Mapping[str, NDArray], *, seed: int = 0
@@ -110,11 +119,13 @@ class LandingMap:
         rate, distance = action["angular_velocity"], action["distance"]
         outcomes = repeated(liquids, MIN_OUTCOMES)
         misses = self.misses(number_of(outcomes), seed)
-        profiles = self.profiles(np.array([rate]), outcomes, misses)
-        sd = landing_sd(self.cups)
-        scores = np.clip(normal_scores(LANDINGS_PER_DRAW), -MAX_LANDING_SDS, MAX_LANDING_SDS)
-        at = profiles.distance, distance, sd * scores
-        return Judged(rate, distance, landed(profiles.fractions[0], *at))
+        fractions = self._landed(np.array([rate]), np.array([distance]), outcomes, misses)[0]
+        found = Judged(rate, distance, fractions)
+        if self.given is None:
+            return found
+        table = self.given.table
+        here = self._landed(table.angular_velocity, table.distance, outcomes, misses)
+        return self.given.outcomes(found, np.moveaxis(here[..., [0, 2]], 0, 1), seed)
 
     def best(self, liquids: Mapping[str, NDArray]) -> Judged:
         """The action that is expected to spill least, judged on draws that did not choose it.
@@ -152,6 +163,46 @@ class LandingMap:
     def rms_error(self) -> float:
         """Of the spilled fraction, over pours that were left out and all distances."""
         return float(np.sqrt(np.mean(self.error**2)))
+
+    def corrected(
+        self, table: PourTable, liquids: Mapping[str, NDArray], *, seed: int = 0
+    ) -> "LandingMap":
+        """The same map, with what pours that were made say of it.
+
+        Args:
+            table: The pours, within the range of the cups.
+            liquids, seed: As for `surface`.
+        """
+        outcomes = repeated(liquids, MIN_OUTCOMES)
+        misses = self.misses(number_of(outcomes), seed)
+        spilled = self._spilled(table, outcomes, misses)
+        landed = self._landed(table.angular_velocity, table.distance, outcomes, misses)
+        retained = landed[:, ::LANDINGS_PER_DRAW, 2].T  # the same wherever the liquid lands
+        return replace(self, given=learn_given(table, spilled, retained))
+
+    def _spilled(
+        self, table: PourTable, liquids: Mapping[str, NDArray], misses: NDArray
+    ) -> NDArray[np.float64]:
+        """Spilled fractions (draws, A) of a table's pours, averaged over where they may land."""
+        from scipy.interpolate import make_interp_spline
+
+        rates, row = np.unique(table.angular_velocity, return_inverse=True)
+        found = surface(self.profiles(rates, liquids, misses), self.cups)
+        along = make_interp_spline(found.distance, found.spilled, k=1, axis=2)(table.distance)
+        return along[:, row, np.arange(len(row))]
+
+    def _landed(
+        self, rate: NDArray, distance: NDArray, liquids: Mapping[str, NDArray], misses: NDArray
+    ) -> NDArray[np.float64]:
+        """Fractions (A, draws * LANDINGS_PER_DRAW, 3) of A actions, at each place of landing."""
+        rates, row = np.unique(rate, return_inverse=True)
+        profiles = self.profiles(rates, liquids, misses)
+        scores = np.clip(normal_scores(LANDINGS_PER_DRAW), -MAX_LANDING_SDS, MAX_LANDING_SDS)
+        off = landing_sd(self.cups) * scores
+        pairs = zip(row, distance, strict=True)
+        return np.stack(
+            [landed(profiles.fractions[k], profiles.distance, at, off) for k, at in pairs]
+        )
 
     def _predicted(self, rates: NDArray, liquids: Mapping[str, NDArray]) -> NDArray[np.float64]:
         """Rows (W * draws, ROW), the rates first."""

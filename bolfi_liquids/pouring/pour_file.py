@@ -3,7 +3,8 @@
 Its groups are `actions` and `actions_plug_in`, over a grid of actions, the spillage expected for
 each draw of the posterior, or at theta*, and the risk that was minimised; `chosen` and `plug_in`,
 over outcomes, fractions with draws that did not choose; `liquids`, the posterior draws that the
-choice was made with; `pours`, those that the map was learned from, and how far it missed each.
+choice was made with; `pours`, those that the map was learned from, and how far it missed each;
+`given`, pours that were given and correct the map, and what it expects of them alone.
 """
 
 from collections.abc import Mapping
@@ -18,6 +19,7 @@ from .spillage import ACTION, FRACTIONS, RISK, Surface
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
+    from .given import GivenPours
     from .landing_map import LandingMap
 
 ACTION_UNITS = {"angular_velocity": "rad s-1", "distance": "m"}
@@ -49,6 +51,8 @@ def pour_tree(
         "liquids": Dataset({name: ("draw", values) for name, values in liquids.items()}),
         "pours": _pours(learned),
     }
+    if learned.given is not None:
+        groups["given"] = _given(learned.given)
     return DataTree.from_dict({f"/{name}": dataset for name, dataset in groups.items()})
 
 
@@ -58,6 +62,20 @@ def _pours(learned: "LandingMap") -> "Dataset":
     missed = np.sqrt(np.mean(learned.error**2, axis=1))
     theta = {name: ("pour", values) for name, values in learned.poured.theta.items()}
     return Dataset({**theta, "missed": ("pour", missed)})
+
+
+def _given(given: "GivenPours") -> "Dataset":
+    from xarray import Dataset
+
+    table = given.table
+    names = (*ACTION, *FRACTIONS, "expected_spilled", "expected_retained")
+    values = (table.angular_velocity, table.distance, *table.fractions.T, *given.expected.T)
+    columns = {
+        name: ("line", of, {"units": ACTION_UNITS.get(name, "1")})
+        for name, of in zip(names, values, strict=True)
+    }
+    attributes = {"file": table.path.name, "liquid": table.liquid, "sha256": table.hash}
+    return Dataset(columns, {"line": table.lines}, attributes)
 
 
 def _actions(surface: Surface, risk: str) -> "Dataset":

@@ -15,14 +15,27 @@ from ..inputs.settings import PourSettings
 from ..run.directory import POUR, run_path
 from ..run.summary import SUMMARY_FILE, Number, Section
 from ..wording import command, html_table, spilled
+from .draining import Hold
 from .spillage import ACTION, FRACTIONS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from xarray import DataTree
 
+    from .given import GivenPours
+
 SPILLAGE_QUANTILE = 0.95
 """Of the spilled fraction: one outcome in twenty exceeds it."""
+
+INTERVAL = 0.05, 0.95
+"""Quantiles of the fractions that arrive and stay."""
+
+SHOWN_GIVEN = 3
+"""Given pours that are shown beside the choice: those most like it."""
+
+CONTRADICTION = 0.05
+"""Difference between the fractions that a given pour has spilled and that the map expects of it,
+from which on a person is warned."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,19 +155,28 @@ class Pour:
 
 @dataclass(frozen=True)
 class ActionSummary:
-    """An action and what it is expected to spill.
+    """An action and what becomes of the liquid.
 
     Attributes:
         angular_velocity_deg_s: Of the source about its lip [deg/s].
         distance_cm: Horizontally from the lip to the receiver's axis [cm].
         expected_spillage: Mean spilled fraction.
         spillage_q95: Fraction that one outcome in twenty exceeds.
+        expected_received, received_q05, received_q95: Mean and quantiles of the fraction that
+            arrives in the receiver; None where an older version chose.
+        expected_retained, retained_q05, retained_q95: Likewise, of what stays in the source.
     """
 
     angular_velocity_deg_s: Number
     distance_cm: Number
     expected_spillage: Number
     spillage_q95: Number
+    expected_received: Number | None = None
+    received_q05: Number | None = None
+    received_q95: Number | None = None
+    expected_retained: Number | None = None
+    retained_q05: Number | None = None
+    retained_q95: Number | None = None
 
     @classmethod
     def of(cls, judged: Judged, **more) -> Self:
@@ -164,6 +186,8 @@ class ActionSummary:
             distance_cm=100.0 * judged.distance,
             expected_spillage=judged.expected_spillage,
             spillage_q95=judged.spillage_q95,
+            **_spread("received", judged.fractions[:, 1]),
+            **_spread("retained", judged.fractions[:, 2]),
             **more,
         )
 
@@ -173,7 +197,86 @@ class ActionSummary:
         return self.angular_velocity_deg_s, self.distance_cm
 
 
+def _spread(name: str, fractions: NDArray) -> dict[str, float]:
+    """Mean and `INTERVAL` of fractions, by the names of `ActionSummary`."""
+    low, high = np.quantile(fractions, INTERVAL)
+    mean = float(fractions.mean())
+    return {f"expected_{name}": mean, f"{name}_q05": float(low), f"{name}_q95": float(high)}
+
+
 @dataclass(frozen=True)
+class GivenPour:
+    """A pour that was made, and what the map alone expects of it.
+
+    Attributes:
+        line: Of the table's file.
+        angular_velocity_deg_s: Of the source about its lip [deg/s].
+        distance_cm: Horizontally from the lip to the receiver's axis [cm].
+        spilled, retained: Fractions.
+        expected_spillage, expected_retained: Their means on the map.
+    """
+
+    line: int
+    angular_velocity_deg_s: Number
+    distance_cm: Number
+    spilled: Number
+    retained: Number
+    expected_spillage: Number
+    expected_retained: Number
+
+    @property
+    def contradiction(self) -> float:
+        """How much more or less was spilled than the map expects."""
+        return abs(self.spilled - self.expected_spillage)
+
+
+@dataclass(frozen=True)
+class GivenSummary:
+    """The pours that were given, and what they have changed.
+
+    Attributes:
+        file, sha256: Name and digest of the table's file.
+        liquid: Whose pours count, by its name in the table; "" where it names none.
+        lines: Of the file, whose pours count.
+        nearest: Those most like the chosen action, the likest first.
+        contradicting: The pour that the map misses by most, if it is by `CONTRADICTION` at least.
+        without: The action that would be chosen without the given pours, judged with them.
+    """
+
+    file: str
+    sha256: str
+    liquid: str
+    lines: tuple[int, ...]
+    nearest: tuple[GivenPour, ...]
+    contradicting: GivenPour | None
+    without: ActionSummary
+
+    @classmethod
+    def of(cls, given: "GivenPours", chosen: Judged, without: Judged) -> Self:
+        """From the given pours, the chosen action and the one that would be chosen otherwise."""
+        table = given.table
+        numbers = zip(
+            table.lines.tolist(),
+            np.degrees(table.angular_velocity).tolist(),
+            (100.0 * table.distance).tolist(),
+            *table.observed.tolist(),
+            *given.expected.T.tolist(),
+            strict=True,
+        )
+        pours = [GivenPour(*row) for row in numbers]
+        worst = max(pours, key=lambda pour: pour.contradiction)
+        return cls(
+            file=table.path.name,
+            sha256=table.hash,
+            liquid=table.liquid,
+            lines=tuple(pour.line for pour in pours),
+            nearest=tuple(pours[k] for k in given.nearest(chosen)[:SHOWN_GIVEN]),
+            contradicting=worst if worst.contradiction >= CONTRADICTION else None,
+            without=ActionSummary.of(without),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
 class PourSummary(ActionSummary, Section):
     """The section "pour" of summary.json: the chosen action, beside the plug-in.
 
@@ -187,6 +290,9 @@ class PourSummary(ActionSummary, Section):
         plug_in: The action that would be best if theta* were the truth.
         fit_status: Of the calibration whose posterior it was chosen over; a bad fit's was chosen by
             force. None where an older version chose.
+        given: Pours that were given, which correct the map; None without any.
+        hold: How the source empties when it is held for longer; None unless more than a tenth of
+            the liquid stays.
     """
 
     SECTION: ClassVar[str] = "pour"
@@ -198,6 +304,8 @@ class PourSummary(ActionSummary, Section):
     plug_in: ActionSummary
     fit_status: FitStatus | None = None
     map_error: Number | None = None
+    given: GivenSummary | None = None
+    hold: Hold | None = None
 
     @classmethod
     def from_judged(

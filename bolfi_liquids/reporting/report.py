@@ -179,6 +179,8 @@ def _pour_context(pour: Pour) -> dict[str, Any]:
         "summary": summary,
         "chosen": sentences.pour_sentence(summary),
         "plug_in": sentences.plug_in_sentence(summary),
+        "fate": sentences.fate_sentences(summary),
+        "given": sentences.given_sentences(summary),
         "map": sentences.map_sentences(summary),
         "limits": sentence("pour.limits"),
         "contact_angle": sentences.contact_angle_sentences(json.loads(tree.attrs["cups"])),

@@ -83,6 +83,21 @@ def pour_sentence(summary: PourSummary) -> Sentence:
     return sentence("pour.chosen", summary=summary)
 
 
+def fate_sentences(summary: PourSummary) -> list[Sentence]:
+    """What arrives and what stays; older versions did not keep it."""
+    return [] if summary.expected_received is None else [sentence("pour.fate", summary=summary)]
+
+
+def given_sentences(summary: PourSummary) -> list[Sentence]:
+    """Which given pours count, and how they have moved the choice."""
+    given = summary.given
+    if given is None:
+        return []
+    moved = given.without.action != summary.action
+    more = [sentence("pour.given_moved", without=given.without)] if moved else []
+    return [sentence("pour.given", given=given), *more]
+
+
 def plug_in_sentence(summary: PourSummary) -> Sentence:
     """What the best action at theta* alone would spill."""
     if summary.plug_in.action == summary.action:

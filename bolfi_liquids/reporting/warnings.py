@@ -3,6 +3,7 @@
 Their wording is in `data/warning_sentences.jinja`.
 """
 
+import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,8 +15,10 @@ from ..calibration.summary import CalibrationSummary
 from ..criticism.result import Criticism, criticism_of
 from ..criticism.summary import CriticismSummary
 from ..criticism.verdict import Verdict
+from ..pouring.draining import TENTH
 from ..pouring.result import Pour, PourSummary, pour_of
 from ..pouring.spillage import ACTION
+from ..run.given_pours import digest_of_pours
 from ..wording import LEAST_SPILLED, Sentence, sentence
 from .criticism_sentences import verdict_sentence
 from .sentences import (
@@ -34,9 +37,6 @@ MIN_SEARCHED = 3
 MUCH_SPILLED = 0.05
 """Expected spillage that a person would mop up."""
 
-MUCH_RETAINED = 0.2
-"""Share that stays in the source; a gel, once it flows, leaves less than this."""
-
 PRIOR_ENDS = {
     ("angular_velocity", 0): "slowest",
     ("angular_velocity", 1): "fastest",
@@ -54,6 +54,7 @@ class Results:
         calibrated, criticised, poured: Sections of summary.json; None where there is none.
         latest: Of the calibration that is poured, with what a criticism accepted.
         pour: pour.nc; None where there is none.
+        given: Digest of the pours that the run was given; "" without any.
         posterior: Draws of the latest calibration.
         searched: Number of simulations at points that were chosen by what was learned.
     """
@@ -63,6 +64,7 @@ class Results:
     criticised: CriticismSummary | None
     poured: PourSummary | None
     pour: "DataTree | None"
+    given: str
     posterior: "Dataset"
     searched: int
 
@@ -88,6 +90,7 @@ def results_of(
         criticised=None if criticism is None else criticism.summary,
         poured=None if pour is None else pour.summary,
         pour=None if pour is None else pour.tree,
+        given=digest_of_pours(calibration.path),
         posterior=latest.posterior,
         searched=summary.n_simulations - int(calibration.tree.attrs["initial"]),
     )
@@ -114,10 +117,16 @@ def _of_the_search(calibrated: CalibrationSummary, searched: int) -> list[Senten
 
 
 def stale_sentences(run: Results) -> list[Sentence]:
-    """That the pour was chosen over another posterior than the latest, where it was."""
-    if run.pour is None or was_poured_over(run.pour, run.posterior):
+    """That the pour was chosen over another posterior than the latest, or with other given pours
+    than the run holds, where it was."""
+    if run.pour is None:
         return []
-    return [sentence("warning.stale_pour")]
+    found = []
+    if not was_poured_over(run.pour, run.posterior):
+        found.append(sentence("warning.stale_pour"))
+    if run.pour.attrs.get("given_pours", "") != run.given:
+        found.append(sentence("warning.stale_given"))
+    return found
 
 
 def was_poured_over(pour: "DataTree", posterior: "Dataset") -> bool:
@@ -160,9 +169,13 @@ def _of_the_pour(poured: PourSummary | None, pour: "DataTree | None") -> list[Se
     found = _of_the_edge(pour) if poured.spillage_q95 >= LEAST_SPILLED else []
     if poured.expected_spillage > MUCH_SPILLED:
         found.append(sentence("warning.much_spilled", share=poured.expected_spillage))
+    if poured.given is not None and poured.given.contradicting is not None:
+        found.append(sentence("warning.given_contradict", pour=poured.given.contradicting))
     retained = float(pour["chosen"].to_dataset()["retained"].mean())
-    if retained > MUCH_RETAINED:
-        found.append(sentence("warning.much_retained", share=retained))
+    if retained > TENTH:
+        held = json.loads(pour.attrs["cups"])["pour"]["hold"]
+        more = {"share": retained, "held": held, "hold": poured.hold}
+        found.append(sentence("warning.much_retained", **more))
     return found
 
 

@@ -10,7 +10,7 @@ from ..criticism.criticise import criticise
 from ..pouring.choose import choose_pour
 from ..pouring.spillage import pour_all, surface
 from ..progress import silent
-from ..run.directory import open_bank
+from ..run.directory import GIVEN_POURS, open_bank
 from ..run.execution import HERE, Execution
 from ..seeds import Phase
 from .decisions import executions, spilled_by
@@ -61,6 +61,8 @@ def spilled_where_it_sticks(
         **execution._asdict(),
     )
     tried = {"iterations": scale.rates, "seed": seed, "force": True, **execution._asdict()}
+    # of a study that goes on: before criticism no pour is known
+    (calibration.path / GIVEN_POURS).unlink(missing_ok=True)
     before = choose_pour(calibration, cups, **tried)
     given = {"pours": table, "cups": cups, "effects": scale.considered, "seed": seed}
     criticism = criticise(calibration, **given, **execution._asdict())

@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -39,7 +39,8 @@ class ChosenPour:
         run: The RUN directory.
         judged: The action and what it spills, as pour.nc has them.
         cups: For which it was chosen.
-        stale: That it was chosen over another posterior than the latest; empty if it was not.
+        stale: That it was chosen over another posterior than the latest, or with other given pours;
+            empty if it was not.
         fit_is_bad: Whether the fit was, or is, so bad that the pour could only be chosen by force.
         worries: The report's other warnings.
     """
@@ -52,14 +53,14 @@ class ChosenPour:
     worries: tuple[Sentence, ...]
 
     def check_fresh(self) -> None:
-        """Refuse a pour of another posterior than the latest.
+        """Refuse a pour of another posterior than the latest, or of other given pours.
 
         Raises:
             InputError: It is one.
         """
         if self.stale:
             raise InputError(
-                "its pour is out of date: it was chosen over another posterior than the latest",
+                "its pour is out of date: posterior or given pours have changed since",
                 where=str(self.run),
                 fix=_again(self.run),
             )
@@ -148,11 +149,13 @@ def _kept_cups(run: Path, tree: "DataTree") -> "Cups":
 def _check_summary(run: Path, told: PourSummary, chosen: Judged) -> None:
     """Refuse a pour that a person has read about otherwise."""
     held = ActionSummary.of(chosen)
-    for name in ActionSummary.__dataclass_fields__:
-        written, kept = getattr(told, name), getattr(held, name)
+    for field in fields(ActionSummary):
+        written, kept = getattr(told, field.name), getattr(held, field.name)
+        if written is None:  # by an older version
+            continue
         if not math.isclose(written, kept, rel_tol=ROUNDING, abs_tol=ROUNDING):
             raise InputError(
-                f"pour.{name} is {written:g}, but {kept:g} in {POUR}",
+                f"pour.{field.name} is {written:g}, but {kept:g} in {POUR}",
                 where=str(run / SUMMARY_FILE),
                 fix=_again(run),
             )

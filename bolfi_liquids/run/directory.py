@@ -26,6 +26,7 @@ POSTERIOR = "posterior.nc"
 CRITICISM = "criticism.nc"
 CRITICISM_FORMAT = 3  # of what a criticism is kept as; another is made again
 POUR = "pour.nc"
+GIVEN_POURS = "given_pours.nc"
 FRAMES = "frames.nc"
 REPORT = "report.html"
 

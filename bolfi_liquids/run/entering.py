@@ -14,7 +14,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..files import disk_errno
-from .directory import RUN_TOML, SIMULATIONS, enter_run, open_bank, read_run
+from .directory import GIVEN_POURS, RUN_TOML, SIMULATIONS, enter_run, open_bank, read_run
 from .recordings import RECORDINGS_FOLDER
 
 try:
@@ -199,7 +199,7 @@ def _occupied(path: Path) -> InputError:
 
 def _own_files(run: Path) -> list[Path]:
     """What a run has before its first result."""
-    own = (RUN_TOML, f"{SIMULATIONS}*", f"{RECORDINGS_FOLDER}/*")
+    own = (RUN_TOML, GIVEN_POURS, f"{SIMULATIONS}*", f"{RECORDINGS_FOLDER}/*")
     return [path for pattern in own for path in run.glob(pattern)]
 
 

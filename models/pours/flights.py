@@ -35,6 +35,12 @@ class Flights(NamedTuple):
         along[:, 2] -= 0.5 * GRAVITY * since**2
         return along
 
+    def left(self, time: np.ndarray) -> np.ndarray:
+        """Share of the liquid that has not left by some times [s], shape (m,); NaN if the pour
+        went wrong."""
+        gone = np.searchsorted(np.sort(self.time), time, side="right") / self.particles
+        return np.where(np.isnan(self.retained), np.nan, 1.0 - gone)
+
     def before(self, time: float, drop: float) -> np.ndarray:
         """Places at a time [s] of those that are still above a height `drop` below the lip [m],
         shape (m, 3)."""

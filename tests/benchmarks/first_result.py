@@ -111,7 +111,7 @@ def demo(_: argparse.Namespace) -> None:
             others = {"held_out": str(data / HELD_OUT), "baseline": str(data / CLEAN)}
             found = bl.criticise(fitted, **others, progress=False)
         with phase("pour"):
-            bl.choose_pour(found, pours=POURS, progress=False)
+            bl.choose_pour(found, budget=POURS, progress=False)
 
 
 def main() -> None:

@@ -104,7 +104,7 @@ def pour_settings():
     turned = {"angular_velocity_deg_s": (90.0, 180.0), "hold": 0.4}
     plan = bundled.pour.model_copy(update=turned)
     cups = bundled.model_copy(update={"source": source, "pour": plan})
-    return {"pours": 24, "draws": 16, "cups": cups}
+    return {"budget": 24, "draws": 16, "cups": cups}
 
 
 @pytest.fixture(scope="session")

@@ -70,7 +70,7 @@ def test_a_pour_is_the_same(here, cluster, tmp_path, where):
         run = tmp_path / at
         shutil.copytree(here.path, run)
         with executor_of(at, cluster) as options:
-            found.append(bl.choose_pour(run, pours=24, draws=16, seed=2, force=True, **options))
+            found.append(bl.choose_pour(run, budget=24, draws=16, seed=2, force=True, **options))
     for judged, other in zip(*((one.chosen, one.plug_in) for one in found), strict=True):
         assert judged.action == other.action
         np.testing.assert_array_equal(judged.fractions, other.fractions)

@@ -22,6 +22,14 @@ class MadeUp(NamedTuple):
         slow = 0.004 * np.log(viscosity)
         return 0.04 - slow + 0.01 * np.log(rate) - 0.005 * cohesion - 0.02 * adhesion
 
+    def film(self, viscosity):
+        """Share that stays in the source."""
+        return 0.3 * viscosity / (1.0 + viscosity)
+
+    def draining(self, liquid, angular_velocity, cups, seeds, held, effects=None):
+        viscosity = np.broadcast_to(np.asarray(liquid.viscosity, float), len(seeds))
+        return self.film(viscosity)[:, None] * np.exp(-np.asarray(held))
+
     def landings(self, liquid, angular_velocity, cups, seeds, effects=None):
         size = len(seeds)
         self.calls.append(size)
@@ -30,7 +38,7 @@ class MadeUp(NamedTuple):
             for values in (liquid.viscosity, liquid.cohesion, angular_velocity)
         )
         adhesion = np.broadcast_to((effects or {}).get("adhesion", 0.0), size)
-        kept = np.round(0.3 * viscosity / (1.0 + viscosity) * PARTICLES) / PARTICLES  # a film
+        kept = np.round(self.film(viscosity) * PARTICLES) / PARTICLES
         position = np.full((size, PARTICLES, 2), np.nan, np.float32)
         for row, at in enumerate(self.middle(viscosity, cohesion, rate, adhesion)):
             count = round(PARTICLES * (1.0 - kept[row]))
@@ -44,4 +52,5 @@ def made_up(monkeypatch):
     """Pours are made up."""
     made = MadeUp([])
     monkeypatch.setattr(models, "landings", made.landings)
+    monkeypatch.setattr(models, "draining", made.draining)
     return made

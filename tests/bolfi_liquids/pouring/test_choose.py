@@ -133,7 +133,7 @@ def test_an_effect_that_does_not_act_in_pours_needs_no_new_ones(
     bl.choose_pour(extended(run, "camera_tilt"), **more)
     assert len(made_up.calls) == before
     bl.choose_pour(extended(run, "adhesion"), **more)
-    count = pour_settings["pours"]
+    count = pour_settings["budget"]
     assert sum(made_up.calls) == 2 * count
     tree = xr.load_datatree(run.path / "pour.nc")
     assert (tree["pours"]["adhesion"] == 0.0).sum() == count < tree["pours"].sizes["pour"]
@@ -169,7 +169,7 @@ def test_a_choice_that_was_killed_goes_on_from_its_pours(
         with pytest.raises(KeyboardInterrupt):
             bl.choose_pour(runs[1], **more)
     again = bl.choose_pour(runs[1], **more)
-    assert sum(made_up.calls) == pour_settings["pours"]
+    assert sum(made_up.calls) == pour_settings["budget"]
     assert again.chosen.equals(whole.chosen) and again.plug_in.equals(whole.plug_in)
 
 
@@ -186,7 +186,7 @@ def test_section_is_of_the_pour(pour, calibration, pour_settings):
     plug_in = section["plug_in"]["expected_spillage"]
     assert plug_in == pytest.approx(pour.plug_in.expected_spillage, rel=1e-12)
     tree = xr.load_datatree(pour.path / "pour.nc")
-    assert section["n_simulations"] == pour_settings["pours"] == tree["pours"].sizes["pour"]
+    assert section["n_simulations"] == pour_settings["budget"] == tree["pours"].sizes["pour"]
     missed = tree["pours"]["missed"].to_numpy()
     assert section["map_error"] == pytest.approx(np.sqrt(np.mean(missed**2)), rel=1e-9)
     assert section["map_error"] == tree.attrs["map_error"]
@@ -208,8 +208,8 @@ def test_more_draws_than_there_are_is_said_in_the_setting_s_terms(calibration):
 @pytest.mark.parametrize(
     ("setting", "value"),
     [
-        ("pours", 23),
-        ("pours", 101),
+        ("budget", 23),
+        ("budget", 101),
         ("iterations", 2),
         ("draws", 0),
         ("risk", "median"),

@@ -9,8 +9,9 @@ import xarray as xr
 from bolfi_liquids.calibration.fit_figures import _rms_by
 from bolfi_liquids.criticism.source_summary import PourVerdict
 from bolfi_liquids.criticism.verdict import Verdict
+from bolfi_liquids.pouring.draining import Hold
 from bolfi_liquids.pouring.figures import not_surely_worse
-from bolfi_liquids.pouring.result import ActionSummary, PourSummary
+from bolfi_liquids.pouring.result import ActionSummary, GivenPour, GivenSummary, PourSummary
 from bolfi_liquids.reporting.warnings import Results, warnings_of
 
 FINE = {
@@ -42,7 +43,9 @@ def poured(rate=1.0, distance=0.03, retained=0.05):
         attrs={"angular_velocity": rate, "distance": distance},
     )
     liquids = xr.Dataset({"viscosity": ("draw", [1.0, 3.0])})
-    return xr.DataTree.from_dict({"/actions": actions, "/chosen": chosen, "/liquids": liquids})
+    tree = xr.DataTree.from_dict({"/actions": actions, "/chosen": chosen, "/liquids": liquids})
+    tree.attrs.update(cups='{"pour": {"hold": 0.9}}', given_pours="")
+    return tree
 
 
 POSTERIOR = xr.Dataset({"viscosity": (("chain", "draw"), [[1.0, 2.0, 3.0]])})
@@ -57,6 +60,7 @@ def fine(calibration, criticism_summary):
         criticised=replace(criticism_summary, **AGREES),
         poured=POURED,
         pour=poured(),
+        given="",
         posterior=POSTERIOR,
         searched=13,
     )
@@ -108,12 +112,43 @@ def test_each_warning_is_given_alone(fine, field, changes, key, values):
     [
         ({"rate": 0.5}, "at_the_edge", {"ends": ("slowest",)}),
         ({"rate": 3.0, "distance": 0.07}, "at_the_edge", {"ends": ("fastest", "farthest")}),
-        ({"retained": 0.4}, "much_retained", {"share": pytest.approx(0.4)}),
+        (
+            {"retained": 0.11},
+            "much_retained",
+            {"share": pytest.approx(0.11), "held": 0.9, "hold": None},
+        ),
     ],
 )
 def test_each_warning_of_the_chosen_action(fine, action, key, values):
     (sentence,) = warnings_of(replace(fine, pour=poured(**action)))
     assert (sentence.key, sentence.values) == (f"warning.{key}", values)
+
+
+@pytest.mark.parametrize(
+    ("hold", "said"),
+    [
+        (Hold(6.3, 10.0, 0.08), "Hold it for 6.3 s to leave a tenth: write"),
+        (Hold(41.0, 10.0, 0.25), "Hold it for 41 s to leave a tenth (extrapolated from 10 s)"),
+        (Hold(np.nan, 10.0, 0.31), "Held for 10 s it still keeps 31 %"),
+    ],
+)
+def test_the_hold_that_leaves_a_tenth_is_said(fine, hold, said):
+    much = replace(fine, poured=replace(fine.poured, hold=hold), pour=poured(retained=0.54))
+    (sentence,) = warnings_of(much)
+    assert said in str(sentence) and "54 %" in str(sentence) and "0.9 s" in str(sentence)
+
+
+def test_a_pour_that_contradicts_the_simulator_is_said(fine):
+    row = GivenPour(2, 30.0, 1.2, 0.127, 0.02, 0.001, 0.02)
+    given = GivenSummary("oil.csv", "0", "", (2,), (row,), row, ACTION)
+    (sentence,) = warnings_of(replace(fine, poured=replace(fine.poured, given=given)))
+    assert sentence.key == "warning.given_contradict"
+    assert "line 2" in str(sentence) and "13 %" in str(sentence)
+
+
+def test_a_pour_with_other_given_pours_is_said_to_be_one(fine):
+    (sentence,) = warnings_of(replace(fine, given="abc oil"))
+    assert sentence.key == "warning.stale_given"
 
 
 def test_an_end_of_the_range_is_no_loss_where_nothing_is_spilled(fine):

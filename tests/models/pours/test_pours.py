@@ -160,6 +160,25 @@ def test_the_turned_cup_keeps_its_lip_and_its_lengths():
     )
 
 
+def test_what_has_not_left_by_a_time_is_left():
+    three = np.zeros((3, 3))
+    flights = Flights(three, three, np.array([2.0, 0.5, 1.0]), 0.25, 4)
+    assert flights.left(np.array([0.4, 0.5, 1.5, 9.0])).tolist() == [1.0, 0.75, 0.5, 0.25]
+    assert np.isnan(flights._replace(retained=np.nan).left(np.array([0.4, 9.0]))).all()
+
+
+@pytest.mark.slow
+def test_a_source_empties_while_it_is_held_and_keeps_what_landings_say(cups):
+    """But for what hangs at the lip or falls beside it at the end, which has not yet left."""
+    held = np.linspace(0.0, 2.0, 21)
+    rate, long = np.radians(90.0), changed(cups, pour={"hold": 2.0})
+    left = models.draining(GLYCERIN, rate, long, [0, 1], held)
+    assert (np.diff(left, axis=1) <= 0.0).all() and (left[:, 0] > left[:, -1] + 0.1).all()
+    kept = models.landings(GLYCERIN, rate, long, [0, 1]).retained
+    assert (left[:, -1] >= kept).all()
+    np.testing.assert_allclose(left[:, -1], kept, atol=0.02)
+
+
 @pytest.mark.parametrize("cell", [0.004, 0.0047])
 def test_the_cup_holds_its_volume_and_its_wall_parts_two_sides(cell):
     cup = Vessel(0.028, 0.06, 0.034, cell)

@@ -1,0 +1,130 @@
+"""What pours that were made say of a map of pours: a Gaussian process of what the map misses.
+
+A share s is an angle arcsin √s here: so a pour that is repeated varies alike whatever it spills,
+and no correction leads below nothing or beyond all. What becomes of the liquid is the angle that
+one of many outcomes of the map predicts, plus a process of the action that is the same for all
+outcomes; a given pour is that plus its own repeatability. Given pours move each outcome by
+Matheron's rule (Wilson et al., Pathwise conditioning of Gaussian processes, JMLR 2021): by what
+separates this very outcome from them, as far as the process or the spread of the outcomes connects
+them with the action.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..criticism.pour_noise import ACTION_STEP, REPEATABILITY_SD
+
+LOG_PRIOR_SD = 1.0, 0.5, 0.5
+"""Of the logs of the process's standard deviation and of its two lengths."""
+NODES = 7  # at which an expectation over the process is computed
+
+
+def coordinates(angular_velocity: NDArray, distance: NDArray) -> NDArray[np.float64]:
+    """Actions [rad/s], [m] as the process sees them, in `ACTION_STEP`, shape (n, 2)."""
+    return np.column_stack([np.log(angular_velocity), distance]) / ACTION_STEP
+
+
+def angle(share: NDArray) -> NDArray[np.float64]:
+    """Of shares."""
+    return np.arcsin(np.sqrt(np.clip(share, 0.0, 1.0)))
+
+
+def share(angle: NDArray) -> NDArray[np.float64]:
+    """Of angles, those beyond nothing or all taken there."""
+    return np.sin(np.clip(angle, 0.0, np.pi / 2.0)) ** 2
+
+
+def expected_share(mean: NDArray, sd: NDArray) -> NDArray[np.float64]:
+    """Mean share of angles that are normally distributed, mean (n, m) and sd (m,)."""
+    nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
+    parts = (w * share(mean + at * sd) for at, w in zip(nodes, weights, strict=True))
+    return sum(parts, start=np.zeros_like(mean)) / weights.sum()
+
+
+class Residual(NamedTuple):
+    """Of one share that was observed in A given pours; see `learn_residual`.
+
+    Attributes:
+        at: `coordinates` of the given pours, shape (A, 2).
+        observed: Angles of their shares, shape (A,).
+        sd: Of the process.
+        lengths: Of its correlation along both coordinates, shape (2,).
+    """
+
+    at: NDArray[np.float64]
+    observed: NDArray[np.float64]
+    sd: float
+    lengths: NDArray[np.float64]
+
+    def moved(
+        self, here: NDArray, there: NDArray, at: NDArray
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """What n outcomes predict of m actions, as the given pours say.
+
+        Args:
+            here: Angles that the outcomes predict of the given pours, shape (n, A).
+            there: Angles that they predict of the actions, shape (n, m).
+            at: `coordinates` of the actions, shape (m, 2).
+
+        Returns:
+            Mean angles, shape (n, m), none beyond nothing or all; the sd of a pour about each,
+            shape (m,).
+        """
+        cross = self.covariance(at, self.at)
+        process = self.given_covariance
+        weights = np.linalg.solve(process + _spread(here, here), (cross + _spread(there, here)).T).T
+        left = self.sd**2 - 2.0 * np.sum(weights * cross, axis=1)
+        left += np.sum((weights @ process) * weights, axis=1) + REPEATABILITY_SD**2
+        # what lies below nothing for a smooth process is not known to be nothing
+        mean = np.clip(there + (self.observed - here) @ weights.T, 0.0, np.pi / 2.0)
+        return mean, np.sqrt(left)
+
+    @property
+    def given_covariance(self) -> NDArray[np.float64]:
+        """Of the given pours about an outcome, shape (A, A)."""
+        return self.covariance(self.at, self.at) + REPEATABILITY_SD**2 * np.eye(len(self.at))
+
+    def covariance(self, a: NDArray, b: NDArray) -> NDArray[np.float64]:
+        """Of the process between coordinates (n, 2) and (m, 2), shape (n, m)."""
+        apart = np.sum(((a[:, None] - b) / self.lengths) ** 2, axis=-1)
+        return self.sd**2 * np.exp(-0.5 * apart)
+
+    def log_density(self, here: NDArray) -> float:
+        """Of the given pours, where outcomes predict angles `here` of them, (n, A); less a
+        constant."""
+        whole = self.given_covariance + _spread(here, here)
+        left = self.observed - here.mean(axis=0)
+        return -0.5 * float(left @ np.linalg.solve(whole, left) + np.linalg.slogdet(whole)[1])
+
+
+def learn_residual(
+    at: NDArray, observed: NDArray, here: NDArray, sd: float, lengths: Sequence[float]
+) -> Residual:
+    """The process that most probably separates outcomes from given pours.
+
+    Args:
+        at: `coordinates` of the given pours, shape (A, 2).
+        observed: Angles of their shares, shape (A,).
+        here: Angles that n outcomes predict of them, shape (n, A).
+        sd, lengths: Medians of the process's prior.
+    """
+    from scipy.optimize import minimize
+
+    middle, width = np.log([sd, *lengths]), np.array(LOG_PRIOR_SD)
+
+    def residual(z: NDArray) -> Residual:
+        first, *others = np.exp(middle + width * z)
+        return Residual(at, observed, float(first), np.array(others))
+
+    def loss(z: NDArray) -> float:
+        return 0.5 * float(z @ z) - residual(z).log_density(here)
+
+    return residual(minimize(loss, np.zeros(len(middle)), method="L-BFGS-B").x)
+
+
+def _spread(a: NDArray, b: NDArray) -> NDArray[np.float64]:
+    """Covariance (m, k) between outcomes a (n, m) and b (n, k)."""
+    return (a - a.mean(axis=0)).T @ (b - b.mean(axis=0)) / len(a)

@@ -1,0 +1,93 @@
+"""Pours of its liquid that a run was given: they count in every pour that it chooses.
+
+Whichever command is given a table (`calibrate`, `criticise` or `pour`) keeps it here, in the place
+of an earlier one.
+"""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..files import write_netcdf
+from ..inputs.pour_table import PourTable
+from .directory import GIVEN_POURS
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+    from ..models import Cups
+
+FRACTIONS = ("spilled", "received", "retained")
+UNITS = {"angular_velocity": "rad s-1", "distance": "m", **dict.fromkeys(FRACTIONS, "1")}
+
+
+def keep_pours(run: Path, table: PourTable, cups: "Cups") -> None:
+    """Keep pours that were made with these cups, and no others."""
+    from xarray import Dataset
+
+    values = [table.angular_velocity, table.distance, *table.fractions.T]
+    columns = {
+        name: ("row", of, {"units": unit})
+        for (name, unit), of in zip(UNITS.items(), values, strict=True)
+    }
+    attributes = {
+        "file": table.path.name,
+        "liquid": table.liquid,
+        "sha256": table.hash,
+        "cups": json.dumps(_scene(cups)),
+    }
+    coordinates = {"line": ("row", table.lines)}
+    write_netcdf(Dataset(columns, coordinates, attributes), run / GIVEN_POURS)
+
+
+def kept_pours(run: Path, cups: "Cups") -> PourTable | None:
+    """The pours that the run was given, if they were made with these cups; None without any.
+
+    Raises:
+        InputError: The file is damaged.
+    """
+    held = _held(run)
+    if held is None or json.loads(held.attrs["cups"]) != _scene(cups):
+        return None
+    return PourTable(
+        path=Path(held.attrs["file"]),
+        liquid=held.attrs["liquid"],
+        angular_velocity=held["angular_velocity"].to_numpy(),
+        distance=held["distance"].to_numpy(),
+        fractions=np.column_stack([held[name] for name in FRACTIONS]),
+        lines=held["line"].to_numpy(),
+        hash=held.attrs["sha256"],
+    )
+
+
+def digest_of_pours(run: Path) -> str:
+    """Digest of the table that the run was given, and the name of its liquid; "" without one.
+
+    Raises:
+        InputError: The file is damaged.
+    """
+    held = _held(run)
+    return "" if held is None else f"{held.attrs['sha256']} {held.attrs['liquid']}".strip()
+
+
+def _held(run: Path) -> "Dataset | None":
+    import xarray
+
+    path = run / GIVEN_POURS
+    if not path.is_file():
+        return None
+    try:
+        with xarray.open_dataset(path, engine="h5netcdf") as held:
+            return held.load()
+    except (OSError, ValueError, KeyError) as err:
+        fix = "delete it, and give the table of pours again"
+        raise InputError("damaged, cannot be read", where=str(path), fix=fix) from err
+
+
+def _scene(cups: "Cups") -> dict[str, Any]:
+    """What becomes of a pour depends on this, and not on the actions that may be chosen."""
+    ranges = {"angular_velocity_deg_s", "distance"}
+    return json.loads(cups.model_dump_json(exclude={"pour": ranges}))
