@@ -16,6 +16,7 @@ from .checks import tarp as tarp
 from .emulation import Emulation as Emulation
 from .emulation import emulate as emulate
 from .loop import fit as fit
+from .loop import fit_losses as fit_losses
 from .prior import Prior as Prior
 from .regression import Regression as Regression
 from .regression import regress as regress
@@ -24,6 +25,7 @@ from .sampling.convergence import SamplingWarning as SamplingWarning
 from .simulations.bank import SimulationBank as SimulationBank
 from .surrogates.base import Acquisition as Acquisition
 from .surrogates.families import DiscrepancyFamily as DiscrepancyFamily
+from .surrogates.families import LogLikelihoodFamily as LogLikelihoodFamily
 from .surrogates.families import SignalFamily as SignalFamily
 from .surrogates.squared_difference import squared_difference as squared_difference
 from .surrogates.warnings import EmulatorWarning as EmulatorWarning

@@ -33,9 +33,8 @@ from .simulations.job import BATCH
 from .simulations.returned import told_signals
 from .sobol import sobol, start_size
 from .surrogates.base import Acquisition
-from .surrogates.families import Family, Learnable, Measured, resolve
-from .surrogates.outliers import sane
-from .surrogates.success import Feasibility
+from .surrogates.families import Family, Learnable, Measured, check_observed, resolve
+from .surrogates.success import Feasibility, sane
 from .surrogates.warnings import EmulatorWarning
 from .types import Theta
 
@@ -51,10 +50,12 @@ class Bolfi:
 
     Args:
         prior: The parameters and their priors.
-        observed: The measured output [*signal_shape], time first; NaN is a missing sample.
-        surrogate: "signal", which emulates the output; "discrepancy", the paper's; a
-            `SignalFamily` or `DiscrepancyFamily`; None is "signal", unless a discrepancy, or
-            another option of that family alone, is given.
+        observed: The measured output [*signal_shape], time first; NaN is a missing sample. None,
+            and only so, for the surrogate "log_likelihood".
+        surrogate: "signal", which emulates the output; "discrepancy", the paper's;
+            "log_likelihood", where the simulator returns that; a `SignalFamily`,
+            `DiscrepancyFamily` or `LogLikelihoodFamily`; None is "signal", unless a discrepancy,
+            or another option of that family alone, is given.
         acquisition: "eiv", "maxvar", "draws", "lcb" (with "discrepancy"), an object (see
             `Acquisition`), or None for the surrogate's best.
         seed: Fixes the start design and the acquisitions.
@@ -70,7 +71,7 @@ class Bolfi:
     def __init__(  # noqa: PLR0913  one flat place for what defines a run
         self,
         prior: Prior,
-        observed: ArrayLike,
+        observed: ArrayLike | None = None,
         *,
         surrogate: str | Family | None = None,
         acquisition: str | Acquisition | None = None,
@@ -80,7 +81,9 @@ class Bolfi:
     ):
         checked_prior(prior)
         self.prior = prior
-        self.observed = checked_array("observed", observed)
+        self.family = resolve(surrogate, options)
+        check_observed(observed, self.family)
+        self.observed = checked_array("observed", np.nan if observed is None else observed)
         if np.isinf(self.observed).any():
             raise ValueError("observed must not be infinite; NaN is a missing sample")
         self.seed = checked_integer("seed", seed, 0)
@@ -90,7 +93,6 @@ class Bolfi:
             MIN_LEARN,
             MOST_SIMULATIONS,
         )
-        self.family = resolve(surrogate, options)
         self._learner = self.family.learner(self.observed)
         self._acquire = resolve_acquisition(acquisition, self.family.name, self.family.acquisition)
         # a user's own function may compare unlike shapes

@@ -18,6 +18,7 @@ from .arguments import (
     check_timeout,
     checked_array,
     checked_integer,
+    checked_number,
     is_table,
 )
 from .bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi
@@ -45,7 +46,7 @@ from .types import Simulator, SingleSimulator, Theta
 def fit(  # noqa: PLR0913  the one call that most users make
     simulate: Simulator | SingleSimulator,
     prior: Prior,
-    observed: ArrayLike,
+    observed: ArrayLike | None = None,
     *,
     budget: int = 20,
     batch: int = BATCH,
@@ -85,7 +86,9 @@ def fit(  # noqa: PLR0913  the one call that most users make
             A run that raises, takes too long, returns NaN or something else than a signal costs
             that run only, see `Fit.failures`; a masked value is NaN.
         prior: The parameters and their priors.
-        observed: The measured signal [*signal_shape], time first; NaN is a missing sample.
+        observed: The measured signal [*signal_shape], time first; NaN is a missing sample. None,
+            and only so, with surrogate="log_likelihood": `simulate` then returns log likelihoods
+            [b], or [b, 2] with the sd of their noise; -inf where the data are impossible.
         budget: Simulations in all, failed ones and those found in the bank included; at most 8192,
             earlier ones counted.
         batch: Points per round, or in flight: as many as the executor has workers.
@@ -191,6 +194,59 @@ def fit(  # noqa: PLR0913  the one call that most users make
                 "from there"
             )
     return engine.fit({"simulator": seconds}, stacklevel=3, warn=warn)
+
+
+def fit_losses(
+    theta: Theta,
+    loss: ArrayLike,
+    prior: Prior,
+    *,
+    noise: float | None = None,
+    n: int | None = None,
+    warn: bool = True,
+) -> Fit:
+    """Infer parameters from losses that are sums of squares, as an optimiser leaves them.
+
+    With a known noise the log likelihood is -loss / (2 noise^2); with an unknown one, of prior
+    1 / noise, it is -(n / 2) log(loss). Any other loss is a log likelihood by your own formula:
+    `fit(None, prior, surrogate="log_likelihood", budget=0, earlier=(theta, values))`.
+
+    Args:
+        theta: Name -> [m], in the prior's support; it may be a data frame.
+        loss: Sum over n data of (datum - model)^2 [m]; NaN is a failed trial, and inf is
+            impossible.
+        prior: The parameters and their priors, such as the ranges of the search.
+        noise: Sd of the data's noise, in their units; 1 if the squares are divided by variances.
+        n: Number of independent data in the sum, where their noise is unknown.
+        warn: As in `fit`.
+
+    Raises:
+        ValueError: bad argument; not one of noise and n; negative losses, or, with n, a zero; fewer
+            than three finite ones.
+
+    Warns:
+        EmulatorWarning: for each of the surrogate's complaints, unless warn=False.
+    """
+    if (noise is None) == (n is None):
+        raise ValueError(
+            "give either noise=, the sd of the data's noise, or n=, the number of data in a loss, "
+            f"got noise={noise!r:.100} and n={n!r:.100}"
+        )
+    losses = checked_array("loss", loss)
+    least = np.nanmin(losses, initial=np.inf)
+    if least < 0.0 or (least == 0.0 and noise is None):
+        raise ValueError(
+            f"loss must hold sums of squares, {'positive' if noise is None else 'from 0'}, got "
+            f'{least:.4g}; what is minus a log likelihood goes to fit(surrogate="log_likelihood")'
+        )
+    if noise is not None:
+        sd = checked_number("noise", noise, lambda sd: 0.0 < sd < np.inf, "positive and finite")
+        values = -0.5 * losses / sd**2
+    else:
+        values = -0.5 * checked_integer("n", n) * np.log(losses)
+    engine = Bolfi(prior, surrogate="log_likelihood", initial=MIN_LEARN)
+    engine.tell(theta, values)
+    return engine.fit(warn=warn, stacklevel=3)
 
 
 def _in_rounds(engine: Bolfi, runner: Runner, budget: int, batch: int) -> Iterator[Simulation]:

@@ -21,8 +21,10 @@ from .sampling.draw import SAMPLERS, draw_posterior
 from .sampling.importance import explore
 from .sampling.target import Length, Target, log_likelihood
 from .surrogates.base import Surrogate
+from .surrogates.log_likelihood import LogLikelihoodSurrogate
 from .surrogates.signal import SignalSurrogate
 from .surrogates.warnings import (
+    NEGATIVE,
     UNLEARNED,
     censored_warnings,
     history_warnings,
@@ -158,6 +160,10 @@ class Fit:
     def _data_warnings(self) -> list[str]:
         """What the observed output itself shows where it is compared."""
         said = []
+        if isinstance(self.learned, LogLikelihoodSurrogate):
+            return said
+        if (self.history.discrepancy < 0.0).any():
+            said.append(NEGATIVE)
         own = (self.settings.get(name, "None") for name in ("summary", "discrepancy"))
         if all(function == "None" for function in own):
             said += censored_warnings(self.observed, self.closest.signal)

@@ -16,6 +16,7 @@ class Failure(StrEnum):
     TIMEOUT = "timeout"
     UNUSABLE = "unusable"  # the simulator returned something else than a signal
     INCOMPARABLE = "incomparable"  # the user's discrepancy or summary failed on the signal
+    IMPOSSIBLE = "impossible"  # the log likelihood is -inf
 
 
 class NoSignals(ValueError):
@@ -58,6 +59,10 @@ def unusable(what: str) -> str:
 
 def incomparable(what: str) -> str:
     return f"{Failure.INCOMPARABLE}: {what}"
+
+
+def impossible(what: str) -> str:
+    return f"{Failure.IMPOSSIBLE}: {what}"
 
 
 def kind(error: str) -> Failure:

@@ -19,7 +19,7 @@ from ..gp.process import (
 )
 from ..types import LogLikelihood, LogSecondMoment
 from .hyper_draws import posterior_draws
-from .outliers import sane
+from .success import sane
 from .threshold import (
     Threshold,
     ThresholdState,

@@ -9,17 +9,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_callable, checked_array, checked_integer, checked_number
-from ..simulations.failures import not_finite
+from ..simulations.failures import impossible, incomparable, not_finite
 from ..types import Discrepancy
 from .base import Surrogate
 from .discrepancy import DiscrepancySurrogate, learn, marginalised, with_threshold
 from .emulator import PREDICTED_SHARE, Limits, emulate
 from .given_noise import GivenNoise, given_noise
-from .outliers import sane
+from .log_likelihood import LogLikelihoodSurrogate
+from .log_likelihood import learn as learn_level
 from .output_vectors import Output, Summary, describe, infinities, summarise
 from .signal import Noise, SignalSurrogate, observe
 from .squared_difference import evaluate, failed_on, squared_difference
-from .success import Feasibility, learn_success
+from .success import Feasibility, learn_success, sane
 from .threshold import Threshold, check_rule
 from .transform import TRANSFORMS
 
@@ -246,10 +247,79 @@ class SignalLearner:
         return self.learn(known, None)
 
 
-Family = DiscrepancyFamily | SignalFamily
-Learner = DiscrepancyLearner | SignalLearner
+@dataclass(frozen=True)
+class LogLikelihoodFamily:
+    """A Gaussian process on the log likelihood that the simulator itself returns.
+
+    A simulator returns a number, or two of which the second is the sd of the first one's noise.
+    -inf is where the data are impossible. Nothing is observed beside.
+    """
+
+    name: ClassVar[str] = "log_likelihood"
+    acquisition: ClassVar[str] = "draws"
+    replicates: ClassVar[bool] = False
+
+    def learner(self, observed: np.ndarray) -> "LogLikelihoodLearner":
+        return LogLikelihoodLearner()
+
+
+@dataclass(frozen=True)
+class LogLikelihoodLearner:
+    """Log likelihoods are learned from as they are; the discrepancy is minus one."""
+
+    features: ClassVar[int] = 1  # the sd of the noise, NaN where none is given
+    any_shape: ClassVar[bool] = True
+
+    def measure(self, signals: Sequence[np.ndarray | None]) -> Measured:
+        """Sds [n, 1] and minus the log likelihoods of n signals, None where a run failed."""
+        n = len(signals)
+        found, errors = np.full((n, 2), np.nan), [""] * n
+        for i, signal in enumerate(signals):
+            if signal is None or (signal.size and np.isnan(signal).all()):
+                continue
+            values = signal.ravel()
+            found[i, : values.size] = values[:2] if values.size <= 2 else np.nan
+            errors[i] = _unlikely(signal)
+        failed = np.array([error != "" for error in errors])
+        return Measured(found[:, 1:], np.where(failed, np.nan, -found[:, 0]), errors)
+
+    def learnable(self, discrepancy: np.ndarray) -> np.ndarray:
+        """Which of the successful simulations are learned from, bool [n]: what blew up is not."""
+        return sane(discrepancy)
+
+    def learn(
+        self, known: Learnable, previous: LogLikelihoodSurrogate | None
+    ) -> LogLikelihoodSurrogate:
+        kept = self.learnable(known.discrepancy)
+        values, sd = -known.discrepancy[kept], known.features[kept, 0]
+        learned = learn_level(known.u[kept], values, sd, previous, known.normal)
+        success = learn_success(known.runs, known.normal)
+        return replace(learned, state=learned.state._replace(success=success))
+
+    def finish(self, known: Learnable, seed: int) -> Surrogate:
+        """The surrogate on which a fit rests: it is cautious, while a search is not."""
+        learned = self.learn(known, None)
+        return replace(learned, state=learned.state._replace(caution=np.ones(())))
+
+
+def _unlikely(signal: np.ndarray) -> str:
+    """Why a signal is no log likelihood of data that are possible; "" if it is one."""
+    if not 1 <= signal.size <= 2:
+        return incomparable(
+            f"a log likelihood is one number, or two with its sd, got a signal of {signal.shape}"
+        )
+    value, *sd = signal.ravel()
+    if value == -np.inf:
+        return impossible("the log likelihood is -inf")
+    if not np.isfinite(value) or not all(0.0 <= one < np.inf for one in sd):
+        return not_finite(f"the log likelihood, or its sd: {signal.ravel()}")
+    return ""
+
+
+Family = DiscrepancyFamily | SignalFamily | LogLikelihoodFamily
+Learner = DiscrepancyLearner | SignalLearner | LogLikelihoodLearner
 FAMILIES: dict[str, type[Family]] = {
-    family.name: family for family in (DiscrepancyFamily, SignalFamily)
+    family.name: family for family in (DiscrepancyFamily, SignalFamily, LogLikelihoodFamily)
 }
 """Surrogates by the name users give."""
 
@@ -263,7 +333,7 @@ def resolve(surrogate: str | Family | None, options: dict) -> Family:
         ValueError: unknown name, an option that the family has not, or without a name a
             discrepancy and an option of "signal".
     """
-    if isinstance(surrogate, DiscrepancyFamily | SignalFamily):
+    if isinstance(surrogate, Family):
         if options:
             raise ValueError(f"give {tuple(options)} to {surrogate!r} itself")
         return surrogate
@@ -288,6 +358,21 @@ def resolve(surrogate: str | Family | None, options: dict) -> Family:
             f"the options {tuple(sorted(_options(surrogate)))}"
         )
     return FAMILIES[surrogate](**options)
+
+
+def check_observed(observed: object, family: Family) -> None:
+    """Raise ValueError unless something is observed, or the family has the likelihood already."""
+    has_it = isinstance(family, LogLikelihoodFamily)
+    if has_it and observed is not None:
+        raise ValueError(
+            'surrogate="log_likelihood" takes no observed: the simulator compares with the data '
+            f"itself, and returns the log likelihood; leave it out, got {observed!r:.100}"
+        )
+    if not has_it and observed is None:
+        raise ValueError(
+            "observed must be an array of numbers, got None; a simulator that returns the log "
+            'likelihood needs surrogate="log_likelihood", losses need fit_losses'
+        )
 
 
 def _options(name: str) -> set[str]:

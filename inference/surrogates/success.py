@@ -10,6 +10,8 @@ from ..gp.process import GP, Data, condition, padded, padded_rows, predict
 
 KERNEL_WIDTH = 0.1  # in prior quantiles
 PRIOR_SUCCESSES = 0.05  # successes that are assumed everywhere
+BEST_SHARE = 0.25  # of the runs, which tell how far discrepancies spread
+MAX_DEVIATIONS = 1e6  # of that spread
 
 
 class Feasibility(NamedTuple):
@@ -17,6 +19,15 @@ class Feasibility(NamedTuple):
 
     u: np.ndarray  # [p, d]
     succeeded: np.ndarray  # bool [p]
+
+
+def sane(discrepancy: np.ndarray) -> np.ndarray:
+    """Which of the discrepancies [n] are not absurdly larger than the best quarter, bool [n]; NaN
+    is. Most runs may have blown up, or hold a number such as 1e16 in place of infinity."""
+    deviation = discrepancy - np.nanmin(discrepancy, initial=np.inf)
+    finite = deviation[np.isfinite(deviation)]
+    spread = np.quantile(finite, BEST_SHARE) if finite.size else 0.0
+    return ~(deviation > MAX_DEVIATIONS * spread) | (spread == 0.0)
 
 
 def log_feasible(runs: Feasibility, u: np.ndarray) -> np.ndarray:

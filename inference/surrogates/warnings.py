@@ -5,6 +5,7 @@ import numpy as np
 
 from .._lazy import stats
 from ..history import History
+from ..simulations.failures import Failure
 from .held_back import HeldBack
 
 FALSE_ALARMS = 1e-3  # of each leave-one-out check, were its errors independent and normal
@@ -28,6 +29,14 @@ FEW_NUMBERS = (
 UNLEARNED = (
     "much of the posterior lies where hardly anything was simulated: what is not known there "
     "counts as agreement; simulate more, or narrow the prior"
+)
+UNCERTAIN = (
+    "much of what may be the posterior lies where the log likelihood is hardly known, and does not "
+    "count there: the posterior may be too narrow, or miss a part; simulate more"
+)
+NEGATIVE = (
+    "some discrepancies are negative: if they are minus a log likelihood, let the simulator return "
+    'the log likelihood, with surrogate="log_likelihood", whose posterior needs no threshold'
 )
 LOW_THRESHOLD = (
     "the threshold lies below all that a simulation can be expected to come to: where the "
@@ -122,7 +131,8 @@ def _too_large(errors: np.ndarray, matters: float) -> bool:
 def history_warnings(history: History) -> list[str]:
     """That most simulations failed, and that equal seeds gave unlike signals."""
     told, succeeded = len(history.theta), int(history.succeeded.sum())
-    failed, contradicting = told - succeeded, history.contradicting
+    failed = told - succeeded - history.failures.get(Failure.IMPOSSIBLE.value, 0)
+    contradicting = history.contradicting
     said = []
     if failed > FAILED_SHARE * told:
         last = [error for error in history.errors if error][-1]
@@ -198,6 +208,6 @@ def unreached_warnings(observed: np.ndarray, simulated: np.ndarray, noise: float
         return []
     return [
         f"the observed number, {observed[0]:.4g}, lies {side} all {len(distance)} simulated ones, "
-        f"{near[0]:.4g} from the nearest: if they are losses, say so by discrepancy=, such as "
-        "lambda observed, simulated: float(simulated[0]); else widen the prior, or give noise="
+        f"{near[0]:.4g} from the nearest: if they are losses, as sums of squares, give them "
+        "to fit_losses, or say so by discrepancy=; else widen the prior, or give noise="
     ]
