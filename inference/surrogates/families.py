@@ -299,7 +299,9 @@ class LogLikelihoodLearner:
     def finish(self, known: Learnable, seed: int) -> Surrogate:
         """The surrogate on which a fit rests: it is cautious, while a search is not."""
         learned = self.learn(known, None)
-        return replace(learned, state=learned.state._replace(caution=np.ones(())))
+        return replace(
+            learned, state=learned.state._replace(caution=np.ones(()), optimism=np.zeros(()))
+        )
 
 
 def _unlikely(signal: np.ndarray) -> str:

@@ -30,6 +30,8 @@ from .warnings import EQUAL, UNCERTAIN, complaints
 LINEAR = 40.0  # nats below the best, from where on depth counts by its logarithm
 MAX_FOLDS = 30.0  # powers of e by which a predicted depth may exceed LINEAR: overflow
 MIN_SD_SHARE = 0.05  # of the usual sd that is given, below which noise is not believed
+MAX_RISE = 10.0  # nats above the best value, which a fit may predict
+OPTIMISM = 2.0  # sds, of a search: where a run was unlucky others are to be made
 UPPER_QUARTILE = float(ndtri(0.75))
 MAX_SD = 1.5  # of a log likelihood that is known, in nats
 MAX_UNCERTAIN_SHARE = 0.2  # of what may be the posterior, from which a fit warns
@@ -38,14 +40,16 @@ MAX_UNCERTAIN_SHARE = 0.2  # of what may be the posterior, from which a fit warn
 class LevelState(NamedTuple):
     """What the likelihood depends on; the process is one of (compressed depth - location) / spread.
 
-    `caution` is 1 for the harmonic mean of what the likelihood may be, 0 for its median.
+    A fit takes the harmonic mean of what the likelihood may be, a search the bound that lies
+    `optimism` sds above its median.
     """
 
     gp: GP
     top: np.ndarray  # [], the best log likelihood
     location: np.ndarray  # []
     spread: np.ndarray  # [], in nats near the top
-    caution: np.ndarray  # []
+    caution: np.ndarray  # [], 1 for the harmonic mean, 0 for the median
+    optimism: np.ndarray  # [], 0 in a fit
     success: GP | None = None  # see `success.learn_success`
 
     def padded(self) -> "LevelState":
@@ -80,12 +84,14 @@ def log_likelihood(state: LevelState, u: Any) -> Any:
     Where its latent value has mean m and variance v, the median of the likelihood is exp(m)
     (Jarvenpaa et al. 2021), its mean exp(m + v / 2), which explodes where nothing is known, and
     its harmonic mean exp(m - v / 2): what is not known explains nothing. With `caution` it is the
-    last.
+    last. None exceeds the best value by more than MAX_RISE, lest an extrapolation outweigh P.
     """
+    xp = namespace(u)
     mean, variance = predict(state.gp, u)
     doubt = 0.5 * state.caution * state.spread**2 * variance[0]
-    height = state.location + state.spread * mean[0] + doubt
-    return state.top - expanded(height) + log_success(state.success, u)
+    hope = state.optimism * state.spread * xp.sqrt(variance[0])
+    height = state.location + state.spread * mean[0] + doubt - hope
+    return state.top - expanded(xp.maximum(height, -MAX_RISE)) + log_success(state.success, u)
 
 
 def log_second_moment(state: LevelState, u: np.ndarray, spread: np.ndarray | None) -> np.ndarray:
@@ -186,7 +192,7 @@ class LogLikelihoodSurrogate:
 
     def _uncertain(self) -> float:
         """Share of the median likelihood's posterior where its log is not known to MAX_SD."""
-        median = self.state._replace(caution=np.zeros(()))
+        median = self.state._replace(caution=np.zeros(()), optimism=np.zeros(()))
         target = Target(log_likelihood, median, self.gp.data.u.shape[1])
         population = explore(np.random.default_rng(0), target)
         weights = np.exp(population.log_weights - population.log_weights.max())
@@ -233,7 +239,9 @@ def learn(
     data = Data(u, ((heights - scale[0]) / scale[1])[None], normal, noise)
     hyper = maximum_a_posteriori(data) if kept is None else kept.gp.hyper
     numbers = (np.asarray(number) for number in (top, *scale))
-    state = LevelState(condition(hyper, data), *numbers, caution=np.zeros(()))
+    state = LevelState(
+        condition(hyper, data), *numbers, caution=np.zeros(()), optimism=np.asarray(OPTIMISM)
+    )
     return LogLikelihoodSurrogate(state, values, n if kept is None else kept.learned_at)
 
 

@@ -1,0 +1,214 @@
+"""Posteriors from losses and from log likelihoods, beside the same by a grid."""
+
+import numpy as np
+import numpyro.distributions as dist
+import pytest
+from bolfi_liquids.inference.surrogates.log_likelihood import compressed, expanded
+from bolfi_liquids.inference.surrogates.success import sane
+from bolfi_liquids.inference.surrogates.warnings import NEGATIVE, UNCERTAIN
+
+from bolfi_liquids import inference
+
+TIME = np.linspace(0.0, 5.0, 30)
+SD = 0.2
+DATA = 3.0 * np.exp(-0.8 * TIME) + SD * np.random.default_rng(4).normal(size=30)
+DECAY = inference.Prior({"height": dist.Uniform(0.5, 6), "rate": dist.Uniform(0.05, 3)})
+BOX = inference.Prior({"a": dist.Uniform(-3, 3), "b": dist.Uniform(-2, 6)})
+QUIET = {"progress": False, "warn": False}
+
+
+def losses(theta):
+    model = theta["height"][:, None] * np.exp(-theta["rate"][:, None] * TIME)
+    return np.sum((model - DATA) ** 2, axis=1)
+
+
+def trials():
+    """Sixty trials as an optimiser leaves them: dense near the best, and three that failed."""
+    rng = np.random.default_rng(5)
+    height = np.r_[rng.uniform(0.5, 6, 25), np.clip(3 + 0.3 * rng.normal(size=35), 0.5, 6)]
+    rate = np.r_[rng.uniform(0.05, 3, 25), np.clip(0.8 + 0.12 * rng.normal(size=35), 0.05, 3)]
+    theta = {"height": height, "rate": rate}
+    loss = losses(theta)
+    loss[[3, 30, 50]] = np.nan
+    return theta, loss
+
+
+def moments(fit, log_likelihood):
+    """Shift of the means in exact sds, and ratio of the sds, beside a grid of the prior."""
+    u = np.stack(np.meshgrid(*[(np.arange(400) + 0.5) / 400] * 2), -1).reshape(-1, 2)
+    theta = fit.prior.from_unit(u)
+    values = log_likelihood(theta)
+    weights = np.exp(values - values.max()) / np.exp(values - values.max()).sum()
+    drawn = fit.sample("quadrature", warn=False)["posterior"]
+    found = []
+    for name, column in theta.items():
+        mean = weights @ column
+        sd = np.sqrt(weights @ (column - mean) ** 2)
+        draws = drawn[name].to_numpy()
+        found.append(((draws.mean() - mean) / sd, draws.std() / sd))
+    return np.abs(np.array(found)[:, 0]).max(), np.array(found)[:, 1]
+
+
+def assert_near(fit, log_likelihood, shift=0.5, ratio=1.5):
+    off, ratios = moments(fit, log_likelihood)
+    assert off < shift and (ratios < ratio).all() and (ratios > 1.0 / ratio).all(), (off, ratios)
+
+
+def banana(theta):
+    return -0.5 * (theta["a"] / 0.7) ** 2 - 0.5 * ((theta["b"] - theta["a"] ** 2) / 0.3) ** 2
+
+
+def round_hill(theta):
+    return -0.5 * (theta["a"] / 0.4) ** 2 - 0.5 * ((theta["b"] - 2.0) / 0.5) ** 2
+
+
+def beside_a_cliff(theta):
+    return np.where(theta["a"] > 0.1, -np.inf, round_hill(theta))
+
+
+def test_a_table_of_losses_with_known_and_unknown_noise():
+    theta, loss = trials()
+    known = inference.fit_losses(theta, loss, DECAY, noise=SD)
+    assert_near(known, lambda t: -0.5 * losses(t) / SD**2, 0.1, 1.1)
+    assert known.failures == {"not finite": 3}
+    unknown = inference.fit_losses(theta, loss, DECAY, n=30)
+    assert_near(unknown, lambda t: -15.0 * np.log(losses(t)), 0.1, 1.1)
+    off, _ = moments(inference.fit_losses(theta, loss, DECAY, noise=SD), lambda t: -losses(t))
+    ratios = moments(known, lambda t: -0.5 * losses(t) / (3.0 * SD) ** 2)[1]
+    assert off < 1.0 and (ratios < 0.5).all()  # a wrong noise would be seen
+
+
+@pytest.mark.parametrize("factor", [1.0, 1e4])
+def test_depths_do_not_spoil_the_top(factor):
+    """Thousands or millions of nats below the best, where the model is off, too."""
+
+    def steep(theta):
+        far = np.maximum(np.abs(theta["a"]) - 1.5, 0.0)
+        return round_hill(theta) - factor * far**3
+
+    fit = inference.fit(lambda t, s: steep(t), BOX, surrogate="log_likelihood", budget=30, **QUIET)
+    assert_near(fit, steep, 0.2, 1.2)
+
+
+def noisy(log_likelihood, sd, told=False):
+    def simulate(theta, seeds):
+        noise = np.array([np.random.default_rng(seed).normal() for seed in seeds])
+        values = log_likelihood(theta) + sd * noise
+        return np.stack([values, np.full(len(seeds), sd)], -1) if told else values
+
+    return simulate
+
+
+@pytest.mark.parametrize("sd", [0.0, 1.0])
+def test_a_banana(sd):
+    fit = inference.fit(
+        noisy(banana, sd), BOX, surrogate="log_likelihood", budget=60, seed=1, **QUIET
+    )
+    assert_near(fit, banana, *((0.2, 1.25) if sd == 0.0 else (1.0, 2.0)))
+
+
+@pytest.mark.parametrize("told", [False, True])
+@pytest.mark.parametrize("sd", [1.0, 3.0])
+def test_noisy_log_likelihoods(sd, told):
+    fit = inference.fit(
+        noisy(round_hill, sd, told), BOX, surrogate="log_likelihood", budget=60, **QUIET
+    )
+    assert_near(fit, round_hill, 1.0, 2.0)
+
+
+@pytest.mark.parametrize("bad", [-np.inf, -1e16])
+def test_impossible_beyond_an_edge(bad):
+    def simulate(theta, seeds):
+        values = beside_a_cliff(theta)
+        return np.where(np.isfinite(values), values, bad)
+
+    fit = inference.fit(simulate, BOX, surrogate="log_likelihood", budget=50, **QUIET)
+    assert_near(fit, beside_a_cliff, 0.5, 1.5)
+    if bad == -np.inf:
+        assert fit.failures.keys() == {"impossible"}
+        assert not any("failed" in said for said in fit.warnings)
+
+
+def test_what_is_not_known_explains_nothing():
+    """Runs in a corner; the rest of the box, which none has seen, gets no mass."""
+    u = 0.3 * np.random.default_rng(0).random((30, 2))
+    theta = BOX.from_unit(u)
+    values = -0.5 * np.sum(((u - 0.15) / 0.04) ** 2, axis=1)
+    fit = inference.fit(
+        None, BOX, surrogate="log_likelihood", budget=0, earlier=(theta, values), warn=False
+    )
+    drawn = fit.sample("quadrature", warn=False)["posterior"]
+    far = (drawn["a"] > BOX.from_unit(np.full(2, 0.4))["a"]) | (drawn["b"] > 1.2)
+    assert far.mean() < 0.01
+    rough = np.random.default_rng(1).normal(0.0, 10.0, 30)  # nothing can be learned of these
+    told = inference.fit(
+        None, BOX, surrogate="log_likelihood", budget=0, earlier=(theta, rough), warn=False
+    )
+    assert UNCERTAIN in told.warnings and UNCERTAIN not in fit.warnings
+
+
+@pytest.mark.parametrize("sampler", ["nuts", "emcee"])
+def test_samplers_agree_with_quadrature(sampler):
+    fit = inference.fit_losses(*trials(), DECAY, noise=SD)
+    drawn, exact = (fit.sample(name)["posterior"] for name in (sampler, "quadrature"))
+    assert drawn.attrs["status"] == "converged"
+    for name in DECAY.names:
+        assert abs(drawn[name].mean() - exact[name].mean()) < 0.2 * exact[name].std()
+
+
+def test_depths_are_compressed_and_back():
+    depth = np.array([-5.0, 0.0, 39.0, 41.0, 1e3, 1e9])
+    np.testing.assert_allclose(expanded(compressed(depth)), depth)
+    assert compressed(np.array([1e16])) < 2000.0
+
+
+def test_most_runs_may_have_blown_up():
+    few = np.r_[np.arange(5.0), np.full(8, 1e16), np.nan]
+    np.testing.assert_array_equal(sane(few), few != 1e16)
+    assert sane(np.zeros(4)).all() and sane(np.full(3, np.nan)).all()
+
+
+def test_losses_as_output_are_sent_to_fit_losses():
+    theta, loss = trials()
+    fit = inference.fit(None, DECAY, [0.0], budget=0, earlier=(theta, loss[:, None]), **QUIET)
+    assert any("fit_losses" in said for said in fit.warnings)
+
+
+@pytest.mark.parametrize(("sign", "said"), [(1.0, True), (-1.0, False)])
+def test_minus_a_log_likelihood_as_discrepancy_is_sent_to_log_likelihood(sign, said):
+    def minus(observed, simulated):
+        return sign * float(simulated[0])
+
+    theta, loss = trials()
+    values = -1.0 - loss[:, None]
+    options = {"discrepancy": minus, "earlier": (theta, values)}
+    fit = inference.fit(None, DECAY, [0.0], budget=0, **options, **QUIET)
+    assert (NEGATIVE in fit.warnings) == said and "log_likelihood" in NEGATIVE
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({}, "either noise=.* or n="),
+        ({"noise": 1.0, "n": 3}, "either noise=.* or n="),
+        ({"noise": 0.0}, "noise must be positive"),
+        ({"n": 0}, "n must be an integer"),
+    ],
+)
+def test_bad_arguments_of_fit_losses(given, said):
+    with pytest.raises(ValueError, match=said):
+        inference.fit_losses(*trials(), DECAY, **given)
+
+
+def test_what_is_no_loss_and_no_log_likelihood_is_refused():
+    theta, loss = trials()
+    with pytest.raises(ValueError, match="sums of squares, from 0.*log_likelihood"):
+        inference.fit_losses(theta, -loss, DECAY, noise=SD)
+    with pytest.raises(ValueError, match="sums of squares, positive"):
+        inference.fit_losses(theta, 0.0 * loss, DECAY, n=30)
+    with pytest.raises(ValueError, match="takes no observed"):
+        inference.fit(noisy(banana, 0.0), BOX, [0.0], surrogate="log_likelihood")
+    with pytest.raises(ValueError, match="observed must be .*fit_losses"):
+        inference.fit(noisy(banana, 0.0), BOX)
+    with pytest.raises(ValueError, match=r"two with its sd, got a signal of \(3,\)"):
+        inference.fit(lambda t, s: np.zeros((len(s), 3)), BOX, surrogate="log_likelihood")
