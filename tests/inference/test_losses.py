@@ -1,5 +1,8 @@
 """Posteriors from losses and from log likelihoods, beside the same by a grid."""
 
+import re
+from importlib.resources import files
+
 import numpy as np
 import numpyro.distributions as dist
 import pytest
@@ -212,3 +215,16 @@ def test_what_is_no_loss_and_no_log_likelihood_is_refused():
         inference.fit(noisy(banana, 0.0), BOX)
     with pytest.raises(ValueError, match=r"two with its sd, got a signal of \(3,\)"):
         inference.fit(lambda t, s: np.zeros((len(s), 3)), BOX, surrogate="log_likelihood")
+
+
+def test_the_guide_s_example():
+    page = (files("bolfi_liquids.guide") / "simulator.md").read_text(encoding="utf-8")
+    section = page.split("\n## Losses and log likelihoods\n", 1)[1].split("\n## ", 1)[0]
+    (block,) = re.findall(r"```python\n(.*?)```", section, re.DOTALL)
+    made: dict = {}
+    exec(block, made)
+
+    def exact(t):
+        return -12.5 * (20 * (t["a"] - 1.2) ** 2 + 30 * (t["b"] - t["a"] ** 2 / 2) ** 2)
+
+    assert_near(made["fit"], exact, 0.3, 1.3)
