@@ -8,6 +8,7 @@ from typing import Any
 import jax
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import ndtr
 
 from ._float64 import in_float64
 from .acquisition.given import chosen, resolve_acquisition
@@ -27,7 +28,7 @@ from .history import (
 )
 from .notebook_display import as_html, as_text
 from .prior import Prior, check_support, checked_prior
-from .result import Fit
+from .result import Fit, Moments
 from .simulations.failures import Failure, incomparable, kind, unusable
 from .simulations.job import BATCH
 from .simulations.returned import told_signals
@@ -104,6 +105,7 @@ class Bolfi:
         }
         self._state = init(len(prior), self.observed.shape, self._learner.features)
         self._learned: Any = None  # the family's surrogate, once there is one
+        self._before: Moments | None = None  # the posterior of which `confirm` drew
         self._seconds = 0.0
 
     def __repr__(self) -> str:
@@ -177,6 +179,30 @@ class Bolfi:
         theta = self.prior.to_dict(asked)
         self._seconds += time.perf_counter() - started
         return theta
+
+    def confirm(self, fit: Fit, n: int = 3) -> dict[str, np.ndarray]:
+        """Draws of a fit's posterior to simulate, name -> [n].
+
+        The next `fit` says whether what was told since has moved the posterior, see
+        `Fit.confirmed`.
+
+        Args:
+            fit: What this engine's `fit` returned last.
+            n: How many draws.
+
+        Raises:
+            ValueError: bad argument.
+        """
+        n = checked_integer("n", n, 1, MOST_SIMULATIONS)
+        if not isinstance(fit, Fit) or fit.history is not self._state.history:
+            raise ValueError("fit must be what `fit` returned after the last simulation was told")
+        started = time.perf_counter()
+        self._before = fit.moments
+        drawn = fit.population.resample(np.random.default_rng([self.seed, self.asked]), n)
+        asked = self.prior.to_array(self.prior.from_unit(ndtr(drawn)))
+        self._state = remember_asked(self._state, asked, 0)
+        self._seconds += time.perf_counter() - started
+        return self.prior.to_dict(asked)
 
     def _designed_now(self, n: int) -> int:
         """How many of the next n points the start design provides."""
@@ -347,7 +373,7 @@ class Bolfi:
         fitted = self._learner.finish(known, self.seed)
         learned_from = history.distinct
         learned_from[learned_from] = self._learner.learnable(known.discrepancy)
-        spent = self._seconds + time.perf_counter() - started
+        self._seconds += time.perf_counter() - started
         made = Fit(
             prior=self.prior,
             observed=self.observed,
@@ -355,11 +381,18 @@ class Bolfi:
             learned=fitted,
             learned_from=learned_from,
             settings=self.settings,
-            seconds={"simulator": 0.0, **measured, "engine": spent},
+            seconds={"simulator": 0.0, **measured, "engine": self._seconds},
+            before=self._before,
         )
-        for complaint in made.warnings if warn else []:
-            warnings.warn(complaint, EmulatorWarning, stacklevel=stacklevel)
+        if warn:
+            complain(made, stacklevel + 1)
         return made
+
+
+def complain(fit: Fit, stacklevel: int) -> None:
+    """Raise each of a fit's complaints as an `EmulatorWarning`; 2 blames the caller."""
+    for complaint in fit.warnings:
+        warnings.warn(complaint, EmulatorWarning, stacklevel=stacklevel)
 
 
 def _located(measured: Measured, theta: Mapping[str, np.ndarray], seeds: np.ndarray) -> Measured:

@@ -18,11 +18,12 @@ from .notebook_display import as_html, as_text
 from .prior import Prior
 from .sampling.convergence import SamplingWarning
 from .sampling.draw import SAMPLERS, draw_posterior
-from .sampling.importance import explore
+from .sampling.importance import Population, explore
 from .sampling.target import Length, Target, log_likelihood
 from .surrogates.base import Surrogate
 from .surrogates.signal import SignalSurrogate
 from .surrogates.warnings import (
+    UNCONFIRMED,
     UNLEARNED,
     censored_warnings,
     history_warnings,
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+WIDER = 2.0
 UNLEARNED_VARIANCE = 0.1  # of targets of variance 1, beyond which little is known of them
 MAX_UNLEARNED_SHARE = 0.2  # of the posterior, from which that is said
 MOST_CHAINS, MOST_DRAWS = 1000, 1_000_000  # of one call: more would take days, or all memory
@@ -46,6 +48,19 @@ class Closest(NamedTuple):
     theta: dict[str, float]
     signal: np.ndarray
     discrepancy: float
+
+
+class Moments(NamedTuple):
+    """Mean and standard deviation of each parameter in a posterior, [d] each; in normal scores
+    of the prior."""
+
+    mean: np.ndarray
+    sd: np.ndarray
+
+    def agree(self, other: "Moments") -> bool:
+        """Whether means lie within the smaller sd, and no sd is twice as large as the other."""
+        near = np.abs(self.mean - other.mean) <= np.minimum(self.sd, other.sd)
+        return bool(near.all() and (np.abs(np.log(self.sd / other.sd)) < np.log(WIDER)).all())
 
 
 class SurrogateView:
@@ -96,6 +111,7 @@ class Fit:
         learned_from: Which simulations it knows, bool [n].
         settings: How the run was made.
         seconds: Time in the "simulator" and in the "engine" [s].
+        before: The posterior of which `Bolfi.confirm` drew last; None where it never did.
     """
 
     prior: Prior
@@ -105,6 +121,7 @@ class Fit:
     learned_from: np.ndarray
     settings: Mapping[str, object]
     seconds: Mapping[str, float]
+    before: Moments | None = None
 
     def __repr__(self) -> str:
         return as_text("Fit", self._shown())
@@ -135,6 +152,8 @@ class Fit:
         said = self.learned.warnings() + history_warnings(self.history) + self._data_warnings()
         if self._unlearned() > MAX_UNLEARNED_SHARE:
             said.append(UNLEARNED)
+        if self.confirmed is False:
+            said.append(UNCONFIRMED)
         learned, needed = int(self.learned_from.sum()), 2 * len(self.prior) + 2
         if learned < needed:
             said.append(
@@ -144,16 +163,30 @@ class Fit:
             )
         return said
 
+    @cached_property
+    @in_float64
+    def population(self) -> Population:
+        """Weighted points of the posterior, which depend on nothing but the surrogate."""
+        return explore(np.random.default_rng(0), self._target)
+
+    @property
+    def moments(self) -> Moments:
+        return Moments(*self.population.moments)
+
+    @property
+    def confirmed(self) -> bool | None:
+        """Whether what was simulated at draws of the posterior left it where it was; None where
+        nothing was."""
+        return None if self.before is None else self.before.agree(self.moments)
+
     @in_float64
     def _unlearned(self) -> float:
         """Posterior probability of places where the surrogate knows little of its targets."""
         gp = self.learned.state.gp
         if not len(gp.weights):  # nothing is predicted, which is said
             return 0.0
-        population = explore(np.random.default_rng(0), self._target)
-        weights = np.exp(population.log_weights - population.log_weights.max())
-        variance = predict(gp, ndtr(population.x))[1][0]
-        return float(weights @ (variance > UNLEARNED_VARIANCE) / weights.sum())
+        variance = predict(gp, ndtr(self.population.x))[1][0]
+        return float(self.population.weights @ (variance > UNLEARNED_VARIANCE))
 
     def _data_warnings(self) -> list[str]:
         """What the observed output itself shows where it is compared."""

@@ -39,6 +39,27 @@ class Population(NamedTuple):
     log_proposal: np.ndarray  # [n], log density of the mixture
     effective: float  # number of points, (sum w)^2 / sum w^2
 
+    @property
+    def weights(self) -> np.ndarray:
+        """Of the points, whose sum is 1 [n]."""
+        weights = np.exp(self.log_weights - self.log_weights.max())
+        return weights / weights.sum()
+
+    @property
+    def moments(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and standard deviation of each coordinate, [d] each."""
+        mean = self.weights @ self.x
+        return mean, np.sqrt(self.weights @ (self.x - mean) ** 2)
+
+    def resample(self, rng: np.random.Generator, count: int) -> np.ndarray:
+        """`count` points [count, d], the first drawn as they are weighted, the others in proportion
+        to what they add to the variance, too: there a posterior is known least."""
+        mean, sd = self.moments
+        outer = self.weights * np.sum(((self.x - mean) / sd) ** 2, axis=1)
+        first = rng.choice(len(self.x), 1, p=self.weights)
+        others = rng.choice(len(self.x), count - 1, p=outer / outer.sum())
+        return self.x[np.concatenate([first, others])]
+
 
 class _Points(NamedTuple):
     x: np.ndarray  # [n, d]

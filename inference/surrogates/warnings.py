@@ -29,6 +29,10 @@ UNLEARNED = (
     "much of the posterior lies where hardly anything was simulated: what is not known there "
     "counts as agreement; simulate more, or narrow the prior"
 )
+UNCONFIRMED = (
+    "runs at draws of the posterior moved it, more than once where more were made: it is not known "
+    "yet; simulate more, or narrow the prior"
+)
 LOW_THRESHOLD = (
     "the threshold lies below all that a simulation can be expected to come to: where the "
     "posterior lies is chance; give a larger threshold, or none"
