@@ -12,12 +12,14 @@ sample_stats: `lp`, log density over Phi^-1(u) of the prior quantiles u, and wha
 records. prior: as many draws. observed_data: `signal`. posterior_predictive: what the surrogate
 predicts at some draws, whose indices are its coordinate `draw`. constant_data: the surrogate's
 constants. emulator_checks: the surrogate's own checks for each simulation, NaN where it learned
-nothing from one, and its complaints in the attribute `warnings`. simulations: as `Fit.simulations`.
-The root's attributes hold how the run was made, and the seconds it took.
+nothing from one, and the fit's complaints in the attribute `warnings`. simulations: as
+`Fit.simulations`. The root's attributes hold how the run was made, the seconds it took, and
+`fit_status`.
 """
 
 from collections.abc import Mapping
 from importlib.metadata import version
+from typing import TYPE_CHECKING
 
 import arviz_base
 import numpy as np
@@ -27,7 +29,9 @@ from .history import History
 from .prior import Prior
 from .sampling.convergence import diagnose
 from .sampling.target import Chains
-from .surrogates.base import Surrogate
+
+if TYPE_CHECKING:
+    from .result import Fit
 
 PREDICTED_DRAWS = 50  # draws of each chain for which the surrogate predicts
 SAMPLE_DIMS = ("chain", "draw")
@@ -97,20 +101,15 @@ def results_tree(
     return tree
 
 
-def add_surrogate(
-    tree: xr.DataTree,
-    surrogate: Surrogate,
-    learned_from: np.ndarray,
-    u: np.ndarray,
-    rng: np.random.Generator,
-) -> None:
-    """Add what the surrogate says of itself: constant_data, posterior_predictive (at evenly
+def add_surrogate(tree: xr.DataTree, fit: "Fit", u: np.ndarray, rng: np.random.Generator) -> None:
+    """Add what a fit's surrogate says of itself: constant_data, posterior_predictive (at evenly
     spaced draws u [chain, draw, d], whose indices are its coordinate `draw`), emulator_checks.
 
-    The checks' first axis is the simulation, with rows of NaN where nothing was learned from one
-    (`learned_from`, bool [n]); their group's attribute `warnings` joins what the surrogate
-    complains of, one per line, and is empty where there is nothing.
+    The checks' first axis is the simulation, with rows of NaN where nothing was learned from one;
+    their group's attribute `warnings` joins what the fit complains of, one per line, and is empty
+    where there is nothing.
     """
+    surrogate = fit.learned
     constants = {name: np.asarray(value) for name, value in surrogate.constants().items()}
     if constants:
         tree["constant_data"] = arviz_base.from_dict({"constant_data": constants})["constant_data"]
@@ -126,11 +125,11 @@ def add_surrogate(
         tree["posterior_predictive"] = made["posterior_predictive"]
     checks = {}
     for name, values in surrogate.checks().items():
-        of_all = np.full((len(learned_from), *values.shape[1:]), np.nan)
-        of_all[learned_from] = values
+        of_all = np.full((len(fit.learned_from), *values.shape[1:]), np.nan)
+        of_all[fit.learned_from] = values
         axes = (f"{name}_dim_{i}" for i in range(values.ndim - 1))
         checks[name] = (["simulation", *axes], of_all)
-    attributes = {"warnings": "\n".join(surrogate.warnings())}
+    attributes = {"warnings": "\n".join(fit.warnings)}
     tree["emulator_checks"] = xr.DataTree(xr.Dataset(checks, attrs=attributes))
 
 

@@ -28,7 +28,7 @@ from .history import (
 )
 from .notebook_display import as_html, as_text
 from .prior import Prior, check_support, checked_prior
-from .result import Fit, Moments
+from .result import Before, Fit
 from .simulations.failures import Failure, incomparable, kind, unusable
 from .simulations.job import BATCH
 from .simulations.returned import told_signals
@@ -105,7 +105,7 @@ class Bolfi:
         }
         self._state = init(len(prior), self.observed.shape, self._learner.features)
         self._learned: Any = None  # the family's surrogate, once there is one
-        self._before: Moments | None = None  # the posterior of which `confirm` drew
+        self._before: Before | None = None  # the posterior of which `confirm` drew
         self._seconds = 0.0
 
     def __repr__(self) -> str:
@@ -197,7 +197,7 @@ class Bolfi:
         if not isinstance(fit, Fit) or fit.history is not self._state.history:
             raise ValueError("fit must be what `fit` returned after the last simulation was told")
         started = time.perf_counter()
-        self._before = fit.moments
+        self._before = Before(*fit.population.moments, self.told)
         drawn = fit.population.resample(np.random.default_rng([self.seed, self.asked]), n)
         asked = self.prior.to_array(self.prior.from_unit(ndtr(drawn)))
         self._state = remember_asked(self._state, asked, 0)

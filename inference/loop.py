@@ -23,7 +23,7 @@ from .arguments import (
 from .bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi, complain
 from .prior import Prior
 from .progress import progress_bar
-from .result import Fit
+from .result import MUCH_DOUBT, Fit
 from .simulations.bank import Simulation, SimulationBank, check_bank
 from .simulations.executors import Workers, check_executor, open_executor
 from .simulations.job import (
@@ -202,7 +202,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
                 seconds += simulation.seconds
                 advance(1)
             made = engine.fit({"simulator": seconds}, warn=False)
-            if made.confirmed:
+            if made.confirmed and made.doubt < MUCH_DOUBT:
                 break
     if warn:
         complain(made, stacklevel=3)

@@ -12,7 +12,6 @@ from scipy.special import ndtr
 
 from ._float64 import in_float64
 from .arguments import check_flag, checked_integer
-from .gp.process import predict
 from .history import History
 from .notebook_display import as_html, as_text
 from .prior import Prior
@@ -23,8 +22,8 @@ from .sampling.target import Length, Target, log_likelihood
 from .surrogates.base import Surrogate
 from .surrogates.signal import SignalSurrogate
 from .surrogates.warnings import (
+    DOUBTED,
     UNCONFIRMED,
-    UNLEARNED,
     censored_warnings,
     history_warnings,
     unreached_warnings,
@@ -37,8 +36,7 @@ if TYPE_CHECKING:
 
 
 WIDER = 2.0
-UNLEARNED_VARIANCE = 0.1  # of targets of variance 1, beyond which little is known of them
-MAX_UNLEARNED_SHARE = 0.2  # of the posterior, from which that is said
+MUCH_DOUBT = 1.5
 MOST_CHAINS, MOST_DRAWS = 1000, 1_000_000  # of one call: more would take days, or all memory
 
 
@@ -50,17 +48,22 @@ class Closest(NamedTuple):
     discrepancy: float
 
 
-class Moments(NamedTuple):
-    """Mean and standard deviation of each parameter in a posterior, [d] each; in normal scores
-    of the prior."""
+class Before(NamedTuple):
+    """A posterior before runs were made at draws of it.
+
+    Attributes:
+        mean, sd: Of each parameter [d], in normal scores of the prior.
+        told: Simulations that it knew.
+    """
 
     mean: np.ndarray
     sd: np.ndarray
+    told: int
 
-    def agree(self, other: "Moments") -> bool:
+    def agrees(self, mean: np.ndarray, sd: np.ndarray) -> bool:
         """Whether means lie within the smaller sd, and no sd is twice as large as the other."""
-        near = np.abs(self.mean - other.mean) <= np.minimum(self.sd, other.sd)
-        return bool(near.all() and (np.abs(np.log(self.sd / other.sd)) < np.log(WIDER)).all())
+        near = np.abs(self.mean - mean) <= np.minimum(self.sd, sd)
+        return bool(near.all() and (np.abs(np.log(self.sd / sd)) < np.log(WIDER)).all())
 
 
 class SurrogateView:
@@ -121,7 +124,7 @@ class Fit:
     learned_from: np.ndarray
     settings: Mapping[str, object]
     seconds: Mapping[str, float]
-    before: Moments | None = None
+    before: Before | None = None
 
     def __repr__(self) -> str:
         return as_text("Fit", self._shown())
@@ -130,18 +133,38 @@ class Fit:
         return as_html("Fit", self._shown())
 
     def _shown(self) -> list[tuple[str, str]]:
-        parameters = [f"{name} ~ {of['prior']}" for name, of in self.prior.describe().items()]
         failed = ", ".join(f"{n} {kind}" for kind, n in self.failures.items())
-        told = len(self.history.theta)
+        told, learned = len(self.history.theta), self.learned_from.sum()
+        surrogate = f"{self.settings['surrogate']!r}, of {learned} simulations"
         return [
-            ("parameters", ", ".join(parameters)),
+            ("parameters", ", ".join(self._quantiles())),
             ("simulations", f"{told}, failed: {failed or 'none'}"),
-            (
-                "surrogate",
-                f"{self.settings['surrogate']!r}, of {self.learned_from.sum()} simulations",
-            ),
+            ("discrepancy", self._discrepancies()),
+            ("surrogate", ", ".join([surrogate, *self.learned.described()])),
+            ("status", self.status),
             ("warnings", "; ".join(self.warnings) or "none"),
         ]
+
+    @in_float64
+    def _quantiles(self) -> list[str]:
+        """Median and 90 % interval of each parameter."""
+        theta = self.prior.from_unit(ndtr(self.population.x))
+        said = []
+        for name, values in theta.items():
+            order = np.argsort(values)
+            reached = np.cumsum(self.population.weights[order])
+            low, middle, high = np.interp((0.05, 0.5, 0.95), reached, values[order])
+            said.append(f"{name} {middle:.4g} ({low:.4g} to {high:.4g})")
+        return said
+
+    def _discrepancies(self) -> str:
+        """Of the closest run, and of those at draws of the posterior."""
+        said = f"{self.closest.discrepancy:.4g} of the closest run"
+        if self.before is None:
+            return said
+        drawn = self.history.discrepancy[self.before.told :]
+        worth = ", ".join("failed" if np.isnan(one) else f"{one:.4g}" for one in drawn)
+        return f"{said}, {worth} at draws of the posterior"
 
     @cached_property
     def warnings(self) -> list[str]:
@@ -149,9 +172,10 @@ class Fit:
         of the simulations failed; and that fewer were learned from than the 2 d + 2 that d
         parameters need: a level and a slope and a curvature along each parameter, and one more
         that could contradict."""
-        said = self.learned.warnings() + history_warnings(self.history) + self._data_warnings()
-        if self._unlearned() > MAX_UNLEARNED_SHARE:
-            said.append(UNLEARNED)
+        said = self.learned.warnings(confirmed=self.confirmed is True)
+        said += history_warnings(self.history) + self._data_warnings()
+        if self.doubt > MUCH_DOUBT:
+            said.append(DOUBTED)
         if self.confirmed is False:
             said.append(UNCONFIRMED)
         learned, needed = int(self.learned_from.sum()), 2 * len(self.prior) + 2
@@ -163,6 +187,16 @@ class Fit:
             )
         return said
 
+    @property
+    def status(self) -> str:
+        """ "fitted"; "not fitted", where parameters and noise do not explain what was observed; or
+        "not confirmed", where runs at draws of the posterior moved it, or none were made, or the
+        emulator's doubt makes it much wider."""
+        if not self.learned.fits:
+            return "not fitted"
+        sure = self.confirmed is True and self.doubt <= MUCH_DOUBT
+        return "fitted" if sure else "not confirmed"
+
     @cached_property
     @in_float64
     def population(self) -> Population:
@@ -170,23 +204,27 @@ class Fit:
         return explore(np.random.default_rng(0), self._target)
 
     @property
-    def moments(self) -> Moments:
-        return Moments(*self.population.moments)
-
-    @property
     def confirmed(self) -> bool | None:
         """Whether what was simulated at draws of the posterior left it where it was; None where
         nothing was."""
-        return None if self.before is None else self.before.agree(self.moments)
+        return None if self.before is None else self.before.agrees(*self.population.moments)
 
+    @cached_property
     @in_float64
-    def _unlearned(self) -> float:
-        """Posterior probability of places where the surrogate knows little of its targets."""
-        gp = self.learned.state.gp
-        if not len(gp.weights):  # nothing is predicted, which is said
-            return 0.0
-        variance = predict(gp, ndtr(self.population.x))[1][0]
-        return float(self.population.weights @ (variance > UNLEARNED_VARIANCE))
+    def doubt(self) -> float:
+        """How many times as far from where it would be, were the emulator sure, the posterior
+        lies, in the parameter of which that is most true: 1 where the simulator is as good as
+        known. The distance is a root mean square, in standard deviations of the sure posterior."""
+        found, target = self.population, self._target
+        surely = target._replace(state=target.state._replace(doubt=np.zeros(())))
+        at = ndtr(found.x)
+        change = log_likelihood(surely, at) - log_likelihood(target, at)
+        there = np.isfinite(found.log_weights + change)
+        log_weights = found.log_weights[there] + change[there]
+        known = found._replace(x=found.x[there], log_weights=log_weights)
+        (mean, sd), (sure_mean, sure_sd) = found.moments, known.moments
+        with np.errstate(divide="ignore"):  # one point is left
+            return float(np.max(np.hypot(sd, mean - sure_mean) / sure_sd))
 
     def _data_warnings(self) -> list[str]:
         """What the observed output itself shows where it is compared."""
@@ -320,10 +358,11 @@ class Fit:
         tree = results_tree(self.prior, made.chains, drawn, self.observed, self.simulations)
         tree["posterior"].attrs.update(status=made.status, draws_made=made.steps, **made.checks)
         rng = np.random.default_rng([seed, *b"predictive"])
-        add_surrogate(tree, self.learned, self.learned_from, made.chains.u, rng)
+        add_surrogate(tree, self, made.chains.u, rng)
         attributes: dict[str, object] = {
             **self.settings,
             **{"sampler": sampler, **length._asdict(), "extend": extend, "sampling_seed": seed},
+            "fit_status": self.status,
             **{f"seconds_{part}": spent for part, spent in seconds.items()},
         }
         return finished(tree, attributes)

@@ -23,6 +23,7 @@ MIN_EFFECTIVE = 400.0  # effective points at which one more round ends it
 BOX_EDGE = 1e-12  # quantile at which the box is cut, so that x = Phi^-1(u) stays finite
 MIN_LOG_POWER = -60.0  # log of the smallest inverse temperature
 HALVINGS = 30  # of the interval of log powers
+LEAST = 1e-12
 SHARPENED_WIDTH = 0.5  # width of half the proposals, while the temperature still has to fall
 
 
@@ -52,13 +53,15 @@ class Population(NamedTuple):
         return mean, np.sqrt(self.weights @ (self.x - mean) ** 2)
 
     def resample(self, rng: np.random.Generator, count: int) -> np.ndarray:
-        """`count` points [count, d], the first drawn as they are weighted, the others in proportion
-        to what they add to the variance, too: there a posterior is known least."""
+        """`count` different points [count, d], the first drawn as they are weighted, the others in
+        proportion to what they add to the variance, too: there a posterior is known least."""
         mean, sd = self.moments
-        outer = self.weights * np.sum(((self.x - mean) / sd) ** 2, axis=1)
-        first = rng.choice(len(self.x), 1, p=self.weights)
-        others = rng.choice(len(self.x), count - 1, p=outer / outer.sum())
-        return self.x[np.concatenate([first, others])]
+        first = rng.choice(len(self.x), p=self.weights)
+        distance = np.sum(((self.x - mean) / np.maximum(sd, LEAST)) ** 2, axis=1)
+        outer = self.weights * distance + LEAST  # of a posterior that is one point, too
+        outer[first] = 0.0
+        others = rng.choice(len(self.x), count - 1, replace=False, p=outer / outer.sum())
+        return self.x[np.append(others, first)]
 
 
 class _Points(NamedTuple):

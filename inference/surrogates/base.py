@@ -47,13 +47,27 @@ class Surrogate(Protocol):
         """What a reader of the posterior must know of the likelihood."""
         ...
 
+    def described(self) -> list[str]:
+        """What a reader of the fit should know first, in a few words."""
+        ...
+
     def checks(self) -> dict[str, np.ndarray]:
         """Of the emulator: `loo_z`, studentised leave-one-out errors [n, ...], a row for each
         simulation that was learned from."""
         ...
 
-    def warnings(self) -> list[str]:
-        """What these checks complain of, in sentences."""
+    @property
+    def fits(self) -> bool:
+        """Whether what was observed is explained."""
+        ...
+
+    def warnings(self, *, confirmed: bool = False) -> list[str]:
+        """What is complained of, in sentences.
+
+        Args:
+            confirmed: Runs at draws of the posterior left it where it was: then errors of the
+                emulator, which may lie far from it, are not complained of.
+        """
         ...
 
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:

@@ -50,6 +50,7 @@ from .warnings import (
     FEW_NUMBERS,
     MISFIT,
     OUTSIDE,
+    SMOOTH,
     UNPREDICTED,
     complaints,
     held_back_warnings,
@@ -61,6 +62,8 @@ SCREENED_POINTS = 128
 MISFIT_POINTS = 1024  # among which the smallest misfit is looked for
 MIN_FREEDOM = 3  # numbers more than parameters, from which the size of the noise can be told
 NEEDED = 0.95  # posterior probability of a misfit from which it is said
+LEAST_SEEN = 0.01  # of the outputs' sd, from which a misfit is worth a word
+SLOW = 0.9  # correlation of neighbouring samples from which noise looks like a signal
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,6 +159,12 @@ class SignalSurrogate:
             "measurement_noise_correlation": weights @ self.nodes.rho,
         }
 
+    def described(self) -> list[str]:
+        """The noise, and how it was found."""
+        noise = float(self.constants()["measurement_noise_sd"])
+        how = "estimated" if self.known is None else "given"
+        return [f"noise of sd {noise:.3g} in the first value, {how}"]
+
     @in_float64
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new simulated output's values at u [n, d]: [n, m], [n, m].
@@ -170,18 +179,49 @@ class SignalSurrogate:
         [n, components + 1], see `HeldBack`."""
         return {"loo_z": loo_errors(self.emulator), "foretold_z": self.held_back.errors}
 
+    @property
+    def fits(self) -> bool:
+        """Whether parameters and noise explain what was observed."""
+        if not self.emulator.basis.used:
+            return True
+        return not (self._missed() or self._smooth() or self._outside())
+
     @in_float64
-    def warnings(self) -> list[str]:
-        """What the emulator's own checks complain of."""
+    def warnings(self, *, confirmed: bool = False) -> list[str]:
+        """What the emulator's own checks complain of, unless it is confirmed, and what the data
+        show."""
         if self.emulator.basis.used == 0:
             return [EQUAL if self.emulator.equal else UNPREDICTED]
-        said = complaints(loo_errors(self.emulator), "output")
-        said += noise_warnings(noise_share(self.emulator)) + held_back_warnings(self.held_back)
-        if self.known is not None and self.misfit_probability > NEEDED:
+        said = [] if confirmed else complaints(loo_errors(self.emulator), "output")
+        said += noise_warnings(noise_share(self.emulator))
+        said += [] if confirmed else held_back_warnings(self.held_back)
+        if self._missed():
             said.append(MISFIT)
+        if self._smooth():
+            said.append(SMOOTH)
         if self.known is None and len(self.observed) - self.gp.data.u.shape[1] < MIN_FREEDOM:
             said.append(FEW_NUMBERS)
         return [OUTSIDE, *said] if self._outside() else said
+
+    def _missed(self) -> bool:
+        """Whether the given noise does not explain what was observed."""
+        return self.known is not None and self.misfit_probability > NEEDED
+
+    def _smooth(self) -> bool:
+        """Whether the noise that was found varies as slowly as a signal, and is most of what no
+        component can make of the data."""
+        if self.known is not None or not self.output.long:
+            return False
+        weights, (sigma, rho) = self.node_weights, self.nodes
+        slow = float(weights @ (sigma**2 * (rho > SLOW)))
+        most = 0.5 * max(self._residual**2, float(weights @ sigma**2))
+        return slow > max(most, LEAST_SEEN**2)
+
+    @property
+    def _residual(self) -> float:
+        """Root mean square of what no component can make of the data, standardised."""
+        basis = self.emulator.basis
+        return residual_size(basis.standardise(self.observed), basis.vectors[:, : basis.used])
 
     def _outside(self) -> bool:
         """Whether the observed scores are twice as far out as any simulated ones, or what no
@@ -191,8 +231,7 @@ class SignalSurrogate:
         reach = np.abs(self.gp.data.y[used]).max(1)
         error = np.sqrt(np.diagonal(self.reduced.covariance, axis1=1, axis2=2))[:, used]
         far = np.abs(self.reduced.estimate[:, used]) > 2.0 * reach + 3.0 * error
-        size = residual_size(basis.standardise(self.observed), basis.vectors[:, used])
-        return bool(far.any(1).all()) or (self.output.long and size > 1.0)
+        return bool(far.any(1).all()) or (self.output.long and self._residual > 1.0)
 
     @in_float64
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:

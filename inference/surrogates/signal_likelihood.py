@@ -29,6 +29,7 @@ class SignalState(NamedTuple):
     low: np.ndarray  # [d], ends of the box outside of which the likelihood vanishes
     high: np.ndarray
     success: GP | None = None  # see `success.learn_success`
+    doubt: np.ndarray = np.ones(())  # the part of the emulator's variance that counts
 
     def padded(self) -> "SignalState":
         """The same likelihood in arrays of few shapes."""
@@ -69,7 +70,7 @@ def node_log_densities(state: SignalState, u: Any) -> Any:
 def scores(state: SignalState, u: Any) -> tuple[Any, Any]:
     """Means and variances [n, k] of the scores at u; outside of the box, those at its end."""
     mean, variance = predict(state.gp, namespace(u).clip(u, state.low, state.high))
-    return mean.T * state.used, variance.T * state.used
+    return mean.T * state.used, variance.T * state.used * state.doubt
 
 
 def _wall(state: SignalState, u: Any) -> Any:

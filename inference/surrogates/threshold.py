@@ -19,6 +19,7 @@ class ThresholdState(NamedTuple):
     gp: GP  # k processes, one for each draw of the hyperparameters
     threshold: np.ndarray  # []
     success: GP | None = None  # see `success.learn_success`
+    doubt: np.ndarray = np.ones(())  # the part of the latent variance that counts
 
     def padded(self) -> "ThresholdState":
         """The same likelihood in arrays of few shapes."""
@@ -62,7 +63,7 @@ def _standardised(state: ThresholdState, u: Any) -> tuple[Any, Any]:
     """(eps - mu) / sigma and sigma^2, [n, k] each."""
     xp = namespace(u)
     mean, variance = predict(state.gp, u)
-    noisy = variance.T + xp.exp(2.0 * state.gp.hyper.log_noise)
+    noisy = state.doubt * variance.T + xp.exp(2.0 * state.gp.hyper.log_noise)
     return (state.threshold - mean.T) / xp.sqrt(noisy), noisy
 
 

@@ -21,13 +21,17 @@ MISFIT = (
     "posterior allows for a misfit of that size: look at the residual of the closest run, "
     "correct noise=, or simulate more"
 )
+SMOOTH = (
+    "what the simulator misses of what was observed varies as slowly as a signal: it lacks "
+    "something rather than that the data are noisy; look at the residual of the closest run"
+)
 FEW_NUMBERS = (
     "no noise was given, and so few numbers cannot tell its size from a misfit of the parameters': "
     "the posterior's width rests on a guess; give noise="
 )
-UNLEARNED = (
-    "much of the posterior lies where hardly anything was simulated: what is not known there "
-    "counts as agreement; simulate more, or narrow the prior"
+DOUBTED = (
+    "the posterior is much wider than the data make it: what a simulation would give is not known "
+    "well enough in places, which counts as agreement; simulate more, or narrow the prior"
 )
 UNCONFIRMED = (
     "runs at draws of the posterior moved it, more than once where more were made: it is not known "

@@ -34,5 +34,10 @@ def observed():
 @pytest.fixture(scope="session")
 def line_fit(simulate, prior, observed):
     return inference.fit(
-        simulate, prior, observed, budget=20, discrepancy=inference.squared_difference(TIME)
+        simulate,
+        prior,
+        observed,
+        budget=20,
+        confirm=0,
+        discrepancy=inference.squared_difference(TIME),
     )

@@ -9,7 +9,7 @@ from bolfi_liquids.inference.simulations.job import BATCH, simulation_seed
 from bolfi_liquids import inference
 
 BUDGET = 9
-SMALL = {"budget": BUDGET, "batch": 3, "vectorised": False}
+SMALL = {"budget": BUDGET, "batch": 3, "confirm": 0, "vectorised": False}
 
 
 def spoilt(simulate, indices, how=lambda signal: signal[:29]):
