@@ -195,13 +195,15 @@ class SignalSurrogate:
         said = [] if confirmed else complaints(loo_errors(self.emulator), "output")
         said += noise_warnings(noise_share(self.emulator))
         said += [] if confirmed else held_back_warnings(self.held_back)
-        if self._missed():
+        if self._outside():
+            said.append(OUTSIDE)
+        elif self._missed():
             said.append(MISFIT)
-        if self._smooth():
+        elif self._smooth():
             said.append(SMOOTH)
         if self.known is None and len(self.observed) - self.gp.data.u.shape[1] < MIN_FREEDOM:
             said.append(FEW_NUMBERS)
-        return [OUTSIDE, *said] if self._outside() else said
+        return said
 
     def _missed(self) -> bool:
         """Whether the given noise does not explain what was observed."""

@@ -372,7 +372,7 @@ def test_a_warning_that_is_an_error_loses_no_simulation(tmp_path, prior, observe
         calls.extend(seeds)
         return np.ones((len(seeds), 30))
 
-    given = {"budget": 12, "bank": tmp_path / "b.sqlite", "progress": False}
+    given = {"budget": 12, "confirm": 0, "bank": tmp_path / "b.sqlite", "progress": False}
     with pytest.raises(inference.EmulatorWarning, match="all simulations are equal"):
         inference.fit(constant, prior, observed, **given)
     fit = inference.fit(constant, prior, observed, warn=False, **given)

@@ -74,6 +74,7 @@ def test_a_run_on_which_the_discrepancy_fails_costs_itself_and_is_named(
             prior,
             observed,
             **SMALL,
+            warn=False,
             in_rounds=in_rounds,
             executor=pool if executor else None,
             discrepancy=lambda a, b: (
