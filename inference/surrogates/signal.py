@@ -163,7 +163,7 @@ class SignalSurrogate:
         """The noise, and how it was found."""
         noise = float(self.constants()["measurement_noise_sd"])
         how = "estimated" if self.known is None else "given"
-        return [f"noise of sd {noise:.3g} in the first value, {how}"]
+        return [f"measurement noise of sd {noise:.3g} in the first value, {how}"]
 
     @in_float64
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
