@@ -7,7 +7,7 @@ import numpy as np
 
 from ..arguments import checked_array
 from ..surrogates.base import Acquisition
-from .rules import RULES, CautiousDraws, LowerConfidenceBound
+from .rules import RULES, LowerConfidenceBound
 
 DIGITS, EDGE = 7, 1e-7  # of the prior quantiles that are asked, and how near the bounds
 
@@ -36,11 +36,10 @@ def resolve_acquisition(given: str | Acquisition | None, family: str, best: str)
             f"acquisition must be a name or an object to be called, got {acquisition!r:.100}"
         )
     _check_called(acquisition)
-    own = {LowerConfidenceBound: "lcb", CautiousDraws: "cautious"}
-    if type(acquisition) in own and family != "discrepancy":
+    if isinstance(acquisition, LowerConfidenceBound) and family != "discrepancy":
         raise ValueError(
-            f"the acquisition {own[type(acquisition)]!r} needs surrogate='discrepancy', got {family!r}; use one "
-            f"of {tuple(name for name in RULES if name not in own.values())}"
+            f"the acquisition 'lcb' needs surrogate='discrepancy', got {family!r}; use one "
+            f"of {tuple(name for name in RULES if name != 'lcb')}"
         )
     return cast(Acquisition, acquisition)
 

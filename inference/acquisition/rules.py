@@ -268,7 +268,9 @@ class CautiousDraws:
         first = n - int(n * self.share + generator(key).uniform())
         points = np.zeros((0, surrogate.gp.data.u.shape[1]))
         if first:
-            points = PosteriorDraws()(key, surrogate.cautious, first, feasibility)
+            points = PosteriorDraws()(
+                key, getattr(surrogate, "cautious", surrogate), first, feasibility
+            )
         if first == n:
             return points
         more = ExpectedIntegratedVariance()(key, surrogate.believe(points), n - first, feasibility)

@@ -43,7 +43,8 @@ from .warnings import (
     held_back_warnings,
 )
 
-MAX_WIDTH_RATIO = 2.5  # of the posterior and the exact one, as far as noise makes it
+MAX_WIDTH_RATIO = 2.0  # of the posterior and the exact one, as far as noise makes it
+BETWEEN = 0.25  # of the least simulated discrepancy: the least that is taken for its minimum
 WITHIN = 0.3  # of the largest likelihood, from which a run lies in the posterior
 MAX_DOUBT_OF_FEW = 0.25  # resolutions of sd, where no more than d runs lie there
 MIN_RESOLUTION = 1e-4  # of the spread of g(Delta)
@@ -108,8 +109,10 @@ class DiscrepancySurrogate:
     @in_float64
     def state(self) -> ThresholdState:
         threshold = (self.threshold - self.scale.location) / self.scale.spread
-        units = np.asarray([self.width, self.resolution]) / self.scale.spread
-        return ThresholdState(self.gp, np.asarray(threshold), *units, self.success)
+        width, resolution = (
+            np.asarray(part / self.scale.spread) for part in (self.width, self.resolution)
+        )
+        return ThresholdState(self.gp, np.asarray(threshold), width, resolution, self.success)
 
     @property
     @in_float64
@@ -285,7 +288,12 @@ def with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> Discrepanc
     if rule is None or isinstance(rule, Matched):
         d = learned.gp.data.u.shape[1]
         matching = Matched(d + UNKNOWN_FREEDOM) if rule is None else rule
-        threshold, width, ratio = matched(matching, *at_minimum(), learned.transform, d)
+        least = at_minimum()
+        mean, sd = (float(part[0]) for part in learned.predict(learned.minimum()[None]))
+        # between the runs the least may be lower, but not out of all proportion
+        if learned.transform.inverse(np.asarray(mean)) > BETWEEN * learned.discrepancy.min():
+            least = min(least, (mean, sd))
+        threshold, width, ratio = matched(matching, *least, learned.transform, d)
         return replace(learned, threshold=threshold, width=width, width_ratio=ratio)
     threshold = choose_threshold(rule, learned.discrepancy, learned.transform, at_minimum)
     return replace(learned, threshold=threshold, width=0.0, width_ratio=1.0)

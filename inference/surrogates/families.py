@@ -54,7 +54,9 @@ class DiscrepancyFamily:
         discrepancy: Callable (observed, simulated) -> float; None is `squared_difference()`.
         transform: "identity", "sqrt" or "log" of the discrepancy; None chooses by
             leave-one-out log predictive density.
-        threshold: Rule for eps, or a number on the discrepancy's own scale, which may be
+        threshold: Rule for eps; None makes the posterior as wide as the closest run's residual
+            suggests, see `threshold.matched`, or guesses of fewer than 3 numbers more than
+            parameters; or a number on the discrepancy's own scale, which may be
             negative where a user's discrepancy is, as a logarithm; see
             `threshold.choose_threshold`.
         hyper_draws: Posterior draws of the hyperparameters over which the likelihood of a fit

@@ -54,6 +54,7 @@ class Matched(NamedTuple):
 Threshold = str | float | Quantile | Predicted | Matched | None
 RULES = ("min_mean", "min_observed")
 MATCHED_QUANTILE, LEAST_QUANTILE = 0.2, 0.02  # of a new discrepancy at the minimum
+FAR_BELOW = 1e-9  # of the way from a logarithm's end to the least discrepancy
 EXCESSES = np.geomspace(1e-8, 1e4, 400)  # over the least discrepancy, in units of it
 LOG_LIKELIHOOD_VARIANCE = 0.5  # of one error, where the discrepancy is minus a log likelihood
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(48)
@@ -173,7 +174,8 @@ def check_rule(rule: Threshold) -> None:
     if not valid:
         raise ValueError(
             f"threshold must be one of {RULES}, Predicted(q) with 0 < q < 1, Quantile(q) with "
-            f"0 <= q <= 1, Matched(numbers) with numbers > 0, a finite number on the discrepancy's scale or None, got {rule!r}"
+            f"0 <= q <= 1, Matched(numbers) with numbers > 0, a finite "
+            f"number on the discrepancy's scale or None, got {rule!r}"
         )
 
 
@@ -209,6 +211,9 @@ def choose_threshold(
     if isinstance(rule, Quantile):
         return float(transform(np.quantile(discrepancy, rule.q)))
     number = float(rule)
+    if transform.offset < 0 or transform.signed:  # below lies nothing that was simulated
+        end = -transform.offset
+        return float(transform(max(number, end + FAR_BELOW * (discrepancy.min() - end))))
     if transform.name != "identity" and number + transform.offset <= 0:
         raise ValueError(
             f"threshold {rule} must be positive for the transform {transform.name!r}; "

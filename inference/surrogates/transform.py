@@ -14,16 +14,18 @@ class Transform(NamedTuple):
 
     name: str
     offset: float
+    signed: bool = False
 
     def __call__(self, discrepancy: np.ndarray) -> np.ndarray:
         return TRANSFORMS[self.name][0](np.asarray(discrepancy) + self.offset)
 
     def inverse(self, value: np.ndarray) -> np.ndarray:
-        """Delta where g(Delta + offset) = value; 0 where that would be negative."""
+        """Delta where g(Delta + offset) = value; 0 where that would be negative, unless some
+        discrepancies are."""
         if self.name == "identity":
             return np.asarray(value)
         raw = np.exp(value) if self.name == "log" else np.maximum(value, 0.0) ** 2
-        return np.maximum(raw - self.offset, 0.0) if self.offset >= 0 else raw - self.offset
+        return raw - self.offset if self.signed else np.maximum(raw - self.offset, 0.0)
 
     def log_jacobian(self, discrepancy: np.ndarray) -> np.ndarray:
         """log |dg / dDelta|."""
@@ -59,7 +61,9 @@ def candidates(name: str | None, discrepancy: np.ndarray) -> list[Transform]:
     names = ("identity",) if lowest < 0 else tuple(TRANSFORMS) if name is None else (name,)
     found = [Transform(n, 0.0 if n == "identity" else _offset(discrepancy)) for n in names]
     near = float(np.quantile(discrepancy, NEAR_SHARE)) - lowest
-    return [*found, Transform("log", near - lowest)] if name is None and near > 0 else found
+    return (
+        [*found, Transform("log", near - lowest, bool(lowest < 0))] if not name and near else found
+    )
 
 
 def _offset(discrepancy: np.ndarray) -> float:

@@ -6,6 +6,7 @@ import numpy as np
 from .._lazy import stats
 from ..history import History
 from .held_back import HeldBack
+from .squared_difference import independent
 
 FALSE_ALARMS = 1e-3  # of each leave-one-out check, were its errors independent and normal
 HELD_BACK_FALSE_ALARMS = 1e-2  # nominal share of good fits warned, see `held_back_warnings`
@@ -47,6 +48,11 @@ GUESSED = (
     "posterior's width rests on a guess; give threshold=, such as Matched(numbers) for a sum of "
     'that many squares, or use surrogate="signal" with noise='
 )
+SYSTEMATIC = (
+    "the errors of the closest simulation hang together: the simulator lacks something, or what "
+    "fits better was not found; the posterior allows for errors of that size; simulate more, or "
+    'use surrogate="signal"'
+)
 UNEVEN = (
     "a few of the observed numbers make up nearly all of the discrepancy, even of the closest "
     "simulation: the others count for nothing; give a discrepancy of logarithms or of errors in "
@@ -70,6 +76,8 @@ NEAR_RUNS = 5  # whose spread tells how closely runs approach what was observed
 NOISE_SDS = 3.0  # up to which noise explains that no run reaches what was observed
 OUTSIDE_VARIANCES = 4.0  # of the runs, beyond which the closest run's misfit is far off
 UNEVEN_SHARE = 0.1  # of the root mean square error, below which the median error is too small
+ROUGHER = 0.9  # share of the runs, of which the others are as rough as the data
+SYSTEMATIC_SHARE = 0.15  # of the numbers, to which a residual amounts that is no noise
 MIN_ROUGH = 8  # numbers of which unevenness, and samples of which roughness, is judged
 NOISY_SHARES = (0.9, 0.5)  # shares of run-to-run noise in the variance that deserve a word
 
@@ -244,6 +252,9 @@ def distance_warnings(observed: np.ndarray, outputs: np.ndarray) -> list[str]:
     said = []
     if (np.sum(error**2, 0) > OUTSIDE_VARIANCES * np.sum(runs.var(0), 0)).any():
         said.append(f'{OUTSIDE}; surrogate="signal" may say which part')
+    residual = np.where(there, error, np.nan)
+    if t >= MIN_ROUGH and independent(residual) < SYSTEMATIC_SHARE * there.sum():
+        said.append(SYSTEMATIC)
     size = np.abs(error[there])
     if size.size >= MIN_ROUGH and np.median(size) < UNEVEN_SHARE * np.sqrt(np.mean(size**2)):
         said.append(UNEVEN)
@@ -251,4 +262,4 @@ def distance_warnings(observed: np.ndarray, outputs: np.ndarray) -> list[str]:
         return said
     rough = np.mean(np.diff(runs, 4, axis=1) ** 2, axis=(1, 2))
     data = np.mean(np.diff(observed.reshape(t, -1), 4, axis=0) ** 2)
-    return [*said, TOO_SMOOTH] if rough[0] < data / 4.0 < np.median(rough) else said
+    return [*said, TOO_SMOOTH] if rough[0] < data / 4.0 < np.quantile(rough, ROUGHER) else said
