@@ -1,6 +1,6 @@
 """The families of surrogates: what a user may choose of each, and how it learns."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import ClassVar, NamedTuple
@@ -18,12 +18,14 @@ from .given_noise import GivenNoise, given_noise
 from .outliers import sane
 from .output_vectors import Output, Summary, describe, infinities, summarise
 from .signal import Noise, SignalSurrogate, observe
-from .squared_difference import evaluate, failed_on, squared_difference
+from .squared_difference import evaluate, failed_on, independent, numbers, squared_difference
 from .success import Feasibility, learn_success
-from .threshold import Threshold, check_rule
+from .threshold import Matched, Threshold, check_rule
 from .transform import TRANSFORMS
+from .warnings import GUESSED, distance_warnings
 
 MAX_COMPONENTS = 8
+MIN_FREEDOM = 3  # numbers more than parameters, from which the size of the noise can be told
 
 
 class Learnable(NamedTuple):
@@ -52,7 +54,9 @@ class DiscrepancyFamily:
         discrepancy: Callable (observed, simulated) -> float; None is `squared_difference()`.
         transform: "identity", "sqrt" or "log" of the discrepancy; None chooses by
             leave-one-out log predictive density.
-        threshold: Rule for eps, or a number on the discrepancy's own scale, which may be
+        threshold: Rule for eps; None makes the posterior as wide as the closest run's residual
+            suggests, see `threshold.matched`, or guesses of fewer than 3 numbers more than
+            parameters; or a number on the discrepancy's own scale, which may be
             negative where a user's discrepancy is, as a logarithm; see
             `threshold.choose_threshold`.
         hyper_draws: Posterior draws of the hyperparameters over which the likelihood of a fit
@@ -60,7 +64,7 @@ class DiscrepancyFamily:
     """
 
     name: ClassVar[str] = "discrepancy"
-    acquisition: ClassVar[str] = "eiv"
+    acquisition: ClassVar[str] = "cautious"
     replicates: ClassVar[bool] = False
 
     discrepancy: Discrepancy | None = None
@@ -88,7 +92,10 @@ class DiscrepancyLearner:
     family: DiscrepancyFamily
     distance: Discrepancy
     observed: np.ndarray
-    features: ClassVar[int] = 0
+
+    @property
+    def features(self) -> int:
+        return self.observed.size
 
     @property
     def any_shape(self) -> bool:
@@ -96,30 +103,60 @@ class DiscrepancyLearner:
         return self.family.discrepancy is not None
 
     def measure(self, signals: Sequence[np.ndarray | None]) -> Measured:
-        """Features [n, 0] and discrepancies of n signals, None where a run failed."""
-        return Measured(
-            np.zeros((len(signals), 0)), *evaluate(self.distance, self.observed, signals)
-        )
+        """Features [n, m] and discrepancies of n signals, None where a run failed.
+
+        The features are the signal, NaN where it has another shape than what was observed.
+        """
+        features = np.full((len(signals), self.observed.size), np.nan)
+        for row, signal in zip(features, signals, strict=True):
+            if signal is not None and signal.shape == self.observed.shape:
+                row[:] = signal.ravel()
+        return Measured(features, *evaluate(self.distance, self.observed, signals))
 
     def learnable(self, discrepancy: np.ndarray) -> np.ndarray:
-        """Which of the successful simulations are learned from, bool [n]: all."""
-        return np.ones(len(discrepancy), bool)
+        """Which of the successful simulations are learned from, bool [n]: what blew up is not."""
+        return sane(discrepancy)
 
     def learn(
         self, known: Learnable, previous: DiscrepancySurrogate | None
     ) -> DiscrepancySurrogate:
-        transform, rule = self.family.transform, self.family.threshold
-        learned = learn(known.u, known.discrepancy, transform, previous, known.normal)
+        """To search with: errors count as independent, lest a poor start leave it undecided."""
+        return self._learn(known, previous, self._rule(known, numbers))
+
+    def _learn(
+        self, known: Learnable, previous: DiscrepancySurrogate | None, rule: Threshold
+    ) -> DiscrepancySurrogate:
+        transform = self.family.transform
+        good = self.learnable(known.discrepancy)
+        learned = learn(known.u[good], known.discrepancy[good], transform, previous, known.normal)
         learned = replace(learned, success=learn_success(known.runs, known.normal))
         return learned if rule is None else with_threshold(learned, rule)
 
+    def _rule(self, known: Learnable, number: Callable[..., float]) -> Threshold:
+        """The threshold that was given, or the one that fits the closest run's residual."""
+        residual = self._residual(known)
+        if self.family.threshold is not None or numbers(residual) - known.u.shape[1] < MIN_FREEDOM:
+            return self.family.threshold
+        return Matched(number(residual))
+
+    def _residual(self, known: Learnable) -> np.ndarray:
+        """By which the closest run misses what was observed, NaN where nothing can be said."""
+        closest = known.features[np.argmin(known.discrepancy)]
+        return closest.reshape(self.observed.shape) - self.observed
+
     def finish(self, known: Learnable, seed: int) -> Surrogate:
         """The surrogate on which a fit rests."""
-        learned = self.learn(known, None)
-        draws = self.family.hyper_draws
-        if not draws:
-            return learned
-        return marginalised(learned, self.family.threshold, draws, seed)
+        rule = self._rule(known, independent)
+        learned, draws = self._learn(known, None, rule), self.family.hyper_draws
+        if draws:
+            learned = marginalised(learned, rule, draws, seed)
+        said = () if rule is not None else (GUESSED,)
+        if self.family.discrepancy is None:
+            good = self.learnable(known.discrepancy)
+            order = np.argsort(known.discrepancy[good])
+            outputs = known.features[good][order].reshape(-1, *self.observed.shape)
+            said += tuple(distance_warnings(self.observed, outputs))
+        return replace(learned.cautious, said=said)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ import numpy as np
 from .._lazy import stats
 from ..history import History
 from .held_back import HeldBack
+from .squared_difference import independent
 
 FALSE_ALARMS = 1e-3  # of each leave-one-out check, were its errors independent and normal
 HELD_BACK_FALSE_ALARMS = 1e-2  # nominal share of good fits warned, see `held_back_warnings`
@@ -41,6 +42,35 @@ LOW_THRESHOLD = (
     "the threshold lies below all that a simulation can be expected to come to: where the "
     "posterior lies is chance; give a larger threshold, or none"
 )
+UNRESOLVED = (
+    "the discrepancy is not resolved where it is least: too few simulations lie there, or what "
+    "the surrogate does not know exceeds what the threshold tells apart; simulate more, or use "
+    'surrogate="signal"'
+)
+WIDE = (
+    "run-to-run noise of the discrepancy makes the posterior much wider than the data do: average "
+    'the noise out, or use surrogate="signal"'
+)
+GUESSED = (
+    "how far a discrepancy may exceed its least value is not known of so few numbers: the "
+    "posterior's width rests on a guess; give threshold=, such as Matched(numbers) for a sum of "
+    'that many squares, or use surrogate="signal" with noise='
+)
+SYSTEMATIC = (
+    "the errors of the closest simulation hang together: the simulator lacks something, or what "
+    "fits better was not found; the posterior allows for errors of that size; simulate more, or "
+    'use surrogate="signal"'
+)
+UNEVEN = (
+    "a few of the observed numbers make up nearly all of the discrepancy, even of the closest "
+    "simulation: the others count for nothing; give a discrepancy of logarithms or of errors in "
+    'units of their noise, or use surrogate="signal" with such a summary'
+)
+TOO_SMOOTH = (
+    "the closest simulation is far smoother than what was observed, though others are as rough: a "
+    "sum of squares prefers too little noise, and cannot tell its size; give a discrepancy of "
+    'summaries that can, or use surrogate="signal" with them'
+)
 EQUAL = "all simulations are equal: the data cannot tell parameters apart"
 UNPREDICTED = (
     "the parameters predict nothing of what was simulated, as far as so few runs can tell from "
@@ -52,6 +82,11 @@ EQUAL_SHARE, LEAST_EQUAL = 0.25, 5  # of a channel's samples, from which they ma
 ROUNDED_SHARE = 1e-6  # of their range, to which data may be rounded without losing anything
 NEAR_RUNS = 5  # whose spread tells how closely runs approach what was observed
 NOISE_SDS = 3.0  # up to which noise explains that no run reaches what was observed
+OUTSIDE_VARIANCES = 4.0  # of the runs, beyond which the closest run's misfit is far off
+UNEVEN_SHARE = 0.1  # of the root mean square error, below which the median error is too small
+ROUGHER = 0.9  # share of the runs, of which the others are as rough as the data
+SYSTEMATIC_SHARE = 0.15  # of the numbers, to which a residual amounts that is no noise
+MIN_ROUGH = 8  # numbers of which unevenness, and samples of which roughness, is judged
 NOISY_SHARES = (0.9, 0.5)  # shares of run-to-run noise in the variance that deserve a word
 
 
@@ -209,3 +244,30 @@ def unreached_warnings(observed: np.ndarray, simulated: np.ndarray, noise: float
         f"{near[0]:.4g} from the nearest: if they are losses, say so by discrepancy=, such as "
         "lambda observed, simulated: float(simulated[0]); else widen the prior, or give noise="
     ]
+
+
+def distance_warnings(observed: np.ndarray, outputs: np.ndarray) -> list[str]:
+    """What the outputs show against a sum of squared differences.
+
+    Args:
+        observed: [t, ...], NaN where missing.
+        outputs: Of the simulations, the closest first [n, t, ...].
+    """
+    n, t = outputs.shape[:2]
+    there = np.isfinite(observed.reshape(t, -1))
+    error = np.where(there, (outputs[0] - observed).reshape(t, -1), 0.0)
+    runs = np.where(there, outputs.reshape(n, t, -1), 0.0)
+    said = []
+    if (np.sum(error**2, 0) > OUTSIDE_VARIANCES * np.sum(runs.var(0), 0)).any():
+        said.append(f'{OUTSIDE}; surrogate="signal" may say which part')
+    residual = np.where(there, error, np.nan)
+    if t >= MIN_ROUGH and independent(residual) < SYSTEMATIC_SHARE * there.sum():
+        said.append(SYSTEMATIC)
+    size = np.abs(error[there])
+    if size.size >= MIN_ROUGH and np.median(size) < UNEVEN_SHARE * np.sqrt(np.mean(size**2)):
+        said.append(UNEVEN)
+    if t < MIN_ROUGH or not there.all():
+        return said
+    rough = np.mean(np.diff(runs, 4, axis=1) ** 2, axis=(1, 2))
+    data = np.mean(np.diff(observed.reshape(t, -1), 4, axis=0) ** 2)
+    return [*said, TOO_SMOOTH] if rough[0] < data / 4.0 < np.quantile(rough, ROUGHER) else said

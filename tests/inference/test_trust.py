@@ -6,9 +6,13 @@ import pytest
 from bolfi_liquids.inference.surrogates.warnings import (
     DOUBTED,
     FEW_NUMBERS,
+    GUESSED,
     LOW_THRESHOLD,
     MISFIT,
+    TOO_SMOOTH,
     UNCONFIRMED,
+    UNEVEN,
+    distance_warnings,
 )
 
 from bolfi_liquids import inference
@@ -104,3 +108,49 @@ def test_a_budget_is_exceeded_by_half_at_most():
     for confirm, most in ((0, 8), (2, 12), (3, 11)):
         made = inference.fit(narrow, prior, data, confirm=confirm, **options)
         assert 8 + confirm <= len(made.history.theta) <= most
+
+
+PAPER = {"surrogate": "discrepancy"}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_sum_of_squares_gives_the_exact_posterior(seed):
+    """Against a grid: independent noise whose size nothing tells but the residual."""
+    fit = inference.fit(
+        decay, PRIOR, DATA, budget=30, seed=seed, progress=False, warn=False, **PAPER
+    )
+    drawn = fit.sample("quadrature", warn=False)["posterior"]
+    axes = np.meshgrid(np.linspace(2.5, 3.5, 201), np.linspace(0.6, 1.1, 201), indexing="ij")
+    height, rate = (axis.ravel() for axis in axes)
+    misfit = np.sum((decay({"height": height, "rate": rate}, None) - DATA) ** 2, 1)
+    weights = np.exp(-15.0 * np.log(misfit / misfit.min()))
+    for name, grid in (("height", height), ("rate", rate)):
+        mean = np.average(grid, weights=weights)
+        sd = np.sqrt(np.average((grid - mean) ** 2, weights=weights))
+        assert abs(float(drawn[name].mean()) - mean) < sd
+        assert 0.5 < float(drawn[name].std()) / sd < 3.0
+
+
+def test_data_far_outside_are_said_by_the_discrepancy_too():
+    assert any("far outside" in said for said in warnings_of(decay, DATA + 50.0, **PAPER))
+    assert not any("far outside" in said for said in warnings_of(decay, DATA, **PAPER))
+
+
+def test_a_discrepancy_of_one_number_leaves_the_width_to_guess():
+    def loss(theta, seeds):
+        return np.sum((decay(theta, seeds) - DATA) ** 2, 1)[:, None]
+
+    own = {"discrepancy": lambda observed, simulated: float(simulated[0])}
+    assert GUESSED in warnings_of(loss, [0.0], **own)
+    assert GUESSED not in warnings_of(loss, [0.0], **own, threshold=0.4)
+
+
+@pytest.mark.parametrize(("seen", "said"), [("few", UNEVEN), ("rough", TOO_SMOOTH), ("fair", None)])
+def test_what_a_sum_of_squares_cannot_see_is_said(seen, said):
+    rng = np.random.default_rng(0)
+    noise, run = rng.normal(size=(4, 40)), np.linspace(0.0, 9.0, 40)
+    size = {"few": 10.0 ** -np.linspace(0, 6, 40), "rough": 1.0, "fair": 1.0}[seen]
+    sizes = np.array({"rough": [0.05, 1.0, 2.0]}.get(seen, [1.0, 1.0, 1.0]))
+    outputs = run * np.array([1.0, 1.5, 2.0])[:, None] + size * sizes[:, None] * noise[:3]
+    found = distance_warnings(run + size * noise[3], outputs)
+    assert all((text in found) == (text == said) for text in (UNEVEN, TOO_SMOOTH))
