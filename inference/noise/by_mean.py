@@ -239,6 +239,10 @@ class ByMean:
         columns = zip(features.T, self._table.T, self._means.T, strict=True)
         return np.stack([np.interp(*column) for column in columns], axis=1)
 
+    @property
+    def unit(self) -> np.ndarray:
+        return np.ones(len(self.observed))
+
     def sds(self, values: np.ndarray) -> np.ndarray:
         return self.law.sd(values, self.counts)
 

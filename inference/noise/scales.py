@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from ..surrogates.given_noise import GivenNoise
+from ..surrogates.output_vectors import Output
 from .run_size import EQUAL_RUNS_TOLERANCE
 
 NEEDED_NATS = 6.0  # log likelihood that noise which grows with the mean must gain
@@ -36,6 +37,18 @@ class Scale(Protocol):
     def check(self, values: np.ndarray) -> None:
         """Raise ValueError if mean values [..., m] have no measurement noise of this kind."""
         ...
+
+    @property
+    def unit(self) -> np.ndarray | None:
+        """Sd of the noise of each feature [m]; None where it is not known to be the same for all
+        runs."""
+        ...
+
+
+def comparable(scale: Scale, output: Output) -> Callable[[np.ndarray], np.ndarray]:
+    """What makes features comparable: features [n, m] -> [m]."""
+    unit = scale.unit
+    return output.scale if unit is None else lambda _: unit
 
 
 def in_units(scale: Scale, features: np.ndarray, sd: np.ndarray) -> np.ndarray:
@@ -73,11 +86,13 @@ class Plain:
         given: The measurement noise; it is zero or unknown where values are stretched.
         stretch: None for none.
         offset: Added before [m].
+        unit: Sd of the run-to-run noise of stretched values [m].
     """
 
     given: GivenNoise | None
     stretch: Stretch | None = None
     offset: np.ndarray | float = 0.0
+    unit: np.ndarray | None = None
 
     def of(self, values: np.ndarray) -> np.ndarray:
         return values if self.stretch is None else self.stretch.of(values + self.offset)
@@ -127,10 +142,11 @@ class Plain:
         if max(gains) < NEEDED_NATS:
             return self
         best = kinds[int(np.argmax(gains))]
-        if best.power == 2:
-            return replace(self, stretch=best)
-        unit = np.bincount(channel, difference.sum(0)) / np.bincount(channel, mean.sum(0))
-        return replace(self, stretch=best, offset=ANSCOMBE * unit[channel])
+        total = np.bincount(channel, (mean**best.power).sum(0))
+        unit = (np.bincount(channel, difference.sum(0)) / np.where(total > 0.0, total, 1.0))[channel]
+        offset = ANSCOMBE * unit if best.power == 1 else 0.0
+        noise = np.sqrt(np.where(unit > 0.0, unit, 1.0))
+        return replace(self, stretch=best, offset=offset, unit=noise)
 
 
 def repeated(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -76,17 +76,8 @@ class Emulator(NamedTuple):
         return self.basis.used == 0 and self.remainder.total == 0.0
 
     @property
-    def varies(self) -> bool:
-        """Whether runs at equal parameters differ, as far as any were repeated."""
-        return bool(self._repeats().any()) or not len(self._repeats())
-
-    @property
-    def repeated(self) -> bool:
-        """Whether there are runs at equal parameters."""
-        return len(self._repeats()) > 0
-
-    def _repeats(self) -> np.ndarray:
-        """Of each run at the parameters of one before: whether its output differs."""
+    def repeats(self) -> np.ndarray:
+        """Of each run at the parameters of one before: whether its output differs, bool [r]."""
         n = len(self.outputs)
         first, which = np.unique(
             self.gp.data.u[:n], axis=0, return_index=True, return_inverse=True
@@ -166,13 +157,14 @@ def resized(emulator: Emulator, scale: Callable[[np.ndarray], np.ndarray]) -> Em
     """The same with run-to-run noise whose size depends on the parameters, if errors show that.
 
     Goldberg et al. (1998), with the most likely size: a process of the logarithm of each run's
-    leave-one-out error. Where nothing is gained, or noise is next to none, no bit changes.
+    leave-one-out error. Where nothing is gained, noise is next to none, or no runs of equal
+    parameters differ, no bit changes.
 
     Args:
         scale: As for `emulate`.
     """
     found = emulator
-    if noise_share(emulator) < MIN_NOISE_SHARE or not emulator.varies:
+    if noise_share(emulator) < MIN_NOISE_SHARE or not emulator.repeats.any():
         return emulator
     data = emulator.gp.data
     for _ in range(SIZE_ROUNDS):

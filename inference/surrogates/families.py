@@ -16,7 +16,7 @@ from ..arguments import (
     checked_number,
 )
 from ..noise.by_mean import ByMean, SdOfMean, law_of
-from ..noise.scales import Plain, Scale
+from ..noise.scales import Plain, Scale, comparable
 from ..simulations.failures import not_finite
 from ..types import Discrepancy
 from .base import Surrogate
@@ -254,7 +254,7 @@ class SignalLearner:
         if previous is not None and not goes_on(previous.emulator, previous.scale.of(values)):
             previous = None
         scale = self._fitting(u, values) if previous is None else previous.scale
-        emulator = self._emulator(u, scale.of(values), known.normal, previous)
+        emulator = self._emulator(known._replace(u=u, features=values), scale, previous)
         seen, noise = scale.of(self.values[None])[0], Noise(scale.given, self.family.misfit)
         observed = observe(emulator, self.output, seen, noise, previous)
         success = learn_success(known.runs, known.normal)
@@ -267,18 +267,13 @@ class SignalLearner:
         return self.scale.fitting(u, values, self.values, self.output.layout.channel)
 
     def _emulator(
-        self,
-        u: np.ndarray,
-        features: np.ndarray,
-        normal: np.ndarray | None,
-        previous: SignalSurrogate | None,
+        self, known: Learnable, scale: Scale, previous: SignalSurrogate | None
     ) -> Emulator:
         limits = Limits(self.family.components, self.family.predicted)
+        features, units = scale.of(known.features), comparable(scale, self.output)
         old = None if previous is None else previous.emulator
-        found = emulate(u, features, self.output.scale, limits, old, normal)
-        if old is not None or not self.family.varying_noise:
-            return found
-        return resized(found, self.output.scale)
+        found = emulate(known.u, features, units, limits, old, known.normal)
+        return found if old or not self.family.varying_noise else resized(found, units)
 
     def finish(self, known: Learnable, seed: int) -> Surrogate:
         """The surrogate on which a fit rests."""

@@ -10,7 +10,7 @@ from .._float64 import in_float64
 from ..gp.optimise import minimise_in_box
 from ..gp.process import GP, believe, predict_points
 from ..noise.run_size import run_spread
-from ..noise.scales import Plain, Scale, in_units
+from ..noise.scales import Plain, Scale, comparable, in_units
 from ..sobol import sobol
 from ..types import LogLikelihood, LogSecondMoment
 from .emulator import (
@@ -108,7 +108,7 @@ class SignalSurrogate:
     @cached_property
     def held_back(self) -> HeldBack:
         """Errors of the last simulations."""
-        return held_back(self.emulator, self.output.scale)
+        return held_back(self.emulator, comparable(self.scale, self.output))
 
     @property
     def log_likelihood(self) -> LogLikelihood:
@@ -198,7 +198,9 @@ class SignalSurrogate:
         error = np.sqrt(np.diagonal(self.reduced.covariance, axis1=1, axis2=2))[:, used]
         far = np.abs(self.reduced.estimate[:, used]) > 2.0 * reach + 3.0 * error
         size = residual_size(basis.standardise(self.observed), basis.vectors[:, used])
-        return bool(far.any(1).all()) or (self.output.long and size > 1.0)
+        varied = np.sum(basis.vectors**2) + self.emulator.remainder.total
+        differ = np.sqrt(varied / len(self.observed))  # what simulations differ by
+        return bool(far.any(1).all()) or (self.output.long and size > max(1.0, differ))
 
     @in_float64
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
