@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from scipy.special import xlogy
@@ -11,10 +11,11 @@ from scipy.special import xlogy
 from ..arguments import checked_array, checked_number
 from ..surrogates.given_noise import GivenNoise
 
-EXACT_TO = 3.0  # root of the deviance of one value up to which it is exact
-LARGEST_DEVIANCE = 1e12
-REACH, STEPS, ZOOMS = 5.0, 201, 4  # of the search for the mean that fits a value best
-TABLE = np.linspace(-20.0, 20.0, 401)  # logs of distances and ratios at which the scale is inverted
+DECADES = np.linspace(-25.0, 25.0, 1001)  # logs of the means, over the largest observed one
+LEAST_STEP = 1e-12  # of the scale, from one of them to the next
+TRUSTED = 3.0  # sds from an observed value, up to which its likelihood is looked at
+HALF_STEP = 0.5  # sds, over which its slope and curvature are taken
+LEAST_CURVATURE = 0.1  # where it is not convex, as far from an observed value
 ROUNDING = 1e-9  # relative: a mean that is negative by less counts as 0
 LARGEST_COUNT = 1e18  # that NumPy draws
 
@@ -131,26 +132,14 @@ def law_of(noise: object) -> Law | None:
     return Gaussian(noise) if callable(noise) else None
 
 
-class Line(NamedTuple):
-    """How features go on from a mean: over the scale on which noise is even."""
-
-    mean: np.ndarray  # [m]
-    even: np.ndarray
-    feature: np.ndarray
-    rise: np.ndarray
-
-    def at(self, even: np.ndarray) -> np.ndarray:
-        return self.feature + self.rise * (even - self.even)
-
-
 @dataclass(frozen=True, eq=False)
 class ByMean:
-    """Signed roots of the deviance between observed values and simulated means.
+    """Means on a scale on which their noise has sd 1: the integral of 1 / sd (Bartlett 1947).
 
-    Half their sum of squares is the log likelihood ratio of the best means and the simulated ones
-    (McCullagh and Nelder 1989, section 2.4): features with observed value 0 and Gaussian noise of
-    sd 1 have the very likelihood of the law. Beyond EXACT_TO they go on as straight lines over the
-    integral of 1 / sd, as a root or a logarithm: smooth, and far enough from 0 to exclude a mean.
+    There, the likelihood of each observed value is nearly Gaussian. `seen` is the Gaussian that has
+    its slope and curvature at given means: iterated with the means that fit best, the posterior has
+    the mode and the width of the exact one (Fisher's scoring; McCullagh and Nelder 1989, section
+    2.5).
 
     Attributes:
         law: Of the noise.
@@ -162,82 +151,43 @@ class ByMean:
     observed: np.ndarray
     counts: np.ndarray
 
+    rounds: ClassVar[int] = 3
+
     def __post_init__(self) -> None:
         self.law.check(self.observed)
 
-    @property
-    def given(self) -> GivenNoise:
-        m = len(self.observed)
-        return GivenNoise(np.ones(m), np.zeros((m, 0)))
-
     @cached_property
-    def best(self) -> np.ndarray:
-        """The mean of greatest likelihood for each value [m]."""
-        width = REACH * self.law.sd(self.observed, self.counts)
-        found = self.observed
-        for _ in range(ZOOMS):
-            tried = found + width * np.linspace(-1.0, 1.0, STEPS)[:, None]
-            density = self.law.log_density(self.observed, tried, self.counts)
-            found = np.take_along_axis(tried, density.argmax(0)[None], 0)[0]
-            width = 2.0 * width / (STEPS - 1)
-        return found
-
-    @cached_property
-    def _means(self) -> np.ndarray:
-        """Means from small to large [p, m], close together at the best one and at 0."""
-        size = np.maximum(self.law.sd(self.best, self.counts), np.abs(self.best))
-        steps = np.exp(TABLE)[:, None] * np.where(size > 0.0, size, 1.0 / self.counts)
-        ends = [self.best - steps, self.best + steps, -steps, steps]
-        return np.sort(np.concatenate([*ends, self.best[None]]), axis=0)
-
-    @cached_property
-    def _even(self) -> np.ndarray:
-        """The scale on which noise is 1 everywhere, the integral of 1 / sd, at `_means` [p, m]."""
-        sd = self.law.sd(self._means, self.counts)
+    def _table(self) -> tuple[np.ndarray, np.ndarray]:
+        """Means from small to large, close together at 0, and the integral up to them."""
+        size = np.abs(self.observed).max() or 1.0
+        above = size * np.exp(DECADES)
+        means = np.concatenate([-above[::-1], [0.0], above])
+        sd = self.law.sd(means, np.ones(len(means)))
         fine = np.isfinite(sd) & (sd > 0.0)
         rate = np.where(fine, 1.0 / np.where(fine, sd, 1.0), 0.0)
-        steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(self._means, axis=0)
-        return np.concatenate([np.zeros((1, len(self.best))), np.cumsum(steps, axis=0)])
-
-    @cached_property
-    def _ends(self) -> tuple[Line, Line]:
-        """Where the exact features end below and above the best mean, and how they go on."""
-        exact, means = self._exact(self._means), self._means
-        within = np.abs(exact) <= EXACT_TO
-        at = np.argmin(np.abs(means - self.best), axis=0)
-        rows = np.arange(len(means))[:, None]
-        low = np.where(within | (rows > at), -1, rows).max(0) + 1
-        high = np.where(within | (rows < at), len(rows), rows).min(0) - 1
-        low, high = np.minimum(low, at - 1), np.maximum(high, at + 1)
-        return self._line(exact, low, 1), self._line(exact, high, -1)
-
-    def _line(self, exact: np.ndarray, row: np.ndarray, inside: int) -> Line:
-        column = np.arange(len(row))
-        here, next_ = (row, column), (row + inside, column)
-        step = self._even[next_] - self._even[here]
-        rise = np.where(step > 0.0, (exact[next_] - exact[here]) / np.where(step, step, 1.0), 1.0)
-        return Line(self._means[here], self._even[here], exact[here], rise)
-
-    def _exact(self, values: np.ndarray) -> np.ndarray:
-        at_best = self.law.log_density(self.observed, self.best, self.counts)
-        density = self.law.log_density(self.observed, values, self.counts)
-        deviance = np.clip(2.0 * (at_best - density), 0.0, LARGEST_DEVIANCE)
-        return np.sign(values - self.best) * np.sqrt(deviance)
+        # every step rises, lest the scale could not be inverted
+        steps = np.maximum(0.5 * (rate[1:] + rate[:-1]) * np.diff(means), LEAST_STEP)
+        integral = np.append(0.0, np.cumsum(steps))
+        return means, integral - integral[len(above)]
 
     def of(self, values: np.ndarray) -> np.ndarray:
-        columns = zip(values.T, self._means.T, self._even.T, strict=True)
-        even = np.stack([np.interp(*column) for column in columns], axis=1)
-        low, high = self._ends
-        found = np.where(values < low.mean, low.at(even), self._exact(values))
-        return np.where(values > high.mean, high.at(even), found)
-
-    @cached_property
-    def _table(self) -> np.ndarray:
-        return np.maximum.accumulate(self.of(self._means))
+        return np.sqrt(self.counts) * np.interp(values, *self._table)
 
     def back(self, features: np.ndarray) -> np.ndarray:
-        columns = zip(features.T, self._table.T, self._means.T, strict=True)
-        return np.stack([np.interp(*column) for column in columns], axis=1)
+        means, integral = self._table
+        return np.interp(features / np.sqrt(self.counts), integral, means)
+
+    def seen(self, at: np.ndarray | None) -> tuple[np.ndarray, GivenNoise]:
+        own = self.of(self.observed)
+        near = own if at is None else np.clip(at, own - TRUSTED, own + TRUSTED)
+        less, here, more = (
+            self.law.log_density(self.observed, self.back(near + step), self.counts)
+            for step in (-HALF_STEP, 0.0, HALF_STEP)
+        )
+        slope = (more - less) / (2.0 * HALF_STEP)
+        curvature = np.maximum((2.0 * here - more - less) / HALF_STEP**2, LEAST_CURVATURE)
+        given = GivenNoise(1.0 / curvature, np.zeros((len(own), 0)))
+        return near + slope / curvature, given
 
     @property
     def unit(self) -> np.ndarray:

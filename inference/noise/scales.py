@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -18,8 +18,16 @@ class Scale(Protocol):
     """Values [n, m] of outputs as features [n, m], and back."""
 
     @property
-    def given(self) -> GivenNoise | None:
-        """The measurement noise of the features; None where it is unknown."""
+    def rounds(self) -> int:
+        """How often `seen` must be asked until it stays the same."""
+        ...
+
+    def seen(self, at: np.ndarray | None) -> tuple[np.ndarray, GivenNoise | None]:
+        """The observed features [m] and their measurement noise, None where it is unknown.
+
+        Args:
+            at: Features around which this must be right [m]; None if they are not known yet.
+        """
         ...
 
     def of(self, values: np.ndarray) -> np.ndarray: ...
@@ -83,16 +91,23 @@ class Plain:
     """Values as they are, or stretched, with noise that does not depend on them.
 
     Attributes:
+        observed: [m]
         given: The measurement noise; it is zero or unknown where values are stretched.
         stretch: None for none.
         offset: Added before [m].
         unit: Sd of the run-to-run noise of stretched values [m].
     """
 
+    observed: np.ndarray
     given: GivenNoise | None
     stretch: Stretch | None = None
     offset: np.ndarray | float = 0.0
     unit: np.ndarray | None = None
+
+    rounds: ClassVar[int] = 1
+
+    def seen(self, at: np.ndarray | None) -> tuple[np.ndarray, GivenNoise | None]:
+        return self.of(self.observed), self.given
 
     def of(self, values: np.ndarray) -> np.ndarray:
         return values if self.stretch is None else self.stretch.of(values + self.offset)
@@ -109,9 +124,7 @@ class Plain:
     def check(self, values: np.ndarray) -> None:
         """Any values will do."""
 
-    def fitting(
-        self, u: np.ndarray, values: np.ndarray, observed: np.ndarray, channel: np.ndarray
-    ) -> "Plain":
+    def fitting(self, u: np.ndarray, values: np.ndarray, channel: np.ndarray) -> "Plain":
         """The scale on which run-to-run noise does not grow with the mean, as far as repeated runs
         show that it does.
 
@@ -122,12 +135,12 @@ class Plain:
         Args:
             u: Prior quantiles [n, d].
             values: [n, m], the means of which show it.
-            observed: [m]
             channel: Of each value [m].
         """
         if self.given is not None and self.given.variance.any():
             return self  # on another scale that noise would depend on the mean
-        if min(values.min(), observed.min()) < 0.0:
+        least = min(values.min(), self.observed.min())
+        if least < 0.0:
             return self
         first, second = repeated(u)
         if not len(first):
@@ -137,7 +150,7 @@ class Plain:
         differ = difference > (EQUAL_RUNS_TOLERANCE * values.std(0)) ** 2
         if not differ.any():
             return self
-        kinds = [one for one in STRETCHES if one.power < 2 or min(values.min(), observed.min()) > 0]
+        kinds = [one for one in STRETCHES if one.power < 2 or least > 0.0]
         gains = [_gain(difference, mean, channel, one.power) for one in kinds]
         if max(gains) < NEEDED_NATS:
             return self

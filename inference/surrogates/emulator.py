@@ -38,10 +38,12 @@ class Limits(NamedTuple):
         components: At most.
         predicted: Share of a component's variance that the parameters must predict, lest it
             count as noise; None emulates every component.
+        left: Variance of a value, in units of its scale, that components may leave at most.
     """
 
     components: int
     predicted: float | None = PREDICTED_SHARE
+    left: float = np.inf
 
 
 class Emulator(NamedTuple):
@@ -125,7 +127,10 @@ def _learned(  # noqa: PLR0913  as `emulate`
 ) -> Emulator:
     """Components and hyperparameters, the run-to-run noise being of a known size."""
     n, spread = len(u), run_spread(size, u)
-    components = principal_components(outputs, scale(outputs), limits.components, EXPLAINED_SHARE)
+    units = scale(outputs)
+    varied = float(np.mean(np.var(outputs, axis=0) / units**2))
+    share = max(EXPLAINED_SHARE, 1.0 - limits.left / varied) if varied else EXPLAINED_SHARE
+    components = principal_components(outputs, units, limits.components, share)
     data = Data(u, components.scores(outputs).T, normal, spread)
     basis, hyper = _taught(components, data, limits.predicted)
     remainder = _left(basis, outputs, spread)

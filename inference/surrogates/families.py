@@ -32,6 +32,7 @@ from .threshold import Threshold, check_rule
 from .transform import TRANSFORMS
 
 MAX_COMPONENTS = 8
+LEFT_OF_NOISE = 0.02  # of the variance of noise by the mean, that components may leave
 
 
 class Learnable(NamedTuple):
@@ -191,7 +192,8 @@ class SignalFamily:
         law = law_of(self.noise)
         if law is not None:
             return ByMean(law, values, output.counts)
-        return Plain(None if self.noise is None else given_noise(self.noise, output))  # pyright: ignore[reportArgumentType]  no function is left
+        given = None if self.noise is None else given_noise(self.noise, output)  # pyright: ignore[reportArgumentType]  no function is left
+        return Plain(values, given)
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,21 +257,26 @@ class SignalLearner:
             previous = None
         scale = self._fitting(u, values) if previous is None else previous.scale
         emulator = self._emulator(known._replace(u=u, features=values), scale, previous)
-        seen, noise = scale.of(self.values[None])[0], Noise(scale.given, self.family.misfit)
-        observed = observe(emulator, self.output, seen, noise, previous)
-        success = learn_success(known.runs, known.normal)
-        return replace(observed, success=success, scale=scale)
+        success, at = learn_success(known.runs, known.normal), None
+        for _ in range(scale.rounds):
+            seen, given = scale.seen(at)
+            noise = Noise(given, self.family.misfit)
+            found = observe(emulator, self.output, seen, noise, previous)
+            found = replace(found, success=success, scale=scale)
+            at = found.best_features if scale.rounds > 1 else None
+        return found
 
     def _fitting(self, u: np.ndarray, values: np.ndarray) -> Scale:
         """The scale for runs of values [n, m] at u [n, d]."""
         if not (self.family.varying_noise and isinstance(self.scale, Plain)):
             return self.scale
-        return self.scale.fitting(u, values, self.values, self.output.layout.channel)
+        return self.scale.fitting(u, values, self.output.layout.channel)
 
     def _emulator(
         self, known: Learnable, scale: Scale, previous: SignalSurrogate | None
     ) -> Emulator:
-        limits = Limits(self.family.components, self.family.predicted)
+        left = LEFT_OF_NOISE if isinstance(scale, ByMean) else np.inf
+        limits = Limits(self.family.components, self.family.predicted, left)
         features, units = scale.of(known.features), comparable(scale, self.output)
         old = None if previous is None else previous.emulator
         found = emulate(known.u, features, units, limits, old, known.normal)

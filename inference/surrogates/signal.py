@@ -94,7 +94,7 @@ class SignalSurrogate:
     reduced: Reduced
     box: tuple[np.ndarray, np.ndarray] | None = None
     success: GP | None = None
-    scale: Scale = Plain(None)
+    scale: Scale = Plain(np.zeros(0), None)
 
     @property
     def gp(self) -> GP:
@@ -141,6 +141,11 @@ class SignalSurrogate:
         return weights / weights.sum()
 
     @property
+    def best_features(self) -> np.ndarray:
+        """What is predicted at the best parameters, on the emulator's scale [m]."""
+        return predict(self.emulator, self.minimum()[None])[0][0]
+
+    @property
     def misfit_probability(self) -> float:
         """Posterior probability of a misfit beside noise that is given."""
         return float(self.node_weights[self.nodes.sigma > 0.0].sum())
@@ -150,7 +155,7 @@ class SignalSurrogate:
         """What a reader of the posterior must know of the likelihood."""
         weights = self.node_weights
         misfit = np.sqrt(weights @ self.nodes.sigma**2) * self.emulator.basis.scale
-        best = predict(self.emulator, self.minimum()[None])[0]
+        best = self.best_features[None]
         given = self.scale.sds(self.scale.back(best))[0, 0]
         return {
             "components": np.asarray(self.emulator.basis.used),
