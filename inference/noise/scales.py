@@ -18,6 +18,11 @@ class Scale(Protocol):
     """Values [n, m] of outputs as features [n, m], and back."""
 
     @property
+    def observed(self) -> np.ndarray:
+        """Values [m]."""
+        ...
+
+    @property
     def rounds(self) -> int:
         """How often `seen` must be asked until it stays the same."""
         ...

@@ -214,13 +214,14 @@ def _predicted(basis: Basis, hyper: Hyper, data: Data, least: float) -> tuple[Ba
 def predicted_share(gp: GP) -> np.ndarray:
     """Share of each score's variance that is predicted when a run is left out, [k].
 
-    Not above 0 where the mean of the others would do as well, and 0 for empty components.
+    Not above 0 where the mean of the others would do as well, and 0 for empty components. Runs
+    count the less the noisier they are.
     """
-    score, n = gp.data.y, len(gp.data.u)
+    score, n, weight = gp.data.y, len(gp.data.u), 1.0 / gp.data.noise(0.0)
     error = score - leave_one_out(gp)[0]
     from_mean = (score - score.mean(1, keepdims=True)) * n / (n - 1)  # of the other scores
-    total = np.sum(from_mean**2, 1)
-    return np.where(total > 0, 1.0 - np.sum(error**2, 1) / np.where(total > 0, total, 1.0), 0.0)
+    total = from_mean**2 @ weight
+    return np.where(total > 0, 1.0 - error**2 @ weight / np.where(total > 0, total, 1.0), 0.0)
 
 
 def goes_on(previous: Emulator, outputs: np.ndarray) -> bool:

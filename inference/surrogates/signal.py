@@ -53,6 +53,7 @@ from .warnings import (
     MISFIT,
     OUTSIDE,
     UNPREDICTED,
+    UNRESOLVED,
     complaints,
     held_back_warnings,
     noise_warnings,
@@ -184,10 +185,14 @@ class SignalSurrogate:
     @in_float64
     def warnings(self) -> list[str]:
         """What the emulator's own checks complain of."""
-        if self.emulator.basis.used == 0:
-            return [EQUAL if self.emulator.equal else UNPREDICTED]
+        repeats, sized = self.emulator.repeats, self.emulator.size is not None
+        if self.emulator.basis.used == 0 and not sized:
+            if self.emulator.equal:
+                return [EQUAL]
+            return [UNRESOLVED if len(repeats) and not repeats.any() else UNPREDICTED]
         said = complaints(loo_errors(self.emulator), "output")
-        said += noise_warnings(noise_share(self.emulator)) + held_back_warnings(self.held_back)
+        said += noise_warnings(noise_share(self.emulator), repeats, sized)
+        said += held_back_warnings(self.held_back)
         if self.known is not None and self.misfit_probability > NEEDED:
             said.append(MISFIT)
         if self.known is None and len(self.observed) - self.gp.data.u.shape[1] < MIN_FREEDOM:
