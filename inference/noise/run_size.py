@@ -17,7 +17,7 @@ from ..gp.process import (
     predict_mean,
 )
 
-NEEDED_NATS = 4.0  # log predictive density that a size by parameters must gain over a constant one
+NEEDED_NATS = 12.0  # log predictive density that a size by parameters must gain over a constant one
 EQUAL_RUNS_TOLERANCE = 1e-9  # relative difference up to which two runs count as equal
 FIXED = np.log(0.7), 0.0, np.log(0.7)  # length, amplitude and noise of the process that asks first
 

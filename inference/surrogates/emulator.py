@@ -130,7 +130,7 @@ def _learned(  # noqa: PLR0913  as `emulate`
     units = scale(outputs)
     varied = float(np.mean(np.var(outputs, axis=0) / units**2))
     share = max(EXPLAINED_SHARE, 1.0 - limits.left / varied) if varied else EXPLAINED_SHARE
-    components = principal_components(outputs, units, limits.components, share)
+    components = principal_components(outputs, units, limits.components, share, spread)
     data = Data(u, components.scores(outputs).T, normal, spread)
     basis, hyper = _taught(components, data, limits.predicted)
     remainder = _left(basis, outputs, spread)
@@ -145,8 +145,10 @@ def _learned(  # noqa: PLR0913  as `emulate`
 def _left(basis: Basis, outputs: np.ndarray, spread: np.ndarray | None) -> Remainder:
     """What the components leave of outputs [n, m], for noise of the size 1."""
     residuals = basis.residuals(outputs)
-    if spread is not None:
-        residuals = residuals / np.sqrt(spread)[:, None]
+    if spread is not None:  # all runs of one length: what is left of their sizes is no correlation
+        length = np.linalg.norm(residuals, axis=1)
+        mean = np.sqrt(np.mean(length**2 / spread))
+        residuals = residuals * (mean / np.where(length > 0.0, length, 1.0))[:, None]
     return shrunk_covariance(residuals, basis.used + 1)
 
 
@@ -217,9 +219,10 @@ def predicted_share(gp: GP) -> np.ndarray:
     Not above 0 where the mean of the others would do as well, and 0 for empty components. Runs
     count the less the noisier they are.
     """
-    score, n, weight = gp.data.y, len(gp.data.u), 1.0 / gp.data.noise(0.0)
+    score, weight = gp.data.y, 1.0 / gp.data.noise(0.0)
     error = score - leave_one_out(gp)[0]
-    from_mean = (score - score.mean(1, keepdims=True)) * n / (n - 1)  # of the other scores
+    mean = (score @ weight / weight.sum())[:, None]
+    from_mean = (score - mean) * weight.sum() / (weight.sum() - weight)  # of the other scores
     total = from_mean**2 @ weight
     return np.where(total > 0, 1.0 - error**2 @ weight / np.where(total > 0, total, 1.0), 0.0)
 
