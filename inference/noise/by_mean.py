@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Protocol
+from typing import ClassVar, Protocol, cast
 
 import numpy as np
 from scipy.special import xlogy
@@ -129,7 +129,7 @@ def law_of(noise: object) -> Law | None:
         if noise != "poisson":
             raise ValueError(f'noise must be "poisson", a function or numbers, got {noise!r:.100}')
         return Poisson()
-    return Gaussian(noise) if callable(noise) else None
+    return Gaussian(cast(SdOfMean, noise)) if callable(noise) else None
 
 
 @dataclass(frozen=True, eq=False)

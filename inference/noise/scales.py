@@ -22,10 +22,8 @@ class Scale(Protocol):
         """Values [m]."""
         ...
 
-    @property
-    def rounds(self) -> int:
-        """How often `seen` must be asked until it stays the same."""
-        ...
+    rounds: ClassVar[int]
+    """How often `seen` must be asked until it stays the same."""
 
     def seen(self, at: np.ndarray | None) -> tuple[np.ndarray, GivenNoise | None]:
         """The observed features [m] and their measurement noise, None where it is unknown.
@@ -161,7 +159,9 @@ class Plain:
             return self
         best = kinds[int(np.argmax(gains))]
         total = np.bincount(channel, (mean**best.power).sum(0))
-        unit = (np.bincount(channel, difference.sum(0)) / np.where(total > 0.0, total, 1.0))[channel]
+        unit = (np.bincount(channel, difference.sum(0)) / np.where(total > 0.0, total, 1.0))[
+            channel
+        ]
         offset = ANSCOMBE * unit if best.power == 1 else 0.0
         noise = np.sqrt(np.where(unit > 0.0, unit, 1.0))
         return replace(self, stretch=best, offset=offset, unit=noise)

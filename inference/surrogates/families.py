@@ -257,13 +257,18 @@ class SignalLearner:
             previous = None
         scale = self._fitting(u, values) if previous is None else previous.scale
         emulator = self._emulator(known._replace(u=u, features=values), scale, previous)
-        success, at = learn_success(known.runs, known.normal), None
-        for _ in range(scale.rounds):
+        success = learn_success(known.runs, known.normal)
+
+        def compared(at: np.ndarray | None) -> SignalSurrogate:
+            """With what was observed, its noise being right around the features `at` [m]."""
             seen, given = scale.seen(at)
             noise = Noise(given, self.family.misfit)
             found = observe(emulator, self.output, seen, noise, previous)
-            found = replace(found, success=success, scale=scale)
-            at = found.best_features if scale.rounds > 1 else None
+            return replace(found, success=success, scale=scale)
+
+        found = compared(None)
+        for _ in range(scale.rounds - 1):
+            found = compared(found.best_features)
         return found
 
     def _fitting(self, u: np.ndarray, values: np.ndarray) -> Scale:

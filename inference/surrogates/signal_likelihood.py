@@ -70,7 +70,7 @@ def node_log_densities(state: SignalState, u: Any) -> Any:
     mean, variance = scores(state, u)
     of_noise, log_weight = state.covariance, state.log_weight
     if state.size is not None:
-        factor = _noise_factor(state, u)
+        factor = _noise_factor(state, state.size, u)
         of_noise = factor[..., None, None] * of_noise
         log_weight = log_weight - 0.5 * (
             state.freedom * namespace(u).log(factor) + state.unexplained * (1.0 / factor - 1.0)
@@ -81,14 +81,14 @@ def node_log_densities(state: SignalState, u: Any) -> Any:
     return log_weight - 0.5 * (constant + log_det + square)
 
 
-def _noise_factor(state: SignalState, u: Any) -> Any:
+def _noise_factor(state: SignalState, size: Size, u: Any) -> Any:
     """By how much the variance of all noise is larger at u than at size 1 of the run-to-run noise,
     [n, g].
 
     Exact where a node has no other noise, or next to no run-to-run noise; between the two, all of
     a node's noise keeps its shape while it grows.
     """
-    spread = namespace(u).exp(2.0 * log_size(state.size, u))
+    spread = namespace(u).exp(2.0 * log_size(size, u))
     return 1.0 + state.share * (spread[:, None] - 1.0)
 
 
@@ -122,7 +122,7 @@ def log_second_moment(state: SignalState, u: np.ndarray, spread: np.ndarray | No
     left = (state.estimate[loudest] - mean).reshape(len(u), *ones, k)
     covariance = state.covariance[loudest]
     if state.size is not None:
-        factor = _noise_factor(state, u)[np.arange(len(u)), loudest]
+        factor = _noise_factor(state, state.size, u)[np.arange(len(u)), loudest]
         covariance = factor[:, None, None] * covariance
     covariance = covariance.reshape(len(u), *ones, k, k)
     total = total.reshape(left.shape)

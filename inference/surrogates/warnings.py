@@ -45,9 +45,9 @@ UNREPEATED = (
     "runs with other seeds"
 )
 UNRESOLVED = (
-    "runs of equal parameters agree, but the parameters predict less than half of what others differ "
-    "by: the output changes faster, or in a narrower range, than so few runs show; simulate more, "
-    "or narrow the prior"
+    "runs of equal parameters agree, but the parameters predict less than half of what others "
+    "differ by: the output changes faster, or in a narrower range, than so few runs show; simulate "
+    "more, or narrow the prior"
 )
 WIDE_RANGE = (
     "what was observed spans more than three decades and no noise was given: one size of noise is "
