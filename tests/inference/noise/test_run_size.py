@@ -64,7 +64,7 @@ def test_a_constant_spread_changes_no_bit():
 
 
 def test_counts_of_a_random_simulator_are_emulated_as_roots():
-    shape = np.array([0.5, 1.0, 3.0, 8.0, 3.0, 1.0])
+    shape = np.linspace(1.0, 8.0, 20)
 
     def simulate(theta, seeds):
         runs = zip(theta["q"], seeds, strict=True)
@@ -79,7 +79,7 @@ def test_counts_of_a_random_simulator_are_emulated_as_roots():
     centre = weight @ GRID
     width = np.sqrt(weight @ (GRID - centre) ** 2)
     assert abs(draws.mean() - centre) < 0.7 * width
-    assert 0.7 < draws.std() / width < 1.5
+    assert 0.7 < draws.std() / width < 1.4
     mean = fit.surrogate.predict({"q": np.array([4.0])})[0]
     np.testing.assert_allclose(mean[0], 4.0 * shape, atol=2.0)
 
