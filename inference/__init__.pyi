@@ -17,6 +17,7 @@ from .checks import tarp as tarp
 from .emulation import Emulation as Emulation
 from .emulation import emulate as emulate
 from .loop import fit as fit
+from .noise.by_mean import relative as relative
 from .prior import Prior as Prior
 from .regression import Regression as Regression
 from .regression import regress as regress

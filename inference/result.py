@@ -26,6 +26,7 @@ from .surrogates.warnings import (
     UNCONFIRMED,
     censored_warnings,
     history_warnings,
+    range_warnings,
     unreached_warnings,
 )
 from .types import Theta
@@ -233,10 +234,11 @@ class Fit:
         if all(function == "None" for function in own):
             said += censored_warnings(self.observed, self.closest.signal)
         if isinstance(self.learned, SignalSurrogate):
-            known = self.learned.known
-            noise = 0.0 if known is None else float(np.sqrt(known.variance[0]))
-            learned = self.history.features[self.learned_from]
-            said += unreached_warnings(self.learned.observed, learned, noise)
+            learned, scale = self.history.features[self.learned_from], self.learned.scale
+            values = scale.observed
+            noise = float(scale.sds(values[None])[0, 0])
+            said += unreached_warnings(values, learned, noise)
+            said += range_warnings(values) if self.learned.known is None else []
         return said
 
     @property

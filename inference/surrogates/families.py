@@ -8,13 +8,21 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_callable, checked_array, checked_integer, checked_number
+from ..arguments import (
+    check_callable,
+    check_flag,
+    checked_array,
+    checked_integer,
+    checked_number,
+)
+from ..noise.by_mean import ByMean, SdOfMean, law_of
+from ..noise.scales import Plain, Scale, comparable
 from ..simulations.failures import not_finite
 from ..types import Discrepancy
 from .base import Surrogate
 from .discrepancy import DiscrepancySurrogate, learn, marginalised, with_threshold
-from .emulator import PREDICTED_SHARE, Limits, emulate
-from .given_noise import GivenNoise, given_noise
+from .emulator import PREDICTED_SHARE, Emulator, Limits, emulate, goes_on, resized
+from .given_noise import given_noise
 from .outliers import sane
 from .output_vectors import Output, Summary, describe, infinities, summarise
 from .signal import Noise, SignalSurrogate, observe
@@ -26,6 +34,7 @@ from .warnings import GUESSED, distance_warnings
 
 MAX_COMPONENTS = 8
 MIN_FREEDOM = 3  # numbers more than parameters, from which the size of the noise can be told
+LEFT_OF_NOISE = 0.02  # of the variance of noise by the mean, that components may leave
 
 
 class Learnable(NamedTuple):
@@ -168,8 +177,13 @@ class SignalFamily:
             takes the output as it is.
         noise: Measurement noise that the simulator does not make: its sd, a number or an array
             shaped like the observed (summarised) output; or sds [n], or a covariance [n, n], of
-            that output's n finite values, flattened; 0 for none. None estimates it: as an AR(1)
-            process where the output is a series, of at least 5 samples without a summary.
+            that output's n finite values, flattened; 0 for none. "poisson" where counts were
+            observed and their means are simulated; `relative(0.2)` for an sd of 20 % of the
+            simulated mean; or a function from simulated means to sds, value by value. None
+            estimates it: as an AR(1) process where the output is a series, of at least 5 samples
+            without a summary.
+        varying_noise: Whether the noise that the simulator makes itself may depend on the
+            parameters and on the mean, where runs show that it does.
         misfit: Prior probability that the data are missed by more than the given noise, because
             the simulator errs or the noise is larger; its size is integrated out. 0 for never.
         components: At most.
@@ -185,18 +199,20 @@ class SignalFamily:
     replicates: ClassVar[bool] = True
 
     summary: Summary | None = None
-    noise: ArrayLike | None = None
+    noise: ArrayLike | SdOfMean | None = None
     misfit: float = 0.1
     components: int = MAX_COMPONENTS
     predicted: float | None = PREDICTED_SHARE
     discrepancy: Discrepancy | None = None
+    varying_noise: bool = True
 
     def __post_init__(self) -> None:
         check_callable("summary", self.summary)
         check_callable("discrepancy", self.discrepancy)
+        check_flag("varying_noise", self.varying_noise)
         checked_integer("components", self.components)
-        if self.noise is not None:  # its shape is looked at beside the output's
-            checked_array("noise", self.noise)
+        if self.noise is not None and law_of(self.noise) is None:
+            checked_array("noise", self.noise)  # its shape is looked at beside the output's
         checked_number("misfit", self.misfit, lambda p: 0.0 <= p < 1.0, "from 0 to below 1")
         if self.predicted is not None:
             due = "None or from 0 to below 1"
@@ -206,8 +222,15 @@ class SignalFamily:
         output = describe(observed, self.summary)
         values = output.values(observed)
         distance = self.discrepancy or partial(_of_summaries, self.summary)
-        noise = None if self.noise is None else given_noise(self.noise, output)
-        return SignalLearner(self, output, distance, observed, values, noise)
+        return SignalLearner(self, output, distance, observed, values, self._scale(output, values))
+
+    def _scale(self, output: Output, values: np.ndarray) -> Scale:
+        """On which outputs are emulated, `values` [m] being observed."""
+        law = law_of(self.noise)
+        if law is not None:
+            return ByMean(law, values, output.counts)
+        given = None if self.noise is None else given_noise(self.noise, output)  # pyright: ignore[reportArgumentType]  no function is left
+        return Plain(values, given)
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,7 +242,7 @@ class SignalLearner:
     distance: Discrepancy
     observed: np.ndarray
     values: np.ndarray
-    noise: GivenNoise | None
+    scale: Scale
 
     @property
     def features(self) -> int:
@@ -243,6 +266,10 @@ class SignalLearner:
                 features[i] = self.output.values(signal)
             except (Exception, SystemExit) as error:  # of the user's summary
                 errors[i] = failed_on("summary", signal, self.observed, error)
+            try:
+                self.scale.check(features[i])
+            except (Exception, SystemExit) as error:  # of the user's function of the mean
+                errors[i], features[i] = failed_on("noise", signal, self.observed, error), np.nan
         failed = ~np.isfinite(features).all(1)
         return Measured(features, np.where(failed, np.nan, discrepancy), errors)
 
@@ -262,21 +289,40 @@ class SignalLearner:
 
     def learn(self, known: Learnable, previous: SignalSurrogate | None) -> SignalSurrogate:
         learnable = self.learnable(known.discrepancy)
-        features = known.features[learnable]
+        u, values = known.u[learnable], known.features[learnable]
+        if previous is not None and not goes_on(previous.emulator, previous.scale.of(values)):
+            previous = None
+        scale = self._fitting(u, values) if previous is None else previous.scale
+        emulator = self._emulator(known._replace(u=u, features=values), scale, previous)
+        success = learn_success(known.runs, known.normal)
+
+        def compared(at: np.ndarray | None) -> SignalSurrogate:
+            """With what was observed, its noise being right around the features `at` [m]."""
+            seen, given = scale.seen(at)
+            noise = Noise(given, self.family.misfit)
+            found = observe(emulator, self.output, seen, noise, previous)
+            return replace(found, success=success, scale=scale)
+
+        found = compared(None)
+        for _ in range(scale.rounds - 1):
+            found = compared(found.best_features)
+        return found
+
+    def _fitting(self, u: np.ndarray, values: np.ndarray) -> Scale:
+        """The scale for runs of values [n, m] at u [n, d]."""
+        if not (self.family.varying_noise and isinstance(self.scale, Plain)):
+            return self.scale
+        return self.scale.fitting(u, values, self.output.layout.channel)
+
+    def _emulator(
+        self, known: Learnable, scale: Scale, previous: SignalSurrogate | None
+    ) -> Emulator:
+        left = LEFT_OF_NOISE if isinstance(scale, ByMean) else np.inf
+        limits = Limits(self.family.components, self.family.predicted, left)
+        features, units = scale.of(known.features), comparable(scale, self.output)
         old = None if previous is None else previous.emulator
-        limits = Limits(self.family.components, self.family.predicted)
-        emulator = emulate(
-            known.u[learnable],
-            features,
-            self.output.scale,
-            limits,
-            old,
-            known.normal,
-        )
-        kept = previous if old is not None and emulator.learned_at == old.learned_at else None
-        noise = Noise(self.noise, self.family.misfit)
-        observed = observe(emulator, self.output, self.values, noise, kept)
-        return replace(observed, success=learn_success(known.runs, known.normal))
+        found = emulate(known.u, features, units, limits, old, known.normal)
+        return found if old or not self.family.varying_noise else resized(found, units)
 
     def finish(self, known: Learnable, seed: int) -> Surrogate:
         """The surrogate on which a fit rests."""

@@ -74,9 +74,25 @@ TOO_SMOOTH = (
 EQUAL = "all simulations are equal: the data cannot tell parameters apart"
 UNPREDICTED = (
     "the parameters predict nothing of what was simulated, as far as so few runs can tell from "
-    "chance: simulate more, or choose a summary that averages the noise out; until then the "
-    "posterior is the prior"
+    "chance: simulate more, or, if the simulator is random, choose a summary that averages the "
+    "noise out; until then the posterior is the prior"
 )
+UNREPEATED = (
+    "the parameters predict less than half of what simulations differ by: either the simulator is "
+    "random, or the output changes faster than so few runs show; simulate more, or repeat some "
+    "runs with other seeds"
+)
+TOO_FAST = (
+    "runs of equal parameters agree, but the parameters predict less than half of what others "
+    "differ by: the output changes faster, or in a narrower range, than so few runs show; simulate "
+    "more, or narrow the prior"
+)
+WIDE_RANGE = (
+    "what was observed spans more than three decades and no noise was given: one size of noise is "
+    "taken for all values, so that only the largest count; give noise=, such as "
+    'inference.relative(0.2) or "poisson", or summary=np.log'
+)
+WIDE_RATIO = 1e3  # of observed values, from which one size of noise is hardly meant
 FAILED_SHARE = 0.5  # of the simulations, beyond which a fit warns
 EQUAL_SHARE, LEAST_EQUAL = 0.25, 5  # of a channel's samples, from which they may be cut off
 ROUNDED_SHARE = 1e-6  # of their range, to which data may be rounded without losing anything
@@ -102,7 +118,9 @@ def complaints(loo_z: np.ndarray, what: str) -> list[str]:
         what: Name of the emulated quantity.
     """
     count = loo_z.size
-    said = []
+    said: list[str] = []
+    if not count:
+        return said
     far = int(np.sum(np.abs(loo_z) > FAR_ERROR))
     if far > stats.binom.isf(FALSE_ALARMS, count, 2.0 * stats.norm.sf(FAR_ERROR)):
         said.append(
@@ -143,11 +161,19 @@ def held_back_warnings(found: HeldBack) -> list[str]:
     ]
 
 
-def noise_warnings(share: float) -> list[str]:
-    """A warning if run-to-run noise has a large share of the outputs' variance, else none."""
+def noise_warnings(share: float, repeats: np.ndarray, sized: bool) -> list[str]:
+    """A warning if what no parameter predicts is a large share of the outputs' variance.
+
+    Args:
+        share: That share.
+        repeats: Of each repeated run: whether it differs from the one before, bool [r].
+        sized: Whether the noise's size is known to depend on the parameters.
+    """
     reached = [least for least in NOISY_SHARES if share > least]
-    if not reached:
+    if not reached or sized:
         return []
+    if not repeats.any():
+        return [TOO_FAST if len(repeats) else UNREPEATED]
     return [
         f"run-to-run noise makes up more than {reached[0]:.0%} of the output's variance "
         "between simulations, and the likelihood takes it as Gaussian and equal for all "
@@ -209,6 +235,13 @@ def censored_warnings(observed: np.ndarray, simulated: np.ndarray) -> list[str]:
                     "are lost, give NaN"
                 )
     return said
+
+
+def range_warnings(observed: np.ndarray) -> list[str]:
+    """A warning if positive data of unknown noise span decades."""
+    seen = observed[np.isfinite(observed)]
+    wide = seen.min() > 0.0 and seen.max() > WIDE_RATIO * seen.min()
+    return [WIDE_RANGE] if wide else []
 
 
 def _step(values: np.ndarray) -> float:
