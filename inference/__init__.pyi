@@ -17,7 +17,6 @@ from .checks import tarp as tarp
 from .emulation import Emulation as Emulation
 from .emulation import emulate as emulate
 from .loop import fit as fit
-from .noise.by_mean import relative as relative
 from .prior import Prior as Prior
 from .regression import Regression as Regression
 from .regression import regress as regress
@@ -27,5 +26,6 @@ from .simulations.bank import SimulationBank as SimulationBank
 from .surrogates.base import Acquisition as Acquisition
 from .surrogates.families import DiscrepancyFamily as DiscrepancyFamily
 from .surrogates.families import SignalFamily as SignalFamily
+from .surrogates.noise.by_mean import relative as relative
 from .surrogates.squared_difference import squared_difference as squared_difference
 from .surrogates.warnings import EmulatorWarning as EmulatorWarning

@@ -17,10 +17,10 @@ from ..gp.process import (
     predict_joint,
 )
 from ..gp.process import predict_points as predict_scores
-from ..noise.run_size import EQUAL_RUNS_TOLERANCE, Size, learn_size, run_spread
 from .component_noise import absorbed_noise, left_over
 from .components import Basis, principal_components
 from .measurement_noise import Remainder, shrunk_covariance
+from .noise.run_size import EQUAL_RUNS_TOLERANCE, Size, learn_size, run_spread
 
 EXPLAINED_SHARE = 0.9995  # of the variance, to be explained by components
 PREDICTED_SHARE = 0.3  # see `_predicted`
@@ -108,7 +108,7 @@ def emulate(
         normal: Which parameters the kernels see as normal scores [d], see `gp.process.coordinates`.
     """
     if previous is None or not goes_on(previous, outputs):
-        return _learned(u, outputs, scale, limits, normal)
+        return _learned(Data(u, outputs.T, normal), scale, limits)
     basis, learned_at, excess = previous.basis, previous.learned_at, previous.excess
     spread = run_spread(previous.size, u)
     targets = _targets(basis, outputs, learned_at, excess)
@@ -117,21 +117,20 @@ def emulate(
     return _with_noise(kept, gp, _left(basis, outputs, spread))
 
 
-def _learned(  # noqa: PLR0913  as `emulate`
-    u: np.ndarray,
-    outputs: np.ndarray,
+def _learned(
+    known: Data,
     scale: Callable[[np.ndarray], np.ndarray],
     limits: Limits,
-    normal: np.ndarray | None,
     size: Size | None = None,
 ) -> Emulator:
-    """Components and hyperparameters, the run-to-run noise being of a known size."""
-    n, spread = len(u), run_spread(size, u)
+    """Components and hyperparameters of outputs known.y [m, n], the run-to-run noise being of a
+    known size."""
+    outputs, n, spread = known.y.T, len(known.u), run_spread(size, known.u)
     units = scale(outputs)
     varied = float(np.mean(np.var(outputs, axis=0) / units**2))
     share = max(EXPLAINED_SHARE, 1.0 - limits.left / varied) if varied else EXPLAINED_SHARE
     components = principal_components(outputs, units, limits.components, share, spread)
-    data = Data(u, components.scores(outputs).T, normal, spread)
+    data = known._replace(y=components.scores(outputs).T, spread=spread)
     basis, hyper = _taught(components, data, limits.predicted)
     remainder = _left(basis, outputs, spread)
     excess = absorbed_noise(basis, np.exp(2.0 * hyper.log_noise), remainder, n)
@@ -178,7 +177,8 @@ def resized(emulator: Emulator, scale: Callable[[np.ndarray], np.ndarray]) -> Em
         size = learn_size(_log_sizes(found), data.u, data.normal)
         if size is None:
             break
-        found = _learned(data.u, found.outputs, scale, found.limits, data.normal, size)
+        known = Data(data.u, found.outputs.T, data.normal)
+        found = _learned(known, scale, found.limits, size)
     return found
 
 

@@ -15,14 +15,14 @@ from ..arguments import (
     checked_integer,
     checked_number,
 )
-from ..noise.by_mean import ByMean, SdOfMean, law_of
-from ..noise.scales import Plain, Scale, comparable
 from ..simulations.failures import not_finite
 from ..types import Discrepancy
 from .base import Surrogate
 from .discrepancy import DiscrepancySurrogate, learn, marginalised, with_threshold
 from .emulator import PREDICTED_SHARE, Emulator, Limits, emulate, goes_on, resized
 from .given_noise import given_noise
+from .noise.by_mean import ByMean, SdOfMean, law_of
+from .noise.scales import Plain, Scale, comparable
 from .outliers import sane
 from .output_vectors import Output, Summary, describe, infinities, summarise
 from .signal import Noise, SignalSurrogate, observe

@@ -9,8 +9,6 @@ import numpy as np
 from .._float64 import in_float64
 from ..gp.optimise import minimise_in_box
 from ..gp.process import GP, believe, predict_points
-from ..noise.run_size import run_spread
-from ..noise.scales import Plain, Scale, comparable, in_units
 from ..sobol import sobol
 from ..types import LogLikelihood, LogSecondMoment
 from .emulator import (
@@ -40,6 +38,8 @@ from .measurement_noise import (
     residual_size,
     with_misfit,
 )
+from .noise.run_size import run_spread
+from .noise.scales import Plain, Scale, comparable, in_units
 from .output_vectors import Output
 from .signal_likelihood import (
     SignalState,

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..gp.namespaces import log_sum_exp, namespace
 from ..gp.process import GP, padded, padded_rows, predict
-from ..noise.run_size import Size, log_size
+from .noise.run_size import Size, log_size
 from .success import log_success, padded_success
 
 SCORES_TOGETHER = 8  # by which the scores of padded states are counted

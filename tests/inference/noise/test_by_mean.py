@@ -3,7 +3,7 @@
 import numpy as np
 import numpyro.distributions as dist
 import pytest
-from bolfi_liquids.inference.noise.by_mean import ByMean, Poisson, law_of, relative
+from bolfi_liquids.inference.surrogates.noise.by_mean import ByMean, Poisson, law_of, relative
 
 from bolfi_liquids import inference
 

@@ -3,8 +3,8 @@
 import numpy as np
 import numpyro.distributions as dist
 import pytest
-from bolfi_liquids.inference.noise.run_size import learn_size, log_size
-from bolfi_liquids.inference.surrogates.warnings import UNREPEATED, TOO_FAST, WIDE_RANGE
+from bolfi_liquids.inference.surrogates.noise.run_size import learn_size, log_size
+from bolfi_liquids.inference.surrogates.warnings import TOO_FAST, UNREPEATED, WIDE_RANGE
 
 from bolfi_liquids import inference
 

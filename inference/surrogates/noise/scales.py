@@ -6,8 +6,8 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from ..surrogates.given_noise import GivenNoise
-from ..surrogates.output_vectors import Output
+from ..given_noise import GivenNoise
+from ..output_vectors import Output
 from .run_size import EQUAL_RUNS_TOLERANCE
 
 NEEDED_NATS = 6.0  # log likelihood that noise which grows with the mean must gain

@@ -4,9 +4,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..gp.hyperparameters import maximum_a_posteriori
-from ..gp.namespaces import namespace
-from ..gp.process import (
+from ...gp.hyperparameters import maximum_a_posteriori
+from ...gp.namespaces import namespace
+from ...gp.process import (
     GP,
     Data,
     Hyper,

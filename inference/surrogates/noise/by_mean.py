@@ -8,8 +8,8 @@ from typing import ClassVar, Protocol, cast
 import numpy as np
 from scipy.special import xlogy
 
-from ..arguments import checked_array, checked_number
-from ..surrogates.given_noise import GivenNoise
+from ...arguments import checked_array, checked_number
+from ..given_noise import GivenNoise
 
 DECADES = np.linspace(-25.0, 25.0, 1001)  # logs of the means, over the largest observed one
 LEAST_STEP = 1e-12  # of the scale, from one of them to the next
