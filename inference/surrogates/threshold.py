@@ -151,13 +151,16 @@ def matched(
         weights = q ** (dimension / 2) * ndtr(z - (raised - mean) / sigma)  # of log q
         return float(np.log(weights @ q / weights.sum() / (dimension * variance)))
 
-    usual, lowest = ndtri(MATCHED_QUANTILE), ndtri(LEAST_QUANTILE)
+    def root(function: Callable[[float], float], low: float, high: float) -> float:
+        return float(brentq(function, low, high))  # pyright: ignore[reportArgumentType]
+
+    usual, lowest = float(ndtri(MATCHED_QUANTILE)), float(ndtri(LEAST_QUANTILE))
     if excess(usual, sd) < 0.0:
         top = float(raised[-1] - mean)
         wide = excess(usual, top) < 0.0
-        sigma = top if wide else brentq(lambda sigma: excess(usual, sigma), sd, top)
+        sigma = top if wide else root(lambda sigma: excess(usual, sigma), sd, top)
         return mean + usual * sigma, float(np.sqrt(max(sigma**2 - sd**2, 0.0))), 1.0
-    z = lowest if excess(lowest, sd) > 0.0 else brentq(excess, lowest, usual, args=(sd,))
+    z = lowest if excess(lowest, sd) > 0.0 else root(lambda z: excess(z, sd), lowest, usual)
     return mean + z * sd, 0.0, float(np.exp(0.5 * excess(z, sd)))
 
 
@@ -212,7 +215,7 @@ def choose_threshold(
         return float(transform(discrepancy.min()))
     if isinstance(rule, Quantile):
         return float(transform(np.quantile(discrepancy, rule.q)))
-    number = float(rule)
+    number = float(rule)  # pyright: ignore[reportArgumentType]  # `check_rule`
     if transform.offset < 0 or transform.signed:  # below lies nothing that was simulated
         end = -transform.offset
         return float(transform(max(number, end + FAR_BELOW * (discrepancy.min() - end))))
