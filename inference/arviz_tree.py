@@ -17,9 +17,8 @@ nothing from one, and the fit's complaints in the attribute `warnings`. simulati
 `fit_status`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
-from typing import TYPE_CHECKING
 
 import arviz_base
 import numpy as np
@@ -29,9 +28,7 @@ from .history import History
 from .prior import Prior
 from .sampling.convergence import diagnose
 from .sampling.target import Chains
-
-if TYPE_CHECKING:
-    from .result import Fit
+from .surrogates.base import Surrogate
 
 PREDICTED_DRAWS = 50  # draws of each chain for which the surrogate predicts
 SAMPLE_DIMS = ("chain", "draw")
@@ -101,15 +98,11 @@ def results_tree(
     return tree
 
 
-def add_surrogate(tree: xr.DataTree, fit: "Fit", u: np.ndarray, rng: np.random.Generator) -> None:
-    """Add what a fit's surrogate says of itself: constant_data, posterior_predictive (at evenly
-    spaced draws u [chain, draw, d], whose indices are its coordinate `draw`), emulator_checks.
-
-    The checks' first axis is the simulation, with rows of NaN where nothing was learned from one;
-    their group's attribute `warnings` joins what the fit complains of, one per line, and is empty
-    where there is nothing.
-    """
-    surrogate = fit.learned
+def add_surrogate(
+    tree: xr.DataTree, surrogate: Surrogate, u: np.ndarray, rng: np.random.Generator
+) -> None:
+    """Add what the surrogate says of itself: constant_data, and posterior_predictive at evenly
+    spaced draws u [chain, draw, d], whose indices are its coordinate `draw`."""
     constants = {name: np.asarray(value) for name, value in surrogate.constants().items()}
     if constants:
         tree["constant_data"] = arviz_base.from_dict({"constant_data": constants})["constant_data"]
@@ -123,14 +116,25 @@ def add_surrogate(tree: xr.DataTree, fit: "Fit", u: np.ndarray, rng: np.random.G
     if groups:
         made = arviz_base.from_dict({"posterior_predictive": groups}, coords={"draw": rows})
         tree["posterior_predictive"] = made["posterior_predictive"]
-    checks = {}
-    for name, values in surrogate.checks().items():
-        of_all = np.full((len(fit.learned_from), *values.shape[1:]), np.nan)
-        of_all[fit.learned_from] = values
+
+
+def add_checks(
+    tree: xr.DataTree,
+    checks: Mapping[str, np.ndarray],
+    learned_from: np.ndarray,
+    warnings: Sequence[str],
+) -> None:
+    """Add emulator_checks, whose first axis is the simulation, with rows of NaN where nothing was
+    learned from one (`learned_from`, bool [n]). The attribute `warnings` joins what the fit
+    complains of, one per line, and is empty where there is nothing."""
+    columns = {}
+    for name, values in checks.items():
+        of_all = np.full((len(learned_from), *values.shape[1:]), np.nan)
+        of_all[learned_from] = values
         axes = (f"{name}_dim_{i}" for i in range(values.ndim - 1))
-        checks[name] = (["simulation", *axes], of_all)
-    attributes = {"warnings": "\n".join(fit.warnings)}
-    tree["emulator_checks"] = xr.DataTree(xr.Dataset(checks, attrs=attributes))
+        columns[name] = (["simulation", *axes], of_all)
+    attributes = {"warnings": "\n".join(warnings)}
+    tree["emulator_checks"] = xr.DataTree(xr.Dataset(columns, attrs=attributes))
 
 
 def finished(tree: xr.DataTree, attributes: Mapping[str, object]) -> xr.DataTree:

@@ -1,7 +1,6 @@
 """Ask and tell: Bayesian optimisation for likelihood-free inference, one step at a time."""
 
 import time
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -28,7 +27,8 @@ from .history import (
 )
 from .notebook_display import as_html, as_text
 from .prior import Prior, check_support, checked_prior
-from .result import Before, Fit
+from .result import Fit
+from .sampling.importance import Before
 from .simulations.failures import Failure, incomparable, kind, unusable
 from .simulations.job import BATCH
 from .simulations.returned import told_signals
@@ -37,7 +37,7 @@ from .surrogates.base import Acquisition
 from .surrogates.families import Family, Learnable, Measured, resolve
 from .surrogates.outliers import sane
 from .surrogates.success import Feasibility
-from .surrogates.warnings import EmulatorWarning
+from .surrogates.warnings import complain
 from .types import Theta
 
 MIN_LEARN = 3  # successful simulations before the surrogate may choose
@@ -385,14 +385,8 @@ class Bolfi:
             before=self._before,
         )
         if warn:
-            complain(made, stacklevel + 1)
+            complain(made.warnings, stacklevel + 1)
         return made
-
-
-def complain(fit: Fit, stacklevel: int) -> None:
-    """Raise each of a fit's complaints as an `EmulatorWarning`; 2 blames the caller."""
-    for complaint in fit.warnings:
-        warnings.warn(complaint, EmulatorWarning, stacklevel=stacklevel)
 
 
 def _located(measured: Measured, theta: Mapping[str, np.ndarray], seeds: np.ndarray) -> Measured:

@@ -20,7 +20,7 @@ from .arguments import (
     checked_integer,
     is_table,
 )
-from .bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi, complain
+from .bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi
 from .prior import Prior
 from .progress import progress_bar
 from .result import MUCH_DOUBT, Fit
@@ -39,6 +39,7 @@ from .simulations.runner import Keep, Runner
 from .sobol import start_size
 from .surrogates.base import Acquisition
 from .surrogates.families import Family
+from .surrogates.warnings import complain
 from .types import Simulator, SingleSimulator, Theta
 
 
@@ -205,7 +206,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
             if made.confirmed and made.doubt < MUCH_DOUBT:
                 break
     if warn:
-        complain(made, stacklevel=3)
+        complain(made.warnings, stacklevel=3)
     return made
 
 

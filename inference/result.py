@@ -17,7 +17,7 @@ from .notebook_display import as_html, as_text
 from .prior import Prior
 from .sampling.convergence import SamplingWarning
 from .sampling.draw import SAMPLERS, draw_posterior
-from .sampling.importance import Population, explore
+from .sampling.importance import Before, Population, explore
 from .sampling.target import Length, Target, log_likelihood
 from .surrogates.base import Surrogate
 from .surrogates.signal import SignalSurrogate
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-WIDER = 2.0
 MUCH_DOUBT = 1.5
 MOST_CHAINS, MOST_DRAWS = 1000, 1_000_000  # of one call: more would take days, or all memory
 
@@ -47,24 +46,6 @@ class Closest(NamedTuple):
     theta: dict[str, float]
     signal: np.ndarray
     discrepancy: float
-
-
-class Before(NamedTuple):
-    """A posterior before runs were made at draws of it.
-
-    Attributes:
-        mean, sd: Of each parameter [d], in normal scores of the prior.
-        told: Simulations that it knew.
-    """
-
-    mean: np.ndarray
-    sd: np.ndarray
-    told: int
-
-    def agrees(self, mean: np.ndarray, sd: np.ndarray) -> bool:
-        """Whether means lie within the smaller sd, and no sd is twice as large as the other."""
-        near = np.abs(self.mean - mean) <= np.minimum(self.sd, sd)
-        return bool(near.all() and (np.abs(np.log(self.sd / sd)) < np.log(WIDER)).all())
 
 
 class SurrogateView:
@@ -347,7 +328,7 @@ class Fit:
         extend = checked_integer("extend", extend)
         seed = checked_integer("seed", seed, 0)
         check_flag("warn", warn)
-        from .arviz_tree import add_surrogate, finished, results_tree
+        from .arviz_tree import add_checks, add_surrogate, finished, results_tree
 
         started = time.perf_counter()
         length = Length(chains, warmup, draws)
@@ -360,7 +341,8 @@ class Fit:
         tree = results_tree(self.prior, made.chains, drawn, self.observed, self.simulations)
         tree["posterior"].attrs.update(status=made.status, draws_made=made.steps, **made.checks)
         rng = np.random.default_rng([seed, *b"predictive"])
-        add_surrogate(tree, self, made.chains.u, rng)
+        add_surrogate(tree, self.learned, made.chains.u, rng)
+        add_checks(tree, self.learned.checks(), self.learned_from, self.warnings)
         attributes: dict[str, object] = {
             **self.settings,
             **{"sampler": sampler, **length._asdict(), "extend": extend, "sampling_seed": seed},

@@ -24,6 +24,7 @@ BOX_EDGE = 1e-12  # quantile at which the box is cut, so that x = Phi^-1(u) stay
 MIN_LOG_POWER = -60.0  # log of the smallest inverse temperature
 HALVINGS = 30  # of the interval of log powers
 LEAST = 1e-12
+WIDER = 2.0  # sds whose ratio is larger are not the same
 SHARPENED_WIDTH = 0.5  # width of half the proposals, while the temperature still has to fall
 
 
@@ -62,6 +63,24 @@ class Population(NamedTuple):
         outer[first] = 0.0
         others = rng.choice(len(self.x), count - 1, replace=False, p=outer / outer.sum())
         return self.x[np.append(others, first)]
+
+
+class Before(NamedTuple):
+    """A posterior before runs were made at draws of it.
+
+    Attributes:
+        mean, sd: Of each parameter [d], in normal scores of the prior.
+        told: Simulations that it knew.
+    """
+
+    mean: np.ndarray
+    sd: np.ndarray
+    told: int
+
+    def agrees(self, mean: np.ndarray, sd: np.ndarray) -> bool:
+        """Whether means lie within the smaller sd, and no sd is twice as large as the other."""
+        near = np.abs(self.mean - mean) <= np.minimum(self.sd, sd)
+        return bool(near.all() and (np.abs(np.log(self.sd / sd)) < np.log(WIDER)).all())
 
 
 class _Points(NamedTuple):

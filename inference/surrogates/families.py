@@ -20,12 +20,12 @@ from ..types import Discrepancy
 from .base import Surrogate
 from .discrepancy import DiscrepancySurrogate, learn, marginalised, with_threshold
 from .emulator import PREDICTED_SHARE, Emulator, Limits, emulate, goes_on, resized
-from .given_noise import given_noise
+from .given_noise import Noise, given_noise
 from .noise.by_mean import ByMean, SdOfMean, law_of
 from .noise.scales import Plain, Scale, comparable
 from .outliers import sane
 from .output_vectors import Output, Summary, describe, infinities, summarise
-from .signal import Noise, SignalSurrogate, observe
+from .signal import SignalSurrogate, observe
 from .squared_difference import evaluate, failed_on, independent, numbers, squared_difference
 from .success import Feasibility, learn_success
 from .threshold import Matched, Threshold, check_rule

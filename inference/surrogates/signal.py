@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from .emulator import (
     predict,
     predictive_draws,
 )
-from .given_noise import GivenNoise
+from .given_noise import GivenNoise, Noise
 from .held_back import HeldBack, held_back
 from .measurement_noise import (
     CORRELATIONS,
@@ -287,19 +286,6 @@ def state_of(
     freedom = np.asarray(float(len(emulator.basis.scale) - used))
     sized = {"size": emulator.size, "share": reduced.share, "freedom": freedom}
     return state._replace(unexplained=reduced.unexplained, **sized)
-
-
-class Noise(NamedTuple):
-    """What is believed of the noise between the simulator and the data.
-
-    Attributes:
-        given: The measurement noise; None where it is unknown.
-        misfit: Prior probability that the data are missed by more than the given noise explains;
-            0 for none.
-    """
-
-    given: GivenNoise | None
-    misfit: float
 
 
 @in_float64

@@ -1,6 +1,9 @@
 """Warnings from leave-one-out errors, held-back errors and the noise of an emulator, and from what
 was given, whatever was learned of it."""
 
+import warnings
+from collections.abc import Sequence
+
 import numpy as np
 
 from .._lazy import stats
@@ -108,6 +111,12 @@ NOISY_SHARES = (0.9, 0.5)  # shares of run-to-run noise in the variance that des
 
 class EmulatorWarning(UserWarning):
     """The surrogate's errors are larger than its variance; the message says where."""
+
+
+def complain(said: Sequence[str], stacklevel: int) -> None:
+    """Raise each complaint as a warning; stacklevel 2 blames the caller."""
+    for complaint in said:
+        warnings.warn(complaint, EmulatorWarning, stacklevel=stacklevel)
 
 
 def complaints(loo_z: np.ndarray, what: str) -> list[str]:
