@@ -2,8 +2,8 @@ from . import checks as checks
 from . import criticism as criticism
 from . import simulations as simulations
 from . import surrogates as surrogates
-from .acquisition.rules import ExpectedIntegratedVariance as ExpectedIntegratedVariance
 from .acquisition.rules import CautiousDraws as CautiousDraws
+from .acquisition.rules import ExpectedIntegratedVariance as ExpectedIntegratedVariance
 from .acquisition.rules import LowerConfidenceBound as LowerConfidenceBound
 from .acquisition.rules import MaxVariance as MaxVariance
 from .acquisition.rules import PosteriorDraws as PosteriorDraws

@@ -55,8 +55,8 @@ class Bolfi:
         surrogate: "signal", which emulates the output; "discrepancy", the paper's; a
             `SignalFamily` or `DiscrepancyFamily`; None is "signal", unless a discrepancy, or
             another option of that family alone, is given.
-        acquisition: "eiv", "maxvar", "draws", "cautious", "lcb" (with "discrepancy"), an object (see
-            `Acquisition`), or None for the surrogate's best.
+        acquisition: "eiv", "maxvar", "draws", "cautious", "lcb" (with "discrepancy"), an object
+            (see `Acquisition`), or None for the surrogate's best.
         seed: Fixes the start design and the acquisitions.
         initial: Points of the Sobol start design; None is 2 d + 6.
         options: Of the surrogate's family: `summary`, `noise`, `components`, `predicted` and

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -80,10 +81,10 @@ def _standardised(state: ThresholdState, u: Any) -> tuple[Any, Any, Any]:
     """(eps - mu) / sigma, sigma^2, and the part of it that is latent, [n, k] each."""
     xp = namespace(u)
     mean, variance = predict(state.gp, u)
-    ratio = variance.T / state.resolution**2
-    latent, doubt = variance.T / (1.0 + ratio), variance.T * ratio / (1.0 + ratio)
+    latent = variance.T / (1.0 + variance.T / state.resolution**2)
+    doubt = variance.T / xp.sqrt(variance.T + state.resolution**2)  # root of the rest
     noisy = latent + xp.exp(2.0 * state.gp.hyper.log_noise) + state.width**2
-    return (state.threshold - mean.T - xp.sqrt(doubt)) / xp.sqrt(noisy), noisy, latent
+    return (state.threshold - mean.T - doubt) / xp.sqrt(noisy), noisy, latent
 
 
 def log_second_moment(
@@ -153,9 +154,10 @@ def matched(
     if excess(usual, sd) < 0.0:
         top = float(raised[-1] - mean)
         wide = excess(usual, top) < 0.0
-        sigma = top if wide else brentq(lambda sigma: excess(usual, sigma), sd, top)
+        sigma = top if wide else float(brentq(partial(excess, usual), sd, top))  # pyright: ignore
         return mean + usual * sigma, float(np.sqrt(max(sigma**2 - sd**2, 0.0))), 1.0
-    z = lowest if excess(lowest, sd) > 0.0 else brentq(excess, lowest, usual, args=(sd,))
+    late = excess(lowest, sd) > 0.0
+    z = lowest if late else float(brentq(excess, lowest, usual, args=(sd,)))  # pyright: ignore
     return mean + z * sd, 0.0, float(np.exp(0.5 * excess(z, sd)))
 
 
@@ -180,7 +182,7 @@ def check_rule(rule: Threshold) -> None:
 
 
 def choose_threshold(
-    rule: Threshold,
+    rule: str | float | Quantile | Predicted,
     discrepancy: np.ndarray,
     transform: Transform,
     at_minimum: Callable[[], tuple[float, float]],
