@@ -37,13 +37,12 @@ from .transform import Transform, candidates
 from .warnings import (
     EQUAL,
     LOW_THRESHOLD,
+    NOISY,
     UNRESOLVED,
-    WIDE,
     complaints,
     held_back_warnings,
 )
 
-MAX_WIDTH_RATIO = 2.0  # of the posterior and the exact one, as far as noise makes it
 BETWEEN = 0.25  # of the least simulated discrepancy: the least that is taken for its minimum
 WITHIN = 0.3  # of the largest likelihood, from which a run lies in the posterior
 MAX_DOUBT_OF_FEW = 0.25  # resolutions of sd, where no more than d runs lie there
@@ -77,8 +76,8 @@ class DiscrepancySurrogate:
         chosen_at: Simulations known when the transform was chosen.
         success: Where runs succeed, see `success.learn_success`.
         width: Sd that the threshold has itself, on the scale of g(Delta).
-        width_ratio: Width of the posterior over that of independent normal errors, as far as
-            the threshold is `Matched`, else 1.
+        noisy: Whether the noise of g(Delta) alone makes the posterior wider than the data do, as
+            far as the threshold is `Matched`.
         resolution: Sd on the scale of g(Delta) from which doubt counts against a place, see
             `threshold.log_likelihood`; infinite while it shall attract runs.
         said: What the outputs, of which the surrogate knows nothing, have been found to lack.
@@ -92,7 +91,7 @@ class DiscrepancySurrogate:
     chosen_at: int
     success: GP | None = None
     width: float = 0.0
-    width_ratio: float = 1.0
+    noisy: bool = False
     resolution: float = np.inf
     said: tuple[str, ...] = ()
 
@@ -190,8 +189,8 @@ class DiscrepancySurrogate:
         if not confirmed:
             said += complaints(self.checks()["loo_z"], "discrepancy")
             said += [*held_back_warnings(self._held_back()), *self._unresolved()]
-        if self.width_ratio > MAX_WIDTH_RATIO:
-            said.append(WIDE)
+        if self.noisy:
+            said.append(NOISY)
         return said if self.fits else [*said, LOW_THRESHOLD]
 
     def _held_back(self) -> HeldBack:
@@ -304,10 +303,10 @@ def with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> Discrepanc
         # between the runs the least may be lower, but not out of all proportion
         if learned.transform.inverse(np.asarray(mean)) > BETWEEN * learned.discrepancy.min():
             least = min(least, (mean, sd))
-        threshold, width, ratio = matched(matching, *least, learned.transform, d)
-        return replace(learned, threshold=threshold, width=width, width_ratio=ratio)
+        threshold, width = matched(matching, *least, learned.transform, d)
+        return replace(learned, threshold=threshold, width=width, noisy=width == 0.0)
     threshold = choose_threshold(rule, learned.discrepancy, learned.transform, at_minimum)
-    return replace(learned, threshold=threshold, width=0.0, width_ratio=1.0)
+    return replace(learned, threshold=threshold, width=0.0, noisy=False)
 
 
 @in_float64

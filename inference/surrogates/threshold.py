@@ -128,9 +128,8 @@ def _log_both_by_quadrature(z: np.ndarray, r: np.ndarray) -> np.ndarray:
 
 def matched(
     rule: Matched, mean: float, sd: float, transform: Transform, dimension: int
-) -> tuple[float, float, float]:
-    """Threshold and its width on the transformed scale, and how many times as wide as the exact
-    posterior of independent normal errors that of Phi((eps - g) / sigma) is.
+) -> tuple[float, float]:
+    """Threshold and its width on the transformed scale.
 
     Near its least value D the discrepancy is D plus a quadratic form, of which the exact
     posterior expects d s^2, where s^2 = D / (numbers - d) estimates the variance of one error.
@@ -159,9 +158,9 @@ def matched(
         top = float(raised[-1] - mean)
         wide = excess(usual, top) < 0.0
         sigma = top if wide else root(lambda sigma: excess(usual, sigma), sd, top)
-        return mean + usual * sigma, float(np.sqrt(max(sigma**2 - sd**2, 0.0))), 1.0
+        return mean + usual * sigma, float(np.sqrt(max(sigma**2 - sd**2, 0.0)))
     z = lowest if excess(lowest, sd) > 0.0 else root(lambda z: excess(z, sd), lowest, usual)
-    return mean + z * sd, 0.0, float(np.exp(0.5 * excess(z, sd)))
+    return mean + z * sd, 0.0
 
 
 def check_rule(rule: Threshold) -> None:
@@ -185,7 +184,7 @@ def check_rule(rule: Threshold) -> None:
 
 
 def choose_threshold(
-    rule: Threshold,
+    rule: str | float | Quantile | Predicted,
     discrepancy: np.ndarray,
     transform: Transform,
     at_minimum: Callable[[], tuple[float, float]],

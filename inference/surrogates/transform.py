@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+ROUNDING = 1e-9  # of the largest discrepancy, below which differences tell nothing
 NEAR_SHARE = 0.25  # of the runs, to which a logarithm may be linear
 
 
@@ -61,9 +62,9 @@ def candidates(name: str | None, discrepancy: np.ndarray) -> list[Transform]:
     names = ("identity",) if lowest < 0 else tuple(TRANSFORMS) if name is None else (name,)
     found = [Transform(n, 0.0 if n == "identity" else _offset(discrepancy)) for n in names]
     near = float(np.quantile(discrepancy, NEAR_SHARE)) - lowest
-    return (
-        [*found, Transform("log", near - lowest, bool(lowest < 0))] if not name and near else found
-    )
+    if name is not None or near <= ROUNDING * np.abs(discrepancy).max():
+        return found
+    return [*found, Transform("log", near - lowest, bool(lowest < 0))]
 
 
 def _offset(discrepancy: np.ndarray) -> float:

@@ -50,9 +50,10 @@ UNRESOLVED = (
     "the surrogate does not know exceeds what the threshold tells apart; simulate more, or use "
     'surrogate="signal"'
 )
-WIDE = (
-    "run-to-run noise of the discrepancy makes the posterior much wider than the data do: average "
-    'the noise out, or use surrogate="signal"'
+NOISY = (
+    "run-to-run noise of the discrepancy exceeds what the data tell apart: the posterior is wider "
+    "than the data make it, and its centre is as uncertain; simulate more, average the noise out, "
+    'or use surrogate="signal"'
 )
 GUESSED = (
     "how far a discrepancy may exceed its least value is not known of so few numbers: the "

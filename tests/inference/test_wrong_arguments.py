@@ -114,6 +114,7 @@ def cases():
         "LowerConfidenceBound": (inference.LowerConfidenceBound, {}),
         "MaxVariance": (inference.MaxVariance, {}),
         "PosteriorDraws": (inference.PosteriorDraws, {}),
+        "CautiousDraws": (inference.CautiousDraws, {}),
         "ExpectedIntegratedVariance": (inference.ExpectedIntegratedVariance, {}),
         "squared_difference": (inference.squared_difference, {}),
         "FitPipeline": (inference.FitPipeline, {"simulate": simulate, "prior": prior}),
@@ -257,6 +258,7 @@ VALUES = {
     "FitPipeline": [{"options": {"budget": 3}}, {"sampling": {"draw": 3}}, {"prior": "flat"}],
     "LowerConfidenceBound": [{"jitter": np.inf}, {"jitter": "small"}],
     "PosteriorDraws": [{"share": None}, {"share": np.nan}],
+    "CautiousDraws": [{"share": None}, {"share": np.nan}],
 }
 
 
