@@ -195,7 +195,7 @@ class Bolfi:
         """
         n = checked_integer("n", n, 1, MOST_SIMULATIONS)
         if not isinstance(fit, Fit) or fit.history is not self._state.history:
-            raise ValueError("fit must be what `fit` returned after the last simulation was told")
+            raise ValueError(f"fit must be what `fit` returned last, got {fit!r:.100}")
         started = time.perf_counter()
         self._before = Before(*fit.population.moments, self.told)
         drawn = fit.population.resample(np.random.default_rng([self.seed, self.asked]), n)

@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtr
 
 from .._float64 import in_float64
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
@@ -18,8 +17,6 @@ from ..gp.process import (
     predict,
     predict_points,
 )
-from ..sampling.importance import explore
-from ..sampling.target import Target
 from ..types import LogLikelihood, LogSecondMoment
 from .held_back import FIRST_SHARE, MIN_FIRST_RUNS, HeldBack
 from .hyper_draws import posterior_draws
@@ -38,14 +35,11 @@ from .warnings import (
     EQUAL,
     LOW_THRESHOLD,
     NOISY,
-    UNRESOLVED,
     complaints,
     held_back_warnings,
 )
 
 BETWEEN = 0.25  # of the least simulated discrepancy: the least that is taken for its minimum
-WITHIN = 0.3  # of the largest likelihood, from which a run lies in the posterior
-MAX_DOUBT_OF_FEW = 0.25  # resolutions of sd, where no more than d runs lie there
 MIN_RESOLUTION = 1e-4  # of the spread of g(Delta)
 UNKNOWN_FREEDOM = 20.0  # errors more than parameters, where nothing tells their number
 LOW = 3.0  # sds of a new discrepancy by which a threshold lies too low
@@ -188,7 +182,7 @@ class DiscrepancySurrogate:
         said = [*self.said]
         if not confirmed:
             said += complaints(self.checks()["loo_z"], "discrepancy")
-            said += [*held_back_warnings(self._held_back()), *self._unresolved()]
+            said += held_back_warnings(self._held_back())
         if self.noisy:
             said.append(NOISY)
         return said if self.fits else [*said, LOW_THRESHOLD]
@@ -204,19 +198,6 @@ class DiscrepancySurrogate:
             gp = condition(early, data._replace(y=y))
             errors[first:] = (gp.whitener[0] @ y[0])[first:, None]
         return HeldBack(errors, freedom)
-
-    def _unresolved(self) -> list[str]:
-        """A warning if the latent sd, averaged over the posterior, exceeds the resolution; or
-        hardly a run lies in the posterior, and that sd is not much smaller."""
-        state, d = self.state, self.gp.data.u.shape[1]
-        found = explore(np.random.default_rng(0), Target(log_likelihood, state, d))
-        weights = np.exp(found.log_weights - found.log_weights.max())
-        sd = np.sqrt(np.mean(predict(self.gp, ndtr(found.x))[1], axis=0)) / state.resolution
-        doubt = weights @ sd / weights.sum()
-        high = log_likelihood(state, np.concatenate([self.gp.data.u, ndtr(found.x)]))
-        within = np.sum(high[: len(self.gp.data.u)] > high.max() + np.log(WITHIN))
-        few = within <= d and doubt > MAX_DOUBT_OF_FEW
-        return [UNRESOLVED] if few or doubt > 1.0 else []
 
     @in_float64
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:

@@ -144,9 +144,12 @@ def independent(residual: np.ndarray) -> float:
         residual: [t, ...], time first; NaN where nothing was observed.
     """
     error = np.nan_to_num(residual).reshape(len(residual), -1) if residual.ndim else residual[None]
-    squares, count = np.sum(error**2), numbers(residual)
-    if not squares > 0.0:
+    size, count = np.abs(error).max(), numbers(residual)
+    if not size > 0.0:
         return count
+    with np.errstate(under="ignore"):
+        error = error / size
+        squares = np.sum(error**2)
     rho = np.sum(error[1:] * error[:-1]) / squares if len(error) >= MIN_SERIES else 0.0
     uneven = 3.0 * squares**2 / np.sum(error**4) / count
     return float(count * min(1.0, (1.0 - rho) / (1.0 + rho)) * min(1.0, uneven))

@@ -143,12 +143,12 @@ def matched(
     """
     least = float(transform.inverse(np.asarray(mean)))
     variance = least / max(rule.numbers - dimension, 1.0) if least > 0 else LOG_LIKELIHOOD_VARIANCE
-    q = EXCESSES * max(least, variance)
-    raised = transform(least + q)
+    unit, q = max(least, variance), EXCESSES
+    raised = transform(least + unit * q)
 
     def excess(z: float, sigma: float) -> float:
         weights = q ** (dimension / 2) * ndtr(z - (raised - mean) / sigma)  # of log q
-        return float(np.log(weights @ q / weights.sum() / (dimension * variance)))
+        return float(np.log(weights @ q / weights.sum() / (dimension * variance / unit)))
 
     def root(function: Callable[[float], float], low: float, high: float) -> float:
         return float(brentq(function, low, high))  # pyright: ignore[reportArgumentType]

@@ -45,11 +45,6 @@ LOW_THRESHOLD = (
     "the threshold lies below all that a simulation can be expected to come to: where the "
     "posterior lies is chance; give a larger threshold, or none"
 )
-UNRESOLVED = (
-    "the discrepancy is not resolved where it is least: too few simulations lie there, or what "
-    "the surrogate does not know exceeds what the threshold tells apart; simulate more, or use "
-    'surrogate="signal"'
-)
 NOISY = (
     "run-to-run noise of the discrepancy exceeds what the data tell apart: the posterior is wider "
     "than the data make it, and its centre is as uncertain; simulate more, average the noise out, "
@@ -297,6 +292,8 @@ def distance_warnings(observed: np.ndarray, outputs: np.ndarray) -> list[str]:
         outputs: Of the simulations, the closest first [n, t, ...].
     """
     n, t = outputs.shape[:2]
+    unit = max(np.nanmax(np.abs(observed)), np.nanmax(np.abs(outputs))) or 1.0
+    observed, outputs = observed / unit, outputs / unit
     there = np.isfinite(observed.reshape(t, -1))
     error = np.where(there, (outputs[0] - observed).reshape(t, -1), 0.0)
     runs = np.where(there, outputs.reshape(n, t, -1), 0.0)

@@ -198,7 +198,7 @@ def test_a_fit_on_a_few_of_many_says_so(prior, observed, simulate):
     theta = {"slope": np.linspace(-1.0, 1.0, 12)[::-1], "offset": np.arange(12) * 5 % 12 / 12}
     theta = {name: values[:10] for name, values in theta.items()}
     engine.tell(theta, fragile(theta, np.arange(10)))
-    assert engine.fit().warnings == []
+    assert not any("failed" in said for said in engine.fit(warn=False).warnings)
     fewer = {name: np.concatenate([values[:4]] * 2) for name, values in theta.items()}
     engine.tell(fewer, fragile(fewer, np.arange(8)))
     with pytest.warns(inference.EmulatorWarning, match="12 of 18 simulations failed"):

@@ -96,7 +96,7 @@ def test_runs_at_draws_of_the_posterior_confirm_it_or_move_it():
     engine.tell(drawn, circle(drawn["a"]))
     moved = engine.fit(warn=False)
     assert moved.confirmed is False and UNCONFIRMED in moved.warnings
-    with pytest.raises(ValueError, match="after the last simulation"):
+    with pytest.raises(ValueError, match="fit must be what"):
         engine.confirm(before)
 
 

@@ -70,6 +70,7 @@ def cases():
         "Bolfi.ask": (inference.Bolfi(prior, OBSERVED).ask, {}),
         "Bolfi.tell": (engine.tell, {"theta": THETA, "signals": signals}),
         "Bolfi.fit": (engine.fit, {}),
+        "Bolfi.confirm": (engine.confirm, {"fit": engine.fit(warn=False)}),
         "Fit.log_prob": (fit.log_prob, {"theta": THETA}),
         "Fit.sample": (fit.sample, {"sampler": "quadrature", "draws": 8}),
         "Fit.plot_search": (fit.plot_search, {}),
@@ -117,6 +118,7 @@ def cases():
         "CautiousDraws": (inference.CautiousDraws, {}),
         "ExpectedIntegratedVariance": (inference.ExpectedIntegratedVariance, {}),
         "squared_difference": (inference.squared_difference, {}),
+        "relative": (inference.relative, {"share": 0.2}),
         "FitPipeline": (inference.FitPipeline, {"simulate": simulate, "prior": prior}),
         "shared_design": (
             inference.shared_design,
