@@ -17,7 +17,7 @@ from .notebook_display import as_html, as_text
 from .prior import Prior
 from .sampling.convergence import SamplingWarning
 from .sampling.draw import SAMPLERS, draw_posterior
-from .sampling.importance import Before, Population, explore
+from .sampling.importance import Before, Population, explore, weighted_quantiles
 from .sampling.target import Length, Target, log_likelihood
 from .surrogates.base import Surrogate
 from .surrogates.signal import SignalSurrogate
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-MUCH_DOUBT = 1.5
+MUCH_DOUBT = 1.5  # see `Fit.doubt`: beyond it more is simulated, and a fit warns
 MOST_CHAINS, MOST_DRAWS = 1000, 1_000_000  # of one call: more would take days, or all memory
 
 
@@ -131,11 +131,9 @@ class Fit:
     def _quantiles(self) -> list[str]:
         """Median and 90 % interval of each parameter."""
         theta = self.prior.from_unit(ndtr(self.population.x))
-        said = []
+        weights, said = self.population.weights, []
         for name, values in theta.items():
-            order = np.argsort(values)
-            reached = np.cumsum(self.population.weights[order])
-            low, middle, high = np.interp((0.05, 0.5, 0.95), reached, values[order])
+            low, middle, high = weighted_quantiles(values, weights, (0.05, 0.5, 0.95))
             said.append(f"{name} {middle:.4g} ({low:.4g} to {high:.4g})")
         return said
 

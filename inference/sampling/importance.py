@@ -7,6 +7,7 @@ al. 2012, adaptive multiple importance sampling; Veach and Guibas 1995, balance 
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ MIN_EFFECTIVE = 400.0  # effective points at which one more round ends it
 BOX_EDGE = 1e-12  # quantile at which the box is cut, so that x = Phi^-1(u) stays finite
 MIN_LOG_POWER = -60.0  # log of the smallest inverse temperature
 HALVINGS = 30  # of the interval of log powers
-LEAST = 1e-12
+LEAST = 1e-12  # sd, and weight of a draw, where a posterior is one point
 WIDER = 2.0  # sds whose ratio is larger are not the same
 SHARPENED_WIDTH = 0.5  # width of half the proposals, while the temperature still has to fall
 
@@ -50,19 +51,29 @@ class Population(NamedTuple):
     @property
     def moments(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean and standard deviation of each coordinate, [d] each."""
-        mean = self.weights @ self.x
-        return mean, np.sqrt(self.weights @ (self.x - mean) ** 2)
+        weights = self.weights
+        mean = weights @ self.x
+        return mean, np.sqrt(weights @ (self.x - mean) ** 2)
 
     def resample(self, rng: np.random.Generator, count: int) -> np.ndarray:
         """`count` different points [count, d], the first drawn as they are weighted, the others in
         proportion to what they add to the variance, too: there a posterior is known least."""
-        mean, sd = self.moments
-        first = rng.choice(len(self.x), p=self.weights)
+        (mean, sd), weights = self.moments, self.weights
+        first = rng.choice(len(self.x), p=weights)
         distance = np.sum(((self.x - mean) / np.maximum(sd, LEAST)) ** 2, axis=1)
-        outer = self.weights * distance + LEAST  # of a posterior that is one point, too
+        outer = weights * distance + LEAST  # of a posterior that is one point, too
         outer[first] = 0.0
         others = rng.choice(len(self.x), count - 1, replace=False, p=outer / outer.sum())
         return self.x[np.append(others, first)]
+
+
+def weighted_quantiles(
+    values: np.ndarray, weights: np.ndarray, shares: Sequence[float]
+) -> np.ndarray:
+    """Quantiles [len(shares)] of weighted values [n]."""
+    order = np.argsort(values)
+    reached = np.cumsum(weights[order])
+    return np.interp(shares, reached / reached[-1], values[order])
 
 
 class Before(NamedTuple):

@@ -25,7 +25,7 @@ from .noise.by_mean import ByMean, SdOfMean, law_of
 from .noise.scales import Plain, Scale, comparable
 from .outliers import sane
 from .output_vectors import Output, Summary, describe, infinities, summarise
-from .signal import SignalSurrogate, observe
+from .signal import MIN_FREEDOM, SignalSurrogate, observe
 from .squared_difference import evaluate, failed_on, independent, numbers, squared_difference
 from .success import Feasibility, learn_success
 from .threshold import Matched, Threshold, check_rule
@@ -33,7 +33,6 @@ from .transform import TRANSFORMS
 from .warnings import GUESSED, distance_warnings
 
 MAX_COMPONENTS = 8
-MIN_FREEDOM = 3  # numbers more than parameters, from which the size of the noise can be told
 LEFT_OF_NOISE = 0.02  # of the variance of noise by the mean, that components may leave
 
 

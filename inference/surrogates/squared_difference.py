@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike
 from ..arguments import checked_array
 from ..simulations.failures import incomparable, raised
 from ..types import Discrepancy
-
-MIN_SERIES = 5  # samples from which a correlation is looked for
+from .output_vectors import MIN_SERIES
 
 
 def squared_difference(time: ArrayLike | None = None) -> Discrepancy:
