@@ -1,18 +1,18 @@
 """Ask and tell: Bayesian optimisation for likelihood-free inference, one step at a time."""
 
 import time
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import ndtr
 
 from ._float64 import in_float64
 from .acquisition.given import chosen, resolve_acquisition
 from .acquisition.replicates import next_replicate
-from .arguments import Unusable, check_flag, checked_array, checked_integer, checked_mapping
+from .arguments import Unusable, check_flag, checked_integer, checked_mapping
 from .describe import describe
 from .history import (
     UNKNOWN,
@@ -28,14 +28,15 @@ from .history import (
 from .notebook_display import as_html, as_text
 from .prior import Prior, check_support, checked_prior
 from .result import Fit
+from .sampling.importance import Before
 from .simulations.failures import Failure, incomparable, kind, unusable
 from .simulations.job import BATCH
 from .simulations.returned import told_signals
 from .sobol import sobol, start_size
-from .surrogates.base import Acquisition
-from .surrogates.families import Family, Learnable, Measured, check_observed, resolve
+from .surrogates.base import Acquisition, Learnable, Measured
+from .surrogates.families import Family, checked_observed, resolve
 from .surrogates.success import Feasibility, sane
-from .surrogates.warnings import EmulatorWarning
+from .surrogates.warnings import complain
 from .types import Theta
 
 MIN_LEARN = 3  # successful simulations before the surrogate may choose
@@ -50,14 +51,13 @@ class Bolfi:
 
     Args:
         prior: The parameters and their priors.
-        observed: The measured output [*signal_shape], time first; NaN is a missing sample. None,
-            and only so, for the surrogate "log_likelihood".
+        observed: The measured output [*signal_shape], time first; NaN is a missing sample. None
+            for the surrogate "log_likelihood" alone.
         surrogate: "signal", which emulates the output; "discrepancy", the paper's;
-            "log_likelihood", where the simulator returns that; a `SignalFamily`,
-            `DiscrepancyFamily` or `LogLikelihoodFamily`; None is "signal", unless a discrepancy,
-            or another option of that family alone, is given.
-        acquisition: "eiv", "maxvar", "draws", "lcb" (with "discrepancy"), an object (see
-            `Acquisition`), or None for the surrogate's best.
+            "log_likelihood", which the simulator returns; an object such as `SignalFamily`; None
+            is "signal", unless a discrepancy, or another option of that family alone, is given.
+        acquisition: "eiv", "maxvar", "draws", "cautious", "lcb" (with "discrepancy"), an object
+            (see `Acquisition`), or None for the surrogate's best.
         seed: Fixes the start design and the acquisitions.
         initial: Points of the Sobol start design; None is 2 d + 6.
         options: Of the surrogate's family: `summary`, `noise`, `components`, `predicted` and
@@ -82,10 +82,7 @@ class Bolfi:
         checked_prior(prior)
         self.prior = prior
         self.family = resolve(surrogate, options)
-        check_observed(observed, self.family)
-        self.observed = checked_array("observed", np.nan if observed is None else observed)
-        if np.isinf(self.observed).any():
-            raise ValueError("observed must not be infinite; NaN is a missing sample")
+        self.observed = checked_observed(observed, self.family)
         self.seed = checked_integer("seed", seed, 0)
         self.initial = checked_integer(
             "initial",
@@ -106,6 +103,7 @@ class Bolfi:
         }
         self._state = init(len(prior), self.observed.shape, self._learner.features)
         self._learned: Any = None  # the family's surrogate, once there is one
+        self._before: Before | None = None  # the posterior of which `confirm` drew
         self._seconds = 0.0
 
     def __repr__(self) -> str:
@@ -179,6 +177,30 @@ class Bolfi:
         theta = self.prior.to_dict(asked)
         self._seconds += time.perf_counter() - started
         return theta
+
+    def confirm(self, fit: Fit, n: int = 3) -> dict[str, np.ndarray]:
+        """Draws of a fit's posterior to simulate, name -> [n].
+
+        The next `fit` says whether what was told since has moved the posterior, see
+        `Fit.confirmed`.
+
+        Args:
+            fit: What this engine's `fit` returned last.
+            n: How many draws.
+
+        Raises:
+            ValueError: bad argument.
+        """
+        n = checked_integer("n", n, 1, MOST_SIMULATIONS)
+        if not isinstance(fit, Fit) or fit.history is not self._state.history:
+            raise ValueError(f"fit must be what `fit` returned last, got {fit!r:.100}")
+        started = time.perf_counter()
+        self._before = Before(*fit.population.moments, self.told)
+        drawn = fit.population.resample(np.random.default_rng([self.seed, self.asked]), n)
+        asked = self.prior.to_array(self.prior.from_unit(ndtr(drawn)))
+        self._state = remember_asked(self._state, asked, 0)
+        self._seconds += time.perf_counter() - started
+        return self.prior.to_dict(asked)
 
     def _designed_now(self, n: int) -> int:
         """How many of the next n points the start design provides."""
@@ -349,7 +371,7 @@ class Bolfi:
         fitted = self._learner.finish(known, self.seed)
         learned_from = history.distinct
         learned_from[learned_from] = self._learner.learnable(known.discrepancy)
-        spent = self._seconds + time.perf_counter() - started
+        self._seconds += time.perf_counter() - started
         made = Fit(
             prior=self.prior,
             observed=self.observed,
@@ -357,10 +379,11 @@ class Bolfi:
             learned=fitted,
             learned_from=learned_from,
             settings=self.settings,
-            seconds={"simulator": 0.0, **measured, "engine": spent},
+            seconds={"simulator": 0.0, **measured, "engine": self._seconds},
+            before=self._before,
         )
-        for complaint in made.warnings if warn else []:
-            warnings.warn(complaint, EmulatorWarning, stacklevel=stacklevel)
+        if warn:
+            complain(made.warnings, stacklevel + 1)
         return made
 
 

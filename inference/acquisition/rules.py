@@ -7,7 +7,7 @@ point of a batch before it chooses the next (see `believe` of the surrogates).
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -247,10 +247,41 @@ class ExpectedIntegratedVariance:
         return log_sum_exp((resolved - found.log_density[rows, None]).T)
 
 
+@dataclass(frozen=True)
+class CautiousDraws:
+    """`PosteriorDraws` of the posterior that a fit would give, in which doubt counts against a
+    place; and EIV of that in which it counts as agreement, so that no mode stays unseen.
+
+    Attributes:
+        share: Of EIV's points; their number is rounded at random.
+    """
+
+    share: float = 0.25
+
+    def __post_init__(self) -> None:
+        checked_number("share", self.share, lambda share: 0.0 <= share <= 1.0, "from 0 to 1")
+
+    def __call__(
+        self, key: jax.Array, surrogate: Any, n: int, feasibility: Feasibility
+    ) -> np.ndarray:
+        """n different points u [n, d]."""
+        first = n - int(n * self.share + generator(key).uniform())
+        points = np.zeros((0, surrogate.gp.data.u.shape[1]))
+        if first:
+            points = PosteriorDraws()(
+                key, getattr(surrogate, "cautious", surrogate), first, feasibility
+            )
+        if first == n:
+            return points
+        more = ExpectedIntegratedVariance()(key, surrogate.believe(points), n - first, feasibility)
+        return np.concatenate([points, more])
+
+
 RULES = {
     "lcb": LowerConfidenceBound,
     "maxvar": MaxVariance,
     "eiv": ExpectedIntegratedVariance,
     "draws": PosteriorDraws,
+    "cautious": CautiousDraws,
 }
 """Acquisitions by the name users give."""

@@ -4,6 +4,7 @@ from .families import DiscrepancyFamily as DiscrepancyFamily
 from .families import LogLikelihoodFamily as LogLikelihoodFamily
 from .families import SignalFamily as SignalFamily
 from .squared_difference import squared_difference as squared_difference
+from .threshold import Matched as Matched
 from .threshold import Predicted as Predicted
 from .threshold import Quantile as Quantile
 from .warnings import EmulatorWarning as EmulatorWarning

@@ -1,6 +1,6 @@
 """Protocols of what the engine learns and how it chooses; families and users satisfy them."""
 
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import jax
 import numpy as np
@@ -8,6 +8,24 @@ import numpy as np
 from ..gp.process import GP
 from ..types import LogLikelihood, LogSecondMoment
 from .success import Feasibility
+
+
+class Learnable(NamedTuple):
+    """Successful simulations, as a family measured them."""
+
+    u: np.ndarray  # [n, d]
+    features: np.ndarray  # [n, m]
+    discrepancy: np.ndarray  # [n]
+    normal: np.ndarray | None  # bool [d], see `Prior.normal`
+    runs: Feasibility  # all, failed ones too
+
+
+class Measured(NamedTuple):
+    """n simulations in view of what was observed."""
+
+    features: np.ndarray  # [n, m]
+    discrepancy: np.ndarray  # [n], NaN where a run failed
+    errors: list[str]  # [n], why the user's own function could not compare a signal; "" elsewhere
 
 
 class Surrogate(Protocol):
@@ -47,13 +65,27 @@ class Surrogate(Protocol):
         """What a reader of the posterior must know of the likelihood."""
         ...
 
+    def described(self) -> list[str]:
+        """What a reader of the fit should know first, in a few words."""
+        ...
+
     def checks(self) -> dict[str, np.ndarray]:
         """Of the emulator: `loo_z`, studentised leave-one-out errors [n, ...], a row for each
         simulation that was learned from."""
         ...
 
-    def warnings(self) -> list[str]:
-        """What these checks complain of, in sentences."""
+    @property
+    def fits(self) -> bool:
+        """Whether what was observed is explained."""
+        ...
+
+    def warnings(self, *, confirmed: bool = False) -> list[str]:
+        """What is complained of, in sentences.
+
+        Args:
+            confirmed: Runs at draws of the posterior left it where it was: then errors of the
+                emulator, which may lie far from it, are not complained of.
+        """
         ...
 
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:

@@ -18,20 +18,32 @@ from ..gp.process import (
     predict_points,
 )
 from ..types import LogLikelihood, LogSecondMoment
+from .held_back import FIRST_SHARE, MIN_FIRST_RUNS, HeldBack
 from .hyper_draws import posterior_draws
 from .success import sane
 from .threshold import (
+    Matched,
     Threshold,
     ThresholdState,
     choose_threshold,
     log_likelihood,
     log_second_moment,
+    matched,
 )
 from .transform import Transform, candidates
-from .warnings import EQUAL, LOW_THRESHOLD, complaints
+from .warnings import (
+    EQUAL,
+    LOW_THRESHOLD,
+    NOISY,
+    complaints,
+    held_back_warnings,
+)
 
+BETWEEN = 0.25  # of the least simulated discrepancy: the least that is taken for its minimum
+MIN_RESOLUTION = 1e-4  # of the spread of g(Delta)
+UNKNOWN_FREEDOM = 20.0  # errors more than parameters, where nothing tells their number
 LOW = 3.0  # sds of a new discrepancy by which a threshold lies too low
-TRANSFORM_GROWTH = 2.0  # the transform is chosen anew when data have grown by this factor
+TRANSFORM_GROWTH = 1.3  # the transform is chosen anew when data have grown by this factor
 
 
 class Scale(NamedTuple):
@@ -57,6 +69,12 @@ class DiscrepancySurrogate:
         learned_at: Simulations known when the hyperparameters were found.
         chosen_at: Simulations known when the transform was chosen.
         success: Where runs succeed, see `success.learn_success`.
+        width: Sd that the threshold has itself, on the scale of g(Delta).
+        noisy: Whether the noise of g(Delta) alone makes the posterior wider than the data do, as
+            far as the threshold is `Matched`.
+        resolution: Sd on the scale of g(Delta) from which doubt counts against a place, see
+            `threshold.log_likelihood`; infinite while it shall attract runs.
+        said: What the outputs, of which the surrogate knows nothing, have been found to lack.
     """
 
     gp: GP
@@ -66,6 +84,10 @@ class DiscrepancySurrogate:
     learned_at: int
     chosen_at: int
     success: GP | None = None
+    width: float = 0.0
+    noisy: bool = False
+    resolution: float = np.inf
+    said: tuple[str, ...] = ()
 
     @property
     def equal(self) -> bool:
@@ -80,7 +102,19 @@ class DiscrepancySurrogate:
     @in_float64
     def state(self) -> ThresholdState:
         threshold = (self.threshold - self.scale.location) / self.scale.spread
-        return ThresholdState(self.gp, np.asarray(threshold), self.success)
+        width, resolution = (
+            np.asarray(part / self.scale.spread) for part in (self.width, self.resolution)
+        )
+        return ThresholdState(self.gp, np.asarray(threshold), width, resolution, self.success)
+
+    @property
+    @in_float64
+    def cautious(self) -> "DiscrepancySurrogate":
+        """The surrogate to which doubt beyond what the threshold can resolve is no agreement."""
+        mean, _ = self.predict(self.gp.data.u)
+        noise = self.scale.spread * float(np.exp(self.gp.hyper.log_noise).min())
+        scales = float(np.hypot(noise, self.width)), self.threshold - float(mean.min())
+        return replace(self, resolution=max(*scales, MIN_RESOLUTION * self.scale.spread))
 
     @property
     def log_likelihood(self) -> LogLikelihood:
@@ -121,6 +155,10 @@ class DiscrepancySurrogate:
         """What a reader of the posterior must know of the likelihood."""
         return {"threshold": np.asarray(self.threshold)}
 
+    def described(self) -> list[str]:
+        """The threshold, on the scale of the discrepancy."""
+        return [f"threshold {float(self.transform.inverse(np.asarray(self.threshold))):.3g}"]
+
     @in_float64
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised leave-one-out errors `loo_z` [n, 1]."""
@@ -129,13 +167,37 @@ class DiscrepancySurrogate:
         total = variance.mean(0) + mean.var(0)  # of the mixture over hyperparameters
         return {"loo_z": (error / np.sqrt(total))[: len(self.discrepancy), None]}
 
-    def warnings(self) -> list[str]:
-        """What the leave-one-out errors complain of."""
+    @property
+    def fits(self) -> bool:
+        """Whether discrepancies as low as the threshold can be expected anywhere."""
+        mean, sd = self.predict(self.gp.data.u)
+        low = LOW * np.hypot(sd, self.width)
+        return self.equal or bool((self.threshold > mean - low).any())
+
+    @in_float64
+    def warnings(self, *, confirmed: bool = False) -> list[str]:
+        """What the process's errors complain of, unless it is confirmed, and what was compared."""
         if self.equal:
             return [EQUAL]
-        said = complaints(self.checks()["loo_z"], "discrepancy")
-        mean, sd = self.predict(self.gp.data.u)
-        return [*said, LOW_THRESHOLD] if (self.threshold < mean - LOW * sd).all() else said
+        said = [*self.said]
+        if not confirmed:
+            said += complaints(self.checks()["loo_z"], "discrepancy")
+            said += held_back_warnings(self._held_back())
+        if self.noisy:
+            said.append(NOISY)
+        return said if self.fits else [*said, LOW_THRESHOLD]
+
+    def _held_back(self) -> HeldBack:
+        """Innovations of the last runs, with hyperparameters of the first ones."""
+        data, first = self.gp.data, round(FIRST_SHARE * len(self.discrepancy))
+        freedom = first - (1 + 2 * data.u.shape[1])
+        errors = np.full((len(self.discrepancy), 2), np.nan)
+        if first >= MIN_FIRST_RUNS and freedom > 0:
+            y = data.y[:1]
+            early = maximum_a_posteriori(data._replace(u=data.u[:first], y=y[:, :first]))
+            gp = condition(early, data._replace(y=y))
+            errors[first:] = (gp.whitener[0] @ y[0])[first:, None]
+        return HeldBack(errors, freedom)
 
     @in_float64
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
@@ -214,8 +276,18 @@ def with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> Discrepanc
         best = np.argmin(mean)
         return float(mean[best]), float(sd[best])
 
+    if rule is None or isinstance(rule, Matched):
+        d = learned.gp.data.u.shape[1]
+        matching = Matched(d + UNKNOWN_FREEDOM) if rule is None else rule
+        least = at_minimum()
+        mean, sd = (float(part[0]) for part in learned.predict(learned.minimum()[None]))
+        # between the runs the least may be lower, but not out of all proportion
+        if learned.transform.inverse(np.asarray(mean)) > BETWEEN * learned.discrepancy.min():
+            least = min(least, (mean, sd))
+        threshold, width = matched(matching, *least, learned.transform, d)
+        return replace(learned, threshold=threshold, width=width, noisy=width == 0.0)
     threshold = choose_threshold(rule, learned.discrepancy, learned.transform, at_minimum)
-    return replace(learned, threshold=threshold)
+    return replace(learned, threshold=threshold, width=0.0, noisy=False)
 
 
 @in_float64
@@ -241,9 +313,10 @@ def _standardise(transform: Transform, values: np.ndarray) -> Scale:
 
 
 def _score(gp: GP, scale: Scale, values: np.ndarray) -> float:
-    """Leave-one-out log predictive density of the discrepancy under the scale, summed."""
+    """Leave-one-out log predictive density of the discrepancy under the scale, summed over the
+    better half of the runs: with a wide prior the others only tell that they are bad."""
     mean, variance = (moment[0] for moment in leave_one_out(gp))
     residual = gp.data.y[0] - mean
-    density = -0.5 * np.sum(residual**2 / variance + np.log(2.0 * np.pi * variance))
+    density = -0.5 * (residual**2 / variance + np.log(2.0 * np.pi * variance))
     jacobian = scale.transform.log_jacobian(values) - np.log(scale.spread)
-    return float(density + np.sum(jacobian))
+    return float(np.sum((density + jacobian)[values <= np.median(values)]))

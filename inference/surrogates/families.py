@@ -1,48 +1,33 @@
 """The families of surrogates: what a user may choose of each, and how it learns."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_callable, checked_array, checked_integer, checked_number
-from ..simulations.failures import impossible, incomparable, not_finite
+from ..arguments import check_callable, check_flag, checked_array, checked_integer, checked_number
+from ..simulations.failures import not_finite
 from ..types import Discrepancy
-from .base import Surrogate
+from .base import Learnable, Measured, Surrogate
 from .discrepancy import DiscrepancySurrogate, learn, marginalised, with_threshold
-from .emulator import PREDICTED_SHARE, Limits, emulate
-from .given_noise import GivenNoise, given_noise
-from .log_likelihood import LogLikelihoodSurrogate
-from .log_likelihood import learn as learn_level
+from .emulator import PREDICTED_SHARE, Emulator, Limits, emulate, goes_on, resized
+from .given_noise import Noise, given_noise
+from .log_likelihood import LogLikelihoodFamily, LogLikelihoodLearner
+from .noise.by_mean import ByMean, SdOfMean, law_of
+from .noise.scales import Plain, Scale, comparable
 from .output_vectors import Output, Summary, describe, infinities, summarise
-from .signal import Noise, SignalSurrogate, observe
-from .squared_difference import evaluate, failed_on, squared_difference
-from .success import Feasibility, learn_success, sane
-from .threshold import Threshold, check_rule
+from .signal import MIN_FREEDOM, SignalSurrogate, observe
+from .squared_difference import evaluate, failed_on, independent, numbers, squared_difference
+from .success import learn_success, sane
+from .threshold import Matched, Threshold, check_rule
 from .transform import TRANSFORMS
+from .warnings import GUESSED, NEGATIVE, distance_warnings
 
 MAX_COMPONENTS = 8
-
-
-class Learnable(NamedTuple):
-    """Successful simulations, as a family measured them."""
-
-    u: np.ndarray  # [n, d]
-    features: np.ndarray  # [n, m]
-    discrepancy: np.ndarray  # [n]
-    normal: np.ndarray | None  # bool [d], see `Prior.normal`
-    runs: Feasibility  # all, failed ones too
-
-
-class Measured(NamedTuple):
-    """n simulations in view of what was observed."""
-
-    features: np.ndarray  # [n, m]
-    discrepancy: np.ndarray  # [n], NaN where a run failed
-    errors: list[str]  # [n], why the user's own function could not compare a signal; "" elsewhere
+LEFT_OF_NOISE = 0.02  # of the variance of noise by the mean, that components may leave
 
 
 @dataclass(frozen=True)
@@ -53,7 +38,9 @@ class DiscrepancyFamily:
         discrepancy: Callable (observed, simulated) -> float; None is `squared_difference()`.
         transform: "identity", "sqrt" or "log" of the discrepancy; None chooses by
             leave-one-out log predictive density.
-        threshold: Rule for eps, or a number on the discrepancy's own scale, which may be
+        threshold: Rule for eps; None makes the posterior as wide as the closest run's residual
+            suggests, see `threshold.matched`, or guesses of fewer than 3 numbers more than
+            parameters; or a number on the discrepancy's own scale, which may be
             negative where a user's discrepancy is, as a logarithm; see
             `threshold.choose_threshold`.
         hyper_draws: Posterior draws of the hyperparameters over which the likelihood of a fit
@@ -61,7 +48,7 @@ class DiscrepancyFamily:
     """
 
     name: ClassVar[str] = "discrepancy"
-    acquisition: ClassVar[str] = "eiv"
+    acquisition: ClassVar[str] = "cautious"
     replicates: ClassVar[bool] = False
 
     discrepancy: Discrepancy | None = None
@@ -89,7 +76,10 @@ class DiscrepancyLearner:
     family: DiscrepancyFamily
     distance: Discrepancy
     observed: np.ndarray
-    features: ClassVar[int] = 0
+
+    @property
+    def features(self) -> int:
+        return self.observed.size
 
     @property
     def any_shape(self) -> bool:
@@ -97,30 +87,62 @@ class DiscrepancyLearner:
         return self.family.discrepancy is not None
 
     def measure(self, signals: Sequence[np.ndarray | None]) -> Measured:
-        """Features [n, 0] and discrepancies of n signals, None where a run failed."""
-        return Measured(
-            np.zeros((len(signals), 0)), *evaluate(self.distance, self.observed, signals)
-        )
+        """Features [n, m] and discrepancies of n signals, None where a run failed.
+
+        The features are the signal, NaN where it has another shape than what was observed.
+        """
+        features = np.full((len(signals), self.observed.size), np.nan)
+        for row, signal in zip(features, signals, strict=True):
+            if signal is not None and signal.shape == self.observed.shape:
+                row[:] = signal.ravel()
+        return Measured(features, *evaluate(self.distance, self.observed, signals))
 
     def learnable(self, discrepancy: np.ndarray) -> np.ndarray:
-        """Which of the successful simulations are learned from, bool [n]: all."""
-        return np.ones(len(discrepancy), bool)
+        """Which of the successful simulations are learned from, bool [n]: what blew up is not."""
+        return sane(discrepancy)
 
     def learn(
         self, known: Learnable, previous: DiscrepancySurrogate | None
     ) -> DiscrepancySurrogate:
-        transform, rule = self.family.transform, self.family.threshold
-        learned = learn(known.u, known.discrepancy, transform, previous, known.normal)
+        """To search with: errors count as independent, lest a poor start leave it undecided."""
+        return self._learn(known, previous, self._rule(known, numbers))
+
+    def _learn(
+        self, known: Learnable, previous: DiscrepancySurrogate | None, rule: Threshold
+    ) -> DiscrepancySurrogate:
+        transform = self.family.transform
+        good = self.learnable(known.discrepancy)
+        learned = learn(known.u[good], known.discrepancy[good], transform, previous, known.normal)
         learned = replace(learned, success=learn_success(known.runs, known.normal))
         return learned if rule is None else with_threshold(learned, rule)
 
+    def _rule(self, known: Learnable, number: Callable[..., float]) -> Threshold:
+        """The threshold that was given, or the one that fits the closest run's residual."""
+        residual = self._residual(known)
+        if self.family.threshold is not None or numbers(residual) - known.u.shape[1] < MIN_FREEDOM:
+            return self.family.threshold
+        return Matched(number(residual))
+
+    def _residual(self, known: Learnable) -> np.ndarray:
+        """By which the closest run misses what was observed, NaN where nothing can be said."""
+        closest = known.features[np.argmin(known.discrepancy)]
+        return closest.reshape(self.observed.shape) - self.observed
+
     def finish(self, known: Learnable, seed: int) -> Surrogate:
         """The surrogate on which a fit rests."""
-        learned = self.learn(known, None)
-        draws = self.family.hyper_draws
-        if not draws:
-            return learned
-        return marginalised(learned, self.family.threshold, draws, seed)
+        rule = self._rule(known, independent)
+        learned, draws = self._learn(known, None, rule), self.family.hyper_draws
+        if draws:
+            learned = marginalised(learned, rule, draws, seed)
+        said = () if rule is not None else (GUESSED,)
+        if self.family.threshold is None and known.discrepancy.min() < 0.0:
+            said += (NEGATIVE,)
+        if self.family.discrepancy is None:
+            good = self.learnable(known.discrepancy)
+            order = np.argsort(known.discrepancy[good])
+            outputs = known.features[good][order].reshape(-1, *self.observed.shape)
+            said += tuple(distance_warnings(self.observed, outputs))
+        return replace(learned.cautious, said=said)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +154,13 @@ class SignalFamily:
             takes the output as it is.
         noise: Measurement noise that the simulator does not make: its sd, a number or an array
             shaped like the observed (summarised) output; or sds [n], or a covariance [n, n], of
-            that output's n finite values, flattened; 0 for none. None estimates it: as an AR(1)
-            process where the output is a series, of at least 5 samples without a summary.
+            that output's n finite values, flattened; 0 for none. "poisson" where counts were
+            observed and their means are simulated; `relative(0.2)` for an sd of 20 % of the
+            simulated mean; or a function from simulated means to sds, value by value. None
+            estimates it: as an AR(1) process where the output is a series, of at least 5 samples
+            without a summary.
+        varying_noise: Whether the noise that the simulator makes itself may depend on the
+            parameters and on the mean, where runs show that it does.
         misfit: Prior probability that the data are missed by more than the given noise, because
             the simulator errs or the noise is larger; its size is integrated out. 0 for never.
         components: At most.
@@ -149,18 +176,20 @@ class SignalFamily:
     replicates: ClassVar[bool] = True
 
     summary: Summary | None = None
-    noise: ArrayLike | None = None
+    noise: ArrayLike | SdOfMean | None = None
     misfit: float = 0.1
     components: int = MAX_COMPONENTS
     predicted: float | None = PREDICTED_SHARE
     discrepancy: Discrepancy | None = None
+    varying_noise: bool = True
 
     def __post_init__(self) -> None:
         check_callable("summary", self.summary)
         check_callable("discrepancy", self.discrepancy)
+        check_flag("varying_noise", self.varying_noise)
         checked_integer("components", self.components)
-        if self.noise is not None:  # its shape is looked at beside the output's
-            checked_array("noise", self.noise)
+        if self.noise is not None and law_of(self.noise) is None:
+            checked_array("noise", self.noise)  # its shape is looked at beside the output's
         checked_number("misfit", self.misfit, lambda p: 0.0 <= p < 1.0, "from 0 to below 1")
         if self.predicted is not None:
             due = "None or from 0 to below 1"
@@ -170,8 +199,15 @@ class SignalFamily:
         output = describe(observed, self.summary)
         values = output.values(observed)
         distance = self.discrepancy or partial(_of_summaries, self.summary)
-        noise = None if self.noise is None else given_noise(self.noise, output)
-        return SignalLearner(self, output, distance, observed, values, noise)
+        return SignalLearner(self, output, distance, observed, values, self._scale(output, values))
+
+    def _scale(self, output: Output, values: np.ndarray) -> Scale:
+        """On which outputs are emulated, `values` [m] being observed."""
+        law = law_of(self.noise)
+        if law is not None:
+            return ByMean(law, values, output.counts)
+        given = None if self.noise is None else given_noise(self.noise, output)  # pyright: ignore[reportArgumentType]  no function is left
+        return Plain(values, given)
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +219,7 @@ class SignalLearner:
     distance: Discrepancy
     observed: np.ndarray
     values: np.ndarray
-    noise: GivenNoise | None
+    scale: Scale
 
     @property
     def features(self) -> int:
@@ -207,6 +243,10 @@ class SignalLearner:
                 features[i] = self.output.values(signal)
             except (Exception, SystemExit) as error:  # of the user's summary
                 errors[i] = failed_on("summary", signal, self.observed, error)
+            try:
+                self.scale.check(features[i])
+            except (Exception, SystemExit) as error:  # of the user's function of the mean
+                errors[i], features[i] = failed_on("noise", signal, self.observed, error), np.nan
         failed = ~np.isfinite(features).all(1)
         return Measured(features, np.where(failed, np.nan, discrepancy), errors)
 
@@ -226,96 +266,44 @@ class SignalLearner:
 
     def learn(self, known: Learnable, previous: SignalSurrogate | None) -> SignalSurrogate:
         learnable = self.learnable(known.discrepancy)
-        features = known.features[learnable]
+        u, values = known.u[learnable], known.features[learnable]
+        if previous is not None and not goes_on(previous.emulator, previous.scale.of(values)):
+            previous = None
+        scale = self._fitting(u, values) if previous is None else previous.scale
+        emulator = self._emulator(known._replace(u=u, features=values), scale, previous)
+        success = learn_success(known.runs, known.normal)
+
+        def compared(at: np.ndarray | None) -> SignalSurrogate:
+            """With what was observed, its noise being right around the features `at` [m]."""
+            seen, given = scale.seen(at)
+            noise = Noise(given, self.family.misfit)
+            found = observe(emulator, self.output, seen, noise, previous)
+            return replace(found, success=success, scale=scale)
+
+        found = compared(None)
+        for _ in range(scale.rounds - 1):
+            found = compared(found.best_features)
+        return found
+
+    def _fitting(self, u: np.ndarray, values: np.ndarray) -> Scale:
+        """The scale for runs of values [n, m] at u [n, d]."""
+        if not (self.family.varying_noise and isinstance(self.scale, Plain)):
+            return self.scale
+        return self.scale.fitting(u, values, self.output.layout.channel)
+
+    def _emulator(
+        self, known: Learnable, scale: Scale, previous: SignalSurrogate | None
+    ) -> Emulator:
+        left = LEFT_OF_NOISE if isinstance(scale, ByMean) else np.inf
+        limits = Limits(self.family.components, self.family.predicted, left)
+        features, units = scale.of(known.features), comparable(scale, self.output)
         old = None if previous is None else previous.emulator
-        limits = Limits(self.family.components, self.family.predicted)
-        emulator = emulate(
-            known.u[learnable],
-            features,
-            self.output.scale,
-            limits,
-            old,
-            known.normal,
-        )
-        kept = previous if old is not None and emulator.learned_at == old.learned_at else None
-        noise = Noise(self.noise, self.family.misfit)
-        observed = observe(emulator, self.output, self.values, noise, kept)
-        return replace(observed, success=learn_success(known.runs, known.normal))
+        found = emulate(known.u, features, units, limits, old, known.normal)
+        return found if old or not self.family.varying_noise else resized(found, units)
 
     def finish(self, known: Learnable, seed: int) -> Surrogate:
         """The surrogate on which a fit rests."""
         return self.learn(known, None)
-
-
-@dataclass(frozen=True)
-class LogLikelihoodFamily:
-    """A Gaussian process on the log likelihood that the simulator itself returns.
-
-    A simulator returns a number, or two of which the second is the sd of the first one's noise.
-    -inf is where the data are impossible. Nothing is observed beside.
-    """
-
-    name: ClassVar[str] = "log_likelihood"
-    acquisition: ClassVar[str] = "draws"
-    replicates: ClassVar[bool] = False
-
-    def learner(self, observed: np.ndarray) -> "LogLikelihoodLearner":
-        return LogLikelihoodLearner()
-
-
-@dataclass(frozen=True)
-class LogLikelihoodLearner:
-    """Log likelihoods are learned from as they are; the discrepancy is minus one."""
-
-    features: ClassVar[int] = 1  # the sd of the noise, NaN where none is given
-    any_shape: ClassVar[bool] = True
-
-    def measure(self, signals: Sequence[np.ndarray | None]) -> Measured:
-        """Sds [n, 1] and minus the log likelihoods of n signals, None where a run failed."""
-        n = len(signals)
-        found, errors = np.full((n, 2), np.nan), [""] * n
-        for i, signal in enumerate(signals):
-            if signal is None or (signal.size and np.isnan(signal).all()):
-                continue
-            values = signal.ravel()
-            found[i, : values.size] = values[:2] if values.size <= 2 else np.nan
-            errors[i] = _unlikely(signal)
-        failed = np.array([error != "" for error in errors])
-        return Measured(found[:, 1:], np.where(failed, np.nan, -found[:, 0]), errors)
-
-    def learnable(self, discrepancy: np.ndarray) -> np.ndarray:
-        """Which of the successful simulations are learned from, bool [n]: what blew up is not."""
-        return sane(discrepancy)
-
-    def learn(
-        self, known: Learnable, previous: LogLikelihoodSurrogate | None
-    ) -> LogLikelihoodSurrogate:
-        kept = self.learnable(known.discrepancy)
-        values, sd = -known.discrepancy[kept], known.features[kept, 0]
-        learned = learn_level(known.u[kept], values, sd, previous, known.normal)
-        success = learn_success(known.runs, known.normal)
-        return replace(learned, state=learned.state._replace(success=success))
-
-    def finish(self, known: Learnable, seed: int) -> Surrogate:
-        """The surrogate on which a fit rests: it is cautious, while a search is not."""
-        learned = self.learn(known, None)
-        return replace(
-            learned, state=learned.state._replace(caution=np.ones(()), optimism=np.zeros(()))
-        )
-
-
-def _unlikely(signal: np.ndarray) -> str:
-    """Why a signal is no log likelihood of data that are possible; "" if it is one."""
-    if not 1 <= signal.size <= 2:
-        return incomparable(
-            f"a log likelihood is one number, or two with its sd, got a signal of {signal.shape}"
-        )
-    value, *sd = signal.ravel()
-    if value == -np.inf:
-        return impossible("the log likelihood is -inf")
-    if not np.isfinite(value) or not all(0.0 <= one < np.inf for one in sd):
-        return not_finite(f"the log likelihood, or its sd: {signal.ravel()}")
-    return ""
 
 
 Family = DiscrepancyFamily | SignalFamily | LogLikelihoodFamily
@@ -362,19 +350,28 @@ def resolve(surrogate: str | Family | None, options: dict) -> Family:
     return FAMILIES[surrogate](**options)
 
 
-def check_observed(observed: object, family: Family) -> None:
-    """Raise ValueError unless something is observed, or the family has the likelihood already."""
-    has_it = isinstance(family, LogLikelihoodFamily)
-    if has_it and observed is not None:
+def checked_observed(observed: ArrayLike | None, family: Family) -> np.ndarray:
+    """What was observed; NaN where the simulator returns the likelihood.
+
+    Raises:
+        ValueError: something was observed but shall not, or shall but was not, or is infinite.
+    """
+    if isinstance(family, LogLikelihoodFamily):
+        if observed is None:
+            return np.array(np.nan)
         raise ValueError(
             'surrogate="log_likelihood" takes no observed: the simulator compares with the data '
             f"itself, and returns the log likelihood; leave it out, got {observed!r:.100}"
         )
-    if not has_it and observed is None:
+    if observed is None:
         raise ValueError(
             "observed must be an array of numbers, got None; a simulator that returns the log "
             'likelihood needs surrogate="log_likelihood", losses need fit_losses'
         )
+    array = checked_array("observed", observed)
+    if np.isinf(array).any():
+        raise ValueError("observed must not be infinite; NaN is a missing sample")
+    return array
 
 
 def _options(name: str) -> set[str]:

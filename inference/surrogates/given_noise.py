@@ -33,6 +33,19 @@ class GivenNoise(NamedTuple):
         )
 
 
+class Noise(NamedTuple):
+    """What is believed of the noise between the simulator and the data.
+
+    Attributes:
+        given: The measurement noise; None where it is unknown.
+        misfit: Prior probability that the data are missed by more than the given noise explains;
+            0 for none.
+    """
+
+    given: GivenNoise | None
+    misfit: float
+
+
 def given_noise(noise: ArrayLike, output: Output) -> GivenNoise:
     """The noise of an output's values.
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .._float64 import in_float64
-from .emulator import Emulator, beyond_components, emulate, innovations
+from .emulator import Emulator, beyond_components, emulate, innovations, resized
 
 FIRST_SHARE = 2.0 / 3.0  # share of the runs from which the others are predicted
 # First runs: with fewer the hyperparameters are unreliable.
@@ -53,6 +53,7 @@ def held_back(emulator: Emulator, scale: Callable[[np.ndarray], np.ndarray]) -> 
     if first < MIN_FIRST_RUNS or freedom < 1 or not within.any():
         return HeldBack(errors, freedom)
     early = emulate(u[:first], outputs[:first], scale, emulator.limits, None, data.normal)
+    early = early if emulator.size is None else resized(early, scale)
     errors[within, : early.basis.used] = innovations(early, u[within], outputs[within])
-    errors[within, k] = beyond_components(early, outputs[within])
+    errors[within, k] = beyond_components(early, u[within], outputs[within])
     return HeldBack(errors, freedom)

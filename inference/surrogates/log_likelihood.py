@@ -1,7 +1,8 @@
 """A Gaussian process of the log likelihood, where a simulator or a table of losses has it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -23,8 +24,10 @@ from ..gp.process import (
 )
 from ..sampling.importance import explore
 from ..sampling.target import Target
+from ..simulations.failures import impossible, incomparable, not_finite
 from ..types import LogLikelihood, LogSecondMoment
-from .success import log_success, padded_success
+from .base import Learnable, Measured
+from .success import learn_success, log_success, padded_success, sane
 from .warnings import EQUAL, UNCERTAIN, complaints
 
 LINEAR = 40.0  # nats below the best, from where on depth counts by its logarithm
@@ -48,9 +51,9 @@ class LevelState(NamedTuple):
     top: np.ndarray  # [], the best log likelihood
     location: np.ndarray  # []
     spread: np.ndarray  # [], in nats near the top
-    caution: np.ndarray  # [], 1 for the harmonic mean, 0 for the median
-    optimism: np.ndarray  # [], 0 in a fit
     success: GP | None = None  # see `success.learn_success`
+    doubt: np.ndarray = np.ones(())  # the part of the latent variance that counts against a place
+    optimism: np.ndarray = np.zeros(())
 
     def padded(self) -> "LevelState":
         """The same likelihood in arrays of few shapes."""
@@ -83,12 +86,12 @@ def log_likelihood(state: LevelState, u: Any) -> Any:
 
     Where its latent value has mean m and variance v, the median of the likelihood is exp(m)
     (Jarvenpaa et al. 2021), its mean exp(m + v / 2), which explodes where nothing is known, and
-    its harmonic mean exp(m - v / 2): what is not known explains nothing. With `caution` it is the
+    its harmonic mean exp(m - v / 2): what is not known explains nothing. With `doubt` it is the
     last. None exceeds the best value by more than MAX_RISE, lest an extrapolation outweigh P.
     """
     xp = namespace(u)
     mean, variance = predict(state.gp, u)
-    doubt = 0.5 * state.caution * state.spread**2 * variance[0]
+    doubt = 0.5 * state.doubt * state.spread**2 * variance[0]
     hope = state.optimism * state.spread * xp.sqrt(variance[0])
     height = state.location + state.spread * mean[0] + doubt - hope
     return state.top - expanded(xp.maximum(height, -MAX_RISE)) + log_success(state.success, u)
@@ -133,6 +136,12 @@ class LogLikelihoodSurrogate:
         return self.state.gp
 
     @property
+    def cautious(self) -> "LogLikelihoodSurrogate":
+        """The surrogate of a fit, to which what is not known explains nothing."""
+        state = self.state._replace(doubt=np.ones(()), optimism=np.zeros(()))
+        return replace(self, state=state)
+
+    @property
     def log_likelihood(self) -> LogLikelihood:
         return log_likelihood
 
@@ -173,6 +182,10 @@ class LogLikelihoodSurrogate:
         noise = self.state.spread * np.exp(self.gp.hyper.log_noise[0])
         return {"best_log_likelihood": self.state.top, "noise": noise}
 
+    def described(self) -> list[str]:
+        """The noise of a log likelihood near the best one."""
+        return [f"noise {float(self.constants()['noise']):.2g} nats"]
+
     @in_float64
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised leave-one-out errors `loo_z` [n, 1] of the compressed depths."""
@@ -180,19 +193,24 @@ class LogLikelihoodSurrogate:
         error = (self.gp.data.y - mean) / np.sqrt(variance)
         return {"loo_z": error[0, : len(self.values), None]}
 
+    @property
+    def fits(self) -> bool:
+        """Always: no data are compared here."""
+        return True
+
     @in_float64
-    def warnings(self) -> list[str]:
-        """What the leave-one-out errors complain of, of depths that count; and that much of what
-        may be the posterior lies where the log likelihood is hardly known."""
+    def warnings(self, *, confirmed: bool = False) -> list[str]:
+        """What the leave-one-out errors complain of, of depths that count, unless confirmed; and
+        that much of what may be the posterior lies where the log likelihood is hardly known."""
         if np.ptp(self.values) <= 1e-12 * np.abs(self.values).max():
             return [EQUAL]
         near = self.values > self.values.max() - LINEAR
-        said = complaints(self.checks()["loo_z"][near], "log likelihood")
+        said = [] if confirmed else complaints(self.checks()["loo_z"][near], "log likelihood")
         return [*said, UNCERTAIN] if self._uncertain() > MAX_UNCERTAIN_SHARE else said
 
     def _uncertain(self) -> float:
         """Share of the median likelihood's posterior where its log is not known to MAX_SD."""
-        median = self.state._replace(caution=np.zeros(()), optimism=np.zeros(()))
+        median = self.state._replace(doubt=np.zeros(()), optimism=np.zeros(()))
         target = Target(log_likelihood, median, self.gp.data.u.shape[1])
         population = explore(np.random.default_rng(0), target)
         weights = np.exp(population.log_weights - population.log_weights.max())
@@ -225,22 +243,25 @@ def learn(
             until the data have grown by GROWTH, or a value is better than its best by LINEAR.
         normal: Which parameters the kernel sees as normal scores [d], see `gp.process.coordinates`.
     """
-    n = len(u)
+    n, best = len(u), values.max()
     kept = previous if previous and n < GROWTH * previous.learned_at else None
-    if kept is not None and values.max() > kept.state.top + LINEAR:
+    if kept is not None and best > kept.state.top + LINEAR:
         kept = None
-    top = values.max() if kept is None else kept.state.top
-    heights = compressed(top - values)
+    depth = best - values if kept is None else kept.state.top - values
+    heights = compressed(depth)
     if kept is None:
-        scale = heights.mean(), heights.std() or 1.0
+        top, location, spread = best, heights.mean(), heights.std() or 1.0
     else:
-        scale = kept.state.location, kept.state.spread
-    noise = _relative_noise(sd, top - values)
-    data = Data(u, ((heights - scale[0]) / scale[1])[None], normal, noise)
+        top, location, spread = kept.state.top, kept.state.location, kept.state.spread
+    data = Data(u, ((heights - location) / spread)[None], normal, _relative_noise(sd, depth))
     hyper = maximum_a_posteriori(data) if kept is None else kept.gp.hyper
-    numbers = (np.asarray(number) for number in (top, *scale))
     state = LevelState(
-        condition(hyper, data), *numbers, caution=np.zeros(()), optimism=np.asarray(OPTIMISM)
+        condition(hyper, data),
+        np.asarray(top),
+        np.asarray(location),
+        np.asarray(spread),
+        doubt=np.zeros(()),
+        optimism=np.asarray(OPTIMISM),
     )
     return LogLikelihoodSurrogate(state, values, n if kept is None else kept.learned_at)
 
@@ -252,3 +273,70 @@ def _relative_noise(sd: np.ndarray, depth: np.ndarray) -> np.ndarray | None:
         return None
     share = np.maximum(np.where(np.isfinite(sd), sd / usual, 1.0), MIN_SD_SHARE)
     return (share * LINEAR / np.maximum(depth, LINEAR)) ** 2
+
+
+@dataclass(frozen=True)
+class LogLikelihoodFamily:
+    """A Gaussian process on the log likelihood that the simulator itself returns.
+
+    A simulator returns a number, or two of which the second is the sd of the first one's noise.
+    -inf is where the data are impossible. Nothing is observed beside.
+    """
+
+    name: ClassVar[str] = "log_likelihood"
+    acquisition: ClassVar[str] = "draws"
+    replicates: ClassVar[bool] = False
+
+    def learner(self, observed: np.ndarray) -> "LogLikelihoodLearner":
+        return LogLikelihoodLearner()
+
+
+@dataclass(frozen=True)
+class LogLikelihoodLearner:
+    """Log likelihoods are learned from as they are; the discrepancy is minus one."""
+
+    features: ClassVar[int] = 1  # the sd of the noise, NaN where none is given
+    any_shape: ClassVar[bool] = True
+
+    def measure(self, signals: Sequence[np.ndarray | None]) -> Measured:
+        """Sds [n, 1] and minus the log likelihoods of n signals, None where a run failed."""
+        found, errors = np.full((len(signals), 2), np.nan), [""] * len(signals)
+        for i, signal in enumerate(signals):
+            if signal is None or (signal.size and np.isnan(signal).all()):
+                continue
+            errors[i] = _unlikely(signal)
+            if not errors[i]:
+                found[i, : signal.size] = signal.ravel()
+        return Measured(found[:, 1:], -found[:, 0], errors)
+
+    def learnable(self, discrepancy: np.ndarray) -> np.ndarray:
+        """Which of the successful simulations are learned from, bool [n]: what blew up is not."""
+        return sane(discrepancy)
+
+    def learn(
+        self, known: Learnable, previous: LogLikelihoodSurrogate | None
+    ) -> LogLikelihoodSurrogate:
+        """To search with: where a run was unlucky others are to be made."""
+        kept = self.learnable(known.discrepancy)
+        values, sd = -known.discrepancy[kept], known.features[kept, 0]
+        learned = learn(known.u[kept], values, sd, previous, known.normal)
+        success = learn_success(known.runs, known.normal)
+        return replace(learned, state=learned.state._replace(success=success))
+
+    def finish(self, known: Learnable, seed: int) -> LogLikelihoodSurrogate:
+        """The surrogate on which a fit rests."""
+        return self.learn(known, None).cautious
+
+
+def _unlikely(signal: np.ndarray) -> str:
+    """Why a signal is no log likelihood of data that are possible; "" if it is one."""
+    if not 1 <= signal.size <= 2:
+        return incomparable(
+            f"a log likelihood is one number, or two with its sd, got a signal of {signal.shape}"
+        )
+    value, *sd = signal.ravel()
+    if value == -np.inf:
+        return impossible("the log likelihood is -inf")
+    if not np.isfinite(value) or not all(0.0 <= one < np.inf for one in sd):
+        return not_finite(f"the log likelihood, or its sd: {signal.ravel()}")
+    return ""

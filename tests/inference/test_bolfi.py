@@ -129,7 +129,7 @@ def test_a_prior_that_fades_out_reaches_the_kernel():
     )
     noise = 0.05 * np.random.default_rng(0).normal(size=(24, 1))
     squared.tell(theta, theta["a"][:, None] + noise)
-    fit = squared.fit()
+    fit = squared.fit(warn=False)  # one number leaves the posterior's width to guess
     assert abs(fit.best["a"] - 2.2) < 0.1
     at = prior.to_unit({"a": np.array([2.3, 2.5, 2.7])})  # beyond the last run, 2.04
     np.testing.assert_allclose(fit.learned.predict(at)[0], [0.01, 0.09, 0.25], atol=0.2)
@@ -145,7 +145,7 @@ def test_asking_and_telling_compile_nothing(prior, observed, simulate, surrogate
     for batch in (10, 1, 5):
         theta = engine.ask(batch)
         engine.tell(theta, simulate(theta, np.arange(batch) + engine.told))
-    engine.fit()
+    engine.fit(warn=False)  # of 16 runs
     assert not compiled
 
 

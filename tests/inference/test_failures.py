@@ -124,7 +124,8 @@ def test_a_fit_of_fewer_runs_than_the_surrogate_needs_warns(
         return simulate({name: np.array([value]) for name, value in theta.items()}, [seed])[0]
 
     made = []
-    fit = inference.fit(fragile, prior, observed, budget=9, vectorised=False, warn=False)
+    options = {"budget": 9, "confirm": 0, "vectorised": False, "warn": False}
+    fit = inference.fit(fragile, prior, observed, **options)
     few = [said for said in fit.warnings if f"learned from {9 - failing} simulations" in said]
     assert bool(few) is warned
     assert all(said in repr(fit) for said in few)

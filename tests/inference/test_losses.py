@@ -173,7 +173,13 @@ def test_most_runs_may_have_blown_up():
 
 def test_losses_as_output_are_sent_to_fit_losses():
     theta, loss = trials()
-    fit = inference.fit(None, DECAY, [0.0], budget=0, earlier=(theta, loss[:, None]), **QUIET)
+    with pytest.raises(ValueError, match="observed number, 0, lies below all 57 .* fit_losses"):
+        inference.fit(None, DECAY, [0.0], budget=0, earlier=(theta, loss[:, None]), **QUIET)
+
+    def simulate(theta, seeds):
+        return losses(theta)[:, None]
+
+    fit = inference.fit(simulate, DECAY, [0.0], budget=12, confirm=0, **QUIET)
     assert any("fit_losses" in said for said in fit.warnings)
 
 

@@ -235,8 +235,16 @@ def check_checks(of):
     assert len(z) == RUNS and finite(z)
 
 
+def check_fits(of):
+    assert isinstance(of.fits, bool)
+
+
+def check_described(of):
+    assert all(isinstance(said, str) and said for said in of.described())
+
+
 def check_warnings(of):
-    assert isinstance(of.warnings(), list)
+    assert isinstance(of.warnings(), list) and isinstance(of.warnings(confirmed=True), list)
     assert all(isinstance(said, str) and said for said in of.warnings())
 
 

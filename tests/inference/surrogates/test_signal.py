@@ -14,6 +14,7 @@ from bolfi_liquids.inference.surrogates.emulator import Limits, emulate, noise_s
 from bolfi_liquids.inference.surrogates.families import Learnable, SignalFamily
 from bolfi_liquids.inference.surrogates.signal_likelihood import log_likelihood, log_second_moment
 from bolfi_liquids.inference.surrogates.success import Feasibility
+from bolfi_liquids.inference.surrogates.warnings import UNREPEATED
 from scipy.stats import binom, multivariate_normal
 
 from bolfi_liquids import inference
@@ -180,7 +181,12 @@ def test_the_check_speaks_up_where_noise_rules(design):
     loud = outputs(design, range(30)) + 10.0 * np.random.default_rng(0).normal(size=(30, 1))
     found = learned(design, loud, loud[0])
     assert noise_share(found.emulator) > 0.5
-    assert any("run-to-run noise" in said for said in found.warnings())
+    assert UNREPEATED in found.warnings()
+    rng = np.random.default_rng(1)
+    again = loud[:3] + 10.0 * rng.normal(size=(3, 1)), loud[:3]
+    for repeated, said in zip(again, ("run-to-run noise", "runs of equal parameters"), strict=True):
+        both = np.concatenate([design, design[:3]]), np.concatenate([loud, repeated])
+        assert any(one.startswith(said) for one in learned(*both, loud[0]).warnings())
     quiet = learned(design, outputs(design), outputs(design)[0])
     assert quiet.warnings() == []
 

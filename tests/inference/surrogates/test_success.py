@@ -37,7 +37,14 @@ def test_no_mass_lies_where_runs_fail():
     observed = np.array([0.47, 0.5])
     for options in ({"noise": 0.1}, {"surrogate": "discrepancy"}):
         fit = inference.fit(
-            simulate, prior, observed, budget=40, vectorised=False, progress=False, **options
+            simulate,
+            prior,
+            observed,
+            budget=40,
+            vectorised=False,
+            progress=False,
+            warn=False,
+            **options,
         )
         drawn = fit.sample("quadrature", warn=False)["posterior"]
         # 0.18 of the mass would lie there if runs did not fail
