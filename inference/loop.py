@@ -251,7 +251,13 @@ def fit_losses(
             "give either noise=, the sd of the data's noise, or n=, the number of data in a loss, "
             f"got noise={noise!r:.100} and n={n!r:.100}"
         )
-    losses = checked_array("loss", loss)
+    engine = Bolfi(prior, surrogate="log_likelihood", initial=MIN_LEARN)
+    losses, m = checked_array("loss", loss), len(np.atleast_2d(prior.to_array(theta)))
+    if losses.shape != (m,) or np.isfinite(losses).sum() < MIN_LEARN:
+        raise ValueError(
+            f"loss must hold {m} numbers, one per theta, {MIN_LEARN} of them finite, got shape "
+            f"{losses.shape} with {np.isfinite(losses).sum()} finite ones; simulate more"
+        )
     least = np.nanmin(losses, initial=np.inf)
     if least < 0.0 or (least == 0.0 and noise is None):
         raise ValueError(
@@ -263,7 +269,6 @@ def fit_losses(
         values = -0.5 * losses / sd**2
     else:
         values = -0.5 * checked_integer("n", n) * np.log(losses)
-    engine = Bolfi(prior, surrogate="log_likelihood", initial=MIN_LEARN)
     engine.tell(theta, values)
     return engine.fit(warn=warn, stacklevel=3)
 

@@ -136,7 +136,7 @@ class DiscrepancyLearner:
             learned = marginalised(learned, rule, draws, seed)
         said = () if rule is not None else (GUESSED,)
         if self.family.threshold is None and known.discrepancy.min() < 0.0:
-            said += (NEGATIVE,)
+            said = (NEGATIVE,)
         if self.family.discrepancy is None:
             good = self.learnable(known.discrepancy)
             order = np.argsort(known.discrepancy[good])

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import ndtr, ndtri
 
 from .._float64 import in_float64
@@ -30,8 +31,9 @@ from .base import Learnable, Measured
 from .success import learn_success, log_success, padded_success, sane
 from .warnings import EQUAL, UNCERTAIN, complaints
 
-LINEAR = 40.0  # nats below the best, from where on depth counts by its logarithm
-MAX_FOLDS = 30.0  # powers of e by which a predicted depth may exceed LINEAR: overflow
+NEAR = 40.0  # nats below the best, down to which a log likelihood must be right
+LINEAR = (NEAR, 1e3, 1e9)  # nats below the best, from where on depth may count by its logarithm
+MAX_FOLDS = 30.0  # powers of e by which a predicted depth may exceed these: overflow
 MIN_SD_SHARE = 0.05  # of the usual sd that is given, below which noise is not believed
 MAX_RISE = 10.0  # nats above the best value, which a fit may predict
 OPTIMISM = 2.0  # sds, of a search: where a run was unlucky others are to be made
@@ -40,17 +42,54 @@ MAX_SD = 1.5  # of a log likelihood that is known, in nats
 MAX_UNCERTAIN_SHARE = 0.2  # of what may be the posterior, from which a fit warns
 
 
+class Scale(NamedTuple):
+    """From log likelihoods to the process's targets: (compressed depth - location) / spread.
+
+    A depth below the top, in nats, is itself down to `linear`; beyond it grows as its logarithm.
+    Near the top the log likelihood keeps its shape, of which a parabola is the commonest. Far below
+    only that it lies far below must be right: what a process misses there by, say, a tenth of the
+    depth is not to cost it the resolution above (the purpose of noise shaping, Acerbi 2020).
+    """
+
+    top: np.ndarray  # [], the best log likelihood
+    linear: np.ndarray  # [], one of LINEAR
+    location: np.ndarray  # []
+    spread: np.ndarray  # [], in nats near the top
+
+    def targets(self, values: np.ndarray) -> np.ndarray:
+        return (compressed(self.top - values, self.linear) - self.location) / self.spread
+
+    def values(self, latent: Any) -> Any:
+        """Log likelihoods, MAX_RISE above the best at most, lest an extrapolation outweigh P."""
+        height = namespace(latent).maximum(self.location + self.spread * latent, -MAX_RISE)
+        return self.top - expanded(height, self.linear)
+
+    def folds(self, values: np.ndarray) -> np.ndarray:
+        """By how much nats at these log likelihoods are compressed, 1 near the top."""
+        return np.maximum((self.top - values) / self.linear, 1.0)
+
+
+def compressed(depth: np.ndarray, linear: ArrayLike) -> np.ndarray:
+    beyond = np.maximum(depth, linear) / linear
+    return np.where(depth < linear, depth, linear * (1.0 + np.log(beyond)))
+
+
+def expanded(height: Any, linear: ArrayLike) -> Any:
+    """The inverse of `compressed`, for arrays of NumPy or JAX."""
+    xp = namespace(height)
+    folds = xp.clip(height / linear - 1.0, 0.0, MAX_FOLDS)
+    return xp.where(height < linear, height, linear * xp.exp(folds))
+
+
 class LevelState(NamedTuple):
-    """What the likelihood depends on; the process is one of (compressed depth - location) / spread.
+    """What the likelihood depends on.
 
     A fit takes the harmonic mean of what the likelihood may be, a search the bound that lies
     `optimism` sds above its median.
     """
 
     gp: GP
-    top: np.ndarray  # [], the best log likelihood
-    location: np.ndarray  # []
-    spread: np.ndarray  # [], in nats near the top
+    scale: Scale
     success: GP | None = None  # see `success.learn_success`
     doubt: np.ndarray = np.ones(())  # the part of the latent variance that counts against a place
     optimism: np.ndarray = np.zeros(())
@@ -63,38 +102,19 @@ class LevelState(NamedTuple):
         )
 
 
-def compressed(depth: np.ndarray) -> np.ndarray:
-    """A depth below the top, in nats: itself down to LINEAR, beyond it grows as its logarithm.
-
-    Near the top the log likelihood keeps its shape, of which a parabola is the commonest. Far below
-    only that it lies far below must be right: what a process misses there by, say, a tenth of the
-    depth is not to cost it the resolution above (the purpose of noise shaping, Acerbi 2020).
-    """
-    beyond = np.maximum(depth, LINEAR) / LINEAR
-    return np.where(depth < LINEAR, depth, LINEAR * (1.0 + np.log(beyond)))
-
-
-def expanded(height: Any) -> Any:
-    """The inverse of `compressed`, for arrays of NumPy or JAX."""
-    xp = namespace(height)
-    folds = xp.clip(height / LINEAR - 1.0, 0.0, MAX_FOLDS)
-    return xp.where(height < LINEAR, height, LINEAR * xp.exp(folds))
-
-
 def log_likelihood(state: LevelState, u: Any) -> Any:
     """log P(success) plus the log likelihood of which the process tells, at u [n, d]: [n].
 
     Where its latent value has mean m and variance v, the median of the likelihood is exp(m)
     (Jarvenpaa et al. 2021), its mean exp(m + v / 2), which explodes where nothing is known, and
     its harmonic mean exp(m - v / 2): what is not known explains nothing. With `doubt` it is the
-    last. None exceeds the best value by more than MAX_RISE, lest an extrapolation outweigh P.
+    last.
     """
     xp = namespace(u)
     mean, variance = predict(state.gp, u)
-    doubt = 0.5 * state.doubt * state.spread**2 * variance[0]
-    hope = state.optimism * state.spread * xp.sqrt(variance[0])
-    height = state.location + state.spread * mean[0] + doubt - hope
-    return state.top - expanded(xp.maximum(height, -MAX_RISE)) + log_success(state.success, u)
+    doubt = 0.5 * state.doubt * state.scale.spread * variance[0]
+    latent = mean[0] + doubt - state.optimism * xp.sqrt(variance[0])
+    return state.scale.values(latent) + log_success(state.success, u)
 
 
 def log_second_moment(state: LevelState, u: np.ndarray, spread: np.ndarray | None) -> np.ndarray:
@@ -109,9 +129,8 @@ def log_second_moment(state: LevelState, u: np.ndarray, spread: np.ndarray | Non
     mean, variance = (part[0] for part in predict(state.gp, u))
     varying = variance if spread is None else spread[..., 0]
     shape = len(u), *[1] * (varying.ndim - 1)
-    height = (state.location + state.spread * mean).reshape(shape)
-    reach = UPPER_QUARTILE * state.spread * np.sqrt(np.maximum(varying, 0.0))
-    high, low = state.top - expanded(height - reach), state.top - expanded(height + reach)
+    mean, reach = mean.reshape(shape), UPPER_QUARTILE * np.sqrt(np.maximum(varying, 0.0))
+    high, low = state.scale.values(mean - reach), state.scale.values(mean + reach)
     log_range = high + np.log(-np.expm1(-np.maximum(high - low, 1e-12)))
     log_range = log_range + log_success(state.success, u).reshape(shape)
     return np.logaddexp(2.0 * log_likelihood(state, u).reshape(shape), 2.0 * log_range)
@@ -172,15 +191,14 @@ class LogLikelihoodSurrogate:
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new log likelihood, its noise included, at u [n, d]: [n], [n]."""
         mean, variance = predict_points(self.gp, u)
-        height = self.state.location + self.state.spread * mean[0]
-        sd = self.state.spread * np.sqrt(variance[0] + np.exp(2.0 * self.gp.hyper.log_noise[0]))
-        depth = expanded(height)
-        return self.state.top - depth, sd * np.maximum(depth / LINEAR, 1.0)
+        sd = np.sqrt(variance[0] + np.exp(2.0 * self.gp.hyper.log_noise[0]))
+        scale, values = self.state.scale, self.state.scale.values(mean[0])
+        return values, scale.spread * scale.folds(values) * sd
 
     def constants(self) -> dict[str, np.ndarray]:
         """The best log likelihood, and the sd of one estimate's noise near it, in nats."""
-        noise = self.state.spread * np.exp(self.gp.hyper.log_noise[0])
-        return {"best_log_likelihood": self.state.top, "noise": noise}
+        noise = self.state.scale.spread * np.exp(self.gp.hyper.log_noise[0])
+        return {"best_log_likelihood": self.state.scale.top, "noise": noise}
 
     def described(self) -> list[str]:
         """The noise of a log likelihood near the best one."""
@@ -204,18 +222,20 @@ class LogLikelihoodSurrogate:
         that much of what may be the posterior lies where the log likelihood is hardly known."""
         if np.ptp(self.values) <= 1e-12 * np.abs(self.values).max():
             return [EQUAL]
-        near = self.values > self.values.max() - LINEAR
+        near = self.values > self.values.max() - NEAR
         said = [] if confirmed else complaints(self.checks()["loo_z"][near], "log likelihood")
         return [*said, UNCERTAIN] if self._uncertain() > MAX_UNCERTAIN_SHARE else said
 
     def _uncertain(self) -> float:
-        """Share of the median likelihood's posterior where its log is not known to MAX_SD."""
+        """Share of the median likelihood's posterior where its log is not known to MAX_SD, or
+        exceeds the best value by as much as it may."""
         median = self.state._replace(doubt=np.zeros(()), optimism=np.zeros(()))
         target = Target(log_likelihood, median, self.gp.data.u.shape[1])
-        population = explore(np.random.default_rng(0), target)
-        weights = np.exp(population.log_weights - population.log_weights.max())
-        sd = self.state.spread * np.sqrt(predict(self.gp, ndtr(population.x))[1][0])
-        return float(weights @ (sd > MAX_SD) / weights.sum())
+        population, scale = explore(np.random.default_rng(0), target), self.state.scale
+        mean, variance = (part[0] for part in predict(self.gp, ndtr(population.x)))
+        unknown = scale.spread * np.sqrt(variance) > MAX_SD
+        capped = scale.location + scale.spread * mean < -MAX_RISE
+        return float(population.weights @ (unknown | capped))
 
     @in_float64
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
@@ -240,39 +260,55 @@ def learn(
         sd: Of their noise [n], NaN where it is not known; known ones tell how it varies, their
             common size is learned.
         previous: Learned from the first of these data; its hyperparameters and scale are kept
-            until the data have grown by GROWTH, or a value is better than its best by LINEAR.
+            until the data have grown by GROWTH, or a value is better than its best by NEAR.
         normal: Which parameters the kernel sees as normal scores [d], see `gp.process.coordinates`.
     """
-    n, best = len(u), values.max()
-    kept = previous if previous and n < GROWTH * previous.learned_at else None
-    if kept is not None and best > kept.state.top + LINEAR:
-        kept = None
-    depth = best - values if kept is None else kept.state.top - values
-    heights = compressed(depth)
-    if kept is None:
-        top, location, spread = best, heights.mean(), heights.std() or 1.0
+    kept = previous if previous and len(u) < GROWTH * previous.learned_at else None
+    if kept is not None and values.max() < kept.state.scale.top + NEAR:
+        scale, learned_at = kept.state.scale, kept.learned_at
+        gp = condition(kept.gp.hyper, _data(u, values, sd, scale, normal))
     else:
-        top, location, spread = kept.state.top, kept.state.location, kept.state.spread
-    data = Data(u, ((heights - location) / spread)[None], normal, _relative_noise(sd, depth))
-    hyper = maximum_a_posteriori(data) if kept is None else kept.gp.hyper
-    state = LevelState(
-        condition(hyper, data),
-        np.asarray(top),
-        np.asarray(location),
-        np.asarray(spread),
-        doubt=np.zeros(()),
-        optimism=np.asarray(OPTIMISM),
-    )
-    return LogLikelihoodSurrogate(state, values, n if kept is None else kept.learned_at)
+        fitted = []
+        for scale in _scales(values):
+            data = _data(u, values, sd, scale, normal)
+            fitted.append((condition(maximum_a_posteriori(data), data), scale))
+        gp, scale = max(fitted, key=lambda one: _score(*one, values))
+        learned_at = len(u)
+    state = LevelState(gp, scale, doubt=np.zeros(()), optimism=np.asarray(OPTIMISM))
+    return LogLikelihoodSurrogate(state, values, learned_at)
 
 
-def _relative_noise(sd: np.ndarray, depth: np.ndarray) -> np.ndarray | None:
-    """Noise variances of compressed depths over the usual one [n]; None where no sd is known."""
+def _scales(values: np.ndarray) -> list[Scale]:
+    """Those that differ for these log likelihoods."""
+    depth, found = values.max() - values, []
+    for linear in LINEAR:
+        heights = compressed(depth, linear)
+        parts = values.max(), linear, heights.mean(), heights.std() or 1.0
+        found.append(Scale(*map(np.asarray, parts)))
+        if depth.max() < linear:
+            break
+    return found
+
+
+def _score(gp: GP, scale: Scale, values: np.ndarray) -> float:
+    """Leave-one-out log predictive density of the log likelihoods that count, or of the best
+    quarter, in nats."""
+    mean, variance = (moment[0] for moment in leave_one_out(gp))
+    density = -0.5 * ((gp.data.y[0] - mean) ** 2 / variance + np.log(variance))
+    near = values >= min(values.max() - NEAR, np.quantile(values, 0.75))
+    return float(np.sum((density - np.log(scale.spread * scale.folds(values)))[near]))
+
+
+def _data(
+    u: np.ndarray, values: np.ndarray, sd: np.ndarray, scale: Scale, normal: np.ndarray | None
+) -> Data:
+    """What the process learns; the noise is told where some sds are known."""
     usual = np.nanmedian(sd) if np.isfinite(sd).any() else 0.0
-    if usual == 0.0:
-        return None
-    share = np.maximum(np.where(np.isfinite(sd), sd / usual, 1.0), MIN_SD_SHARE)
-    return (share * LINEAR / np.maximum(depth, LINEAR)) ** 2
+    noise = None
+    if usual > 0.0:
+        share = np.maximum(np.where(np.isfinite(sd), sd / usual, 1.0), MIN_SD_SHARE)
+        noise = (share / scale.folds(values)) ** 2
+    return Data(u, scale.targets(values)[None], normal, noise)
 
 
 @dataclass(frozen=True)
