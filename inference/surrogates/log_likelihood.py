@@ -35,7 +35,7 @@ NEAR = 40.0  # nats below the best, down to which a log likelihood must be right
 LINEAR = (NEAR, 1e3, 1e9)  # nats below the best, from where on depth may count by its logarithm
 MAX_FOLDS = 30.0  # powers of e by which a predicted depth may exceed these: overflow
 MIN_SD_SHARE = 0.05  # of the usual sd that is given, below which noise is not believed
-MAX_RISE = 10.0  # nats above the best value, which a fit may predict
+MAX_RISE = 10.0  # nats above the best value, beyond which a prediction is an extrapolation
 OPTIMISM = 2.0  # sds, of a search: where a run was unlucky others are to be made
 UPPER_QUARTILE = float(ndtri(0.75))
 MAX_SD = 1.5  # of a log likelihood that is known, in nats
@@ -60,9 +60,7 @@ class Scale(NamedTuple):
         return (compressed(self.top - values, self.linear) - self.location) / self.spread
 
     def values(self, latent: Any) -> Any:
-        """Log likelihoods, MAX_RISE above the best at most, lest an extrapolation outweigh P."""
-        height = namespace(latent).maximum(self.location + self.spread * latent, -MAX_RISE)
-        return self.top - expanded(height, self.linear)
+        return self.top - expanded(self.location + self.spread * latent, self.linear)
 
     def folds(self, values: np.ndarray) -> np.ndarray:
         """By how much nats at these log likelihoods are compressed, 1 near the top."""
@@ -93,6 +91,7 @@ class LevelState(NamedTuple):
     success: GP | None = None  # see `success.learn_success`
     doubt: np.ndarray = np.ones(())  # the part of the latent variance that counts against a place
     optimism: np.ndarray = np.zeros(())
+    rise: np.ndarray = np.full((), MAX_RISE)  # nats above the best value that count at most
 
     def padded(self) -> "LevelState":
         """The same likelihood in arrays of few shapes."""
@@ -114,7 +113,11 @@ def log_likelihood(state: LevelState, u: Any) -> Any:
     mean, variance = predict(state.gp, u)
     doubt = 0.5 * state.doubt * state.scale.spread * variance[0]
     latent = mean[0] + doubt - state.optimism * xp.sqrt(variance[0])
-    return state.scale.values(latent) + log_success(state.success, u)
+    return _values(state, latent) + log_success(state.success, u)
+
+
+def _values(state: LevelState, latent: Any) -> Any:
+    return namespace(latent).minimum(state.scale.values(latent), state.scale.top + state.rise)
 
 
 def log_second_moment(state: LevelState, u: np.ndarray, spread: np.ndarray | None) -> np.ndarray:
@@ -130,7 +133,7 @@ def log_second_moment(state: LevelState, u: np.ndarray, spread: np.ndarray | Non
     varying = variance if spread is None else spread[..., 0]
     shape = len(u), *[1] * (varying.ndim - 1)
     mean, reach = mean.reshape(shape), UPPER_QUARTILE * np.sqrt(np.maximum(varying, 0.0))
-    high, low = state.scale.values(mean - reach), state.scale.values(mean + reach)
+    high, low = _values(state, mean - reach), _values(state, mean + reach)
     log_range = high + np.log(-np.expm1(-np.maximum(high - low, 1e-12)))
     log_range = log_range + log_success(state.success, u).reshape(shape)
     return np.logaddexp(2.0 * log_likelihood(state, u).reshape(shape), 2.0 * log_range)
@@ -156,8 +159,13 @@ class LogLikelihoodSurrogate:
 
     @property
     def cautious(self) -> "LogLikelihoodSurrogate":
-        """The surrogate of a fit, to which what is not known explains nothing."""
-        state = self.state._replace(doubt=np.ones(()), optimism=np.zeros(()))
+        """The surrogate of a fit, to which what is not known explains nothing.
+
+        Where runs failed, what is extrapolated beyond their border must not outweigh
+        log P(success).
+        """
+        rise = np.full((), np.inf) if self.state.success is None else self.state.rise
+        state = self.state._replace(doubt=np.ones(()), optimism=np.zeros(()), rise=rise)
         return replace(self, state=state)
 
     @property
@@ -228,14 +236,14 @@ class LogLikelihoodSurrogate:
 
     def _uncertain(self) -> float:
         """Share of the median likelihood's posterior where its log is not known to MAX_SD, or
-        exceeds the best value by as much as it may."""
+        exceeds the best value by MAX_RISE."""
         median = self.state._replace(doubt=np.zeros(()), optimism=np.zeros(()))
         target = Target(log_likelihood, median, self.gp.data.u.shape[1])
         population, scale = explore(np.random.default_rng(0), target), self.state.scale
         mean, variance = (part[0] for part in predict(self.gp, ndtr(population.x)))
         unknown = scale.spread * np.sqrt(variance) > MAX_SD
-        capped = scale.location + scale.spread * mean < -MAX_RISE
-        return float(population.weights @ (unknown | capped))
+        extrapolated = scale.values(mean) > scale.top + MAX_RISE
+        return float(population.weights @ (unknown | extrapolated))
 
     @in_float64
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:

@@ -44,8 +44,7 @@ UNCONFIRMED = (
 )
 UNCERTAIN = (
     "much of what may be the posterior lies where the log likelihood is hardly known, or far above "
-    "all that were simulated: the posterior may be too narrow or too wide, or miss a part; "
-    "simulate more"
+    "all that were simulated: the posterior may be too narrow, or miss a part; simulate more"
 )
 NEGATIVE = (
     "some discrepancies are negative, and taken for minus a log likelihood: let the simulator "

@@ -81,6 +81,25 @@ def test_a_table_of_losses_with_known_and_unknown_noise():
     assert off < 1.0 and (ratios < 0.5).all()  # a wrong noise would be seen
 
 
+def narrow(theta):
+    """Its sds are 1 and 2 % of the box; the median of its depths is 2,000 nats."""
+    return -0.5 * ((theta["a"] - 0.4) / 0.06) ** 2 - 0.5 * ((theta["b"] - theta["a"]) / 0.16) ** 2
+
+
+def far_table(seed):
+    rng = np.random.default_rng(seed)
+    theta = {"a": rng.uniform(-3, 3, 60), "b": rng.uniform(-2, 6, 60)}
+    return inference.fit_losses(theta, -2.0 * narrow(theta), BOX, noise=1, warn=False)
+
+
+def test_a_table_far_from_a_narrow_posterior():
+    """A quadratic form is seen as it is; that it rises far above all runs is warned of."""
+    for seed, far in ((0, True), (3, True), (4, False)):
+        fit = far_table(seed)
+        assert_near(fit, narrow, 0.2, 1.2)
+        assert (fit.closest.discrepancy > 10.0) == far == (UNCERTAIN in fit.warnings)
+
+
 @pytest.mark.parametrize("factor", [1.0, 1e4])
 def test_depths_do_not_spoil_the_top(factor):
     """Thousands or millions of nats below the best, where the model is off, too."""
@@ -179,7 +198,7 @@ def test_losses_as_output_are_sent_to_fit_losses():
     def simulate(theta, seeds):
         return losses(theta)[:, None]
 
-    fit = inference.fit(simulate, DECAY, [0.0], budget=24, confirm=0, **QUIET)
+    fit = inference.fit(simulate, DECAY, [0.0], budget=40, confirm=0, **QUIET)
     assert any("fit_losses" in said for said in fit.warnings)
 
 
@@ -215,6 +234,10 @@ def test_what_is_no_loss_and_no_log_likelihood_is_refused():
         inference.fit_losses(theta, -loss, DECAY, noise=SD)
     with pytest.raises(ValueError, match="sums of squares, positive"):
         inference.fit_losses(theta, 0.0 * loss, DECAY, n=30)
+    with pytest.raises(ValueError, match=r"loss must hold 60 numbers.*got shape \(59,\)"):
+        inference.fit_losses(theta, loss[1:], DECAY, noise=SD)
+    with pytest.raises(ValueError, match="loss must hold 60 numbers.*with 0 finite ones"):
+        inference.fit_losses(theta, np.nan * loss, DECAY, noise=SD)
     with pytest.raises(ValueError, match="takes no observed"):
         inference.fit(noisy(banana, 0.0), BOX, [0.0], surrogate="log_likelihood")
     with pytest.raises(ValueError, match="observed must be .*fit_losses"):
