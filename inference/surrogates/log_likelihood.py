@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.special import ndtr, ndtri
 
 from .._float64 import in_float64
@@ -67,12 +66,12 @@ class Scale(NamedTuple):
         return np.maximum((self.top - values) / self.linear, 1.0)
 
 
-def compressed(depth: np.ndarray, linear: ArrayLike) -> np.ndarray:
+def compressed(depth: np.ndarray, linear: float | np.ndarray) -> np.ndarray:
     beyond = np.maximum(depth, linear) / linear
     return np.where(depth < linear, depth, linear * (1.0 + np.log(beyond)))
 
 
-def expanded(height: Any, linear: ArrayLike) -> Any:
+def expanded(height: Any, linear: float | np.ndarray) -> Any:
     """The inverse of `compressed`, for arrays of NumPy or JAX."""
     xp = namespace(height)
     folds = xp.clip(height / linear - 1.0, 0.0, MAX_FOLDS)
@@ -280,7 +279,7 @@ def learn(
         for scale in _scales(values):
             data = _data(u, values, sd, scale, normal)
             fitted.append((condition(maximum_a_posteriori(data), data), scale))
-        gp, scale = max(fitted, key=lambda one: _score(*one, values))
+        gp, scale = max(fitted, key=lambda one: _score(one[0], one[1], values))
         learned_at = len(u)
     state = LevelState(gp, scale, doubt=np.zeros(()), optimism=np.asarray(OPTIMISM))
     return LogLikelihoodSurrogate(state, values, learned_at)
@@ -291,8 +290,9 @@ def _scales(values: np.ndarray) -> list[Scale]:
     depth, found = values.max() - values, []
     for linear in LINEAR:
         heights = compressed(depth, linear)
-        parts = values.max(), linear, heights.mean(), heights.std() or 1.0
-        found.append(Scale(*map(np.asarray, parts)))
+        top, location = np.asarray(values.max()), np.asarray(heights.mean())
+        spread = np.asarray(heights.std() or 1.0)
+        found.append(Scale(top, np.asarray(linear), location, spread))
         if depth.max() < linear:
             break
     return found
