@@ -185,9 +185,12 @@ class Fit:
 
     @property
     def confirmed(self) -> bool | None:
-        """Whether what was simulated at draws of the posterior left it where it was; None where
-        nothing was."""
-        return None if self.before is None else self.before.agrees(*self.population.moments)
+        """Whether what was simulated at draws of the posterior left it where it was, and most of
+        it succeeded; None where nothing was."""
+        if self.before is None:
+            return None
+        succeeded = self.history.succeeded[self.before.told :].mean() >= 0.5
+        return bool(succeeded) and self.before.agrees(*self.population.moments)
 
     @cached_property
     @in_float64

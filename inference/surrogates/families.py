@@ -27,7 +27,7 @@ from .outliers import sane
 from .output_vectors import Output, Summary, describe, infinities, summarise
 from .signal import MIN_FREEDOM, SignalSurrogate, observe
 from .squared_difference import evaluate, failed_on, independent, numbers, squared_difference
-from .success import Feasibility, learn_success
+from .success import Runs, learn_success
 from .threshold import Matched, Threshold, check_rule
 from .transform import TRANSFORMS
 from .warnings import GUESSED, distance_warnings
@@ -43,7 +43,7 @@ class Learnable(NamedTuple):
     features: np.ndarray  # [n, m]
     discrepancy: np.ndarray  # [n]
     normal: np.ndarray | None  # bool [d], see `Prior.normal`
-    runs: Feasibility  # all, failed ones too
+    runs: Runs  # all, failed ones too
 
 
 class Measured(NamedTuple):
