@@ -35,7 +35,8 @@ from .simulations.returned import told_signals
 from .sobol import sobol, start_size
 from .surrogates.base import Acquisition, Learnable, Measured
 from .surrogates.families import Family, checked_observed, resolve
-from .surrogates.success import Feasibility, sane
+from .surrogates.outliers import sane
+from .surrogates.success import Runs
 from .surrogates.warnings import complain
 from .types import Theta
 
@@ -217,20 +218,19 @@ class Bolfi:
         repeated = next_replicate(history, pending) if self.family.replicates else None
         parts = [] if repeated is None else [repeated[None]]
         if n > len(parts):
-            runs = self._runs()
             # made by NumPy: JAX would compile for half a second
             words = np.random.SeedSequence([self.seed, self._state.asked]).generate_state(2)
             key = jax.random.wrap_key_data(jax.device_put(words), impl="threefry2x32")
             believing = self._learned.believe(self.prior.to_unit(self.prior.to_dict(pending)))
             shape = n - len(parts), len(self.prior)
-            u = chosen(in_float64(self._acquire)(key, believing, shape[0], runs), shape)
+            u = chosen(in_float64(self._acquire)(key, believing, shape[0]), shape)
             parts.append(self.prior.to_array(self.prior.from_unit(u)))
         return np.concatenate(parts)
 
-    def _runs(self) -> Feasibility:
+    def _runs(self) -> Runs:
         """Where runs succeeded; those that blew up did not."""
         history = self._state.history
-        return Feasibility(history.u, history.succeeded & sane(history.discrepancy))
+        return Runs(history.u, history.succeeded & sane(history.discrepancy))
 
     def _known(self) -> Learnable:
         history = self._state.history

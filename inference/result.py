@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-
 MUCH_DOUBT = 1.5  # see `Fit.doubt`: beyond it more is simulated, and a fit warns
 MOST_CHAINS, MOST_DRAWS = 1000, 1_000_000  # of one call: more would take days, or all memory
 
@@ -81,8 +80,7 @@ class SurrogateView:
 
 def _shaped(rows: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """[n, ...] -> [*shape, ...]."""
-    array = np.asarray(rows)
-    return array.reshape((*shape, *array.shape[1:]))
+    return np.reshape(rows, (*shape, *np.shape(rows)[1:]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,11 +114,10 @@ class Fit:
 
     def _shown(self) -> list[tuple[str, str]]:
         failed = ", ".join(f"{n} {kind}" for kind, n in self.failures.items())
-        told, learned = len(self.history.theta), self.learned_from.sum()
-        surrogate = f"{self.settings['surrogate']!r}, of {learned} simulations"
+        surrogate = f"{self.settings['surrogate']!r}, of {self.learned_from.sum()} simulations"
         return [
             ("parameters", ", ".join(self._quantiles())),
-            ("simulations", f"{told}, failed: {failed or 'none'}"),
+            ("simulations", f"{len(self.history.theta)}, failed: {failed or 'none'}"),
             ("discrepancy", self._discrepancies()),
             ("surrogate", ", ".join([surrogate, *self.learned.described()])),
             ("status", self.status),
@@ -185,9 +182,12 @@ class Fit:
 
     @property
     def confirmed(self) -> bool | None:
-        """Whether what was simulated at draws of the posterior left it where it was; None where
-        nothing was."""
-        return None if self.before is None else self.before.agrees(*self.population.moments)
+        """Whether what was simulated at draws of the posterior left it where it was, and most of
+        it succeeded; None where nothing was."""
+        if self.before is None:
+            return None
+        succeeded = self.history.succeeded[self.before.told :].mean() >= 0.5
+        return bool(succeeded) and self.before.agrees(*self.population.moments)
 
     @cached_property
     @in_float64

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..gp.process import GP
 from ..types import LogLikelihood, LogSecondMoment
-from .success import Feasibility
+from .success import Runs
 
 
 class Learnable(NamedTuple):
@@ -17,7 +17,7 @@ class Learnable(NamedTuple):
     features: np.ndarray  # [n, m]
     discrepancy: np.ndarray  # [n]
     normal: np.ndarray | None  # bool [d], see `Prior.normal`
-    runs: Feasibility  # all, failed ones too
+    runs: Runs  # all, failed ones too
 
 
 class Measured(NamedTuple):
@@ -41,6 +41,17 @@ class Surrogate(Protocol):
         """NamedTuple of NumPy arrays on which the likelihood depends, `gp` among them; data, never
         a closure. Its method `padded` gives the same likelihood in arrays of few shapes: NUTS is
         compiled for each."""
+        ...
+
+    @property
+    def success(self) -> GP | None:
+        """Where runs succeed, see `success.log_success`; None is everywhere."""
+        ...
+
+    @property
+    def cautious(self) -> "Surrogate":
+        """The surrogate to which its own doubt beyond what the data can resolve is no
+        agreement."""
         ...
 
     @property
@@ -96,15 +107,12 @@ class Surrogate(Protocol):
 class Acquisition(Protocol):
     """Where to simulate next."""
 
-    def __call__(
-        self, key: jax.Array, surrogate: Any, n: int, feasibility: Feasibility, /
-    ) -> np.ndarray:
+    def __call__(self, key: jax.Array, surrogate: Any, n: int, /) -> np.ndarray:
         """n different points u [n, d].
 
         Args:
             key: Fixes the choice.
             surrogate: A `Surrogate` that already believes what is pending.
             n: Points wanted.
-            feasibility: Where runs succeeded and failed; see `success.log_feasible`.
         """
         ...

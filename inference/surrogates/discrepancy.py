@@ -18,9 +18,8 @@ from ..gp.process import (
     predict_points,
 )
 from ..types import LogLikelihood, LogSecondMoment
-from .held_back import FIRST_SHARE, MIN_FIRST_RUNS, HeldBack
 from .hyper_draws import posterior_draws
-from .success import sane
+from .outliers import sane
 from .threshold import (
     Matched,
     Threshold,
@@ -36,7 +35,6 @@ from .warnings import (
     LOW_THRESHOLD,
     NOISY,
     complaints,
-    held_back_warnings,
 )
 
 BETWEEN = 0.25  # of the least simulated discrepancy: the least that is taken for its minimum
@@ -182,22 +180,9 @@ class DiscrepancySurrogate:
         said = [*self.said]
         if not confirmed:
             said += complaints(self.checks()["loo_z"], "discrepancy")
-            said += held_back_warnings(self._held_back())
         if self.noisy:
             said.append(NOISY)
         return said if self.fits else [*said, LOW_THRESHOLD]
-
-    def _held_back(self) -> HeldBack:
-        """Innovations of the last runs, with hyperparameters of the first ones."""
-        data, first = self.gp.data, round(FIRST_SHARE * len(self.discrepancy))
-        freedom = first - (1 + 2 * data.u.shape[1])
-        errors = np.full((len(self.discrepancy), 2), np.nan)
-        if first >= MIN_FIRST_RUNS and freedom > 0:
-            y = data.y[:1]
-            early = maximum_a_posteriori(data._replace(u=data.u[:first], y=y[:, :first]))
-            gp = condition(early, data._replace(y=y))
-            errors[first:] = (gp.whitener[0] @ y[0])[first:, None]
-        return HeldBack(errors, freedom)
 
     @in_float64
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:

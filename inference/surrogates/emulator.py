@@ -9,12 +9,10 @@ from .._float64 import in_float64
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
 from ..gp.process import (
     GP,
-    JITTER,
     Data,
     Hyper,
     condition,
     leave_one_out,
-    predict_joint,
 )
 from ..gp.process import predict_points as predict_scores
 from .component_noise import absorbed_noise, left_over
@@ -25,7 +23,6 @@ from .noise.run_size import EQUAL_RUNS_TOLERANCE, Size, learn_size, run_spread
 EXPLAINED_SHARE = 0.9995  # of the variance, to be explained by components
 PREDICTED_SHARE = 0.3  # see `_predicted`
 PRIOR_RUNS = 5.0  # runs that speak for uncorrelated scores
-ROUNDING_VARIANCE = 1e-24  # variance of standardised outputs that counts as none
 MIN_NOISE_SHARE = 0.01  # share of noise in the outputs' variance from which its size may vary
 SIZE_ROUNDS = 2  # of learning sizes from errors, and the emulator with these sizes
 LEAST_OF_ERROR = 0.05  # of an expected squared error, added before its logarithm is taken
@@ -265,39 +262,6 @@ def loo_errors(emulator: Emulator) -> np.ndarray:
     gp = emulator.gp.only(slice(emulator.basis.used))
     mean, variance = leave_one_out(gp)
     return ((gp.data.y - mean) / np.sqrt(variance)).T[: len(emulator.outputs)]
-
-
-def innovations(emulator: Emulator, u: np.ndarray, outputs: np.ndarray) -> np.ndarray:
-    """Studentised errors [n, used] in the scores of new outputs [n, m] at u [n, d].
-
-    Each output is predicted from all earlier outputs, with components and hyperparameters fixed.
-    """
-    basis, used = emulator.basis, emulator.basis.used
-    squared = np.sum(basis.vectors[:, :used] ** 2, 0)
-    noise = np.diag(emulator.noise)[:used] + emulator.remainder.white / squared
-    gp = emulator.gp.only(slice(used))
-    mean = predict_scores(gp, u)[0]
-    noisy = noise[:, None, None] * _spread(emulator, u) + JITTER
-    total = predict_joint(gp, u, u) + noisy * np.eye(len(u))
-    factor = np.linalg.cholesky(total)
-    error = (basis.scores(outputs)[:, :used].T - mean)[:, :, None]
-    return np.linalg.solve(factor, error)[:, :, 0].T
-
-
-def beyond_components(emulator: Emulator, u: np.ndarray, outputs: np.ndarray) -> np.ndarray:
-    """What the components leave of outputs [n, m] at u [n, d]: its length over the due one [n].
-
-    The remainder is what is expected, and no less than the share of the variance that the
-    components may leave.
-    """
-    basis, remainder = emulator.basis, emulator.remainder
-    squared = np.sum(basis.vectors**2)
-    there = np.sum(remainder.factors**2) + remainder.white * (len(basis.vectors) - basis.used)
-    there = there * _spread(emulator, u)
-    least = (1.0 - EXPLAINED_SHARE) * (squared + remainder.total)
-    return np.linalg.norm(basis.residuals(outputs), axis=1) / np.sqrt(
-        np.maximum(there, max(least, ROUNDING_VARIANCE))
-    )
 
 
 def noise_share(emulator: Emulator) -> float:

@@ -18,10 +18,11 @@ from .given_noise import Noise, given_noise
 from .log_likelihood import LogLikelihoodFamily, LogLikelihoodLearner
 from .noise.by_mean import ByMean, SdOfMean, law_of
 from .noise.scales import Plain, Scale, comparable
+from .outliers import sane
 from .output_vectors import Output, Summary, describe, infinities, summarise
 from .signal import MIN_FREEDOM, SignalSurrogate, observe
 from .squared_difference import evaluate, failed_on, independent, numbers, squared_difference
-from .success import learn_success, sane
+from .success import learn_success
 from .threshold import Matched, Threshold, check_rule
 from .transform import TRANSFORMS
 from .warnings import GUESSED, NEGATIVE, distance_warnings

@@ -27,7 +27,8 @@ from ..sampling.target import Target
 from ..simulations.failures import impossible, incomparable, not_finite
 from ..types import LogLikelihood, LogSecondMoment
 from .base import Learnable, Measured
-from .success import learn_success, log_success, padded_success, sane
+from .outliers import sane
+from .success import learn_success, log_success, padded_success
 from .warnings import EQUAL, UNCERTAIN, complaints
 
 NEAR = 40.0  # nats below the best, down to which a log likelihood must be right
@@ -155,6 +156,10 @@ class LogLikelihoodSurrogate:
     @property
     def gp(self) -> GP:
         return self.state.gp
+
+    @property
+    def success(self) -> GP | None:
+        return self.state.success
 
     @property
     def cautious(self) -> "LogLikelihoodSurrogate":

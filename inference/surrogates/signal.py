@@ -18,7 +18,6 @@ from .emulator import (
     predictive_draws,
 )
 from .given_noise import GivenNoise, Noise
-from .held_back import HeldBack, held_back
 from .measurement_noise import (
     CORRELATIONS,
     FEW_CORRELATIONS,
@@ -38,7 +37,7 @@ from .measurement_noise import (
     with_misfit,
 )
 from .noise.run_size import run_spread
-from .noise.scales import Plain, Scale, comparable, in_units
+from .noise.scales import Plain, Scale, in_units
 from .output_vectors import Output
 from .signal_likelihood import (
     SignalState,
@@ -55,7 +54,6 @@ from .warnings import (
     TOO_FAST,
     UNPREDICTED,
     complaints,
-    held_back_warnings,
     noise_warnings,
 )
 
@@ -103,15 +101,15 @@ class SignalSurrogate:
     def gp(self) -> GP:
         return self.emulator.gp
 
+    @property
+    def cautious(self) -> "SignalSurrogate":
+        """This one: a misfit of unknown size leaves no agreement to doubt."""
+        return self
+
     @cached_property
     @in_float64
     def state(self) -> SignalState:
         return state_of(self.emulator, self.reduced, self.box)._replace(success=self.success)
-
-    @cached_property
-    def held_back(self) -> HeldBack:
-        """Errors of the last simulations."""
-        return held_back(self.emulator, comparable(self.scale, self.output))
 
     @property
     def log_likelihood(self) -> LogLikelihood:
@@ -186,9 +184,8 @@ class SignalSurrogate:
 
     @in_float64
     def checks(self) -> dict[str, np.ndarray]:
-        """Studentised errors: leave-one-out ones `loo_z` [n, components in use], and `foretold_z`
-        [n, components + 1], see `HeldBack`."""
-        return {"loo_z": loo_errors(self.emulator), "foretold_z": self.held_back.errors}
+        """Studentised leave-one-out errors `loo_z` [n, components in use]."""
+        return {"loo_z": loo_errors(self.emulator)}
 
     @property
     def fits(self) -> bool:
@@ -208,7 +205,6 @@ class SignalSurrogate:
             return [TOO_FAST if len(repeats) and not repeats.any() else UNPREDICTED]
         said = [] if confirmed else complaints(loo_errors(self.emulator), "output")
         said += noise_warnings(noise_share(self.emulator), repeats, sized)
-        said += [] if confirmed else held_back_warnings(self.held_back)
         if self._outside():
             said.append(OUTSIDE)
         elif self._missed():

@@ -1,5 +1,5 @@
-"""Warnings from leave-one-out errors, held-back errors and the noise of an emulator, and from what
-was given, whatever was learned of it."""
+"""Warnings from leave-one-out errors and the noise of an emulator, and from what was given,
+whatever was learned of it."""
 
 import warnings
 from collections.abc import Sequence
@@ -9,11 +9,9 @@ import numpy as np
 from .._lazy import stats
 from ..history import History
 from ..simulations.failures import Failure
-from .held_back import HeldBack
 from .squared_difference import independent
 
 FALSE_ALARMS = 1e-3  # of each leave-one-out check, were its errors independent and normal
-HELD_BACK_FALSE_ALARMS = 1e-2  # nominal share of good fits warned, see `held_back_warnings`
 FAR_ERROR = 3.0  # studentised errors beyond are rare
 OVERCONFIDENT_SQUARE = 1.5  # mean square of the studentised errors that matters
 OUTSIDE = (
@@ -39,8 +37,8 @@ DOUBTED = (
     "well enough in places, which counts as agreement; simulate more, or narrow the prior"
 )
 UNCONFIRMED = (
-    "runs at draws of the posterior moved it, more than once where more were made: it is not known "
-    "yet; simulate more, or narrow the prior"
+    "runs at draws of the posterior moved it or failed, more than once where more were made: it is "
+    "not known yet; simulate more, or narrow the prior"
 )
 UNCERTAIN = (
     "much of what may be the posterior lies where the log likelihood is hardly known, or far above "
@@ -149,31 +147,6 @@ def complaints(loo_z: np.ndarray, what: str) -> list[str]:
             "the emulator predicts; simulate more"
         )
     return said
-
-
-def held_back_warnings(found: HeldBack) -> list[str]:
-    """A warning if the held-back errors are too large, else an empty list.
-
-    The components of one run share their error, and hyperparameters come from few runs. So each
-    run counts once, by its mean square over the components, and the mean of q runs is compared
-    with Fisher's F of q and the first runs' degrees of freedom. This is an approximation: outputs
-    smooth on the scale of the box hardly ever alarm (tests); outputs that turn within half of it
-    alarm more often than HELD_BACK_FALSE_ALARMS. What lies beyond the components is judged in the
-    same way. The check detects gross failures only.
-    """
-    seen = np.isfinite(found.errors[:, -1])
-    if not seen.any():
-        return []
-    scores, beyond = found.errors[seen, :-1], found.errors[seen, -1]
-    scores = scores[:, np.isfinite(scores).all(0)]
-    limit = stats.f.isf(HELD_BACK_FALSE_ALARMS / 2.0, len(beyond), found.freedom)
-    if max(np.mean(part**2) for part in (scores, beyond) if part.size) <= limit:
-        return []
-    return [
-        "the last third of the simulations lies further from what the others predict than the "
-        "emulator's variance allows: the output changes faster with the parameters "
-        "than so few simulations show, and the posterior may be too narrow; simulate more"
-    ]
 
 
 def noise_warnings(share: float, repeats: np.ndarray, sized: bool) -> list[str]:

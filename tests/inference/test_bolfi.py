@@ -152,7 +152,7 @@ def test_asking_and_telling_compile_nothing(prior, observed, simulate, surrogate
 def test_an_acquisition_is_called_in_float64(prior, observed, simulate):
     seen = []
 
-    def acquire(key, surrogate, n, feasibility):
+    def acquire(key, surrogate, n):
         seen.append(jax.numpy.asarray(0.1).dtype)
         return np.full((n, 2), 0.5) + 0.1 * np.arange(n)[:, None] / n
 

@@ -196,7 +196,7 @@ def test_a_simulator_may_write_into_what_it_is_given(prior, observed, simulate):
 )
 def test_what_an_acquisition_returns_is_checked(prior, observed, simulate, returned, message):
     engine = inference.Bolfi(
-        prior, observed, initial=4, acquisition=lambda key, surrogate, n, runs: returned(n)
+        prior, observed, initial=4, acquisition=lambda key, surrogate, n: returned(n)
     )
     theta = engine.ask(4)
     engine.tell(theta, simulate(theta, range(4)))

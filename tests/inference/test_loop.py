@@ -51,7 +51,7 @@ def test_a_larger_budget_goes_on_where_the_smaller_ended(
     """Also from within a round, 9 being no multiple of 4, whose points are chosen jointly."""
     calls = []
 
-    def jointly(key, surrogate, n, feasibility):
+    def jointly(key, surrogate, n):
         steps = (np.arange(n)[:, None] + 0.5) / n
         return (steps + np.asarray(jax.random.uniform(key, (1, 2)))) % 1.0
 
@@ -201,8 +201,8 @@ def test_a_fit_on_a_few_of_many_says_so(prior, observed, simulate):
     assert not any("failed" in said for said in engine.fit(warn=False).warnings)
     fewer = {name: np.concatenate([values[:4]] * 2) for name, values in theta.items()}
     engine.tell(fewer, fragile(fewer, np.arange(8)))
-    with pytest.warns(inference.EmulatorWarning, match="12 of 18 simulations failed"):
-        engine.fit()
+    said = engine.fit(warn=False).warnings
+    assert any("12 of 18 simulations failed" in one for one in said)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import numpy as np
 import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference.surrogates.log_likelihood import compressed, expanded
-from bolfi_liquids.inference.surrogates.success import sane
+from bolfi_liquids.inference.surrogates.outliers import sane
 from bolfi_liquids.inference.surrogates.warnings import NEGATIVE, UNCERTAIN
 
 from bolfi_liquids import inference

@@ -181,13 +181,16 @@ def _gain(squared: np.ndarray, mean: np.ndarray, channel: np.ndarray, power: int
 
     Args:
         squared: Half the squared differences [p, m].
-        mean: [p, m]; where it is 0, nothing is concluded.
+        mean: [p, m]; where it is the least or the largest, both runs were cut off there (a count of
+            0, a sensor's limit), and nothing is concluded.
         channel: [m]
     """
     total = 0.0
     for one in np.unique(channel):
-        for near, at in zip(squared[:, channel == one], mean[:, channel == one], strict=True):
-            near, at = near[at > 0.0], at[at > 0.0] ** power
+        means = mean[:, channel == one]
+        within = (means > means.min()) & (means < means.max())
+        for near, at, free in zip(squared[:, channel == one], means, within, strict=True):
+            near, at = near[free], at[free] ** power
             if len(near) > 1 and near.any():
                 even = np.log(near.mean())
                 total += 0.5 * np.sum(even - np.log(np.mean(near / at)) - np.log(at))

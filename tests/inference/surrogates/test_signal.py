@@ -13,7 +13,7 @@ from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.emulator import Limits, emulate, noise_share
 from bolfi_liquids.inference.surrogates.families import Learnable, SignalFamily
 from bolfi_liquids.inference.surrogates.signal_likelihood import log_likelihood, log_second_moment
-from bolfi_liquids.inference.surrogates.success import Feasibility
+from bolfi_liquids.inference.surrogates.success import Runs
 from bolfi_liquids.inference.surrogates.warnings import UNREPEATED
 from scipy.stats import binom, multivariate_normal
 
@@ -37,7 +37,7 @@ def outputs(u, seeds=None):
 def learned(u, signals, observed, **options):
     learner = SignalFamily(**options).learner(observed)
     measured = learner.measure(signals)
-    runs = Feasibility(u, np.isfinite(measured.discrepancy))
+    runs = Runs(u, np.isfinite(measured.discrepancy))
     known = Learnable(u, measured.features, measured.discrepancy, None, runs)
     return learner.learn(known, None)
 
