@@ -3,7 +3,7 @@
 import numpy as np
 
 BEST_SHARE = 0.25  # of the runs, which tell how far discrepancies spread
-MAX_DEVIATIONS = 1e6  # of that spread
+MAX_DEVIATIONS = 1e9  # of that spread
 
 
 def sane(discrepancy: np.ndarray) -> np.ndarray:
@@ -12,4 +12,4 @@ def sane(discrepancy: np.ndarray) -> np.ndarray:
     deviation = discrepancy - np.nanmin(discrepancy, initial=np.inf)
     finite = deviation[np.isfinite(deviation)]
     spread = np.quantile(finite, BEST_SHARE) if finite.size else 0.0
-    return ~(deviation > MAX_DEVIATIONS * spread) | (spread == 0.0)
+    return ~(deviation / MAX_DEVIATIONS > spread) | (spread == 0.0)

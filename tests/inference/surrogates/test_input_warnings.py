@@ -76,7 +76,7 @@ def test_a_fit_says_so_where_the_output_itself_is_compared():
     assert any("losses" in said for said in fitted([0.0], losses))
     assert not any("losses" in said for said in fitted([1.5], losses, noise=0.1))
     found = fitted([0.0], losses, discrepancy=lambda observed, simulated: float(simulated[0]))
-    assert not any("losses" in said for said in found)
+    assert not any("simulated ones" in said for said in found)
     decays = RUNS["level"][:, None] * DECAY
     limited, half = np.maximum(2.0 * SEEN, LIMIT), np.minimum(decays, 1e3)
     assert any("cut off" in said for said in fitted(limited, decays, noise=0.02))
