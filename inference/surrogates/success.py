@@ -64,21 +64,31 @@ def learn_success(runs: Runs, normal: np.ndarray | None) -> GP | None:
 def _laplace(gram: np.ndarray, labels: np.ndarray) -> _Laplace:
     """For the latent function's covariance [p, p] and labels [p] of -1 and 1."""
     latent = np.zeros(len(labels))
+    found, following = _newton(gram, labels, latent)
     for _ in range(STEPS):
-        log_density = -0.5 * latent**2 - 0.5 * np.log(2.0 * np.pi)
-        slope = labels * np.exp(log_density - log_ndtr(labels * latent))
-        curvature = np.maximum(slope**2 + latent * slope, LEAST_CURVATURE)
-        root = np.sqrt(curvature)
-        factor = np.linalg.cholesky(np.eye(len(gram)) + root[:, None] * gram * root)
-        step = curvature * latent + slope
-        white = np.linalg.solve(factor, root * (gram @ step))
-        weights = step - root * np.linalg.solve(factor.T, white)
-        before, latent = latent, gram @ weights
-        if np.abs(latent - before).max() < TOLERANCE:
+        if np.abs(following - latent).max() < TOLERANCE:
             break
-    log_evidence = np.sum(log_ndtr(labels * latent)) - 0.5 * weights @ latent
+        latent = following
+        found, following = _newton(gram, labels, latent)
+    return found
+
+
+def _newton(
+    gram: np.ndarray, labels: np.ndarray, latent: np.ndarray
+) -> tuple[_Laplace, np.ndarray]:
+    """The approximation around latent values [p], and its mean [p] (algorithm 3.1)."""
+    log_density = -0.5 * latent**2 - 0.5 * np.log(2.0 * np.pi)
+    slope = labels * np.exp(log_density - log_ndtr(labels * latent))
+    curvature = np.maximum(slope**2 + latent * slope, LEAST_CURVATURE)
+    root = np.sqrt(curvature)
+    factor = np.linalg.cholesky(np.eye(len(gram)) + root[:, None] * gram * root)
+    targets = latent + slope / curvature
+    white = np.linalg.solve(factor, root * (gram @ (curvature * targets)))
+    weights = curvature * targets - root * np.linalg.solve(factor.T, white)
+    mean = gram @ weights
+    log_evidence = np.sum(log_ndtr(labels * mean)) - 0.5 * weights @ mean
     log_evidence -= np.sum(np.log(np.diag(factor)))
-    return _Laplace(float(log_evidence), before + slope / curvature, 1.0 / curvature)
+    return _Laplace(float(log_evidence), targets, 1.0 / curvature), mean
 
 
 def log_success(gp: GP | None, u: Any) -> Any:
