@@ -196,7 +196,7 @@ class Fit:
         lies, in the parameter of which that is most true: 1 where the simulator is as good as
         known. The distance is a root mean square, in standard deviations of the sure posterior."""
         found, target = self.population, self._target
-        surely = target._replace(state=target.state._replace(doubt=np.zeros(())))
+        surely = target._replace(state=self.learned.sure)
         at = ndtr(found.x)
         change = log_likelihood(surely, at) - log_likelihood(target, at)
         there = np.isfinite(found.log_weights + change)

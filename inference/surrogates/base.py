@@ -55,6 +55,11 @@ class Surrogate(Protocol):
         ...
 
     @property
+    def sure(self) -> Any:
+        """The state, were what is emulated known."""
+        ...
+
+    @property
     def log_likelihood(self) -> LogLikelihood: ...
 
     @property

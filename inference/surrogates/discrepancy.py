@@ -115,6 +115,10 @@ class DiscrepancySurrogate:
         return replace(self, resolution=max(*scales, MIN_RESOLUTION * self.scale.spread))
 
     @property
+    def sure(self) -> ThresholdState:
+        return self.state._replace(doubt=np.zeros(()))
+
+    @property
     def log_likelihood(self) -> LogLikelihood:
         return log_likelihood
 

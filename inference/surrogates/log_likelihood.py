@@ -173,6 +173,10 @@ class LogLikelihoodSurrogate:
         return replace(self, state=state)
 
     @property
+    def sure(self) -> LevelState:
+        return self.state._replace(doubt=np.zeros(()))
+
+    @property
     def log_likelihood(self) -> LogLikelihood:
         return log_likelihood
 

@@ -29,6 +29,7 @@ from .measurement_noise import (
     NO_MEASUREMENT_NOISE,
     Nodes,
     Reduced,
+    Remainder,
     candidates,
     correlated,
     correlation_weights,
@@ -44,6 +45,7 @@ from .signal_likelihood import (
     log_likelihood,
     log_second_moment,
     node_log_densities,
+    state_of,
 )
 from .warnings import (
     EQUAL,
@@ -110,6 +112,21 @@ class SignalSurrogate:
     @in_float64
     def state(self) -> SignalState:
         return state_of(self.emulator, self.reduced, self.box)._replace(success=self.success)
+
+    @property
+    @in_float64
+    def sure(self) -> SignalState:
+        """The state, were the simulator the emulator's mean. Where repeated runs agree, what looks
+        like run-to-run noise is doubt, too."""
+        repeats = self.emulator.repeats
+        if repeats.any() or not len(repeats):
+            return self.state._replace(doubt=np.zeros(()))
+        none = Remainder(np.zeros((len(self.observed), 0)), MIN_SIZE**2)
+        exact = self.emulator._replace(noise=np.zeros_like(self.emulator.noise), remainder=none)
+        noise = Noise(self.known, 0.0)
+        sure = observe(exact, self.output, self.observed, noise, previous=self)
+        sure = replace(sure, box=self.box, success=self.success)
+        return sure.state._replace(doubt=np.zeros(()))
 
     @property
     def log_likelihood(self) -> LogLikelihood:
@@ -262,26 +279,6 @@ class SignalSurrogate:
         noise = correlated(rng.normal(size=values.shape), self.output.layout, nodes)
         values = self.scale.back(values + self.emulator.basis.scale * noise)
         return {"signal": self.output.restore(self.scale.observe(rng, values))}
-
-
-def state_of(
-    emulator: Emulator, reduced: Reduced, box: tuple[np.ndarray, np.ndarray] | None = None
-) -> SignalState:
-    """What the likelihood depends on: of the components in use."""
-    used, d = emulator.basis.used, emulator.gp.data.u.shape[1]
-    state = SignalState(
-        emulator.gp.only(slice(used)),
-        np.ones(used),
-        reduced.estimate[:, :used],
-        reduced.covariance[:, :used, :used],
-        reduced.log_weight,
-        *(box or (np.zeros(d), np.ones(d))),
-    )
-    if emulator.size is None:
-        return state
-    freedom = np.asarray(float(len(emulator.basis.scale) - used))
-    sized = {"size": emulator.size, "share": reduced.share, "freedom": freedom}
-    return state._replace(unexplained=reduced.unexplained, **sized)
 
 
 @in_float64

@@ -9,6 +9,8 @@ import numpy as np
 
 from ..gp.namespaces import log_sum_exp, namespace
 from ..gp.process import GP, padded, padded_rows, predict
+from .emulator import Emulator
+from .measurement_noise import Reduced
 from .noise.run_size import Size, log_size
 from .success import log_success, padded_success
 
@@ -53,6 +55,26 @@ class SignalState(NamedTuple):
             success=padded_success(self.success),
             size=None if self.size is None else self.size.padded(),
         )
+
+
+def state_of(
+    emulator: Emulator, reduced: Reduced, box: tuple[np.ndarray, np.ndarray] | None = None
+) -> SignalState:
+    """What the likelihood depends on: of the components in use."""
+    used, d = emulator.basis.used, emulator.gp.data.u.shape[1]
+    state = SignalState(
+        emulator.gp.only(slice(used)),
+        np.ones(used),
+        reduced.estimate[:, :used],
+        reduced.covariance[:, :used, :used],
+        reduced.log_weight,
+        *(box or (np.zeros(d), np.ones(d))),
+    )
+    if emulator.size is None:
+        return state
+    freedom = np.asarray(float(len(emulator.basis.scale) - used))
+    sized = {"size": emulator.size, "share": reduced.share, "freedom": freedom}
+    return state._replace(unexplained=reduced.unexplained, **sized)
 
 
 def log_likelihood(state: SignalState, u: Any) -> Any:

@@ -208,6 +208,11 @@ def check_cautious(of):
     assert finite(cautious) and (cautious <= first + 1e-9).all()
 
 
+def check_sure(of):
+    """Where nothing is doubted, no more than where something is."""
+    assert finite(of.log_likelihood(of.sure, POINTS))
+
+
 def check_minimum(of):
     best = of.minimum()
     assert best.shape == (2,) and ((best >= 0.0) & (best <= 1.0)).all()
