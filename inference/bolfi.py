@@ -61,9 +61,7 @@ class Bolfi:
             (see `Acquisition`), or None for the surrogate's best.
         seed: Fixes the start design and the acquisitions.
         initial: Points of the Sobol start design; None is 2 d + 6.
-        options: Of the surrogate's family: `summary`, `noise`, `components`, `predicted` and
-            `discrepancy` of "signal"; `discrepancy`, `transform`, `threshold` and `hyper_draws`
-            of "discrepancy".
+        options: Of the surrogate's family, see `SignalFamily` and `DiscrepancyFamily`.
 
     Raises:
         ValueError: an argument is not one of the above.

@@ -304,10 +304,14 @@ def test_log_prob_is_prior_times_likelihood(line_fit):
     theta = {"slope": np.array([0.2, 0.9, 2.0]), "offset": np.array([0.7, 0.1, 0.5])}
     values = line_fit.log_prob(theta)
     inside = {name: v[:2] for name, v in theta.items()}
-    learned = line_fit.learned
-    at = line_fit.prior.to_unit(inside)
-    expected = np.log(0.5) + learned.log_likelihood(learned.state, at)
-    np.testing.assert_allclose(values[:2], expected, rtol=1e-6)
+    # Phi((eps - mu) / sigma), what is not known of mu beyond the resolution counting against it
+    learned, (mean, sd) = line_fit.learned, line_fit.surrogate.predict(inside)
+    noise = learned.scale.spread * np.exp(learned.gp.hyper.log_noise[0])
+    latent, resolution = sd**2 - noise**2, learned.resolution**2
+    counted = latent * resolution / (latent + resolution)
+    sigma = np.sqrt(counted + noise**2 + learned.width**2)
+    z = (learned.threshold - mean - np.sqrt(latent - counted)) / sigma
+    np.testing.assert_allclose(values[:2], np.log(0.5) + norm.logcdf(z), rtol=1e-6)
     assert values[2] == -np.inf
     assert line_fit.log_prob({"slope": 0.2, "offset": 0.7}).shape == ()
 
