@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .._float64 import in_float64
+from .._lazy import stats
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
 from ..gp.process import (
     GP,
@@ -19,12 +20,15 @@ from .component_noise import absorbed_noise, left_over
 from .components import Basis, principal_components
 from .measurement_noise import Remainder, shrunk_covariance
 from .noise.run_size import EQUAL_RUNS_TOLERANCE, Size, learn_size, run_spread
+from .noise.scales import repeated
+from .squared_difference import independent
 
 EXPLAINED_SHARE = 0.9995  # of the variance, to be explained by components
 PREDICTED_SHARE = 0.3  # see `_predicted`
 PRIOR_RUNS = 5.0  # runs that speak for uncorrelated scores
 MIN_NOISE_SHARE = 0.01  # share of noise in the outputs' variance from which its size may vary
 SIZE_ROUNDS = 2  # of learning sizes from errors, and the emulator with these sizes
+TOO_SMALL = 0.01  # probability that repeated runs differ by less than they may
 LEAST_OF_ERROR = 0.05  # of an expected squared error, added before its logarithm is taken
 
 
@@ -272,6 +276,28 @@ def noise_share(emulator: Emulator) -> float:
     noise, rest = spread * np.exp(2.0 * emulator.gp.hyper.log_noise[:used]), spread * rest
     total = weight.sum() + rest
     return float((weight @ np.minimum(noise, 1.0) + rest) / total) if total > 0 else 0.0
+
+
+def noise_variance(emulator: Emulator) -> float:
+    """Of the run-to-run noise, at its size 1, over all standardised values together."""
+    squared = np.sum(emulator.basis.vectors**2, 0)
+    return emulator.remainder.total + float(np.diag(emulator.noise) @ squared)
+
+
+def borne_out(emulator: Emulator) -> float:
+    """The largest share of the run-to-run noise that repeated runs allow; 1 where none were made.
+
+    Half the squared differences of two runs are a sample of its variance.
+    """
+    u, outputs = emulator.gp.data.u[: len(emulator.outputs)], emulator.outputs
+    first, second = repeated(u)
+    whole = noise_variance(emulator)
+    if not len(first) or not whole:
+        return 1.0
+    differences = (outputs[first] - outputs[second]) / emulator.basis.scale
+    sample = np.sum(differences**2, 1) / (2.0 * _spread(emulator, u[first]))
+    freedom = sum(independent(one) for one in differences)
+    return float(min(1.0, sample.mean() * freedom / stats.chi2.ppf(TOO_SMALL, freedom) / whole))
 
 
 @in_float64

@@ -12,8 +12,10 @@ from ..sobol import sobol
 from ..types import LogLikelihood, LogSecondMoment
 from .emulator import (
     Emulator,
+    borne_out,
     loo_errors,
     noise_share,
+    noise_variance,
     predict,
     predictive_draws,
 )
@@ -116,17 +118,18 @@ class SignalSurrogate:
     @property
     @in_float64
     def sure(self) -> SignalState:
-        """The state, were the simulator the emulator's mean. Where repeated runs agree, what looks
-        like run-to-run noise is doubt, too."""
-        repeats = self.emulator.repeats
-        if repeats.any() or not len(repeats):
-            return self.state._replace(doubt=np.zeros(()))
-        none = Remainder(np.zeros((len(self.observed), 0)), MIN_SIZE**2)
-        exact = self.emulator._replace(noise=np.zeros_like(self.emulator.noise), remainder=none)
-        noise = Noise(self.known, 0.0)
-        sure = observe(exact, self.output, self.observed, noise, previous=self)
-        sure = replace(sure, box=self.box, success=self.success)
-        return sure.state._replace(doubt=np.zeros(()))
+        """The state, were the simulator the emulator's mean. What looks like run-to-run noise, but
+        repeated runs do not bear out, is doubt, too."""
+        found, share = self, max(borne_out(self.emulator), MIN_SIZE**2)
+        if share < 1.0:
+            white, factors = self.emulator.remainder.white, self.emulator.remainder.factors
+            remainder = Remainder(np.sqrt(share) * factors, share * white)
+            noise = share * self.emulator.noise
+            emulator = self.emulator._replace(noise=noise, remainder=remainder)
+            known = Noise(self.known, 0.0)
+            found = observe(emulator, self.output, self.observed, known, previous=self)
+            found = replace(found, box=self.box, success=self.success)
+        return found.state._replace(doubt=np.zeros(()))
 
     @property
     def log_likelihood(self) -> LogLikelihood:
@@ -314,7 +317,7 @@ def observe(
         reduced = Reduced(*(np.zeros((len(log_weight), *[0] * axes)) for axes in (1, 2, 0, 0, 0)))
     else:
         reduced = reduce((vectors, target, factors), white, output.layout, nodes)
-    own = _own_variance(emulator)
+    own = noise_variance(emulator)
     other = np.sum(white - remainder.white) + np.sum(factors[:, remainder.factors.shape[1] :] ** 2)
     other = other + len(target) * nodes.sigma**2
     share = own / np.maximum(own + other, np.finfo(float).tiny)
@@ -325,13 +328,6 @@ def observe(
         reduced = Reduced(*(part[kept] for part in reduced))
         nodes, log_weight = Nodes(*(part[kept] for part in nodes)), log_weight[kept]
     return SignalSurrogate(emulator, output, observed, given, nodes, log_weight, reduced)
-
-
-def _own_variance(emulator: Emulator) -> float:
-    """Of the run-to-run noise, at its size 1, over all values together."""
-    used = emulator.basis.used
-    squared = np.sum(emulator.basis.vectors[:, :used] ** 2, 0)
-    return emulator.remainder.total + float(np.diag(emulator.noise)[:used] @ squared)
 
 
 def _nodes(

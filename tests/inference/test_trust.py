@@ -154,3 +154,23 @@ def test_what_a_sum_of_squares_cannot_see_is_said(seen, said):
     outputs = run * np.array([1.0, 1.5, 2.0])[:, None] + size * sizes[:, None] * noise[:3]
     found = distance_warnings(run + size * noise[3], outputs)
     assert all((text in found) == (text == said) for text in (UNEVEN, TOO_SMOOTH))
+
+
+def test_noise_that_repeated_runs_do_not_show_is_doubt():
+    """A wave of many cycles, of which the components make half: no run has any noise."""
+    time = np.linspace(0.0, 20.0, 80)
+    prior = inference.Prior({"w": dist.Uniform(0.5, 5.0)})
+    observed = np.sin(2.3 * time) + 0.3 * np.random.default_rng(0).normal(size=80)
+
+    def simulate(theta, seeds):
+        return np.sin(theta["w"][:, None] * time)
+
+    options = {"budget": 16, "noise": 0.3, "warn": False, "progress": False}
+    fit = inference.fit(simulate, prior, observed, **options)
+    latent = fit.learned.state._replace(doubt=np.zeros(()))
+    gap = [
+        np.ptp(fit.learned.log_likelihood(state, prior.to_unit({"w": np.array([2.3, 3.0])})))
+        for state in (latent, fit.learned.sure)
+    ]
+    assert gap[1] > 2.0 * gap[0]
+    assert fit.status == "not confirmed"

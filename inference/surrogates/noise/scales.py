@@ -181,14 +181,15 @@ def _gain(squared: np.ndarray, mean: np.ndarray, channel: np.ndarray, power: int
 
     Args:
         squared: Half the squared differences [p, m].
-        mean: [p, m]; where it is the least or the largest, both runs were cut off there (a count of
-            0, a sensor's limit), and nothing is concluded.
+        mean: [p, m]; where both runs are at its least or its largest, they were cut off there (a
+            count of 0, a sensor's limit), and nothing is concluded.
         channel: [m]
     """
     total = 0.0
     for one in np.unique(channel):
         means = mean[:, channel == one]
-        within = (means > means.min()) & (means < means.max())
+        ends = (means == means.min()) | (means == means.max())
+        within = ~ends | (squared[:, channel == one] > 0.0)
         for near, at, free in zip(squared[:, channel == one], means, within, strict=True):
             near, at = near[free], at[free] ** power
             if len(near) > 1 and near.any():
