@@ -194,7 +194,7 @@ class Bolfi:
         if not isinstance(fit, Fit) or fit.history is not self._state.history:
             raise ValueError(f"fit must be what `fit` returned last, got {fit!r:.100}")
         started = time.perf_counter()
-        self._before = Before(*fit.population.moments, self.told)
+        self._before = Before(*fit.population.moments, self.told, n)
         drawn = fit.population.resample(np.random.default_rng([self.seed, self.asked]), n)
         asked = self.prior.to_array(self.prior.from_unit(ndtr(drawn)))
         self._state = remember_asked(self._state, asked, 0)
@@ -225,6 +225,12 @@ class Bolfi:
             parts.append(self.prior.to_array(self.prior.from_unit(u)))
         return np.concatenate(parts)
 
+    @property
+    def _learnable(self) -> np.ndarray:
+        """Which runs are learned from, bool [n]: no copies, nor what blew up."""
+        history = self._state.history
+        return history.distinct & sane(history.discrepancy)
+
     def _runs(self) -> Runs:
         """Where runs succeeded; those that blew up did not."""
         history = self._state.history
@@ -232,7 +238,7 @@ class Bolfi:
 
     def _known(self) -> Learnable:
         history = self._state.history
-        good = history.distinct
+        good = self._learnable
         known = history.u[good], history.features[good], history.discrepancy[good]
         return Learnable(*known, self.prior.normal, self._runs())
 
@@ -367,15 +373,13 @@ class Bolfi:
         started = time.perf_counter()
         known, history = self._known(), self._state.history
         fitted = self._learner.finish(known, self.seed)
-        learned_from = history.distinct
-        learned_from[learned_from] = self._learner.learnable(known.discrepancy)
         self._seconds += time.perf_counter() - started
         made = Fit(
             prior=self.prior,
             observed=self.observed,
             history=history,
             learned=fitted,
-            learned_from=learned_from,
+            learned_from=self._learnable,
             settings=self.settings,
             seconds={"simulator": 0.0, **measured, "engine": self._seconds},
             before=self._before,

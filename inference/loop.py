@@ -119,7 +119,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
             a simulation is told: an executor's workers then never wait for the slowest run of a
             round, and other points are simulated than in rounds.
         confirm: Runs beyond the budget at draws of the posterior, which tell whether it is known:
-            as long as they move it, as many are made again, up to half the budget; 0 for none.
+            once, and again while they move it, up to half the budget; 0 for none.
             See `Fit.confirmed`.
         warn: Whether each of the surrogate's complaints is raised as an `EmulatorWarning`;
             `Fit.warnings` holds them in any case.
@@ -203,6 +203,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         if not budget and made.unreached:  # a table of losses, rather than of outputs
             raise ValueError(made.unreached[0])
         rounds = max(1, budget // (2 * confirm)) if confirm and budget else 0
+        rounds = min(rounds, (MOST_SIMULATIONS - engine.told) // max(confirm, 1))
         for _ in range(rounds):
             for simulation in _confirmation(engine, made, runner, confirm):
                 seconds += simulation.seconds

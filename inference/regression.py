@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from ._float64 import in_float64
 from .arguments import checked_array
 from .prior import Prior, check_support, checked_prior
-from .result import SurrogateView
+from .surrogates.base import SurrogateView
 from .surrogates.discrepancy import DiscrepancySurrogate, learn
 from .surrogates.transform import TRANSFORMS, Transform
 from .types import Theta

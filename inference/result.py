@@ -17,11 +17,12 @@ from .notebook_display import as_html, as_text
 from .prior import Prior
 from .sampling.convergence import SamplingWarning
 from .sampling.draw import SAMPLERS, draw_posterior
-from .sampling.importance import Before, Population, explore, weighted_quantiles
+from .sampling.importance import LEAST, Before, Population, explore, weighted_quantiles
 from .sampling.target import Length, Target, log_likelihood
-from .surrogates.base import Surrogate
+from .surrogates.base import Surrogate, SurrogateView
 from .surrogates.signal import SignalSurrogate
 from .surrogates.warnings import (
+    COLLAPSED,
     DOUBTED,
     UNCONFIRMED,
     censored_warnings,
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
+LEAST_EFFECTIVE = 32.0  # points of a population that stand for a posterior
 MUCH_DOUBT = 1.5  # see `Fit.doubt`: beyond it more is simulated, and a fit warns
 MOST_CHAINS, MOST_DRAWS = 1000, 1_000_000  # of one call: more would take days, or all memory
 
@@ -45,42 +47,6 @@ class Closest(NamedTuple):
     theta: dict[str, float]
     signal: np.ndarray
     discrepancy: float
-
-
-class SurrogateView:
-    """A surrogate in the prior's natural units.
-
-    Attributes:
-        prior: Leads from parameters to the quantiles that the surrogate knows.
-        learned: The surrogate over these quantiles, with all that its family offers.
-    """
-
-    def __init__(self, prior: Prior, learned: Surrogate):
-        self.prior = prior
-        self.learned = learned
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({self.prior}, {type(self.learned).__name__})"
-
-    def predict(self, theta: Theta) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and sd of a new simulation at theta, each [..., *its own axes].
-
-        Of the discrepancy family that is the transformed discrepancy, of the signal family the
-        output's values; the sd holds run-to-run noise, but no measurement noise.
-        """
-        u = self.prior.to_unit(theta)
-        mean, sd = self.learned.predict(u.reshape(-1, u.shape[-1]))
-        return _shaped(mean, u.shape[:-1]), _shaped(sd, u.shape[:-1])
-
-    @property
-    def warnings(self) -> list[str]:
-        """What the surrogate's own checks complain of, in sentences."""
-        return self.learned.warnings()
-
-
-def _shaped(rows: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """[n, ...] -> [*shape, ...]."""
-    return np.reshape(rows, (*shape, *np.shape(rows)[1:]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,11 +103,8 @@ class Fit:
     def _discrepancies(self) -> str:
         """Of the closest run, and of those at draws of the posterior."""
         said = f"{self.closest.discrepancy:.4g} of the closest run"
-        if self.before is None:
-            return said
-        drawn = self.history.discrepancy[self.before.told :]
-        worth = ", ".join("failed" if np.isnan(one) else f"{one:.4g}" for one in drawn)
-        return f"{said}, {worth} at draws of the posterior"
+        worth = ["failed" if np.isnan(one) else f"{one:.4g}" for one in self._drawn]
+        return f"{said}, {', '.join(worth)} at draws of the posterior" if worth else said
 
     @cached_property
     def warnings(self) -> list[str]:
@@ -155,6 +118,8 @@ class Fit:
             said.append(DOUBTED)
         if self.confirmed is False:
             said.append(UNCONFIRMED)
+        if self._collapsed:
+            said.append(COLLAPSED)
         learned, needed = int(self.learned_from.sum()), 2 * len(self.prior) + 2
         if learned < needed:
             said.append(
@@ -172,7 +137,12 @@ class Fit:
         if not self.learned.fits:
             return "not fitted"
         sure = self.confirmed is True and self.doubt <= MUCH_DOUBT
-        return "fitted" if sure else "not confirmed"
+        return "fitted" if sure and not self._collapsed else "not confirmed"
+
+    @property
+    def _collapsed(self) -> bool:
+        """Whether too few points stand for the posterior to tell where it lies."""
+        return self.population.effective < LEAST_EFFECTIVE
 
     @cached_property
     @in_float64
@@ -184,17 +154,24 @@ class Fit:
     def confirmed(self) -> bool | None:
         """Whether what was simulated at draws of the posterior left it where it was, and most of
         it succeeded; None where nothing was."""
-        if self.before is None:
+        drawn = self._drawn
+        if self.before is None or not len(drawn):
             return None
-        succeeded = self.history.succeeded[self.before.told :].mean() >= 0.5
-        return bool(succeeded) and self.before.agrees(*self.population.moments)
+        most = np.isfinite(drawn).mean() >= 0.5
+        return bool(most) and self.before.agrees(*self.population.moments)
+
+    @property
+    def _drawn(self) -> np.ndarray:
+        """Discrepancies of the runs at draws of the posterior, NaN where one failed."""
+        runs = slice(0) if self.before is None else self.before.runs
+        return self.history.discrepancy[runs]
 
     @cached_property
     @in_float64
     def doubt(self) -> float:
-        """How many times as far from where it would be, were the emulator sure, the posterior
-        lies, in the parameter of which that is most true: 1 where the simulator is as good as
-        known. The distance is a root mean square, in standard deviations of the sure posterior."""
+        """The largest ratio, over parameters, of the posterior's root mean square distance from the
+        mean that it would have, were the emulator sure, to the sd that it would have then: 1 where
+        the simulator is as good as known."""
         found, target = self.population, self._target
         surely = target._replace(state=self.learned.sure)
         at = ndtr(found.x)
@@ -203,8 +180,7 @@ class Fit:
         log_weights = found.log_weights[there] + change[there]
         known = found._replace(x=found.x[there], log_weights=log_weights)
         (mean, sd), (sure_mean, sure_sd) = found.moments, known.moments
-        with np.errstate(divide="ignore"):  # one point is left
-            return float(np.max(np.hypot(sd, mean - sure_mean) / sure_sd))
+        return float(np.max(np.hypot(sd, mean - sure_mean) / np.maximum(sure_sd, LEAST)))
 
     def _data_warnings(self) -> list[str]:
         """What the observed output itself shows where it is compared."""

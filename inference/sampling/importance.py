@@ -19,7 +19,7 @@ from .target import NOWHERE_FINITE, Target, log_likelihood
 
 ROUND_POINTS = 256  # points of each round
 SCREEN_POINTS = 1024  # points that fill the prior evenly
-MAX_ROUNDS = 12  # at most; an easy posterior stops after two or three
+MAX_ROUNDS = 40  # at most; an easy posterior stops after two or three
 MIN_EFFECTIVE = 400.0  # effective points at which one more round ends it
 BOX_EDGE = 1e-12  # quantile at which the box is cut, so that x = Phi^-1(u) stays finite
 MIN_LOG_POWER = -60.0  # log of the smallest inverse temperature
@@ -82,16 +82,24 @@ class Before(NamedTuple):
     Attributes:
         mean, sd: Of each parameter [d], in normal scores of the prior.
         told: Simulations that it knew.
+        drawn: Draws of it that were asked next.
     """
 
     mean: np.ndarray
     sd: np.ndarray
     told: int
+    drawn: int
+
+    @property
+    def runs(self) -> slice:
+        """Rows of the runs at the draws."""
+        return slice(self.told, self.told + self.drawn)
 
     def agrees(self, mean: np.ndarray, sd: np.ndarray) -> bool:
         """Whether means lie within the smaller sd, and no sd is twice as large as the other."""
         near = np.abs(self.mean - mean) <= np.minimum(self.sd, sd)
-        return bool(near.all() and (np.abs(np.log(self.sd / sd)) < np.log(WIDER)).all())
+        alike = np.maximum(self.sd, sd) < WIDER * np.minimum(self.sd, sd) + LEAST
+        return bool(near.all() and alike.all())
 
 
 class _Points(NamedTuple):

@@ -6,7 +6,8 @@ import jax
 import numpy as np
 
 from ..gp.process import GP
-from ..types import LogLikelihood, LogSecondMoment
+from ..prior import Prior
+from ..types import LogLikelihood, LogSecondMoment, Theta
 from .success import Runs
 
 
@@ -121,3 +122,39 @@ class Acquisition(Protocol):
             n: Points wanted.
         """
         ...
+
+
+class SurrogateView:
+    """A surrogate in the prior's natural units.
+
+    Attributes:
+        prior: Leads from parameters to the quantiles that the surrogate knows.
+        learned: The surrogate over these quantiles, with all that its family offers.
+    """
+
+    def __init__(self, prior: Prior, learned: Surrogate):
+        self.prior = prior
+        self.learned = learned
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.prior}, {type(self.learned).__name__})"
+
+    def predict(self, theta: Theta) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd of a new simulation at theta, each [..., *its own axes].
+
+        Of the discrepancy family that is the transformed discrepancy, of the signal family the
+        output's values; the sd holds run-to-run noise, but no measurement noise.
+        """
+        u = self.prior.to_unit(theta)
+        mean, sd = self.learned.predict(u.reshape(-1, u.shape[-1]))
+        return _shaped(mean, u.shape[:-1]), _shaped(sd, u.shape[:-1])
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the surrogate's own checks complain of, in sentences."""
+        return self.learned.warnings()
+
+
+def _shaped(rows: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """[n, ...] -> [*shape, ...]."""
+    return np.reshape(rows, (*shape, *np.shape(rows)[1:]))

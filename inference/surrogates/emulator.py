@@ -18,7 +18,7 @@ from ..gp.process import (
 from ..gp.process import predict_points as predict_scores
 from .component_noise import absorbed_noise, left_over
 from .components import Basis, principal_components
-from .measurement_noise import Remainder, shrunk_covariance
+from .measurement_noise import MIN_SIZE, Remainder, shrunk_covariance
 from .noise.run_size import EQUAL_RUNS_TOLERANCE, Size, learn_size, run_spread
 from .noise.scales import repeated
 from .squared_difference import independent
@@ -81,12 +81,8 @@ class Emulator(NamedTuple):
     @property
     def repeats(self) -> np.ndarray:
         """Of each run at the parameters of one before: whether its output differs, bool [r]."""
-        n = len(self.outputs)
-        first, which = np.unique(
-            self.gp.data.u[:n], axis=0, return_index=True, return_inverse=True
-        )[1:]
-        again = np.setdiff1d(np.arange(n), first)
-        differ = np.abs(self.outputs[again] - self.outputs[first[which.ravel()[again]]])
+        first, again = repeated(self.gp.data.u[: len(self.outputs)])
+        differ = np.abs(self.outputs[again] - self.outputs[first])
         return (differ > EQUAL_RUNS_TOLERANCE * self.outputs.std(0)).any(1)
 
 
@@ -298,6 +294,18 @@ def borne_out(emulator: Emulator) -> float:
     sample = np.sum(differences**2, 1) / (2.0 * _spread(emulator, u[first]))
     freedom = sum(independent(one) for one in differences)
     return float(min(1.0, sample.mean() * freedom / stats.chi2.ppf(TOO_SMALL, freedom) / whole))
+
+
+def smallest_misfit(emulator: Emulator, observed: np.ndarray, u: np.ndarray) -> float:
+    """Root of the least expected mean square by which the emulated output at u [n, d] misses the
+    observed values [m], standardised."""
+    basis = emulator.basis
+    mean, variance = (part.T for part in predict_scores(emulator.gp, u))
+    near = (mean - basis.scores(observed[None])) ** 2 + variance
+    # components are orthogonal, so what they miss adds to what they cannot make
+    beyond = np.sum(basis.residuals(observed[None]) ** 2)
+    total = (near @ np.sum(basis.vectors**2, 0)).min() + beyond
+    return float(max(np.sqrt(total / len(observed)), MIN_SIZE))
 
 
 @in_float64

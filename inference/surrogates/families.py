@@ -18,7 +18,6 @@ from .given_noise import Noise, given_noise
 from .log_likelihood import LogLikelihoodFamily, LogLikelihoodLearner
 from .noise.by_mean import ByMean, SdOfMean, law_of
 from .noise.scales import Plain, Scale, comparable
-from .outliers import sane
 from .output_vectors import Output, Summary, describe, infinities, summarise
 from .signal import MIN_FREEDOM, SignalSurrogate, observe
 from .squared_difference import evaluate, failed_on, independent, numbers, squared_difference
@@ -98,10 +97,6 @@ class DiscrepancyLearner:
                 row[:] = signal.ravel()
         return Measured(features, *evaluate(self.distance, self.observed, signals))
 
-    def learnable(self, discrepancy: np.ndarray) -> np.ndarray:
-        """Which of the successful simulations are learned from, bool [n]: what blew up is not."""
-        return sane(discrepancy)
-
     def learn(
         self, known: Learnable, previous: DiscrepancySurrogate | None
     ) -> DiscrepancySurrogate:
@@ -112,8 +107,7 @@ class DiscrepancyLearner:
         self, known: Learnable, previous: DiscrepancySurrogate | None, rule: Threshold
     ) -> DiscrepancySurrogate:
         transform = self.family.transform
-        good = self.learnable(known.discrepancy)
-        learned = learn(known.u[good], known.discrepancy[good], transform, previous, known.normal)
+        learned = learn(known.u, known.discrepancy, transform, previous, known.normal)
         learned = replace(learned, success=learn_success(known.runs, known.normal))
         return learned if rule is None else with_threshold(learned, rule)
 
@@ -139,9 +133,8 @@ class DiscrepancyLearner:
         if self.family.threshold is None and known.discrepancy.min() < 0.0:
             said = (NEGATIVE,)
         if self.family.discrepancy is None:
-            good = self.learnable(known.discrepancy)
-            order = np.argsort(known.discrepancy[good])
-            outputs = known.features[good][order].reshape(-1, *self.observed.shape)
+            order = np.argsort(known.discrepancy)
+            outputs = known.features[order].reshape(-1, *self.observed.shape)
             said += tuple(distance_warnings(self.observed, outputs))
         return replace(learned.cautious, said=said)
 
@@ -261,17 +254,12 @@ class SignalLearner:
             "" if np.isfinite(values).all() else not_finite(f"summary returns {infinities(values)}")
         )
 
-    def learnable(self, discrepancy: np.ndarray) -> np.ndarray:
-        """Which of the successful simulations are learned from, bool [n]: what blew up is not."""
-        return sane(discrepancy)
-
     def learn(self, known: Learnable, previous: SignalSurrogate | None) -> SignalSurrogate:
-        learnable = self.learnable(known.discrepancy)
-        u, values = known.u[learnable], known.features[learnable]
+        u, values = known.u, known.features
         if previous is not None and not goes_on(previous.emulator, previous.scale.of(values)):
             previous = None
         scale = self._fitting(u, values) if previous is None else previous.scale
-        emulator = self._emulator(known._replace(u=u, features=values), scale, previous)
+        emulator = self._emulator(known, scale, previous)
         success = learn_success(known.runs, known.normal)
 
         def compared(at: np.ndarray | None) -> SignalSurrogate:

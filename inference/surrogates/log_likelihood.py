@@ -27,7 +27,6 @@ from ..sampling.target import Target
 from ..simulations.failures import impossible, incomparable, not_finite
 from ..types import LogLikelihood, LogSecondMoment
 from .base import Learnable, Measured
-from .outliers import sane
 from .success import learn_success, log_success, padded_success
 from .warnings import EQUAL, UNCERTAIN, complaints
 
@@ -362,17 +361,12 @@ class LogLikelihoodLearner:
                 found[i, : signal.size] = signal.ravel()
         return Measured(found[:, 1:], -found[:, 0], errors)
 
-    def learnable(self, discrepancy: np.ndarray) -> np.ndarray:
-        """Which of the successful simulations are learned from, bool [n]: what blew up is not."""
-        return sane(discrepancy)
-
     def learn(
         self, known: Learnable, previous: LogLikelihoodSurrogate | None
     ) -> LogLikelihoodSurrogate:
         """To search with: where a run was unlucky others are to be made."""
-        kept = self.learnable(known.discrepancy)
-        values, sd = -known.discrepancy[kept], known.features[kept, 0]
-        learned = learn(known.u[kept], values, sd, previous, known.normal)
+        values, sd = -known.discrepancy, known.features[:, 0]
+        learned = learn(known.u, values, sd, previous, known.normal)
         success = learn_success(known.runs, known.normal)
         return replace(learned, state=learned.state._replace(success=success))
 

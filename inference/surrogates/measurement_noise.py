@@ -17,6 +17,7 @@ STEP = 2.0 ** (1.0 / 3.0)  # from one sigma to the next
 LEAST_OF_RESIDUAL = 1.0 / 8.0  # least sigma over the sd of a residual of many values
 LEAST_OF_MISFIT = 1.0 / 32.0  # least sigma over the smallest expected misfit, where they are few
 MOST = 2.0  # largest sigma over the larger of the two
+MOST_OF_NOISE = 8.0  # the same of a few numbers' noise, whose posterior has a heavy tail
 UNIT = 1e-3  # of the outputs' sd, added to the given noise: the misfit of one that is 0
 
 MIN_SIZE = 1e-4  # of a residual, in units of the outputs' sd: data are never without noise

@@ -6,8 +6,9 @@ from functools import cached_property
 import numpy as np
 
 from .._float64 import in_float64
+from .._lazy import stats
 from ..gp.optimise import minimise_in_box
-from ..gp.process import GP, believe, predict_points
+from ..gp.process import GP, believe
 from ..sobol import sobol
 from ..types import LogLikelihood, LogSecondMoment
 from .emulator import (
@@ -18,6 +19,7 @@ from .emulator import (
     noise_variance,
     predict,
     predictive_draws,
+    smallest_misfit,
 )
 from .given_noise import GivenNoise, Noise
 from .measurement_noise import (
@@ -27,6 +29,7 @@ from .measurement_noise import (
     LEAST_OF_RESIDUAL,
     MIN_SIZE,
     MOST,
+    MOST_OF_NOISE,
     NO_CORRELATION,
     NO_MEASUREMENT_NOISE,
     Nodes,
@@ -51,7 +54,9 @@ from .signal_likelihood import (
 )
 from .warnings import (
     EQUAL,
+    FALSE_ALARMS,
     FEW_NUMBERS,
+    GENEROUS,
     MISFIT,
     OUTSIDE,
     SMOOTH,
@@ -231,6 +236,8 @@ class SignalSurrogate:
             said.append(MISFIT)
         elif self._smooth():
             said.append(SMOOTH)
+        elif self._generous():
+            said.append(GENEROUS)
         if self.known is None and len(self.observed) - self.gp.data.u.shape[1] < MIN_FREEDOM:
             said.append(FEW_NUMBERS)
         return said
@@ -238,6 +245,16 @@ class SignalSurrogate:
     def _missed(self) -> bool:
         """Whether the given noise does not explain what was observed."""
         return self.known is not None and self.misfit_probability > NEEDED
+
+    def _generous(self) -> bool:
+        """Whether a simulation misses independent data by less than the given noise allows."""
+        freedom = len(self.observed) - self.gp.data.u.shape[1]
+        known = self.known
+        if known is None or known.factors.size or not known.white.all() or freedom < MIN_FREEDOM:
+            return False
+        error = (self.emulator.outputs - self.observed) ** 2
+        least = np.min(error @ (1.0 / known.white))
+        return bool(least < stats.chi2.ppf(FALSE_ALARMS, freedom))
 
     def _smooth(self) -> bool:
         """Whether the noise that was found varies as slowly as a signal, and is most of what no
@@ -324,7 +341,7 @@ def observe(
     weighed = reduced._replace(log_weight=reduced.log_weight + log_weight, share=share)
     reduced = _widen(weighed, emulator)
     if len(log_weight) > KEPT_NODES:
-        kept = _keep(emulator, reduced)
+        kept = _keep(emulator, reduced, nodes)
         reduced = Reduced(*(part[kept] for part in reduced))
         nodes, log_weight = Nodes(*(part[kept] for part in nodes)), log_weight[kept]
     return SignalSurrogate(emulator, output, observed, given, nodes, log_weight, reduced)
@@ -338,29 +355,16 @@ def _nodes(
         return NO_MEASUREMENT_NOISE, np.zeros(1)
     basis = emulator.basis
     correlations = FEW_CORRELATIONS if output.series else NO_CORRELATION
-    miss = _smallest_misfit(emulator, observed)
-    low, high = LEAST_OF_MISFIT * miss, MOST * miss
+    miss = smallest_misfit(emulator, observed, _screen(emulator, MISFIT_POINTS))
+    low, high = LEAST_OF_MISFIT * miss, MOST_OF_NOISE * miss
     if noise.given is not None:
         sd = float(np.sqrt(np.mean(noise.given.variance / basis.scale**2)))
-        return with_misfit(candidates(low, high, correlations), sd, noise.misfit)
+        return with_misfit(candidates(low, MOST * miss, correlations), sd, noise.misfit)
     if output.long:
         left = residual_size(basis.standardise(observed), basis.vectors[:, : basis.used])
-        low, high, correlations = LEAST_OF_RESIDUAL * left, max(MOST * left, high), CORRELATIONS
+        low, high, correlations = LEAST_OF_RESIDUAL * left, MOST * max(left, miss), CORRELATIONS
     nodes = candidates(low, high, correlations)
     return nodes, correlation_weights(nodes)
-
-
-def _smallest_misfit(emulator: Emulator, observed: np.ndarray) -> float:
-    """Root of the least expected mean square by which the emulated output misses the observed
-    values [m], standardised, over an even screen of the prior and the runs."""
-    basis = emulator.basis
-    points = _screen(emulator, MISFIT_POINTS)
-    mean, variance = (part.T for part in predict_points(emulator.gp, points))
-    near = (mean - basis.scores(observed[None])) ** 2 + variance
-    # components are orthogonal, so what they miss adds to what they cannot make
-    beyond = np.sum(basis.residuals(observed[None]) ** 2)
-    total = (near @ np.sum(basis.vectors**2, 0)).min() + beyond
-    return float(max(np.sqrt(total / len(observed)), MIN_SIZE))
 
 
 def _widen(reduced: Reduced, emulator: Emulator) -> Reduced:
@@ -376,11 +380,13 @@ def _widen(reduced: Reduced, emulator: Emulator) -> Reduced:
     return reduced._replace(estimate=estimate, covariance=covariance, log_weight=log_weight)
 
 
-def _keep(emulator: Emulator, reduced: Reduced) -> np.ndarray:
-    """The nodes of most evidence, best first, on an even screen of the prior and at the data."""
+def _keep(emulator: Emulator, reduced: Reduced, nodes: Nodes) -> np.ndarray:
+    """The nodes of most evidence, best first, on an even screen of the prior and at the data; none
+    of these need come so near that the given noise explains the rest, so that it is kept."""
     points = _screen(emulator, SCREENED_POINTS)
     terms = node_log_densities(state_of(emulator, reduced), points)
-    return np.argsort(-np.logaddexp.reduce(terms, 0))[:KEPT_NODES]
+    evidence = np.where(nodes.sigma == 0.0, np.inf, np.logaddexp.reduce(terms, 0))
+    return np.argsort(-evidence)[:KEPT_NODES]
 
 
 def _screen(emulator: Emulator, count: int) -> np.ndarray:

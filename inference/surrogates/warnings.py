@@ -37,8 +37,16 @@ DOUBTED = (
     "well enough in places, which counts as agreement; simulate more, or narrow the prior"
 )
 UNCONFIRMED = (
-    "runs at draws of the posterior moved it or failed, more than once where more were made: it is "
-    "not known yet; simulate more, or narrow the prior"
+    "runs at draws of the posterior moved it, or failed: it is not known yet; simulate more, or "
+    "narrow the prior"
+)
+COLLAPSED = (
+    "the posterior is too narrow for its moments to be computed without sampling: whether runs at "
+    "its draws moved it is not known; narrow the prior, or compare fits of more simulations"
+)
+GENEROUS = (
+    "the closest simulation misses what was observed by much less than the given noise: it is "
+    "smaller than given, and the posterior is too wide; correct noise="
 )
 UNCERTAIN = (
     "much of what may be the posterior lies where the log likelihood is hardly known, or far above "
@@ -288,7 +296,9 @@ def distance_warnings(observed: np.ndarray, outputs: np.ndarray) -> list[str]:
     if t >= MIN_ROUGH and independent(residual) < SYSTEMATIC_SHARE * there.sum():
         said.append(SYSTEMATIC)
     size = np.abs(error[there])
-    if size.size >= MIN_ROUGH and np.median(size) < UNEVEN_SHARE * np.sqrt(np.mean(size**2)):
+    small = UNEVEN_SHARE * np.sqrt(np.mean(size**2))
+    ignored = np.linalg.norm(error, axis=0) < small * np.sqrt(there.sum(0))  # channels
+    if size.size >= MIN_ROUGH and (np.median(size) < small or ignored.any()):
         said.append(UNEVEN)
     if t < MIN_ROUGH or not there.all():
         return said

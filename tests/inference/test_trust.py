@@ -6,6 +6,7 @@ import pytest
 from bolfi_liquids.inference.surrogates.warnings import (
     DOUBTED,
     FEW_NUMBERS,
+    GENEROUS,
     GUESSED,
     LOW_THRESHOLD,
     MISFIT,
@@ -174,3 +175,36 @@ def test_noise_that_repeated_runs_do_not_show_is_doubt():
     ]
     assert gap[1] > 2.0 * gap[0]
     assert fit.status == "not confirmed"
+
+
+def test_noise_given_far_too_large_is_said():
+    for noise, said in ((1.0, True), (0.1, False)):
+        assert (GENEROUS in warnings_of(decay, DATA, noise=noise)) is said
+
+
+def test_a_narrow_posterior_of_many_parameters_has_its_moments():
+    """A linear model of six parameters and known noise, against the closed form."""
+    rng = np.random.default_rng(0)
+    design, sd = rng.normal(size=(30, 6)), 0.02
+    prior = inference.Prior({f"t{i}": dist.Normal(0.0, 1.0) for i in range(6)})
+
+    def simulate(theta, seeds):
+        return np.stack(list(theta.values()), 1) @ design.T
+
+    observed = design @ rng.normal(size=6) + sd * rng.normal(size=30)
+    options = {"budget": 60, "noise": sd, "progress": False, "warn": False}
+    fit = inference.fit(simulate, prior, observed, **options)
+    covariance = np.linalg.inv(np.eye(6) + design.T @ design / sd**2)
+    exact = covariance @ design.T @ observed / sd**2, np.sqrt(np.diag(covariance))
+    mean, found = fit.population.moments
+    assert (np.abs(mean - exact[0]) < 0.3 * exact[1]).all()
+    assert (np.abs(np.log(found / exact[1])) < 0.3).all()
+    assert fit.status == "fitted" and not fit.warnings
+
+
+def test_nothing_is_confirmed_before_a_run_is_told():
+    engine = inference.Bolfi(PRIOR, DATA, noise=0.1)
+    theta = engine.ask(20)
+    engine.tell(theta, decay(theta, None))
+    engine.confirm(engine.fit(warn=False))
+    assert engine.fit(warn=False).confirmed is None
