@@ -11,6 +11,7 @@ from ..gp.optimise import minimise_in_box
 from ..gp.process import (
     GP,
     Data,
+    Hyper,
     believe,
     condition,
     leave_one_out,
@@ -57,6 +58,8 @@ class DiscrepancySurrogate:
         learned_at: Simulations known when the hyperparameters were found.
         chosen_at: Simulations known when the transform was chosen.
         success: Where runs succeed, see `success.learn_success`.
+        displaced: Processes and thresholds [k] over which the likelihood is averaged, see
+            `averaged`; None for `gp` alone.
     """
 
     gp: GP
@@ -66,6 +69,7 @@ class DiscrepancySurrogate:
     learned_at: int
     chosen_at: int
     success: GP | None = None
+    displaced: tuple[GP, np.ndarray] | None = None
 
     @property
     def equal(self) -> bool:
@@ -79,8 +83,9 @@ class DiscrepancySurrogate:
     @property
     @in_float64
     def state(self) -> ThresholdState:
-        threshold = (self.threshold - self.scale.location) / self.scale.spread
-        return ThresholdState(self.gp, np.asarray(threshold), self.success)
+        gp, given = self.displaced or (self.gp, self.threshold)
+        threshold = (given - self.scale.location) / self.scale.spread
+        return ThresholdState(gp, np.asarray(threshold), self.success)
 
     @property
     def log_likelihood(self) -> LogLikelihood:
@@ -227,6 +232,37 @@ def marginalised(
     data = surrogate.gp.data
     spread = data._replace(y=np.tile(data.y, (draws, 1)))
     return with_threshold(replace(surrogate, gp=condition(hyper, spread)), rule)
+
+
+@in_float64
+def averaged(
+    surrogate: DiscrepancySurrogate, displaced: np.ndarray, rule: Threshold
+) -> DiscrepancySurrogate:
+    """The surrogate whose likelihood is a mean over draws of an error between simulator and data.
+
+    Had the data been without the error, they would be observed less one of its draws: for each,
+    the runs' discrepancies from that are learned, and have a threshold of their own. So a best
+    fit is as uncertain as the error moves it; an error that is added to discrepancies would only
+    make all of them larger.
+
+    Args:
+        displaced: Discrepancies of the runs from observed less each draw, [n, k]; draws with one
+            that the transform does not know are left out.
+        rule: Of the thresholds.
+    """
+    y = surrogate.scale(displaced.T)
+    known = np.isfinite(y).all(1)
+    if not known.any():
+        return surrogate
+    base, count = surrogate.gp, int(known.sum())
+    hyper = Hyper(*(np.resize(part, (count, *part.shape[1:])) for part in base.hyper))
+    gp = condition(hyper, base.data._replace(y=y[known]))
+    singles = [
+        replace(surrogate, gp=gp.only(slice(k, k + 1)), discrepancy=values)
+        for k, values in enumerate(displaced.T[known])
+    ]
+    thresholds = np.array([with_threshold(one, rule).threshold for one in singles])
+    return replace(surrogate, displaced=(gp, thresholds))
 
 
 def _standardise(transform: Transform, values: np.ndarray) -> Scale:

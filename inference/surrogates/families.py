@@ -12,9 +12,9 @@ from ..arguments import check_callable, checked_array, checked_integer, checked_
 from ..simulations.failures import not_finite
 from ..types import Discrepancy
 from .base import Surrogate
-from .discrepancy import DiscrepancySurrogate, learn, marginalised, with_threshold
+from .discrepancy import DiscrepancySurrogate, averaged, learn, marginalised, with_threshold
 from .emulator import PREDICTED_SHARE, Limits, emulate
-from .given_noise import GivenNoise, given_noise
+from .given_noise import Covariance, GivenNoise, check_noise, given_noise
 from .outliers import sane
 from .output_vectors import Output, Summary, describe, infinities, summarise
 from .signal import Noise, SignalSurrogate, observe
@@ -24,6 +24,7 @@ from .threshold import Threshold, check_rule
 from .transform import TRANSFORMS
 
 MAX_COMPONENTS = 8
+ERROR_DRAWS = 32  # of noise, over which the likelihood of a discrepancy is averaged
 
 
 class Learnable(NamedTuple):
@@ -57,6 +58,10 @@ class DiscrepancyFamily:
             `threshold.choose_threshold`.
         hyper_draws: Posterior draws of the hyperparameters over which the likelihood of a fit
             is averaged; 0 takes the best hyperparameters alone.
+        noise: What lies between simulator and data besides the simulator's own noise, as in
+            `SignalFamily`, such as `criticism.model_error`: the likelihood of a fit is averaged
+            over draws of it, taken off what was observed. Points are chosen without it. None
+            leaves it out.
     """
 
     name: ClassVar[str] = "discrepancy"
@@ -67,9 +72,11 @@ class DiscrepancyFamily:
     transform: str | None = None
     threshold: Threshold = None
     hyper_draws: int = 0
+    noise: ArrayLike | Covariance | None = None
 
     def __post_init__(self) -> None:
         check_rule(self.threshold)
+        check_noise(self.noise)
         check_callable("discrepancy", self.discrepancy)
         if self.transform is not None and self.transform not in tuple(TRANSFORMS):
             raise ValueError(
@@ -78,7 +85,14 @@ class DiscrepancyFamily:
         checked_integer("hyper_draws", self.hyper_draws, 0)
 
     def learner(self, observed: np.ndarray) -> "DiscrepancyLearner":
-        return DiscrepancyLearner(self, _distance(self.discrepancy, observed), observed)
+        distance = _distance(self.discrepancy, observed)
+        if self.noise is None:
+            return DiscrepancyLearner(self, distance, observed, np.empty((0, *observed.shape)))
+        output = describe(observed, None)
+        noise = given_noise(self.noise, output)
+        # the same for all runs of a fit, so that the smallest discrepancy is where it is
+        drawn = output.restore(noise.draw(np.random.default_rng(0), ERROR_DRAWS))
+        return DiscrepancyLearner(self, distance, observed, drawn.reshape(-1, *observed.shape))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +102,11 @@ class DiscrepancyLearner:
     family: DiscrepancyFamily
     distance: Discrepancy
     observed: np.ndarray
-    features: ClassVar[int] = 0
+    errors: np.ndarray  # draws [k, *shape] of the noise
+
+    @property
+    def features(self) -> int:
+        return len(self.errors)
 
     @property
     def any_shape(self) -> bool:
@@ -96,10 +114,11 @@ class DiscrepancyLearner:
         return self.family.discrepancy is not None
 
     def measure(self, signals: Sequence[np.ndarray | None]) -> Measured:
-        """Features [n, 0] and discrepancies of n signals, None where a run failed."""
-        return Measured(
-            np.zeros((len(signals), 0)), *evaluate(self.distance, self.observed, signals)
-        )
+        """Discrepancies of n signals, None where a run failed; features [n, k] are those from
+        observed less each draw of the noise."""
+        displaced = [evaluate(self.distance, self.observed - e, signals)[0] for e in self.errors]
+        features = np.reshape(displaced, (self.features, len(signals))).T
+        return Measured(features, *evaluate(self.distance, self.observed, signals))
 
     def learnable(self, discrepancy: np.ndarray) -> np.ndarray:
         """Which of the successful simulations are learned from, bool [n]: all."""
@@ -116,10 +135,13 @@ class DiscrepancyLearner:
     def finish(self, known: Learnable, seed: int) -> Surrogate:
         """The surrogate on which a fit rests."""
         learned = self.learn(known, None)
-        draws = self.family.hyper_draws
-        if not draws:
+        draws, rule = self.family.hyper_draws, self.family.threshold
+        if draws:
+            learned = marginalised(learned, rule, draws, seed)
+        if not self.features:
             return learned
-        return marginalised(learned, self.family.threshold, draws, seed)
+        worst = known.features[sane(known.discrepancy)].max(0)  # as `learn` counts what blew up
+        return averaged(learned, np.minimum(known.features, worst), rule)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +153,10 @@ class SignalFamily:
             takes the output as it is.
         noise: Measurement noise that the simulator does not make: its sd, a number or an array
             shaped like the observed (summarised) output; or sds [n], or a covariance [n, n], of
-            that output's n finite values, flattened; 0 for none. None estimates it: as an AR(1)
-            process where the output is a series, of at least 5 samples without a summary.
+            that output's n finite values, flattened; or an object that has such a covariance, as
+            `criticism.KnownNoise`, `model_error` and their `SumOfNoises`; 0 for none. None
+            estimates it: as an AR(1) process where the output is a series, of at least 5 samples
+            without a summary.
         misfit: Prior probability that the data are missed by more than the given noise, because
             the simulator errs or the noise is larger; its size is integrated out. 0 for never.
         components: At most.
@@ -148,7 +172,7 @@ class SignalFamily:
     replicates: ClassVar[bool] = True
 
     summary: Summary | None = None
-    noise: ArrayLike | None = None
+    noise: ArrayLike | Covariance | None = None
     misfit: float = 0.1
     components: int = MAX_COMPONENTS
     predicted: float | None = PREDICTED_SHARE
@@ -158,8 +182,7 @@ class SignalFamily:
         check_callable("summary", self.summary)
         check_callable("discrepancy", self.discrepancy)
         checked_integer("components", self.components)
-        if self.noise is not None:  # its shape is looked at beside the output's
-            checked_array("noise", self.noise)
+        check_noise(self.noise)
         checked_number("misfit", self.misfit, lambda p: 0.0 <= p < 1.0, "from 0 to below 1")
         if self.predicted is not None:
             due = "None or from 0 to below 1"
