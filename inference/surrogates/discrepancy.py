@@ -4,9 +4,11 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import ndtr
 
 from .._float64 import in_float64
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
+from ..gp.namespaces import log_sum_exp
 from ..gp.optimise import minimise_in_box
 from ..gp.process import (
     GP,
@@ -18,14 +20,18 @@ from ..gp.process import (
     predict,
     predict_points,
 )
+from ..sampling.importance import explore
+from ..sampling.target import Target
 from ..types import LogLikelihood, LogSecondMoment
 from .hyper_draws import posterior_draws
 from .outliers import sane
+from .success import log_success
 from .threshold import (
     Threshold,
     ThresholdState,
     choose_threshold,
     log_likelihood,
+    log_likelihoods,
     log_second_moment,
 )
 from .transform import Transform, candidates
@@ -58,8 +64,7 @@ class DiscrepancySurrogate:
         learned_at: Simulations known when the hyperparameters were found.
         chosen_at: Simulations known when the transform was chosen.
         success: Where runs succeed, see `success.learn_success`.
-        displaced: Processes and thresholds [k] over which the likelihood is averaged, see
-            `averaged`; None for `gp` alone.
+        displaced: Over which the likelihood is averaged, see `averaged`; None for `gp` alone.
     """
 
     gp: GP
@@ -69,7 +74,7 @@ class DiscrepancySurrogate:
     learned_at: int
     chosen_at: int
     success: GP | None = None
-    displaced: tuple[GP, np.ndarray] | None = None
+    displaced: ThresholdState | None = None
 
     @property
     def equal(self) -> bool:
@@ -83,9 +88,10 @@ class DiscrepancySurrogate:
     @property
     @in_float64
     def state(self) -> ThresholdState:
-        gp, given = self.displaced or (self.gp, self.threshold)
-        threshold = (given - self.scale.location) / self.scale.spread
-        return ThresholdState(gp, np.asarray(threshold), self.success)
+        if self.displaced is not None:
+            return self.displaced._replace(success=self.success)
+        threshold = (self.threshold - self.scale.location) / self.scale.spread
+        return ThresholdState(self.gp, np.asarray(threshold), self.success)
 
     @property
     def log_likelihood(self) -> LogLikelihood:
@@ -238,12 +244,12 @@ def marginalised(
 def averaged(
     surrogate: DiscrepancySurrogate, displaced: np.ndarray, rule: Threshold
 ) -> DiscrepancySurrogate:
-    """The surrogate whose likelihood is a mean over draws of an error between simulator and data.
+    """The surrogate whose posterior is a mean over draws of an error between simulator and data.
 
     Had the data been without the error, they would be observed less one of its draws: for each,
     the runs' discrepancies from that are learned, and have a threshold of their own. So a best
     fit is as uncertain as the error moves it; an error that is added to discrepancies would only
-    make all of them larger.
+    make all of them larger. Each draw counts alike: its likelihood is divided by its integral.
 
     Args:
         displaced: Discrepancies of the runs from observed less each draw, [n, k]; draws with one
@@ -262,7 +268,21 @@ def averaged(
         for k, values in enumerate(displaced.T[known])
     ]
     thresholds = np.array([with_threshold(one, rule).threshold for one in singles])
-    return replace(surrogate, displaced=(gp, thresholds))
+    standard = (thresholds - surrogate.scale.location) / surrogate.scale.spread
+    state = ThresholdState(gp, standard, surrogate.success)
+    return replace(surrogate, displaced=state._replace(log_area=_log_areas(state)))
+
+
+def _log_areas(state: ThresholdState) -> np.ndarray:
+    """Log integrals [k] of the processes' likelihoods over the prior, up to one constant."""
+    target = Target(log_likelihood, state, state.gp.data.u.shape[1])
+    population = explore(np.random.default_rng(0), target)
+    u = ndtr(population.x)
+    weights = population.log_weights - log_likelihood(state, u)
+    terms = log_likelihoods(state._replace(success=None), u) + log_success(state.success, u)[:, None]
+    terms = np.where(np.isfinite(weights)[:, None], terms + weights[:, None], -np.inf)
+    areas = log_sum_exp(terms.T)
+    return areas - areas.max()
 
 
 def _standardise(transform: Transform, values: np.ndarray) -> Scale:

@@ -24,7 +24,7 @@ from .threshold import Threshold, check_rule
 from .transform import TRANSFORMS
 
 MAX_COMPONENTS = 8
-ERROR_DRAWS = 32  # of noise, over which the likelihood of a discrepancy is averaged
+ERROR_DRAWS = 64  # of noise, over which the posterior of a discrepancy is averaged; pairs
 
 
 class Learnable(NamedTuple):
@@ -59,7 +59,7 @@ class DiscrepancyFamily:
         hyper_draws: Posterior draws of the hyperparameters over which the likelihood of a fit
             is averaged; 0 takes the best hyperparameters alone.
         noise: What lies between simulator and data besides the simulator's own noise, as in
-            `SignalFamily`, such as `criticism.model_error`: the likelihood of a fit is averaged
+            `SignalFamily`, such as `criticism.model_error`: the posterior of a fit is averaged
             over draws of it, taken off what was observed. Points are chosen without it. None
             leaves it out.
     """
@@ -91,8 +91,9 @@ class DiscrepancyFamily:
         output = describe(observed, None)
         noise = given_noise(self.noise, output)
         # the same for all runs of a fit, so that the smallest discrepancy is where it is
-        drawn = output.restore(noise.draw(np.random.default_rng(0), ERROR_DRAWS))
-        return DiscrepancyLearner(self, distance, observed, drawn.reshape(-1, *observed.shape))
+        drawn = output.restore(noise.draw(np.random.default_rng(0), ERROR_DRAWS // 2))
+        pairs = np.concatenate([drawn, -drawn]).reshape(-1, *observed.shape)
+        return DiscrepancyLearner(self, distance, observed, pairs)
 
 
 @dataclass(frozen=True, eq=False)

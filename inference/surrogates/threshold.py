@@ -19,6 +19,7 @@ class ThresholdState(NamedTuple):
     gp: GP  # k processes, one for each draw of the hyperparameters
     threshold: np.ndarray  # []
     success: GP | None = None  # see `success.learn_success`
+    log_area: np.ndarray | None = None  # [k], of likelihoods that count alike; None for the same
 
     def padded(self) -> "ThresholdState":
         """The same likelihood in arrays of few shapes."""
@@ -55,7 +56,13 @@ def log_likelihood(state: ThresholdState, u: Any) -> Any:
     (2018), inference. The mean over the processes, where there are several.
     """
     z, _ = _standardised(state, u)
-    return log_sum_exp(log_ndtr(z)) - math.log(z.shape[-1]) + log_success(state.success, u)
+    each = log_ndtr(z) if state.log_area is None else log_ndtr(z) - state.log_area
+    return log_sum_exp(each) - math.log(z.shape[-1]) + log_success(state.success, u)
+
+
+def log_likelihoods(state: ThresholdState, u: np.ndarray) -> np.ndarray:
+    """log Phi((eps - mu(u)) / sigma(u)) of each process at u [n, d], [n, k]."""
+    return log_ndtr(_standardised(state, u)[0])
 
 
 def _standardised(state: ThresholdState, u: Any) -> tuple[Any, Any]:
