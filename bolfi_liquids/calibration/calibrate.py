@@ -19,7 +19,12 @@ from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import Pours, table_and_cups
 from ..inputs.prior import check_prior, default_prior, describe_prior, read_prior
 from ..inputs.recording import Recording, aborted_recordings
-from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
+from ..inputs.settings import (
+    MIN_SIMULATIONS,
+    PAPER_RULES,
+    CalibrationSettings,
+    CriticismSettings,
+)
 from ..inputs.start import check_start
 from ..progress import after_first, progress_bar
 from ..run.directory import (
@@ -37,9 +42,12 @@ from ..run.provenance import LIBRARIES, versions
 from ..run.recordings import check_names, keep_recordings
 from ..run.simulations import warn_of_failures
 from ..run.workers import open_workers
+from .baseline import Clean, check_baseline, clean_residuals
 from .draws import pick_draws
+from .model_error import concluded_beside, model_error
 from .result import Calibration, finished_calibration
 from .stir_simulator import Stirring, stirring_of
+from .stirs import effects_of
 from .summary import CalibrationSummary
 
 if TYPE_CHECKING:
@@ -55,6 +63,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     *,
     out: str | Path | None = None,
     prior: "Prior | None" = None,
+    baseline: Source | Sequence[Source] = (),
     pours: Pours | None = None,
     cups: "Cups | str | Path | None" = None,
     budget: int = 20,
@@ -82,6 +91,10 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
             added up.
         out: The RUN directory; None is a new one among the computer's temporary files.
         prior: Over `viscosity` [Pa s] and `cohesion` [1]; None is `default_prior()`.
+        baseline: Clean recordings of the same rig, of any liquid, in which no effect is believed
+            to be missing: what the simulator errs by is learned from them, at eight more
+            simulations each. Without them it is what is known of the simulator, see
+            `model_error.model_error`.
         pours: A table of pours of the liquid that were made, or its path: the posterior does not
             depend on it, but `choose_pour` does.
         cups: With which they were made, or a TOML file of them; None takes the bundled ones.
@@ -124,6 +137,11 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         check_prior(prior)
     stirring = stirring_of(opened, settings.particles)
     check_names(stirring.recordings)
+    clean = tuple(open_recordings(baseline, Argument("baseline")))
+    check_baseline(stirring, clean)
+    if {one.hash for one in clean} & {one.hash for one in opened}:
+        fix = "give other recordings: it would count as free of errors"
+        raise InputError("is what is calibrated on", where=Argument("baseline"), fix=fix)
     run = (
         Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, Argument("out"))
     )
@@ -131,7 +149,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         with working_in(run):  # unless another command works there
             raise held_error(run)  # before the prior's libraries are loaded
     prior = _usual_prior(run, resume) if prior is None else prior
-    record = run_record(settings, prior, stirring)
+    record = run_record(settings, prior, stirring, clean)
     with (
         open_workers(executor, timeout) as workers,
         entered(run, record, resume=resume, growing="settings.budget") as removed,
@@ -145,11 +163,16 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         for notice in [*aborted_recordings(opened), *frame_warnings(opened)]:
             logger.warning(notice)
         return finished_calibration(run) or _calibrate(
-            run, stirring, prior, settings, Execution(workers, timeout, progress)
+            run, stirring, clean, prior, settings, Execution(workers, timeout, progress)
         )
 
 
-def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring) -> dict[str, Any]:
+def run_record(
+    settings: CalibrationSettings,
+    prior: "Prior",
+    stirring: Stirring,
+    clean: Sequence[Recording] = (),
+) -> dict[str, Any]:
     """Content of run.toml: settings, inputs, versions; see `run.directory.MUST_AGREE`."""
     from ..inference.engine_version import ENGINE_VERSION
 
@@ -158,7 +181,10 @@ def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring
         "settings": asdict(settings) | {"prior": describe_prior(prior)},
         "engine": {"version": ENGINE_VERSION},
         "simulator": stirring.settings,
-        "inputs": {"sha256": [recording.hash for recording in stirring.recordings]},
+        "inputs": {
+            "sha256": [recording.hash for recording in stirring.recordings],
+            **({"baseline": [recording.hash for recording in clean]} if clean else {}),
+        },
         "files": {"recordings": [recording.path.name for recording in stirring.recordings]},
         "versions": versions(LIBRARIES),
     }
@@ -167,6 +193,7 @@ def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring
 def _calibrate(
     run: Path,
     stirring: Stirring,
+    baseline: tuple[Recording, ...],
     prior: "Prior",
     settings: CalibrationSettings,
     execution: Execution,
@@ -181,8 +208,14 @@ def _calibrate(
         bar = progress_bar("simulating stirs", needed, shown=execution.progress, done=kept)
         advance = after_first(kept, stack.enter_context(bar))
         keep = execution.keep(bank, stirring.identity, settings.batch)
-        fit = fit_recordings(stirring, stirring.observed, prior, keep, settings, progress=advance)
-        warn_of_failures(fit.history.errors.tolist(), execution.timeout)
+        made = fit_recordings(
+            stirring, stirring.observed, prior, keep, settings, progress=advance, warn=False
+        )
+        warn_of_failures(made.history.errors.tolist(), execution.timeout)
+        clean = _clean(baseline, settings, prior, bank, execution)
+        error = model_error(stirring, made.closest.theta["viscosity"], clean)
+        options = {"seed": settings.seed, **engine_options(stirring, settings.surrogate)}
+        fit = concluded_beside(error, made, stirring, options)
         sampled = fit.sample(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
         )
@@ -198,9 +231,27 @@ def _calibrate(
             fix="nothing was written; go on with that budget and `resume`",
         )
     write_tree(tree, run / POSTERIOR)
-    summary = CalibrationSummary.from_fit(tree, fit, stirring, check)
+    summary = CalibrationSummary.from_fit(tree, fit, stirring, check, error)
     summary.write(run)
     return Calibration(run, tree, MappingProxyType(dict(record)), summary)
+
+
+def _clean(
+    baseline: tuple[Recording, ...],
+    settings: CalibrationSettings,
+    prior: "Prior",
+    bank: "SimulationBank",
+    execution: Execution,
+) -> list[Clean]:
+    """What is left of clean recordings; `criticise` finds the same simulations in the bank."""
+    if not baseline:
+        return []
+    from ..inference.criticism import Keeping
+
+    keeping = Keeping(
+        bank, CriticismSettings.batch, executor=execution.workers, timeout=execution.timeout
+    )
+    return clean_residuals(baseline, settings.particles, prior, effects_of("stir"), keeping=keeping)
 
 
 def _left(record: Mapping[str, Any], settings: CalibrationSettings, bank: "SimulationBank") -> int:

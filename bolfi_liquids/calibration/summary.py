@@ -13,6 +13,7 @@ from ..inputs.frame import named_faults
 from ..models import stirring_error
 from ..run.summary import Number, Section
 from .check import Check
+from .model_error import ModelError
 from .noise import irreducible_rms, rms
 from .stir_simulator import Stirring
 
@@ -115,6 +116,8 @@ class CalibrationSummary(Section):
         seconds: Time spent.
         seed: Of all random draws.
         version: Of this package.
+        model_error_deg: RMS that the simulator was taken to err by [deg]; 0 in former versions.
+        clean: Names of the recordings from which that was learned.
         frame_faults: Recordings whose inclination and positions are not told in one frame, and how
             it is mended; see `inputs.frame`.
     """
@@ -139,10 +142,15 @@ class CalibrationSummary(Section):
     seed: int
     version: str
     frame_faults: tuple[str, ...] = ()
+    model_error_deg: Number = 0.0
+    clean: tuple[str, ...] = ()
 
     @classmethod
-    def from_fit(cls, tree: "DataTree", fit: "Fit", stirring: Stirring, check: Check) -> Self:
-        """From posterior.nc, the engine's fit, what was stirred and the simulations that check."""
+    def from_fit(
+        cls, tree: "DataTree", fit: "Fit", stirring: Stirring, check: Check, error: ModelError
+    ) -> Self:
+        """From posterior.nc, the engine's fit, what was stirred, the simulations that check and
+        the error that the simulator was taken to make."""
         posterior, closest = tree["posterior"], fit.closest
         seen = [one.inclination for one in stirring.recordings]
         spent = {name: tree.attrs[f"seconds_{name}"] for name in Seconds.__dataclass_fields__}
@@ -164,6 +172,8 @@ class CalibrationSummary(Section):
             seed=int(tree.attrs["seed"]),
             version=version("bolfi-liquids"),
             frame_faults=named_faults(stirring.recordings),
+            model_error_deg=float(np.degrees(error.rms)),
+            clean=error.clean,
         )
 
     def of_posterior(

@@ -55,6 +55,11 @@ def fit_sentence(summary: CalibrationSummary) -> Sentence:
     return sentence("calibration.fit_above_noise", summary=summary)
 
 
+def model_error_sentence(summary: CalibrationSummary) -> Sentence:
+    """Which error of the simulator widened the intervals."""
+    return sentence("calibration.model_error", summary=summary)
+
+
 def sampler_sentences(summary: CalibrationSummary) -> list[Sentence]:
     """A warning where the draws cannot be relied upon."""
     if summary.sampler_status is SamplerStatus.CONVERGED:

@@ -264,18 +264,14 @@ def rhythm(observed: ArrayLike) -> np.ndarray:
     """Autocorrelation by lag [T] of a series [T, ...], its channels' means taken off.
 
     Where a simulator answers a periodic drive a little too much, or too late, it errs in the
-    rhythm of what is observed. NaN is a missing sample.
-
-    Raises:
-        ValueError: nothing in it varies.
+    rhythm of what is observed. NaN is a missing sample; where nothing varies, errors are
+    independent.
     """
     series = checked_array("observed", observed)
     columns = series.reshape(len(series), -1)
     seen = np.maximum(np.isfinite(columns).sum(0), 1)
     found = _autocovariance(columns - np.nansum(columns, 0) / seen, len(columns))
-    if not found[0] > 0.0:
-        raise ValueError("observed must vary over time, or it has no rhythm; give a time instead")
-    return found / found[0]
+    return found / found[0] if found[0] > 0.0 else np.ones(1)
 
 
 def _check_clean(clean: Sequence[CleanData]) -> None:

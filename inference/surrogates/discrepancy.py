@@ -279,7 +279,9 @@ def _log_areas(state: ThresholdState) -> np.ndarray:
     population = explore(np.random.default_rng(0), target)
     u = ndtr(population.x)
     weights = population.log_weights - log_likelihood(state, u)
-    terms = log_likelihoods(state._replace(success=None), u) + log_success(state.success, u)[:, None]
+    terms = (
+        log_likelihoods(state._replace(success=None), u) + log_success(state.success, u)[:, None]
+    )
     terms = np.where(np.isfinite(weights)[:, None], terms + weights[:, None], -np.inf)
     areas = log_sum_exp(terms.T)
     return areas - areas.max()

@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_callable, checked_array, checked_integer, checked_number
+from ..arguments import check_callable, checked_integer, checked_number
 from ..simulations.failures import not_finite
 from ..types import Discrepancy
 from .base import Surrogate

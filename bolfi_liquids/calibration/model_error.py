@@ -1,0 +1,82 @@
+"""What the simulator errs by, beside which a calibration is concluded."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..models import stirring_error
+from .baseline import Clean, usual_for
+from .noise import sensor_noise
+from .stir_simulator import Stirring
+
+if TYPE_CHECKING:
+    from ..inference import Fit
+    from ..inference.criticism import UsualResidual
+
+
+@dataclass(frozen=True, eq=False)
+class ModelError:
+    """What the simulator errs by on a run's recordings.
+
+    It is that of one viscosity, the closest simulation's: one that fell along the posterior would
+    let liquids of which little error is known pass for better ones.
+
+    Attributes:
+        usual: The error, as a process over time.
+        clean: Names of the recordings from which it was learned; none where it is what is known
+            of the simulator.
+    """
+
+    usual: "UsualResidual"
+    clean: tuple[str, ...] = ()
+
+    @property
+    def rms(self) -> float:
+        """Of the inclination [rad]."""
+        return float(np.sqrt(self.usual.autocovariance[0]))
+
+
+def model_error(stirring: Stirring, viscosity: float, clean: Sequence[Clean] = ()) -> ModelError:
+    """The error in a liquid of so many Pa s, learned from clean recordings where there are any.
+
+    Without them its size is `models.stirring_error`, in the rhythm of the stick: in the
+    reference's oil the simulator swings by 8 % of the viscosity too little, which errors that are
+    forgotten within tenths of seconds would not explain.
+    """
+    from ..inference.criticism import model_error, rhythm
+
+    learned = usual_for(stirring, clean, viscosity)
+    if learned is not None:
+        return ModelError(learned, tuple(one.recording.path.name for one in clean))
+    return ModelError(model_error(stirring_error(viscosity), rhythm(stirring.observed)))
+
+
+def concluded_beside(
+    error: ModelError, fit: "Fit", stirring: Stirring, options: Mapping[str, Any]
+) -> "Fit":
+    """What follows from the same simulations where the simulator errs.
+
+    Args:
+        error: Of the simulator.
+        fit: Without it.
+        stirring: What was simulated.
+        options: Of the engine, with which `fit` was made; see `inference.Bolfi`.
+
+    Warns:
+        EmulatorWarning: For each complaint.
+    """
+    from ..inference import Bolfi
+    from ..inference.criticism import Experiment, KnownNoise, SumOfNoises
+
+    cameras = KnownNoise(sensor_noise(stirring.observed))
+    noise = SumOfNoises((cameras, error.usual))
+    corrected = Experiment(stirring.simulate, stirring.observed, noise).corrected
+    engine, history = Bolfi(fit.prior, corrected, noise=noise, **options), fit.history
+    theta = fit.prior.to_dict(history.theta)
+    engine.tell(theta, history.signals, history.seeds, history.errors.tolist())
+    made = engine.fit()
+    seconds = {**fit.seconds, "engine": fit.seconds["engine"] + made.seconds["engine"]}
+    # the fit's own history knows its rounds, and what was recorded
+    return replace(made, observed=fit.observed, history=history, seconds=seconds)
