@@ -249,7 +249,7 @@ def model_error(
     checked_number("freedom", freedom, lambda n: 0.0 < n < np.inf, "finite and positive")
     given = checked_array("correlation", correlation)
     if given.ndim == 0 and 0.0 < given < np.inf:
-        by_lag = np.exp(-np.arange(np.ceil(LAST_LAG * given) + 1.0) / given)
+        by_lag = np.exp(-np.arange(int(np.ceil(LAST_LAG * given)) + 1) / given)
     elif given.ndim == 1 and given.size and given[0] == 1.0 and (np.abs(given) <= 1.0).all():
         by_lag = given
     else:

@@ -1,6 +1,6 @@
 """Measurement noise that the user knows, over the values of an output."""
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +11,7 @@ from .measurement_noise import Layout
 from .output_vectors import Output
 
 
+@runtime_checkable
 class Covariance(Protocol):
     """Noise that knows its covariance [n, n] at n samples, as all of `criticism` do."""
 
@@ -42,7 +43,7 @@ class GivenNoise(NamedTuple):
 
 def check_noise(noise: ArrayLike | Covariance | None) -> None:
     """Raise ValueError for what is never a noise; its shape is looked at beside the output's."""
-    if noise is not None and not hasattr(noise, "covariance"):
+    if noise is not None and not isinstance(noise, Covariance):
         checked_array("noise", noise)
 
 
@@ -58,7 +59,7 @@ def given_noise(noise: ArrayLike | Covariance, output: Output) -> GivenNoise:
         ValueError: noise is none of these.
     """
     samples = len(output.present)
-    if hasattr(noise, "covariance"):
+    if isinstance(noise, Covariance):
         return _covariance(_at_samples(noise, output), output)
     given = checked_array("noise", noise)
     # from the order of the observed output to that of the values
