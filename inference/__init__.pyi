@@ -2,6 +2,7 @@ from . import checks as checks
 from . import criticism as criticism
 from . import simulations as simulations
 from . import surrogates as surrogates
+from .acquisition.rules import CautiousDraws as CautiousDraws
 from .acquisition.rules import ExpectedIntegratedVariance as ExpectedIntegratedVariance
 from .acquisition.rules import LowerConfidenceBound as LowerConfidenceBound
 from .acquisition.rules import MaxVariance as MaxVariance
@@ -25,5 +26,6 @@ from .simulations.bank import SimulationBank as SimulationBank
 from .surrogates.base import Acquisition as Acquisition
 from .surrogates.families import DiscrepancyFamily as DiscrepancyFamily
 from .surrogates.families import SignalFamily as SignalFamily
+from .surrogates.noise.by_mean import relative as relative
 from .surrogates.squared_difference import squared_difference as squared_difference
 from .surrogates.warnings import EmulatorWarning as EmulatorWarning

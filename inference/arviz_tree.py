@@ -12,11 +12,12 @@ sample_stats: `lp`, log density over Phi^-1(u) of the prior quantiles u, and wha
 records. prior: as many draws. observed_data: `signal`. posterior_predictive: what the surrogate
 predicts at some draws, whose indices are its coordinate `draw`. constant_data: the surrogate's
 constants. emulator_checks: the surrogate's own checks for each simulation, NaN where it learned
-nothing from one, and its complaints in the attribute `warnings`. simulations: as `Fit.simulations`.
-The root's attributes hold how the run was made, and the seconds it took.
+nothing from one, and the fit's complaints in the attribute `warnings`. simulations: as
+`Fit.simulations`. The root's attributes hold how the run was made, the seconds it took, and
+`fit_status`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 
 import arviz_base
@@ -98,19 +99,10 @@ def results_tree(
 
 
 def add_surrogate(
-    tree: xr.DataTree,
-    surrogate: Surrogate,
-    learned_from: np.ndarray,
-    u: np.ndarray,
-    rng: np.random.Generator,
+    tree: xr.DataTree, surrogate: Surrogate, u: np.ndarray, rng: np.random.Generator
 ) -> None:
-    """Add what the surrogate says of itself: constant_data, posterior_predictive (at evenly
-    spaced draws u [chain, draw, d], whose indices are its coordinate `draw`), emulator_checks.
-
-    The checks' first axis is the simulation, with rows of NaN where nothing was learned from one
-    (`learned_from`, bool [n]); their group's attribute `warnings` joins what the surrogate
-    complains of, one per line, and is empty where there is nothing.
-    """
+    """Add what the surrogate says of itself: constant_data, and posterior_predictive at evenly
+    spaced draws u [chain, draw, d], whose indices are its coordinate `draw`."""
     constants = {name: np.asarray(value) for name, value in surrogate.constants().items()}
     if constants:
         tree["constant_data"] = arviz_base.from_dict({"constant_data": constants})["constant_data"]
@@ -124,14 +116,25 @@ def add_surrogate(
     if groups:
         made = arviz_base.from_dict({"posterior_predictive": groups}, coords={"draw": rows})
         tree["posterior_predictive"] = made["posterior_predictive"]
-    checks = {}
-    for name, values in surrogate.checks().items():
+
+
+def add_checks(
+    tree: xr.DataTree,
+    checks: Mapping[str, np.ndarray],
+    learned_from: np.ndarray,
+    warnings: Sequence[str],
+) -> None:
+    """Add emulator_checks, whose first axis is the simulation, with rows of NaN where nothing was
+    learned from one (`learned_from`, bool [n]). The attribute `warnings` joins what the fit
+    complains of, one per line, and is empty where there is nothing."""
+    columns = {}
+    for name, values in checks.items():
         of_all = np.full((len(learned_from), *values.shape[1:]), np.nan)
         of_all[learned_from] = values
         axes = (f"{name}_dim_{i}" for i in range(values.ndim - 1))
-        checks[name] = (["simulation", *axes], of_all)
-    attributes = {"warnings": "\n".join(surrogate.warnings())}
-    tree["emulator_checks"] = xr.DataTree(xr.Dataset(checks, attrs=attributes))
+        columns[name] = (["simulation", *axes], of_all)
+    attributes = {"warnings": "\n".join(warnings)}
+    tree["emulator_checks"] = xr.DataTree(xr.Dataset(columns, attrs=attributes))
 
 
 def finished(tree: xr.DataTree, attributes: Mapping[str, object]) -> xr.DataTree:

@@ -1,13 +1,13 @@
 """Ask and tell: Bayesian optimisation for likelihood-free inference, one step at a time."""
 
 import time
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import ndtr
 
 from ._float64 import in_float64
 from .acquisition.given import chosen, resolve_acquisition
@@ -28,6 +28,7 @@ from .history import (
 from .notebook_display import as_html, as_text
 from .prior import Prior, check_support, checked_prior
 from .result import Fit
+from .sampling.importance import Before
 from .simulations.failures import Failure, incomparable, kind, unusable
 from .simulations.job import BATCH
 from .simulations.returned import told_signals
@@ -35,8 +36,8 @@ from .sobol import sobol, start_size
 from .surrogates.base import Acquisition
 from .surrogates.families import Family, Learnable, Measured, resolve
 from .surrogates.outliers import sane
-from .surrogates.success import Feasibility
-from .surrogates.warnings import EmulatorWarning
+from .surrogates.success import Runs
+from .surrogates.warnings import complain
 from .types import Theta
 
 MIN_LEARN = 3  # successful simulations before the surrogate may choose
@@ -55,8 +56,8 @@ class Bolfi:
         surrogate: "signal", which emulates the output; "discrepancy", the paper's; a
             `SignalFamily` or `DiscrepancyFamily`; None is "signal", unless a discrepancy, or
             another option of that family alone, is given.
-        acquisition: "eiv", "maxvar", "draws", "lcb" (with "discrepancy"), an object (see
-            `Acquisition`), or None for the surrogate's best.
+        acquisition: "eiv", "maxvar", "draws", "cautious", "lcb" (with "discrepancy"), an object
+            (see `Acquisition`), or None for the surrogate's best.
         seed: Fixes the start design and the acquisitions.
         initial: Points of the Sobol start design; None is 2 d + 6.
         options: Of the surrogate's family: `summary`, `noise`, `components`, `predicted` and
@@ -104,6 +105,7 @@ class Bolfi:
         }
         self._state = init(len(prior), self.observed.shape, self._learner.features)
         self._learned: Any = None  # the family's surrogate, once there is one
+        self._before: Before | None = None  # the posterior of which `confirm` drew
         self._seconds = 0.0
 
     def __repr__(self) -> str:
@@ -178,6 +180,30 @@ class Bolfi:
         self._seconds += time.perf_counter() - started
         return theta
 
+    def confirm(self, fit: Fit, n: int = 3) -> dict[str, np.ndarray]:
+        """Draws of a fit's posterior to simulate, name -> [n].
+
+        The next `fit` says whether what was told since has moved the posterior, see
+        `Fit.confirmed`.
+
+        Args:
+            fit: What this engine's `fit` returned last.
+            n: How many draws.
+
+        Raises:
+            ValueError: bad argument.
+        """
+        n = checked_integer("n", n, 1, MOST_SIMULATIONS)
+        if not isinstance(fit, Fit) or fit.history is not self._state.history:
+            raise ValueError(f"fit must be what `fit` returned last, got {fit!r:.100}")
+        started = time.perf_counter()
+        self._before = Before(*fit.population.moments, self.told)
+        drawn = fit.population.resample(np.random.default_rng([self.seed, self.asked]), n)
+        asked = self.prior.to_array(self.prior.from_unit(ndtr(drawn)))
+        self._state = remember_asked(self._state, asked, 0)
+        self._seconds += time.perf_counter() - started
+        return self.prior.to_dict(asked)
+
     def _designed_now(self, n: int) -> int:
         """How many of the next n points the start design provides."""
         if self.succeeded < MIN_LEARN:
@@ -193,20 +219,19 @@ class Bolfi:
         repeated = next_replicate(history, pending) if self.family.replicates else None
         parts = [] if repeated is None else [repeated[None]]
         if n > len(parts):
-            runs = self._runs()
             # made by NumPy: JAX would compile for half a second
             words = np.random.SeedSequence([self.seed, self._state.asked]).generate_state(2)
             key = jax.random.wrap_key_data(jax.device_put(words), impl="threefry2x32")
             believing = self._learned.believe(self.prior.to_unit(self.prior.to_dict(pending)))
             shape = n - len(parts), len(self.prior)
-            u = chosen(in_float64(self._acquire)(key, believing, shape[0], runs), shape)
+            u = chosen(in_float64(self._acquire)(key, believing, shape[0]), shape)
             parts.append(self.prior.to_array(self.prior.from_unit(u)))
         return np.concatenate(parts)
 
-    def _runs(self) -> Feasibility:
+    def _runs(self) -> Runs:
         """Where runs succeeded; those that blew up did not."""
         history = self._state.history
-        return Feasibility(history.u, history.succeeded & sane(history.discrepancy))
+        return Runs(history.u, history.succeeded & sane(history.discrepancy))
 
     def _known(self) -> Learnable:
         history = self._state.history
@@ -347,7 +372,7 @@ class Bolfi:
         fitted = self._learner.finish(known, self.seed)
         learned_from = history.distinct
         learned_from[learned_from] = self._learner.learnable(known.discrepancy)
-        spent = self._seconds + time.perf_counter() - started
+        self._seconds += time.perf_counter() - started
         made = Fit(
             prior=self.prior,
             observed=self.observed,
@@ -355,10 +380,11 @@ class Bolfi:
             learned=fitted,
             learned_from=learned_from,
             settings=self.settings,
-            seconds={"simulator": 0.0, **measured, "engine": spent},
+            seconds={"simulator": 0.0, **measured, "engine": self._seconds},
+            before=self._before,
         )
-        for complaint in made.warnings if warn else []:
-            warnings.warn(complaint, EmulatorWarning, stacklevel=stacklevel)
+        if warn:
+            complain(made.warnings, stacklevel + 1)
         return made
 
 

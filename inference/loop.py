@@ -23,7 +23,7 @@ from .arguments import (
 from .bolfi import MIN_LEARN, MOST_SIMULATIONS, Bolfi
 from .prior import Prior
 from .progress import progress_bar
-from .result import Fit
+from .result import MUCH_DOUBT, Fit
 from .simulations.bank import Simulation, SimulationBank, check_bank
 from .simulations.executors import Workers, check_executor, open_executor
 from .simulations.job import (
@@ -39,6 +39,7 @@ from .simulations.runner import Keep, Runner
 from .sobol import start_size
 from .surrogates.base import Acquisition
 from .surrogates.families import Family
+from .surrogates.warnings import complain
 from .types import Simulator, SingleSimulator, Theta
 
 
@@ -60,6 +61,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
     earlier: tuple[Theta, ArrayLike] | tuple[Theta, ArrayLike, ArrayLike] | None = None,
     vectorised: bool = True,
     in_rounds: bool = True,
+    confirm: int = 3,
     warn: bool = True,
     progress: bool | Callable[[int], object] = True,
     **options: Any,
@@ -113,6 +115,9 @@ def fit(  # noqa: PLR0913  the one call that most users make
         in_rounds: Whether points are asked a round at a time. False asks the next one as soon as
             a simulation is told: an executor's workers then never wait for the slowest run of a
             round, and other points are simulated than in rounds.
+        confirm: Runs beyond the budget at draws of the posterior, which tell whether it is known:
+            as long as they move it, as many are made again, up to half the budget; 0 for none.
+            See `Fit.confirmed`.
         warn: Whether each of the surrogate's complaints is raised as an `EmulatorWarning`;
             `Fit.warnings` holds them in any case.
         progress: Whether to show a bar on stderr; or a function that is called with 1 for each
@@ -136,6 +141,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
     batch = checked_integer("batch", batch, 1, MOST_SIMULATIONS)
     least = MIN_LEARN if earlier is None else 0
     budget = checked_integer("budget", budget, least, MOST_SIMULATIONS)
+    confirm = checked_integer("confirm", confirm, 0, MOST_SIMULATIONS)
     check_timeout(timeout)
     check_progress(progress)
     check_text("identity", identity)
@@ -190,7 +196,18 @@ def fit(  # noqa: PLR0913  the one call that most users make
                 f"{bank.where}; mend the cause, or raise budget, and repeat the call to go on "
                 "from there"
             )
-    return engine.fit({"simulator": seconds}, stacklevel=3, warn=warn)
+        made = engine.fit({"simulator": seconds}, warn=False)
+        rounds = max(1, budget // (2 * confirm)) if confirm and budget else 0
+        for _ in range(rounds):
+            for simulation in _confirmation(engine, made, runner, confirm):
+                seconds += simulation.seconds
+                advance(1)
+            made = engine.fit({"simulator": seconds}, warn=False)
+            if made.confirmed and made.doubt < MUCH_DOUBT:
+                break
+    if warn:
+        complain(made.warnings, stacklevel=3)
+    return made
 
 
 def _in_rounds(engine: Bolfi, runner: Runner, budget: int, batch: int) -> Iterator[Simulation]:
@@ -219,6 +236,13 @@ def _in_flight(engine: Bolfi, runner: Runner, budget: int, batch: int) -> Iterat
         flying.append((job, outcome))
     while flying:
         yield from land()
+
+
+def _confirmation(engine: Bolfi, made: Fit, runner: Runner, n: int) -> list[Simulation]:
+    """Simulate n draws of the posterior; returns what the engine was told."""
+    seeds = [simulation_seed(engine.seed, engine.asked + i) for i in range(n)]
+    asked = jobs(engine.confirm(made, n), seeds)
+    return _tell(engine, asked, runner.run(asked, engine.expected_shape))
 
 
 def _tell(engine: Bolfi, asked: list[Job], results: list[Simulation]) -> list[Simulation]:

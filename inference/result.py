@@ -12,20 +12,21 @@ from scipy.special import ndtr
 
 from ._float64 import in_float64
 from .arguments import check_flag, checked_integer
-from .gp.process import predict
 from .history import History
 from .notebook_display import as_html, as_text
 from .prior import Prior
 from .sampling.convergence import SamplingWarning
 from .sampling.draw import SAMPLERS, draw_posterior
-from .sampling.importance import explore
+from .sampling.importance import Before, Population, explore, weighted_quantiles
 from .sampling.target import Length, Target, log_likelihood
 from .surrogates.base import Surrogate
 from .surrogates.signal import SignalSurrogate
 from .surrogates.warnings import (
-    UNLEARNED,
+    DOUBTED,
+    UNCONFIRMED,
     censored_warnings,
     history_warnings,
+    range_warnings,
     unreached_warnings,
 )
 from .types import Theta
@@ -35,8 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-UNLEARNED_VARIANCE = 0.1  # of targets of variance 1, beyond which little is known of them
-MAX_UNLEARNED_SHARE = 0.2  # of the posterior, from which that is said
+MUCH_DOUBT = 1.5  # see `Fit.doubt`: beyond it more is simulated, and a fit warns
 MOST_CHAINS, MOST_DRAWS = 1000, 1_000_000  # of one call: more would take days, or all memory
 
 
@@ -96,6 +96,7 @@ class Fit:
         learned_from: Which simulations it knows, bool [n].
         settings: How the run was made.
         seconds: Time in the "simulator" and in the "engine" [s].
+        before: The posterior of which `Bolfi.confirm` drew last; None where it never did.
     """
 
     prior: Prior
@@ -105,6 +106,7 @@ class Fit:
     learned_from: np.ndarray
     settings: Mapping[str, object]
     seconds: Mapping[str, float]
+    before: Before | None = None
 
     def __repr__(self) -> str:
         return as_text("Fit", self._shown())
@@ -113,18 +115,36 @@ class Fit:
         return as_html("Fit", self._shown())
 
     def _shown(self) -> list[tuple[str, str]]:
-        parameters = [f"{name} ~ {of['prior']}" for name, of in self.prior.describe().items()]
         failed = ", ".join(f"{n} {kind}" for kind, n in self.failures.items())
-        told = len(self.history.theta)
+        told, learned = len(self.history.theta), self.learned_from.sum()
+        surrogate = f"{self.settings['surrogate']!r}, of {learned} simulations"
         return [
-            ("parameters", ", ".join(parameters)),
+            ("parameters", ", ".join(self._quantiles())),
             ("simulations", f"{told}, failed: {failed or 'none'}"),
-            (
-                "surrogate",
-                f"{self.settings['surrogate']!r}, of {self.learned_from.sum()} simulations",
-            ),
+            ("discrepancy", self._discrepancies()),
+            ("surrogate", ", ".join([surrogate, *self.learned.described()])),
+            ("status", self.status),
             ("warnings", "; ".join(self.warnings) or "none"),
         ]
+
+    @in_float64
+    def _quantiles(self) -> list[str]:
+        """Median and 90 % interval of each parameter."""
+        theta = self.prior.from_unit(ndtr(self.population.x))
+        weights, said = self.population.weights, []
+        for name, values in theta.items():
+            low, middle, high = weighted_quantiles(values, weights, (0.05, 0.5, 0.95))
+            said.append(f"{name} {middle:.4g} ({low:.4g} to {high:.4g})")
+        return said
+
+    def _discrepancies(self) -> str:
+        """Of the closest run, and of those at draws of the posterior."""
+        said = f"{self.closest.discrepancy:.4g} of the closest run"
+        if self.before is None:
+            return said
+        drawn = self.history.discrepancy[self.before.told :]
+        worth = ", ".join("failed" if np.isnan(one) else f"{one:.4g}" for one in drawn)
+        return f"{said}, {worth} at draws of the posterior"
 
     @cached_property
     def warnings(self) -> list[str]:
@@ -132,9 +152,12 @@ class Fit:
         of the simulations failed; and that fewer were learned from than the 2 d + 2 that d
         parameters need: a level and a slope and a curvature along each parameter, and one more
         that could contradict."""
-        said = self.learned.warnings() + history_warnings(self.history) + self._data_warnings()
-        if self._unlearned() > MAX_UNLEARNED_SHARE:
-            said.append(UNLEARNED)
+        said = self.learned.warnings(confirmed=self.confirmed is True)
+        said += history_warnings(self.history) + self._data_warnings()
+        if self.doubt > MUCH_DOUBT:
+            said.append(DOUBTED)
+        if self.confirmed is False:
+            said.append(UNCONFIRMED)
         learned, needed = int(self.learned_from.sum()), 2 * len(self.prior) + 2
         if learned < needed:
             said.append(
@@ -144,16 +167,47 @@ class Fit:
             )
         return said
 
+    @property
+    def status(self) -> str:
+        """ "fitted"; "not fitted", where parameters and noise do not explain what was observed; or
+        "not confirmed", where runs at draws of the posterior moved it, or none were made, or the
+        emulator's doubt makes it much wider."""
+        if not self.learned.fits:
+            return "not fitted"
+        sure = self.confirmed is True and self.doubt <= MUCH_DOUBT
+        return "fitted" if sure else "not confirmed"
+
+    @cached_property
     @in_float64
-    def _unlearned(self) -> float:
-        """Posterior probability of places where the surrogate knows little of its targets."""
-        gp = self.learned.state.gp
-        if not len(gp.weights):  # nothing is predicted, which is said
-            return 0.0
-        population = explore(np.random.default_rng(0), self._target)
-        weights = np.exp(population.log_weights - population.log_weights.max())
-        variance = predict(gp, ndtr(population.x))[1][0]
-        return float(weights @ (variance > UNLEARNED_VARIANCE) / weights.sum())
+    def population(self) -> Population:
+        """Weighted points of the posterior, which depend on nothing but the surrogate."""
+        return explore(np.random.default_rng(0), self._target)
+
+    @property
+    def confirmed(self) -> bool | None:
+        """Whether what was simulated at draws of the posterior left it where it was, and most of
+        it succeeded; None where nothing was."""
+        if self.before is None:
+            return None
+        succeeded = self.history.succeeded[self.before.told :].mean() >= 0.5
+        return bool(succeeded) and self.before.agrees(*self.population.moments)
+
+    @cached_property
+    @in_float64
+    def doubt(self) -> float:
+        """How many times as far from where it would be, were the emulator sure, the posterior
+        lies, in the parameter of which that is most true: 1 where the simulator is as good as
+        known. The distance is a root mean square, in standard deviations of the sure posterior."""
+        found, target = self.population, self._target
+        surely = target._replace(state=target.state._replace(doubt=np.zeros(())))
+        at = ndtr(found.x)
+        change = log_likelihood(surely, at) - log_likelihood(target, at)
+        there = np.isfinite(found.log_weights + change)
+        log_weights = found.log_weights[there] + change[there]
+        known = found._replace(x=found.x[there], log_weights=log_weights)
+        (mean, sd), (sure_mean, sure_sd) = found.moments, known.moments
+        with np.errstate(divide="ignore"):  # one point is left
+            return float(np.max(np.hypot(sd, mean - sure_mean) / sure_sd))
 
     def _data_warnings(self) -> list[str]:
         """What the observed output itself shows where it is compared."""
@@ -162,10 +216,11 @@ class Fit:
         if all(function == "None" for function in own):
             said += censored_warnings(self.observed, self.closest.signal)
         if isinstance(self.learned, SignalSurrogate):
-            known = self.learned.known
-            noise = 0.0 if known is None else float(np.sqrt(known.variance[0]))
-            learned = self.history.features[self.learned_from]
-            said += unreached_warnings(self.learned.observed, learned, noise)
+            learned, scale = self.history.features[self.learned_from], self.learned.scale
+            values = scale.observed
+            noise = float(scale.sds(values[None])[0, 0])
+            said += unreached_warnings(values, learned, noise)
+            said += range_warnings(values) if self.learned.known is None else []
         return said
 
     @property
@@ -274,7 +329,7 @@ class Fit:
         extend = checked_integer("extend", extend)
         seed = checked_integer("seed", seed, 0)
         check_flag("warn", warn)
-        from .arviz_tree import add_surrogate, finished, results_tree
+        from .arviz_tree import add_checks, add_surrogate, finished, results_tree
 
         started = time.perf_counter()
         length = Length(chains, warmup, draws)
@@ -287,10 +342,12 @@ class Fit:
         tree = results_tree(self.prior, made.chains, drawn, self.observed, self.simulations)
         tree["posterior"].attrs.update(status=made.status, draws_made=made.steps, **made.checks)
         rng = np.random.default_rng([seed, *b"predictive"])
-        add_surrogate(tree, self.learned, self.learned_from, made.chains.u, rng)
+        add_surrogate(tree, self.learned, made.chains.u, rng)
+        add_checks(tree, self.learned.checks(), self.learned_from, self.warnings)
         attributes: dict[str, object] = {
             **self.settings,
             **{"sampler": sampler, **length._asdict(), "extend": extend, "sampling_seed": seed},
+            "fit_status": self.status,
             **{f"seconds_{part}": spent for part, spent in seconds.items()},
         }
         return finished(tree, attributes)

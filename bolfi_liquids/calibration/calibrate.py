@@ -298,6 +298,7 @@ def fit_recordings(
         seed=settings.seed,
         executor=keep.executor,
         in_rounds=True,
+        confirm=0,
         bank=keep.bank,
         identity=keep.identity,
         timeout=keep.timeout,

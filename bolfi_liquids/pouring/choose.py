@@ -31,7 +31,7 @@ from .draining import LIQUIDS, TENTH, Draining, Hold, hold_of
 from .landed_pours import LandedPours, pours_in
 from .landing_map import LandingMap, learn_map
 from .pour_file import pour_tree
-from .result import GivenSummary, Judged, Pour, PourSummary
+from .result import Judged, Pour, PourSummary
 from .spillage import Surface, landing_sd
 
 if TYPE_CHECKING:
@@ -167,7 +167,7 @@ def decided(
     if learned.given is not None:
         otherwise = simulated.surface(drawn.search, rates=settings.iterations, seed=settings.seed)
         without = learned.judge(otherwise.least(settings.risk), drawn.judge, seed=settings.seed)
-        more["given"] = GivenSummary.of(learned.given, chosen, without)
+        more["given"] = learned.given.summary(chosen, without)
     return _described((chosen, plug_in), choice, learned, settings, calibration, **more)
 
 

@@ -9,8 +9,11 @@ from ..criticism.pour_noise import CORRELATION_LENGTH, SIMULATOR_ERROR_SD
 from ..inputs.pour_table import PourTable
 from ..seeds import Phase, generator
 from .residual import Residual, angle, coordinates, expected_share, learn_residual, share
-from .result import Judged
+from .result import CONTRADICTION, ActionSummary, GivenPour, GivenSummary, Judged
 from .spillage import Surface, normal_scores
+
+SHOWN_GIVEN = 3
+"""Given pours that are shown beside the choice: those most like it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +70,29 @@ class GivenPours:
         """The given pours by how like an action they are, the likest first, shape (A,)."""
         apart = np.sum((self.spilled.at - _coordinates_of(chosen)) ** 2, axis=1)
         return np.argsort(apart, kind="stable")
+
+    def summary(self, chosen: Judged, without: Judged) -> GivenSummary:
+        """What is told of them beside the chosen action and the one that they have changed."""
+        table = self.table
+        numbers = zip(
+            table.lines.tolist(),
+            np.degrees(table.angular_velocity).tolist(),
+            (100.0 * table.distance).tolist(),
+            *table.observed.tolist(),
+            *self.expected.T.tolist(),
+            strict=True,
+        )
+        pours = [GivenPour(*row) for row in numbers]
+        worst = max(pours, key=lambda pour: pour.contradiction)
+        return GivenSummary(
+            file=table.path.name,
+            sha256=table.hash,
+            liquid=table.liquid,
+            lines=tuple(pour.line for pour in pours),
+            nearest=tuple(pours[k] for k in self.nearest(chosen)[:SHOWN_GIVEN]),
+            contradicting=worst if worst.contradiction >= CONTRADICTION else None,
+            without=ActionSummary.of(without),
+        )
 
 
 def _coordinates_of(judged: Judged) -> NDArray[np.float64]:

@@ -22,16 +22,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from xarray import DataTree
 
-    from .given import GivenPours
-
 SPILLAGE_QUANTILE = 0.95
 """Of the spilled fraction: one outcome in twenty exceeds it."""
 
 INTERVAL = 0.05, 0.95
 """Quantiles of the fractions that arrive and stay."""
-
-SHOWN_GIVEN = 3
-"""Given pours that are shown beside the choice: those most like it."""
 
 CONTRADICTION = 0.05
 """Difference between the fractions that a given pour has spilled and that the map expects of it,
@@ -250,30 +245,6 @@ class GivenSummary:
     nearest: tuple[GivenPour, ...]
     contradicting: GivenPour | None
     without: ActionSummary
-
-    @classmethod
-    def of(cls, given: "GivenPours", chosen: Judged, without: Judged) -> Self:
-        """From the given pours, the chosen action and the one that would be chosen otherwise."""
-        table = given.table
-        numbers = zip(
-            table.lines.tolist(),
-            np.degrees(table.angular_velocity).tolist(),
-            (100.0 * table.distance).tolist(),
-            *table.observed.tolist(),
-            *given.expected.T.tolist(),
-            strict=True,
-        )
-        pours = [GivenPour(*row) for row in numbers]
-        worst = max(pours, key=lambda pour: pour.contradiction)
-        return cls(
-            file=table.path.name,
-            sha256=table.hash,
-            liquid=table.liquid,
-            lines=tuple(pour.line for pour in pours),
-            nearest=tuple(pours[k] for k in given.nearest(chosen)[:SHOWN_GIVEN]),
-            contradicting=worst if worst.contradiction >= CONTRADICTION else None,
-            without=ActionSummary.of(without),
-        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -50,10 +50,10 @@ def _check_called(acquisition: Any) -> None:
     except (TypeError, ValueError):  # of compiled code
         return
     try:
-        called.bind(None, None, None, None)
+        called.bind(None, None, None)
     except TypeError as error:
         raise ValueError(
-            "acquisition must be called with (key, surrogate, n, feasibility), got "
+            "acquisition must be called with (key, surrogate, n), got "
             f"{acquisition!r:.100}, which is called with {called}"
         ) from error
 

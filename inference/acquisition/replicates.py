@@ -3,10 +3,10 @@
 import numpy as np
 
 from ..history import History
+from ..surrogates.noise.run_size import EQUAL_RUNS_TOLERANCE
 
 FIRST_REPLICATES = 2  # replicates to begin with, which tell a deterministic simulator
 REPLICATE_SHARE = 0.1  # of the simulations, where runs differ
-EQUAL_RUNS_TOLERANCE = 1e-9  # relative difference up to which two runs count as equal
 
 
 def next_replicate(history: History, pending: np.ndarray) -> np.ndarray | None:

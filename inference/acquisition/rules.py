@@ -19,7 +19,7 @@ from ..gp.namespaces import log_sum_exp
 from ..gp.optimise import minimise_in_box
 from ..gp.process import predict, predict_joint
 from ..surrogates.base import Surrogate
-from ..surrogates.success import Feasibility, log_feasible
+from ..surrogates.success import log_success
 from .screen import ROUNDS, screen
 
 CANDIDATES = 128  # points among which a rule chooses
@@ -39,9 +39,7 @@ def exploration_width(t: int, dimension: int, epsilon: float = 0.1) -> float:
     return float(np.sqrt(2.0 * np.log(t ** (dimension / 2 + 2) * np.pi**2 / (3.0 * epsilon))))
 
 
-def lower_confidence_bound(
-    surrogate: Surrogate, feasibility: Feasibility, u: np.ndarray
-) -> np.ndarray:
+def lower_confidence_bound(surrogate: Surrogate, u: np.ndarray) -> np.ndarray:
     """mu - eta_t sqrt(v) at u [n, d], v the variance of the latent mean (without noise).
 
     In standard deviations of the targets, less the log chance that a run at u succeeds.
@@ -49,7 +47,7 @@ def lower_confidence_bound(
     data = surrogate.gp.data
     mean, variance = predict(surrogate.gp, u)
     bound = mean - exploration_width(*data.u.shape) * np.sqrt(variance)
-    return np.mean(bound, axis=0) - log_feasible(feasibility, u)
+    return np.mean(bound, axis=0) - log_success(surrogate.success, u)
 
 
 @dataclass(frozen=True)
@@ -71,13 +69,11 @@ class LowerConfidenceBound:
         checked_number("jitter", self.jitter, lambda sd: 0.0 < sd < np.inf, "positive")
 
     @in_float64
-    def __call__(
-        self, key: jax.Array, surrogate: Surrogate, n: int, feasibility: Feasibility
-    ) -> np.ndarray:
+    def __call__(self, key: jax.Array, surrogate: Surrogate, n: int) -> np.ndarray:
         """n points u [n, d]; each is believed before the next is chosen."""
         rng, points = generator(key), []
         while len(points) < n:
-            bound = partial(lower_confidence_bound, surrogate, feasibility)
+            bound = partial(lower_confidence_bound, surrogate)
             centre = minimise_in_box(bound, surrogate.gp.data.u.shape[1])
             points.append(truncated_normal(rng, centre, self.jitter))
             if len(points) < n:
@@ -102,12 +98,10 @@ class Candidates(NamedTuple):
 
     u: np.ndarray  # [CANDIDATES, d]; the same point may appear more than once
     log_density: np.ndarray  # [CANDIDATES], of their distribution, up to a constant
-    log_feasible: np.ndarray  # [CANDIDATES], log chance that a run succeeds
+    log_success: np.ndarray  # [CANDIDATES], log chance that a run succeeds
 
 
-def candidates(
-    rng: np.random.Generator, surrogate: Surrogate, feasibility: Feasibility
-) -> Candidates:
+def candidates(rng: np.random.Generator, surrogate: Surrogate) -> Candidates:
     """Systematic resample, in proportion to sqrt(L) or a smaller power, of a quick screen.
 
     The power is halved until at least MIN_EFFECTIVE points count, however narrow the posterior.
@@ -125,7 +119,7 @@ def candidates(
     positions = (np.arange(CANDIDATES) + rng.uniform()) / CANDIDATES
     rows = np.minimum(np.searchsorted(np.cumsum(weights), positions), len(weights) - 1)
     u = found.u[rows]
-    return Candidates(u, power * log_target[rows], log_feasible(feasibility, u))
+    return Candidates(u, power * log_target[rows], log_success(surrogate.success, u))
 
 
 def _normalised(log_weights: np.ndarray) -> np.ndarray:
@@ -147,21 +141,19 @@ Score = Callable[[np.random.Generator, Surrogate, Candidates], np.ndarray]
 
 
 @in_float64
-def best_candidates(
-    score: Score, key: jax.Array, surrogate: Surrogate, n: int, feasibility: Feasibility
-) -> np.ndarray:
+def best_candidates(score: Score, key: jax.Array, surrogate: Surrogate, n: int) -> np.ndarray:
     """The candidates of highest score, each believed before the next is scored: [n, d].
 
     The score is lowered by the log chance that a run succeeds.
     """
     rng = generator(key)
-    found = candidates(rng, surrogate, feasibility)
+    found = candidates(rng, surrogate)
     points: list[np.ndarray] = []
     while len(points) < n:
-        scores = score(rng, surrogate, found) + found.log_feasible
+        scores = score(rng, surrogate, found) + found.log_success
         scores = np.where(np.isnan(scores) | _taken(found.u, points), -np.inf, scores)
         if not np.isfinite(scores).any():  # all chosen: look for others
-            found = candidates(rng, surrogate, feasibility)
+            found = candidates(rng, surrogate)
             scores = np.where(_taken(found.u, points), -np.inf, rng.uniform(size=len(found.u)))
         points.append(found.u[np.argmax(scores)])
         if len(points) < n:
@@ -178,11 +170,9 @@ def _taken(u: np.ndarray, points: list[np.ndarray]) -> np.ndarray:
 class MaxVariance:
     """Maximise Var[L(u)] (MaxVar, Jarvenpaa et al. 2019)."""
 
-    def __call__(
-        self, key: jax.Array, surrogate: Surrogate, n: int, feasibility: Feasibility
-    ) -> np.ndarray:
+    def __call__(self, key: jax.Array, surrogate: Surrogate, n: int) -> np.ndarray:
         """n different points u [n, d]."""
-        return best_candidates(self._score, key, surrogate, n, feasibility)
+        return best_candidates(self._score, key, surrogate, n)
 
     @staticmethod
     def _score(_: np.random.Generator, surrogate: Surrogate, found: Candidates) -> np.ndarray:
@@ -202,11 +192,9 @@ class PosteriorDraws:
     def __post_init__(self) -> None:
         checked_number("share", self.share, lambda share: 0.0 <= share <= 1.0, "from 0 to 1")
 
-    def __call__(
-        self, key: jax.Array, surrogate: Surrogate, n: int, feasibility: Feasibility
-    ) -> np.ndarray:
+    def __call__(self, key: jax.Array, surrogate: Surrogate, n: int) -> np.ndarray:
         """n different points u [n, d]."""
-        return best_candidates(self._score, key, surrogate, n, feasibility)
+        return best_candidates(self._score, key, surrogate, n)
 
     def _score(
         self, rng: np.random.Generator, surrogate: Surrogate, found: Candidates
@@ -234,11 +222,9 @@ class ExpectedIntegratedVariance:
     in expectation, that is to maximise the integral of E[E[L | run]^2].
     """
 
-    def __call__(
-        self, key: jax.Array, surrogate: Surrogate, n: int, feasibility: Feasibility
-    ) -> np.ndarray:
+    def __call__(self, key: jax.Array, surrogate: Surrogate, n: int) -> np.ndarray:
         """n different points u [n, d]."""
-        return best_candidates(self._score, key, surrogate, n, feasibility)
+        return best_candidates(self._score, key, surrogate, n)
 
     @staticmethod
     def _score(rng: np.random.Generator, surrogate: Surrogate, found: Candidates) -> np.ndarray:
@@ -247,10 +233,37 @@ class ExpectedIntegratedVariance:
         return log_sum_exp((resolved - found.log_density[rows, None]).T)
 
 
+@dataclass(frozen=True)
+class CautiousDraws:
+    """`PosteriorDraws` of the posterior that a fit would give, in which doubt counts against a
+    place; and EIV of that in which it counts as agreement, so that no mode stays unseen.
+
+    Attributes:
+        share: Of EIV's points; their number is rounded at random.
+    """
+
+    share: float = 0.25
+
+    def __post_init__(self) -> None:
+        checked_number("share", self.share, lambda share: 0.0 <= share <= 1.0, "from 0 to 1")
+
+    def __call__(self, key: jax.Array, surrogate: Surrogate, n: int) -> np.ndarray:
+        """n different points u [n, d]."""
+        first = n - int(n * self.share + generator(key).uniform())
+        points = np.zeros((0, surrogate.gp.data.u.shape[1]))
+        if first:
+            points = PosteriorDraws()(key, surrogate.cautious, first)
+        if first == n:
+            return points
+        more = ExpectedIntegratedVariance()(key, surrogate.believe(points), n - first)
+        return np.concatenate([points, more])
+
+
 RULES = {
     "lcb": LowerConfidenceBound,
     "maxvar": MaxVariance,
     "eiv": ExpectedIntegratedVariance,
     "draws": PosteriorDraws,
+    "cautious": CautiousDraws,
 }
 """Acquisitions by the name users give."""

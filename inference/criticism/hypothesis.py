@@ -151,7 +151,8 @@ def hypothesise(
     told = runs.of(names)
     # every component: a small effect may show in one that few runs hardly predict
     covariance = noise.covariance(samples(observed))
-    family = SignalFamily(noise=covariance, misfit=0, components=COMPONENTS, predicted=None)
+    fixed = {"misfit": 0, "components": COMPONENTS, "predicted": None, "varying_noise": False}
+    family = SignalFamily(noise=covariance, **fixed)
     engine = Bolfi(prior, observed, surrogate=family)
     theta = {name: told.theta[name] for name in prior.names}
     engine.tell(theta, told.signals, told.seeds)
@@ -220,7 +221,7 @@ def _reduced(surrogate: SignalSurrogate, covariances: Sequence[np.ndarray]) -> R
     basis, g = surrogate.emulator.basis, len(covariances)
     used, k = basis.used, basis.vectors.shape[1]
     estimate, error = np.zeros((g, k)), np.tile(np.eye(k), (g, 1, 1))
-    log_weight = np.zeros(g)
+    log_weight, unexplained = np.zeros(g), np.zeros(g)
     vectors, target = basis.vectors[:, :used], basis.standardise(surrogate.observed)
     for i, covariance in enumerate(covariances):
         factor = np.linalg.cholesky(covariance / np.outer(basis.scale, basis.scale))
@@ -230,9 +231,10 @@ def _reduced(surrogate: SignalSurrogate, covariances: Sequence[np.ndarray]) -> R
         estimate[i, :used] = error[i, :used, :used] @ (white[:, :used].T @ white[:, used])
         left = white[:, used] - white[:, :used] @ estimate[i, :used]
         # the estimate's own normalisation belongs to N(estimate; scores, error)
-        log_weight[i] = 0.5 * np.linalg.slogdet(error[i])[1] - 0.5 * left @ left
+        unexplained[i] = left @ left
+        log_weight[i] = 0.5 * (np.linalg.slogdet(error[i])[1] - unexplained[i])
         log_weight[i] -= np.log(np.diag(factor)).sum()
-    return Reduced(estimate, error, log_weight - log_weight.max())
+    return Reduced(estimate, error, log_weight - log_weight.max(), unexplained, np.ones(g))
 
 
 def _squared_distance(state: SignalState, u: np.ndarray) -> np.ndarray:

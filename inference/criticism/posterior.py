@@ -6,7 +6,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from .._float64 import in_float64
-from ..sampling.importance import explore
+from ..sampling.importance import explore, weighted_quantiles
 from ..sampling.target import Target
 from .hypothesis import Hypothesis
 
@@ -37,9 +37,7 @@ class Weighted(NamedTuple):
     def interval(self, name: str) -> Interval:
         """Mean and 90 % interval of a parameter."""
         values = self.theta[name]
-        order = np.argsort(values)
-        reached = np.cumsum(self.weights[order])
-        low, high = (np.interp(q, reached / reached[-1], values[order]) for q in (0.05, 0.95))
+        low, high = weighted_quantiles(values, self.weights, (0.05, 0.95))
         mean = np.average(values, weights=self.weights)
         return Interval(float(mean), float(low), float(high))
 

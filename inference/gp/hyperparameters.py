@@ -54,14 +54,14 @@ def log_marginal_likelihood(hyper: Hyper, data: Data) -> tuple[np.ndarray, np.nd
     squared = (at[:, None, :] - at) ** 2  # [n, n, d]
     (n, d), k = at.shape, len(data.y)
     basis = trend(hyper, at)
-    variance, rate = np.exp(2.0 * hyper.log_noise), np.exp(-2.0 * hyper.log_length)
+    noise, rate = data.noise(hyper.log_noise), np.exp(-2.0 * hyper.log_length)
     fading = 1.0 - relevance(hyper) ** 2  # -d log r / d log length
     values, gradients = np.empty(k), np.empty((k, d + 2))
     for i, y in enumerate(data.y):
         # one by one: what is found of a process depends on no other, to the last bit
         smooth = smooth_covariance(Hyper(*(part[i : i + 1] for part in hyper)), squared)[0]
         gram = smooth + TREND_SD**2 * basis[i] @ basis[i].T
-        gram[np.diag_indices(n)] += variance[i] + JITTER
+        gram[np.diag_indices(n)] += noise[i] + JITTER
         whitener = inverse_cholesky(gram)
         white = whitener @ y
         weights = white @ whitener
@@ -74,7 +74,7 @@ def log_marginal_likelihood(hyper: Hyper, data: Data) -> tuple[np.ndarray, np.nd
         of_trend = fading[i] * (along[1 : d + 1] + 2.0 * along[d + 1 :])
         gradients[i, :d] = by_length - TREND_SD**2 * of_trend
         gradients[i, d] = pulled.sum()
-        gradients[i, d + 1] = variance[i] * np.trace(excess)
+        gradients[i, d + 1] = noise[i] @ np.diag(excess)
     return values - 0.5 * n * np.log(2.0 * np.pi), gradients
 
 

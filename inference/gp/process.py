@@ -29,6 +29,12 @@ class Data(NamedTuple):
     u: np.ndarray  # [n, d]
     y: np.ndarray  # [k, n], standardised
     normal: np.ndarray | None = None  # bool [d], see `coordinates`; None for none
+    spread: np.ndarray | None = None  # [n], by which the noise's variance is multiplied; None is 1
+
+    def noise(self, log_noise: Any) -> np.ndarray:
+        """Variances of the noise at each point [..., n], for sds of logs `log_noise` [...]."""
+        variance = np.exp(2.0 * np.asarray(log_noise))[..., None]
+        return variance * (np.ones(len(self.u)) if self.spread is None else self.spread)
 
 
 class Hyper(NamedTuple):
@@ -117,21 +123,27 @@ def condition(hyper: Hyper, data: Data) -> GP:
     """The processes given the data. Explicit inverse factors make prediction a product."""
     at = coordinates(data.u, data.normal)
     gram = covariance(hyper, at, at)
-    noise = np.exp(2.0 * hyper.log_noise) + JITTER
+    noise = data.noise(hyper.log_noise) + JITTER
     whitener = np.stack(
-        [inverse_cholesky(g + s * np.eye(len(g))) for g, s in zip(gram, noise, strict=True)]
+        [inverse_cholesky(g + np.diag(s)) for g, s in zip(gram, noise, strict=True)]
     )
     white = np.einsum("kij,kj->ki", whitener, data.y)
     return GP(hyper, data, whitener, np.einsum("kij,ki->kj", whitener, white))
 
 
-def believe(gp: GP, u: np.ndarray) -> GP:
+def believe(gp: GP, u: np.ndarray, spread: np.ndarray | None = None) -> GP:
     """The processes after their own predictions at u [m, d] came true.
 
     The kriging believer of Ginsbourger et al. (2010): the mean stays, the variance shrinks.
+
+    Args:
+        spread: As of `Data`, at u [m]; None where the data have none.
     """
-    y = np.concatenate([gp.data.y, predict(gp, u)[0]], axis=1)
-    return condition(gp.hyper, gp.data._replace(u=np.concatenate([gp.data.u, u]), y=y))
+    data = gp.data
+    y = np.concatenate([data.y, predict(gp, u)[0]], axis=1)
+    if data.spread is not None and spread is not None:
+        spread = np.concatenate([data.spread, spread])
+    return condition(gp.hyper, Data(np.concatenate([data.u, u]), y, data.normal, spread))
 
 
 def padded(gp: GP, processes: int, rows: int) -> GP:
@@ -141,7 +153,7 @@ def padded(gp: GP, processes: int, rows: int) -> GP:
     widths = ((0, more), (0, extra))
     hyper = Hyper(*(np.pad(part, ((0, more), *[(0, 0)] * (part.ndim - 1))) for part in gp.hyper))
     u = np.pad(gp.data.u, ((0, extra), (0, 0)), constant_values=0.5)
-    data = gp.data._replace(u=u, y=np.pad(gp.data.y, widths))
+    data = gp.data._replace(u=u, y=np.pad(gp.data.y, widths), spread=None)
     whitener = np.pad(gp.whitener, (*widths, (0, extra)))
     return GP(hyper, data, whitener, np.pad(gp.weights, widths))
 
@@ -168,6 +180,11 @@ def predict(gp: GP, u: Any) -> tuple[Any, Any]:
         return parts[0]
     mean, variance = (xp.concat(part, axis=1) for part in zip(*parts, strict=True))
     return mean, variance
+
+
+def predict_mean(gp: GP, u: Any) -> Any:
+    """The means [k, m] alone."""
+    return (_cross(gp, u)[0] @ gp.weights[:, :, None])[:, :, 0]
 
 
 def _predict(gp: GP, u: Any) -> tuple[Any, Any]:

@@ -7,6 +7,7 @@ al. 2012, adaptive multiple importance sampling; Veach and Guibas 1995, balance 
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,8 @@ MIN_EFFECTIVE = 400.0  # effective points at which one more round ends it
 BOX_EDGE = 1e-12  # quantile at which the box is cut, so that x = Phi^-1(u) stays finite
 MIN_LOG_POWER = -60.0  # log of the smallest inverse temperature
 HALVINGS = 30  # of the interval of log powers
+LEAST = 1e-12  # sd, and weight of a draw, where a posterior is one point
+WIDER = 2.0  # sds whose ratio is larger are not the same
 SHARPENED_WIDTH = 0.5  # width of half the proposals, while the temperature still has to fall
 
 
@@ -38,6 +41,57 @@ class Population(NamedTuple):
     mixture: Mixture
     log_proposal: np.ndarray  # [n], log density of the mixture
     effective: float  # number of points, (sum w)^2 / sum w^2
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Of the points, whose sum is 1 [n]."""
+        weights = np.exp(self.log_weights - self.log_weights.max())
+        return weights / weights.sum()
+
+    @property
+    def moments(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and standard deviation of each coordinate, [d] each."""
+        weights = self.weights
+        mean = weights @ self.x
+        return mean, np.sqrt(weights @ (self.x - mean) ** 2)
+
+    def resample(self, rng: np.random.Generator, count: int) -> np.ndarray:
+        """`count` different points [count, d], the first drawn as they are weighted, the others in
+        proportion to what they add to the variance, too: there a posterior is known least."""
+        (mean, sd), weights = self.moments, self.weights
+        first = rng.choice(len(self.x), p=weights)
+        distance = np.sum(((self.x - mean) / np.maximum(sd, LEAST)) ** 2, axis=1)
+        outer = weights * distance + LEAST  # of a posterior that is one point, too
+        outer[first] = 0.0
+        others = rng.choice(len(self.x), count - 1, replace=False, p=outer / outer.sum())
+        return self.x[np.append(others, first)]
+
+
+def weighted_quantiles(
+    values: np.ndarray, weights: np.ndarray, shares: Sequence[float]
+) -> np.ndarray:
+    """Quantiles [len(shares)] of weighted values [n]."""
+    order = np.argsort(values)
+    reached = np.cumsum(weights[order])
+    return np.interp(shares, reached / reached[-1], values[order])
+
+
+class Before(NamedTuple):
+    """A posterior before runs were made at draws of it.
+
+    Attributes:
+        mean, sd: Of each parameter [d], in normal scores of the prior.
+        told: Simulations that it knew.
+    """
+
+    mean: np.ndarray
+    sd: np.ndarray
+    told: int
+
+    def agrees(self, mean: np.ndarray, sd: np.ndarray) -> bool:
+        """Whether means lie within the smaller sd, and no sd is twice as large as the other."""
+        near = np.abs(self.mean - mean) <= np.minimum(self.sd, sd)
+        return bool(near.all() and (np.abs(np.log(self.sd / sd)) < np.log(WIDER)).all())
 
 
 class _Points(NamedTuple):

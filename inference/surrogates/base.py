@@ -7,7 +7,6 @@ import numpy as np
 
 from ..gp.process import GP
 from ..types import LogLikelihood, LogSecondMoment
-from .success import Feasibility
 
 
 class Surrogate(Protocol):
@@ -23,6 +22,17 @@ class Surrogate(Protocol):
         """NamedTuple of NumPy arrays on which the likelihood depends, `gp` among them; data, never
         a closure. Its method `padded` gives the same likelihood in arrays of few shapes: NUTS is
         compiled for each."""
+        ...
+
+    @property
+    def success(self) -> GP | None:
+        """Where runs succeed, see `success.log_success`; None is everywhere."""
+        ...
+
+    @property
+    def cautious(self) -> "Surrogate":
+        """The surrogate to which its own doubt beyond what the data can resolve is no
+        agreement."""
         ...
 
     @property
@@ -47,13 +57,27 @@ class Surrogate(Protocol):
         """What a reader of the posterior must know of the likelihood."""
         ...
 
+    def described(self) -> list[str]:
+        """What a reader of the fit should know first, in a few words."""
+        ...
+
     def checks(self) -> dict[str, np.ndarray]:
         """Of the emulator: `loo_z`, studentised leave-one-out errors [n, ...], a row for each
         simulation that was learned from."""
         ...
 
-    def warnings(self) -> list[str]:
-        """What these checks complain of, in sentences."""
+    @property
+    def fits(self) -> bool:
+        """Whether what was observed is explained."""
+        ...
+
+    def warnings(self, *, confirmed: bool = False) -> list[str]:
+        """What is complained of, in sentences.
+
+        Args:
+            confirmed: Runs at draws of the posterior left it where it was: then errors of the
+                emulator, which may lie far from it, are not complained of.
+        """
         ...
 
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
@@ -64,15 +88,12 @@ class Surrogate(Protocol):
 class Acquisition(Protocol):
     """Where to simulate next."""
 
-    def __call__(
-        self, key: jax.Array, surrogate: Any, n: int, feasibility: Feasibility, /
-    ) -> np.ndarray:
+    def __call__(self, key: jax.Array, surrogate: Any, n: int, /) -> np.ndarray:
         """n different points u [n, d].
 
         Args:
             key: Fixes the choice.
             surrogate: A `Surrogate` that already believes what is pending.
             n: Points wanted.
-            feasibility: Where runs succeeded and failed; see `success.log_feasible`.
         """
         ...

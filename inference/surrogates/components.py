@@ -42,7 +42,11 @@ class Basis(NamedTuple):
 
 
 def principal_components(
-    outputs: np.ndarray, scale: np.ndarray, capacity: int, share: float
+    outputs: np.ndarray,
+    scale: np.ndarray,
+    capacity: int,
+    share: float,
+    spread: np.ndarray | None = None,
 ) -> Basis:
     """The fewest components that explain a share of the outputs' variance.
 
@@ -51,9 +55,11 @@ def principal_components(
         scale: [m], positive.
         capacity: Components at most; the arrays hold as many, and min(capacity, m) at most.
         share: Of the variance, to be explained.
+        spread: Variance of each run's noise [n], by which runs count less; None for equal ones.
     """
-    centre = outputs.mean(0)
-    standard = (outputs - centre) / scale
+    weight = np.ones(len(outputs)) if spread is None else np.mean(spread) / spread
+    centre = outputs.mean(0) if spread is None else np.average(outputs, axis=0, weights=weight)
+    standard = (outputs - centre) / scale * np.sqrt(weight / weight.mean())[:, None]
     # what varies by rounding error alone does not vary
     standard = np.where(np.abs(outputs - centre) > 1e-12 * np.abs(outputs), standard, 0.0)
     n, m = standard.shape
@@ -73,4 +79,8 @@ def principal_components(
     else:
         vectors[:, :used] = left[:, :used] * np.sqrt(values[:used])
     explained = float(1.0 - tail[used - 1] / total) if used else 1.0
+    if spread is not None:  # scores of unit variance over all runs, as the processes' priors mean
+        squared = np.sum(vectors**2, 0)
+        scores = ((outputs - centre) / scale) @ vectors / np.where(squared > 0.0, squared, 1.0)
+        vectors = vectors * np.sqrt(np.mean(scores**2, 0))
     return Basis(centre, scale, vectors, used, explained)

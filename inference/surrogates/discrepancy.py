@@ -4,41 +4,44 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtr
 
 from .._float64 import in_float64
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
-from ..gp.namespaces import log_sum_exp
 from ..gp.optimise import minimise_in_box
 from ..gp.process import (
     GP,
     Data,
-    Hyper,
     believe,
     condition,
     leave_one_out,
     predict,
     predict_points,
 )
-from ..sampling.importance import explore
-from ..sampling.target import Target
 from ..types import LogLikelihood, LogSecondMoment
 from .hyper_draws import posterior_draws
 from .outliers import sane
-from .success import log_success
 from .threshold import (
+    Matched,
     Threshold,
     ThresholdState,
     choose_threshold,
     log_likelihood,
-    log_likelihoods,
     log_second_moment,
+    matched,
 )
 from .transform import Transform, candidates
-from .warnings import EQUAL, LOW_THRESHOLD, complaints
+from .warnings import (
+    EQUAL,
+    LOW_THRESHOLD,
+    NOISY,
+    complaints,
+)
 
+BETWEEN = 0.25  # of the least simulated discrepancy: the least that is taken for its minimum
+MIN_RESOLUTION = 1e-4  # of the spread of g(Delta)
+UNKNOWN_FREEDOM = 20.0  # errors more than parameters, where nothing tells their number
 LOW = 3.0  # sds of a new discrepancy by which a threshold lies too low
-TRANSFORM_GROWTH = 2.0  # the transform is chosen anew when data have grown by this factor
+TRANSFORM_GROWTH = 1.3  # the transform is chosen anew when data have grown by this factor
 
 
 class Scale(NamedTuple):
@@ -64,7 +67,12 @@ class DiscrepancySurrogate:
         learned_at: Simulations known when the hyperparameters were found.
         chosen_at: Simulations known when the transform was chosen.
         success: Where runs succeed, see `success.learn_success`.
-        displaced: Over which the likelihood is averaged, see `averaged`; None for `gp` alone.
+        width: Sd that the threshold has itself, on the scale of g(Delta).
+        noisy: Whether the noise of g(Delta) alone makes the posterior wider than the data do, as
+            far as the threshold is `Matched`.
+        resolution: Sd on the scale of g(Delta) from which doubt counts against a place, see
+            `threshold.log_likelihood`; infinite while it shall attract runs.
+        said: What the outputs, of which the surrogate knows nothing, have been found to lack.
     """
 
     gp: GP
@@ -74,7 +82,10 @@ class DiscrepancySurrogate:
     learned_at: int
     chosen_at: int
     success: GP | None = None
-    displaced: ThresholdState | None = None
+    width: float = 0.0
+    noisy: bool = False
+    resolution: float = np.inf
+    said: tuple[str, ...] = ()
 
     @property
     def equal(self) -> bool:
@@ -88,10 +99,20 @@ class DiscrepancySurrogate:
     @property
     @in_float64
     def state(self) -> ThresholdState:
-        if self.displaced is not None:
-            return self.displaced._replace(success=self.success)
         threshold = (self.threshold - self.scale.location) / self.scale.spread
-        return ThresholdState(self.gp, np.asarray(threshold), self.success)
+        width, resolution = (
+            np.asarray(part / self.scale.spread) for part in (self.width, self.resolution)
+        )
+        return ThresholdState(self.gp, np.asarray(threshold), width, resolution, self.success)
+
+    @property
+    @in_float64
+    def cautious(self) -> "DiscrepancySurrogate":
+        """The surrogate to which doubt beyond what the threshold can resolve is no agreement."""
+        mean, _ = self.predict(self.gp.data.u)
+        noise = self.scale.spread * float(np.exp(self.gp.hyper.log_noise).min())
+        scales = float(np.hypot(noise, self.width)), self.threshold - float(mean.min())
+        return replace(self, resolution=max(*scales, MIN_RESOLUTION * self.scale.spread))
 
     @property
     def log_likelihood(self) -> LogLikelihood:
@@ -132,6 +153,10 @@ class DiscrepancySurrogate:
         """What a reader of the posterior must know of the likelihood."""
         return {"threshold": np.asarray(self.threshold)}
 
+    def described(self) -> list[str]:
+        """The threshold, on the scale of the discrepancy."""
+        return [f"threshold {float(self.transform.inverse(np.asarray(self.threshold))):.3g}"]
+
     @in_float64
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised leave-one-out errors `loo_z` [n, 1]."""
@@ -140,13 +165,24 @@ class DiscrepancySurrogate:
         total = variance.mean(0) + mean.var(0)  # of the mixture over hyperparameters
         return {"loo_z": (error / np.sqrt(total))[: len(self.discrepancy), None]}
 
-    def warnings(self) -> list[str]:
-        """What the leave-one-out errors complain of."""
+    @property
+    def fits(self) -> bool:
+        """Whether discrepancies as low as the threshold can be expected anywhere."""
+        mean, sd = self.predict(self.gp.data.u)
+        low = LOW * np.hypot(sd, self.width)
+        return self.equal or bool((self.threshold > mean - low).any())
+
+    @in_float64
+    def warnings(self, *, confirmed: bool = False) -> list[str]:
+        """What the process's errors complain of, unless it is confirmed, and what was compared."""
         if self.equal:
             return [EQUAL]
-        said = complaints(self.checks()["loo_z"], "discrepancy")
-        mean, sd = self.predict(self.gp.data.u)
-        return [*said, LOW_THRESHOLD] if (self.threshold < mean - LOW * sd).all() else said
+        said = [*self.said]
+        if not confirmed:
+            said += complaints(self.checks()["loo_z"], "discrepancy")
+        if self.noisy:
+            said.append(NOISY)
+        return said if self.fits else [*said, LOW_THRESHOLD]
 
     @in_float64
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
@@ -225,8 +261,18 @@ def with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> Discrepanc
         best = np.argmin(mean)
         return float(mean[best]), float(sd[best])
 
+    if rule is None or isinstance(rule, Matched):
+        d = learned.gp.data.u.shape[1]
+        matching = Matched(d + UNKNOWN_FREEDOM) if rule is None else rule
+        least = at_minimum()
+        mean, sd = (float(part[0]) for part in learned.predict(learned.minimum()[None]))
+        # between the runs the least may be lower, but not out of all proportion
+        if learned.transform.inverse(np.asarray(mean)) > BETWEEN * learned.discrepancy.min():
+            least = min(least, (mean, sd))
+        threshold, width = matched(matching, *least, learned.transform, d)
+        return replace(learned, threshold=threshold, width=width, noisy=width == 0.0)
     threshold = choose_threshold(rule, learned.discrepancy, learned.transform, at_minimum)
-    return replace(learned, threshold=threshold)
+    return replace(learned, threshold=threshold, width=0.0, noisy=False)
 
 
 @in_float64
@@ -238,53 +284,6 @@ def marginalised(
     data = surrogate.gp.data
     spread = data._replace(y=np.tile(data.y, (draws, 1)))
     return with_threshold(replace(surrogate, gp=condition(hyper, spread)), rule)
-
-
-@in_float64
-def averaged(
-    surrogate: DiscrepancySurrogate, displaced: np.ndarray, rule: Threshold
-) -> DiscrepancySurrogate:
-    """The surrogate whose posterior is a mean over draws of an error between simulator and data.
-
-    Had the data been without the error, they would be observed less one of its draws: for each,
-    the runs' discrepancies from that are learned, and have a threshold of their own. So a best
-    fit is as uncertain as the error moves it; an error that is added to discrepancies would only
-    make all of them larger. Each draw counts alike: its likelihood is divided by its integral.
-
-    Args:
-        displaced: Discrepancies of the runs from observed less each draw, [n, k]; draws with one
-            that the transform does not know are left out.
-        rule: Of the thresholds.
-    """
-    y = surrogate.scale(displaced.T)
-    known = np.isfinite(y).all(1)
-    if not known.any():
-        return surrogate
-    base, count = surrogate.gp, int(known.sum())
-    hyper = Hyper(*(np.resize(part, (count, *part.shape[1:])) for part in base.hyper))
-    gp = condition(hyper, base.data._replace(y=y[known]))
-    singles = [
-        replace(surrogate, gp=gp.only(slice(k, k + 1)), discrepancy=values)
-        for k, values in enumerate(displaced.T[known])
-    ]
-    thresholds = np.array([with_threshold(one, rule).threshold for one in singles])
-    standard = (thresholds - surrogate.scale.location) / surrogate.scale.spread
-    state = ThresholdState(gp, standard, surrogate.success)
-    return replace(surrogate, displaced=state._replace(log_area=_log_areas(state)))
-
-
-def _log_areas(state: ThresholdState) -> np.ndarray:
-    """Log integrals [k] of the processes' likelihoods over the prior, up to one constant."""
-    target = Target(log_likelihood, state, state.gp.data.u.shape[1])
-    population = explore(np.random.default_rng(0), target)
-    u = ndtr(population.x)
-    weights = population.log_weights - log_likelihood(state, u)
-    terms = (
-        log_likelihoods(state._replace(success=None), u) + log_success(state.success, u)[:, None]
-    )
-    terms = np.where(np.isfinite(weights)[:, None], terms + weights[:, None], -np.inf)
-    areas = log_sum_exp(terms.T)
-    return areas - areas.max()
 
 
 def _standardise(transform: Transform, values: np.ndarray) -> Scale:
@@ -299,9 +298,10 @@ def _standardise(transform: Transform, values: np.ndarray) -> Scale:
 
 
 def _score(gp: GP, scale: Scale, values: np.ndarray) -> float:
-    """Leave-one-out log predictive density of the discrepancy under the scale, summed."""
+    """Leave-one-out log predictive density of the discrepancy under the scale, summed over the
+    better half of the runs: with a wide prior the others only tell that they are bad."""
     mean, variance = (moment[0] for moment in leave_one_out(gp))
     residual = gp.data.y[0] - mean
-    density = -0.5 * np.sum(residual**2 / variance + np.log(2.0 * np.pi * variance))
+    density = -0.5 * (residual**2 / variance + np.log(2.0 * np.pi * variance))
     jacobian = scale.transform.log_jacobian(values) - np.log(scale.spread)
-    return float(density + np.sum(jacobian))
+    return float(np.sum((density + jacobian)[values <= np.median(values)]))

@@ -9,22 +9,23 @@ from .._float64 import in_float64
 from ..gp.hyperparameters import GROWTH, maximum_a_posteriori
 from ..gp.process import (
     GP,
-    JITTER,
     Data,
     Hyper,
     condition,
     leave_one_out,
-    predict_joint,
 )
 from ..gp.process import predict_points as predict_scores
 from .component_noise import absorbed_noise, left_over
 from .components import Basis, principal_components
 from .measurement_noise import Remainder, shrunk_covariance
+from .noise.run_size import EQUAL_RUNS_TOLERANCE, Size, learn_size, run_spread
 
 EXPLAINED_SHARE = 0.9995  # of the variance, to be explained by components
 PREDICTED_SHARE = 0.3  # see `_predicted`
 PRIOR_RUNS = 5.0  # runs that speak for uncorrelated scores
-ROUNDING_VARIANCE = 1e-24  # variance of standardised outputs that counts as none
+MIN_NOISE_SHARE = 0.01  # share of noise in the outputs' variance from which its size may vary
+SIZE_ROUNDS = 2  # of learning sizes from errors, and the emulator with these sizes
+LEAST_OF_ERROR = 0.05  # of an expected squared error, added before its logarithm is taken
 
 
 class Limits(NamedTuple):
@@ -34,10 +35,12 @@ class Limits(NamedTuple):
         components: At most.
         predicted: Share of a component's variance that the parameters must predict, lest it
             count as noise; None emulates every component.
+        left: Variance of a value, in units of its scale, that components may leave at most.
     """
 
     components: int
     predicted: float | None = PREDICTED_SHARE
+    left: float = np.inf
 
 
 class Emulator(NamedTuple):
@@ -52,6 +55,8 @@ class Emulator(NamedTuple):
         learned_at: Simulations known when components and hyperparameters were found.
         excess: Of those simulations' scores, see `absorbed_noise` [k].
         limits: How much it may hold.
+        size: How the run-to-run noise depends on the parameters; None where it does not.
+            `remainder` and `noise` hold for the size 1.
     """
 
     gp: GP
@@ -62,11 +67,23 @@ class Emulator(NamedTuple):
     learned_at: int
     excess: np.ndarray
     limits: Limits
+    size: Size | None = None
 
     @property
     def equal(self) -> bool:
         """Whether all outputs are the same."""
         return self.basis.used == 0 and self.remainder.total == 0.0
+
+    @property
+    def repeats(self) -> np.ndarray:
+        """Of each run at the parameters of one before: whether its output differs, bool [r]."""
+        n = len(self.outputs)
+        first, which = np.unique(
+            self.gp.data.u[:n], axis=0, return_index=True, return_inverse=True
+        )[1:]
+        again = np.setdiff1d(np.arange(n), first)
+        differ = np.abs(self.outputs[again] - self.outputs[first[which.ravel()[again]]])
+        return (differ > EQUAL_RUNS_TOLERANCE * self.outputs.std(0)).any(1)
 
 
 @in_float64
@@ -87,26 +104,91 @@ def emulate(
             kept until the data have grown by GROWTH.
         normal: Which parameters the kernels see as normal scores [d], see `gp.process.coordinates`.
     """
-    n = len(u)
-    if previous is not None and _goes_on(previous, outputs):
-        basis, learned_at, excess = previous.basis, previous.learned_at, previous.excess
-        targets = _targets(basis, outputs, learned_at, excess)
-        gp = condition(previous.gp.hyper, Data(u, targets, normal))
-        remainder = shrunk_covariance(basis.residuals(outputs), basis.used + 1)
-    else:
-        components = principal_components(
-            outputs, scale(outputs), limits.components, EXPLAINED_SHARE
-        )
-        data = Data(u, components.scores(outputs).T, normal)
-        basis, hyper = _taught(components, data, limits.predicted)
-        learned_at, remainder = n, shrunk_covariance(basis.residuals(outputs), basis.used + 1)
-        excess = absorbed_noise(basis, np.exp(2.0 * hyper.log_noise), remainder, n)
-        smaller = np.log1p(-excess)
-        hyper = Hyper(hyper.log_length, hyper.log_amplitude + smaller, hyper.log_noise + smaller)
-        gp = condition(hyper, Data(u, _targets(basis, outputs, n, excess), normal))
-    remainder = left_over(basis, np.exp(2.0 * gp.hyper.log_noise), remainder, excess)
-    noise = run_to_run(gp, basis, remainder.white, n)
-    return Emulator(gp, basis, remainder, noise, outputs, learned_at, excess, limits)
+    if previous is None or not goes_on(previous, outputs):
+        return _learned(Data(u, outputs.T, normal), scale, limits)
+    basis, learned_at, excess = previous.basis, previous.learned_at, previous.excess
+    spread = run_spread(previous.size, u)
+    targets = _targets(basis, outputs, learned_at, excess)
+    gp = condition(previous.gp.hyper, Data(u, targets, normal, spread))
+    kept = previous._replace(outputs=outputs)
+    return _with_noise(kept, gp, _left(basis, outputs, spread))
+
+
+def _learned(
+    known: Data,
+    scale: Callable[[np.ndarray], np.ndarray],
+    limits: Limits,
+    size: Size | None = None,
+) -> Emulator:
+    """Components and hyperparameters of outputs known.y [m, n], the run-to-run noise being of a
+    known size."""
+    outputs, n, spread = known.y.T, len(known.u), run_spread(size, known.u)
+    units = scale(outputs)
+    varied = float(np.mean(np.var(outputs, axis=0) / units**2))
+    share = max(EXPLAINED_SHARE, 1.0 - limits.left / varied) if varied else EXPLAINED_SHARE
+    components = principal_components(outputs, units, limits.components, share, spread)
+    data = known._replace(y=components.scores(outputs).T, spread=spread)
+    basis, hyper = _taught(components, data, limits.predicted)
+    remainder = _left(basis, outputs, spread)
+    excess = absorbed_noise(basis, np.exp(2.0 * hyper.log_noise), remainder, n)
+    smaller = np.log1p(-excess)
+    hyper = Hyper(hyper.log_length, hyper.log_amplitude + smaller, hyper.log_noise + smaller)
+    gp = condition(hyper, data._replace(y=_targets(basis, outputs, n, excess)))
+    found = Emulator(gp, basis, remainder, np.zeros(0), outputs, n, excess, limits, size)
+    return _with_noise(found, gp, remainder)
+
+
+def _left(basis: Basis, outputs: np.ndarray, spread: np.ndarray | None) -> Remainder:
+    """What the components leave of outputs [n, m], for noise of the size 1."""
+    residuals = basis.residuals(outputs)
+    if spread is not None:  # all runs of one length: what is left of their sizes is no correlation
+        length = np.linalg.norm(residuals, axis=1)
+        mean = np.sqrt(np.mean(length**2 / spread))
+        residuals = residuals * (mean / np.where(length > 0.0, length, 1.0))[:, None]
+    return shrunk_covariance(residuals, basis.used + 1)
+
+
+def _with_noise(emulator: Emulator, gp: GP, remainder: Remainder) -> Emulator:
+    basis = emulator.basis
+    remainder = left_over(basis, np.exp(2.0 * gp.hyper.log_noise), remainder, emulator.excess)
+    noise = run_to_run(gp, basis, remainder.white, len(emulator.outputs))
+    return emulator._replace(gp=gp, remainder=remainder, noise=noise)
+
+
+@in_float64
+def resized(emulator: Emulator, scale: Callable[[np.ndarray], np.ndarray]) -> Emulator:
+    """The same with run-to-run noise whose size depends on the parameters, if errors show that.
+
+    Goldberg et al. (1998), with the most likely size: a process of the logarithm of each run's
+    leave-one-out error. Where nothing is gained, noise is next to none, or no runs of equal
+    parameters differ, no bit changes.
+
+    Args:
+        scale: As for `emulate`.
+    """
+    found = emulator
+    if noise_share(emulator) < MIN_NOISE_SHARE or not emulator.repeats.any():
+        return emulator
+    data = emulator.gp.data
+    for _ in range(SIZE_ROUNDS):
+        size = learn_size(_log_sizes(found), data.u, data.normal)
+        if size is None:
+            break
+        known = Data(data.u, found.outputs.T, data.normal)
+        found = _learned(known, scale, found.limits, size)
+    return found
+
+
+def _log_sizes(emulator: Emulator) -> np.ndarray:
+    """Log of the size of each run's noise, as its leave-one-out error shows it [n]."""
+    basis, gp = emulator.basis, emulator.gp.only(slice(emulator.basis.used))
+    mean, variance = leave_one_out(gp)
+    squared = np.sum(basis.vectors[:, : basis.used] ** 2, 0)
+    spread = emulator.gp.data.noise(0.0)
+    due = squared @ variance + emulator.remainder.total * spread
+    residuals = basis.residuals(emulator.outputs)
+    found = squared @ (gp.data.y - mean) ** 2 + np.sum(residuals**2, 1)
+    return 0.5 * np.log(spread * (found / due + LEAST_OF_ERROR))
 
 
 def _taught(basis: Basis, data: Data, predicted: float | None) -> tuple[Basis, Hyper]:
@@ -131,16 +213,18 @@ def _predicted(basis: Basis, hyper: Hyper, data: Data, least: float) -> tuple[Ba
 def predicted_share(gp: GP) -> np.ndarray:
     """Share of each score's variance that is predicted when a run is left out, [k].
 
-    Not above 0 where the mean of the others would do as well, and 0 for empty components.
+    Not above 0 where the mean of the others would do as well, and 0 for empty components. Runs
+    count the less the noisier they are.
     """
-    score, n = gp.data.y, len(gp.data.u)
+    score, weight = gp.data.y, 1.0 / gp.data.noise(0.0)
     error = score - leave_one_out(gp)[0]
-    from_mean = (score - score.mean(1, keepdims=True)) * n / (n - 1)  # of the other scores
-    total = np.sum(from_mean**2, 1)
-    return np.where(total > 0, 1.0 - np.sum(error**2, 1) / np.where(total > 0, total, 1.0), 0.0)
+    mean = (score @ weight / weight.sum())[:, None]
+    from_mean = (score - mean) * weight.sum() / (weight.sum() - weight)  # of the other scores
+    total = from_mean**2 @ weight
+    return np.where(total > 0, 1.0 - error**2 @ weight / np.where(total > 0, total, 1.0), 0.0)
 
 
-def _goes_on(previous: Emulator, outputs: np.ndarray) -> bool:
+def goes_on(previous: Emulator, outputs: np.ndarray) -> bool:
     """Whether these are the outputs that were learned from, and not many more."""
     n = previous.learned_at
     return n <= len(outputs) < GROWTH * n and np.array_equal(previous.outputs[:n], outputs[:n])
@@ -163,7 +247,8 @@ def run_to_run(gp: GP, basis: Basis, white: float, n: int) -> np.ndarray:
     full = squared > 0
     variance = np.exp(2.0 * gp.hyper.log_noise) * full
     variance = np.maximum(variance - white / np.where(full, squared, np.inf), 0.0)
-    residual = np.where(full[:, None], gp.weights, 0.0)
+    spread = gp.data.noise(0.0)
+    residual = np.where(full[:, None], gp.weights * np.sqrt(spread), 0.0)
     length = np.sqrt(np.sum(residual**2, 1, keepdims=True))
     residual = residual / np.where(length > 0, length, 1.0)
     correlation = residual @ residual.T * n / (n + PRIOR_RUNS)
@@ -179,42 +264,12 @@ def loo_errors(emulator: Emulator) -> np.ndarray:
     return ((gp.data.y - mean) / np.sqrt(variance)).T[: len(emulator.outputs)]
 
 
-def innovations(emulator: Emulator, u: np.ndarray, outputs: np.ndarray) -> np.ndarray:
-    """Studentised errors [n, used] in the scores of new outputs [n, m] at u [n, d].
-
-    Each output is predicted from all earlier outputs, with components and hyperparameters fixed.
-    """
-    basis, used = emulator.basis, emulator.basis.used
-    squared = np.sum(basis.vectors[:, :used] ** 2, 0)
-    noise = np.diag(emulator.noise)[:used] + emulator.remainder.white / squared
-    gp = emulator.gp.only(slice(used))
-    mean = predict_scores(gp, u)[0]
-    total = predict_joint(gp, u, u) + (noise[:, None, None] + JITTER) * np.eye(len(u))
-    factor = np.linalg.cholesky(total)
-    error = (basis.scores(outputs)[:, :used].T - mean)[:, :, None]
-    return np.linalg.solve(factor, error)[:, :, 0].T
-
-
-def beyond_components(emulator: Emulator, outputs: np.ndarray) -> np.ndarray:
-    """What the components leave of new outputs [n, m]: its length over the expected one [n].
-
-    The remainder is what is expected, and no less than the share of the variance that the
-    components may leave.
-    """
-    basis, remainder = emulator.basis, emulator.remainder
-    squared = np.sum(basis.vectors**2)
-    there = np.sum(remainder.factors**2) + remainder.white * (len(basis.vectors) - basis.used)
-    least = (1.0 - EXPLAINED_SHARE) * (squared + remainder.total)
-    return np.linalg.norm(basis.residuals(outputs), axis=1) / np.sqrt(
-        max(there, least, ROUNDING_VARIANCE)
-    )
-
-
 def noise_share(emulator: Emulator) -> float:
     """Share of the outputs' variance that no parameter predicts: run-to-run noise."""
     used, rest = emulator.basis.used, emulator.remainder.total
     weight = np.sum(emulator.basis.vectors[:, :used] ** 2, 0)  # their scores have unit variance
-    noise = np.exp(2.0 * emulator.gp.hyper.log_noise[:used])
+    spread = float(np.mean(emulator.gp.data.noise(0.0)))
+    noise, rest = spread * np.exp(2.0 * emulator.gp.hyper.log_noise[:used]), spread * rest
     total = weight.sum() + rest
     return float((weight @ np.minimum(noise, 1.0) + rest) / total) if total > 0 else 0.0
 
@@ -231,6 +286,12 @@ def left_out(emulator: Emulator) -> np.ndarray:
     return _outputs(emulator.basis, leave_one_out(emulator.gp)[0])
 
 
+def _spread(emulator: Emulator, u: np.ndarray) -> np.ndarray:
+    """As `run_spread`, 1 where the size is constant."""
+    found = run_spread(emulator.size, u)
+    return np.ones(len(u)) if found is None else found
+
+
 def _outputs(basis: Basis, scores: np.ndarray) -> np.ndarray:
     """Outputs [n, m] of scores [k, n]."""
     return basis.centre + basis.scale * (scores.T @ basis.vectors.T)
@@ -242,7 +303,7 @@ def predict(emulator: Emulator, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     mean, variance = (part.T for part in predict_scores(emulator.gp, u))
     constant = np.sum(remainder.factors**2, 1) + remainder.white
     constant = constant + np.sum((basis.vectors @ emulator.noise) * basis.vectors, 1)
-    sd = np.sqrt(variance @ basis.vectors.T**2 + constant)
+    sd = np.sqrt(variance @ basis.vectors.T**2 + _spread(emulator, u)[:, None] * constant)
     return basis.centre + basis.scale * (mean @ basis.vectors.T), basis.scale * sd
 
 
@@ -255,10 +316,11 @@ def predictive_draws(rng: np.random.Generator, emulator: Emulator, u: np.ndarray
     factor = rng.normal(size=(len(u), remainder.factors.shape[1]))
     white = rng.normal(size=(len(u), len(basis.scale)))
     values, vectors = np.linalg.eigh(emulator.noise)
-    noisy = noisy @ (vectors * np.sqrt(np.maximum(values, 0.0))).T
-    scores = (mean + np.sqrt(variance) * latent + noisy) * full
-    standard = scores @ basis.vectors.T + factor @ remainder.factors.T
-    return basis.centre + basis.scale * (standard + np.sqrt(remainder.white) * white)
+    noisy = noisy @ (vectors * np.sqrt(np.maximum(values, 0.0))).T * full
+    size = np.sqrt(_spread(emulator, u))[:, None]
+    scores = (mean + np.sqrt(variance) * latent) * full + size * noisy
+    left = factor @ remainder.factors.T + np.sqrt(remainder.white) * white
+    return basis.centre + basis.scale * (scores @ basis.vectors.T + size * left)
 
 
 def latent_covariance(emulator: Emulator, u: np.ndarray) -> np.ndarray:

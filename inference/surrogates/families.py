@@ -1,6 +1,6 @@
 """The families of surrogates: what a user may choose of each, and how it learns."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import ClassVar, NamedTuple
@@ -8,23 +8,26 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_callable, checked_integer, checked_number
+from ..arguments import check_callable, check_flag, checked_integer, checked_number
 from ..simulations.failures import not_finite
 from ..types import Discrepancy
 from .base import Surrogate
-from .discrepancy import DiscrepancySurrogate, averaged, learn, marginalised, with_threshold
-from .emulator import PREDICTED_SHARE, Limits, emulate
-from .given_noise import Covariance, GivenNoise, check_noise, given_noise
+from .discrepancy import DiscrepancySurrogate, learn, marginalised, with_threshold
+from .emulator import PREDICTED_SHARE, Emulator, Limits, emulate, goes_on, resized
+from .given_noise import Covariance, Noise, check_noise, given_noise
+from .noise.by_mean import ByMean, SdOfMean, law_of
+from .noise.scales import Plain, Scale, comparable
 from .outliers import sane
 from .output_vectors import Output, Summary, describe, infinities, summarise
-from .signal import Noise, SignalSurrogate, observe
-from .squared_difference import evaluate, failed_on, squared_difference
-from .success import Feasibility, learn_success
-from .threshold import Threshold, check_rule
+from .signal import MIN_FREEDOM, SignalSurrogate, observe
+from .squared_difference import evaluate, failed_on, independent, numbers, squared_difference
+from .success import Runs, learn_success
+from .threshold import Matched, Threshold, check_rule
 from .transform import TRANSFORMS
+from .warnings import GUESSED, distance_warnings
 
 MAX_COMPONENTS = 8
-ERROR_DRAWS = 64  # of noise, over which the posterior of a discrepancy is averaged; pairs
+LEFT_OF_NOISE = 0.02  # of the variance of noise by the mean, that components may leave
 
 
 class Learnable(NamedTuple):
@@ -34,7 +37,7 @@ class Learnable(NamedTuple):
     features: np.ndarray  # [n, m]
     discrepancy: np.ndarray  # [n]
     normal: np.ndarray | None  # bool [d], see `Prior.normal`
-    runs: Feasibility  # all, failed ones too
+    runs: Runs  # all, failed ones too
 
 
 class Measured(NamedTuple):
@@ -53,30 +56,26 @@ class DiscrepancyFamily:
         discrepancy: Callable (observed, simulated) -> float; None is `squared_difference()`.
         transform: "identity", "sqrt" or "log" of the discrepancy; None chooses by
             leave-one-out log predictive density.
-        threshold: Rule for eps, or a number on the discrepancy's own scale, which may be
+        threshold: Rule for eps; None makes the posterior as wide as the closest run's residual
+            suggests, see `threshold.matched`, or guesses of fewer than 3 numbers more than
+            parameters; or a number on the discrepancy's own scale, which may be
             negative where a user's discrepancy is, as a logarithm; see
             `threshold.choose_threshold`.
         hyper_draws: Posterior draws of the hyperparameters over which the likelihood of a fit
             is averaged; 0 takes the best hyperparameters alone.
-        noise: What lies between simulator and data besides the simulator's own noise, as in
-            `SignalFamily`, such as `criticism.model_error`: the posterior of a fit is averaged
-            over draws of it, taken off what was observed. Points are chosen without it. None
-            leaves it out.
     """
 
     name: ClassVar[str] = "discrepancy"
-    acquisition: ClassVar[str] = "eiv"
+    acquisition: ClassVar[str] = "cautious"
     replicates: ClassVar[bool] = False
 
     discrepancy: Discrepancy | None = None
     transform: str | None = None
     threshold: Threshold = None
     hyper_draws: int = 0
-    noise: ArrayLike | Covariance | None = None
 
     def __post_init__(self) -> None:
         check_rule(self.threshold)
-        check_noise(self.noise)
         check_callable("discrepancy", self.discrepancy)
         if self.transform is not None and self.transform not in tuple(TRANSFORMS):
             raise ValueError(
@@ -85,15 +84,7 @@ class DiscrepancyFamily:
         checked_integer("hyper_draws", self.hyper_draws, 0)
 
     def learner(self, observed: np.ndarray) -> "DiscrepancyLearner":
-        distance = _distance(self.discrepancy, observed)
-        if self.noise is None:
-            return DiscrepancyLearner(self, distance, observed, np.empty((0, *observed.shape)))
-        output = describe(observed, None)
-        noise = given_noise(self.noise, output)
-        # the same for all runs of a fit, so that the smallest discrepancy is where it is
-        drawn = output.restore(noise.draw(np.random.default_rng(0), ERROR_DRAWS // 2))
-        pairs = np.concatenate([drawn, -drawn]).reshape(-1, *observed.shape)
-        return DiscrepancyLearner(self, distance, observed, pairs)
+        return DiscrepancyLearner(self, _distance(self.discrepancy, observed), observed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,11 +94,10 @@ class DiscrepancyLearner:
     family: DiscrepancyFamily
     distance: Discrepancy
     observed: np.ndarray
-    errors: np.ndarray  # draws [k, *shape] of the noise
 
     @property
     def features(self) -> int:
-        return len(self.errors)
+        return self.observed.size
 
     @property
     def any_shape(self) -> bool:
@@ -115,34 +105,60 @@ class DiscrepancyLearner:
         return self.family.discrepancy is not None
 
     def measure(self, signals: Sequence[np.ndarray | None]) -> Measured:
-        """Discrepancies of n signals, None where a run failed; features [n, k] are those from
-        observed less each draw of the noise."""
-        displaced = [evaluate(self.distance, self.observed - e, signals)[0] for e in self.errors]
-        features = np.reshape(displaced, (self.features, len(signals))).T
+        """Features [n, m] and discrepancies of n signals, None where a run failed.
+
+        The features are the signal, NaN where it has another shape than what was observed.
+        """
+        features = np.full((len(signals), self.observed.size), np.nan)
+        for row, signal in zip(features, signals, strict=True):
+            if signal is not None and signal.shape == self.observed.shape:
+                row[:] = signal.ravel()
         return Measured(features, *evaluate(self.distance, self.observed, signals))
 
     def learnable(self, discrepancy: np.ndarray) -> np.ndarray:
-        """Which of the successful simulations are learned from, bool [n]: all."""
-        return np.ones(len(discrepancy), bool)
+        """Which of the successful simulations are learned from, bool [n]: what blew up is not."""
+        return sane(discrepancy)
 
     def learn(
         self, known: Learnable, previous: DiscrepancySurrogate | None
     ) -> DiscrepancySurrogate:
-        transform, rule = self.family.transform, self.family.threshold
-        learned = learn(known.u, known.discrepancy, transform, previous, known.normal)
+        """To search with: errors count as independent, lest a poor start leave it undecided."""
+        return self._learn(known, previous, self._rule(known, numbers))
+
+    def _learn(
+        self, known: Learnable, previous: DiscrepancySurrogate | None, rule: Threshold
+    ) -> DiscrepancySurrogate:
+        transform = self.family.transform
+        good = self.learnable(known.discrepancy)
+        learned = learn(known.u[good], known.discrepancy[good], transform, previous, known.normal)
         learned = replace(learned, success=learn_success(known.runs, known.normal))
         return learned if rule is None else with_threshold(learned, rule)
 
+    def _rule(self, known: Learnable, number: Callable[..., float]) -> Threshold:
+        """The threshold that was given, or the one that fits the closest run's residual."""
+        residual = self._residual(known)
+        if self.family.threshold is not None or numbers(residual) - known.u.shape[1] < MIN_FREEDOM:
+            return self.family.threshold
+        return Matched(number(residual))
+
+    def _residual(self, known: Learnable) -> np.ndarray:
+        """By which the closest run misses what was observed, NaN where nothing can be said."""
+        closest = known.features[np.argmin(known.discrepancy)]
+        return closest.reshape(self.observed.shape) - self.observed
+
     def finish(self, known: Learnable, seed: int) -> Surrogate:
         """The surrogate on which a fit rests."""
-        learned = self.learn(known, None)
-        draws, rule = self.family.hyper_draws, self.family.threshold
+        rule = self._rule(known, independent)
+        learned, draws = self._learn(known, None, rule), self.family.hyper_draws
         if draws:
             learned = marginalised(learned, rule, draws, seed)
-        if not self.features:
-            return learned
-        worst = known.features[sane(known.discrepancy)].max(0)  # as `learn` counts what blew up
-        return averaged(learned, np.minimum(known.features, worst), rule)
+        said = () if rule is not None else (GUESSED,)
+        if self.family.discrepancy is None:
+            good = self.learnable(known.discrepancy)
+            order = np.argsort(known.discrepancy[good])
+            outputs = known.features[good][order].reshape(-1, *self.observed.shape)
+            said += tuple(distance_warnings(self.observed, outputs))
+        return replace(learned.cautious, said=said)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,9 +171,13 @@ class SignalFamily:
         noise: Measurement noise that the simulator does not make: its sd, a number or an array
             shaped like the observed (summarised) output; or sds [n], or a covariance [n, n], of
             that output's n finite values, flattened; or an object that has such a covariance, as
-            `criticism.KnownNoise`, `model_error` and their `SumOfNoises`; 0 for none. None
-            estimates it: as an AR(1) process where the output is a series, of at least 5 samples
-            without a summary.
+            `criticism.KnownNoise`, `model_error` and their `SumOfNoises`; 0 for none. "poisson"
+            where counts were observed and their means are simulated; `relative(0.2)` for an sd of
+            20 % of the simulated mean; or a function from simulated means to sds, value by value.
+            None estimates it: as an AR(1) process where the output is a series, of at least 5
+            samples without a summary.
+        varying_noise: Whether the noise that the simulator makes itself may depend on the
+            parameters and on the mean, where runs show that it does.
         misfit: Prior probability that the data are missed by more than the given noise, because
             the simulator errs or the noise is larger; its size is integrated out. 0 for never.
         components: At most.
@@ -173,17 +193,20 @@ class SignalFamily:
     replicates: ClassVar[bool] = True
 
     summary: Summary | None = None
-    noise: ArrayLike | Covariance | None = None
+    noise: ArrayLike | Covariance | SdOfMean | None = None
     misfit: float = 0.1
     components: int = MAX_COMPONENTS
     predicted: float | None = PREDICTED_SHARE
     discrepancy: Discrepancy | None = None
+    varying_noise: bool = True
 
     def __post_init__(self) -> None:
         check_callable("summary", self.summary)
         check_callable("discrepancy", self.discrepancy)
+        check_flag("varying_noise", self.varying_noise)
         checked_integer("components", self.components)
-        check_noise(self.noise)
+        if self.noise is not None and law_of(self.noise) is None:
+            check_noise(self.noise)
         checked_number("misfit", self.misfit, lambda p: 0.0 <= p < 1.0, "from 0 to below 1")
         if self.predicted is not None:
             due = "None or from 0 to below 1"
@@ -193,8 +216,15 @@ class SignalFamily:
         output = describe(observed, self.summary)
         values = output.values(observed)
         distance = self.discrepancy or partial(_of_summaries, self.summary)
-        noise = None if self.noise is None else given_noise(self.noise, output)
-        return SignalLearner(self, output, distance, observed, values, noise)
+        return SignalLearner(self, output, distance, observed, values, self._scale(output, values))
+
+    def _scale(self, output: Output, values: np.ndarray) -> Scale:
+        """On which outputs are emulated, `values` [m] being observed."""
+        law = law_of(self.noise)
+        if law is not None:
+            return ByMean(law, values, output.counts)
+        given = None if self.noise is None else given_noise(self.noise, output)  # pyright: ignore[reportArgumentType]  no function is left
+        return Plain(values, given)
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +236,7 @@ class SignalLearner:
     distance: Discrepancy
     observed: np.ndarray
     values: np.ndarray
-    noise: GivenNoise | None
+    scale: Scale
 
     @property
     def features(self) -> int:
@@ -230,6 +260,10 @@ class SignalLearner:
                 features[i] = self.output.values(signal)
             except (Exception, SystemExit) as error:  # of the user's summary
                 errors[i] = failed_on("summary", signal, self.observed, error)
+            try:
+                self.scale.check(features[i])
+            except (Exception, SystemExit) as error:  # of the user's function of the mean
+                errors[i], features[i] = failed_on("noise", signal, self.observed, error), np.nan
         failed = ~np.isfinite(features).all(1)
         return Measured(features, np.where(failed, np.nan, discrepancy), errors)
 
@@ -249,21 +283,40 @@ class SignalLearner:
 
     def learn(self, known: Learnable, previous: SignalSurrogate | None) -> SignalSurrogate:
         learnable = self.learnable(known.discrepancy)
-        features = known.features[learnable]
+        u, values = known.u[learnable], known.features[learnable]
+        if previous is not None and not goes_on(previous.emulator, previous.scale.of(values)):
+            previous = None
+        scale = self._fitting(u, values) if previous is None else previous.scale
+        emulator = self._emulator(known._replace(u=u, features=values), scale, previous)
+        success = learn_success(known.runs, known.normal)
+
+        def compared(at: np.ndarray | None) -> SignalSurrogate:
+            """With what was observed, its noise being right around the features `at` [m]."""
+            seen, given = scale.seen(at)
+            noise = Noise(given, self.family.misfit)
+            found = observe(emulator, self.output, seen, noise, previous)
+            return replace(found, success=success, scale=scale)
+
+        found = compared(None)
+        for _ in range(scale.rounds - 1):
+            found = compared(found.best_features)
+        return found
+
+    def _fitting(self, u: np.ndarray, values: np.ndarray) -> Scale:
+        """The scale for runs of values [n, m] at u [n, d]."""
+        if not (self.family.varying_noise and isinstance(self.scale, Plain)):
+            return self.scale
+        return self.scale.fitting(u, values, self.output.layout.channel)
+
+    def _emulator(
+        self, known: Learnable, scale: Scale, previous: SignalSurrogate | None
+    ) -> Emulator:
+        left = LEFT_OF_NOISE if isinstance(scale, ByMean) else np.inf
+        limits = Limits(self.family.components, self.family.predicted, left)
+        features, units = scale.of(known.features), comparable(scale, self.output)
         old = None if previous is None else previous.emulator
-        limits = Limits(self.family.components, self.family.predicted)
-        emulator = emulate(
-            known.u[learnable],
-            features,
-            self.output.scale,
-            limits,
-            old,
-            known.normal,
-        )
-        kept = previous if old is not None and emulator.learned_at == old.learned_at else None
-        noise = Noise(self.noise, self.family.misfit)
-        observed = observe(emulator, self.output, self.values, noise, kept)
-        return replace(observed, success=learn_success(known.runs, known.normal))
+        found = emulate(known.u, features, units, limits, old, known.normal)
+        return found if old or not self.family.varying_noise else resized(found, units)
 
     def finish(self, known: Learnable, seed: int) -> Surrogate:
         """The surrogate on which a fit rests."""

@@ -41,9 +41,22 @@ class GivenNoise(NamedTuple):
         )
 
 
-def check_noise(noise: ArrayLike | Covariance | None) -> None:
+class Noise(NamedTuple):
+    """What is believed of the noise between the simulator and the data.
+
+    Attributes:
+        given: The measurement noise; None where it is unknown.
+        misfit: Prior probability that the data are missed by more than the given noise explains;
+            0 for none.
+    """
+
+    given: GivenNoise | None
+    misfit: float
+
+
+def check_noise(noise: ArrayLike | Covariance) -> None:
     """Raise ValueError for what is never a noise; its shape is looked at beside the output's."""
-    if noise is not None and not isinstance(noise, Covariance):
+    if not isinstance(noise, Covariance):
         checked_array("noise", noise)
 
 

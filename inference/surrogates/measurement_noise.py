@@ -60,6 +60,8 @@ class Reduced(NamedTuple):
     estimate: np.ndarray  # [g, k]
     covariance: np.ndarray  # [g, k, k]
     log_weight: np.ndarray  # [g]
+    unexplained: np.ndarray  # [g], squared distance of the values from what scores can make
+    share: np.ndarray  # [g], of the run-to-run noise in the variance of all noise
 
 
 def shrunk_covariance(residuals: np.ndarray, lost: int) -> Remainder:
@@ -163,7 +165,7 @@ def reduce(
     log_det = log_det + np.linalg.slogdet(inner)[1]
     # the estimate's own normalisation belongs to N(estimate; scores, covariance)
     log_weight = -0.5 * (log_det + unexplained - np.linalg.slogdet(covariance)[1])
-    return Reduced(estimate, covariance, log_weight)
+    return Reduced(estimate, covariance, log_weight, unexplained, np.ones(len(nodes.sigma)))
 
 
 def correlated(white: np.ndarray, layout: Layout, nodes: Nodes) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,8 +17,7 @@ from .emulator import (
     predict,
     predictive_draws,
 )
-from .given_noise import GivenNoise
-from .held_back import HeldBack, held_back
+from .given_noise import GivenNoise, Noise
 from .measurement_noise import (
     CORRELATIONS,
     FEW_CORRELATIONS,
@@ -38,6 +36,8 @@ from .measurement_noise import (
     residual_size,
     with_misfit,
 )
+from .noise.run_size import run_spread
+from .noise.scales import Plain, Scale, in_units
 from .output_vectors import Output
 from .signal_likelihood import (
     SignalState,
@@ -50,9 +50,10 @@ from .warnings import (
     FEW_NUMBERS,
     MISFIT,
     OUTSIDE,
+    SMOOTH,
+    TOO_FAST,
     UNPREDICTED,
     complaints,
-    held_back_warnings,
     noise_warnings,
 )
 
@@ -61,6 +62,8 @@ SCREENED_POINTS = 128
 MISFIT_POINTS = 1024  # among which the smallest misfit is looked for
 MIN_FREEDOM = 3  # numbers more than parameters, from which the size of the noise can be told
 NEEDED = 0.95  # posterior probability of a misfit from which it is said
+LEAST_SEEN = 0.01  # of the outputs' sd, from which a misfit is worth a word
+SLOW = 0.9  # correlation of neighbouring samples from which noise looks like a signal
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +73,8 @@ class SignalSurrogate:
     Attributes:
         emulator: Of the outputs.
         output: How outputs become values.
-        observed: The observed values [m].
-        known: Measurement noise that the user gave.
+        observed: The observed values on the emulator's scale [m].
+        known: Measurement noise that the user gave, on that scale.
         nodes: Sizes and correlations of the unknown measurement noise, or of a misfit beside noise
             that is given; KEPT_NODES of them. Size 0 is no misfit.
         log_prior: Log weights of the nodes before anything is compared [g].
@@ -80,6 +83,7 @@ class SignalSurrogate:
             None is everywhere. Where hardly anything was simulated, the emulator knows least, and
             what it does not know counts as noise that explains anything.
         success: Where runs succeed, see `success.learn_success`.
+        scale: Leads from the output's values to what the emulator knows.
     """
 
     emulator: Emulator
@@ -91,20 +95,21 @@ class SignalSurrogate:
     reduced: Reduced
     box: tuple[np.ndarray, np.ndarray] | None = None
     success: GP | None = None
+    scale: Scale = Plain(np.zeros(0), None)
 
     @property
     def gp(self) -> GP:
         return self.emulator.gp
 
+    @property
+    def cautious(self) -> "SignalSurrogate":
+        """This one: a misfit of unknown size leaves no agreement to doubt."""
+        return self
+
     @cached_property
     @in_float64
     def state(self) -> SignalState:
         return state_of(self.emulator, self.reduced, self.box)._replace(success=self.success)
-
-    @cached_property
-    def held_back(self) -> HeldBack:
-        """Errors of the last simulations."""
-        return held_back(self.emulator, self.output.scale)
 
     @property
     def log_likelihood(self) -> LogLikelihood:
@@ -125,7 +130,8 @@ class SignalSurrogate:
         """Condition on the predicted means at u [n, d], for points still being simulated."""
         if len(u) == 0:
             return self
-        return replace(self, emulator=self.emulator._replace(gp=believe(self.gp, u)))
+        believed = believe(self.gp, u, run_spread(self.emulator.size, u))
+        return replace(self, emulator=self.emulator._replace(gp=believed))
 
     @property
     @in_float64
@@ -136,6 +142,11 @@ class SignalSurrogate:
         return weights / weights.sum()
 
     @property
+    def best_features(self) -> np.ndarray:
+        """What is predicted at the best parameters, on the emulator's scale [m]."""
+        return predict(self.emulator, self.minimum()[None])[0][0]
+
+    @property
     def misfit_probability(self) -> float:
         """Posterior probability of a misfit beside noise that is given."""
         return float(self.node_weights[self.nodes.sigma > 0.0].sum())
@@ -144,17 +155,23 @@ class SignalSurrogate:
     def constants(self) -> dict[str, np.ndarray]:
         """What a reader of the posterior must know of the likelihood."""
         weights = self.node_weights
-        variance = weights @ self.nodes.sigma**2 * self.emulator.basis.scale[0] ** 2
-        if self.known is not None:
-            variance = variance + self.known.variance[0]
+        misfit = np.sqrt(weights @ self.nodes.sigma**2) * self.emulator.basis.scale
+        best = self.best_features[None]
+        given = self.scale.sds(self.scale.back(best))[0, 0]
         return {
             "components": np.asarray(self.emulator.basis.used),
             "explained_variance": np.asarray(self.emulator.basis.explained),
             "run_to_run_noise_share": np.asarray(noise_share(self.emulator)),
             # of the output's first value; a channel's noise is in proportion to its scale
-            "measurement_noise_sd": np.sqrt(variance),
+            "measurement_noise_sd": np.hypot(in_units(self.scale, best, misfit[None])[0, 0], given),
             "measurement_noise_correlation": weights @ self.nodes.rho,
         }
+
+    def described(self) -> list[str]:
+        """The noise, and how it was found."""
+        noise = float(self.constants()["measurement_noise_sd"])
+        how = "estimated" if self.known is None else "given"
+        return [f"measurement noise of sd {noise:.3g} in the first value, {how}"]
 
     @in_float64
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -162,26 +179,61 @@ class SignalSurrogate:
 
         The sd holds the emulator's and the run-to-run variance, not measurement noise.
         """
-        return predict(self.emulator, u)
+        mean, sd = predict(self.emulator, u)
+        return self.scale.back(mean), in_units(self.scale, mean, sd)
 
     @in_float64
     def checks(self) -> dict[str, np.ndarray]:
-        """Studentised errors: leave-one-out ones `loo_z` [n, components in use], and `foretold_z`
-        [n, components + 1], see `HeldBack`."""
-        return {"loo_z": loo_errors(self.emulator), "foretold_z": self.held_back.errors}
+        """Studentised leave-one-out errors `loo_z` [n, components in use]."""
+        return {"loo_z": loo_errors(self.emulator)}
+
+    @property
+    def fits(self) -> bool:
+        """Whether parameters and noise explain what was observed."""
+        if not self.emulator.basis.used and self.emulator.size is None:
+            return True
+        return not (self._missed() or self._smooth() or self._outside())
 
     @in_float64
-    def warnings(self) -> list[str]:
-        """What the emulator's own checks complain of."""
-        if self.emulator.basis.used == 0:
-            return [EQUAL if self.emulator.equal else UNPREDICTED]
-        said = complaints(loo_errors(self.emulator), "output")
-        said += noise_warnings(noise_share(self.emulator)) + held_back_warnings(self.held_back)
-        if self.known is not None and self.misfit_probability > NEEDED:
+    def warnings(self, *, confirmed: bool = False) -> list[str]:
+        """What the emulator's own checks complain of, unless it is confirmed, and what the data
+        show."""
+        repeats, sized = self.emulator.repeats, self.emulator.size is not None
+        if self.emulator.basis.used == 0 and not sized:
+            if self.emulator.equal:
+                return [EQUAL]
+            return [TOO_FAST if len(repeats) and not repeats.any() else UNPREDICTED]
+        said = [] if confirmed else complaints(loo_errors(self.emulator), "output")
+        said += noise_warnings(noise_share(self.emulator), repeats, sized)
+        if self._outside():
+            said.append(OUTSIDE)
+        elif self._missed():
             said.append(MISFIT)
+        elif self._smooth():
+            said.append(SMOOTH)
         if self.known is None and len(self.observed) - self.gp.data.u.shape[1] < MIN_FREEDOM:
             said.append(FEW_NUMBERS)
-        return [OUTSIDE, *said] if self._outside() else said
+        return said
+
+    def _missed(self) -> bool:
+        """Whether the given noise does not explain what was observed."""
+        return self.known is not None and self.misfit_probability > NEEDED
+
+    def _smooth(self) -> bool:
+        """Whether the noise that was found varies as slowly as a signal, and is most of what no
+        component can make of the data."""
+        if self.known is not None or not self.output.long:
+            return False
+        weights, (sigma, rho) = self.node_weights, self.nodes
+        slow = float(weights @ (sigma**2 * (rho > SLOW)))
+        most = 0.5 * max(self._residual**2, float(weights @ sigma**2))
+        return slow > max(most, LEAST_SEEN**2)
+
+    @property
+    def _residual(self) -> float:
+        """Root mean square of what no component can make of the data, standardised."""
+        basis = self.emulator.basis
+        return residual_size(basis.standardise(self.observed), basis.vectors[:, : basis.used])
 
     def _outside(self) -> bool:
         """Whether the observed scores are twice as far out as any simulated ones, or what no
@@ -191,8 +243,10 @@ class SignalSurrogate:
         reach = np.abs(self.gp.data.y[used]).max(1)
         error = np.sqrt(np.diagonal(self.reduced.covariance, axis1=1, axis2=2))[:, used]
         far = np.abs(self.reduced.estimate[:, used]) > 2.0 * reach + 3.0 * error
-        size = residual_size(basis.standardise(self.observed), basis.vectors[:, used])
-        return bool(far.any(1).all()) or (self.output.long and size > 1.0)
+        varied = np.sum(basis.vectors**2) + self.emulator.remainder.total
+        differ = np.sqrt(varied / len(self.observed))  # what simulations differ by
+        far_off = self.output.long and self._residual > max(1.0, differ)
+        return bool(far.any(1).all()) or far_off
 
     @in_float64
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
@@ -206,10 +260,8 @@ class SignalSurrogate:
         which = rng.choice(len(weights), len(u), p=weights)
         nodes = Nodes(*(part[which] for part in self.nodes))
         noise = correlated(rng.normal(size=values.shape), self.output.layout, nodes)
-        values = values + self.emulator.basis.scale * noise
-        if self.known is not None:
-            values = values + self.known.draw(rng, len(values))
-        return {"signal": self.output.restore(values)}
+        values = self.scale.back(values + self.emulator.basis.scale * noise)
+        return {"signal": self.output.restore(self.scale.observe(rng, values))}
 
 
 def state_of(
@@ -217,7 +269,7 @@ def state_of(
 ) -> SignalState:
     """What the likelihood depends on: of the components in use."""
     used, d = emulator.basis.used, emulator.gp.data.u.shape[1]
-    return SignalState(
+    state = SignalState(
         emulator.gp.only(slice(used)),
         np.ones(used),
         reduced.estimate[:, :used],
@@ -225,19 +277,11 @@ def state_of(
         reduced.log_weight,
         *(box or (np.zeros(d), np.ones(d))),
     )
-
-
-class Noise(NamedTuple):
-    """What is believed of the noise between the simulator and the data.
-
-    Attributes:
-        given: The measurement noise; None where it is unknown.
-        misfit: Prior probability that the data are missed by more than the given noise explains;
-            0 for none.
-    """
-
-    given: GivenNoise | None
-    misfit: float
+    if emulator.size is None:
+        return state
+    freedom = np.asarray(float(len(emulator.basis.scale) - used))
+    sized = {"size": emulator.size, "share": reduced.share, "freedom": freedom}
+    return state._replace(unexplained=reduced.unexplained, **sized)
 
 
 @in_float64
@@ -270,15 +314,27 @@ def observe(
     else:
         nodes, log_weight = _nodes(emulator, output, observed, noise)
     if emulator.equal:  # nothing to compare
-        reduced = Reduced(*(np.zeros((len(log_weight), *[0] * axes)) for axes in (1, 2, 0)))
+        reduced = Reduced(*(np.zeros((len(log_weight), *[0] * axes)) for axes in (1, 2, 0, 0, 0)))
     else:
         reduced = reduce((vectors, target, factors), white, output.layout, nodes)
-    reduced = _widen(reduced._replace(log_weight=reduced.log_weight + log_weight), emulator)
+    own = _own_variance(emulator)
+    other = np.sum(white - remainder.white) + np.sum(factors[:, remainder.factors.shape[1] :] ** 2)
+    other = other + len(target) * nodes.sigma**2
+    share = own / np.maximum(own + other, np.finfo(float).tiny)
+    weighed = reduced._replace(log_weight=reduced.log_weight + log_weight, share=share)
+    reduced = _widen(weighed, emulator)
     if len(log_weight) > KEPT_NODES:
         kept = _keep(emulator, reduced)
         reduced = Reduced(*(part[kept] for part in reduced))
         nodes, log_weight = Nodes(*(part[kept] for part in nodes)), log_weight[kept]
     return SignalSurrogate(emulator, output, observed, given, nodes, log_weight, reduced)
+
+
+def _own_variance(emulator: Emulator) -> float:
+    """Of the run-to-run noise, at its size 1, over all values together."""
+    used = emulator.basis.used
+    squared = np.sum(emulator.basis.vectors[:, :used] ** 2, 0)
+    return emulator.remainder.total + float(np.diag(emulator.noise)[:used] @ squared)
 
 
 def _nodes(
@@ -323,7 +379,8 @@ def _widen(reduced: Reduced, emulator: Emulator) -> Reduced:
     estimate[:, :used] = reduced.estimate
     covariance = np.tile(np.eye(k), (nodes, 1, 1))
     covariance[:, :used, :used] = reduced.covariance + emulator.noise[:used, :used]
-    return Reduced(estimate, covariance, reduced.log_weight - reduced.log_weight.max())
+    log_weight = reduced.log_weight - reduced.log_weight.max()
+    return reduced._replace(estimate=estimate, covariance=covariance, log_weight=log_weight)
 
 
 def _keep(emulator: Emulator, reduced: Reduced) -> np.ndarray:

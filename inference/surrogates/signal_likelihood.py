@@ -9,6 +9,7 @@ import numpy as np
 
 from ..gp.namespaces import log_sum_exp, namespace
 from ..gp.process import GP, padded, padded_rows, predict
+from .noise.run_size import Size, log_size
 from .success import log_success, padded_success
 
 SCORES_TOGETHER = 8  # by which the scores of padded states are counted
@@ -29,6 +30,13 @@ class SignalState(NamedTuple):
     low: np.ndarray  # [d], ends of the box outside of which the likelihood vanishes
     high: np.ndarray
     success: GP | None = None  # see `success.learn_success`
+    doubt: np.ndarray = np.ones(())  # the part of the emulator's variance that counts
+    size: Size | None = None  # of the run-to-run noise, where it depends on the parameters
+    # of size 1: its share of each node's noise [g], `Reduced.unexplained` [g], and values less
+    # scores; nothing without `size`
+    share: np.ndarray | None = None
+    unexplained: np.ndarray | None = None
+    freedom: np.ndarray | None = None
 
     def padded(self) -> "SignalState":
         """The same likelihood in arrays of few shapes."""
@@ -43,6 +51,7 @@ class SignalState(NamedTuple):
             estimate=np.pad(self.estimate, ((0, 0), more)),
             covariance=covariance,
             success=padded_success(self.success),
+            size=None if self.size is None else self.size.padded(),
         )
 
 
@@ -60,16 +69,34 @@ def log_likelihood(state: SignalState, u: Any) -> Any:
 def node_log_densities(state: SignalState, u: Any) -> Any:
     """The terms [n, g] of `log_likelihood`'s sum."""
     mean, variance = scores(state, u)
-    covariance = _with_variances(state.covariance, variance[:, None])
+    of_noise, log_weight = state.covariance, state.log_weight
+    if state.size is not None:
+        factor = _noise_factor(state, state.size, u)
+        of_noise = factor[..., None, None] * of_noise
+        log_weight = log_weight - 0.5 * (
+            state.freedom * namespace(u).log(factor) + state.unexplained * (1.0 / factor - 1.0)
+        )
+    covariance = _with_variances(of_noise, variance[:, None])
     log_det, square = eliminate(covariance, state.estimate - mean[:, None])
     constant = math.log(2.0 * math.pi) * state.used.sum()
-    return state.log_weight - 0.5 * (constant + log_det + square)
+    return log_weight - 0.5 * (constant + log_det + square)
+
+
+def _noise_factor(state: SignalState, size: Size, u: Any) -> Any:
+    """By how much the variance of all noise is larger at u than at size 1 of the run-to-run noise,
+    [n, g].
+
+    Exact where a node has no other noise, or next to no run-to-run noise; between the two, all of
+    a node's noise keeps its shape while it grows.
+    """
+    spread = namespace(u).exp(2.0 * log_size(size, u))
+    return 1.0 + state.share * (spread[:, None] - 1.0)
 
 
 def scores(state: SignalState, u: Any) -> tuple[Any, Any]:
     """Means and variances [n, k] of the scores at u; outside of the box, those at its end."""
     mean, variance = predict(state.gp, namespace(u).clip(u, state.low, state.high))
-    return mean.T * state.used, variance.T * state.used
+    return mean.T * state.used, variance.T * state.used * state.doubt
 
 
 def _wall(state: SignalState, u: Any) -> Any:
@@ -94,7 +121,11 @@ def log_second_moment(state: SignalState, u: np.ndarray, spread: np.ndarray | No
     varying = total if spread is None else spread[..., :k]
     ones = [1] * (varying.ndim - 2)  # axes of `spread` beside n and k
     left = (state.estimate[loudest] - mean).reshape(len(u), *ones, k)
-    covariance = state.covariance[loudest].reshape(len(u), *ones, k, k)
+    covariance = state.covariance[loudest]
+    if state.size is not None:
+        factor = _noise_factor(state, state.size, u)[np.arange(len(u)), loudest]
+        covariance = factor[:, None, None] * covariance
+    covariance = covariance.reshape(len(u), *ones, k, k)
     total = total.reshape(left.shape)
     log_det, square = eliminate(_with_variances(covariance, total), left)
     rest = _with_variances(covariance, total - varying)

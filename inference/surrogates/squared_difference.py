@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from ..arguments import checked_array
 from ..simulations.failures import incomparable, raised
 from ..types import Discrepancy
+from .output_vectors import MIN_SERIES
 
 
 def squared_difference(time: ArrayLike | None = None) -> Discrepancy:
@@ -125,3 +126,29 @@ def _number(named: str, returned: object) -> float:
     if value.shape != ():
         raise ValueError(f"{named} must return one number, got shape {value.shape}")
     return float(value) if np.isfinite(value) else np.nan
+
+
+def numbers(residual: np.ndarray) -> float:
+    """How many numbers were observed."""
+    return float(np.isfinite(residual).sum())
+
+
+def independent(residual: np.ndarray) -> float:
+    """The number of independent normal errors of equal size that a residual amounts to.
+
+    Fewer than there are where neighbours in time are correlated, (1 - rho) / (1 + rho) of them,
+    and where a few are much larger than the others: sum(e^2)^2 / sum(e^4) is a third of it.
+
+    Args:
+        residual: [t, ...], time first; NaN where nothing was observed.
+    """
+    error = np.nan_to_num(residual).reshape(len(residual), -1) if residual.ndim else residual[None]
+    size, count = np.abs(error).max(), numbers(residual)
+    if not size > 0.0:
+        return count
+    with np.errstate(under="ignore"):
+        error = error / size
+        squares = np.sum(error**2)
+    rho = np.sum(error[1:] * error[:-1]) / squares if len(error) >= MIN_SERIES else 0.0
+    uneven = 3.0 * squares**2 / np.sum(error**4) / count
+    return float(count * min(1.0, (1.0 - rho) / (1.0 + rho)) * min(1.0, uneven))

@@ -1,51 +1,93 @@
 """Where runs succeed: the probability of it is a factor of the likelihood."""
 
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..gp.hyperparameters import maximum_a_posteriori
+from ..gp.hyperparameters import LENGTH
 from ..gp.namespaces import log_ndtr, namespace
-from ..gp.process import GP, Data, condition, padded, padded_rows, predict
+from ..gp.process import (
+    GP,
+    Data,
+    Hyper,
+    condition,
+    coordinates,
+    covariance,
+    padded,
+    padded_rows,
+    predict,
+)
 
-KERNEL_WIDTH = 0.1  # in prior quantiles
-PRIOR_SUCCESSES = 0.05  # successes that are assumed everywhere
+LENGTHS = (0.1, 0.2, 0.4, 0.8, 1.6)  # of all parameters, among which the evidence chooses
+AMPLITUDES = (1.0, 3.0, 10.0)  # of the latent function: up to how sure a place can be
+STEPS, TOLERANCE = 50, 1e-6  # of Newton's method; the latent function is of order 1
+LEAST_CURVATURE = 1e-6  # of a run's log likelihood, where its label is no surprise at all
 
 
-class Feasibility(NamedTuple):
+class Runs(NamedTuple):
     """Runs so far."""
 
     u: np.ndarray  # [p, d]
     succeeded: np.ndarray  # bool [p]
 
 
-def log_feasible(runs: Feasibility, u: np.ndarray) -> np.ndarray:
-    """Log of the share of successes around u [..., d] (Nadaraya and Watson) [...]; 0 if nothing
-    failed."""
-    near = np.exp(-0.5 * np.sum(((runs.u - u[..., None, :]) / KERNEL_WIDTH) ** 2, axis=-1))
-    good, bad = near @ runs.succeeded + PRIOR_SUCCESSES, near @ ~runs.succeeded
-    return np.log(good) - np.log(good + bad)
+class _Laplace(NamedTuple):
+    """Gaussian approximation of the latent function at the runs."""
+
+    log_evidence: float
+    targets: np.ndarray  # [p]: as a regression on these, with
+    variances: np.ndarray  # [p] of their noise
 
 
-def learn_success(runs: Feasibility, normal: np.ndarray | None) -> GP | None:
-    """A process of +1 where a run succeeded and -1 where it failed; None if none failed.
+def learn_success(runs: Runs, normal: np.ndarray | None) -> GP | None:
+    """A process whose normal integral is the probability of success; None if no run failed.
 
-    Least-squares classification (Rasmussen and Williams 2006, section 6.5): what is random in the
-    failures becomes the process's noise, a border becomes a zero of its mean.
+    Probit classification by Laplace's approximation (Rasmussen and Williams 2006, section 3.4),
+    which is a regression on working targets: a sharp border is a zero of a smooth function, and
+    what fails by chance makes it small.
     """
     if runs.succeeded.all():
         return None
-    data = Data(runs.u, np.where(runs.succeeded, 1.0, -1.0)[None], normal)
-    return condition(maximum_a_posteriori(data), data)
+    at, labels = coordinates(runs.u, normal), np.where(runs.succeeded, 1.0, -1.0)
+    found = []
+    for length, amplitude in product(LENGTHS, AMPLITUDES):
+        logs = np.log([length]), np.log([amplitude])
+        hyper = Hyper(np.tile(logs[0], (1, at.shape[1])), logs[1], np.zeros(1))
+        near = _laplace(covariance(hyper, at, at)[0], labels)
+        log_prior = -0.5 * ((logs[0][0] - LENGTH[0]) / LENGTH[1]) ** 2
+        found.append((near.log_evidence + log_prior, hyper, near))
+    _, hyper, near = max(found, key=lambda one: one[0])
+    return condition(hyper, Data(runs.u, near.targets[None], normal, near.variances))
+
+
+def _laplace(gram: np.ndarray, labels: np.ndarray) -> _Laplace:
+    """For the latent function's covariance [p, p] and labels [p] of -1 and 1."""
+    latent = np.zeros(len(labels))
+    for _ in range(STEPS):
+        log_density = -0.5 * latent**2 - 0.5 * np.log(2.0 * np.pi)
+        slope = labels * np.exp(log_density - log_ndtr(labels * latent))
+        curvature = np.maximum(slope**2 + latent * slope, LEAST_CURVATURE)
+        root = np.sqrt(curvature)
+        factor = np.linalg.cholesky(np.eye(len(gram)) + root[:, None] * gram * root)
+        step = curvature * latent + slope
+        white = np.linalg.solve(factor, root * (gram @ step))
+        weights = step - root * np.linalg.solve(factor.T, white)
+        before, latent = latent, gram @ weights
+        if np.abs(latent - before).max() < TOLERANCE:
+            break
+    log_evidence = np.sum(log_ndtr(labels * latent)) - 0.5 * weights @ latent
+    log_evidence -= np.sum(np.log(np.diag(factor)))
+    return _Laplace(float(log_evidence), before + slope / curvature, 1.0 / curvature)
 
 
 def log_success(gp: GP | None, u: Any) -> Any:
-    """Log probability [n] that a run at u [n, d] succeeds, Phi(mean / sd) of a new label."""
+    """Log probability [n] that a run at u [n, d] succeeds."""
     xp = namespace(u)
     if gp is None:
         return xp.zeros(len(u))
     mean, variance = predict(gp, u)
-    return log_ndtr(mean[0] / xp.sqrt(variance[0] + xp.exp(2.0 * gp.hyper.log_noise[0])))
+    return log_ndtr(mean[0] / xp.sqrt(1.0 + variance[0]))
 
 
 def padded_success(gp: GP | None) -> GP | None:

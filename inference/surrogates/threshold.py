@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri, owens_t
 
 from ..gp.namespaces import log_ndtr, log_sum_exp, namespace
@@ -18,8 +19,10 @@ class ThresholdState(NamedTuple):
 
     gp: GP  # k processes, one for each draw of the hyperparameters
     threshold: np.ndarray  # []
+    width: np.ndarray  # [], sd that the threshold has itself
+    resolution: np.ndarray  # [], sd of the latent mean from which doubt counts against a place
     success: GP | None = None  # see `success.learn_success`
-    log_area: np.ndarray | None = None  # [k], of likelihoods that count alike; None for the same
+    doubt: np.ndarray = np.ones(())  # the part of the latent variance that counts
 
     def padded(self) -> "ThresholdState":
         """The same likelihood in arrays of few shapes."""
@@ -41,36 +44,48 @@ class Predicted(NamedTuple):
     q: float
 
 
-Threshold = str | float | Quantile | Predicted | None
+class Matched(NamedTuple):
+    """Threshold, with a width, at which the posterior is as wide as that of data with `numbers`
+    independent normal errors of unknown size, of whose squares the discrepancy is a sum; see
+    `matched`."""
+
+    numbers: float
+
+
+Threshold = str | float | Quantile | Predicted | Matched | None
 RULES = ("min_mean", "min_observed")
-DEFAULT_THRESHOLD = Predicted(0.2)
+MATCHED_QUANTILE, LEAST_QUANTILE = 0.2, 0.02  # of a new discrepancy at the minimum
+FAR_BELOW = 1e-9  # of the way from a logarithm's end to the least discrepancy
+EXCESSES = np.geomspace(1e-8, 1e4, 400)  # over the least discrepancy, in units of it
+LOG_LIKELIHOOD_VARIANCE = 0.5  # of one error, where the discrepancy is minus a log likelihood
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(48)
 MIN_EXACT_SHARE = 1e-6  # of Phi(z), below which the difference with Owen's T has lost its digits
 
 
 def log_likelihood(state: ThresholdState, u: Any) -> Any:
     """log P(success) Phi((eps - mu(u)) / sigma(u)) at u [n, d], sigma^2 the variance of a new
-    discrepancy.
+    discrepancy, and of the threshold where it has a width.
+
+    Where the latent variance v is small beside resolution^2, that is the paper's. Where it is
+    large, nothing was learned, and ignorance shall not count as agreement: sigma^2 has no more of
+    v than v / (1 + v / resolution^2), and the root of the rest is added to mu.
 
     Gutmann and Corander (2016), eq. for Gaussian-process surrogates; Lopez-Guevara et al.
     (2018), inference. The mean over the processes, where there are several.
     """
-    z, _ = _standardised(state, u)
-    each = log_ndtr(z) if state.log_area is None else log_ndtr(z) - state.log_area
-    return log_sum_exp(each) - math.log(z.shape[-1]) + log_success(state.success, u)
+    z, _, _ = _standardised(state, u)
+    return log_sum_exp(log_ndtr(z)) - math.log(z.shape[-1]) + log_success(state.success, u)
 
 
-def log_likelihoods(state: ThresholdState, u: np.ndarray) -> np.ndarray:
-    """log Phi((eps - mu(u)) / sigma(u)) of each process at u [n, d], [n, k]."""
-    return log_ndtr(_standardised(state, u)[0])
-
-
-def _standardised(state: ThresholdState, u: Any) -> tuple[Any, Any]:
-    """(eps - mu) / sigma and sigma^2, [n, k] each."""
+def _standardised(state: ThresholdState, u: Any) -> tuple[Any, Any, Any]:
+    """(eps - mu) / sigma, sigma^2, and the part of it that is latent, [n, k] each."""
     xp = namespace(u)
     mean, variance = predict(state.gp, u)
-    noisy = variance.T + xp.exp(2.0 * state.gp.hyper.log_noise)
-    return (state.threshold - mean.T) / xp.sqrt(noisy), noisy
+    variance = state.doubt * variance.T
+    latent = variance / (1.0 + variance / state.resolution**2)
+    doubt = variance / xp.sqrt(state.resolution**2 + variance)
+    noisy = latent + xp.exp(2.0 * state.gp.hyper.log_noise) + state.width**2
+    return (state.threshold - mean.T - doubt) / xp.sqrt(noisy), noisy, latent
 
 
 def log_second_moment(
@@ -85,8 +100,8 @@ def log_second_moment(
     T Owen's; where that cancels, which takes a small r,
     E_w[Phi((z + sqrt(r) w) / sqrt(1 - r))^2] by Gauss and Hermite about the integrand's peak.
     """
-    z, noisy = _standardised(state, u)
-    varying = noisy - np.exp(2.0 * state.gp.hyper.log_noise) if spread is None else spread
+    z, noisy, latent = _standardised(state, u)
+    varying = latent if spread is None else spread
     shape = len(u), *[1] * (varying.ndim - 2), z.shape[1]
     r = np.clip(varying / noisy.reshape(shape), 1e-12, 1.0 - 1e-6)
     z = np.broadcast_to(z.reshape(shape), r.shape)
@@ -111,9 +126,48 @@ def _log_both_by_quadrature(z: np.ndarray, r: np.ndarray) -> np.ndarray:
     return log_sum_exp(inside + np.log(width * WEIGHTS / np.sqrt(2.0 * np.pi)))
 
 
+def matched(
+    rule: Matched, mean: float, sd: float, transform: Transform, dimension: int
+) -> tuple[float, float]:
+    """Threshold and its width on the transformed scale.
+
+    Near its least value D the discrepancy is D plus a quadratic form, of which the exact
+    posterior expects d s^2, where s^2 = D / (numbers - d) estimates the variance of one error.
+    With a width, sigma^2 = sd^2 + width^2, the likelihood expects as much at the threshold
+    Predicted(0.2). Where sd alone makes it expect more, there is no width, and the threshold is
+    lower, down to Predicted(0.02). A discrepancy below zero is taken for minus a log likelihood.
+
+    Args:
+        mean, sd: Of a new discrepancy where least is expected, on the transformed scale.
+        dimension: d.
+    """
+    least = float(transform.inverse(np.asarray(mean)))
+    variance = least / max(rule.numbers - dimension, 1.0) if least > 0 else LOG_LIKELIHOOD_VARIANCE
+    unit, q = max(least, variance), EXCESSES
+    raised = transform(least + unit * q)
+
+    def excess(z: float, sigma: float) -> float:
+        weights = q ** (dimension / 2) * ndtr(z - (raised - mean) / sigma)  # of log q
+        return float(np.log(weights @ q / weights.sum() / (dimension * variance / unit)))
+
+    def root(function: Callable[[float], float], low: float, high: float) -> float:
+        return float(brentq(function, low, high))  # pyright: ignore[reportArgumentType]
+
+    usual, lowest = float(ndtri(MATCHED_QUANTILE)), float(ndtri(LEAST_QUANTILE))
+    if excess(usual, sd) < 0.0:
+        top = float(raised[-1] - mean)
+        wide = excess(usual, top) < 0.0
+        sigma = top if wide else root(lambda sigma: excess(usual, sigma), sd, top)
+        return mean + usual * sigma, float(np.sqrt(max(sigma**2 - sd**2, 0.0)))
+    z = lowest if excess(lowest, sd) > 0.0 else root(lambda z: excess(z, sd), lowest, usual)
+    return mean + z * sd, 0.0
+
+
 def check_rule(rule: Threshold) -> None:
     """Raise ValueError unless `rule` is a documented threshold rule."""
-    if isinstance(rule, Quantile):
+    if isinstance(rule, Matched):
+        valid = rule.numbers > 0
+    elif isinstance(rule, Quantile):
         valid = 0.0 <= rule.q <= 1.0
     elif isinstance(rule, Predicted):
         valid = 0.0 < rule.q < 1.0
@@ -124,12 +178,13 @@ def check_rule(rule: Threshold) -> None:
     if not valid:
         raise ValueError(
             f"threshold must be one of {RULES}, Predicted(q) with 0 < q < 1, Quantile(q) with "
-            f"0 <= q <= 1, a finite number on the discrepancy's scale or None, got {rule!r}"
+            f"0 <= q <= 1, Matched(numbers) with numbers > 0, a finite "
+            f"number on the discrepancy's scale or None, got {rule!r}"
         )
 
 
 def choose_threshold(
-    rule: Threshold,
+    rule: str | float | Quantile | Predicted,
     discrepancy: np.ndarray,
     transform: Transform,
     at_minimum: Callable[[], tuple[float, float]],
@@ -137,7 +192,7 @@ def choose_threshold(
     """The threshold on the transformed scale.
 
     Args:
-        rule: None is DEFAULT_THRESHOLD; Predicted(q), the q quantile of a new discrepancy at the
+        rule: Predicted(q), the q quantile of a new discrepancy at the
             simulated point where the surrogate's mean is least; "min_mean", that mean, the same
             as Predicted(0.5) (Gutmann and Corander 2016); "min_observed", the smallest
             discrepancy so far; a Quantile of the discrepancies so far; or a number on the
@@ -151,7 +206,7 @@ def choose_threshold(
     Raises:
         ValueError: the transform is undefined at the given number.
     """
-    rule = DEFAULT_THRESHOLD if rule is None else Predicted(0.5) if rule == "min_mean" else rule
+    rule = Predicted(0.5) if rule == "min_mean" else rule
     if isinstance(rule, Predicted):
         mean, sd = at_minimum()
         return mean + sd * float(ndtri(rule.q))
@@ -159,7 +214,10 @@ def choose_threshold(
         return float(transform(discrepancy.min()))
     if isinstance(rule, Quantile):
         return float(transform(np.quantile(discrepancy, rule.q)))
-    number = float(rule)
+    number = float(rule)  # pyright: ignore[reportArgumentType]  # `check_rule`
+    if transform.offset < 0 or transform.signed:  # below lies nothing that was simulated
+        end = -transform.offset
+        return float(transform(max(number, end + FAR_BELOW * (discrepancy.min() - end))))
     if transform.name != "identity" and number + transform.offset <= 0:
         raise ValueError(
             f"threshold {rule} must be positive for the transform {transform.name!r}; "

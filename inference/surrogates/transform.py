@@ -5,22 +5,28 @@ from typing import NamedTuple
 
 import numpy as np
 
+ROUNDING = 1e-9  # of the largest discrepancy, below which differences tell nothing
+NEAR_SHARE = 0.25  # of the runs, to which a logarithm may be linear
+
 
 class Transform(NamedTuple):
-    """g(Delta + offset); offset > 0 only where a zero would break the log or the Jacobian."""
+    """g(Delta + offset); an offset is where a zero would break the log or the Jacobian, or where
+    the logarithm shall resolve the least discrepancies, whatever their sign."""
 
     name: str
     offset: float
+    signed: bool = False
 
     def __call__(self, discrepancy: np.ndarray) -> np.ndarray:
         return TRANSFORMS[self.name][0](np.asarray(discrepancy) + self.offset)
 
     def inverse(self, value: np.ndarray) -> np.ndarray:
-        """Delta where g(Delta + offset) = value; 0 where that would be negative."""
+        """Delta where g(Delta + offset) = value; 0 where that would be negative, unless some
+        discrepancies are."""
         if self.name == "identity":
             return np.asarray(value)
         raw = np.exp(value) if self.name == "log" else np.maximum(value, 0.0) ** 2
-        return np.maximum(raw - self.offset, 0.0)
+        return raw - self.offset if self.signed else np.maximum(raw - self.offset, 0.0)
 
     def log_jacobian(self, discrepancy: np.ndarray) -> np.ndarray:
         """log |dg / dDelta|."""
@@ -39,7 +45,8 @@ def candidates(name: str | None, discrepancy: np.ndarray) -> list[Transform]:
     """The transforms that `discrepancy` admits.
 
     Args:
-        name: One of TRANSFORMS, or None for all that apply.
+        name: One of TRANSFORMS, or None for all that apply, and a logarithm that is linear among
+            the least discrepancies, which adapts as the search closes in.
         discrepancy: Finite values [n].
 
     Raises:
@@ -53,7 +60,11 @@ def candidates(name: str | None, discrepancy: np.ndarray) -> list[Transform]:
             f"transform {name!r} needs discrepancies >= 0, got {lowest:.3g}; use 'identity'"
         )
     names = ("identity",) if lowest < 0 else tuple(TRANSFORMS) if name is None else (name,)
-    return [Transform(n, 0.0 if n == "identity" else _offset(discrepancy)) for n in names]
+    found = [Transform(n, 0.0 if n == "identity" else _offset(discrepancy)) for n in names]
+    near = float(np.quantile(discrepancy, NEAR_SHARE)) - lowest
+    if name is not None or near <= ROUNDING * np.abs(discrepancy).max():
+        return found
+    return [*found, Transform("log", near - lowest, bool(lowest < 0))]
 
 
 def _offset(discrepancy: np.ndarray) -> float:

@@ -1,14 +1,16 @@
-"""Warnings from leave-one-out errors, held-back errors and the noise of an emulator, and from what
-was given, whatever was learned of it."""
+"""Warnings from leave-one-out errors and the noise of an emulator, and from what was given,
+whatever was learned of it."""
+
+import warnings
+from collections.abc import Sequence
 
 import numpy as np
 
 from .._lazy import stats
 from ..history import History
-from .held_back import HeldBack
+from .squared_difference import independent
 
 FALSE_ALARMS = 1e-3  # of each leave-one-out check, were its errors independent and normal
-HELD_BACK_FALSE_ALARMS = 1e-2  # nominal share of good fits warned, see `held_back_warnings`
 FAR_ERROR = 3.0  # studentised errors beyond are rare
 OVERCONFIDENT_SQUARE = 1.5  # mean square of the studentised errors that matters
 OUTSIDE = (
@@ -21,34 +23,94 @@ MISFIT = (
     "posterior allows for a misfit of that size: look at the residual of the closest run, "
     "correct noise=, or simulate more"
 )
+SMOOTH = (
+    "what the simulator misses of what was observed varies as slowly as a signal: it lacks "
+    "something rather than that the data are noisy; look at the residual of the closest run"
+)
 FEW_NUMBERS = (
     "no noise was given, and so few numbers cannot tell its size from a misfit of the parameters': "
     "the posterior's width rests on a guess; give noise="
 )
-UNLEARNED = (
-    "much of the posterior lies where hardly anything was simulated: what is not known there "
-    "counts as agreement; simulate more, or narrow the prior"
+DOUBTED = (
+    "the posterior is much wider than the data make it: what a simulation would give is not known "
+    "well enough in places, which counts as agreement; simulate more, or narrow the prior"
+)
+UNCONFIRMED = (
+    "runs at draws of the posterior moved it or failed, more than once where more were made: it is "
+    "not known yet; simulate more, or narrow the prior"
 )
 LOW_THRESHOLD = (
     "the threshold lies below all that a simulation can be expected to come to: where the "
     "posterior lies is chance; give a larger threshold, or none"
 )
+NOISY = (
+    "run-to-run noise of the discrepancy exceeds what the data tell apart: the posterior is wider "
+    "than the data make it, and its centre is as uncertain; simulate more, average the noise out, "
+    'or use surrogate="signal"'
+)
+GUESSED = (
+    "how far a discrepancy may exceed its least value is not known of so few numbers: the "
+    "posterior's width rests on a guess; give threshold=, such as Matched(numbers) for a sum of "
+    'that many squares, or use surrogate="signal" with noise='
+)
+SYSTEMATIC = (
+    "the errors of the closest simulation hang together: the simulator lacks something, or what "
+    "fits better was not found; the posterior allows for errors of that size; simulate more, or "
+    'use surrogate="signal"'
+)
+UNEVEN = (
+    "a few of the observed numbers make up nearly all of the discrepancy, even of the closest "
+    "simulation: the others count for nothing; give a discrepancy of logarithms or of errors in "
+    'units of their noise, or use surrogate="signal" with such a summary'
+)
+TOO_SMOOTH = (
+    "the closest simulation is far smoother than what was observed, though others are as rough: a "
+    "sum of squares prefers too little noise, and cannot tell its size; give a discrepancy of "
+    'summaries that can, or use surrogate="signal" with them'
+)
 EQUAL = "all simulations are equal: the data cannot tell parameters apart"
 UNPREDICTED = (
     "the parameters predict nothing of what was simulated, as far as so few runs can tell from "
-    "chance: simulate more, or choose a summary that averages the noise out; until then the "
-    "posterior is the prior"
+    "chance: simulate more, or, if the simulator is random, choose a summary that averages the "
+    "noise out; until then the posterior is the prior"
 )
+UNREPEATED = (
+    "the parameters predict less than half of what simulations differ by: either the simulator is "
+    "random, or the output changes faster than so few runs show; simulate more, or repeat some "
+    "runs with other seeds"
+)
+TOO_FAST = (
+    "runs of equal parameters agree, but the parameters predict less than half of what others "
+    "differ by: the output changes faster, or in a narrower range, than so few runs show; simulate "
+    "more, or narrow the prior"
+)
+WIDE_RANGE = (
+    "what was observed spans more than three decades and no noise was given: one size of noise is "
+    "taken for all values, so that only the largest count; give noise=, such as "
+    'inference.relative(0.2) or "poisson", or summary=np.log'
+)
+WIDE_RATIO = 1e3  # of observed values, from which one size of noise is hardly meant
 FAILED_SHARE = 0.5  # of the simulations, beyond which a fit warns
 EQUAL_SHARE, LEAST_EQUAL = 0.25, 5  # of a channel's samples, from which they may be cut off
 ROUNDED_SHARE = 1e-6  # of their range, to which data may be rounded without losing anything
 NEAR_RUNS = 5  # whose spread tells how closely runs approach what was observed
 NOISE_SDS = 3.0  # up to which noise explains that no run reaches what was observed
+OUTSIDE_VARIANCES = 4.0  # of the runs, beyond which the closest run's misfit is far off
+UNEVEN_SHARE = 0.1  # of the root mean square error, below which the median error is too small
+ROUGHER = 0.9  # share of the runs, of which the others are as rough as the data
+SYSTEMATIC_SHARE = 0.15  # of the numbers, to which a residual amounts that is no noise
+MIN_ROUGH = 8  # numbers of which unevenness, and samples of which roughness, is judged
 NOISY_SHARES = (0.9, 0.5)  # shares of run-to-run noise in the variance that deserve a word
 
 
 class EmulatorWarning(UserWarning):
     """The surrogate's errors are larger than its variance; the message says where."""
+
+
+def complain(said: Sequence[str], stacklevel: int) -> None:
+    """Raise each complaint as a warning; stacklevel 2 blames the caller."""
+    for complaint in said:
+        warnings.warn(complaint, EmulatorWarning, stacklevel=stacklevel)
 
 
 def complaints(loo_z: np.ndarray, what: str) -> list[str]:
@@ -59,7 +121,9 @@ def complaints(loo_z: np.ndarray, what: str) -> list[str]:
         what: Name of the emulated quantity.
     """
     count = loo_z.size
-    said = []
+    said: list[str] = []
+    if not count:
+        return said
     far = int(np.sum(np.abs(loo_z) > FAR_ERROR))
     if far > stats.binom.isf(FALSE_ALARMS, count, 2.0 * stats.norm.sf(FAR_ERROR)):
         said.append(
@@ -75,36 +139,19 @@ def complaints(loo_z: np.ndarray, what: str) -> list[str]:
     return said
 
 
-def held_back_warnings(found: HeldBack) -> list[str]:
-    """A warning if the held-back errors are too large, else an empty list.
+def noise_warnings(share: float, repeats: np.ndarray, sized: bool) -> list[str]:
+    """A warning if what no parameter predicts is a large share of the outputs' variance.
 
-    The components of one run share their error, and hyperparameters come from few runs. So each
-    run counts once, by its mean square over the components, and the mean of q runs is compared
-    with Fisher's F of q and the first runs' degrees of freedom. This is an approximation: outputs
-    smooth on the scale of the box hardly ever alarm (tests); outputs that turn within half of it
-    alarm more often than HELD_BACK_FALSE_ALARMS. What lies beyond the components is judged in the
-    same way. The check detects gross failures only.
+    Args:
+        share: That share.
+        repeats: Of each repeated run: whether it differs from the one before, bool [r].
+        sized: Whether the noise's size is known to depend on the parameters.
     """
-    seen = np.isfinite(found.errors[:, -1])
-    if not seen.any():
-        return []
-    scores, beyond = found.errors[seen, :-1], found.errors[seen, -1]
-    scores = scores[:, np.isfinite(scores).all(0)]
-    limit = stats.f.isf(HELD_BACK_FALSE_ALARMS / 2.0, len(beyond), found.freedom)
-    if max(np.mean(part**2) for part in (scores, beyond) if part.size) <= limit:
-        return []
-    return [
-        "the last third of the simulations lies further from what the others predict than the "
-        "emulator's variance allows: the output changes faster with the parameters "
-        "than so few simulations show, and the posterior may be too narrow; simulate more"
-    ]
-
-
-def noise_warnings(share: float) -> list[str]:
-    """A warning if run-to-run noise has a large share of the outputs' variance, else none."""
     reached = [least for least in NOISY_SHARES if share > least]
-    if not reached:
+    if not reached or sized:
         return []
+    if not repeats.any():
+        return [TOO_FAST if len(repeats) else UNREPEATED]
     return [
         f"run-to-run noise makes up more than {reached[0]:.0%} of the output's variance "
         "between simulations, and the likelihood takes it as Gaussian and equal for all "
@@ -168,6 +215,13 @@ def censored_warnings(observed: np.ndarray, simulated: np.ndarray) -> list[str]:
     return said
 
 
+def range_warnings(observed: np.ndarray) -> list[str]:
+    """A warning if positive data of unknown noise span decades."""
+    seen = observed[np.isfinite(observed)]
+    wide = seen.min() > 0.0 and seen.max() > WIDE_RATIO * seen.min()
+    return [WIDE_RANGE] if wide else []
+
+
 def _step(values: np.ndarray) -> float:
     """The step of which all differences between sorted values are multiples, by Euclid's
     algorithm: that to which they were rounded, or next to nothing."""
@@ -201,3 +255,32 @@ def unreached_warnings(observed: np.ndarray, simulated: np.ndarray, noise: float
         f"{near[0]:.4g} from the nearest: if they are losses, say so by discrepancy=, such as "
         "lambda observed, simulated: float(simulated[0]); else widen the prior, or give noise="
     ]
+
+
+def distance_warnings(observed: np.ndarray, outputs: np.ndarray) -> list[str]:
+    """What the outputs show against a sum of squared differences.
+
+    Args:
+        observed: [t, ...], NaN where missing.
+        outputs: Of the simulations, the closest first [n, t, ...].
+    """
+    n, t = outputs.shape[:2]
+    unit = max(np.nanmax(np.abs(observed)), np.nanmax(np.abs(outputs))) or 1.0
+    observed, outputs = observed / unit, outputs / unit
+    there = np.isfinite(observed.reshape(t, -1))
+    error = np.where(there, (outputs[0] - observed).reshape(t, -1), 0.0)
+    runs = np.where(there, outputs.reshape(n, t, -1), 0.0)
+    said = []
+    if (np.sum(error**2, 0) > OUTSIDE_VARIANCES * np.sum(runs.var(0), 0)).any():
+        said.append(f'{OUTSIDE}; surrogate="signal" may say which part')
+    residual = np.where(there, error, np.nan)
+    if t >= MIN_ROUGH and independent(residual) < SYSTEMATIC_SHARE * there.sum():
+        said.append(SYSTEMATIC)
+    size = np.abs(error[there])
+    if size.size >= MIN_ROUGH and np.median(size) < UNEVEN_SHARE * np.sqrt(np.mean(size**2)):
+        said.append(UNEVEN)
+    if t < MIN_ROUGH or not there.all():
+        return said
+    rough = np.mean(np.diff(runs, 4, axis=1) ** 2, axis=(1, 2))
+    data = np.mean(np.diff(observed.reshape(t, -1), 4, axis=0) ** 2)
+    return [*said, TOO_SMOOTH] if rough[0] < data / 4.0 < np.quantile(rough, ROUGHER) else said

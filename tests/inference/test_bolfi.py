@@ -129,7 +129,7 @@ def test_a_prior_that_fades_out_reaches_the_kernel():
     )
     noise = 0.05 * np.random.default_rng(0).normal(size=(24, 1))
     squared.tell(theta, theta["a"][:, None] + noise)
-    fit = squared.fit()
+    fit = squared.fit(warn=False)  # one number leaves the posterior's width to guess
     assert abs(fit.best["a"] - 2.2) < 0.1
     at = prior.to_unit({"a": np.array([2.3, 2.5, 2.7])})  # beyond the last run, 2.04
     np.testing.assert_allclose(fit.learned.predict(at)[0], [0.01, 0.09, 0.25], atol=0.2)
@@ -145,14 +145,14 @@ def test_asking_and_telling_compile_nothing(prior, observed, simulate, surrogate
     for batch in (10, 1, 5):
         theta = engine.ask(batch)
         engine.tell(theta, simulate(theta, np.arange(batch) + engine.told))
-    engine.fit()
+    engine.fit(warn=False)  # of 16 runs
     assert not compiled
 
 
 def test_an_acquisition_is_called_in_float64(prior, observed, simulate):
     seen = []
 
-    def acquire(key, surrogate, n, feasibility):
+    def acquire(key, surrogate, n):
         seen.append(jax.numpy.asarray(0.1).dtype)
         return np.full((n, 2), 0.5) + 0.1 * np.arange(n)[:, None] / n
 

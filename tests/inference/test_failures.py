@@ -124,7 +124,8 @@ def test_a_fit_of_fewer_runs_than_the_surrogate_needs_warns(
         return simulate({name: np.array([value]) for name, value in theta.items()}, [seed])[0]
 
     made = []
-    fit = inference.fit(fragile, prior, observed, budget=9, vectorised=False, warn=False)
+    options = {"budget": 9, "confirm": 0, "vectorised": False, "warn": False}
+    fit = inference.fit(fragile, prior, observed, **options)
     few = [said for said in fit.warnings if f"learned from {9 - failing} simulations" in said]
     assert bool(few) is warned
     assert all(said in repr(fit) for said in few)
@@ -195,7 +196,7 @@ def test_a_simulator_may_write_into_what_it_is_given(prior, observed, simulate):
 )
 def test_what_an_acquisition_returns_is_checked(prior, observed, simulate, returned, message):
     engine = inference.Bolfi(
-        prior, observed, initial=4, acquisition=lambda key, surrogate, n, runs: returned(n)
+        prior, observed, initial=4, acquisition=lambda key, surrogate, n: returned(n)
     )
     theta = engine.ask(4)
     engine.tell(theta, simulate(theta, range(4)))

@@ -17,7 +17,6 @@ from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates import base
 from bolfi_liquids.inference.surrogates.families import FAMILIES, resolve
 from bolfi_liquids.inference.surrogates.measurement_noise import Layout
-from bolfi_liquids.inference.surrogates.success import Feasibility
 
 from bolfi_liquids import inference
 
@@ -129,7 +128,7 @@ def test_the_kinds_are_found():
 
 def test_a_new_rule_without_a_name_is_noticed(monkeypatch):
     class Lazy:
-        def __call__(self, key, surrogate, n, feasibility, /):
+        def __call__(self, key, surrogate, n, /):
             return np.full((n, 2), 0.5)
 
     monkeypatch.setattr(inference, "Lazy", Lazy, raising=False)
@@ -195,6 +194,16 @@ def check_log_second_moment(of):
     assert (second > 2.0 * first - 1e-3).all()
 
 
+def check_success(of):
+    assert of.success is None  # no run failed
+
+
+def check_cautious(of):
+    """Doubt makes no place more probable to it."""
+    first, cautious = (one.log_likelihood(one.state, POINTS) for one in (of, of.cautious))
+    assert finite(cautious) and (cautious <= first + 1e-9).all()
+
+
 def check_minimum(of):
     best = of.minimum()
     assert best.shape == (2,) and ((best >= 0.0) & (best <= 1.0)).all()
@@ -231,8 +240,16 @@ def check_checks(of):
     assert len(z) == RUNS and finite(z)
 
 
+def check_fits(of):
+    assert isinstance(of.fits, bool)
+
+
+def check_described(of):
+    assert all(isinstance(said, str) and said for said in of.described())
+
+
 def check_warnings(of):
-    assert isinstance(of.warnings(), list)
+    assert isinstance(of.warnings(), list) and isinstance(of.warnings(confirmed=True), list)
     assert all(isinstance(said, str) and said for said in of.warnings())
 
 
@@ -257,18 +274,14 @@ def test_a_surrogate_keeps_its_protocol(learned, member):
 # Acquisitions.
 
 
-def successes(surrogate):
-    return Feasibility(surrogate.gp.data.u, np.ones(RUNS, bool))
-
-
 @pytest.mark.parametrize("name", RULES)
 def test_a_rule_keeps_its_protocol(learned, name):
-    rule, runs, before = RULES[name](), successes(learned), jax.tree.leaves(learned.gp)
-    u = rule(KEYS[0], learned, 2, runs)
+    rule, before = RULES[name](), jax.tree.leaves(learned.gp)
+    u = rule(KEYS[0], learned, 2)
     assert isinstance(u, np.ndarray) and u.shape == (2, 2) and u.dtype == np.float64
     assert ((u > 0.0) & (u < 1.0)).all() and (u[0] != u[1]).any()
-    np.testing.assert_array_equal(u, RULES[name]()(KEYS[0], learned, 2, runs))
-    assert not np.array_equal(u, rule(KEYS[1], learned, 2, runs))
+    np.testing.assert_array_equal(u, RULES[name]()(KEYS[0], learned, 2))
+    assert not np.array_equal(u, rule(KEYS[1], learned, 2))
     assert same(before, jax.tree.leaves(learned.gp))  # it chooses, and changes nothing
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import numpyro.distributions as dist
 import pytest
+from bolfi_liquids.inference.surrogates.warnings import GUESSED
 
 from bolfi_liquids import inference
 
@@ -56,7 +57,7 @@ def test_equals_a_fit_of_the_same_numbers():
     learned = inference.regress(PRIOR, THETA, values, transform="sqrt")
     for ours, theirs in zip(learned.predict(THETA), fit.surrogate.predict(THETA), strict=True):
         np.testing.assert_array_equal(ours, theirs)
-    assert learned.warnings == fit.surrogate.warnings
+    assert learned.warnings == [said for said in fit.surrogate.warnings if said != GUESSED]
 
 
 @pytest.mark.parametrize(

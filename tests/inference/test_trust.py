@@ -4,10 +4,15 @@ import numpy as np
 import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference.surrogates.warnings import (
+    DOUBTED,
     FEW_NUMBERS,
+    GUESSED,
     LOW_THRESHOLD,
     MISFIT,
-    UNLEARNED,
+    TOO_SMOOTH,
+    UNCONFIRMED,
+    UNEVEN,
+    distance_warnings,
 )
 
 from bolfi_liquids import inference
@@ -52,15 +57,100 @@ def test_a_threshold_below_all_runs(threshold, said):
     assert (LOW_THRESHOLD in found) == said
 
 
-def test_a_posterior_where_nothing_was_simulated():
-    """A steep corner that three runs in the middle of the prior say nothing of."""
-    middle = {"a": np.array([0.45, 0.5, 0.55]), "b": np.array([0.5, 0.45, 0.55])}
-    prior = inference.Prior({name: dist.Uniform(0, 1) for name in "ab"})
-    outputs = np.stack([np.sin(9.0 * middle["a"]), middle["b"] ** 2], -1)
-    few = warnings_of(None, [0.5, 2.0], prior, 0, noise=0.1, earlier=(middle, outputs))
-    assert UNLEARNED in few
-    u = np.random.default_rng(0).random((2, 60))
-    many = np.stack([np.sin(9.0 * u[0]), u[1] ** 2], -1)
-    theta = {"a": u[0], "b": u[1]}
-    found = warnings_of(None, [0.5, 0.3], prior, 0, noise=0.1, earlier=(theta, many))
-    assert UNLEARNED not in found
+def circle(a):
+    return np.stack([np.sin(6.0 * a), np.cos(6.0 * a)], -1)
+
+
+@pytest.mark.parametrize(("end", "said"), [(0.3, True), (1.0, False)])
+def test_a_posterior_where_nothing_was_simulated(end, said):
+    """Data of beyond the prior's first third, and runs of that alone, or of all."""
+    prior = inference.Prior({"a": dist.Uniform(0, 1)})
+    a = np.linspace(0.0, end, round(20 * end))
+    data = circle(np.array(0.4)) + [0.02, -0.03]
+    options = {"noise": 0.05, "earlier": ({"a": a}, circle(a)), "progress": False, "warn": False}
+    fit = inference.fit(None, prior, data, budget=0, **options)
+    assert (fit.doubt > 1.5) == (DOUBTED in fit.warnings) == said
+    assert fit.status == "not confirmed"  # nothing was run at draws of the posterior
+
+
+def narrow(theta, seeds):
+    """A line but for a bump, of which a few runs show nothing."""
+    a = theta["a"][:, None]
+    return np.concatenate([a, 3.0 * np.exp(-0.5 * ((a - 0.62) / 0.06) ** 2)], 1)
+
+
+def test_runs_at_draws_of_the_posterior_confirm_it_or_move_it():
+    prior = inference.Prior({"a": dist.Uniform(0, 1)})
+    options = {"noise": 0.1, "progress": False, "warn": False}
+    plain = inference.fit(lambda theta, seeds: circle(theta["a"]), prior, circle(0.4), **options)
+    assert plain.confirmed and plain.status == "fitted" and len(plain.history.theta) == 23
+    engine = inference.Bolfi(prior, circle(0.4), noise=0.1)
+    a = np.linspace(0.0, 0.3, 6)
+    engine.tell({"a": a}, circle(a))
+    before = engine.fit(warn=False)
+    assert before.confirmed is None
+    drawn = engine.confirm(before, 4)
+    assert len(np.unique(drawn["a"])) == 4
+    with pytest.raises(ValueError, match="fit must be what"):
+        engine.confirm(plain)
+    engine.tell(drawn, circle(drawn["a"]))
+    moved = engine.fit(warn=False)
+    assert moved.confirmed is False and UNCONFIRMED in moved.warnings
+    with pytest.raises(ValueError, match="fit must be what"):
+        engine.confirm(before)
+
+
+def test_a_budget_is_exceeded_by_half_at_most():
+    """By as many runs at draws as it takes; none if that is asked for."""
+    prior = inference.Prior({"a": dist.Uniform(0, 1)})
+    data = narrow({"a": np.array([0.62])}, None)[0]
+    options = {"noise": 0.02, "budget": 8, "progress": False, "warn": False}
+    for confirm, most in ((0, 8), (2, 12), (3, 11)):
+        made = inference.fit(narrow, prior, data, confirm=confirm, **options)
+        assert 8 + confirm <= len(made.history.theta) <= most
+
+
+PAPER = {"surrogate": "discrepancy"}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_sum_of_squares_gives_the_exact_posterior(seed):
+    """Against a grid: independent noise whose size nothing tells but the residual."""
+    fit = inference.fit(
+        decay, PRIOR, DATA, budget=30, seed=seed, progress=False, warn=False, **PAPER
+    )
+    drawn = fit.sample("quadrature", warn=False)["posterior"]
+    axes = np.meshgrid(np.linspace(2.5, 3.5, 201), np.linspace(0.6, 1.1, 201), indexing="ij")
+    height, rate = (axis.ravel() for axis in axes)
+    misfit = np.sum((decay({"height": height, "rate": rate}, None) - DATA) ** 2, 1)
+    weights = np.exp(-15.0 * np.log(misfit / misfit.min()))
+    for name, grid in (("height", height), ("rate", rate)):
+        mean = np.average(grid, weights=weights)
+        sd = np.sqrt(np.average((grid - mean) ** 2, weights=weights))
+        assert abs(float(drawn[name].mean()) - mean) < sd
+        assert 0.5 < float(drawn[name].std()) / sd < 3.0
+
+
+def test_data_far_outside_are_said_by_the_discrepancy_too():
+    assert any("far outside" in said for said in warnings_of(decay, DATA + 50.0, **PAPER))
+    assert not any("far outside" in said for said in warnings_of(decay, DATA, **PAPER))
+
+
+def test_a_discrepancy_of_one_number_leaves_the_width_to_guess():
+    def loss(theta, seeds):
+        return np.sum((decay(theta, seeds) - DATA) ** 2, 1)[:, None]
+
+    own = {"discrepancy": lambda observed, simulated: float(simulated[0])}
+    assert GUESSED in warnings_of(loss, [0.0], **own)
+    assert GUESSED not in warnings_of(loss, [0.0], **own, threshold=0.4)
+
+
+@pytest.mark.parametrize(("seen", "said"), [("few", UNEVEN), ("rough", TOO_SMOOTH), ("fair", None)])
+def test_what_a_sum_of_squares_cannot_see_is_said(seen, said):
+    rng = np.random.default_rng(0)
+    noise, run = rng.normal(size=(4, 40)), np.linspace(0.0, 9.0, 40)
+    size = {"few": 10.0 ** -np.linspace(0, 6, 40), "rough": 1.0, "fair": 1.0}[seen]
+    sizes = np.array({"rough": [0.05, 1.0, 2.0]}.get(seen, [1.0, 1.0, 1.0]))
+    outputs = run * np.array([1.0, 1.5, 2.0])[:, None] + size * sizes[:, None] * noise[:3]
+    found = distance_warnings(run + size * noise[3], outputs)
+    assert all((text in found) == (text == said) for text in (UNEVEN, TOO_SMOOTH))

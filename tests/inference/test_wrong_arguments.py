@@ -70,6 +70,7 @@ def cases():
         "Bolfi.ask": (inference.Bolfi(prior, OBSERVED).ask, {}),
         "Bolfi.tell": (engine.tell, {"theta": THETA, "signals": signals}),
         "Bolfi.fit": (engine.fit, {}),
+        "Bolfi.confirm": (engine.confirm, {"fit": engine.fit(warn=False)}),
         "Fit.log_prob": (fit.log_prob, {"theta": THETA}),
         "Fit.sample": (fit.sample, {"sampler": "quadrature", "draws": 8}),
         "Fit.plot_search": (fit.plot_search, {}),
@@ -114,8 +115,10 @@ def cases():
         "LowerConfidenceBound": (inference.LowerConfidenceBound, {}),
         "MaxVariance": (inference.MaxVariance, {}),
         "PosteriorDraws": (inference.PosteriorDraws, {}),
+        "CautiousDraws": (inference.CautiousDraws, {}),
         "ExpectedIntegratedVariance": (inference.ExpectedIntegratedVariance, {}),
         "squared_difference": (inference.squared_difference, {}),
+        "relative": (inference.relative, {"share": 0.2}),
         "FitPipeline": (inference.FitPipeline, {"simulate": simulate, "prior": prior}),
         "shared_design": (
             inference.shared_design,
@@ -257,6 +260,7 @@ VALUES = {
     "FitPipeline": [{"options": {"budget": 3}}, {"sampling": {"draw": 3}}, {"prior": "flat"}],
     "LowerConfidenceBound": [{"jitter": np.inf}, {"jitter": "small"}],
     "PosteriorDraws": [{"share": None}, {"share": np.nan}],
+    "CautiousDraws": [{"share": None}, {"share": np.nan}],
 }
 
 

@@ -1,5 +1,7 @@
 """Acquisition rules against brute force, and on targets far from everything."""
 
+from dataclasses import replace
+
 import jax
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ from bolfi_liquids.inference.acquisition.rules import (
 from bolfi_liquids.inference.gp.process import predict
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.discrepancy import learn, with_threshold
-from bolfi_liquids.inference.surrogates.success import Feasibility, log_feasible
+from bolfi_liquids.inference.surrogates.success import Runs, learn_success, log_success
 from scipy.stats import kstest, multivariate_normal, norm, qmc, truncnorm
 
 from bolfi_liquids import inference
@@ -28,11 +30,6 @@ def fitted(n=12, noise=0.0, rule=None):
     u = sobol(0, 0, n, 2)
     values = 1.0 + ((u - 0.4) ** 2).sum(-1) + noise * np.random.default_rng(0).normal(size=n)
     return with_threshold(learn(u, values, "identity"), rule)
-
-
-def all_succeed(surrogate):
-    u = surrogate.gp.data.u
-    return Feasibility(u, np.ones(len(u), bool))
 
 
 def test_start_design_fills_the_box_and_continues():
@@ -50,10 +47,9 @@ def test_width_follows_the_papers_schedule():
 
 def test_lcb_minimises_mean_less_width_times_latent_sd():
     surrogate = fitted()
-    runs = all_succeed(surrogate)
-    chosen = inference.LowerConfidenceBound(jitter=1e-6)(KEY, surrogate, 1, runs)
-    least = lower_confidence_bound(surrogate, runs, GRID).min()
-    assert lower_confidence_bound(surrogate, runs, chosen)[0] <= least + 1e-4
+    chosen = inference.LowerConfidenceBound(jitter=1e-6)(KEY, surrogate, 1)
+    least = lower_confidence_bound(surrogate, GRID).min()
+    assert lower_confidence_bound(surrogate, chosen)[0] <= least + 1e-4
 
 
 def test_jitter_is_a_truncated_normal():
@@ -68,7 +64,7 @@ def test_jitter_keeps_points_off_the_bounds():
     """The least discrepancy lies in a corner, where every minimiser ends."""
     u = sobol(0, 0, 9, 2)
     surrogate = learn(u, 1.0 + u.sum(-1))
-    batch = inference.LowerConfidenceBound()(KEY, surrogate, 8, all_succeed(surrogate))
+    batch = inference.LowerConfidenceBound()(KEY, surrogate, 8)
     assert np.median(np.minimum(batch, 1.0 - batch).min(-1)) > 1e-3
 
 
@@ -111,20 +107,19 @@ def test_moments_are_finite_however_far_the_threshold():
 @pytest.mark.parametrize("name", RULES)
 def test_batches_differ_stay_in_the_box_and_repeat_with_the_key(name):
     surrogate = fitted(noise=0.05)
-    runs = all_succeed(surrogate)
-    batch = RULES[name]()(KEY, surrogate, 4, runs)
+    batch = RULES[name]()(KEY, surrogate, 4)
     distances = np.linalg.norm(batch[:, None] - batch, axis=-1) + np.eye(4)
     assert distances.min() > 1e-4
     assert ((batch > 0.0) & (batch < 1.0)).all()
-    np.testing.assert_array_equal(batch, RULES[name]()(KEY, surrogate, 4, runs))
-    assert not np.allclose(batch, RULES[name]()(jax.random.key(1), surrogate, 4, runs))
+    np.testing.assert_array_equal(batch, RULES[name]()(KEY, surrogate, 4))
+    assert not np.allclose(batch, RULES[name]()(jax.random.key(1), surrogate, 4))
 
 
 def test_draws_follow_the_posterior():
     """All-draws rule against the likelihood on a grid: means within 5 standard errors."""
     surrogate = fitted(40, noise=0.1)
-    runs, rule = all_succeed(surrogate), inference.PosteriorDraws(share=1.0)
-    drawn = np.concatenate([rule(jax.random.key(i), surrogate, 1, runs) for i in range(60)])
+    rule = inference.PosteriorDraws(share=1.0)
+    drawn = np.concatenate([rule(jax.random.key(i), surrogate, 1) for i in range(60)])
     log_likelihood = log_moments(surrogate, GRID)[0]
     weight = np.exp(log_likelihood - log_likelihood.max())
     mean = weight @ GRID / weight.sum()
@@ -139,7 +134,7 @@ def test_expected_variance_prefers_where_a_run_teaches():
     rng = np.random.default_rng(0)
     values = 1.0 + ((u - 0.4) ** 2).sum(-1) + 0.02 * rng.normal(size=len(u))
     surrogate = learn(u, values, "identity")
-    chosen = RULES["eiv"]()(KEY, surrogate, 1, all_succeed(surrogate))[0]
+    chosen = RULES["eiv"]()(KEY, surrogate, 1)[0]
     assert np.linalg.norm(chosen - centre) > 0.05
 
 
@@ -148,20 +143,22 @@ def test_regions_where_runs_fail_are_avoided():
     good = surrogate.gp.data.u
     bad = np.random.default_rng(0).normal([0.4, 0.4], 0.05, (24, 2))
     u, succeeded = np.concatenate([good, bad]), np.arange(48) < 24
-    runs = Feasibility(u, succeeded)
-    assert log_feasible(runs, np.array([0.4, 0.4])) < -1.5
-    assert log_feasible(runs, np.array([0.95, 0.95])) > -0.1
+    success = learn_success(Runs(u, succeeded), None)
+    assert log_success(success, np.array([[0.4, 0.4]]))[0] < -1.5
+    assert log_success(success, np.array([[0.95, 0.95]]))[0] > -0.3
+    failing = replace(surrogate, success=success)
+
+    def among_failures(rule, of):
+        points = np.concatenate([rule(jax.random.key(k), of, 4) for k in range(8)])
+        return (np.linalg.norm(points - 0.4, axis=1) < 0.1).sum()
+
     for name in RULES:
-        batch = RULES[name]()(KEY, surrogate, 4, runs)
-        plain = RULES[name]()(KEY, surrogate, 4, all_succeed(surrogate))
-        away, towards = (np.linalg.norm(p - 0.4, axis=1).mean() for p in (batch, plain))
-        assert away > towards, name
+        seen, unseen = (among_failures(RULES[name](), of) for of in (failing, surrogate))
+        assert 4 * seen < unseen, name
 
 
 def test_scores_of_the_user_choose_among_candidates():
     surrogate = fitted()
-    best = best_candidates(
-        lambda _, __, found: -found.u[:, 0], KEY, surrogate, 2, all_succeed(surrogate)
-    )
+    best = best_candidates(lambda _, __, found: -found.u[:, 0], KEY, surrogate, 2)
     assert (best[0] != best[1]).any()
     assert best[:, 0].max() < 0.4  # of candidates about 0.4 to 0.6

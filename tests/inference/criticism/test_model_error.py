@@ -18,7 +18,7 @@ KNOWN = KnownNoise(NOISE)
 BESIDE = SumOfNoises((KNOWN, model_error(SIZE, TIME)))
 
 
-def intervals(surrogate, noise, **options):
+def intervals(noise):
     """90 % intervals [DATA, 2] of the amplitude that makes SHAPE, from 12 runs spread evenly."""
     rng = np.random.default_rng(7)
     errors = rng.multivariate_normal(np.zeros(SAMPLES), ERRS, size=DATA)
@@ -28,7 +28,7 @@ def intervals(surrogate, noise, **options):
     found = []
     for error in errors:
         observed = TRUTH * SHAPE + error + NOISE * rng.normal(size=SAMPLES)
-        engine = Bolfi(PRIOR, observed, surrogate=surrogate, noise=noise, **options)
+        engine = Bolfi(PRIOR, observed, noise=noise, misfit=0.0)
         engine.tell(runs, signals)
         log_density = engine.fit(warn=False).log_prob(at)
         mass = np.cumsum(np.exp(log_density - log_density.max()))
@@ -41,24 +41,13 @@ def held(found):
 
 
 @pytest.mark.slow
-def test_intervals_of_signals_hold_beside_the_error_and_only_then():
+def test_intervals_hold_beside_the_error_and_only_then():
     """The exact posterior has an sd of 0.144; coverage of 0.6 would pass once in 1e3."""
-    found = intervals("signal", BESIDE, misfit=0.0)
+    found = intervals(BESIDE)
     assert held(found) >= binom.ppf(ALPHA, DATA, 0.9)
     exact = 1.0 / np.sqrt(SHAPE @ np.linalg.solve(ERRS + NOISE**2 * np.eye(SAMPLES), SHAPE))
     assert np.ptp(found, 1).mean() == pytest.approx(3.29 * exact, rel=0.1)
-    assert held(intervals("signal", KNOWN, misfit=0.0)) < binom.ppf(ALPHA, DATA, 0.9)
-
-
-@pytest.mark.slow
-def test_intervals_of_discrepancies_hold_beside_the_error_and_only_then():
-    """Least squares err by an sd of 0.148, which no threshold may undercut."""
-    found = intervals("discrepancy", BESIDE, threshold="min_mean")
-    assert held(found) >= binom.ppf(ALPHA, DATA, 0.9)
-    least = np.sqrt(SHAPE @ ERRS @ SHAPE) / (SHAPE @ SHAPE)
-    assert 3.29 * least * 0.9 < np.ptp(found, 1).mean() < 3.29 * least * 2.0
-    alone = intervals("discrepancy", None, threshold="min_mean")
-    assert held(alone) < binom.ppf(ALPHA, DATA, 0.9)
+    assert held(intervals(KNOWN)) < binom.ppf(ALPHA, DATA, 0.9)
 
 
 def test_a_process_has_the_size_and_correlation_that_were_given():

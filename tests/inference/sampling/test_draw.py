@@ -304,8 +304,9 @@ def test_log_prob_is_prior_times_likelihood(line_fit):
     theta = {"slope": np.array([0.2, 0.9, 2.0]), "offset": np.array([0.7, 0.1, 0.5])}
     values = line_fit.log_prob(theta)
     inside = {name: v[:2] for name, v in theta.items()}
-    mean, sd = line_fit.surrogate.predict(inside)
-    expected = np.log(0.5) + norm.logcdf((line_fit.learned.threshold - mean) / sd)
+    learned = line_fit.learned
+    at = line_fit.prior.to_unit(inside)
+    expected = np.log(0.5) + learned.log_likelihood(learned.state, at)
     np.testing.assert_allclose(values[:2], expected, rtol=1e-6)
     assert values[2] == -np.inf
     assert line_fit.log_prob({"slope": 0.2, "offset": 0.7}).shape == ()

@@ -125,7 +125,7 @@ def clients(cluster):
 def options(executor):
     """Three in flight."""
     flying = {"batch": 3, "in_rounds": False}
-    return {"budget": BUDGET, "initial": INITIAL, "executor": executor, **flying}
+    return {"budget": BUDGET, "confirm": 0, "initial": INITIAL, "executor": executor, **flying}
 
 
 @pytest.mark.slow
@@ -154,7 +154,9 @@ def test_in_flight_no_executor_has_the_bits_of_one(prior, observed, simulate, by
 @pytest.mark.slow
 def test_progress_is_told_of_every_simulation(prior, observed, simulate):
     told = []
-    inference.fit(simulate, prior, observed, budget=7, initial=5, batch=2, progress=told.append)
+    inference.fit(
+        simulate, prior, observed, budget=7, initial=5, batch=2, confirm=0, progress=told.append
+    )
     assert told == [1] * 7
 
 
@@ -251,7 +253,7 @@ def test_after_an_error_the_bank_is_free_for_the_next_call(prior, observed, simu
                 inference.fit(misshapen, prior, observed, bank=bank, **options(pool))
             finish.set()
         assert 1 <= len(bank) <= 2  # the other worker may have begun another
-        five = {"budget": 5, "initial": 5, "warn": False}
+        five = {"budget": 5, "initial": 5, "confirm": 0, "warn": False}
         fit = inference.fit(simulate, prior, observed, bank=bank, **five)
     assert fit.failures == {}
 

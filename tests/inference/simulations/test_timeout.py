@@ -157,7 +157,7 @@ def test_every_kind_is_counted_and_written(tmp_path, prior, observed, simulate, 
         signals[np.isin(seeds, diverges), 5:] = np.inf
         return signals
 
-    fit = inference.fit(fragile, prior, observed, budget=9, timeout=0.5)
+    fit = inference.fit(fragile, prior, observed, budget=9, confirm=0, timeout=0.5)
     assert fit.failures == {"raised": 1, "not finite": 1, "timeout": 1}
     expected = [""] * 9
     line = fragile.__code__.co_firstlineno + 2
@@ -167,7 +167,7 @@ def test_every_kind_is_counted_and_written(tmp_path, prior, observed, simulate, 
     runs = fit.simulations
     assert runs["error"].to_numpy().tolist() == expected
     np.testing.assert_array_equal(runs["failed"], [bool(error) for error in expected])
-    plain = inference.fit(simulate, prior, observed, budget=7)
+    plain = inference.fit(simulate, prior, observed, budget=7, confirm=0)
     fine = [0, 2, 5, 6]
     np.testing.assert_array_equal(fit.history.signals[fine], plain.history.signals[fine])
     runs.to_netcdf(tmp_path / "runs.nc", engine="h5netcdf")

@@ -68,14 +68,14 @@ def test_a_long_series_needs_no_matrix():
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert learner.noise.white.shape == (MAX_VALUES,)
+    assert learner.scale.given.white.shape == (MAX_VALUES,)
     assert peak < 50e6
 
 
 @pytest.mark.parametrize(
     ("noise", "message"),
     [
-        ("loud", "noise must be an array of numbers, got 'loud'"),
+        ("loud", "noise must be \"poisson\", a function or numbers, got 'loud'"),
         ({"sd": 1.0}, "noise must be an array of numbers, got {'sd'"),
         (-0.5, "not negative where observed is finite, got -0.5"),
         (np.full((20, 2), np.nan), "finite and not negative where observed is finite, got nan"),
@@ -93,4 +93,5 @@ def test_noise_that_reads_two_ways_is_refused(prior):
     observed = np.array([[1.0, np.nan], [np.nan, 2.0]])
     with pytest.raises(ValueError, match="may be sds or a covariance"):
         SignalFamily(noise=np.full((2, 2), 0.1)).learner(observed)
-    np.testing.assert_allclose(SignalFamily(noise=[0.1, 0.1]).learner(observed).noise.white, 0.01)
+    given = SignalFamily(noise=[0.1, 0.1]).learner(observed).scale.given
+    np.testing.assert_allclose(given.white, 0.01)

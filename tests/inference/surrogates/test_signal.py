@@ -13,7 +13,8 @@ from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.emulator import Limits, emulate, noise_share
 from bolfi_liquids.inference.surrogates.families import Learnable, SignalFamily
 from bolfi_liquids.inference.surrogates.signal_likelihood import log_likelihood, log_second_moment
-from bolfi_liquids.inference.surrogates.success import Feasibility
+from bolfi_liquids.inference.surrogates.success import Runs
+from bolfi_liquids.inference.surrogates.warnings import UNREPEATED
 from scipy.stats import binom, multivariate_normal
 
 from bolfi_liquids import inference
@@ -36,7 +37,7 @@ def outputs(u, seeds=None):
 def learned(u, signals, observed, **options):
     learner = SignalFamily(**options).learner(observed)
     measured = learner.measure(signals)
-    runs = Feasibility(u, np.isfinite(measured.discrepancy))
+    runs = Runs(u, np.isfinite(measured.discrepancy))
     known = Learnable(u, measured.features, measured.discrepancy, None, runs)
     return learner.learn(known, None)
 
@@ -180,7 +181,12 @@ def test_the_check_speaks_up_where_noise_rules(design):
     loud = outputs(design, range(30)) + 10.0 * np.random.default_rng(0).normal(size=(30, 1))
     found = learned(design, loud, loud[0])
     assert noise_share(found.emulator) > 0.5
-    assert any("run-to-run noise" in said for said in found.warnings())
+    assert UNREPEATED in found.warnings()
+    rng = np.random.default_rng(1)
+    again = loud[:3] + 10.0 * rng.normal(size=(3, 1)), loud[:3]
+    for repeated, said in zip(again, ("run-to-run noise", "runs of equal parameters"), strict=True):
+        both = np.concatenate([design, design[:3]]), np.concatenate([loud, repeated])
+        assert any(one.startswith(said) for one in learned(*both, loud[0]).warnings())
     quiet = learned(design, outputs(design), outputs(design)[0])
     assert quiet.warnings() == []
 

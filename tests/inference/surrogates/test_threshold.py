@@ -7,7 +7,14 @@ import pytest
 from bolfi_liquids.inference.gp.namespaces import log_ndtr
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.discrepancy import learn, with_threshold
-from bolfi_liquids.inference.surrogates.threshold import log_both_below, log_likelihood
+from bolfi_liquids.inference.surrogates.threshold import (
+    Matched,
+    Predicted,
+    log_both_below,
+    log_likelihood,
+    matched,
+)
+from bolfi_liquids.inference.surrogates.transform import Transform
 from scipy.special import erfcx
 from scipy.stats import norm
 
@@ -18,7 +25,7 @@ DELTA = 1.0 + ((U - 0.4) ** 2).sum(-1)
 
 
 def test_agrees_with_scipy_with_the_noise_in_sigma():
-    fitted = learn(U, DELTA, "identity")
+    fitted = with_threshold(learn(U, DELTA, "identity"), Predicted(0.2))
     u = np.array([[0.8, 0.3]])
     mean, sd = fitted.predict(u)
     value = log_likelihood(fitted.state, u)
@@ -26,7 +33,7 @@ def test_agrees_with_scipy_with_the_noise_in_sigma():
 
 
 def test_finite_and_monotone_with_finite_gradients_over_a_hundred_decades():
-    fitted = learn(U, DELTA, "identity")
+    fitted = with_threshold(learn(U, DELTA, "identity"), Predicted(0.2))
     with jax.enable_x64(True):
         u = jnp.array([0.8, 0.3])
         thresholds = -jnp.logspace(-50.0, 50.0, 201)
@@ -86,3 +93,33 @@ def test_bad_rules_are_refused(prior, observed, rule):
 def test_a_threshold_that_the_transform_cannot_take_is_refused():
     with pytest.raises(ValueError, match="must be positive for the transform 'log'"):
         with_threshold(learn(U, DELTA, "log"), -1.0)
+
+
+@pytest.mark.parametrize("name", ["identity", "sqrt", "log"])
+@pytest.mark.parametrize("dimension", [1, 2, 4])
+def test_a_matched_threshold_gives_the_width_of_independent_errors(name, dimension):
+    """Draws along the radius of a quadratic discrepancy, weighted by Phi: d s^2 is expected."""
+    numbers, least, transform = 30, 6.0, Transform(name, 0.0)
+    mean, sd = float(transform(np.asarray(least))), 1e-3
+    eps, width = matched(Matched(numbers), mean, sd, transform, dimension)
+    r = np.linspace(0.0, 20.0, 200_001)[1:]
+    weights = r ** (dimension - 1) * norm.cdf((eps - transform(least + r**2)) / np.hypot(sd, width))
+    expected = dimension * least / (numbers - dimension)
+    assert weights @ r**2 / weights.sum() == pytest.approx(expected, rel=0.02)
+    assert width > sd
+
+
+def test_noise_that_is_too_large_for_it_is_known():
+    eps, width = matched(Matched(1000), 6.0, 3.0, Transform("identity", 0.0), 1)
+    assert width == 0.0 and eps == pytest.approx(6.0 + 3.0 * norm.ppf(0.02))
+
+
+def test_doubt_is_no_agreement_to_a_cautious_surrogate_and_what_is_learned_stays():
+    at = U[U[:, 0] < 0.6]
+    fitted = with_threshold(learn(at, 1.0 + 9.0 * ((at - 0.3) ** 2).sum(-1), "identity"), 1.2)
+    near, far = np.array([[0.3, 0.3]]), np.array([[1.0, 0.0]])
+    open_, cautious = fitted.state, fitted.cautious.state
+    np.testing.assert_allclose(
+        log_likelihood(cautious, near), log_likelihood(open_, near), atol=0.05
+    )
+    assert log_likelihood(cautious, far) < log_likelihood(open_, far)

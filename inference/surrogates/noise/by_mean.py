@@ -1,0 +1,203 @@
+"""Measurement noise whose size follows from the simulated mean."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, Protocol, cast
+
+import numpy as np
+from scipy.special import xlogy
+
+from ...arguments import checked_array, checked_number
+from ..given_noise import GivenNoise
+
+DECADES = np.linspace(-25.0, 25.0, 1001)  # logs of the means, over the largest observed one
+LEAST_STEP = 1e-12  # of the scale, from one of them to the next
+TRUSTED = 3.0  # sds from an observed value, up to which its likelihood is looked at
+HALF_STEP = 0.5  # sds, over which its slope and curvature are taken
+LEAST_CURVATURE = 0.1  # where it is not convex, as far from an observed value
+ROUNDING = 1e-9  # relative: a mean that is negative by less counts as 0
+LARGEST_COUNT = 1e18  # that NumPy draws
+
+SdOfMean = Callable[[np.ndarray], np.ndarray]
+
+
+class Law(Protocol):
+    """How values scatter around their mean; `counts` [m] samples were averaged for each."""
+
+    def check(self, values: np.ndarray) -> None: ...
+
+    def sd(self, mean: np.ndarray, counts: np.ndarray) -> np.ndarray: ...
+
+    def log_density(
+        self, value: np.ndarray, mean: np.ndarray, counts: np.ndarray
+    ) -> np.ndarray: ...
+
+    def draw(
+        self, rng: np.random.Generator, mean: np.ndarray, counts: np.ndarray
+    ) -> np.ndarray: ...
+
+
+class Poisson:
+    """Counts."""
+
+    def check(self, values: np.ndarray) -> None:
+        least = values.min()
+        if least < -ROUNDING * np.abs(values).max():
+            raise ValueError(f'noise="poisson" needs means that are not negative, got {least:.4g}')
+
+    def sd(self, mean: np.ndarray, counts: np.ndarray) -> np.ndarray:
+        return np.sqrt(np.maximum(mean, 0.0) / counts)
+
+    def log_density(self, value: np.ndarray, mean: np.ndarray, counts: np.ndarray) -> np.ndarray:
+        mean = np.maximum(mean, 0.0)
+        return counts * (xlogy(value, mean) - mean)
+
+    def draw(self, rng: np.random.Generator, mean: np.ndarray, counts: np.ndarray) -> np.ndarray:
+        return rng.poisson(np.clip(counts * mean, 0.0, LARGEST_COUNT)) / counts
+
+
+@dataclass(frozen=True)
+class Gaussian:
+    """Independent Gaussian noise.
+
+    Attributes:
+        sd_of: Its sd, from means to sds of the same shape, value by value.
+    """
+
+    sd_of: SdOfMean
+
+    def check(self, values: np.ndarray) -> None:
+        sds = self._sds(values)
+        wrong = ~(np.isfinite(sds) & (sds > 0.0))
+        if wrong.any():
+            raise ValueError(
+                f"noise must give a positive, finite sd for each mean, got {sds[wrong][0]:.4g} for "
+                f"the mean {values[wrong][0]:.4g}: add what noise is left there, as in "
+                "lambda mean: 0.1 + 0.2 * np.abs(mean), or leave the value out (NaN in observed)"
+            )
+
+    def _sds(self, mean: np.ndarray) -> np.ndarray:
+        with np.errstate(all="ignore"):  # a search may try what no run gives
+            found = checked_array("what noise returns", self.sd_of(mean.ravel()))
+        if found.size not in (1, mean.size):
+            raise ValueError(
+                f"noise must give one sd for each of {mean.size} means, got shape {found.shape}"
+            )
+        return np.broadcast_to(found.ravel(), mean.size).reshape(mean.shape)
+
+    def sd(self, mean: np.ndarray, counts: np.ndarray) -> np.ndarray:
+        return self._sds(mean) / np.sqrt(counts)
+
+    def log_density(self, value: np.ndarray, mean: np.ndarray, counts: np.ndarray) -> np.ndarray:
+        sd = self.sd(mean, counts)
+        fine = np.isfinite(sd) & (sd > 0.0)
+        sd = np.where(fine, sd, 1.0)
+        return np.where(fine, -np.log(sd) - 0.5 * ((value - mean) / sd) ** 2, -np.inf)
+
+    def draw(self, rng: np.random.Generator, mean: np.ndarray, counts: np.ndarray) -> np.ndarray:
+        sd = self.sd(mean, counts)
+        return mean + np.where(np.isfinite(sd), sd, 0.0) * rng.normal(size=mean.shape)
+
+
+@dataclass(frozen=True)
+class Share:
+    """Sd in proportion to the mean."""
+
+    share: float
+
+    def __call__(self, mean: np.ndarray) -> np.ndarray:
+        return self.share * np.abs(mean)
+
+
+def relative(share: float) -> SdOfMean:
+    """Noise in proportion to the simulated mean, for `noise=`: `relative(0.2)` is an sd of 20 %.
+
+    Raises:
+        ValueError: `share` is not positive.
+    """
+    return Share(checked_number("share", share, lambda s: 0.0 < s < np.inf, "positive"))
+
+
+def law_of(noise: object) -> Law | None:
+    """The law that `noise=` names; None where it is a number or an array.
+
+    Raises:
+        ValueError: text other than "poisson".
+    """
+    if isinstance(noise, str):
+        if noise != "poisson":
+            raise ValueError(f'noise must be "poisson", a function or numbers, got {noise!r:.100}')
+        return Poisson()
+    return Gaussian(cast(SdOfMean, noise)) if callable(noise) else None
+
+
+@dataclass(frozen=True, eq=False)
+class ByMean:
+    """Means on a scale on which their noise has sd 1: the integral of 1 / sd (Bartlett 1947).
+
+    There, the likelihood of each observed value is nearly Gaussian. `seen` is the Gaussian that has
+    its slope and curvature at given means: iterated with the means that fit best, the posterior has
+    the mode and the width of the exact one (Fisher's scoring; McCullagh and Nelder 1989, section
+    2.5).
+
+    Attributes:
+        law: Of the noise.
+        observed: [m]
+        counts: Samples averaged for each value [m].
+    """
+
+    law: Law
+    observed: np.ndarray
+    counts: np.ndarray
+
+    rounds: ClassVar[int] = 3
+
+    def __post_init__(self) -> None:
+        self.law.check(self.observed)
+
+    @cached_property
+    def _table(self) -> tuple[np.ndarray, np.ndarray]:
+        """Means from small to large, close together at 0, and the integral up to them."""
+        size = np.abs(self.observed).max() or 1.0
+        above = size * np.exp(DECADES)
+        means = np.concatenate([-above[::-1], [0.0], above])
+        sd = self.law.sd(means, np.ones(len(means)))
+        fine = np.isfinite(sd) & (sd > 0.0)
+        rate = np.where(fine, 1.0 / np.where(fine, sd, 1.0), 0.0)
+        # every step rises, lest the scale could not be inverted
+        steps = np.maximum(0.5 * (rate[1:] + rate[:-1]) * np.diff(means), LEAST_STEP)
+        integral = np.append(0.0, np.cumsum(steps))
+        return means, integral - integral[len(above)]
+
+    def of(self, values: np.ndarray) -> np.ndarray:
+        return np.sqrt(self.counts) * np.interp(values, *self._table)
+
+    def back(self, features: np.ndarray) -> np.ndarray:
+        means, integral = self._table
+        return np.interp(features / np.sqrt(self.counts), integral, means)
+
+    def seen(self, at: np.ndarray | None) -> tuple[np.ndarray, GivenNoise]:
+        own = self.of(self.observed)
+        near = own if at is None else np.clip(at, own - TRUSTED, own + TRUSTED)
+        less, here, more = (
+            self.law.log_density(self.observed, self.back(near + step), self.counts)
+            for step in (-HALF_STEP, 0.0, HALF_STEP)
+        )
+        slope = (more - less) / (2.0 * HALF_STEP)
+        curvature = np.maximum((2.0 * here - more - less) / HALF_STEP**2, LEAST_CURVATURE)
+        given = GivenNoise(1.0 / curvature, np.zeros((len(own), 0)))
+        return near + slope / curvature, given
+
+    @property
+    def unit(self) -> np.ndarray:
+        return np.ones(len(self.observed))
+
+    def sds(self, values: np.ndarray) -> np.ndarray:
+        return self.law.sd(values, self.counts)
+
+    def observe(self, rng: np.random.Generator, values: np.ndarray) -> np.ndarray:
+        return self.law.draw(rng, values, self.counts)
+
+    def check(self, values: np.ndarray) -> None:
+        self.law.check(values)

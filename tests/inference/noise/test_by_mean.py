@@ -1,0 +1,137 @@
+"""Noise that follows from the simulated mean: posteriors against exact grids."""
+
+import numpy as np
+import numpyro.distributions as dist
+import pytest
+from bolfi_liquids.inference.surrogates.noise.by_mean import ByMean, Poisson, law_of, relative
+
+from bolfi_liquids import inference
+
+AT = np.linspace(-1.0, 1.0, 12)
+COUNTS = np.random.default_rng(7).poisson(np.exp(1.2 + 1.5 * AT)).astype(float)  # from 0 to 15
+PRIOR = inference.Prior({"a": dist.Uniform(-1, 3), "b": dist.Uniform(-1, 4)})
+GRID = np.stack(np.meshgrid(np.linspace(-1, 3, 301), np.linspace(-1, 4, 301)), -1).reshape(-1, 2)
+WIDEST, FARTHEST = (0.8, 1.25), 0.3  # ratio of sds, shift in sds
+
+
+def means(theta, seeds=None):
+    return np.exp(theta["a"][:, None] + theta["b"][:, None] * AT)
+
+
+ON_GRID = means(dict(zip("ab", GRID.T, strict=True)))
+
+
+def poisson(y, mean):
+    return y * np.log(mean) - mean
+
+
+def gaussian(y, mean, sd):
+    return -np.log(sd) - 0.5 * ((y - mean) / sd) ** 2
+
+
+def fitted(observed, noise, **options):
+    return inference.fit(
+        means, PRIOR, observed, budget=30, noise=noise, progress=False, warn=False, **options
+    )
+
+
+def compared(fit, log_density):
+    """Shifts and ratios of sds [2] of the posterior, against the exact one on the grid."""
+    weight = np.exp(log_density - log_density.max())
+    weight /= weight.sum()
+    mean = weight @ GRID
+    sd = np.sqrt(weight @ (GRID - mean) ** 2)
+    draws = fit.sample("quadrature", warn=False)["posterior"]
+    drawn = np.stack([draws[name].values.ravel() for name in "ab"], -1)
+    return (drawn.mean(0) - mean) / sd, drawn.std(0) / sd
+
+
+def right(fit, log_density):
+    shift, ratio = compared(fit, log_density)
+    return bool((np.abs(shift) < FARTHEST).all() and (WIDEST[0] < ratio).all()) and bool(
+        (ratio < WIDEST[1]).all()
+    )
+
+
+def test_few_counts_have_their_own_posterior():
+    exact = poisson(COUNTS, ON_GRID).sum(1)
+    assert right(fitted(COUNTS, "poisson"), exact)
+    same = fitted(COUNTS, float(np.sqrt(COUNTS.mean())))  # one size for all: another posterior
+    assert not right(same, exact)
+
+
+@pytest.mark.parametrize("noise", [relative(0.2), lambda mean: 0.2 * mean])
+def test_noise_in_proportion_to_the_mean(noise):
+    observed = np.exp(1.2 + 1.5 * AT) * (1.0 + 0.2 * np.random.default_rng(1).normal(size=12))
+    exact = gaussian(observed, ON_GRID, 0.2 * ON_GRID).sum(1)
+    assert right(fitted(observed, noise), exact)
+
+
+def test_an_own_function_of_the_mean():
+    def sd(mean):
+        return 0.3 + 0.1 * np.abs(mean)
+
+    clean = np.exp(1.2 + 1.5 * AT)
+    observed = clean + sd(clean) * np.random.default_rng(2).normal(size=12)
+    exact = gaussian(observed, ON_GRID, sd(ON_GRID)).sum(1)
+    assert right(fitted(observed, sd), exact)
+
+
+def test_what_is_shown_is_in_the_units_of_the_output():
+    fit = fitted(COUNTS, "poisson")
+    best = {name: np.array([value]) for name, value in fit.best.items()}
+    mean, sd = fit.surrogate.predict(best)
+    np.testing.assert_allclose(mean, means(best), rtol=0.02)
+    assert (sd < 0.2 * mean).all()  # the simulator makes no noise
+    tree = fit.sample("quadrature", warn=False)
+    first = float(tree["constant_data"]["measurement_noise_sd"])
+    assert first == pytest.approx(np.sqrt(means(best)[0, 0]), rel=0.1)
+    drawn = tree["posterior_predictive"]["signal"].values.reshape(-1, 12)
+    np.testing.assert_array_equal(drawn, np.round(drawn))
+    assert drawn[:, -1].std() == pytest.approx(np.sqrt(means(best)[0, -1]), rel=0.5)
+
+
+def test_means_go_to_the_scale_and_back():
+    values = np.array([[0.5, 3.0, 200.0]])
+    for law in (Poisson(), law_of(relative(0.2))):
+        scale = ByMean(law, values[0], np.ones(3))
+        np.testing.assert_allclose(scale.back(scale.of(values)), values, rtol=1e-9)
+        # one sd is one
+        step = scale.of(values + 0.05 * scale.sds(values)) - scale.of(values)
+        np.testing.assert_allclose(step, 0.05, rtol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("noise", "observed", "message"),
+    [
+        ("gauss", COUNTS, 'noise must be "poisson", a function or numbers'),
+        ("poisson", -COUNTS - 1.0, "not negative, got -"),
+        (lambda mean: 0.0 * mean, COUNTS, "positive, finite sd for each mean, got 0"),
+        (lambda mean: -mean, COUNTS + 1.0, "positive, finite sd for each mean, got -"),
+        (lambda mean: np.nan * mean, COUNTS, "positive, finite sd for each mean, got nan"),
+        (lambda mean: mean[:3], COUNTS, "one sd for each of 12 means"),
+        (relative(0.2), np.zeros(12), "got 0 for the mean 0"),
+    ],
+)
+def test_other_noise_is_refused(noise, observed, message):
+    with pytest.raises(ValueError, match=message):
+        inference.Bolfi(PRIOR, observed, noise=noise)
+
+
+@pytest.mark.parametrize("share", [0.0, -0.2, np.inf, "much"])
+def test_a_share_is_positive(share):
+    with pytest.raises(ValueError, match="share must be positive"):
+        inference.relative(share)
+
+
+def test_a_run_without_noise_is_a_failed_run():
+    def some(theta, seeds):
+        found = means(theta)
+        found[theta["a"] < 0.0] = 0.0
+        return found
+
+    fit = inference.fit(
+        some, PRIOR, COUNTS + 1.0, budget=20, noise=relative(0.3), progress=False, warn=False
+    )
+    assert set(fit.failures) == {"incomparable"}
+    assert any("positive, finite sd" in error for error in fit.history.errors)
