@@ -68,7 +68,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     cups: "Cups | str | Path | None" = None,
     budget: int = 20,
     seed: int = 0,
-    surrogate: str = "discrepancy",
+    surrogate: str = "signal",
     batch: int = 4,
     particles: int = 0,
     sampler: str = "nuts",
@@ -92,16 +92,16 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         out: The RUN directory; None is a new one among the computer's temporary files.
         prior: Over `viscosity` [Pa s] and `cohesion` [1]; None is `default_prior()`.
         baseline: Clean recordings of the same rig, of any liquid, in which no effect is believed
-            to be missing: what the simulator errs by is learned from them, at eight more
-            simulations each. Without them it is what is known of the simulator, see
-            `model_error.model_error`.
+            to be missing: the simulator's error is learned from them, at eight more simulations
+            each. Without them it is the usual one, see `model_error.model_error`.
         pours: A table of pours of the liquid that were made, or its path: the posterior does not
             depend on it, but `choose_pour` does.
         cups: With which they were made, or a TOML file of them; None takes the bundled ones.
         budget: Simulations that the engine may learn from. A dozen more judge the result, anew
             where a run grew.
         seed: Seed of all random draws.
-        surrogate: "discrepancy", the paper's, or "signal", which emulates the inclination itself.
+        surrogate: "signal", which emulates the inclination itself and allows for an error of the
+            simulator, or "discrepancy", the paper's, which does not.
         batch: Simulations that are asked, and run, at the same time.
         particles: Number of particles of the simulated liquid; 0: cells follow the stick.
         sampler: "nuts" or "emcee".
@@ -137,11 +137,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         check_prior(prior)
     stirring = stirring_of(opened, settings.particles)
     check_names(stirring.recordings)
-    clean = tuple(open_recordings(baseline, Argument("baseline")))
-    check_baseline(stirring, clean)
-    if {one.hash for one in clean} & {one.hash for one in opened}:
-        fix = "give other recordings: it would count as free of errors"
-        raise InputError("is what is calibrated on", where=Argument("baseline"), fix=fix)
+    clean = _open_clean(baseline, stirring, surrogate)
     run = (
         Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, Argument("out"))
     )
@@ -212,17 +208,17 @@ def _calibrate(
             stirring, stirring.observed, prior, keep, settings, progress=advance, warn=False
         )
         warn_of_failures(made.history.errors.tolist(), execution.timeout)
-        clean = _clean(baseline, settings, prior, bank, execution)
-        error = model_error(stirring, made.closest.theta["viscosity"], clean)
-        options = {"seed": settings.seed, **engine_options(stirring, settings.surrogate)}
-        fit = concluded_beside(error, made, stirring, options)
+        fit, error = made, None
+        if settings.surrogate == "signal":  # the paper's has no noise to which an error adds
+            clean = _learn_clean(baseline, settings, prior, bank, execution)
+            error = model_error(stirring, made.best["viscosity"], clean)
+            options = {"seed": settings.seed, **engine_options(stirring, settings.surrogate)}
+            fit = concluded_beside(error, made, stirring, options)
         sampled = fit.sample(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
         )
         drawn = pick_draws(sampled["posterior"].to_dataset(), PREDICTIVE_DRAWS, settings.seed)
-        check = check_by_simulation(
-            stirring.simulate, drawn, fit.best, settings.seed, keep, advance=advance
-        )
+        check = check_by_simulation(stirring, drawn, fit.best, settings.seed, keep, advance=advance)
     tree = results_tree(sampled, fit, stirring, check)
     if (now := read_run(run)["settings"]["budget"]) != settings.budget:
         raise InputError(
@@ -236,7 +232,7 @@ def _calibrate(
     return Calibration(run, tree, MappingProxyType(dict(record)), summary)
 
 
-def _clean(
+def _learn_clean(
     baseline: tuple[Recording, ...],
     settings: CalibrationSettings,
     prior: "Prior",
@@ -321,6 +317,28 @@ def _usual_prior(run: Path, resume: bool) -> "Prior":
     """That of a run that goes on, which an earlier version may have begun with another default."""
     held = read_run(run).get("settings", {}) if resume and (run / RUN_TOML).is_file() else {}
     return read_prior(held["prior"]) if "prior" in held else default_prior()
+
+
+def _open_clean(
+    baseline: Source | Sequence[Source], stirring: Stirring, surrogate: str
+) -> tuple[Recording, ...]:
+    """Clean recordings beside which a run's can be calibrated.
+
+    Raises:
+        InputError: They cannot be used.
+    """
+    clean = tuple(open_recordings(baseline, Argument("baseline")))
+    if clean and surrogate != "signal":
+        raise InputError(
+            f"clean recordings, but the surrogate {surrogate!r} does not allow for an error",
+            where=Argument("baseline"),
+            fix="leave them out, or take the surrogate 'signal'",
+        )
+    check_baseline(stirring, clean)
+    if {one.hash for one in clean} & {one.hash for one in stirring.recordings}:
+        fix = "give other recordings: it would count as free of errors"
+        raise InputError("is what is calibrated on", where=Argument("baseline"), fix=fix)
+    return clean
 
 
 def _open_all(recordings: Source | Sequence[Source]) -> list[Recording]:

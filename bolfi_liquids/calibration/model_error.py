@@ -1,4 +1,4 @@
-"""What the simulator errs by, beside which a calibration is concluded."""
+"""The simulator's own error, for which the posterior of a calibration allows."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ModelError:
-    """What the simulator errs by on a run's recordings.
+    """The simulator's error on a run's recordings.
 
-    It is that of one viscosity, the closest simulation's: one that fell along the posterior would
-    let liquids of which little error is known pass for better ones.
+    It is that of one viscosity, where a fit without it is best: an error that falls along the
+    posterior would favour the liquids in which it is small.
 
     Attributes:
         usual: The error, as a process over time.
@@ -41,9 +41,9 @@ class ModelError:
 def model_error(stirring: Stirring, viscosity: float, clean: Sequence[Clean] = ()) -> ModelError:
     """The error in a liquid of so many Pa s, learned from clean recordings where there are any.
 
-    Without them its size is `models.stirring_error`, in the rhythm of the stick: in the
-    reference's oil the simulator swings by 8 % of the viscosity too little, which errors that are
-    forgotten within tenths of seconds would not explain.
+    Without them its size is `models.stirring_error`, and it is correlated as the recorded
+    inclination is: in the reference's oil the simulated stick swings as if the viscosity were 8 %
+    larger, which an error with a correlation of tenths of seconds would not explain.
     """
     from ..inference.criticism import model_error, rhythm
 
@@ -56,7 +56,7 @@ def model_error(stirring: Stirring, viscosity: float, clean: Sequence[Clean] = (
 def concluded_beside(
     error: ModelError, fit: "Fit", stirring: Stirring, options: Mapping[str, Any]
 ) -> "Fit":
-    """What follows from the same simulations where the simulator errs.
+    """The fit to the same simulations with the simulator's error and the cameras' noise as noise.
 
     Args:
         error: Of the simulator.
