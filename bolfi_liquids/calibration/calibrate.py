@@ -44,7 +44,7 @@ from ..run.simulations import warn_of_failures
 from ..run.workers import open_workers
 from .baseline import Clean, check_baseline, clean_residuals
 from .draws import pick_draws
-from .model_error import concluded_beside, model_error
+from .model_error import concluded_beside, model_error, noise_beside
 from .result import Calibration, finished_calibration
 from .stir_simulator import Stirring, stirring_of
 from .stirs import effects_of
@@ -204,16 +204,19 @@ def _calibrate(
         bar = progress_bar("simulating stirs", needed, shown=execution.progress, done=kept)
         advance = after_first(kept, stack.enter_context(bar))
         keep = execution.keep(bank, stirring.identity, settings.batch)
-        made = fit_recordings(
-            stirring, stirring.observed, prior, keep, settings, progress=advance, warn=False
-        )
-        warn_of_failures(made.history.errors.tolist(), execution.timeout)
-        fit, error = made, None
-        if settings.surrogate == "signal":  # the paper's has no noise to which an error adds
+        # the paper's surrogate has no noise to which an error adds
+        allows = settings.surrogate == "signal"
+        # beside the largest error the search does not settle on one liquid too early
+        search = {"noise": noise_beside(stirring, model_error(stirring, 0.0))} if allows else {}
+        report = {"progress": advance, "warn": False}
+        fit = fit_recordings(stirring, stirring.observed, prior, keep, settings, **report, **search)
+        warn_of_failures(fit.history.errors.tolist(), execution.timeout)
+        error = None
+        if allows:
             clean = _learn_clean(baseline, settings, prior, bank, execution)
-            error = model_error(stirring, made.best["viscosity"], clean)
+            error = model_error(stirring, fit.best["viscosity"], clean)
             options = {"seed": settings.seed, **engine_options(stirring, settings.surrogate)}
-            fit = concluded_beside(error, made, stirring, options)
+            fit = concluded_beside(error, fit, stirring, options)
         sampled = fit.sample(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
         )
@@ -245,7 +248,7 @@ def _learn_clean(
     from ..inference.criticism import Keeping
 
     keeping = Keeping(
-        bank, CriticismSettings.batch, executor=execution.workers, timeout=execution.timeout
+        bank, CriticismSettings.batch, executor=execution.executor, timeout=execution.timeout
     )
     return clean_residuals(baseline, settings.particles, prior, effects_of("stir"), keeping=keeping)
 
@@ -268,7 +271,7 @@ def fit_recordings(
     prior: "Prior",
     keep: "Keep",
     settings: CalibrationSettings,
-    **report: Any,
+    **more: Any,
 ) -> "Fit":
     """The engine's fit of a stir, with the options that go with the surrogate.
 
@@ -278,7 +281,7 @@ def fit_recordings(
         prior: Prior of the parameters.
         keep: Where simulations are made and kept.
         settings: Budget, surrogate and seed.
-        report: Arguments `progress` and `warn` of `inference.fit`; none shows no bar.
+        more: Other arguments of `inference.fit`; without `progress` no bar is shown.
     """
     from .. import inference
 
@@ -298,7 +301,7 @@ def fit_recordings(
         bank=keep.bank,
         identity=keep.identity,
         timeout=keep.timeout,
-        **{"progress": False, **report},
+        **{"progress": False, **more},
         **options,
     )
 

@@ -10,18 +10,24 @@ from ..models import stirring_error
 from .baseline import Clean, usual_for
 from .noise import sensor_noise
 from .stir_simulator import Stirring
+from .stirs import frame_interval
 
 if TYPE_CHECKING:
     from ..inference import Fit
-    from ..inference.criticism import UsualResidual
+    from ..inference.criticism import SumOfNoises, UsualResidual
+
+SHORT_PART = 0.5
+"""Size of the part of the error that is forgotten soon, over that of the other."""
+
+SHORT_TIME = 0.1
+"""Time over which it is forgotten [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class ModelError:
     """The simulator's error on a run's recordings.
 
-    It is that of one viscosity, where a fit without it is best: an error that falls along the
-    posterior would favour the liquids in which it is small.
+    It is that of one viscosity, the best one beside the largest error.
 
     Attributes:
         usual: The error, as a process over time.
@@ -41,26 +47,39 @@ class ModelError:
 def model_error(stirring: Stirring, viscosity: float, clean: Sequence[Clean] = ()) -> ModelError:
     """The error in a liquid of so many Pa s, learned from clean recordings where there are any.
 
-    Without them its size is `models.stirring_error`, and it is correlated as the recorded
-    inclination is: in the reference's oil the simulated stick swings as if the viscosity were 8 %
-    larger, which an error with a correlation of tenths of seconds would not explain.
+    Without them it has two parts. One, of size `models.stirring_error`, is correlated as the
+    recorded inclination is: in the reference's oil the simulated stick swings as if the viscosity
+    were 8 % larger, which an error with a correlation of tenths of seconds would not explain. The
+    other is half as large and forgotten within tenths of seconds, as most of the error in cream
+    is: whatever does not swing like the stick would count as free of errors.
     """
     from ..inference.criticism import model_error, rhythm
 
     learned = usual_for(stirring, clean, viscosity)
     if learned is not None:
         return ModelError(learned, tuple(one.recording.path.name for one in clean))
-    return ModelError(model_error(stirring_error(viscosity), rhythm(stirring.observed)))
+    swings = rhythm(stirring.observed)
+    lags = frame_interval(stirring.recordings[0]) * np.arange(len(swings))
+    share = SHORT_PART**2
+    correlation = (swings + share * np.exp(-lags / SHORT_TIME)) / (1.0 + share)
+    return ModelError(model_error(stirring_error(viscosity) * np.sqrt(1.0 + share), correlation))
+
+
+def noise_beside(stirring: Stirring, error: ModelError) -> "SumOfNoises":
+    """The cameras' noise and the simulator's error."""
+    from ..inference.criticism import KnownNoise, SumOfNoises
+
+    return SumOfNoises((KnownNoise(sensor_noise(stirring.observed)), error.usual))
 
 
 def concluded_beside(
     error: ModelError, fit: "Fit", stirring: Stirring, options: Mapping[str, Any]
 ) -> "Fit":
-    """The fit to the same simulations with the simulator's error and the cameras' noise as noise.
+    """The fit to the same simulations beside another error of the simulator.
 
     Args:
         error: Of the simulator.
-        fit: Without it.
+        fit: Beside another one.
         stirring: What was simulated.
         options: Of the engine, with which `fit` was made; see `inference.Bolfi`.
 
@@ -68,10 +87,9 @@ def concluded_beside(
         EmulatorWarning: For each complaint.
     """
     from ..inference import Bolfi
-    from ..inference.criticism import Experiment, KnownNoise, SumOfNoises
+    from ..inference.criticism import Experiment
 
-    cameras = KnownNoise(sensor_noise(stirring.observed))
-    noise = SumOfNoises((cameras, error.usual))
+    noise = noise_beside(stirring, error)
     corrected = Experiment(stirring.simulate, stirring.observed, noise).corrected
     engine, history = Bolfi(fit.prior, corrected, noise=noise, **options), fit.history
     theta = fit.prior.to_dict(history.theta)

@@ -206,7 +206,7 @@ class SignalFamily:
         check_flag("varying_noise", self.varying_noise)
         checked_integer("components", self.components)
         if self.noise is not None and law_of(self.noise) is None:
-            check_noise(self.noise)
+            check_noise(self.noise)  # pyright: ignore[reportArgumentType]  no function is left
         checked_number("misfit", self.misfit, lambda p: 0.0 <= p < 1.0, "from 0 to below 1")
         if self.predicted is not None:
             due = "None or from 0 to below 1"
