@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ..inference.criticism import Extension, Keeping, UsualResidual
 
 STARTING_RUNS = 4  # of each clean recording, all over the prior; as many follow near the best
+CLEAN_RUNS = 2 * STARTING_RUNS
 VISCOSITY_FACTOR = 2.0  # over which the simulator's error changes
 
 RIG_SIZES = ("cup_radius", "stick_radius", "stick_length")

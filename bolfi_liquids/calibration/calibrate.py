@@ -42,7 +42,7 @@ from ..run.provenance import LIBRARIES, versions
 from ..run.recordings import check_names, keep_recordings
 from ..run.simulations import warn_of_failures
 from ..run.workers import open_workers
-from .baseline import Clean, check_baseline, clean_residuals
+from .baseline import CLEAN_RUNS, check_baseline, clean_residuals
 from .draws import pick_draws
 from .model_error import concluded_beside, model_error, noise_beside
 from .result import Calibration, finished_calibration
@@ -194,13 +194,15 @@ def _calibrate(
     settings: CalibrationSettings,
     execution: Execution,
 ) -> Calibration:
+    from ..inference.criticism import Keeping
     from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES, check_by_simulation
     from .posterior_file import results_tree, write_tree
 
     record = note_timeout(run, execution.timeout)
-    needed = settings.budget + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
+    of_clean = CLEAN_RUNS * len(baseline)
+    needed = settings.budget + of_clean + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
     with open_bank(run) as bank, ExitStack() as stack:
-        kept = min(max(needed - _left(record, settings, bank), 0), needed)
+        kept = min(max(_kept(record, of_clean, bank), 0), needed)
         bar = progress_bar("simulating stirs", needed, shown=execution.progress, done=kept)
         advance = after_first(kept, stack.enter_context(bar))
         keep = execution.keep(bank, stirring.identity, settings.batch)
@@ -213,7 +215,17 @@ def _calibrate(
         warn_of_failures(fit.history.errors.tolist(), execution.timeout)
         error = None
         if allows:
-            clean = _learn_clean(baseline, settings, prior, bank, execution)
+            keeping = Keeping(
+                bank,
+                CriticismSettings.batch,
+                report=lambda _, finished: advance(finished),
+                executor=execution.executor,
+                timeout=execution.timeout,
+            )
+            # criticise finds the same simulations in the bank
+            clean = clean_residuals(
+                baseline, settings.particles, prior, effects_of("stir"), keeping=keeping
+            )
             error = model_error(stirring, fit.best["viscosity"], clean)
             options = {"seed": settings.seed, **engine_options(stirring, settings.surrogate)}
             fit = concluded_beside(error, fit, stirring, options)
@@ -235,34 +247,16 @@ def _calibrate(
     return Calibration(run, tree, MappingProxyType(dict(record)), summary)
 
 
-def _learn_clean(
-    baseline: tuple[Recording, ...],
-    settings: CalibrationSettings,
-    prior: "Prior",
-    bank: "SimulationBank",
-    execution: Execution,
-) -> list[Clean]:
-    """What is left of clean recordings; `criticise` finds the same simulations in the bank."""
-    if not baseline:
-        return []
-    from ..inference.criticism import Keeping
+def _kept(record: Mapping[str, Any], of_clean: int, bank: "SimulationBank") -> int:
+    """Simulations that a run has; some of those before it grew were judging, or pours.
 
-    keeping = Keeping(
-        bank, CriticismSettings.batch, executor=execution.executor, timeout=execution.timeout
-    )
-    return clean_residuals(baseline, settings.particles, prior, effects_of("stir"), keeping=keeping)
-
-
-def _left(record: Mapping[str, Any], settings: CalibrationSettings, bank: "SimulationBank") -> int:
-    """Simulations that a run still needs; some of those before it grew were judging, or pours.
-
-    Negative where the bank holds pours that followed a calibration whose results were deleted.
+    More than it needs where the bank holds pours that followed a calibration whose results were
+    deleted.
     """
-    from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES
-
-    before = record.get("grown", [{"learned_from": 0, "simulations": 0}])[-1]
-    needed = settings.budget - before["learned_from"] + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
-    return needed - (len(bank) - before["simulations"])
+    if "grown" not in record:
+        return len(bank)
+    before = record["grown"][-1]
+    return before["learned_from"] + of_clean + len(bank) - before["simulations"]
 
 
 def fit_recordings(

@@ -204,7 +204,10 @@ class CalibrationSummary(Section):
     @computed_field
     @property
     def simulator_error_deg(self) -> Number:
-        """RMS that the simulator usually errs by, at the viscosity of the closest simulation."""
+        """RMS error of the simulator: learned from clean recordings, or the usual one at the
+        viscosity of the closest simulation."""
+        if self.clean:
+            return self.model_error_deg
         return float(np.degrees(stirring_error(self.closest["viscosity"])))
 
     @property
