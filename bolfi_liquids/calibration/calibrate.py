@@ -47,7 +47,7 @@ from .draws import pick_draws
 from .model_error import concluded_beside, model_error, noise_beside
 from .result import Calibration, finished_calibration
 from .stir_simulator import Stirring, stirring_of
-from .stirs import effects_of
+from .stirs import camera_noise, effects_of
 from .summary import CalibrationSummary
 
 if TYPE_CHECKING:
@@ -335,6 +335,8 @@ def _open_clean(
     if {one.hash for one in clean} & {one.hash for one in stirring.recordings}:
         fix = "give other recordings: it would count as free of errors"
         raise InputError("is what is calibrated on", where=Argument("baseline"), fix=fix)
+    for recording in clean:
+        camera_noise([recording])  # refuses one that rests too shortly
     return clean
 
 

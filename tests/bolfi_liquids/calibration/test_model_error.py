@@ -74,6 +74,10 @@ def widened(dataset):
     return dataset.assign_attrs(cup_radius=1.1 * dataset.attrs["cup_radius"])
 
 
+def hasty(dataset):
+    return dataset.isel(time=slice(10, None))
+
+
 def same(dataset):
     return dataset.isel(time=slice(0, 60))
 
@@ -83,6 +87,7 @@ def same(dataset):
     [
         (rerated, "signal", "samples a second"),
         (widened, "signal", "cup_radius"),
+        (hasty, "signal", "before the gripper moves"),
         (same, "signal", "what is calibrated on"),
         (lambda dataset: dataset, "discrepancy", "does not allow for an error"),
     ],
