@@ -1,17 +1,19 @@
 """Simulations that judge a calibration: what the posterior predicts, and how noisy it is."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..inference.result import Closest
 from ..inference.simulations import Keep
 from ..progress import Advance, silent
 from ..run.simulations import simulate_kept
 from ..seeds import Phase, simulation_seeds
 from .stir_simulator import Stirring
+
+if TYPE_CHECKING:
+    from ..inference.result import Closest
 
 PREDICTIVE_DRAWS = 8
 THETA_STAR_REPLICATES = 4  # seeds at theta*, for the noise between seeds
@@ -24,7 +26,7 @@ class Check(NamedTuple):
     none may be near, though the posterior is right.
     """
 
-    closest: Closest  # of those at posterior draws
+    closest: "Closest"  # of those at posterior draws
     predictive: NDArray[np.float64]  # (draws, T, planes) rad, each at a posterior draw
     replicates: NDArray[np.float64]  # (seeds, T, planes) rad, all at theta*
     seconds: float  # spent in the simulator [s]
@@ -66,8 +68,10 @@ def check_by_simulation(
     )
 
 
-def _closest(stirring: Stirring, theta: Mapping[str, NDArray], signals: NDArray) -> Closest:
+def _closest(stirring: Stirring, theta: Mapping[str, NDArray], signals: NDArray) -> "Closest":
     """The one of n simulations that comes nearest to what was recorded."""
+    from ..inference.result import Closest
+
     distance = stirring.discrepancy()
     discrepancies = [distance(stirring.observed, signal) for signal in signals]
     at = int(np.argmin(discrepancies))
