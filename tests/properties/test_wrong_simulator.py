@@ -30,6 +30,7 @@ HOLD = 2.1  # s, of the reference's glycerin
 LEVEL = 1e-3
 
 
+@pytest.mark.filterwarnings("ignore::bolfi_liquids.inference.surrogates.warnings.EmulatorWarning")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("liquid", "warned"),
