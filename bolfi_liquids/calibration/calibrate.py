@@ -19,7 +19,12 @@ from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import Pours, table_and_cups
 from ..inputs.prior import check_prior, default_prior, describe_prior, read_prior
 from ..inputs.recording import Recording, aborted_recordings
-from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
+from ..inputs.settings import (
+    MIN_SIMULATIONS,
+    PAPER_RULES,
+    CalibrationSettings,
+    CriticismSettings,
+)
 from ..inputs.start import check_start
 from ..progress import after_first, progress_bar
 from ..run.directory import (
@@ -37,9 +42,12 @@ from ..run.provenance import LIBRARIES, versions
 from ..run.recordings import check_names, keep_recordings
 from ..run.simulations import warn_of_failures
 from ..run.workers import open_workers
+from .baseline import CLEAN_RUNS, check_baseline, clean_residuals
 from .draws import pick_draws
+from .model_error import concluded_beside, model_error, noise_beside
 from .result import Calibration, finished_calibration
 from .stir_simulator import Stirring, stirring_of
+from .stirs import camera_noise, effects_of
 from .summary import CalibrationSummary
 
 if TYPE_CHECKING:
@@ -55,11 +63,12 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     *,
     out: str | Path | None = None,
     prior: "Prior | None" = None,
+    baseline: Source | Sequence[Source] = (),
     pours: Pours | None = None,
     cups: "Cups | str | Path | None" = None,
     budget: int = 20,
     seed: int = 0,
-    surrogate: str = "discrepancy",
+    surrogate: str = "signal",
     batch: int = 4,
     particles: int = 0,
     sampler: str = "nuts",
@@ -82,13 +91,17 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
             added up.
         out: The RUN directory; None is a new one among the computer's temporary files.
         prior: Over `viscosity` [Pa s] and `cohesion` [1]; None is `default_prior()`.
+        baseline: Clean recordings of the same rig, of any liquid, in which no effect is believed
+            to be missing: the simulator's error is learned from them, at eight more simulations
+            each. Without them it is the usual one, see `model_error.model_error`.
         pours: A table of pours of the liquid that were made, or its path: the posterior does not
             depend on it, but `choose_pour` does.
         cups: With which they were made, or a TOML file of them; None takes the bundled ones.
         budget: Simulations that the engine may learn from. A dozen more judge the result, anew
             where a run grew.
         seed: Seed of all random draws.
-        surrogate: "discrepancy", the paper's, or "signal", which emulates the inclination itself.
+        surrogate: "signal", which emulates the inclination itself and allows for an error of the
+            simulator, or "discrepancy", the paper's, which does not.
         batch: Simulations that are asked, and run, at the same time.
         particles: Number of particles of the simulated liquid; 0: cells follow the stick.
         sampler: "nuts" or "emcee".
@@ -124,6 +137,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         check_prior(prior)
     stirring = stirring_of(opened, settings.particles)
     check_names(stirring.recordings)
+    clean = _open_clean(baseline, stirring, surrogate)
     run = (
         Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, Argument("out"))
     )
@@ -131,7 +145,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         with working_in(run):  # unless another command works there
             raise held_error(run)  # before the prior's libraries are loaded
     prior = _usual_prior(run, resume) if prior is None else prior
-    record = run_record(settings, prior, stirring)
+    record = run_record(settings, prior, stirring, clean)
     with (
         open_workers(executor, timeout) as workers,
         entered(run, record, resume=resume, growing="settings.budget") as removed,
@@ -145,11 +159,16 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         for notice in [*aborted_recordings(opened), *frame_warnings(opened)]:
             logger.warning(notice)
         return finished_calibration(run) or _calibrate(
-            run, stirring, prior, settings, Execution(workers, timeout, progress)
+            run, stirring, clean, prior, settings, Execution(workers, timeout, progress)
         )
 
 
-def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring) -> dict[str, Any]:
+def run_record(
+    settings: CalibrationSettings,
+    prior: "Prior",
+    stirring: Stirring,
+    clean: Sequence[Recording] = (),
+) -> dict[str, Any]:
     """Content of run.toml: settings, inputs, versions; see `run.directory.MUST_AGREE`."""
     from ..inference.engine_version import ENGINE_VERSION
 
@@ -158,7 +177,10 @@ def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring
         "settings": asdict(settings) | {"prior": describe_prior(prior)},
         "engine": {"version": ENGINE_VERSION},
         "simulator": stirring.settings,
-        "inputs": {"sha256": [recording.hash for recording in stirring.recordings]},
+        "inputs": {
+            "sha256": [recording.hash for recording in stirring.recordings],
+            **({"baseline": [recording.hash for recording in clean]} if clean else {}),
+        },
         "files": {"recordings": [recording.path.name for recording in stirring.recordings]},
         "versions": versions(LIBRARIES),
     }
@@ -167,29 +189,51 @@ def run_record(settings: CalibrationSettings, prior: "Prior", stirring: Stirring
 def _calibrate(
     run: Path,
     stirring: Stirring,
+    baseline: tuple[Recording, ...],
     prior: "Prior",
     settings: CalibrationSettings,
     execution: Execution,
 ) -> Calibration:
+    from ..inference.criticism import Keeping
     from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES, check_by_simulation
     from .posterior_file import results_tree, write_tree
 
     record = note_timeout(run, execution.timeout)
-    needed = settings.budget + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
+    of_clean = CLEAN_RUNS * len(baseline)
+    needed = settings.budget + of_clean + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
     with open_bank(run) as bank, ExitStack() as stack:
-        kept = min(max(needed - _left(record, settings, bank), 0), needed)
+        kept = min(max(_kept(record, of_clean, bank), 0), needed)
         bar = progress_bar("simulating stirs", needed, shown=execution.progress, done=kept)
         advance = after_first(kept, stack.enter_context(bar))
         keep = execution.keep(bank, stirring.identity, settings.batch)
-        fit = fit_recordings(stirring, stirring.observed, prior, keep, settings, progress=advance)
+        # the paper's surrogate has no noise to which an error adds
+        allows = settings.surrogate == "signal"
+        # beside the largest error the search does not settle on one liquid too early
+        search = {"noise": noise_beside(stirring, model_error(stirring, 0.0))} if allows else {}
+        report = {"progress": advance, "warn": False}
+        fit = fit_recordings(stirring, stirring.observed, prior, keep, settings, **report, **search)
         warn_of_failures(fit.history.errors.tolist(), execution.timeout)
+        error = None
+        if allows:
+            keeping = Keeping(
+                bank,
+                CriticismSettings.batch,
+                report=lambda _, finished: advance(finished),
+                executor=execution.executor,
+                timeout=execution.timeout,
+            )
+            # criticise finds the same simulations in the bank
+            clean = clean_residuals(
+                baseline, settings.particles, prior, effects_of("stir"), keeping=keeping
+            )
+            error = model_error(stirring, fit.best["viscosity"], clean)
+            options = {"seed": settings.seed, **engine_options(stirring, settings.surrogate)}
+            fit = concluded_beside(error, fit, stirring, options)
         sampled = fit.sample(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
         )
         drawn = pick_draws(sampled["posterior"].to_dataset(), PREDICTIVE_DRAWS, settings.seed)
-        check = check_by_simulation(
-            stirring.simulate, drawn, fit.best, settings.seed, keep, advance=advance
-        )
+        check = check_by_simulation(stirring, drawn, fit.best, settings.seed, keep, advance=advance)
     tree = results_tree(sampled, fit, stirring, check)
     if (now := read_run(run)["settings"]["budget"]) != settings.budget:
         raise InputError(
@@ -198,21 +242,21 @@ def _calibrate(
             fix="nothing was written; go on with that budget and `resume`",
         )
     write_tree(tree, run / POSTERIOR)
-    summary = CalibrationSummary.from_fit(tree, fit, stirring, check)
+    summary = CalibrationSummary.from_fit(tree, fit, stirring, check, error)
     summary.write(run)
     return Calibration(run, tree, MappingProxyType(dict(record)), summary)
 
 
-def _left(record: Mapping[str, Any], settings: CalibrationSettings, bank: "SimulationBank") -> int:
-    """Simulations that a run still needs; some of those before it grew were judging, or pours.
+def _kept(record: Mapping[str, Any], of_clean: int, bank: "SimulationBank") -> int:
+    """Simulations that a run has; some of those before it grew were judging, or pours.
 
-    Negative where the bank holds pours that followed a calibration whose results were deleted.
+    More than it needs where the bank holds pours that followed a calibration whose results were
+    deleted.
     """
-    from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES
-
-    before = record.get("grown", [{"learned_from": 0, "simulations": 0}])[-1]
-    needed = settings.budget - before["learned_from"] + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
-    return needed - (len(bank) - before["simulations"])
+    if "grown" not in record:
+        return len(bank)
+    before = record["grown"][-1]
+    return before["learned_from"] + of_clean + len(bank) - before["simulations"]
 
 
 def fit_recordings(
@@ -221,7 +265,7 @@ def fit_recordings(
     prior: "Prior",
     keep: "Keep",
     settings: CalibrationSettings,
-    **report: Any,
+    **more: Any,
 ) -> "Fit":
     """The engine's fit of a stir, with the options that go with the surrogate.
 
@@ -231,7 +275,7 @@ def fit_recordings(
         prior: Prior of the parameters.
         keep: Where simulations are made and kept.
         settings: Budget, surrogate and seed.
-        report: Arguments `progress` and `warn` of `inference.fit`; none shows no bar.
+        more: Other arguments of `inference.fit`; without `progress` no bar is shown.
     """
     from .. import inference
 
@@ -251,7 +295,7 @@ def fit_recordings(
         bank=keep.bank,
         identity=keep.identity,
         timeout=keep.timeout,
-        **{"progress": False, **report},
+        **{"progress": False, **more},
         **options,
     )
 
@@ -270,6 +314,30 @@ def _usual_prior(run: Path, resume: bool) -> "Prior":
     """That of a run that goes on, which an earlier version may have begun with another default."""
     held = read_run(run).get("settings", {}) if resume and (run / RUN_TOML).is_file() else {}
     return read_prior(held["prior"]) if "prior" in held else default_prior()
+
+
+def _open_clean(
+    baseline: Source | Sequence[Source], stirring: Stirring, surrogate: str
+) -> tuple[Recording, ...]:
+    """Clean recordings beside which a run's can be calibrated.
+
+    Raises:
+        InputError: They cannot be used.
+    """
+    clean = tuple(open_recordings(baseline, Argument("baseline")))
+    if clean and surrogate != "signal":
+        raise InputError(
+            f"clean recordings, but the surrogate {surrogate!r} does not allow for an error",
+            where=Argument("baseline"),
+            fix="leave them out, or take the surrogate 'signal'",
+        )
+    check_baseline(stirring, clean)
+    if {one.hash for one in clean} & {one.hash for one in stirring.recordings}:
+        fix = "give other recordings: it would count as free of errors"
+        raise InputError("is what is calibrated on", where=Argument("baseline"), fix=fix)
+    for recording in clean:
+        camera_noise([recording])  # refuses one that rests too shortly
+    return clean
 
 
 def _open_all(recordings: Source | Sequence[Source]) -> list[Recording]:

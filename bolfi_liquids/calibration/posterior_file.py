@@ -7,8 +7,8 @@ Groups from the engine, in ArviZ's schema: `posterior`, `sample_stats`, `prior`,
   frame;
 - `posterior_predictive`: inclination over (chain, draw, frame, plane), fresh seeds;
 - `replicates`: inclination over (seed, frame, plane), at theta*;
-- `closest`: inclination over (frame, plane), discrepancy and parameters of the simulated
-  hypothesis that came nearest;
+- `closest`: inclination over (frame, plane), discrepancy and parameters of the simulation at a
+  posterior draw that came nearest;
 - `surface`: over a grid of prior quantiles, the log densities of prior and posterior.
 """
 
@@ -48,8 +48,8 @@ def results_tree(sampled: "DataTree", fit: "Fit", stirring: Stirring, check: Che
         return Dataset({"inclination": (dims, values, {"units": "rad"})}, coords=frames)
 
     tree = sampled.copy()
-    numbers = {"discrepancy": fit.closest.discrepancy, **fit.closest.theta}
-    closest = inclination(fit.closest.signal).assign(numbers)
+    numbers = {"discrepancy": check.closest.discrepancy, **check.closest.theta}
+    closest = inclination(check.closest.signal).assign(numbers)
     added = {
         "recorded": inclination(stirring.observed),
         "posterior_predictive": inclination(check.predictive[None], "chain", "draw"),

@@ -13,6 +13,7 @@ from ..inputs.frame import named_faults
 from ..models import stirring_error
 from ..run.summary import Number, Section
 from .check import Check
+from .model_error import ModelError
 from .noise import irreducible_rms, rms
 from .stir_simulator import Stirring
 
@@ -54,7 +55,7 @@ class SamplerStatus(StrEnum):
 
 
 class FitStatus(StrEnum):
-    """Whether the closest simulation is near enough to the recording."""
+    """Whether simulations at posterior draws come near enough to the recording."""
 
     ACCEPTABLE = "acceptable"
     BAD = "bad"
@@ -103,10 +104,10 @@ class CalibrationSummary(Section):
         least_viscosity: Below it the simulator cannot distinguish liquids [Pa s].
         below_least_viscosity: Share of the posterior there.
         best: theta*, where the surrogate expects the best fit.
-        closest: Parameters of the simulation with the least discrepancy.
+        closest: Parameters of the simulation at a posterior draw with the least discrepancy.
         n_simulations: Number that the engine learned from.
         n_check_simulations: Number that judged the result.
-        fit_rms_deg: RMS between the recording and the closest simulation [deg].
+        fit_rms_deg: RMS between the recording and that simulation [deg].
         noise_deg: RMS that the right model would leave [deg], see `noise.irreducible_rms`.
         rhat_max, ess_min: Worst R-hat and effective sample size of the parameters.
         n_draws: Number in all chains.
@@ -115,6 +116,9 @@ class CalibrationSummary(Section):
         seconds: Time spent.
         seed: Of all random draws.
         version: Of this package.
+        model_error_deg: RMS error of the simulator that the intervals allow for [deg]; 0 with the
+            paper's surrogate and in former versions.
+        clean: Names of the recordings from which it was learned.
         frame_faults: Recordings whose inclination and positions are not told in one frame, and how
             it is mended; see `inputs.frame`.
     """
@@ -139,11 +143,21 @@ class CalibrationSummary(Section):
     seed: int
     version: str
     frame_faults: tuple[str, ...] = ()
+    model_error_deg: Number = 0.0
+    clean: tuple[str, ...] = ()
 
     @classmethod
-    def from_fit(cls, tree: "DataTree", fit: "Fit", stirring: Stirring, check: Check) -> Self:
-        """From posterior.nc, the engine's fit, what was stirred and the simulations that check."""
-        posterior, closest = tree["posterior"], fit.closest
+    def from_fit(
+        cls,
+        tree: "DataTree",
+        fit: "Fit",
+        stirring: Stirring,
+        check: Check,
+        error: ModelError | None,
+    ) -> Self:
+        """From posterior.nc, the engine's fit, what was stirred, the simulations that check and
+        the error that the fit allows for."""
+        posterior, closest = tree["posterior"], check.closest
         seen = [one.inclination for one in stirring.recordings]
         spent = {name: tree.attrs[f"seconds_{name}"] for name in Seconds.__dataclass_fields__}
         return cls(
@@ -164,6 +178,8 @@ class CalibrationSummary(Section):
             seed=int(tree.attrs["seed"]),
             version=version("bolfi-liquids"),
             frame_faults=named_faults(stirring.recordings),
+            model_error_deg=0.0 if error is None else float(np.degrees(error.rms)),
+            clean=() if error is None else error.clean,
         )
 
     def of_posterior(
@@ -188,7 +204,10 @@ class CalibrationSummary(Section):
     @computed_field
     @property
     def simulator_error_deg(self) -> Number:
-        """RMS that the simulator usually errs by, at the viscosity of the closest simulation."""
+        """RMS error of the simulator: learned from clean recordings, or the usual one at the
+        viscosity of the closest simulation."""
+        if self.clean:
+            return self.model_error_deg
         return float(np.degrees(stirring_error(self.closest["viscosity"])))
 
     @property

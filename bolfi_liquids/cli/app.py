@@ -22,11 +22,11 @@ from .examples import examples, session
 from .grouped import grouped
 from .notices import print_notices
 from .options import (
+    CalibrationData,
     CalibrationOptions,
     CriticismData,
     EffectOptions,
     ExecutionOptions,
-    GivenPours,
     PourData,
     PourOptions,
     RunArgument,
@@ -89,7 +89,7 @@ def calibrate(
     ],
     out: Annotated[Path, typer.Option(metavar="RUN", help="Directory of the run.")],
     options: CalibrationOptions,
-    given: GivenPours,
+    given: CalibrationData,
     compute: Compute,
     resume: Annotated[
         bool,
@@ -111,6 +111,7 @@ def calibrate(
         calibration = run_calibrate(
             opened,
             out=out,
+            baseline=given.baseline or (),
             pours=table,
             cups=given.cups,
             resume=resume,

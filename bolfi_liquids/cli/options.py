@@ -82,6 +82,21 @@ class GivenPours:
         return opened_pours(self.pours, self.liquid)
 
 
+BaselineOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        metavar="RECORDING", help="A recording, of any liquid, in which no effect is expected."
+    ),
+]
+
+
+@dataclass(frozen=True)
+class CalibrationData(GivenPours):
+    """The same, and what the simulator's error is learned from."""
+
+    baseline: BaselineOption = None
+
+
 @dataclass(frozen=True)
 class CriticismData:
     """Data that a criticism compares besides the calibrated recordings."""
@@ -90,12 +105,7 @@ class CriticismData:
         list[Path] | None,
         typer.Option(metavar="RECORDING", help="Same liquid, other path or speed: the proof."),
     ] = None
-    baseline: Annotated[
-        list[Path] | None,
-        typer.Option(
-            metavar="RECORDING", help="A recording, of any liquid, in which no effect is expected."
-        ),
-    ] = None
+    baseline: BaselineOption = None
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from rich.table import Column, Table
 
 from ..criticism.verdict import Verdict
 from ..reporting import criticism_sentences as criticism
-from ..reporting.sentences import fate_sentences, given_sentences
+from ..reporting.sentences import fate_sentences, given_sentences, model_error_sentence
 from ..wording import LIQUID_UNITS, Sentence, percent, spilled
 
 if TYPE_CHECKING:
@@ -35,6 +35,7 @@ def print_calibration(summary: "CalibrationSummary", console: Console) -> None:
     console.print(
         f"closest hypothesis: {summary.fit_rms_deg:.2f} deg RMS from the recording"
         f" (noise alone: {summary.noise_deg:.2f} deg)\n"
+        f"{model_error_sentence(summary)}\n"
         f"simulations: {summary.n_simulations} to learn from,"
         f" {summary.n_check_simulations} to check with\n"
         f"seconds: simulator {seconds.simulator:.1f}, engine {seconds.engine:.1f},"

@@ -7,10 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..calibration.baseline import Clean, clean_residuals, usual_elsewhere, usual_for
 from ..calibration.former_model import refuse_other_model
 from ..calibration.posterior_file import write_tree
 from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, stirring_of
+from ..calibration.stirs import camera_noise, effects_of, held_out_noise, stir_experiment
 from ..errors import Argument, InputError
 from ..inputs.frame import frame_warnings
 from ..inputs.open import Source, open_recordings
@@ -22,24 +24,12 @@ from ..run.directory import CRITICISM, Run, open_bank, run_path
 from ..run.entering import working_in_run
 from ..run.given_pours import keep_pours
 from ..run.workers import open_workers
-from .baseline import (
-    Clean,
-    clean_residuals,
-    usual_elsewhere,
-    usual_for,
-)
 from .criticism_file import criticism_tree
 from .findings import Findings
 from .inputs import Given, Inputs, check_effects, open_inputs
 from .pours import as_prior, pour_experiment
 from .proposals import pour_proposals, stir_proposals
 from .result import Criticism, base_calibration, finished_criticism
-from .stirs import (
-    camera_noise,
-    effects_of,
-    held_out_noise,
-    stir_experiment,
-)
 from .summary import CriticismSummary
 
 if TYPE_CHECKING:

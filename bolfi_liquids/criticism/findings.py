@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .. import inference
+    from ..calibration.baseline import Clean
     from ..calibration.result import Calibration
-    from .baseline import Clean
     from .inputs import Inputs
 
 

@@ -7,8 +7,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ..calibration.baseline import check_baseline, check_rig
 from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, same_liquid, stirring_of
+from ..calibration.stirs import names_of_effects
 from ..errors import Argument, InputError
 from ..inputs.pour_table import Pours, PourTable, check_scene, table_and_cups, table_of
 from ..inputs.recording import Recording
@@ -16,16 +18,9 @@ from ..inputs.settings import FALSE_ALARM_RATE, CriticismSettings
 from ..run.directory import CRITICISM_FORMAT
 from ..run.provenance import generations
 from ..run.recordings import kept_recordings
-from .stirs import frame_interval, names_of_effects, same_rate
 
 if TYPE_CHECKING:
     from ..models import Cups
-
-RIG_SIZES = ("cup_radius", "stick_radius", "stick_length")
-"""Attributes of a recording that make two rigs the same."""
-
-SIZE_TOLERANCE = 0.02
-"""Relative difference up to which two sizes are the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +104,7 @@ def open_inputs(calibration: Calibration, settings: CriticismSettings, given: Gi
     kept_back, believed = given.held_out, given.baseline
     _check_held_out(stirring, kept_back)
     others = _others(believed, [*stirring.recordings, *kept_back])
-    _check_baseline(stirring, others)
+    check_baseline(stirring, others)
     table, cups = table_and_cups(given.pours, given.cups)
     held_out_table = table_of(given.held_out_pours, Argument("held_out_pours"))
     _check_pours(table, held_out_table, settings)
@@ -163,7 +158,7 @@ def _check_held_out(stirring: Stirring, held_out: Sequence[Recording]) -> None:
                 where=Argument(f"held_out {recording.path}"),
                 fix="hold out a recording of the same liquid",
             )
-        _check_rig(stirring, recording, Argument(f"held_out {recording.path}"))
+        check_rig(stirring, recording, Argument(f"held_out {recording.path}"))
 
 
 def check_effects(settings: CriticismSettings) -> None:
@@ -182,30 +177,6 @@ def check_effects(settings: CriticismSettings) -> None:
                 f"{name!r} is none of the effects that are considered",
                 where=Argument("accept"),
                 fix=f"choose from {', '.join(considered)}",
-            )
-
-
-def _check_rig(stirring: Stirring, recording: Recording, where: str) -> None:
-    for name in RIG_SIZES:
-        there, here = recording.number(name), stirring.recordings[0].number(name)
-        if abs(there - here) > SIZE_TOLERANCE * abs(here):
-            raise InputError(
-                f"{name} is {there:g}, but {here:g} in the run",
-                where=where,
-                fix="give recordings of the same rig",
-            )
-
-
-def _check_baseline(stirring: Stirring, baseline: Sequence[Recording]) -> None:
-    first = stirring.recordings[0]
-    for recording in baseline:
-        _check_rig(stirring, recording, Argument(f"baseline {recording.path}"))
-        if not same_rate(recording, first):
-            there, here = (1.0 / frame_interval(r) for r in (recording, first))
-            raise InputError(
-                f"has {there:.3g} samples a second, but the run's recording {here:.3g}",
-                where=Argument(f"baseline {recording.path}"),
-                fix="give recordings of the same frame rate",
             )
 
 

@@ -142,7 +142,7 @@ class CalibrationSettings:
         budget: Simulations that the engine may learn from.
         batch: Simulations run at the same time.
         seed: Seed of all random draws.
-        surrogate: "discrepancy", the paper's, or "signal", which emulates the inclination itself.
+        surrogate: "signal", which emulates the inclination itself, or "discrepancy", the paper's.
         particles: Number of particles of the simulated liquid; 0: cells follow the stick.
         sampler: "nuts" or "emcee".
         chains: Number of chains; R-hat needs at least two.
@@ -152,7 +152,7 @@ class CalibrationSettings:
     budget: Simulations = 20
     batch: Count = 4
     seed: Seed = 0
-    surrogate: Surrogate = "discrepancy"
+    surrogate: Surrogate = "signal"
     particles: Particles = 0
     sampler: Annotated[str, one_of(SAMPLERS)] = "nuts"
     chains: Annotated[Integer, Field(ge=2, le=1000)] = 4

@@ -132,6 +132,7 @@ def calibration_context(calibration: Calibration) -> dict[str, Any]:
             for name, values in summary.parameters.items()
         ],
         "fit": sentences.fit_sentence(summary),
+        "model_error": sentences.model_error_sentence(summary),
         "inclination": inclination_figure(tree),
         "by_stroke": stroke_figure(tree),
         "posterior": posterior_figure(tree),

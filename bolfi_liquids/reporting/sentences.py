@@ -44,7 +44,7 @@ def parameter_sentence(name: str, values: ParameterSummary, prior: NDArray) -> S
 
 
 def fit_sentence(summary: CalibrationSummary) -> Sentence:
-    """How close the closest simulation is, compared with the noise and the simulator's error."""
+    """How close simulations at posterior draws come, compared with noise and simulator's error."""
     fit, noise = summary.fit_rms_deg, summary.noise_deg
     if fit <= FIT_AT_NOISE * noise:
         return sentence("calibration.fit_at_noise", summary=summary)
@@ -53,6 +53,11 @@ def fit_sentence(summary: CalibrationSummary) -> Sentence:
     if summary.unexplained_deg <= FIT_NEAR_NOISE * noise:
         return sentence("calibration.fit_within_error", summary=summary)
     return sentence("calibration.fit_above_noise", summary=summary)
+
+
+def model_error_sentence(summary: CalibrationSummary) -> Sentence:
+    """Which error of the simulator the intervals allow for."""
+    return sentence("calibration.model_error", summary=summary)
 
 
 def sampler_sentences(summary: CalibrationSummary) -> list[Sentence]:

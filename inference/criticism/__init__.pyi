@@ -22,6 +22,8 @@ from .search import Plan as Plan
 from .simulate import Keeping as Keeping
 from .usual_residual import CleanData as CleanData
 from .usual_residual import UsualResidual as UsualResidual
+from .usual_residual import model_error as model_error
+from .usual_residual import rhythm as rhythm
 from .usual_residual import usual_residual as usual_residual
 from .verdict import Candidate as Candidate
 from .verdict import Verdict as Verdict

@@ -6,11 +6,12 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.linalg import block_diag, solve
 
 from .._float64 import in_float64
 from .._lazy import stats
-from ..arguments import checked_array
+from ..arguments import checked_array, checked_number
 from ..surrogates.measurement_noise import Layout
 from .measurement_noise import Noise, SumOfNoises, gaussian, samples
 
@@ -25,6 +26,8 @@ MIN_OTHERS = 0.5  # weight of the other clean data by which one of them can be j
 MIN_FREEDOM = 3  # with fewer, draws have no variance and no effect would be found
 SIZE_TAIL = 1e-3  # probability of a size beyond those that are averaged over, on either side
 JITTER = 1e-9  # of the largest variance, so that covariances can be inverted
+LAST_LAG = 12.0  # correlation times after which errors count as independent
+KNOWN_FREEDOM = 30.0  # of a size that is given: known within some 13 %
 
 
 class CleanData(NamedTuple):
@@ -220,6 +223,55 @@ def usual_residual(
     ]
     _check_clean(clean)
     return _learned(clean)
+
+
+def model_error(
+    size: float, correlation: ArrayLike, freedom: float = KNOWN_FREEDOM
+) -> UsualResidual:
+    """What a simulator is known to err by, without clean data to learn it from.
+
+    Like any noise it goes into `Experiment`, and into `fit` as `noise=`, beside that of the
+    measurement: `SumOfNoises((KnownNoise(0.1), model_error(0.3, 6.0)))`. Errors that change as the
+    output does when a parameter changes look like another value of it: they widen the posterior
+    most (Brynjarsdottir and O'Hagan 2014).
+
+    Args:
+        size: Sd, in the output's unit, not negative.
+        correlation: Over time, in each channel: the time t over which errors are forgotten, in
+            samples, as exp(-lag / t); or the correlation by lag [lags] from 1 on, 0 beyond, such
+            as `rhythm(observed)`. One that no process has becomes the nearest that one has.
+        freedom: The size is known as well as a variance from so many numbers.
+
+    Raises:
+        ValueError: an argument is not as above.
+    """
+    checked_number("size", size, lambda sd: 0.0 <= sd < np.inf, "finite and not negative")
+    checked_number("freedom", freedom, lambda n: 0.0 < n < np.inf, "finite and positive")
+    given = checked_array("correlation", correlation)
+    if given.ndim == 0 and 0.0 < given < np.inf:
+        by_lag = np.exp(-np.arange(int(np.ceil(LAST_LAG * given)) + 1) / given)
+    elif given.ndim == 1 and given.size and given[0] == 1.0 and (np.abs(given) <= 1.0).all():
+        by_lag = given
+    else:
+        raise ValueError(
+            "correlation must be a positive number of samples, or correlations by lag [lags] of "
+            f"which the first is 1, got {correlation!r:.100}"
+        )
+    return UsualResidual(size**2 * positive_autocovariance(by_lag), freedom)
+
+
+def rhythm(observed: ArrayLike) -> np.ndarray:
+    """Autocorrelation by lag [T] of a series [T, ...], its channels' means taken off.
+
+    Where a simulator answers a periodic drive a little too much, or too late, it errs in the
+    rhythm of what is observed. NaN is a missing sample; where nothing varies, errors are
+    independent.
+    """
+    series = checked_array("observed", observed)
+    columns = series.reshape(len(series), -1)
+    seen = np.maximum(np.isfinite(columns).sum(0), 1)
+    found = _autocovariance(columns - np.nansum(columns, 0) / seen, len(columns))
+    return found / found[0] if found[0] > 0.0 else np.ones(1)
 
 
 def _check_clean(clean: Sequence[CleanData]) -> None:

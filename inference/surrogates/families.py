@@ -14,7 +14,7 @@ from ..types import Discrepancy
 from .base import Learnable, Measured, Surrogate
 from .discrepancy import DiscrepancySurrogate, learn, marginalised, with_threshold
 from .emulator import PREDICTED_SHARE, Emulator, Limits, emulate, goes_on, resized
-from .given_noise import Noise, given_noise
+from .given_noise import Covariance, Noise, check_noise, given_noise
 from .log_likelihood import LogLikelihoodFamily, LogLikelihoodLearner
 from .noise.by_mean import ByMean, SdOfMean, law_of
 from .noise.scales import Plain, Scale, comparable
@@ -148,11 +148,12 @@ class SignalFamily:
             takes the output as it is.
         noise: Measurement noise that the simulator does not make: its sd, a number or an array
             shaped like the observed (summarised) output; or sds [n], or a covariance [n, n], of
-            that output's n finite values, flattened; 0 for none. "poisson" where counts were
-            observed and their means are simulated; `relative(0.2)` for an sd of 20 % of the
-            simulated mean; or a function from simulated means to sds, value by value. None
-            estimates it: as an AR(1) process where the output is a series, of at least 5 samples
-            without a summary.
+            that output's n finite values, flattened; or an object that has such a covariance, as
+            `criticism.KnownNoise`, `model_error` and their `SumOfNoises`; 0 for none. "poisson"
+            where counts were observed and their means are simulated; `relative(0.2)` for an sd of
+            20 % of the simulated mean; or a function from simulated means to sds, value by value.
+            None estimates it: as an AR(1) process where the output is a series, of at least 5
+            samples without a summary.
         varying_noise: Whether the noise that the simulator makes itself may depend on the
             parameters and on the mean, where runs show that it does.
         misfit: Prior probability that the data are missed by more than the given noise, because
@@ -170,7 +171,7 @@ class SignalFamily:
     replicates: ClassVar[bool] = True
 
     summary: Summary | None = None
-    noise: ArrayLike | SdOfMean | None = None
+    noise: ArrayLike | Covariance | SdOfMean | None = None
     misfit: float = 0.1
     components: int = MAX_COMPONENTS
     predicted: float | None = PREDICTED_SHARE
@@ -183,7 +184,7 @@ class SignalFamily:
         check_flag("varying_noise", self.varying_noise)
         checked_integer("components", self.components)
         if self.noise is not None and law_of(self.noise) is None:
-            checked_array("noise", self.noise)  # its shape is looked at beside the output's
+            check_noise(self.noise)  # pyright: ignore[reportArgumentType]  no function is left
         checked_number("misfit", self.misfit, lambda p: 0.0 <= p < 1.0, "from 0 to below 1")
         if self.predicted is not None:
             due = "None or from 0 to below 1"

@@ -1,13 +1,21 @@
 """Measurement noise that the user knows, over the values of an output."""
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .._float64 import in_float64
 from ..arguments import checked_array
+from .measurement_noise import Layout
 from .output_vectors import Output
+
+
+@runtime_checkable
+class Covariance(Protocol):
+    """Noise that knows its covariance [n, n] at n samples, as all of `criticism` do."""
+
+    def covariance(self, at: Layout) -> np.ndarray: ...
 
 
 class GivenNoise(NamedTuple):
@@ -46,17 +54,26 @@ class Noise(NamedTuple):
     misfit: float
 
 
-def given_noise(noise: ArrayLike, output: Output) -> GivenNoise:
+def check_noise(noise: ArrayLike | Covariance) -> None:
+    """Raise ValueError for what is never a noise; its shape is looked at beside the output's."""
+    if not isinstance(noise, Covariance):
+        checked_array("noise", noise)
+
+
+def given_noise(noise: ArrayLike | Covariance, output: Output) -> GivenNoise:
     """The noise of an output's values.
 
     Args:
-        noise: As in `SignalFamily`: sd, sds or covariance of what was observed.
+        noise: As in `SignalFamily`: sd, sds or covariance of what was observed, or an object that
+            has it.
         output: How what was observed becomes m values.
 
     Raises:
         ValueError: noise is none of these.
     """
     samples = len(output.present)
+    if isinstance(noise, Covariance):
+        return _covariance(_at_samples(noise, output), output)
     given = checked_array("noise", noise)
     # from the order of the observed output to that of the values
     rank = np.argsort(np.argsort(output.present))
@@ -84,6 +101,15 @@ def given_noise(noise: ArrayLike, output: Output) -> GivenNoise:
             f"noise must be finite and not negative where observed is finite, got {wrong[0]}"
         )
     return _independent(output.average(sds**2) / output.counts)
+
+
+def _at_samples(noise: Covariance, output: Output) -> np.ndarray:
+    """Covariance of what was observed, in the flattened order."""
+    if output.summary is not None:
+        raise ValueError("noise of samples is not that of their summary; give noise= as sds of it")
+    channels = int(np.prod(output.shape[1:]))
+    at = np.sort(output.present)
+    return checked_array("noise", noise.covariance(Layout(at % channels, at // channels)))
 
 
 def _independent(variances: np.ndarray) -> GivenNoise:

@@ -27,16 +27,16 @@ from bolfi_liquids.inference import criticism
 from kept import keep, results
 
 from bolfi_liquids import inference, models
+from bolfi_liquids.calibration.baseline import Clean, clean_residuals, usual_for
 from bolfi_liquids.calibration.stir_simulator import Stirring, stirring_of
-from bolfi_liquids.criticism.baseline import Clean, clean_residuals, usual_for
-from bolfi_liquids.criticism.pour_noise import REPEATABILITY_SD
-from bolfi_liquids.criticism.pours import Pouring
-from bolfi_liquids.criticism.stirs import (
+from bolfi_liquids.calibration.stirs import (
     camera_noise,
     effects_of,
     held_out_noise,
     stir_experiment,
 )
+from bolfi_liquids.criticism.pour_noise import REPEATABILITY_SD
+from bolfi_liquids.criticism.pours import Pouring
 from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.inputs.recording import Recording, Trajectory
 from bolfi_liquids.inputs.settings import CriticismSettings

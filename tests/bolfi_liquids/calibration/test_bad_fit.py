@@ -18,6 +18,7 @@ SAMPLES = 120  # 4 s, five strokes
 TURN = np.exp(0.25j * np.pi)
 
 
+@pytest.mark.filterwarnings("ignore::bolfi_liquids.inference.surrogates.warnings.EmulatorWarning")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "fault"),

@@ -18,9 +18,11 @@ from bolfi_liquids.inference.simulations import job
 import bolfi_liquids as bl
 from bolfi_liquids import inference, models
 from bolfi_liquids.calibration import calibrate as calibrating
+from bolfi_liquids.calibration.check import PREDICTIVE_DRAWS
 from bolfi_liquids.calibration.stir_simulator import Stirring, stirring_of
 from bolfi_liquids.drawing import new_figure
 from bolfi_liquids.inputs.prior import default_prior
+from bolfi_liquids.seeds import Phase, simulation_seeds
 
 
 def test_summary_is_of_the_posterior(calibration, settings):
@@ -55,13 +57,17 @@ def test_summary_says_below_which_viscosity_liquids_look_alike(
     assert calibration.summary.below_least_viscosity == pytest.approx((draws < floor).mean())
 
 
-def test_closest_is_the_least_discrepancy_and_reproducible(calibration, short_recording, settings):
-    simulations = calibration.tree["simulations"].to_dataset()
-    nearest = simulations.isel(simulation=int(np.argmin(simulations["discrepancy"].data)))
-    assert float(calibration.tree["closest"]["discrepancy"]) == float(nearest["discrepancy"])
+def test_closest_is_of_the_posterior_draws_and_reproducible(calibration, short_recording, settings):
     stirring = stirring_of([bl.open_recording(short_recording)], settings["particles"])
+    drawn = calibration.tree["posterior_predictive"]["inclination"].to_numpy()[0]
+    discrepancies = [stirring.discrepancy()(stirring.observed, signal) for signal in drawn]
+    at = int(np.argmin(discrepancies))
+    assert float(calibration.tree["closest"]["discrepancy"]) == discrepancies[at]
     theta = {name: np.array([value]) for name, value in calibration.summary.closest.items()}
-    again = stirring.simulate(theta, np.array([int(nearest["seed"])]))
+    for name, values in theta.items():
+        assert values in calibration.posterior[name]
+    seeds = simulation_seeds(settings["seed"], Phase.PREDICTIVE, PREDICTIVE_DRAWS)
+    again = stirring.simulate(theta, np.array([seeds[at]]))
     np.testing.assert_array_equal(again[0], calibration.tree["closest"]["inclination"])
 
 

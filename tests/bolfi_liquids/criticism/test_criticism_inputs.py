@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from bolfi_liquids.calibration.baseline import Clean, apart, usual_elsewhere, usual_for
 from bolfi_liquids.calibration.stir_simulator import stirring_of
-from bolfi_liquids.criticism.baseline import Clean, apart, usual_elsewhere, usual_for
+from bolfi_liquids.calibration.stirs import camera_noise, held_out_noise, stir_experiment
 from bolfi_liquids.criticism.inputs import Given, check_effects, open_inputs
 from bolfi_liquids.criticism.result import finished_criticism
-from bolfi_liquids.criticism.stirs import camera_noise, held_out_noise, stir_experiment
 from bolfi_liquids.errors import Argument, InputError
 from bolfi_liquids.inputs.cups import open_cups
 from bolfi_liquids.inputs.open import open_recordings

@@ -24,7 +24,10 @@ FATE = {
     *("expected_retained", "retained_q05", "retained_q95"),
 }
 ADDED_SINCE = {
-    "calibrate": {"simulator_error_deg", "fit_to_noise", "fit_status", "frame_faults"},
+    "calibrate": {
+        *("simulator_error_deg", "fit_to_noise", "fit_status", "frame_faults"),
+        *("model_error_deg", "clean"),
+    },
     "criticise": {"frame_faults"},
     "pour": {"fit_status", "map_error", "given", "hold", *FATE},
 }

@@ -28,7 +28,10 @@ from bolfi_liquids.run.directory import RUN_TOML, SIMULATIONS, open_bank, read_r
 from bolfi_liquids.run.recordings import kept_recordings
 
 ARCHIVE = Path(__file__).parents[2] / "data" / "run_0_1.tar.xz"
-SETTINGS = {"budget": 8, "batch": 2, "particles": 100, "seed": 3, "chains": 2, "draws": 100}
+SETTINGS = {
+    **{"budget": 8, "batch": 2, "particles": 100, "seed": 3, "chains": 2, "draws": 100},
+    "surrogate": "discrepancy",  # the default of that version
+}
 
 
 @pytest.fixture

@@ -7,18 +7,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration.noise import sensor_noise
-from ..calibration.stir_simulator import stirring_of
+from ..errors import Argument, InputError
 from ..inputs.recording import Recording
-from .stirs import camera_noise, same_experiment, stir_experiment
+from .noise import sensor_noise
+from .stir_simulator import Stirring, stirring_of
+from .stirs import camera_noise, frame_interval, same_experiment, same_rate, stir_experiment
 
 if TYPE_CHECKING:
-    from ..calibration.stir_simulator import Stirring
     from ..inference import Prior
     from ..inference.criticism import Extension, Keeping, UsualResidual
 
 STARTING_RUNS = 4  # of each clean recording, all over the prior; as many follow near the best
+CLEAN_RUNS = 2 * STARTING_RUNS
 VISCOSITY_FACTOR = 2.0  # over which the simulator's error changes
+
+RIG_SIZES = ("cup_radius", "stick_radius", "stick_length")
+"""Attributes of a recording that make two rigs the same."""
+
+SIZE_TOLERANCE = 0.02
+"""Relative difference up to which two sizes are the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +77,34 @@ def clean_residuals(
     return [learn(recording) for recording in recordings]
 
 
+def check_rig(stirring: Stirring, recording: Recording, where: str) -> None:
+    """Raise `InputError` unless a recording has the sizes of the run's rig."""
+    for name in RIG_SIZES:
+        there, here = recording.number(name), stirring.recordings[0].number(name)
+        if abs(there - here) > SIZE_TOLERANCE * abs(here):
+            raise InputError(
+                f"{name} is {there:g}, but {here:g} in the run",
+                where=where,
+                fix="give recordings of the same rig",
+            )
+
+
+def check_baseline(stirring: Stirring, baseline: Sequence[Recording]) -> None:
+    """Raise `InputError` unless clean recordings are of the run's rig and frame rate."""
+    first = stirring.recordings[0]
+    for recording in baseline:
+        check_rig(stirring, recording, Argument(f"baseline {recording.path}"))
+        if not same_rate(recording, first):
+            there, here = (1.0 / frame_interval(r) for r in (recording, first))
+            raise InputError(
+                f"has {there:.3g} samples a second, but the run's recording {here:.3g}",
+                where=Argument(f"baseline {recording.path}"),
+                fix="give recordings of the same frame rate",
+            )
+
+
 def usual_for(
-    stirring: "Stirring", clean: Sequence[Clean], viscosity: float | None
+    stirring: Stirring, clean: Sequence[Clean], viscosity: float | None
 ) -> "UsualResidual | None":
     """What is usual for an experiment on a liquid [Pa s]; None where nothing is known to be.
 
@@ -84,7 +117,7 @@ def usual_for(
 
 
 def usual_elsewhere(
-    stirring: "Stirring", clean: Sequence[Clean], viscosity: float | None
+    stirring: Stirring, clean: Sequence[Clean], viscosity: float | None
 ) -> "UsualResidual | None":
     """What is usual on paths of which there is no clean recording; None if there is none at all."""
     return _usual(clean, [False] * len(clean), viscosity, stirring.least_viscosity)

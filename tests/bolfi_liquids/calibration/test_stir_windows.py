@@ -7,7 +7,7 @@ import numpy as np
 from bolfi_liquids.hardware.motion import Trajectory, star
 
 from bolfi_liquids.calibration.stir_simulator import Stirring
-from bolfi_liquids.criticism.stir_windows import windows
+from bolfi_liquids.calibration.stir_windows import windows
 from bolfi_liquids.inputs.recording import Recording
 from bolfi_liquids.inputs.strokes import resting
 

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..calibration.stir_simulator import Stirring
 from ..errors import Argument, InputError
 from ..inputs.recording import Recording
 from ..inputs.strokes import resting
+from .stir_simulator import Stirring
 from .stir_windows import windows
 
 if TYPE_CHECKING:

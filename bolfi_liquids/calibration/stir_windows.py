@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration.stir_simulator import Stirring
 from ..inputs.fields import PLANE_NAMES
 from ..inputs.recording import Recording
 from ..inputs.strokes import resting, speed, strokes
+from .stir_simulator import Stirring
 
 if TYPE_CHECKING:
     from ..inference.criticism import Window
