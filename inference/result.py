@@ -108,10 +108,12 @@ class Fit:
 
     @cached_property
     def warnings(self) -> list[str]:
-        """What the surrogate's own checks complain of; what was given wrongly; that more than half
-        of the simulations failed; and that fewer were learned from than the 2 d + 2 that d
-        parameters need: a level and a slope and a curvature along each parameter, and one more
-        that could contradict."""
+        """Sentences of what may be wrong, each with its cure.
+
+        They come from the surrogate, the simulations, the data and the runs at draws of the
+        posterior. Fewer than 2 d + 2 learned simulations are one: a level, a slope and a curvature
+        along each of d parameters, and one that could contradict.
+        """
         said = self.learned.warnings(confirmed=self.confirmed is True)
         said += history_warnings(self.history) + self._data_warnings()
         if self.doubt > MUCH_DOUBT:

@@ -112,7 +112,7 @@ class SignalSurrogate:
 
     @property
     def cautious(self) -> "SignalSurrogate":
-        """This one: a misfit of unknown size leaves no agreement to doubt."""
+        """Itself: misfits of every size have a prior, so large variance is no agreement."""
         return self
 
     @cached_property

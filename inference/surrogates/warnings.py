@@ -122,7 +122,7 @@ NOISY_SHARES = (0.9, 0.5)  # shares of run-to-run noise in the variance that des
 
 
 class EmulatorWarning(UserWarning):
-    """The surrogate's errors are larger than its variance; the message says where."""
+    """A fit may be wrong, too wide or too narrow; the message says why, and what to do."""
 
 
 def complain(said: Sequence[str], stacklevel: int) -> None:
