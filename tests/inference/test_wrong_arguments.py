@@ -66,6 +66,10 @@ def cases():
     check = {"of": pipeline, "simulate": simulate, "prior": prior}
     return {
         "fit": (inference.fit, {**of_fit, "budget": 4, "progress": False}),
+        "fit_losses": (
+            inference.fit_losses,
+            {"theta": THETA, "loss": np.arange(9.0), "prior": prior, "noise": 1.0, "warn": False},
+        ),
         "Bolfi": (inference.Bolfi, {"prior": prior, "observed": OBSERVED}),
         "Bolfi.ask": (inference.Bolfi(prior, OBSERVED).ask, {}),
         "Bolfi.tell": (engine.tell, {"theta": THETA, "signals": signals}),
@@ -112,6 +116,7 @@ def cases():
         "SimulationBank.close": (inference.SimulationBank().close, {}),
         "SignalFamily": (inference.SignalFamily, {}),
         "DiscrepancyFamily": (inference.DiscrepancyFamily, {}),
+        "LogLikelihoodFamily": (inference.LogLikelihoodFamily, {}),
         "LowerConfidenceBound": (inference.LowerConfidenceBound, {}),
         "MaxVariance": (inference.MaxVariance, {}),
         "PosteriorDraws": (inference.PosteriorDraws, {}),
