@@ -254,16 +254,19 @@ def fit_losses(
         )
     engine = Bolfi(prior, surrogate="log_likelihood", initial=MIN_LEARN)
     losses, m = checked_array("loss", loss), len(np.atleast_2d(prior.to_array(theta)))
-    if losses.shape != (m,) or np.isfinite(losses).sum() < MIN_LEARN:
+    if losses.shape != (m,):
+        raise ValueError(f"loss must have shape ({m},), one per theta, got {losses.shape}")
+    if np.isfinite(losses).sum() < MIN_LEARN:
         raise ValueError(
-            f"loss must hold {m} numbers, one per theta, {MIN_LEARN} of them finite, got shape "
-            f"{losses.shape} with {np.isfinite(losses).sum()} finite ones; simulate more"
+            f"loss must hold {MIN_LEARN} finite numbers, got {np.isfinite(losses).sum()} of {m}: "
+            "simulate more"
         )
     least = np.nanmin(losses, initial=np.inf)
     if least < 0.0 or (least == 0.0 and noise is None):
         raise ValueError(
             f"loss must hold sums of squares, {'positive' if noise is None else 'from 0'}, got "
-            f'{least:.4g}; what is minus a log likelihood goes to fit(surrogate="log_likelihood")'
+            f"{least:.4g}: leave such trials out, give noise= for a perfect fit, or give minus a "
+            'log likelihood, its sign changed, to fit(surrogate="log_likelihood")'
         )
     if noise is not None:
         sd = checked_number("noise", noise, lambda sd: 0.0 < sd < np.inf, "positive and finite")

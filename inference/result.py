@@ -86,7 +86,7 @@ class Fit:
             ("simulations", f"{len(self.history.theta)}, failed: {failed or 'none'}"),
             ("discrepancy", self._discrepancies()),
             ("surrogate", ", ".join([surrogate, *self.learned.described()])),
-            ("status", self.status),
+            ("status", f"{self.status}{'' if len(self._drawn) else ': no runs at its draws'}"),
             ("warnings", "; ".join(self.warnings) or "none"),
         ]
 

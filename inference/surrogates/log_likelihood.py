@@ -385,5 +385,5 @@ def _unlikely(signal: np.ndarray) -> str:
     if value == -np.inf:
         return impossible("the log likelihood is -inf")
     if not np.isfinite(value) or not all(0.0 <= one < np.inf for one in sd):
-        return not_finite(f"the log likelihood, or its sd: {signal.ravel()}")
+        return not_finite(f"a log likelihood, or its sd, which is from 0: {signal.ravel()}")
     return ""

@@ -195,7 +195,7 @@ class SignalSurrogate:
     def described(self) -> list[str]:
         """The noise, and how it was found."""
         noise = float(self.constants()["measurement_noise_sd"])
-        how = "estimated" if self.known is None else "given"
+        how = "estimated" if self.known is None else "given" + self._missed() * ", and a misfit"
         return [f"measurement noise of sd {noise:.3g} in the first value, {how}"]
 
     @in_float64
@@ -249,11 +249,10 @@ class SignalSurrogate:
     def _generous(self) -> bool:
         """Whether a simulation misses independent data by less than the given noise allows."""
         freedom = len(self.observed) - self.gp.data.u.shape[1]
-        known = self.known
-        if known is None or known.factors.size or not known.white.all() or freedom < MIN_FREEDOM:
+        known, even = self.known, isinstance(self.scale, Plain) and freedom >= MIN_FREEDOM
+        if not even or known is None or known.factors.size or not known.white.all():
             return False
-        error = (self.emulator.outputs - self.observed) ** 2
-        least = np.min(error @ (1.0 / known.white))
+        least = np.min((self.emulator.outputs - self.observed) ** 2 @ (1.0 / known.white))
         return bool(least < stats.chi2.ppf(FALSE_ALARMS, freedom))
 
     def _smooth(self) -> bool:
@@ -283,7 +282,13 @@ class SignalSurrogate:
         varied = np.sum(basis.vectors**2) + self.emulator.remainder.total
         differ = np.sqrt(varied / len(self.observed))  # what simulations differ by
         far_off = self.output.long and self._residual > max(1.0, differ)
-        return bool(far.any(1).all()) or far_off
+        return bool(far.any(1).all()) or (far_off and not self._noise_explains())
+
+    def _noise_explains(self) -> bool:
+        """Whether noise as it is given, or one that varies fast, explains the residual."""
+        if self.known is not None:
+            return not self._missed()
+        return float(self.node_weights @ (self.nodes.rho > SLOW)) < 0.5
 
     @in_float64
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:

@@ -45,8 +45,8 @@ COLLAPSED = (
     "its draws moved it is not known; narrow the prior, or compare fits of more simulations"
 )
 GENEROUS = (
-    "the closest simulation misses what was observed by much less than the given noise: it is "
-    "smaller than given, and the posterior is too wide; correct noise="
+    "the closest simulation misses what was observed by much less than the given noise, which is "
+    "larger than that of the data: the posterior is too wide; correct noise="
 )
 UNCERTAIN = (
     "much of what may be the posterior lies where the log likelihood is hardly known, or far above "

@@ -10,6 +10,7 @@ from bolfi_liquids.inference.surrogates.warnings import (
     GUESSED,
     LOW_THRESHOLD,
     MISFIT,
+    OUTSIDE,
     TOO_SMOOTH,
     UNCONFIRMED,
     UNEVEN,
@@ -208,3 +209,19 @@ def test_nothing_is_confirmed_before_a_run_is_told():
     engine.tell(theta, decay(theta, None))
     engine.confirm(engine.fit(warn=False))
     assert engine.fit(warn=False).confirmed is None
+
+
+@pytest.mark.parametrize("noise", [0.3, None])
+def test_noise_larger_than_what_runs_differ_by_is_no_misfit(noise):
+    time, prior = np.linspace(0.0, 5.0, 50), inference.Prior({"tau": dist.Uniform(0.8, 2.1)})
+
+    def simulate(theta, seeds):
+        return np.exp(-time / theta["tau"][:, None])
+
+    data = np.exp(-time / 1.3) + np.random.default_rng(0).normal(0.0, 0.3, 50)
+    for offset, status in ((0.0, "fitted"), (3.0, "not fitted")):
+        fit = inference.fit(
+            simulate, prior, data + offset, noise=noise, budget=20, progress=False, warn=False
+        )
+        assert fit.status == status
+        assert (OUTSIDE in fit.warnings) is (offset > 0.0)

@@ -180,14 +180,20 @@ class ByMean:
     def seen(self, at: np.ndarray | None) -> tuple[np.ndarray, GivenNoise]:
         own = self.of(self.observed)
         near = own if at is None else np.clip(at, own - TRUSTED, own + TRUSTED)
-        less, here, more = (
-            self.law.log_density(self.observed, self.back(near + step), self.counts)
-            for step in (-HALF_STEP, 0.0, HALF_STEP)
-        )
+        densities = self._around(near)
+        # means at which what was observed is impossible: the observed value's own are not
+        near = np.where(np.isfinite(densities).all(0), near, own)
+        less, here, more = np.nan_to_num(self._around(near), posinf=0.0, neginf=0.0)
         slope = (more - less) / (2.0 * HALF_STEP)
         curvature = np.maximum((2.0 * here - more - less) / HALF_STEP**2, LEAST_CURVATURE)
         given = GivenNoise(1.0 / curvature, np.zeros((len(own), 0)))
         return near + slope / curvature, given
+
+    def _around(self, near: np.ndarray) -> np.ndarray:
+        """Log densities of the observed values half a step below `near`, there and above [3, m]."""
+        steps = -HALF_STEP, 0.0, HALF_STEP
+        means = (self.back(near + step) for step in steps)
+        return np.stack([self.law.log_density(self.observed, mean, self.counts) for mean in means])
 
     @property
     def unit(self) -> np.ndarray:

@@ -135,3 +135,25 @@ def test_a_run_without_noise_is_a_failed_run():
     )
     assert set(fit.failures) == {"incomparable"}
     assert any("positive, finite sd" in error for error in fit.history.errors)
+
+
+def test_counts_where_next_to_none_are_expected():
+    """Means may come close to 0 where something was counted."""
+    time, prior = np.linspace(0.0, 5.0, 50), inference.Prior({"tau": dist.Uniform(0.1, 2.1)})
+    counts = np.random.default_rng(0).poisson(np.exp(-time / 1.3))
+
+    def expected(theta, seeds):
+        return np.exp(-time / theta["tau"][:, None])
+
+    fit = inference.fit(
+        expected, prior, counts, noise="poisson", budget=20, progress=False, warn=False
+    )
+    tau = np.linspace(0.1, 2.1, 2001)[1:]
+    mean = np.exp(-time / tau[:, None])
+    log_density = (counts * np.log(mean) - mean).sum(1)
+    weights = np.exp(log_density - log_density.max())
+    weights /= weights.sum()
+    exact = weights @ tau
+    sd = np.sqrt(weights @ (tau - exact) ** 2)
+    drawn = fit.sample("quadrature", warn=False)["posterior"]["tau"].to_numpy()
+    assert abs(drawn.mean() - exact) < 0.4 * sd and 0.7 < drawn.std() / sd < 1.4
