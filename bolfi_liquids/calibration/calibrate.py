@@ -215,10 +215,14 @@ def _calibrate(
         warn_of_failures(fit.history.errors.tolist(), execution.timeout)
         error = None
         if allows:
+
+            def report_clean(_: str, finished: int) -> None:
+                advance(finished)
+
             keeping = Keeping(
                 bank,
                 CriticismSettings.batch,
-                report=lambda _, finished: advance(finished),
+                report=report_clean,
                 executor=execution.executor,
                 timeout=execution.timeout,
             )
@@ -332,10 +336,11 @@ def _open_clean(
             fix="leave them out, or take the surrogate 'signal'",
         )
     check_baseline(stirring, clean)
-    if {one.hash for one in clean} & {one.hash for one in stirring.recordings}:
-        fix = "give other recordings: it would count as free of errors"
-        raise InputError("is what is calibrated on", where=Argument("baseline"), fix=fix)
     for recording in clean:
+        if recording.hash in {one.hash for one in stirring.recordings}:
+            fix = "give another recording: this one would count as free of errors"
+            where = Argument(f"baseline {recording.path}")
+            raise InputError("is what is calibrated on", where=where, fix=fix)
         camera_noise([recording])  # refuses one that rests too shortly
     return clean
 

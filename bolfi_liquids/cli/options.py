@@ -44,7 +44,7 @@ class CalibrationOptions:
         CalibrationSettings.budget
     )
     surrogate: Annotated[
-        str, typer.Option(metavar="|".join(SURROGATES), help="What the engine emulates.")
+        str, typer.Option(metavar="|".join(SURROGATES), help="What is emulated, see guide priors.")
     ] = CalibrationSettings.surrogate
     sampler: Annotated[
         str, typer.Option(metavar="|".join(SAMPLERS), help="Sampler of the posterior.")
@@ -85,7 +85,8 @@ class GivenPours:
 BaselineOption = Annotated[
     list[Path] | None,
     typer.Option(
-        metavar="RECORDING", help="A recording, of any liquid, in which no effect is expected."
+        metavar="RECORDING",
+        help="Of any liquid, without an effect: shows the simulator's own error. Repeatable.",
     ),
 ]
 
