@@ -38,6 +38,7 @@ def simulated_recording(path, theta, seed, particles):
         pytest.param(5, 3, FULL, id="five", marks=pytest.mark.minutes),
     ],
 )
+@pytest.mark.filterwarnings("ignore::bolfi_liquids.inference.surrogates.warnings.EmulatorWarning")
 def test_simulated_truth_is_found(tmp_path, truths, least, settings):
     """Truths from the prior: an interval of 90 % misses both of two, or three of five, once in
     100 tries. A viscosity off by a sixth of the prior's range is found in either size."""

@@ -188,6 +188,7 @@ def test_settings_may_be_integers_of_numpy(short_recording, calibration, setting
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::bolfi_liquids.inference.surrogates.warnings.EmulatorWarning")
 def test_stirs_that_take_too_long_are_counted_and_their_limit_is_kept(
     short_recording, settings, tmp_path, monkeypatch, caplog
 ):
