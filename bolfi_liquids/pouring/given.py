@@ -72,7 +72,7 @@ class GivenPours:
         return np.argsort(apart, kind="stable")
 
     def summary(self, chosen: Judged, without: Judged) -> GivenSummary:
-        """What is told of them beside the chosen action and the one that they have changed."""
+        """Numbers of the given pours, of the chosen action, and of that without given pours."""
         table = self.table
         numbers = zip(
             table.lines.tolist(),

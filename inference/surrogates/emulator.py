@@ -141,7 +141,7 @@ def _learned(
 def _left(basis: Basis, outputs: np.ndarray, spread: np.ndarray | None) -> Remainder:
     """What the components leave of outputs [n, m], for noise of the size 1."""
     residuals = basis.residuals(outputs)
-    if spread is not None:  # all runs of one length: what is left of their sizes is no correlation
+    if spread is not None:  # scaled to one length: unlike sizes would look like correlation
         length = np.linalg.norm(residuals, axis=1)
         mean = np.sqrt(np.mean(length**2 / spread))
         residuals = residuals * (mean / np.where(length > 0.0, length, 1.0))[:, None]

@@ -318,7 +318,7 @@ def _score(gp: GP, scale: Scale, values: np.ndarray) -> float:
 def _data(
     u: np.ndarray, values: np.ndarray, sd: np.ndarray, scale: Scale, normal: np.ndarray | None
 ) -> Data:
-    """What the process learns; the noise is told where some sds are known."""
+    """Targets of the process; where some sds are known, its noise varies as they do."""
     usual = np.nanmedian(sd) if np.isfinite(sd).any() else 0.0
     noise = None
     if usual > 0.0:
