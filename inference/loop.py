@@ -1,7 +1,7 @@
 """The usual loop: ask, simulate, store, tell."""
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import ExitStack
 from pathlib import Path
@@ -43,6 +43,13 @@ from .surrogates.families import Family
 from .surrogates.warnings import complain
 from .types import Simulator, SingleSimulator, Theta
 
+Earlier = (
+    tuple[Theta, ArrayLike]
+    | tuple[Theta, ArrayLike, ArrayLike]
+    | tuple[Theta, ArrayLike, ArrayLike, Sequence[str]]
+)
+"""Simulations made before: theta, signals, seeds and errors, see `Bolfi.tell`."""
+
 
 def fit(  # noqa: PLR0913  the one call that most users make
     simulate: Simulator | SingleSimulator,
@@ -59,7 +66,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
     bank: str | Path | SimulationBank = ":memory:",
     identity: str = "",
     timeout: float | None = None,
-    earlier: tuple[Theta, ArrayLike] | tuple[Theta, ArrayLike, ArrayLike] | None = None,
+    earlier: Earlier | None = None,
     vectorised: bool = True,
     in_rounds: bool = True,
     confirm: int = 3,
@@ -109,10 +116,11 @@ def fit(  # noqa: PLR0913  the one call that most users make
         timeout: Seconds that one simulation may take; those of one call together as many times
             as long, and if it fails they are tried one by one. `simulate` then runs in a
             thread, which is abandoned, not stopped, when it is overdue: see `job.within`.
-        earlier: Your own simulations (theta, signals) or (theta, signals, seeds), as
-            `SimulationBank.simulations` returns them; theta may be a data frame. They are learned
-            from like the others, take the place of the start design's points, and count beside
-            the budget, which may then be 0.
+        earlier: Your own simulations (theta, signals), with seeds, as
+            `SimulationBank.simulations` returns them, and errors, where these are known: what
+            `Bolfi.tell` takes; theta may be a data frame. They are learned from like the others,
+            take the place of the start design's points, and count beside the budget, which may
+            then be 0; what they say is confirmed all the same, unless `simulate` is None.
         vectorised: Whether `simulate` makes a batch of runs in one call; False calls it once
             for each run, such as `simulate({"a": 1.0}, seed)`.
         in_rounds: Whether points are asked a round at a time. False asks the next one as soon as
@@ -152,7 +160,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         check_flag(name, flag)
     check_bank(bank)
     check_executor(executor)
-    if budget:
+    if budget or simulate is not None:
         check_function("simulate", simulate)
     told = _length(earlier)
     if budget + told > MOST_SIMULATIONS:
@@ -172,7 +180,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         **options,
     )
     if earlier is not None:
-        engine.tell(earlier[0], earlier[1], earlier[2] if len(earlier) == 3 else None)
+        engine.tell(*earlier)
     if budget + engine.told < engine.initial:
         raise ValueError(
             f"budget={budget} is smaller than the start design of initial={engine.initial} points; "
@@ -200,11 +208,9 @@ def fit(  # noqa: PLR0913  the one call that most users make
                 "from there"
             )
         made = engine.fit({"simulator": seconds}, warn=False)
-        if not budget and made.unreached:  # a table of losses, rather than of outputs
+        if simulate is None and made.unreached:  # a table of losses, rather than of outputs
             raise ValueError(made.unreached[0])
-        rounds = max(1, budget // (2 * confirm)) if confirm and budget else 0
-        rounds = min(rounds, (MOST_SIMULATIONS - engine.told) // max(confirm, 1))
-        for _ in range(rounds):
+        for _ in range(_confirmations(engine, budget, confirm) if simulate is not None else 0):
             for simulation in _confirmation(engine, made, runner, confirm):
                 seconds += simulation.seconds
                 advance(1)
@@ -305,9 +311,17 @@ def _in_flight(engine: Bolfi, runner: Runner, budget: int, batch: int) -> Iterat
         yield from land()
 
 
+def _confirmations(engine: Bolfi, budget: int, n: int) -> int:
+    """How often n runs may confirm: up to half the budget, but once at least."""
+    if not n:
+        return 0
+    return min(max(1, budget // (2 * n)), (MOST_SIMULATIONS - engine.told) // n)
+
+
 def _confirmation(engine: Bolfi, made: Fit, runner: Runner, n: int) -> list[Simulation]:
     """Simulate n draws of the posterior; returns what the engine was told."""
-    seeds = [simulation_seed(engine.seed, engine.asked + i) for i in range(n)]
+    first = max(engine.asked, engine.told)  # earlier runs may be of the same seed
+    seeds = [simulation_seed(engine.seed, first + i) for i in range(n)]
     asked = jobs(engine.confirm(made, n), seeds)
     return _tell(engine, asked, runner.run(asked, engine.expected_shape))
 
@@ -337,11 +351,11 @@ def _length(earlier: Any) -> int:
     """Simulations in `fit`'s argument `earlier`."""
     if earlier is None:
         return 0
-    pair = isinstance(earlier, tuple | list) and len(earlier) in (2, 3)
-    if not (pair and is_table(earlier[0])):
+    told = isinstance(earlier, tuple | list) and len(earlier) in (2, 3, 4)
+    if not (told and is_table(earlier[0])):
         raise ValueError(
-            "earlier must be (theta, signals) or (theta, signals, seeds), theta a mapping of "
-            f"names to values, or None, got {earlier!r:.100}"
+            "earlier must be (theta, signals) or (theta, signals, seeds, errors), theta a mapping "
+            f"of names to values, or None, got {earlier!r:.100}"
         )
     if isinstance(earlier[1], list | tuple):
         return len(earlier[1])  # `tell` looks at each of them

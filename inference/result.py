@@ -163,10 +163,14 @@ class Fit:
         return bool(most) and self.before.agrees(*self.population.moments)
 
     @property
+    def confirming(self) -> slice:
+        """Rows of the runs that were made last at draws of the posterior."""
+        return slice(0) if self.before is None else self.before.runs
+
+    @property
     def _drawn(self) -> np.ndarray:
         """Discrepancies of the runs at draws of the posterior, NaN where one failed."""
-        runs = slice(0) if self.before is None else self.before.runs
-        return self.history.discrepancy[runs]
+        return self.history.discrepancy[self.confirming]
 
     @cached_property
     @in_float64

@@ -3,13 +3,14 @@
 import logging
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import mkdtemp
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import Argument, InputError
@@ -26,7 +27,7 @@ from ..inputs.settings import (
     CriticismSettings,
 )
 from ..inputs.start import check_start
-from ..progress import after_first, progress_bar
+from ..progress import Advance, after_first, progress_bar
 from ..run.directory import (
     POSTERIOR,
     RUN_TOML,
@@ -42,9 +43,8 @@ from ..run.provenance import LIBRARIES, versions
 from ..run.recordings import check_names, keep_recordings
 from ..run.simulations import warn_of_failures
 from ..run.workers import open_workers
-from .baseline import CLEAN_RUNS, check_baseline, clean_residuals
-from .draws import pick_draws
-from .model_error import concluded_beside, model_error, noise_beside
+from .baseline import CLEAN_RUNS, Clean, check_baseline, clean_residuals
+from .model_error import ModelError, model_error, noise_beside
 from .result import Calibration, finished_calibration
 from .stir_simulator import Stirring, stirring_of
 from .stirs import camera_noise, effects_of
@@ -194,8 +194,7 @@ def _calibrate(
     settings: CalibrationSettings,
     execution: Execution,
 ) -> Calibration:
-    from ..inference.criticism import Keeping
-    from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES, check_by_simulation
+    from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES, check_of
     from .posterior_file import results_tree, write_tree
 
     record = note_timeout(run, execution.timeout)
@@ -210,34 +209,27 @@ def _calibrate(
         allows = settings.surrogate == "signal"
         # beside the largest error the search does not settle on one liquid too early
         search = {"noise": noise_beside(stirring, model_error(stirring, 0.0))} if allows else {}
-        report = {"progress": advance, "warn": False}
-        fit = fit_recordings(stirring, stirring.observed, prior, keep, settings, **report, **search)
-        warn_of_failures(fit.history.errors.tolist(), execution.timeout)
+        fit = fit_recordings(
+            stirring,
+            stirring.observed,
+            prior,
+            keep,
+            settings,
+            confirm=0,
+            warn=False,
+            progress=advance,
+            **search,
+        )
         error = None
         if allows:
-
-            def report_clean(_: str, finished: int) -> None:
-                advance(finished)
-
-            keeping = Keeping(
-                bank,
-                CriticismSettings.batch,
-                report=report_clean,
-                executor=execution.executor,
-                timeout=execution.timeout,
-            )
-            # criticise finds the same simulations in the bank
-            clean = clean_residuals(
-                baseline, settings.particles, prior, effects_of("stir"), keeping=keeping
-            )
+            clean = _clean_residuals(baseline, prior, settings, bank, execution, advance)
             error = model_error(stirring, fit.best["viscosity"], clean)
-            options = {"seed": settings.seed, **engine_options(stirring, settings.surrogate)}
-            fit = concluded_beside(error, fit, stirring, options)
+        fit = _confirmed(fit, error, stirring, keep, settings, advance)
+        warn_of_failures(fit.history.errors.tolist(), execution.timeout)
         sampled = fit.sample(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
         )
-        drawn = pick_draws(sampled["posterior"].to_dataset(), PREDICTIVE_DRAWS, settings.seed)
-        check = check_by_simulation(stirring, drawn, fit.best, settings.seed, keep, advance=advance)
+        check = check_of(fit, stirring, settings.seed, keep, advance=advance)
     tree = results_tree(sampled, fit, stirring, check)
     if (now := read_run(run)["settings"]["budget"]) != settings.budget:
         raise InputError(
@@ -249,6 +241,80 @@ def _calibrate(
     summary = CalibrationSummary.from_fit(tree, fit, stirring, check, error)
     summary.write(run)
     return Calibration(run, tree, MappingProxyType(dict(record)), summary)
+
+
+def _confirmed(
+    fit: "Fit",
+    error: ModelError | None,
+    stirring: Stirring,
+    keep: "Keep",
+    settings: CalibrationSettings,
+    advance: Advance,
+) -> "Fit":
+    """The fit to the same simulations, and to some at its draws, beside the simulator's error.
+
+    Args:
+        fit: Of the search, beside another error.
+        error: Of the simulator; None where the surrogate allows for none.
+        stirring: What was simulated.
+        keep: Where simulations are made and kept.
+        settings: Of the run.
+        advance: Called with 1 for each simulation.
+
+    Warns:
+        EmulatorWarning: For each complaint.
+    """
+    from ..inference.criticism import Experiment
+    from .check import PREDICTIVE_DRAWS
+
+    observed, search = stirring.observed, fit.history
+    theta = fit.prior.to_dict(search.theta)
+    beside = {}
+    if error is not None:
+        beside = {"noise": noise_beside(stirring, error)}
+        observed = Experiment(stirring.simulate, observed, **beside).corrected
+    made = fit_recordings(
+        stirring,
+        observed,
+        fit.prior,
+        keep,
+        settings,
+        budget=0,
+        earlier=(theta, search.signals, search.seeds, search.errors.tolist()),
+        confirm=PREDICTIVE_DRAWS,
+        progress=advance,
+        **beside,
+    )
+    # which simulations were asked together, and what was recorded, is known to the search
+    rounds = np.append(search.rounds, made.history.rounds[len(search.rounds) :])
+    return replace(
+        made,
+        observed=fit.observed,
+        history=made.history._replace(rounds=rounds),
+        seconds={part: spent + made.seconds[part] for part, spent in fit.seconds.items()},
+    )
+
+
+def _clean_residuals(
+    baseline: tuple[Recording, ...],
+    prior: "Prior",
+    settings: CalibrationSettings,
+    bank: "SimulationBank",
+    execution: Execution,
+    advance: Advance,
+) -> list[Clean]:
+    """What the simulator leaves of clean recordings; criticise finds the same simulations."""
+    from ..inference.criticism import Keeping
+
+    keeping = Keeping(
+        bank,
+        CriticismSettings.batch,
+        report=lambda _, finished: advance(finished),
+        executor=execution.executor,
+        timeout=execution.timeout,
+    )
+    effects = effects_of("stir")
+    return clean_residuals(baseline, settings.particles, prior, effects, keeping=keeping)
 
 
 def _kept(record: Mapping[str, Any], of_clean: int, bank: "SimulationBank") -> int:
@@ -279,7 +345,8 @@ def fit_recordings(
         prior: Prior of the parameters.
         keep: Where simulations are made and kept.
         settings: Budget, surrogate and seed.
-        more: Other arguments of `inference.fit`; without `progress` no bar is shown.
+        more: Other arguments of `inference.fit`, which come first; without `progress` no bar is
+            shown.
     """
     from .. import inference
 
@@ -290,16 +357,14 @@ def fit_recordings(
         stirring.simulate,
         prior,
         observed,
-        budget=settings.budget,
         batch=settings.batch,
         seed=settings.seed,
         executor=keep.executor,
         in_rounds=True,
-        confirm=0,
         bank=keep.bank,
         identity=keep.identity,
         timeout=keep.timeout,
-        **{"progress": False, **more},
+        **{"budget": settings.budget, "progress": False, **more},
         **options,
     )
 

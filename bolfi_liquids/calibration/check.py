@@ -1,6 +1,5 @@
 """Simulations that judge a calibration: what the posterior predicts, and how noisy it is."""
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -13,67 +12,68 @@ from ..seeds import Phase, simulation_seeds
 from .stir_simulator import Stirring
 
 if TYPE_CHECKING:
-    from ..inference.result import Closest
+    from ..inference.result import Closest, Fit
 
 PREDICTIVE_DRAWS = 8
 THETA_STAR_REPLICATES = 4  # seeds at theta*, for the noise between seeds
 
 
 class Check(NamedTuple):
-    """Signals of simulations that the engine did not learn from.
+    """Signals of the simulations that judge a calibration.
 
-    `closest` of them judges the fit, not the closest that was learned from: among few of these
-    none may be near, though the posterior is right.
+    `closest` of them judges the fit, not the closest of the search: among few of these none may be
+    near, though the posterior is right.
     """
 
     closest: "Closest"  # of those at posterior draws
     predictive: NDArray[np.float64]  # (draws, T, planes) rad, each at a posterior draw
     replicates: NDArray[np.float64]  # (seeds, T, planes) rad, all at theta*
-    seconds: float  # spent in the simulator [s]
+    seconds: float  # spent in the simulator at theta* [s]
 
 
-def check_by_simulation(
-    stirring: Stirring,
-    draws: Mapping[str, NDArray],
-    best: Mapping[str, float],
-    seed: int,
-    keep: Keep,
-    *,
-    advance: Advance = silent,
+def check_of(
+    fit: "Fit", stirring: Stirring, seed: int, keep: Keep, *, advance: Advance = silent
 ) -> Check:
-    """Simulate at `draws` and, with several seeds, at `best`; all with fresh seeds.
+    """Simulations at draws of a fit's posterior, which it has seen, and new ones at theta*.
 
     Args:
+        fit: Of the engine, with runs that confirm it or not.
         stirring: The simulator, and what was recorded.
-        draws: Posterior draws, name -> shape (n,).
-        best: theta*.
         seed: Of the run.
         keep: Where simulations are made and kept.
         advance: Called with 1 for each simulation.
+
+    Raises:
+        RuntimeError: Every simulation at a posterior draw failed, or every one at theta*.
     """
-    count = len(next(iter(draws.values())))
-    at_best = {name: np.full(THETA_STAR_REPLICATES, value) for name, value in best.items()}
-    seeds = (
-        simulation_seeds(seed, Phase.PREDICTIVE, count),
-        simulation_seeds(seed, Phase.REPLICATES, THETA_STAR_REPLICATES),
-    )
-    predictive = simulate_kept(stirring.simulate, draws, seeds[0], keep, advance=advance)
-    replicates = simulate_kept(stirring.simulate, at_best, seeds[1], keep, advance=advance)
-    simulated = {name: values[predictive.places] for name, values in draws.items()}
+    at_best = {name: np.full(THETA_STAR_REPLICATES, value) for name, value in fit.best.items()}
+    seeds = simulation_seeds(seed, Phase.REPLICATES, THETA_STAR_REPLICATES)
+    replicates = simulate_kept(stirring.simulate, at_best, seeds, keep, advance=advance)
+    drawn = np.arange(len(fit.history.theta))[fit.confirming]
+    good = drawn[fit.history.succeeded[drawn]]
+    if not good.size:
+        raise RuntimeError(
+            f"all {len(drawn)} simulations at draws of the posterior failed, the first:"
+            f" {fit.history.errors[drawn[0]]}; repeat the call with a larger budget"
+        )
     return Check(
-        _closest(stirring, simulated, predictive.signals),
-        predictive.signals,
+        _closest(stirring, fit, good),
+        fit.history.signals[good],
         replicates.signals,
-        predictive.seconds + replicates.seconds,
+        replicates.seconds,
     )
 
 
-def _closest(stirring: Stirring, theta: Mapping[str, NDArray], signals: NDArray) -> "Closest":
-    """The one of n simulations that comes nearest to what was recorded."""
+def _closest(stirring: Stirring, fit: "Fit", runs: NDArray[np.int64]) -> "Closest":
+    """The one of these runs that comes nearest to what was recorded."""
     from ..inference.result import Closest
 
-    distance = stirring.discrepancy()
-    discrepancies = [distance(stirring.observed, signal) for signal in signals]
+    distance, history = stirring.discrepancy(), fit.history
+    discrepancies = [distance(stirring.observed, history.signal(run)) for run in runs]
     at = int(np.argmin(discrepancies))
-    there = {name: float(values[at]) for name, values in theta.items()}
-    return Closest(there, signals[at], discrepancies[at])
+    theta = fit.prior.to_dict(history.theta[runs[at]])
+    return Closest(
+        {name: float(value) for name, value in theta.items()},
+        history.signal(runs[at]),
+        discrepancies[at],
+    )

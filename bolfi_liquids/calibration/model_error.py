@@ -1,8 +1,8 @@
 """The simulator's own error, for which the posterior of a calibration allows."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from .stir_simulator import Stirring
 from .stirs import frame_interval
 
 if TYPE_CHECKING:
-    from ..inference import Fit
     from ..inference.criticism import SumOfNoises, UsualResidual
 
 SHORT_PART = 0.5
@@ -70,31 +69,3 @@ def noise_beside(stirring: Stirring, error: ModelError) -> "SumOfNoises":
     from ..inference.criticism import KnownNoise, SumOfNoises
 
     return SumOfNoises((KnownNoise(sensor_noise(stirring.observed)), error.usual))
-
-
-def concluded_beside(
-    error: ModelError, fit: "Fit", stirring: Stirring, options: Mapping[str, Any]
-) -> "Fit":
-    """The fit to the same simulations beside another error of the simulator.
-
-    Args:
-        error: Of the simulator.
-        fit: Beside another one.
-        stirring: What was simulated.
-        options: Of the engine, with which `fit` was made; see `inference.Bolfi`.
-
-    Warns:
-        EmulatorWarning: For each complaint.
-    """
-    from ..inference import Bolfi
-    from ..inference.criticism import Experiment
-
-    noise = noise_beside(stirring, error)
-    corrected = Experiment(stirring.simulate, stirring.observed, noise).corrected
-    engine, history = Bolfi(fit.prior, corrected, noise=noise, **options), fit.history
-    theta = fit.prior.to_dict(history.theta)
-    engine.tell(theta, history.signals, history.seeds, history.errors.tolist())
-    made = engine.fit()
-    seconds = {**fit.seconds, "engine": fit.seconds["engine"] + made.seconds["engine"]}
-    # the fit's own history knows its rounds, and what was recorded
-    return replace(made, observed=fit.observed, history=history, seconds=seconds)
