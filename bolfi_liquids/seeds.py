@@ -21,7 +21,6 @@ class Phase(Enum):
     ONLINE_SEARCH = "search while the robot stirs"
     ONLINE_STIRS = "stirs while the robot stirs"
     POSTERIOR_DRAWS = "posterior draws"
-    PREDICTIVE = "posterior predictive"
     REHEARSAL = "rehearsal of a chosen pour"
     REPLICATES = "replicates at the best parameters"
     RUNS_OF_POURS = "packings of a table's pours"

@@ -127,7 +127,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
             a simulation is told: an executor's workers then never wait for the slowest run of a
             round, and other points are simulated than in rounds.
         confirm: Runs beyond the budget at draws of the posterior, which tell whether it is known:
-            once, and again while they move it, up to half the budget; 0 for none.
+            once, and again while they move it, twice in all or up to half the budget; 0 for none.
             See `Fit.confirmed`.
         warn: Whether each of the surrogate's complaints is raised as an `EmulatorWarning`;
             `Fit.warnings` holds them in any case.
@@ -312,10 +312,10 @@ def _in_flight(engine: Bolfi, runner: Runner, budget: int, batch: int) -> Iterat
 
 
 def _confirmations(engine: Bolfi, budget: int, n: int) -> int:
-    """How often n runs may confirm: up to half the budget, but once at least."""
+    """How often n runs may confirm: twice, or up to half the budget."""
     if not n:
         return 0
-    return min(max(1, budget // (2 * n)), (MOST_SIMULATIONS - engine.told) // n)
+    return min(max(2, budget // (2 * n)), (MOST_SIMULATIONS - engine.told) // n)
 
 
 def _confirmation(engine: Bolfi, made: Fit, runner: Runner, n: int) -> list[Simulation]:

@@ -97,8 +97,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         pours: A table of pours of the liquid that were made, or its path: the posterior does not
             depend on it, but `choose_pour` does.
         cups: With which they were made, or a TOML file of them; None takes the bundled ones.
-        budget: Simulations that the engine may learn from. A dozen more judge the result, anew
-            where a run grew.
+        budget: Simulations of the search. Eight more, at draws of the posterior, confirm it or
+            move it; where they move it, eight more follow; and four tell the noise between seeds.
         seed: Seed of all random draws.
         surrogate: "signal", which emulates the inclination itself and allows for an error of the
             simulator, or "discrepancy", the paper's, which does not.
@@ -238,7 +238,7 @@ def _calibrate(
             fix="nothing was written; go on with that budget and `resume`",
         )
     write_tree(tree, run / POSTERIOR)
-    summary = CalibrationSummary.from_fit(tree, fit, stirring, check, error)
+    summary = CalibrationSummary.from_fit(tree, fit, stirring, check, error, settings.budget)
     summary.write(run)
     return Calibration(run, tree, MappingProxyType(dict(record)), summary)
 

@@ -105,8 +105,9 @@ class CalibrationSummary(Section):
         below_least_viscosity: Share of the posterior there.
         best: theta*, where the surrogate expects the best fit.
         closest: Parameters of the simulation at a posterior draw with the least discrepancy.
-        n_simulations: Number that the engine learned from.
-        n_check_simulations: Number that judged the result.
+        n_simulations: Number of the search.
+        n_check_simulations: Number that judged the result: those at posterior draws, which the
+            engine learned from, too, and those at theta*.
         fit_rms_deg: RMS between the recording and that simulation [deg].
         noise_deg: RMS that the right model would leave [deg], see `noise.irreducible_rms`.
         rhat_max, ess_min: Worst R-hat and effective sample size of the parameters.
@@ -154,9 +155,10 @@ class CalibrationSummary(Section):
         stirring: Stirring,
         check: Check,
         error: ModelError | None,
+        budget: int,
     ) -> Self:
-        """From posterior.nc, the engine's fit, what was stirred, the simulations that check and
-        the error that the fit allows for."""
+        """From posterior.nc, the engine's fit, what was stirred, the simulations that check, the
+        error that the fit allows for, and the number of simulations of the search."""
         posterior, closest = tree["posterior"], check.closest
         seen = [one.inclination for one in stirring.recordings]
         spent = {name: tree.attrs[f"seconds_{name}"] for name in Seconds.__dataclass_fields__}
@@ -168,8 +170,8 @@ class CalibrationSummary(Section):
             below_least_viscosity=_below(posterior.to_dataset(), stirring.least_viscosity),
             best=fit.best,
             closest=closest.theta,
-            n_simulations=int(fit.simulations.sizes["simulation"]),
-            n_check_simulations=len(check.predictive) + len(check.replicates),
+            n_simulations=budget,
+            n_check_simulations=len(fit.history.theta) - budget + len(check.replicates),
             fit_rms_deg=float(np.degrees(rms(stirring.observed - closest.signal))),
             noise_deg=float(np.degrees(irreducible_rms(seen, check.replicates))),
             **_sampling(posterior.to_dataset()),

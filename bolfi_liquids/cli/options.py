@@ -40,7 +40,7 @@ ParticlesOption = Annotated[
 class CalibrationOptions:
     """Settings of `calibrate`, as `CalibrationSettings` describes them."""
 
-    budget: Annotated[int, typer.Option(help="Simulations to learn from.")] = (
+    budget: Annotated[int, typer.Option(help="Simulations of the search.")] = (
         CalibrationSettings.budget
     )
     surrogate: Annotated[

@@ -139,7 +139,7 @@ class CalibrationSettings:
     """What decides a calibration besides its recordings and prior.
 
     Attributes:
-        budget: Simulations that the engine may learn from.
+        budget: Of the search.
         batch: Simulations run at the same time.
         seed: Seed of all random draws.
         surrogate: "signal", which emulates the inclination itself, or "discrepancy", the paper's.

@@ -15,8 +15,8 @@ PARTS = ("hardware", "inference", "models")
 
 def test_seeds_differ_by_run_phase_and_step():
     every = [seed for phase in Phase for seed in simulation_seeds(0, phase, COUNT)]
-    every += simulation_seeds(1, Phase.PREDICTIVE, COUNT)
-    every += simulation_seeds(0, Phase.PREDICTIVE, COUNT, 1)
+    every += simulation_seeds(1, Phase.REPLICATES, COUNT)
+    every += simulation_seeds(0, Phase.REPLICATES, COUNT, 1)
     # by chance 1500 of 2^31 hold two that are equal once in two thousand times
     assert len(set(every)) == len(every)
     assert min(every) >= 0 and max(every) < 2**31

@@ -85,8 +85,26 @@ def test_earlier_simulations_count_beside_the_budget(prior, observed, simulate):
     engine.tell(theta, signals)
     first = prior.to_array(engine.ask(4))  # the acquisition's, not the design's
     np.testing.assert_array_equal(fit.history.theta[10:], first)
-    alone = inference.fit(simulate, prior, observed, budget=0, earlier=(theta, signals))
-    assert alone.best == engine.fit().best
+
+
+def test_earlier_simulations_alone_are_confirmed_where_there_is_a_simulator(
+    prior, observed, simulate
+):
+    theta = prior.from_unit(np.random.default_rng(3).uniform(size=(10, 2)))
+    signals = simulate(theta, range(10))
+    seeds, errors = [*range(10)], ["too hot", *[""] * 9]
+    signals[0] = np.nan
+    told = theta, signals, seeds, errors
+    alone, confirmed = (
+        inference.fit(of, prior, observed, budget=0, earlier=told, noise=0.05, confirm=4)
+        for of in (None, simulate)
+    )
+    engine = inference.Bolfi(prior, observed, noise=0.05)
+    engine.tell(*told)
+    assert alone.best == engine.fit(warn=False).best and alone.confirmed is None
+    assert confirmed.confirming == slice(10, 14) and confirmed.confirmed
+    assert confirmed.history.errors[0] == "too hot"
+    assert len(np.unique(confirmed.history.seeds)) == 14
 
 
 def test_a_bank_s_simulations_serve_as_earlier_ones(prior, observed, simulate):

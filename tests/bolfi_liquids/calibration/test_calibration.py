@@ -18,11 +18,10 @@ from bolfi_liquids.inference.simulations import job
 import bolfi_liquids as bl
 from bolfi_liquids import inference, models
 from bolfi_liquids.calibration import calibrate as calibrating
-from bolfi_liquids.calibration.check import PREDICTIVE_DRAWS
+from bolfi_liquids.calibration.check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES
 from bolfi_liquids.calibration.stir_simulator import Stirring, stirring_of
 from bolfi_liquids.drawing import new_figure
 from bolfi_liquids.inputs.prior import default_prior
-from bolfi_liquids.seeds import Phase, simulation_seeds
 
 
 def test_summary_is_of_the_posterior(calibration, settings):
@@ -39,8 +38,10 @@ def test_summary_is_of_the_posterior(calibration, settings):
     rms = np.degrees(np.sqrt((residual**2).mean()))
     assert section["fit_rms_deg"] == pytest.approx(float(rms))
     assert 0.05 < section["noise_deg"] < 2.0  # 0.1 degrees of camera noise, and the seeds'
-    assert section["n_simulations"] == tree["simulations"].sizes["simulation"]
     assert section["n_simulations"] == settings["budget"]
+    confirming = tree["simulations"].sizes["simulation"] - settings["budget"]
+    assert confirming in (PREDICTIVE_DRAWS, 2 * PREDICTIVE_DRAWS)
+    assert section["n_check_simulations"] == confirming + THETA_STAR_REPLICATES
     tree.close()
 
 
@@ -63,11 +64,12 @@ def test_closest_is_of_the_posterior_draws_and_reproducible(calibration, short_r
     discrepancies = [stirring.discrepancy()(stirring.observed, signal) for signal in drawn]
     at = int(np.argmin(discrepancies))
     assert float(calibration.tree["closest"]["discrepancy"]) == discrepancies[at]
+    learned = calibration.tree["simulations"].isel(simulation=slice(-PREDICTIVE_DRAWS, None))
+    np.testing.assert_array_equal(learned["signal"], drawn)
     theta = {name: np.array([value]) for name, value in calibration.summary.closest.items()}
     for name, values in theta.items():
-        assert values in calibration.posterior[name]
-    seeds = simulation_seeds(settings["seed"], Phase.PREDICTIVE, PREDICTIVE_DRAWS)
-    again = stirring.simulate(theta, np.array([seeds[at]]))
+        assert values == learned[name][at]
+    again = stirring.simulate(theta, learned["seed"].to_numpy()[[at]])
     np.testing.assert_array_equal(again[0], calibration.tree["closest"]["inclination"])
 
 

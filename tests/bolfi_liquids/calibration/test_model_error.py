@@ -4,14 +4,16 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import numpyro.distributions as dist
 import pytest
 from bolfi_liquids.inference.surrogates.measurement_noise import Layout
 from bolfi_liquids.models import stirring_error
 
 import bolfi_liquids as bl
+from bolfi_liquids import inference
 from bolfi_liquids.calibration import calibrate as calibrating
 from bolfi_liquids.calibration import check as checking
-from bolfi_liquids.calibration.check import check_by_simulation
+from bolfi_liquids.calibration.check import check_of
 from bolfi_liquids.calibration.model_error import SHORT_PART, model_error
 from bolfi_liquids.calibration.stir_simulator import stirring_of
 from bolfi_liquids.reporting.sentences import model_error_sentence
@@ -109,20 +111,32 @@ def test_clean_recordings_that_say_nothing_are_refused_before_the_first_simulati
     assert not (tmp_path / "run").exists()
 
 
+def straight(theta, seeds):
+    slopes = np.log(theta["viscosity"])[:, None, None]
+    return slopes * np.linspace(0.2, 1.0, 10)[:, None] * np.ones(2)
+
+
 def test_the_closest_run_at_posterior_draws_judges_a_fit(monkeypatch):
     """Failed runs are left out; parameters stay with their signals."""
-    observed = np.zeros((5, 2))
-    signals = np.array([3.0, 0.5, 2.0])[:, None, None] * np.ones((3, 5, 2))
-    kept = iter([Kept(signals, np.array([0, 2, 3]), 1.0), Kept(signals, np.arange(3), 2.0)])
-    monkeypatch.setattr(checking, "simulate_kept", lambda *_, **__: next(kept))
+    kept = Kept(np.zeros((4, 10, 2)), np.arange(4), 2.0)
+    monkeypatch.setattr(checking, "simulate_kept", lambda *_, **__: kept)
+    prior = inference.Prior({"viscosity": dist.LogUniform(0.1, 10.0)})
+    observed = straight({"viscosity": np.array([0.5])}, [0])[0]
+    options = {"budget": 9, "confirm": 4, "noise": 0.1, "progress": False, "warn": False}
+    fit = inference.fit(straight, prior, observed, **options)
+    first, *others = range(len(fit.history.theta))[fit.confirming]
+    discrepancy = fit.history.discrepancy.copy()
+    discrepancy[first] = np.nan
+    judged = replace(fit, history=fit.history._replace(discrepancy=discrepancy))
     stirring = SimpleNamespace(
         observed=observed,
         simulate=None,
         discrepancy=lambda: lambda a, b: float(np.sum((a - b) ** 2)),
     )
-    draws = {"viscosity": np.array([1.0, 2.0, 3.0, 4.0])}
-    found = check_by_simulation(stirring, draws, {"viscosity": 2.5}, 0, None)
-    assert found.closest.theta == {"viscosity": 3.0}
-    np.testing.assert_array_equal(found.closest.signal, signals[1])
-    assert found.closest.discrepancy == pytest.approx(2.5)
-    assert found.seconds == 3.0
+    found = check_of(judged, stirring, 0, None)
+    nearest = min(others, key=lambda run: abs(np.log(fit.history.theta[run, 0] / 0.5)))
+    assert found.closest.theta == {"viscosity": fit.history.theta[nearest, 0]}
+    np.testing.assert_array_equal(found.closest.signal, fit.history.signals[nearest])
+    np.testing.assert_array_equal(found.predictive, fit.history.signals[others])
+    off = np.sum((observed - found.closest.signal) ** 2)
+    assert found.closest.discrepancy == pytest.approx(off)
