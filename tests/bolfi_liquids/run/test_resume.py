@@ -20,7 +20,7 @@ from bolfi_liquids.run.directory import SIMULATIONS
 # On two cores, 24 processes beside it, a criticism began to simulate after 127 s; with a patience
 # of 120 s it was killed before, and the test failed.
 PATIENCE_S = 1800
-EFFECTS = ("camera_delay",)
+EFFECTS = ("camera_delay", "gripper_scale", "stick_mass")
 STIRRINGS = "SELECT theta, seed, created FROM simulation WHERE theta LIKE '%viscosity%'"
 
 
@@ -146,7 +146,7 @@ def test_criticism_killed_and_repeated_equals_undisturbed(calibration, tmp_path)
     whole = bl.criticise(quiet, effects=EFFECTS, progress=False)
 
     process = subprocess.Popen(criticise_command(killed), stderr=subprocess.DEVNULL)
-    before = kill_after(process, killed, len(known) + 10)
+    before = kill_after(process, killed, len(known) + 4)
     assert len(known) < len(before) < len(finished(quiet))
     assert "criticise" not in (killed / "summary.json").read_text()
 
