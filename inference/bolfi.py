@@ -28,7 +28,7 @@ from .history import (
 from .notebook_display import as_html, as_text
 from .prior import Prior, check_support, checked_prior
 from .result import Fit
-from .sampling.importance import Before
+from .sampling.confirmation import Before
 from .simulations.failures import Failure, incomparable, kind, unusable
 from .simulations.job import BATCH
 from .simulations.returned import told_signals
@@ -194,7 +194,7 @@ class Bolfi:
         if not isinstance(fit, Fit) or fit.history is not self._state.history:
             raise ValueError(f"fit must be what `fit` returned last, got {fit!r:.100}")
         started = time.perf_counter()
-        self._before = Before(*fit.population.moments, self.told, n)
+        self._before = Before(*fit.population.moments, fit.learned, self.told, n)
         drawn = fit.population.resample(np.random.default_rng([self.seed, self.asked]), n)
         asked = self.prior.to_array(self.prior.from_unit(ndtr(drawn)))
         self._state = remember_asked(self._state, asked, 0)

@@ -15,9 +15,10 @@ from .arguments import check_flag, checked_integer
 from .history import History
 from .notebook_display import as_html, as_text
 from .prior import Prior
+from .sampling.confirmation import Before
 from .sampling.convergence import SamplingWarning
 from .sampling.draw import SAMPLERS, draw_posterior
-from .sampling.importance import LEAST, Before, Population, explore, weighted_quantiles
+from .sampling.importance import LEAST, Population, explore, weighted_quantiles
 from .sampling.target import Length, Target, log_likelihood
 from .surrogates.base import Surrogate, SurrogateView
 from .surrogates.signal import SignalSurrogate
@@ -154,13 +155,11 @@ class Fit:
 
     @property
     def confirmed(self) -> bool | None:
-        """Whether what was simulated at draws of the posterior left it where it was, and most of
-        it succeeded; None where nothing was."""
-        drawn = self._drawn
-        if self.before is None or not len(drawn):
+        """Whether what was simulated at draws of the posterior left it where it was, see
+        `Before.holds`; None where nothing was."""
+        if self.before is None or not len(self._drawn):
             return None
-        most = np.isfinite(drawn).mean() >= 0.5
-        return bool(most) and self.before.agrees(*self.population.moments)
+        return self.before.holds(self.history, *self.population.moments)
 
     @property
     def confirming(self) -> slice:

@@ -25,7 +25,6 @@ BOX_EDGE = 1e-12  # quantile at which the box is cut, so that x = Phi^-1(u) stay
 MIN_LOG_POWER = -60.0  # log of the smallest inverse temperature
 HALVINGS = 30  # of the interval of log powers
 LEAST = 1e-12  # sd, and weight of a draw, where a posterior is one point
-WIDER = 2.0  # sds whose ratio is larger are not the same
 SHARPENED_WIDTH = 0.5  # width of half the proposals, while the temperature still has to fall
 
 
@@ -74,32 +73,6 @@ def weighted_quantiles(
     order = np.argsort(values)
     reached = np.cumsum(weights[order])
     return np.interp(shares, reached / reached[-1], values[order])
-
-
-class Before(NamedTuple):
-    """A posterior before runs were made at draws of it.
-
-    Attributes:
-        mean, sd: Of each parameter [d], in normal scores of the prior.
-        told: Simulations that it knew.
-        drawn: Draws of it that were asked next.
-    """
-
-    mean: np.ndarray
-    sd: np.ndarray
-    told: int
-    drawn: int
-
-    @property
-    def runs(self) -> slice:
-        """Rows of the runs at the draws."""
-        return slice(self.told, self.told + self.drawn)
-
-    def agrees(self, mean: np.ndarray, sd: np.ndarray) -> bool:
-        """Whether means lie within the smaller sd, and no sd is twice as large as the other."""
-        near = np.abs(self.mean - mean) <= np.minimum(self.sd, sd)
-        alike = np.maximum(self.sd, sd) < WIDER * np.minimum(self.sd, sd) + LEAST
-        return bool(near.all() and alike.all())
 
 
 class _Points(NamedTuple):

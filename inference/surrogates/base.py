@@ -78,6 +78,10 @@ class Surrogate(Protocol):
         """Mean and sd of a new simulation at u [n, d], each [n, ...]."""
         ...
 
+    def predicted(self, features: np.ndarray, discrepancy: np.ndarray) -> np.ndarray:
+        """That of which `predict` gives the mean and sd, of n runs as they were measured."""
+        ...
+
     def constants(self) -> dict[str, np.ndarray]:
         """What a reader of the posterior must know of the likelihood."""
         ...

@@ -135,6 +135,10 @@ class DiscrepancySurrogate:
         sd = np.sqrt(noisy.mean(0) + mean.var(0))
         return self.scale.location + self.scale.spread * centre, self.scale.spread * sd
 
+    def predicted(self, features: np.ndarray, discrepancy: np.ndarray) -> np.ndarray:
+        """g(Delta) [n], of what blew up that of the worst run, as `learn` has it."""
+        return self.transform(np.minimum(discrepancy, self.discrepancy.max()))
+
     @in_float64
     def minimum(self) -> np.ndarray:
         """Where the mean is surely low: minimiser of mean + sd over the box, u [d].

@@ -210,6 +210,10 @@ class LogLikelihoodSurrogate:
         scale, values = self.state.scale, self.state.scale.values(mean[0])
         return values, scale.spread * scale.folds(values) * sd
 
+    def predicted(self, features: np.ndarray, discrepancy: np.ndarray) -> np.ndarray:
+        """The log likelihoods [n]."""
+        return -discrepancy
+
     def constants(self) -> dict[str, np.ndarray]:
         """The best log likelihood, and the sd of one estimate's noise near it, in nats."""
         noise = self.state.scale.spread * np.exp(self.gp.hyper.log_noise[0])

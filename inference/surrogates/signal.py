@@ -207,6 +207,10 @@ class SignalSurrogate:
         mean, sd = predict(self.emulator, u)
         return self.scale.back(mean), in_units(self.scale, mean, sd)
 
+    def predicted(self, features: np.ndarray, discrepancy: np.ndarray) -> np.ndarray:
+        """The outputs' values [n, m]."""
+        return features
+
     @in_float64
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised leave-one-out errors `loo_z` [n, components in use]."""
@@ -282,13 +286,11 @@ class SignalSurrogate:
         varied = np.sum(basis.vectors**2) + self.emulator.remainder.total
         differ = np.sqrt(varied / len(self.observed))  # what simulations differ by
         far_off = self.output.long and self._residual > max(1.0, differ)
-        return bool(far.any(1).all()) or (far_off and not self._noise_explains())
-
-    def _noise_explains(self) -> bool:
-        """Whether noise as it is given, or one that varies fast, explains the residual."""
-        if self.known is not None:
-            return not self._missed()
-        return float(self.node_weights @ (self.nodes.rho > SLOW)) < 0.5
+        if far.any(1).all() or not far_off:
+            return bool(far.any(1).all())
+        # noise as it is given, or one that varies fast, may explain the residual
+        given, slow = self.known is not None, self.nodes.rho > SLOW
+        return self._missed() if given else bool(self.node_weights @ slow >= 0.5)
 
     @in_float64
     def predictive(self, rng: np.random.Generator, u: np.ndarray) -> dict[str, np.ndarray]:
@@ -331,10 +333,8 @@ def observe(
     if given is not None:
         white = white + given.white / basis.scale**2
         factors = np.column_stack([factors, given.factors / basis.scale[:, None]])
-    if previous is not None:
-        nodes, log_weight = previous.nodes, previous.log_prior
-    else:
-        nodes, log_weight = _nodes(emulator, output, observed, noise)
+    kept = None if previous is None else (previous.nodes, previous.log_prior)
+    nodes, log_weight = kept or _nodes(emulator, output, observed, noise)
     if emulator.equal:  # nothing to compare
         reduced = Reduced(*(np.zeros((len(log_weight), *[0] * axes)) for axes in (1, 2, 0, 0, 0)))
     else:
@@ -343,8 +343,8 @@ def observe(
     other = np.sum(white - remainder.white) + np.sum(factors[:, remainder.factors.shape[1] :] ** 2)
     other = other + len(target) * nodes.sigma**2
     share = own / np.maximum(own + other, np.finfo(float).tiny)
-    weighed = reduced._replace(log_weight=reduced.log_weight + log_weight, share=share)
-    reduced = _widen(weighed, emulator)
+    reduced = reduced._replace(log_weight=reduced.log_weight + log_weight, share=share)
+    reduced = _widen(reduced, emulator)
     if len(log_weight) > KEPT_NODES:
         kept = _keep(emulator, reduced, nodes)
         reduced = Reduced(*(part[kept] for part in reduced))

@@ -37,8 +37,8 @@ DOUBTED = (
     "well enough in places, which counts as agreement; simulate more, or narrow the prior"
 )
 UNCONFIRMED = (
-    "runs at draws of the posterior moved it, or failed: it is not known yet; simulate more, or "
-    "narrow the prior"
+    "runs at draws of the posterior moved it, came out otherwise than predicted, or failed: it is "
+    "not known yet; simulate more, or narrow the prior"
 )
 COLLAPSED = (
     "the posterior is too narrow for its moments to be computed without sampling: whether runs at "
