@@ -81,6 +81,7 @@ def narrow(theta, seeds):
     return np.concatenate([a, 3.0 * np.exp(-0.5 * ((a - 0.62) / 0.06) ** 2)], 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("family", "budget"), [("signal", 20), ("discrepancy", 40)])
 def test_a_fault_in_a_quarter_of_the_posterior_is_found(family, budget):
     """There the output is that of a rate two sds off. Of 12 draws none may lie there, once in 30
