@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.calibrate import engine_options, fit_recordings
+from ..calibration.check import PREDICTIVE_DRAWS
 from ..calibration.stir_simulator import Stirring
 from ..inputs.settings import RUNS_PER_POINT, CalibrationSettings
 from ..seeds import Phase, simulation_seeds
@@ -59,7 +60,8 @@ class Calibrate:
         with SimulationBank(":memory:") as bank:
             keep = Keep(bank, self.stirring.identity, timeout=self.timeout)
             settings = replace(self.settings, seed=seed)
-            fit = fit_recordings(self.stirring, observed, self.prior, keep, settings, warn=False)
+            known = self.stirring, observed, self.prior, keep, settings
+            fit = fit_recordings(*known, confirm=PREDICTIVE_DRAWS, warn=False)
         return fit.sample(seed=seed, **SAMPLING), fit.log_prob
 
 
