@@ -372,7 +372,7 @@ class Bolfi:
             )
         started = time.perf_counter()
         known, history = self._known(), self._state.history
-        fitted = self._learner.finish(known, self.seed)
+        fitted = self._learner.finish(known)
         self._seconds += time.perf_counter() - started
         made = Fit(
             prior=self.prior,

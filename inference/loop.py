@@ -180,7 +180,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         **options,
     )
     if earlier is not None:
-        engine.tell(*earlier)
+        engine.tell(*cast(Any, earlier))
     if budget + engine.told < engine.initial:
         raise ValueError(
             f"budget={budget} is smaller than the start design of initial={engine.initial} points; "

@@ -18,7 +18,6 @@ from ..gp.process import (
     predict_points,
 )
 from ..types import LogLikelihood, LogSecondMoment
-from .hyper_draws import posterior_draws
 from .outliers import sane
 from .threshold import (
     Matched,
@@ -60,7 +59,7 @@ class DiscrepancySurrogate:
     """GP of g(Delta); see `learn`.
 
     Attributes:
-        gp: The conditioned process; one for each draw of the hyperparameters, or one.
+        gp: The conditioned process.
         scale: g, and the standardisation of g(Delta).
         discrepancy: What was learned from [n].
         threshold: eps on the scale of g(Delta).
@@ -110,7 +109,7 @@ class DiscrepancySurrogate:
     def cautious(self) -> "DiscrepancySurrogate":
         """The surrogate to which doubt beyond what the threshold can resolve is no agreement."""
         mean, _ = self.predict(self.gp.data.u)
-        noise = self.scale.spread * float(np.exp(self.gp.hyper.log_noise).min())
+        noise = self.scale.spread * float(np.exp(self.gp.hyper.log_noise[0]))
         scales = float(np.hypot(noise, self.width)), self.threshold - float(mean.min())
         return replace(self, resolution=max(*scales, MIN_RESOLUTION * self.scale.spread))
 
@@ -129,11 +128,9 @@ class DiscrepancySurrogate:
     @in_float64
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd of a new g(Delta), its noise included, at quantiles u [n, d]: [n], [n]."""
-        mean, variance = predict_points(self.gp, u)
-        noisy = variance + np.exp(2.0 * self.gp.hyper.log_noise)[:, None]
-        centre = mean.mean(0)
-        sd = np.sqrt(noisy.mean(0) + mean.var(0))
-        return self.scale.location + self.scale.spread * centre, self.scale.spread * sd
+        (mean,), (variance,) = predict_points(self.gp, u)
+        sd = np.sqrt(variance + np.exp(2.0 * self.gp.hyper.log_noise[0]))
+        return self.scale.location + self.scale.spread * mean, self.scale.spread * sd
 
     def predicted(self, features: np.ndarray, discrepancy: np.ndarray) -> np.ndarray:
         """g(Delta) [n], of what blew up that of the worst run, as `learn` has it."""
@@ -147,8 +144,8 @@ class DiscrepancySurrogate:
         """
 
         def surely(u: np.ndarray) -> np.ndarray:
-            mean, variance = predict(self.gp, u)
-            return np.mean(mean + np.sqrt(variance), axis=0)
+            (mean,), (variance,) = predict(self.gp, u)
+            return mean + np.sqrt(variance)
 
         return minimise_in_box(surely, self.gp.data.u.shape[1])
 
@@ -169,9 +166,8 @@ class DiscrepancySurrogate:
     def checks(self) -> dict[str, np.ndarray]:
         """Studentised leave-one-out errors `loo_z` [n, 1]."""
         mean, variance = leave_one_out(self.gp)
-        error = self.gp.data.y[0] - mean.mean(0)
-        total = variance.mean(0) + mean.var(0)  # of the mixture over hyperparameters
-        return {"loo_z": (error / np.sqrt(total))[: len(self.discrepancy), None]}
+        error = (self.gp.data.y - mean) / np.sqrt(variance)
+        return {"loo_z": error[0, : len(self.discrepancy), None]}
 
     @property
     def fits(self) -> bool:
@@ -281,17 +277,6 @@ def with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> Discrepanc
         return replace(learned, threshold=threshold, width=width, noisy=width == 0.0)
     threshold = choose_threshold(rule, learned.discrepancy, learned.transform, at_minimum)
     return replace(learned, threshold=threshold, width=0.0, noisy=False)
-
-
-@in_float64
-def marginalised(
-    surrogate: DiscrepancySurrogate, rule: Threshold, draws: int, seed: int
-) -> DiscrepancySurrogate:
-    """The surrogate with one process for each of `draws` posterior draws of the hyperparameters."""
-    hyper = posterior_draws(surrogate.gp.data, draws, seed)
-    data = surrogate.gp.data
-    spread = data._replace(y=np.tile(data.y, (draws, 1)))
-    return with_threshold(replace(surrogate, gp=condition(hyper, spread)), rule)
 
 
 def _standardise(transform: Transform, values: np.ndarray) -> Scale:

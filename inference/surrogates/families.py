@@ -12,7 +12,7 @@ from ..arguments import check_callable, check_flag, checked_array, checked_integ
 from ..simulations.failures import not_finite
 from ..types import Discrepancy
 from .base import Learnable, Measured, Surrogate
-from .discrepancy import DiscrepancySurrogate, learn, marginalised, with_threshold
+from .discrepancy import DiscrepancySurrogate, learn, with_threshold
 from .emulator import PREDICTED_SHARE, Emulator, Limits, emulate, goes_on, resized
 from .given_noise import Covariance, Noise, check_noise, given_noise
 from .log_likelihood import LogLikelihoodFamily, LogLikelihoodLearner
@@ -43,8 +43,6 @@ class DiscrepancyFamily:
             parameters; or a number on the discrepancy's own scale, which may be
             negative where a user's discrepancy is, as a logarithm; see
             `threshold.choose_threshold`.
-        hyper_draws: Posterior draws of the hyperparameters over which the likelihood of a fit
-            is averaged; 0 takes the best hyperparameters alone.
     """
 
     name: ClassVar[str] = "discrepancy"
@@ -54,7 +52,6 @@ class DiscrepancyFamily:
     discrepancy: Discrepancy | None = None
     transform: str | None = None
     threshold: Threshold = None
-    hyper_draws: int = 0
 
     def __post_init__(self) -> None:
         check_rule(self.threshold)
@@ -63,7 +60,6 @@ class DiscrepancyFamily:
             raise ValueError(
                 f"transform must be one of {tuple(TRANSFORMS)} or None, got {self.transform!r}"
             )
-        checked_integer("hyper_draws", self.hyper_draws, 0)
 
     def learner(self, observed: np.ndarray) -> "DiscrepancyLearner":
         return DiscrepancyLearner(self, _distance(self.discrepancy, observed), observed)
@@ -123,12 +119,10 @@ class DiscrepancyLearner:
         closest = known.features[np.argmin(known.discrepancy)]
         return closest.reshape(self.observed.shape) - self.observed
 
-    def finish(self, known: Learnable, seed: int) -> Surrogate:
+    def finish(self, known: Learnable) -> Surrogate:
         """The surrogate on which a fit rests."""
         rule = self._rule(known, independent)
-        learned, draws = self._learn(known, None, rule), self.family.hyper_draws
-        if draws:
-            learned = marginalised(learned, rule, draws, seed)
+        learned = self._learn(known, None, rule)
         said = () if rule is not None else (GUESSED,)
         if self.family.threshold is None and known.discrepancy.min() < 0.0:
             said = (NEGATIVE,)
@@ -291,7 +285,7 @@ class SignalLearner:
         found = emulate(known.u, features, units, limits, old, known.normal)
         return found if old or not self.family.varying_noise else resized(found, units)
 
-    def finish(self, known: Learnable, seed: int) -> Surrogate:
+    def finish(self, known: Learnable) -> Surrogate:
         """The surrogate on which a fit rests."""
         return self.learn(known, None)
 

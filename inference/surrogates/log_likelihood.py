@@ -374,7 +374,7 @@ class LogLikelihoodLearner:
         success = learn_success(known.runs, known.normal)
         return replace(learned, state=learned.state._replace(success=success))
 
-    def finish(self, known: Learnable, seed: int) -> LogLikelihoodSurrogate:
+    def finish(self, known: Learnable) -> LogLikelihoodSurrogate:
         """The surrogate on which a fit rests."""
         return self.learn(known, None).cautious
 

@@ -1,6 +1,5 @@
 """The approximate likelihood of a threshold on the discrepancy."""
 
-import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -71,10 +70,10 @@ def log_likelihood(state: ThresholdState, u: Any) -> Any:
     v than v / (1 + v / resolution^2), and the root of the rest is added to mu.
 
     Gutmann and Corander (2016), eq. for Gaussian-process surrogates; Lopez-Guevara et al.
-    (2018), inference. The mean over the processes, where there are several.
+    (2018), inference.
     """
     z, _, _ = _standardised(state, u)
-    return log_sum_exp(log_ndtr(z)) - math.log(z.shape[-1]) + log_success(state.success, u)
+    return log_ndtr(z[:, 0]) + log_success(state.success, u)
 
 
 def _standardised(state: ThresholdState, u: Any) -> tuple[Any, Any, Any]:
@@ -105,8 +104,7 @@ def log_second_moment(
     shape = len(u), *[1] * (varying.ndim - 2), z.shape[1]
     r = np.clip(varying / noisy.reshape(shape), 1e-12, 1.0 - 1e-6)
     z = np.broadcast_to(z.reshape(shape), r.shape)
-    both = log_sum_exp(log_both_below(z, r)) - math.log(z.shape[-1])
-    return both + 2.0 * log_success(state.success, u).reshape(shape[:-1])
+    return log_both_below(z, r)[..., 0] + 2.0 * log_success(state.success, u).reshape(shape[:-1])
 
 
 def log_both_below(z: np.ndarray, r: np.ndarray) -> np.ndarray:

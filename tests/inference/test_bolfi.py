@@ -187,7 +187,6 @@ def test_a_discrepancy_may_compare_unlike_shapes(prior):
         ({"noise": -1.0, "components": 0}, "components must be an integer from 1"),
         ({"components": 2.5}, "components must be an integer from 1 to .*, got 2.5"),
         ({"components": "all"}, "components must be an integer"),
-        ({"hyper_draws": "many"}, "hyper_draws must be an integer from 0"),
         ({"summary": "mean"}, "summary must be a function or None, got 'mean'"),
         ({"summary": lambda signal: "loud"}, "what summary returns must be an array of numbers"),
         ({"discrepancy": 2.0}, "discrepancy must be a function or None, got 2.0"),

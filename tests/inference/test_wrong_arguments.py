@@ -233,7 +233,6 @@ VALUES = {
         {"discrepancy": "squared"},
         {"threshold": "best"},
         {"transform": "cube"},
-        {"hyper_draws": -1},
     ],
     "Fit.sample": [
         {"sampler": ["nuts"]},

@@ -3,7 +3,7 @@ import warnings
 import numpy as np
 import pytest
 from bolfi_liquids.inference.sobol import sobol
-from bolfi_liquids.inference.surrogates.discrepancy import learn, marginalised, with_threshold
+from bolfi_liquids.inference.surrogates.discrepancy import learn, with_threshold
 from bolfi_liquids.inference.surrogates.transform import Transform, candidates
 
 pytestmark = pytest.mark.slow
@@ -130,15 +130,3 @@ def test_a_run_that_blew_up_does_not_drown_the_others():
     values[np.argmax(np.abs(u - 0.4).sum(1))] = 1e100
     fitted = learn(u, values)
     assert np.abs(fitted.minimum() - 0.4).max() < 0.15
-
-
-@pytest.mark.minutes
-def test_marginalised_hyperparameters_widen_what_few_points_leave_open():
-    u = sobol(0, 0, 7, 1)
-    values = 1.0 + 3.0 * (u[:, 0] - 0.4) ** 2 + 0.2 * np.random.default_rng(1).normal(size=7)
-    one = learn(u, values, "identity")
-    many = marginalised(one, None, 32, seed=0)
-    grid = np.linspace(0.05, 0.95, 10)[:, None]
-    assert np.log(many.predict(grid)[1] / one.predict(grid)[1]).mean() > 0.0
-    assert np.isfinite(many.threshold)
-    assert many.gp.hyper.log_noise.shape == (32,)
