@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 RECORDING, HELD_OUT = "late_oil_v10.nc", "late_oil_v7.nc"  # the cameras were late, and say nothing
 CLEAN = "clean_oil_v10.nc"  # the same strokes of an arm whose cameras were in time
-SURROGATE = "discrepancy"  # without the delay "signal" leaves half of its posterior at 0.0003 Pa s
 POURS = 24  # that each decision's map is learned from: few, as two are made
 
 
@@ -98,7 +97,7 @@ def run_demo(
                 workers.submit(runtime.start)
         stir = open_recording(recording)
         _refuse_other_run(out, stir)
-        calibration = calibrate(stir, out=out, surrogate=SURROGATE, resume=True, **where)
+        calibration = calibrate(stir, out=out, resume=True, **where)
         ends["calibrate"] = time.perf_counter()
         fitted(calibration)
         # the fit is bad, and without criticism nobody should pour after it
@@ -126,7 +125,7 @@ def _refuse_other_run(out: Path, stir: "Recording") -> None:
     """
     if not (out / RUN_TOML).exists():
         return
-    held, own = read_run(out), asdict(CalibrationSettings(surrogate=SURROGATE))
+    held, own = read_run(out), asdict(CalibrationSettings())
     same_data = held.get("inputs") == {"sha256": [stir.hash]}
     if not same_data or {name: held.get("settings", {}).get(name) for name in own} != own:
         raise InputError("holds another run", where=str(out), fix="choose another `out`")
