@@ -8,7 +8,7 @@ import tomli_w
 
 from bolfi_liquids.calibration.calibrate import run_record
 from bolfi_liquids.calibration.stir_simulator import stirring_of
-from bolfi_liquids.demo import RECORDING, SURROGATE, run_demo
+from bolfi_liquids.demo import RECORDING, run_demo
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.open import open_recording
 from bolfi_liquids.inputs.prior import default_prior
@@ -19,7 +19,7 @@ from bolfi_liquids.run.directory import RUN_TOML
 def of_the_demo(**changes):
     """What `calibrate` notes of the demo's recording, with other settings."""
     recording = open_recording(files("bolfi_liquids.data") / RECORDING)
-    settings = replace(CalibrationSettings(surrogate=SURROGATE), **changes)
+    settings = replace(CalibrationSettings(), **changes)
     return run_record(settings, default_prior(), stirring_of([recording], settings.particles))
 
 
