@@ -12,7 +12,6 @@ from .process import (
     coordinates,
     inverse_cholesky,
     relevance,
-    smooth_covariance,
     trend,
 )
 
@@ -26,6 +25,7 @@ AMPLITUDE = (np.log(1.0), 0.7)
 NOISE = (np.log(0.2), 1.0)  # 95 %: 3 % of the targets' sd to more than all of it
 SCORED_STARTS = 8  # starts that are evaluated
 REFINED_STARTS = 2  # best of these, which are optimised
+CACHED_NUMBERS = 8192  # of a matrix of each process, so that these stay near
 
 
 def unpack(vectors: np.ndarray) -> Hyper:
@@ -48,33 +48,49 @@ def log_marginal_likelihood(hyper: Hyper, data: Data) -> tuple[np.ndarray, np.nd
     """log p(y | hyper) [k], trend integrated out, and its gradient [k, d + 2].
 
     Rasmussen and Williams (2006), eqs. 2.30 and 5.9; NaN where a Gram matrix is not positive
-    definite.
+    definite. What is found of a process depends on no other, to the last bit.
     """
     at = coordinates(data.u, data.normal)
-    squared = (at[:, None, :] - at) ** 2  # [n, n, d]
-    (n, d), k = at.shape, len(data.y)
+    squared = ((at[:, None, :] - at) ** 2).reshape(-1, at.shape[1])
+    together = max(1, CACHED_NUMBERS // len(squared))
+    parts = [
+        _together(Hyper(*(part[some] for part in hyper)), data._replace(y=data.y[some]), squared)
+        for some in (slice(i, i + together) for i in range(0, len(data.y), together))
+    ]
+    values, gradients = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return values, gradients
+
+
+def _together(hyper: Hyper, data: Data, squared: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of a few processes: squared differences of coordinates are [n n, d]."""
+    at = coordinates(data.u, data.normal)
+    (n, d), k, diagonal = at.shape, len(data.y), np.arange(len(at))
     basis = trend(hyper, at)
     noise, rate = data.noise(hyper.log_noise), np.exp(-2.0 * hyper.log_length)
+    # in place, as what is allocated takes as long as what is computed
+    smooth = (squared @ (-0.5 * rate[:, :, None])).reshape(k, n, n)
+    smooth += 2.0 * hyper.log_amplitude[:, None, None]
+    np.exp(smooth, out=smooth)
+    gram = (TREND_SD**2 * basis) @ basis.mT
+    gram += smooth
+    gram[:, diagonal, diagonal] += noise + JITTER
+    for one in gram:
+        one[:] = inverse_cholesky(one)
+    whitener = gram
+    white = whitener @ data.y[..., None]
+    weights = whitener.mT @ white
+    values = np.log(whitener[:, diagonal, diagonal]).sum(1) - 0.5 * np.sum(white**2, axis=(1, 2))
+    # dL = trace(excess dK) / 2
+    excess = whitener.mT @ whitener
+    np.subtract(weights * weights.mT, excess, out=excess)
+    pulled = np.multiply(smooth, excess, out=smooth)
+    by_length = 0.5 * rate * (pulled.reshape(k, 1, -1) @ squared)[:, 0]
+    along = np.sum(basis * (excess @ basis), axis=1)
     fading = 1.0 - relevance(hyper) ** 2  # -d log r / d log length
-    values, gradients = np.empty(k), np.empty((k, d + 2))
-    for i, y in enumerate(data.y):
-        # one by one: what is found of a process depends on no other, to the last bit
-        smooth = smooth_covariance(Hyper(*(part[i : i + 1] for part in hyper)), squared)[0]
-        gram = smooth + TREND_SD**2 * basis[i] @ basis[i].T
-        gram[np.diag_indices(n)] += noise[i] + JITTER
-        whitener = inverse_cholesky(gram)
-        white = whitener @ y
-        weights = white @ whitener
-        values[i] = np.sum(np.log(np.diag(whitener))) - 0.5 * white @ white
-        # dL = trace(excess dK) / 2
-        excess = np.outer(weights, weights) - whitener.T @ whitener
-        pulled = excess * smooth
-        by_length = 0.5 * rate[i] * (pulled.ravel() @ squared.reshape(-1, d))
-        along = np.sum(basis[i] * (excess @ basis[i]), axis=0)
-        of_trend = fading[i] * (along[1 : d + 1] + 2.0 * along[d + 1 :])
-        gradients[i, :d] = by_length - TREND_SD**2 * of_trend
-        gradients[i, d] = pulled.sum()
-        gradients[i, d + 1] = noise[i] @ np.diag(excess)
+    of_trend = fading * (along[:, 1 : d + 1] + 2.0 * along[:, d + 1 :])
+    by_noise = np.sum(noise * excess[:, diagonal, diagonal], axis=1)
+    others = pulled.sum(axis=(1, 2)), by_noise
+    gradients = np.column_stack([by_length - TREND_SD**2 * of_trend, *others])
     return values - 0.5 * n * np.log(2.0 * np.pi), gradients
 
 
@@ -107,17 +123,19 @@ def maximum_a_posteriori(data: Data, previous: Hyper | None = None) -> Hyper:
     if not taught.any():
         return unpack(found)
 
-    def evaluate(vectors: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return negative_log_posterior(vectors, data._replace(y=data.y[taught][rows]))
+    y = data.y[taught]
 
-    every = np.arange(taught.sum())
+    def evaluate(vectors: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return negative_log_posterior(vectors, data._replace(y=y[rows % len(y)]))
+
     if previous is not None:
         found[taught] = minimise_many(evaluate, pack(previous)[taught])[0]
         return unpack(found)
     candidates = starts(data.u.shape[1])
-    scores = np.array([evaluate(np.tile(c, (len(every), 1)), every)[0] for c in candidates])
-    order = np.argsort(np.where(np.isfinite(scores), scores, np.inf), axis=0)
-    runs = [minimise_many(evaluate, candidates[order[i]]) for i in range(REFINED_STARTS)]
-    best = np.argmin([values for _, values in runs], axis=0)
-    found[taught] = np.array([x for x, _ in runs])[best, every]
+    every = np.arange(SCORED_STARTS * len(y))
+    scores = evaluate(np.repeat(candidates, len(y), axis=0), every)[0].reshape(SCORED_STARTS, -1)
+    order = np.argsort(np.where(np.isfinite(scores), scores, np.inf), axis=0)[:REFINED_STARTS]
+    x, values = minimise_many(evaluate, candidates[order].reshape(-1, candidates.shape[1]))
+    best = np.argmin(values.reshape(REFINED_STARTS, -1), axis=0)
+    found[taught] = x[best * len(y) + np.arange(len(y))]
     return unpack(found)
