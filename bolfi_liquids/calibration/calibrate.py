@@ -286,7 +286,8 @@ def _confirmed(
         **beside,
     )
     # which simulations were asked together, and what was recorded, is known to the search
-    rounds = np.append(search.rounds, made.history.rounds[len(search.rounds) :])
+    later = made.history.rounds[len(search.rounds) :] + search.rounds.max() + 1
+    rounds = np.append(search.rounds, later)
     return replace(
         made,
         observed=fit.observed,

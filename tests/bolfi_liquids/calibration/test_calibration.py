@@ -40,6 +40,8 @@ def test_summary_is_of_the_posterior(calibration, settings):
     assert 0.05 < section["noise_deg"] < 2.0  # 0.1 degrees of camera noise, and the seeds'
     assert section["n_simulations"] == settings["budget"]
     confirming = tree["simulations"].sizes["simulation"] - settings["budget"]
+    rounds = tree["simulations"]["round"].to_numpy()
+    assert (np.diff(rounds) >= 0).all() and rounds[-confirming] == rounds[-confirming - 1] + 1
     assert confirming in (PREDICTIVE_DRAWS, 2 * PREDICTIVE_DRAWS)
     assert section["n_check_simulations"] == confirming + THETA_STAR_REPLICATES
     tree.close()
