@@ -5,6 +5,7 @@ runs at draws show: there they are of parameters two posterior sds further along
 Without run-to-run noise: runs as noisy as the data cannot tell such a fault from their noise.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ class Task(NamedTuple):
     """A simulator without noise, and the sd of its data's."""
 
     prior: inference.Prior
-    simulate: inference.Simulator
+    simulate: Callable[..., np.ndarray]
     noise: float
 
 

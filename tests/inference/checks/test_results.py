@@ -7,7 +7,7 @@ import numpy as np
 import numpyro.distributions as dist
 import pytest
 import xarray as xr
-from scipy.stats import binomtest
+from scipy.stats import binom, binomtest
 
 from bolfi_liquids import inference
 
@@ -51,6 +51,18 @@ def test_coverage_of_all_and_none_has_an_interval():
     np.testing.assert_array_equal(result.rate, [[1.0, 0.0]])
     assert result.high[0, 0] == 1.0 and 0.7 < result.low[0, 0] < 0.8
     assert result.low[0, 1] == 0.0 and 0.2 < result.high[0, 1] < 0.3
+
+
+def test_coverage_says_what_it_would_find(made):
+    """Counts at that coverage fail in four of five cases, counts at a larger one less often."""
+    result = inference.coverage(made, levels=(0.5, 0.9))
+    rng, limit = np.random.default_rng(0), result.alpha / result.p_values.size
+    for level, rate in zip(result.levels, result.noticed, strict=True):
+        for truth, least, most in ((rate, 0.77, 0.83), (rate + 0.05, 0.0, 0.7)):
+            counts = rng.binomial(80, truth, 4000)
+            failed = 2.0 * binom.cdf(counts, 80, level) < limit
+            assert least <= np.mean(failed) <= most
+    assert f"up to {result.noticed[1]:.3f}" in str(result)
 
 
 def test_tarp_follows_the_scale_of_no_parameter(made):
