@@ -27,9 +27,9 @@ from .stir_simulator import Stirring
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
-    from ..inference import Fit, Prior
+    from ..inference import Fit
 
-GRID_POINTS = 121
+GRID_POINTS = 61  # of either half of an axis
 
 
 def results_tree(sampled: "DataTree", fit: "Fit", stirring: Stirring, check: Check) -> "DataTree":
@@ -66,7 +66,8 @@ def results_tree(sampled: "DataTree", fit: "Fit", stirring: Stirring, check: Che
 
 
 def surface(fit: "Fit") -> "Dataset":
-    """Prior and posterior over a grid that is regular in prior quantiles.
+    """Prior and posterior over a grid; half of each axis are quantiles of the prior, half of the
+    posterior, which may be narrow.
 
     Returns:
         Over (viscosity, cohesion), or whichever two parameters: `log_prior` and
@@ -75,7 +76,7 @@ def surface(fit: "Fit") -> "Dataset":
     from xarray import Dataset
 
     names = fit.prior.names
-    axes = _quantile_axes(fit.prior)
+    axes = _axes(fit)
     mesh = np.meshgrid(*axes.values(), indexing="ij")
     theta = {name: values.ravel() for name, values in zip(names, mesh, strict=True)}
     columns = {
@@ -89,9 +90,16 @@ def surface(fit: "Fit") -> "Dataset":
     )
 
 
-def _quantile_axes(prior: "Prior") -> dict[str, np.ndarray]:
-    quantiles = np.repeat(np.linspace(0.0, 1.0, GRID_POINTS)[:, None], len(prior), axis=1)
-    return prior.from_unit(quantiles)
+def _axes(fit: "Fit") -> dict[str, np.ndarray]:
+    from scipy.special import ndtr
+
+    from ..inference.sampling.importance import weighted_quantiles
+
+    shares, population = np.linspace(0.0, 1.0, GRID_POINTS), fit.population
+    even = fit.prior.from_unit(np.repeat(shares[:, None], len(fit.prior), axis=1))
+    theta = fit.prior.from_unit(ndtr(population.x))
+    near = {n: weighted_quantiles(theta[n], population.weights, shares) for n in theta}
+    return {name: np.union1d(even[name], near[name]) for name in even}
 
 
 def read_tree(path: Path, *, fix: str) -> "DataTree":

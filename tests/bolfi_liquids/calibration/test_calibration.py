@@ -19,6 +19,7 @@ import bolfi_liquids as bl
 from bolfi_liquids import inference, models
 from bolfi_liquids.calibration import calibrate as calibrating
 from bolfi_liquids.calibration.check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES
+from bolfi_liquids.calibration.posterior_figure import grid_density, marginal
 from bolfi_liquids.calibration.stir_simulator import Stirring, stirring_of
 from bolfi_liquids.drawing import new_figure
 from bolfi_liquids.inputs.prior import default_prior
@@ -73,6 +74,16 @@ def test_closest_is_of_the_posterior_draws_and_reproducible(calibration, short_r
         assert values[0] == learned[name].to_numpy()[at]
     again = stirring.simulate(theta, learned["seed"].to_numpy()[[at]])
     np.testing.assert_array_equal(again[0], calibration.tree["closest"]["inclination"])
+
+
+def test_the_grid_of_a_narrow_posterior_resolves_it(calibration):
+    """Mean and sd of the marginal over the grid are those of the draws."""
+    density, (x, y) = grid_density(calibration.tree["surface"].to_dataset())
+    mass = marginal(density, x, y) * np.gradient(x)
+    mean = mass @ x / mass.sum()
+    drawn = np.log(calibration.posterior["viscosity"].to_numpy())
+    assert abs(mean - drawn.mean()) < 0.1 * drawn.std()
+    assert np.sqrt(mass @ (x - mean) ** 2 / mass.sum()) == pytest.approx(drawn.std(), rel=0.1)
 
 
 def test_run_toml_says_how_it_was_made(calibration, short_recording, settings):
