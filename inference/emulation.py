@@ -5,8 +5,8 @@ from numpy.typing import ArrayLike
 
 from ._float64 import in_float64
 from .arguments import checked_array
-from .prior import Prior, check_support, checked_prior
-from .regression import MIN_VALUES
+from .prior import Prior
+from .regression import finite_runs
 from .surrogates import emulator as vectors
 from .surrogates.emulator import Emulator, Limits
 from .types import Theta
@@ -51,24 +51,13 @@ def emulate(prior: Prior, theta: Theta, outputs: ArrayLike, scale: ArrayLike) ->
         ValueError: shapes disagree, fewer than three finite rows, theta outside the support, or a
             scale that is not positive.
     """
-    checked_prior(prior)
-    rows = prior.to_dict(np.atleast_2d(prior.to_array(theta)))
-    known, weights = checked_array("outputs", outputs), checked_array("scale", scale)
-    n = len(next(iter(rows.values())))
-    if known.ndim != 2 or len(known) != n:
-        raise ValueError(f"outputs must have shape ({n}, m), a row per theta, got {known.shape}")
+    weights = checked_array("scale", scale)
+    u, known = finite_runs(prior, theta, "outputs", outputs, axes=2)
     if weights.shape != known.shape[1:] or not (weights > 0.0).all():
         raise ValueError(
             f"scale must hold {known.shape[1]} positive numbers, one per output, got shape "
             f"{weights.shape} and least {weights.min(initial=np.inf)}"
         )
-    finite = np.isfinite(known).all(axis=1)
-    if finite.sum() < MIN_VALUES:
-        raise ValueError(
-            f"outputs must hold {MIN_VALUES} finite rows, got {finite.sum()} of {n}; make more"
-        )
-    check_support(prior, rows)
     limits = Limits(COMPONENTS, predicted=None)
-    u = prior.to_unit(rows)[finite]
-    learned = vectors.emulate(u, known[finite], lambda _: weights, limits, None, prior.normal)
+    learned = vectors.emulate(u, known, lambda _: weights, limits, None, prior.normal)
     return Emulation(prior, learned)

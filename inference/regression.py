@@ -49,22 +49,32 @@ def regress(
         ValueError: shapes disagree, fewer than three finite values, theta outside the support,
             or a transform that is undefined at some value.
     """
-    checked_prior(prior)
     if transform is not None and transform not in tuple(TRANSFORMS):
         raise ValueError(
             f"transform must be one of {tuple(TRANSFORMS)} or None, got {transform!r:.100}"
         )
+    u, known = finite_runs(prior, theta, "values", values, axes=1)
+    return Regression(prior, learn(u, known, transform, normal=prior.normal))
+
+
+def finite_runs(
+    prior: Prior, theta: Theta, name: str, values: ArrayLike, axes: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Prior quantiles [k, d] and values, [k] or with two axes [k, m], of finite runs.
+
+    Raises:
+        ValueError: shapes disagree, fewer than three finite runs, or theta outside the support.
+    """
+    checked_prior(prior)
     rows = prior.to_dict(np.atleast_2d(prior.to_array(theta)))
-    known = checked_array("values", values)
-    n = len(next(iter(rows.values())))
-    if known.shape != (n,):
-        raise ValueError(f"values must have shape ({n},), one per theta, got {known.shape}")
-    finite = np.isfinite(known)
+    known, n = checked_array(name, values), len(next(iter(rows.values())))
+    due = f"({n},), one per theta" if axes == 1 else f"({n}, m), a row per theta"
+    if known.ndim != axes or len(known) != n:
+        raise ValueError(f"{name} must have shape {due}, got {known.shape}")
+    finite = np.isfinite(known.reshape(n, -1)).all(axis=1)
     if finite.sum() < MIN_VALUES:
         raise ValueError(
-            f"values must hold {MIN_VALUES} finite numbers, got {finite.sum()} of {n}; make more"
+            f"{name} must be finite for {MIN_VALUES} theta, got {finite.sum()} of {n}; make more"
         )
     check_support(prior, rows)
-    u = prior.to_unit(rows)[finite]
-    learned = learn(u, known[finite], transform, normal=prior.normal)
-    return Regression(prior, learned)
+    return prior.to_unit(rows)[finite], known[finite]

@@ -62,7 +62,7 @@ def test_a_run_that_is_not_finite_is_left_out():
         (curve(THETA)[:, 0], ONE, r"shape \(50, m\)"),
         (curve(THETA), ONE[:3], "30 positive"),
         (curve(THETA), 0.0 * ONE, "30 positive"),
-        (np.full((50, 30), np.nan), ONE, "3 finite rows, got 0"),
+        (np.full((50, 30), np.nan), ONE, "finite for 3 theta, got 0"),
     ],
 )
 def test_wrong_arguments_are_refused(outputs, scale, match):

@@ -64,7 +64,7 @@ def test_equals_a_fit_of_the_same_numbers():
     ("theta", "values", "message"),
     [
         (THETA, SQUARED[:5], "one per theta"),
-        (THETA, np.full(60, np.nan), "3 finite numbers, got 0 of 60"),
+        (THETA, np.full(60, np.nan), "finite for 3 theta, got 0 of 60"),
         ({**THETA, "size": THETA["size"] + 5.0}, SQUARED, "support of the prior"),
     ],
 )
