@@ -180,8 +180,8 @@ class Bolfi:
     def confirm(self, fit: Fit, n: int = 3) -> dict[str, np.ndarray]:
         """Draws of a fit's posterior to simulate, name -> [n].
 
-        The next `fit` says whether what was told since has moved the posterior, see
-        `Fit.confirmed`.
+        The next `fit` says whether they have moved the posterior, see `Fit.confirmed`. Half are
+        as likely as it says; the others lie where it is wide, for there it is known least.
 
         Args:
             fit: What this engine's `fit` returned last.
@@ -194,9 +194,9 @@ class Bolfi:
         if not isinstance(fit, Fit) or fit.history is not self._state.history:
             raise ValueError(f"fit must be what `fit` returned last, got {fit!r:.100}")
         started = time.perf_counter()
-        self._before = Before(*fit.population.moments, fit.learned, self.told, n)
         drawn = fit.population.resample(np.random.default_rng([self.seed, self.asked]), n)
         asked = self.prior.to_array(self.prior.from_unit(ndtr(drawn)))
+        self._before = Before(*fit.population.moments, fit.learned, self.told, asked)
         self._state = remember_asked(self._state, asked, 0)
         self._seconds += time.perf_counter() - started
         return self.prior.to_dict(asked)

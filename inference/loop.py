@@ -1,7 +1,7 @@
 """The usual loop: ask, simulate, store, tell."""
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import ExitStack
 from pathlib import Path
@@ -43,13 +43,6 @@ from .surrogates.families import Family
 from .surrogates.warnings import complain
 from .types import Simulator, SingleSimulator, Theta
 
-Earlier = (
-    tuple[Theta, ArrayLike]
-    | tuple[Theta, ArrayLike, ArrayLike]
-    | tuple[Theta, ArrayLike, ArrayLike, Sequence[str]]
-)
-"""Simulations made before: theta, signals, seeds and errors, see `Bolfi.tell`."""
-
 
 def fit(  # noqa: PLR0913  the one call that most users make
     simulate: Simulator | SingleSimulator,
@@ -66,7 +59,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
     bank: str | Path | SimulationBank = ":memory:",
     identity: str = "",
     timeout: float | None = None,
-    earlier: Earlier | None = None,
+    earlier: tuple[Any, ...] | None = None,
     vectorised: bool = True,
     in_rounds: bool = True,
     confirm: int = 3,
@@ -116,11 +109,11 @@ def fit(  # noqa: PLR0913  the one call that most users make
         timeout: Seconds that one simulation may take; those of one call together as many times
             as long, and if it fails they are tried one by one. `simulate` then runs in a
             thread, which is abandoned, not stopped, when it is overdue: see `job.within`.
-        earlier: Your own simulations (theta, signals), with seeds, as
-            `SimulationBank.simulations` returns them, and errors, where these are known: what
-            `Bolfi.tell` takes; theta may be a data frame. They are learned from like the others,
-            take the place of the start design's points, and count beside the budget, which may
-            then be 0; what they say is confirmed all the same, unless `simulate` is None.
+        earlier: Your own simulations (theta, signals), (theta, signals, seeds), as
+            `SimulationBank.simulations` returns them, or (theta, signals, seeds, errors); see
+            `Bolfi.tell`. theta may be a data frame. They are learned from like the others, take the
+            place of the start design's points, and count beside the budget, which may then be 0.
+            Their posterior is confirmed, too, unless `simulate` is None.
         vectorised: Whether `simulate` makes a batch of runs in one call; False calls it once
             for each run, such as `simulate({"a": 1.0}, seed)`.
         in_rounds: Whether points are asked a round at a time. False asks the next one as soon as
@@ -180,7 +173,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         **options,
     )
     if earlier is not None:
-        engine.tell(*cast(Any, earlier))
+        engine.tell(*earlier)
     if budget + engine.told < engine.initial:
         raise ValueError(
             f"budget={budget} is smaller than the start design of initial={engine.initial} points; "
@@ -189,7 +182,8 @@ def fit(  # noqa: PLR0913  the one call that most users make
     with ExitStack() as stack:
         if not isinstance(bank, SimulationBank):
             bank = stack.enter_context(SimulationBank(bank))
-        advance = stack.enter_context(progress_bar("simulations", budget, shown=progress))
+        due = budget + (confirm if simulate is not None else 0)
+        advance = stack.enter_context(progress_bar("simulations", due, shown=progress))
         workers = stack.enter_context(open_executor(executor))
         simulator: Any = simulate if vectorised else OneByOne(cast(SingleSimulator, simulate))
         keep = Keep(bank, identity, batch, workers, timeout)
@@ -208,7 +202,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
                 "from there"
             )
         made = engine.fit({"simulator": seconds}, warn=False)
-        if simulate is None and made.unreached:  # a table of losses, rather than of outputs
+        if not budget and made.unreached:  # a table of losses, rather than of outputs
             raise ValueError(made.unreached[0])
         for _ in range(_confirmations(engine, budget, confirm) if simulate is not None else 0):
             for simulation in _confirmation(engine, made, runner, confirm):
@@ -354,8 +348,8 @@ def _length(earlier: Any) -> int:
     told = isinstance(earlier, tuple | list) and len(earlier) in (2, 3, 4)
     if not (told and is_table(earlier[0])):
         raise ValueError(
-            "earlier must be (theta, signals) or (theta, signals, seeds, errors), theta a mapping "
-            f"of names to values, or None, got {earlier!r:.100}"
+            "earlier must be (theta, signals), (theta, signals, seeds) or (theta, signals, seeds, "
+            f"errors), theta a mapping of names to values, or None, got {earlier!r:.100}"
         )
     if isinstance(earlier[1], list | tuple):
         return len(earlier[1])  # `tell` looks at each of them

@@ -25,10 +25,10 @@ from .surrogates.signal import SignalSurrogate
 from .surrogates.warnings import (
     COLLAPSED,
     DOUBTED,
-    UNCONFIRMED,
     censored_warnings,
     history_warnings,
     range_warnings,
+    unconfirmed_warnings,
     unreached_warnings,
 )
 from .types import Theta
@@ -105,7 +105,9 @@ class Fit:
         """Of the closest run, and of those at draws of the posterior."""
         said = f"{self.closest.discrepancy:.4g} of the closest run"
         worth = ["failed" if np.isnan(one) else f"{one:.4g}" for one in self._drawn]
-        return f"{said}, {', '.join(worth)} at draws of the posterior" if worth else said
+        return (
+            f"{said}, {', '.join(worth)} at draws of the posterior before them" if worth else said
+        )
 
     @cached_property
     def warnings(self) -> list[str]:
@@ -120,7 +122,7 @@ class Fit:
         if self.doubt > MUCH_DOUBT:
             said.append(DOUBTED)
         if self.confirmed is False:
-            said.append(UNCONFIRMED)
+            said += unconfirmed_warnings(self.history, self.confirming)
         if self._collapsed:
             said.append(COLLAPSED)
         learned, needed = int(self.learned_from.sum()), 2 * len(self.prior) + 2
@@ -134,13 +136,13 @@ class Fit:
 
     @property
     def status(self) -> str:
-        """ "fitted"; "not fitted", where parameters and noise do not explain what was observed; or
-        "not confirmed", where runs at draws of the posterior moved it, or none were made, or the
-        emulator's doubt makes it much wider."""
-        if not self.learned.fits:
+        """ "fitted"; "not confirmed", where runs at draws of the posterior moved it, or none were
+        made, or the emulator's doubt makes it much wider; or, where that is not so or unknown, "not
+        fitted": parameters and noise do not explain what was observed."""
+        unsure = self.confirmed is False or self.doubt > MUCH_DOUBT or self._collapsed
+        if not self.learned.fits and not unsure:
             return "not fitted"
-        sure = self.confirmed is True and self.doubt <= MUCH_DOUBT
-        return "fitted" if sure and not self._collapsed else "not confirmed"
+        return "fitted" if self.confirmed and not unsure else "not confirmed"
 
     @property
     def _collapsed(self) -> bool:
@@ -157,14 +159,14 @@ class Fit:
     def confirmed(self) -> bool | None:
         """Whether what was simulated at draws of the posterior left it where it was, see
         `Before.holds`; None where nothing was."""
-        if self.before is None or not len(self._drawn):
+        if self.before is None:
             return None
         return self.before.holds(self.history, *self.population.moments)
 
     @property
-    def confirming(self) -> slice:
-        """Rows of the runs that were made last at draws of the posterior."""
-        return slice(0) if self.before is None else self.before.runs
+    def confirming(self) -> np.ndarray:
+        """Rows of the runs that were made last at draws of the posterior, int [n]."""
+        return np.zeros(0, int) if self.before is None else self.before.runs(self.history)
 
     @property
     def _drawn(self) -> np.ndarray:

@@ -97,8 +97,8 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         pours: A table of pours of the liquid that were made, or its path: the posterior does not
             depend on it, but `choose_pour` does.
         cups: With which they were made, or a TOML file of them; None takes the bundled ones.
-        budget: Simulations of the search. Eight more, at draws of the posterior, confirm it or
-            move it; where they move it, eight more follow; and four tell the noise between seeds.
+        budget: Simulations of the search. Eight more, at draws of the posterior, confirm it;
+            where they do not, eight more follow; and four tell the noise between seeds.
         seed: Seed of all random draws.
         surrogate: "signal", which emulates the inclination itself and allows for an error of the
             simulator, or "discrepancy", the paper's, which does not.
@@ -224,7 +224,7 @@ def _calibrate(
         if allows:
             clean = _clean_residuals(baseline, prior, settings, bank, execution, advance)
             error = model_error(stirring, fit.best["viscosity"], clean)
-        fit = _confirmed(fit, error, stirring, keep, settings, advance)
+        fit = confirmed(fit, error, stirring, keep, settings, advance)
         warn_of_failures(fit.history.errors.tolist(), execution.timeout)
         sampled = fit.sample(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
@@ -243,7 +243,7 @@ def _calibrate(
     return Calibration(run, tree, MappingProxyType(dict(record)), summary)
 
 
-def _confirmed(
+def confirmed(
     fit: "Fit",
     error: ModelError | None,
     stirring: Stirring,
@@ -267,7 +267,7 @@ def _confirmed(
     from ..inference.criticism import Experiment
     from .check import PREDICTIVE_DRAWS
 
-    observed, search = stirring.observed, fit.history
+    observed, search = fit.observed, fit.history
     theta = fit.prior.to_dict(search.theta)
     beside = {}
     if error is not None:
@@ -285,7 +285,7 @@ def _confirmed(
         progress=advance,
         **beside,
     )
-    # which simulations were asked together, and what was recorded, is known to the search
+    # keep the search's rounds, and what was recorded, less no error
     later = made.history.rounds[len(search.rounds) :] + search.rounds.max() + 1
     rounds = np.append(search.rounds, later)
     return replace(

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration.calibrate import engine_options, fit_recordings
-from ..calibration.check import PREDICTIVE_DRAWS
+from ..calibration.calibrate import confirmed, engine_options, fit_recordings
 from ..calibration.stir_simulator import Stirring
 from ..inputs.settings import RUNS_PER_POINT, CalibrationSettings
+from ..progress import silent
 from ..seeds import Phase, simulation_seeds
 
 if TYPE_CHECKING:
@@ -61,7 +61,8 @@ class Calibrate:
             keep = Keep(bank, self.stirring.identity, timeout=self.timeout)
             settings = replace(self.settings, seed=seed)
             known = self.stirring, observed, self.prior, keep, settings
-            fit = fit_recordings(*known, confirm=PREDICTIVE_DRAWS, warn=False)
+            found = fit_recordings(*known, confirm=0, warn=False)
+            fit = confirmed(found, None, self.stirring, keep, settings, silent)
         return fit.sample(seed=seed, **SAMPLING), fit.log_prob
 
 

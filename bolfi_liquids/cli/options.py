@@ -220,7 +220,7 @@ class SbcOptions:
     design: Annotated[
         int, typer.Option(help="Points that the emulator's replicates share, each stirred twice.")
     ] = SbcSettings.design
-    budget: Annotated[int, typer.Option(help="Simulations that each replicate learns from.")] = (
+    budget: Annotated[int, typer.Option(help="Simulations of each replicate's search.")] = (
         SbcSettings.budget
     )
     noise_deg: Annotated[float, typer.Option("--noise", help="Of the cameras [deg].")] = (

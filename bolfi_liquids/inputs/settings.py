@@ -139,7 +139,7 @@ class CalibrationSettings:
     """What decides a calibration besides its recordings and prior.
 
     Attributes:
-        budget: Of the search.
+        budget: Simulations of the search.
         batch: Simulations run at the same time.
         seed: Seed of all random draws.
         surrogate: "signal", which emulates the inclination itself, or "discrepancy", the paper's.
@@ -167,7 +167,7 @@ class SbcSettings:
         runs: Replicates of the emulator of the inclination, which share their simulations.
         sequential: Replicates of the paper's surrogate, each with simulations of its own.
         design: Points that the former share, each stirred twice.
-        budget: Simulations that each learns from.
+        budget: Simulations of each one's search.
         noise_deg: Standard deviation of the cameras' noise, added to each simulated sample [deg].
         particles: Number of particles of the simulated liquid; 0: cells follow the stick.
         seed: Seed of all random draws.

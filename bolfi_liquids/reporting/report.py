@@ -138,6 +138,7 @@ def calibration_context(calibration: Calibration) -> dict[str, Any]:
         "posterior": posterior_figure(tree),
         "search": search_figure(tree),
         "start": min(int(tree.attrs["initial"]), summary.n_simulations),
+        "confirming": tree["simulations"].sizes["simulation"] - summary.n_simulations,
         "priors": {
             name: prior_text(one) for name, one in calibration.record["settings"]["prior"].items()
         },

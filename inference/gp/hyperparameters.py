@@ -54,16 +54,19 @@ def log_marginal_likelihood(hyper: Hyper, data: Data) -> tuple[np.ndarray, np.nd
     squared = ((at[:, None, :] - at) ** 2).reshape(-1, at.shape[1])
     together = max(1, CACHED_NUMBERS // len(squared))
     parts = [
-        _together(Hyper(*(part[some] for part in hyper)), data._replace(y=data.y[some]), squared)
+        _together(
+            Hyper(*(part[some] for part in hyper)), data._replace(y=data.y[some]), at, squared
+        )
         for some in (slice(i, i + together) for i in range(0, len(data.y), together))
     ]
     values, gradients = (np.concatenate(part) for part in zip(*parts, strict=True))
     return values, gradients
 
 
-def _together(hyper: Hyper, data: Data, squared: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of a few processes: squared differences of coordinates are [n n, d]."""
-    at = coordinates(data.u, data.normal)
+def _together(
+    hyper: Hyper, data: Data, at: np.ndarray, squared: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Of a few processes at coordinates [n, d], whose squared differences are [n n, d]."""
     (n, d), k, diagonal = at.shape, len(data.y), np.arange(len(at))
     basis = trend(hyper, at)
     noise, rate = data.noise(hyper.log_noise), np.exp(-2.0 * hyper.log_length)
@@ -79,7 +82,9 @@ def _together(hyper: Hyper, data: Data, squared: np.ndarray) -> tuple[np.ndarray
     whitener = gram
     white = whitener @ data.y[..., None]
     weights = whitener.mT @ white
-    values = np.log(whitener[:, diagonal, diagonal]).sum(1) - 0.5 * np.sum(white**2, axis=(1, 2))
+    # `np.diagonal` has one memory layout for one process and for several, so sums have one order
+    roots = np.diagonal(whitener, axis1=1, axis2=2)
+    values = np.log(roots).sum(1) - 0.5 * np.sum(white**2, axis=(1, 2))
     # dL = trace(excess dK) / 2
     excess = whitener.mT @ whitener
     np.subtract(weights * weights.mT, excess, out=excess)
@@ -88,7 +93,7 @@ def _together(hyper: Hyper, data: Data, squared: np.ndarray) -> tuple[np.ndarray
     along = np.sum(basis * (excess @ basis), axis=1)
     fading = 1.0 - relevance(hyper) ** 2  # -d log r / d log length
     of_trend = fading * (along[:, 1 : d + 1] + 2.0 * along[:, d + 1 :])
-    by_noise = np.sum(noise * excess[:, diagonal, diagonal], axis=1)
+    by_noise = np.sum(noise * np.diagonal(excess, axis1=1, axis2=2), axis=1)
     others = pulled.sum(axis=(1, 2)), by_noise
     gradients = np.column_stack([by_length - TREND_SD**2 * of_trend, *others])
     return values - 0.5 * n * np.log(2.0 * np.pi), gradients

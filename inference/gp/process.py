@@ -85,17 +85,13 @@ def covariance(hyper: Hyper, a: Any, b: Any) -> Any:
     exclude of a trend grows towards the edges of the box, and the likelihood, which knows the
     surrogate's uncertainty, shuns them.
     """
-    smooth = smooth_covariance(hyper, (a[:, None, :] - b) ** 2)
-    return smooth + TREND_SD**2 * trend(hyper, a) @ trend(hyper, b).mT
-
-
-def smooth_covariance(hyper: Hyper, squared: Any) -> Any:
-    """The squared exponential [k, m, n] at squared differences of coordinates [m, n, d]."""
-    xp = namespace(squared)
+    xp = namespace(a)
+    squared = (a[:, None, :] - b) ** 2
     rate = xp.exp(-2.0 * hyper.log_length)
     distance = rate @ squared.reshape(-1, squared.shape[-1]).T  # [k, m n]
     exponent = 2.0 * hyper.log_amplitude[:, None] - 0.5 * distance
-    return xp.exp(exponent).reshape(len(rate), *squared.shape[:2])
+    smooth = xp.exp(exponent).reshape(len(rate), *squared.shape[:2])
+    return smooth + TREND_SD**2 * trend(hyper, a) @ trend(hyper, b).mT
 
 
 def trend(hyper: Hyper, a: Any) -> Any:

@@ -5,15 +5,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .._lazy import stats
+from .importance import LEAST
 
 if TYPE_CHECKING:
     from ..history import History
     from ..surrogates.base import Surrogate
 
-LEAST = 1e-12  # sd of a posterior that is one point
-CHANCE = 0.01  # that runs seem otherwise than predicted though they are not
-MOVED, MOVED_BY_SURPRISE = 1.0, 0.05  # sds by which a posterior may move, see `Before.holds`
-MOST = 0.5  # of the runs, that must succeed
+ROUNDING = 1e-12
+SURPRISE_ALPHA = 0.01  # chance that runs seem otherwise than predicted though they are not
+MAX_SHIFT, MAX_SHIFT_BY_SURPRISE = 1.0, 0.05  # sds, see `Before.holds`
+MIN_SHARE = 0.5  # of the runs at draws, that must come back, and of these, that must succeed
 
 
 class Before(NamedTuple):
@@ -23,22 +24,24 @@ class Before(NamedTuple):
         mean, sd: Of each parameter [d], in normal scores of the prior.
         learned: The surrogate on which it rests.
         told: Simulations that were told.
-        drawn: Draws of it that were asked next.
+        drawn: Draws of it that were asked next, theta [n, d].
     """
 
     mean: np.ndarray
     sd: np.ndarray
     learned: "Surrogate"
     told: int
-    drawn: int
+    drawn: np.ndarray
 
-    @property
-    def runs(self) -> slice:
-        """Rows of the runs at the draws."""
-        return slice(self.told, self.told + self.drawn)
+    def runs(self, history: "History") -> np.ndarray:
+        """Rows of the runs at the draws, whatever was told among them."""
+        later = history.theta[self.told :]
+        at_draws = (later[:, None] == self.drawn).all(-1).any(-1)
+        return self.told + np.flatnonzero(at_draws)
 
-    def holds(self, history: "History", mean: np.ndarray, sd: np.ndarray) -> bool:
-        """Whether most runs succeeded, and the posterior that knows them is the same.
+    def holds(self, history: "History", mean: np.ndarray, sd: np.ndarray) -> bool | None:
+        """Whether most runs succeeded, and the posterior that knows them is the same; None where
+        most have not come back.
 
         It is where no mean moved by more than the smaller sd, and no sd grew or shrank to twice as
         much. Where the runs came out otherwise than predicted, the emulator is wrong in a part of
@@ -48,10 +51,13 @@ class Before(NamedTuple):
             history: With the runs.
             mean, sd: Of the posterior that knows them.
         """
-        good = self.told + np.flatnonzero(history.succeeded[self.runs])
-        if len(good) < MOST * len(history.theta[self.runs]):
+        runs = self.runs(history)
+        if len(runs) < MIN_SHARE * len(self.drawn):
+            return None
+        good = runs[history.succeeded[runs]]
+        if len(good) < MIN_SHARE * len(runs):
             return False
-        share = MOVED_BY_SURPRISE if self._surprised(history, good) else MOVED
+        share = MAX_SHIFT_BY_SURPRISE if self._surprised(history, good) else MAX_SHIFT
         near = np.abs(self.mean - mean) <= share * np.minimum(self.sd, sd)
         alike = np.maximum(self.sd, sd) < (1.0 + share) * np.minimum(self.sd, sd) + LEAST
         return bool(near.all() and alike.all())
@@ -63,6 +69,9 @@ class Before(NamedTuple):
         """
         made = self.learned.predicted(history.features[runs], history.discrepancy[runs])
         mean, sd = self.learned.predict(history.u[runs])
-        errors = np.divide(made - mean, sd, out=np.zeros_like(mean), where=sd > 0.0)
+        missed = np.abs(made - mean)
+        missed = np.where(missed > ROUNDING * np.abs(mean), missed, 0.0)
+        # what has been constant so far is predicted for sure
+        errors = np.divide(missed, sd, out=np.where(missed > 0.0, np.inf, 0.0), where=sd > 0.0)
         known = len(self.learned.gp.data.u)
-        return bool(np.mean(errors**2) > stats.f.isf(CHANCE, len(runs), known))
+        return bool(np.mean(errors**2) > stats.f.isf(SURPRISE_ALPHA, len(runs), known))

@@ -55,14 +55,15 @@ class Population(NamedTuple):
         return mean, np.sqrt(weights @ (self.x - mean) ** 2)
 
     def resample(self, rng: np.random.Generator, count: int) -> np.ndarray:
-        """`count` different points [count, d], the first drawn as they are weighted, the others in
+        """`count` different points [count, d], one half drawn as they are weighted, the other in
         proportion to what they add to the variance, too: there a posterior is known least."""
-        (mean, sd), weights = self.moments, self.weights
-        first = rng.choice(len(self.x), p=weights)
+        (mean, sd), weights = self.moments, self.weights + LEAST  # of one point, too
+        plain = max(1, count // 2)
+        first = rng.choice(len(self.x), plain, replace=False, p=weights / weights.sum())
         distance = np.sum(((self.x - mean) / np.maximum(sd, LEAST)) ** 2, axis=1)
-        outer = weights * distance + LEAST  # of a posterior that is one point, too
+        outer = weights * distance + LEAST
         outer[first] = 0.0
-        others = rng.choice(len(self.x), count - 1, replace=False, p=outer / outer.sum())
+        others = rng.choice(len(self.x), count - plain, replace=False, p=outer / outer.sum())
         return self.x[np.append(others, first)]
 
 

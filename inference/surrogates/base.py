@@ -79,7 +79,7 @@ class Surrogate(Protocol):
         ...
 
     def predicted(self, features: np.ndarray, discrepancy: np.ndarray) -> np.ndarray:
-        """That of which `predict` gives the mean and sd, of n runs as they were measured."""
+        """What `predict` predicts, of n finished runs [n, ...]."""
         ...
 
     def constants(self) -> dict[str, np.ndarray]:

@@ -133,7 +133,7 @@ class DiscrepancySurrogate:
         return self.scale.location + self.scale.spread * mean, self.scale.spread * sd
 
     def predicted(self, features: np.ndarray, discrepancy: np.ndarray) -> np.ndarray:
-        """g(Delta) [n], of what blew up that of the worst run, as `learn` has it."""
+        """g(Delta) [n], capped at the worst run that was learned from."""
         return self.transform(np.minimum(discrepancy, self.discrepancy.max()))
 
     @in_float64

@@ -180,7 +180,8 @@ class SignalSurrogate:
     def constants(self) -> dict[str, np.ndarray]:
         """What a reader of the posterior must know of the likelihood."""
         weights = self.node_weights
-        misfit = np.sqrt(weights @ self.nodes.sigma**2) * self.emulator.basis.scale
+        needed = self.known is None or self._missed()
+        misfit = needed * np.sqrt(weights @ self.nodes.sigma**2) * self.emulator.basis.scale
         best = self.best_features[None]
         given = self.scale.sds(self.scale.back(best))[0, 0]
         return {

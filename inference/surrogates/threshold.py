@@ -16,7 +16,7 @@ from .transform import Transform
 class ThresholdState(NamedTuple):
     """What the likelihood depends on; threshold in the standardised units of the GP."""
 
-    gp: GP  # k processes, one for each draw of the hyperparameters
+    gp: GP  # one process
     threshold: np.ndarray  # []
     width: np.ndarray  # [], sd that the threshold has itself
     resolution: np.ndarray  # [], sd of the latent mean from which doubt counts against a place

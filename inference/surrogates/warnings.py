@@ -37,8 +37,8 @@ DOUBTED = (
     "well enough in places, which counts as agreement; simulate more, or narrow the prior"
 )
 UNCONFIRMED = (
-    "runs at draws of the posterior moved it, came out otherwise than predicted, or failed: it is "
-    "not known yet; simulate more, or narrow the prior"
+    "runs at draws of the posterior moved it, so that it is not known yet: simulate more, or "
+    "narrow the prior"
 )
 COLLAPSED = (
     "the posterior is too narrow for its moments to be computed without sampling: whether runs at "
@@ -203,6 +203,22 @@ def history_warnings(history: History) -> list[str]:
             "signals follow from theta and seed"
         )
     return said
+
+
+def unconfirmed_warnings(history: History, runs: np.ndarray) -> list[str]:
+    """Why runs at draws of the posterior do not confirm it.
+
+    Args:
+        history: Of all runs.
+        runs: Rows of these.
+    """
+    errors = [error for error in history.errors[runs] if error]
+    if 2 * len(errors) <= len(runs):
+        return [UNCONFIRMED]
+    return [
+        f"{len(errors)} of {len(runs)} runs at draws of the posterior failed; the last error: "
+        f"{errors[-1]}: mend the cause, or simulate more, so that it is known where runs fail"
+    ]
 
 
 def censored_warnings(observed: np.ndarray, simulated: np.ndarray) -> list[str]:
