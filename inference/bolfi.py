@@ -273,11 +273,9 @@ class Bolfi:
         rows = self.prior.to_dict(natural)
         told_rows, faults = self._signals(len(natural), signals)
         check_support(self.prior, rows)
-        given_errors, given_seeds = (
-            told_errors(errors, len(natural)),
-            told_seeds(seeds, len(natural)),
-        )
+        given_seeds = told_seeds(seeds, len(natural))
         measured = _located(self._learner.measure(told_rows), rows, given_seeds)
+        given_errors = told_errors(errors, np.isfinite(measured.discrepancy))
         self._check_compared(measured)
         found = np.where(faults == "", np.array(measured.errors, str), faults)
         why = np.where(found == "", given_errors, found)

@@ -190,15 +190,25 @@ def told_seeds(seeds: ArrayLike | None, n: int) -> np.ndarray:
     return np.ma.getdata(array).astype(np.int64)
 
 
-def told_errors(errors: Sequence[str] | None, n: int) -> np.ndarray:
+def told_errors(errors: Sequence[str] | None, succeeded: np.ndarray) -> np.ndarray:
     """The errors of n runs that a user tells, str [n]; "" for each if none are told.
 
+    Args:
+        errors: As told.
+        succeeded: Whether each run left a signal that can be learned from, bool [n].
+
     Raises:
-        ValueError: not n texts.
+        ValueError: not n texts, or one for a run that succeeded.
     """
+    n = len(succeeded)
     array = np.full(n, "") if errors is None else np.asarray(errors, str)
     if array.shape != (n,):
         raise ValueError(
             f"errors must have shape ({n},), one per theta, got {array.shape}: {errors!r:.100}"
+        )
+    for run in np.flatnonzero((array != "") & succeeded):
+        raise ValueError(
+            f"errors[{run}] is {str(array[run])!r:.100}, but the run's signal is finite: tell NaN in "
+            'its place if the run failed, or the error ""'
         )
     return array

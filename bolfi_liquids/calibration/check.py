@@ -49,7 +49,7 @@ def check_of(
     at_best = {name: np.full(THETA_STAR_REPLICATES, value) for name, value in fit.best.items()}
     seeds = simulation_seeds(seed, Phase.REPLICATES, THETA_STAR_REPLICATES)
     replicates = simulate_kept(stirring.simulate, at_best, seeds, keep, advance=advance)
-    drawn = np.arange(len(fit.history.theta))[fit.confirming]
+    drawn = fit.confirming
     good = drawn[fit.history.succeeded[drawn]]
     if not good.size:
         raise RuntimeError(

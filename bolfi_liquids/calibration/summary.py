@@ -120,6 +120,8 @@ class CalibrationSummary(Section):
         model_error_deg: RMS error of the simulator that the intervals allow for [deg]; 0 with the
             paper's surrogate and in former versions.
         clean: Names of the recordings from which it was learned.
+        confirmed: Whether simulations at posterior draws left the posterior where it was; None in
+            former versions.
         frame_faults: Recordings whose inclination and positions are not told in one frame, and how
             it is mended; see `inputs.frame`.
     """
@@ -146,6 +148,7 @@ class CalibrationSummary(Section):
     frame_faults: tuple[str, ...] = ()
     model_error_deg: Number = 0.0
     clean: tuple[str, ...] = ()
+    confirmed: bool | None = None
 
     @classmethod
     def from_fit(
@@ -182,6 +185,7 @@ class CalibrationSummary(Section):
             frame_faults=named_faults(stirring.recordings),
             model_error_deg=0.0 if error is None else float(np.degrees(error.rms)),
             clean=() if error is None else error.clean,
+            confirmed=fit.confirmed,
         )
 
     def of_posterior(

@@ -102,8 +102,11 @@ def test_earlier_simulations_alone_are_confirmed_where_there_is_a_simulator(
     engine = inference.Bolfi(prior, observed, noise=0.05)
     engine.tell(*told)
     assert alone.best == engine.fit(warn=False).best and alone.confirmed is None
-    assert confirmed.confirming == slice(10, 14) and confirmed.confirmed
+    np.testing.assert_array_equal(confirmed.confirming, [10, 11, 12, 13])
+    assert confirmed.confirmed
     assert confirmed.history.errors[0] == "too hot"
+    with pytest.raises(ValueError, match=r"errors\[1\] is 'cold', but the run's signal is finite"):
+        engine.tell(theta, signals, seeds, ["too hot", "cold", *errors[2:]])
     assert len(np.unique(confirmed.history.seeds)) == 14
 
 
@@ -267,7 +270,7 @@ def test_a_fit_says_what_it_is_in_a_few_lines(line_fit, prior, observed, simulat
     "earlier", [5, "runs.npz", {"theta": {}, "signals": []}, (np.zeros((4, 2)), np.zeros((4, 30)))]
 )
 def test_earlier_simulations_of_another_form_are_refused(prior, observed, simulate, earlier):
-    with pytest.raises(ValueError, match=r"earlier must be \(theta, signals\) or .*, got "):
+    with pytest.raises(ValueError, match=r"earlier must be \(theta, signals\), .*, got "):
         inference.fit(simulate, prior, observed, earlier=earlier)
     with pytest.raises(ValueError, match="earlier's signals must be an array of numbers"):
         inference.fit(simulate, prior, observed, earlier=({"slope": [0]}, "loud"))
@@ -329,7 +332,7 @@ def test_progress_is_told_on_stderr_unless_silenced(prior, observed, simulate, c
     assert capsys.readouterr() == ("", "")
     inference.fit(simulate, prior, observed, budget=7)
     said = capsys.readouterr()
-    assert said.out == "" and "7" in said.err
+    assert said.out == "" and "10" in said.err  # three confirm
 
 
 @pytest.mark.parametrize("progress", [None, 1, "bar"])

@@ -124,7 +124,7 @@ def test_the_closest_run_at_posterior_draws_judges_a_fit(monkeypatch):
     observed = straight({"viscosity": np.array([0.5])}, [0])[0]
     options = {"budget": 9, "confirm": 4, "noise": 0.1, "progress": False, "warn": False}
     fit = inference.fit(straight, prior, observed, **options)
-    first, *others = range(len(fit.history.theta))[fit.confirming]
+    first, *others = fit.confirming
     discrepancy = fit.history.discrepancy.copy()
     discrepancy[first] = np.nan
     judged = replace(fit, history=fit.history._replace(discrepancy=discrepancy))

@@ -102,6 +102,19 @@ def test_processes_of_a_batch_do_not_mix(rows, hyper):
         np.testing.assert_allclose(together[1:], apart, rtol=1e-9)
 
 
+def test_what_is_found_of_a_process_depends_on_no_other():
+    """Not a bit, wherever processes are computed together: at few runs, and not at many."""
+    rng = np.random.default_rng(2)
+    for n in (14, 50, 100):
+        data = Data(rng.random((n, 2)), rng.standard_normal((8, n)))
+        hyper = Hyper(rng.normal(size=(8, 2)), rng.normal(size=8), rng.normal(size=8) - 1.0)
+        together = log_marginal_likelihood(hyper, data)
+        for i in range(8):
+            own = Hyper(*(part[i : i + 1] for part in hyper)), data._replace(y=data.y[i : i + 1])
+            for whole, alone in zip(together, log_marginal_likelihood(*own), strict=True):
+                np.testing.assert_array_equal(whole[i], alone[0])
+
+
 def test_joint_prediction_agrees_with_dense_algebra(rows, hyper):
     u, y = rows
     a, b = np.array([[0.4, 0.7], [0.1, 0.2]]), np.array([[0.5, 0.5], [0.9, 0.1], [0.4, 0.7]])
