@@ -208,7 +208,7 @@ def told_errors(errors: Sequence[str] | None, succeeded: np.ndarray) -> np.ndarr
         )
     for run in np.flatnonzero((array != "") & succeeded):
         raise ValueError(
-            f"errors[{run}] is {str(array[run])!r:.100}, but the signal of that run is finite: tell "
-            'NaN in its place if the run failed, or the error ""'
+            f"errors[{run}] is {str(array[run])!r:.100}, but the signal of that run is finite: "
+            'tell NaN in its place if the run failed, or the error ""'
         )
     return array

@@ -26,7 +26,7 @@ class Check(NamedTuple):
     """
 
     closest: "Closest"  # of those at posterior draws
-    predictive: NDArray[np.float64]  # (draws, T, planes) rad, each at a posterior draw
+    predictive: NDArray[np.float64]  # (draws, T, planes) rad, at draws, half where it is wide
     replicates: NDArray[np.float64]  # (seeds, T, planes) rad, all at theta*
     seconds: float  # spent in the simulator at theta* [s]
 
