@@ -26,7 +26,7 @@ FATE = {
 ADDED_SINCE = {
     "calibrate": {
         *("simulator_error_deg", "fit_to_noise", "fit_status", "frame_faults"),
-        *("model_error_deg", "clean"),
+        *("model_error_deg", "clean", "confirmed"),
     },
     "criticise": {"frame_faults"},
     "pour": {"fit_status", "map_error", "given", "hold", *FATE},
