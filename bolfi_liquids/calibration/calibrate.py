@@ -269,10 +269,11 @@ def confirmed(
 
     observed, search = fit.observed, fit.history
     theta = fit.prior.to_dict(search.theta)
-    beside = {}
+    beside: dict[str, Any] = {}
     if error is not None:
-        beside = {"noise": noise_beside(stirring, error)}
-        observed = Experiment(stirring.simulate, observed, **beside).corrected
+        noise = noise_beside(stirring, error)
+        beside = {"noise": noise}
+        observed = Experiment(stirring.simulate, observed, noise).corrected
     made = fit_recordings(
         stirring,
         observed,
@@ -307,10 +308,13 @@ def _clean_residuals(
     """What the simulator leaves of clean recordings; criticise finds the same simulations."""
     from ..inference.criticism import Keeping
 
+    def report(_: str, finished: int) -> None:
+        advance(finished)
+
     keeping = Keeping(
         bank,
         CriticismSettings.batch,
-        report=lambda _, finished: advance(finished),
+        report=report,
         executor=execution.executor,
         timeout=execution.timeout,
     )

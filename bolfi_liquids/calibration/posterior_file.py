@@ -98,7 +98,7 @@ def _axes(fit: "Fit") -> dict[str, np.ndarray]:
     shares, population = np.linspace(0.0, 1.0, GRID_POINTS), fit.population
     even = fit.prior.from_unit(np.repeat(shares[:, None], len(fit.prior), axis=1))
     theta = fit.prior.from_unit(ndtr(population.x))
-    near = {n: weighted_quantiles(theta[n], population.weights, shares) for n in theta}
+    near = {n: weighted_quantiles(theta[n], population.weights, list(shares)) for n in theta}
     return {name: np.union1d(even[name], near[name]) for name in even}
 
 
