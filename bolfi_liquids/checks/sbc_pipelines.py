@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration.calibrate import confirmed, engine_options, fit_recordings
+from ..calibration.engine_fit import confirmed, engine_options, fit_recordings
 from ..calibration.stir_simulator import Stirring
 from ..inputs.settings import RUNS_PER_POINT, CalibrationSettings
 from ..progress import silent

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration.calibrate import engine_options
 from ..calibration.draws import pick_draws
+from ..calibration.engine_fit import engine_options
 from ..calibration.stir_simulator import Stirring
 from ..checks.sbc_pipelines import SAMPLING, CameraNoise
 from ..inputs.prior import describe_prior

@@ -1,6 +1,6 @@
 """Whether runs at draws of a posterior left it where it was."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -9,7 +9,6 @@ from .importance import LEAST
 
 if TYPE_CHECKING:
     from ..history import History
-    from ..surrogates.base import Surrogate
 
 ROUNDING = 1e-12
 SURPRISE_ALPHA = 0.01  # chance that runs seem otherwise than predicted though they are not
@@ -22,14 +21,14 @@ class Before(NamedTuple):
 
     Attributes:
         mean, sd: Of each parameter [d], in normal scores of the prior.
-        learned: The surrogate on which it rests.
+        learned: The `Surrogate` on which it rests.
         told: Simulations that were told.
         drawn: Draws of it that were asked next, theta [n, d].
     """
 
     mean: np.ndarray
     sd: np.ndarray
-    learned: "Surrogate"
+    learned: Any
     told: int
     drawn: np.ndarray
 

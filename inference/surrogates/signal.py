@@ -389,8 +389,7 @@ def _widen(reduced: Reduced, emulator: Emulator) -> Reduced:
 def _keep(emulator: Emulator, reduced: Reduced, nodes: Nodes) -> np.ndarray:
     """The nodes of most evidence, best first, on an even screen of the prior and at the data; none
     of these need come so near that the given noise explains the rest, so that it is kept."""
-    points = _screen(emulator, SCREENED_POINTS)
-    terms = node_log_densities(state_of(emulator, reduced), points)
+    terms = node_log_densities(state_of(emulator, reduced), _screen(emulator, SCREENED_POINTS))
     evidence = np.where(nodes.sigma == 0.0, np.inf, np.logaddexp.reduce(terms, 0))
     return np.argsort(-evidence)[:KEPT_NODES]
 

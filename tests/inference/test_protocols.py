@@ -239,6 +239,13 @@ def check_predict(of):
     assert finite(mean) and finite(sd) and (sd > 0.0).all()
 
 
+def check_predicted(of):
+    """What three runs would be if they came out as predicted, in the units of `predict`."""
+    size = of.output.layout.channel.size if hasattr(of, "output") else 1
+    made = of.predicted(np.ones((3, size)), np.array([1.0, 2.0, 3.0]))
+    assert made.shape == of.predict(POINTS)[0].shape and finite(made)
+
+
 def check_constants(of):
     assert of.constants()
     assert all(finite(value) for value in of.constants().values())

@@ -51,6 +51,7 @@ def test_a_calibration_says_for_which_error_it_allows(calibration):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::bolfi_liquids.inference.surrogates.warnings.EmulatorWarning")
 def test_the_papers_surrogate_allows_for_none(short_recording, settings, tmp_path):
     made = bl.calibrate(
         short_recording,

@@ -1,0 +1,120 @@
+"""The engine's fit of recordings, and runs at draws that confirm it."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES, CalibrationSettings
+from ..progress import Advance
+from .check import PREDICTIVE_DRAWS
+from .model_error import ModelError, noise_beside
+from .stir_simulator import Stirring
+
+if TYPE_CHECKING:
+    from ..inference import Fit, Prior
+    from ..inference.simulations import Keep
+
+
+def fit_recordings(
+    stirring: Stirring,
+    observed: NDArray,
+    prior: "Prior",
+    keep: "Keep",
+    settings: CalibrationSettings,
+    **more: Any,
+) -> "Fit":
+    """The engine's fit of a stir, with the options that go with the surrogate.
+
+    Args:
+        stirring: The simulator, and how two signals are compared.
+        observed: Inclinations (T, 2) [rad], NaN where missing.
+        prior: Prior of the parameters.
+        keep: Where simulations are made and kept.
+        settings: Budget, surrogate and seed.
+        more: Other arguments of `inference.fit`, which come first; without `progress` no bar is
+            shown.
+    """
+    from .. import inference
+
+    options = engine_options(stirring, settings.surrogate)
+    if "initial" in options:
+        options["initial"] = min(options["initial"], settings.budget)
+    return inference.fit(
+        stirring.simulate,
+        prior,
+        observed,
+        batch=settings.batch,
+        seed=settings.seed,
+        executor=keep.executor,
+        in_rounds=True,
+        bank=keep.bank,
+        identity=keep.identity,
+        timeout=keep.timeout,
+        **{"budget": settings.budget, "progress": False, **more},
+        **options,
+    )
+
+
+def engine_options(stirring: Stirring, surrogate: str) -> dict[str, Any]:
+    """Options of `inference.Bolfi` that go with one of `settings.SURROGATES`."""
+    paper = {**PAPER_RULES, "initial": MIN_SIMULATIONS}
+    return {
+        "surrogate": surrogate,
+        "discrepancy": stirring.discrepancy(),
+        **(paper if surrogate == "discrepancy" else {}),
+    }
+
+
+def confirmed(
+    fit: "Fit",
+    error: ModelError | None,
+    stirring: Stirring,
+    keep: "Keep",
+    settings: CalibrationSettings,
+    advance: Advance,
+) -> "Fit":
+    """The fit to the same simulations, and to some at its draws, beside the simulator's error.
+
+    Args:
+        fit: Of the search, beside another error.
+        error: Of the simulator; None where the surrogate allows for none.
+        stirring: What was simulated.
+        keep: Where simulations are made and kept.
+        settings: Of the run.
+        advance: Called with 1 for each simulation.
+
+    Warns:
+        EmulatorWarning: For each complaint.
+    """
+    from ..inference.criticism import Experiment
+
+    observed, search = fit.observed, fit.history
+    theta = fit.prior.to_dict(search.theta)
+    beside: dict[str, Any] = {}
+    if error is not None:
+        noise = noise_beside(stirring, error)
+        beside = {"noise": noise}
+        observed = Experiment(stirring.simulate, observed, noise).corrected
+    made = fit_recordings(
+        stirring,
+        observed,
+        fit.prior,
+        keep,
+        settings,
+        budget=0,
+        earlier=(theta, search.signals, search.seeds, search.errors.tolist()),
+        confirm=PREDICTIVE_DRAWS,
+        progress=advance,
+        **beside,
+    )
+    # keep the search's rounds, and what was recorded, less no error
+    later = made.history.rounds[len(search.rounds) :] + search.rounds.max() + 1
+    rounds = np.append(search.rounds, later)
+    return replace(
+        made,
+        observed=fit.observed,
+        history=made.history._replace(rounds=rounds),
+        seconds={part: spent + made.seconds[part] for part, spent in fit.seconds.items()},
+    )
