@@ -146,6 +146,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
     least = MIN_LEARN if earlier is None else 0
     budget = checked_integer("budget", budget, least, MOST_SIMULATIONS)
     confirm = checked_integer("confirm", confirm, 0, MOST_SIMULATIONS)
+    confirm = 0 if simulate is None else confirm
     check_timeout(timeout)
     check_progress(progress)
     check_text("identity", identity)
@@ -182,8 +183,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
     with ExitStack() as stack:
         if not isinstance(bank, SimulationBank):
             bank = stack.enter_context(SimulationBank(bank))
-        due = budget + (confirm if simulate is not None else 0)
-        advance = stack.enter_context(progress_bar("simulations", due, shown=progress))
+        advance = stack.enter_context(progress_bar("simulations", budget + confirm, shown=progress))
         workers = stack.enter_context(open_executor(executor))
         simulator: Any = simulate if vectorised else OneByOne(cast(SingleSimulator, simulate))
         keep = Keep(bank, identity, batch, workers, timeout)
@@ -204,7 +204,7 @@ def fit(  # noqa: PLR0913  the one call that most users make
         made = engine.fit({"simulator": seconds}, warn=False)
         if not budget and made.unreached:  # a table of losses, rather than of outputs
             raise ValueError(made.unreached[0])
-        for _ in range(_confirmations(engine, budget, confirm) if simulate is not None else 0):
+        for _ in range(_confirmations(engine, budget, confirm)):
             for simulation in _confirmation(engine, made, runner, confirm):
                 seconds += simulation.seconds
                 advance(1)

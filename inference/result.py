@@ -155,7 +155,7 @@ class Fit:
         """Weighted points of the posterior, which depend on nothing but the surrogate."""
         return explore(np.random.default_rng(0), self._target)
 
-    @property
+    @cached_property
     def confirmed(self) -> bool | None:
         """Whether what was simulated at draws of the posterior left it where it was, see
         `Before.holds`; None where nothing was."""

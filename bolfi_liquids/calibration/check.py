@@ -46,9 +46,6 @@ def check_of(
     Raises:
         RuntimeError: Every simulation at a posterior draw failed, or every one at theta*.
     """
-    at_best = {name: np.full(THETA_STAR_REPLICATES, value) for name, value in fit.best.items()}
-    seeds = simulation_seeds(seed, Phase.REPLICATES, THETA_STAR_REPLICATES)
-    replicates = simulate_kept(stirring.simulate, at_best, seeds, keep, advance=advance)
     drawn = fit.confirming
     good = drawn[fit.history.succeeded[drawn]]
     if not good.size:
@@ -56,6 +53,9 @@ def check_of(
             f"all {len(drawn)} simulations at draws of the posterior failed, the first:"
             f" {fit.history.errors[drawn[0]]}; repeat the call with a larger budget"
         )
+    at_best = {name: np.full(THETA_STAR_REPLICATES, value) for name, value in fit.best.items()}
+    seeds = simulation_seeds(seed, Phase.REPLICATES, THETA_STAR_REPLICATES)
+    replicates = simulate_kept(stirring.simulate, at_best, seeds, keep, advance=advance)
     return Check(
         _closest(stirring, fit, good),
         fit.history.signals[good],

@@ -33,8 +33,8 @@ def fit_recordings(
         prior: Prior of the parameters.
         keep: Where simulations are made and kept.
         settings: Budget, surrogate and seed.
-        more: Other arguments of `inference.fit`, which come first; without `progress` no bar is
-            shown.
+        more: Other arguments of `inference.fit`, and `budget` in place of the settings'; without
+            `progress` no bar is shown.
     """
     from .. import inference
 
@@ -94,9 +94,8 @@ def confirmed(
     theta = fit.prior.to_dict(search.theta)
     beside: dict[str, Any] = {}
     if error is not None:
-        noise = noise_beside(stirring, error)
-        beside = {"noise": noise}
-        observed = Experiment(stirring.simulate, observed, noise).corrected
+        beside["noise"] = noise_beside(stirring, error)
+        observed = Experiment(stirring.simulate, observed, beside["noise"]).corrected
     made = fit_recordings(
         stirring,
         observed,
@@ -109,7 +108,7 @@ def confirmed(
         progress=advance,
         **beside,
     )
-    # keep the search's rounds, and what was recorded, less no error
+    # the rounds that the search asked in, and what was recorded before it was corrected
     later = made.history.rounds[len(search.rounds) :] + search.rounds.max() + 1
     rounds = np.append(search.rounds, later)
     return replace(

@@ -3,9 +3,8 @@
 Truths are drawn from the prior, their stirs simulated with seeds of their own, camera noise is
 added, and each is calibrated as a recording would be. The emulator of the inclination learns from
 one set of simulations for all of them, and no others confirm it; the paper's surrogate makes its
-own for each. Bands and
-intervals assume independent replicates; those that share simulations are weakly dependent. Another
-seed draws another set.
+own for each. Bands and intervals assume independent replicates; those that share simulations are
+weakly dependent. Another seed draws another set.
 """
 
 from collections.abc import Mapping
