@@ -19,9 +19,9 @@ from .inputs.settings import CalibrationSettings, PourSettings
 from .models import runtime
 from .pouring.choose import choose_pour, decided
 from .reporting.report import CHAPTERS, written
-from .run.directory import RUN_TOML, read_run
-from .run.entering import working_in_run
+from .reporting.warnings import Results
 from .run.execution import Execution
+from .run.run import RUN_TOML, Run
 from .run.workers import open_workers
 
 if TYPE_CHECKING:
@@ -111,8 +111,8 @@ def run_demo(
         pour = choose_pour(criticism, budget=POURS, **where)
         ends["pour"] = time.perf_counter()
         chapters = {"calibration": chapter.result(), "criticism": found.result()}
-        with working_in_run(out):
-            page = written(calibration, criticism, pour, chapters=chapters, **where)
+        with Run.entered(out) as run:
+            page = written(Results.of(run), chapters=chapters, **where)
         ends["report"] = time.perf_counter()
     seconds = {phase: end - before for (_, before), (phase, end) in pairwise(ends.items())}
     return Demo(calibration, criticism, pour, pour_before, page, seconds)
@@ -125,7 +125,7 @@ def _refuse_other_run(out: Path, stir: "Recording") -> None:
     """
     if not (out / RUN_TOML).exists():
         return
-    held, own = read_run(out), asdict(CalibrationSettings())
+    held, own = Run.open(out).record, asdict(CalibrationSettings())
     same_data = held.get("inputs") == {"sha256": [stir.hash]}
     if not same_data or {name: held.get("settings", {}).get(name) for name in own} != own:
         raise InputError("holds another run", where=str(out), fix="choose another `out`")

@@ -1,13 +1,11 @@
 """From recordings to a posterior over the simulator's parameters."""
 
 import logging
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import mkdtemp
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from ..errors import Argument, InputError
@@ -15,33 +13,25 @@ from ..files import given_path
 from ..inputs.frame import frame_warnings
 from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import Pours, table_and_cups
-from ..inputs.prior import check_prior, default_prior, describe_prior, read_prior
+from ..inputs.prior import check_prior, default_prior, describe_prior
 from ..inputs.recording import Recording, aborted_recordings
 from ..inputs.settings import (
     CalibrationSettings,
     CriticismSettings,
 )
 from ..inputs.start import check_start
-from ..progress import Advance, after_first, progress_bar
-from ..run.directory import (
-    POSTERIOR,
-    RUN_TOML,
-    held_error,
-    note_timeout,
-    open_bank,
-    read_run,
-)
-from ..run.entering import entered, working_in
+from ..progress import Advance, progress_bar
 from ..run.execution import Execution
 from ..run.given_pours import keep_pours
 from ..run.provenance import LIBRARIES, versions
 from ..run.recordings import check_names, keep_recordings
+from ..run.run import RUN_TOML, Run
 from ..run.simulations import warn_of_failures
 from ..run.workers import open_workers
 from .baseline import CLEAN_RUNS, Clean, check_baseline, clean_residuals
 from .engine_fit import confirmed, fit_recordings
 from .model_error import model_error, noise_beside
-from .result import Calibration, finished_calibration
+from .result import Calibration
 from .stir_simulator import Stirring, stirring_of
 from .stirs import camera_noise, effects_of
 from .summary import CalibrationSummary
@@ -134,29 +124,23 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     stirring = stirring_of(opened, settings.particles)
     check_names(stirring.recordings)
     clean = _open_clean(baseline, stirring, surrogate)
-    run = (
+    path = (
         Path(mkdtemp(prefix="bolfi_liquids_")) if out is None else given_path(out, Argument("out"))
     )
-    if not resume and (run / RUN_TOML).exists():
-        with working_in(run):  # unless another command works there
-            raise held_error(run)  # before the prior's libraries are loaded
-    prior = _usual_prior(run, resume) if prior is None else prior
-    record = run_record(settings, prior, stirring, clean)
+    prior = _usual_prior(path, resume) if prior is None else prior
+    record = run_record(settings, prior, stirring, clean, timeout)
     with (
         open_workers(executor, timeout) as workers,
-        entered(run, record, resume=resume, growing="settings.budget") as removed,
+        Run.begun(path, record, resume=resume, growing="settings.budget") as run,
     ):
-        if removed:
-            what = f"removed {', '.join(removed)}, concluded from fewer simulations"
-            logger.warning("%s: %s; every simulation is kept", run, what)
-        keep_recordings(run, stirring.recordings)
+        keep_recordings(path, stirring.recordings)
         if table is not None:
-            keep_pours(run, table, made_with)
+            keep_pours(path, table, made_with)
         for notice in [*aborted_recordings(opened), *frame_warnings(opened)]:
             logger.warning(notice)
-        return finished_calibration(run) or _calibrate(
-            run, stirring, clean, prior, settings, Execution(workers, timeout, progress)
-        )
+        if run.result("calibrate") is None:
+            _calibrate(run, stirring, clean, prior, settings, Execution(workers, timeout, progress))
+        return Calibration.of(run)
 
 
 def run_record(
@@ -164,8 +148,9 @@ def run_record(
     prior: "Prior",
     stirring: Stirring,
     clean: Sequence[Recording] = (),
+    timeout: float | None = None,
 ) -> dict[str, Any]:
-    """Content of run.toml: settings, inputs, versions; see `run.directory.MUST_AGREE`."""
+    """Content of run.toml: settings, inputs, versions; see `run.run.MUST_AGREE`."""
     from ..inference.engine_version import ENGINE_VERSION
 
     return {
@@ -179,27 +164,28 @@ def run_record(
         },
         "files": {"recordings": [recording.path.name for recording in stirring.recordings]},
         "versions": versions(LIBRARIES),
+        # runs may go on with another limit, but it decides which simulations were given up
+        **({} if timeout is None else {"timeouts": [float(timeout)]}),
     }
 
 
 def _calibrate(
-    run: Path,
+    run: Run,
     stirring: Stirring,
     baseline: tuple[Recording, ...],
     prior: "Prior",
     settings: CalibrationSettings,
     execution: Execution,
-) -> Calibration:
+) -> None:
+    """Search, confirm, judge, and keep the result in the run."""
     from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES, check_of
-    from .posterior_file import results_tree, write_tree
+    from .posterior_file import results_tree
 
-    record = note_timeout(run, execution.timeout)
-    of_clean = CLEAN_RUNS * len(baseline)
-    needed = settings.budget + of_clean + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
-    with open_bank(run) as bank, ExitStack() as stack:
-        kept = min(max(_kept(record, of_clean, bank), 0), needed)
-        bar = progress_bar("simulating stirs", needed, shown=execution.progress, done=kept)
-        advance = after_first(kept, stack.enter_context(bar))
+    needed = settings.budget + CLEAN_RUNS * len(baseline) + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
+    with (
+        run.bank() as bank,
+        progress_bar("simulating stirs", needed, shown=execution.progress) as advance,
+    ):
         keep = execution.keep(bank, stirring.identity, settings.batch)
         # the paper's surrogate has no noise to which an error adds
         allows = settings.surrogate == "signal"
@@ -227,16 +213,8 @@ def _calibrate(
         )
         check = check_of(fit, stirring, settings.seed, keep, advance=advance)
     tree = results_tree(sampled, fit, stirring, check)
-    if (now := read_run(run)["settings"]["budget"]) != settings.budget:
-        raise InputError(
-            f"another call has made its budget {now} meanwhile",
-            where=str(run),
-            fix="nothing was written; go on with that budget and `resume`",
-        )
-    write_tree(tree, run / POSTERIOR)
     summary = CalibrationSummary.from_fit(tree, fit, stirring, check, error, settings.budget)
-    summary.write(run)
-    return Calibration(run, tree, MappingProxyType(dict(record)), summary)
+    run.keep("calibrate", tree, run.made_from, summary.to_json())
 
 
 def _clean_residuals(
@@ -264,22 +242,9 @@ def _clean_residuals(
     return clean_residuals(baseline, settings.particles, prior, effects, keeping=keeping)
 
 
-def _kept(record: Mapping[str, Any], of_clean: int, bank: "SimulationBank") -> int:
-    """Simulations that a run has; some of those before it grew were judging, or pours.
-
-    More than it needs where the bank holds pours that followed a calibration whose results were
-    deleted.
-    """
-    if "grown" not in record:
-        return len(bank)
-    before = record["grown"][-1]
-    return before["learned_from"] + of_clean + len(bank) - before["simulations"]
-
-
-def _usual_prior(run: Path, resume: bool) -> "Prior":
-    """That of a run that goes on, which an earlier version may have begun with another default."""
-    held = read_run(run).get("settings", {}) if resume and (run / RUN_TOML).is_file() else {}
-    return read_prior(held["prior"]) if "prior" in held else default_prior()
+def _usual_prior(path: Path, resume: bool) -> "Prior":
+    """That of a run that goes on, or else the default."""
+    return Run.open(path).prior if resume and (path / RUN_TOML).exists() else default_prior()
 
 
 def _open_clean(

@@ -12,13 +12,10 @@ Groups from the engine, in ArviZ's schema: `posterior`, `sample_stats`, `prior`,
 - `surface`: over a grid of prior quantiles, the log densities of prior and posterior.
 """
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError
-from ..files import write_netcdf
 from ..inputs.fields import PLANE_NAMES
 from ..inputs.strokes import stroke_numbers
 from .check import Check
@@ -100,23 +97,3 @@ def _axes(fit: "Fit") -> dict[str, np.ndarray]:
     theta = fit.prior.from_unit(ndtr(population.x))
     near = {n: weighted_quantiles(theta[n], population.weights, list(shares)) for n in theta}
     return {name: np.union1d(even[name], near[name]) for name in even}
-
-
-def read_tree(path: Path, *, fix: str) -> "DataTree":
-    """A tree that `write_tree` wrote.
-
-    Raises:
-        InputError: The file is damaged; the message ends with `fix`.
-    """
-    import xarray
-
-    try:
-        with xarray.open_datatree(path, engine="h5netcdf") as tree:
-            return tree.load()
-    except (OSError, ValueError, KeyError) as err:
-        raise InputError("damaged, cannot be read", where=str(path), fix=fix) from err
-
-
-def write_tree(tree: "DataTree", path: Path) -> None:
-    """Write a tree in one piece, such that `xarray.open_datatree` reads it back."""
-    write_netcdf(tree, path)

@@ -1,18 +1,15 @@
 """What stirring taught: the posterior of a run and what came with it."""
 
+import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..inputs.prior import read_prior
-from ..inputs.settings import CalibrationSettings
-from ..run.directory import POSTERIOR, read_run, run_path
-from ..wording import command, html_table, with_unit
+from ..run.run import Run, RunOrPath, key_of
+from ..wording import html_table, with_unit
 from .bad_fit import bad_fit
 from .draws import pick_draws
 from .summary import CalibrationSummary
@@ -24,8 +21,6 @@ if TYPE_CHECKING:
 
     from ..inference import Prior
 
-RESUMED_OPTIONS = ("budget", "surrogate", "sampler", "seed", "particles", "batch")  # of the command
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
@@ -34,16 +29,16 @@ class Calibration:
     The plots draw in `axes`, where they are given, or else in a figure of their own.
 
     Attributes:
-        path: The RUN directory.
+        run: What it was made from.
         tree: posterior.nc, in ArviZ's schema; groups as in `calibration.posterior_file`.
-        record: run.toml: settings, versions, seed and hashes.
         summary: The section "calibrate" of summary.json.
+        key: Of the posterior, which tells it from all others.
     """
 
-    path: Path
+    run: Run
     tree: "DataTree"
-    record: Mapping[str, Any]
     summary: CalibrationSummary
+    key: str
 
     def __repr__(self) -> str:
         rows = ", ".join(f"{name} {text}" for name, text in self._quantiles().items())
@@ -65,29 +60,34 @@ class Calibration:
         }
 
     @classmethod
-    def open(cls, run: str | Path) -> "Calibration":
+    def open(cls, run: RunOrPath) -> "Calibration":
         """Read a finished calibration.
 
         Raises:
             InputError: There is none in the directory, or it was not finished.
         """
-        run = run_path(run)
-        if (found := finished_calibration(run)) is None:
-            record = read_run(run)
-            raise InputError(
-                "the calibration in it is not finished",
-                where=str(run),
-                fix="go on with it: "
-                + command(
-                    *("calibrate", "RECORDING...", "--out", run, "--resume"),
-                    *given_options(record),
-                ),
-            )
-        return found
+        return cls.of(Run.open(run))
 
-    def __reduce__(self):
-        """A mapping proxy cannot be pickled."""
-        return _unpickled, ({**vars(self), "record": dict(self.record)},)
+    @classmethod
+    def of(cls, run: Run) -> "Calibration":
+        """The calibration of a run, without what a criticism accepted.
+
+        Raises:
+            InputError: It is not finished, or its settings are others now.
+        """
+        tree = run.required("calibrate")
+        summary = CalibrationSummary.from_json(json.loads(tree.attrs["summary"]))
+        return cls(run, tree, summary, key_of(tree))
+
+    @property
+    def path(self) -> Path:
+        """The RUN directory."""
+        return self.run.path
+
+    @property
+    def record(self) -> Mapping[str, Any]:
+        """run.toml: settings, versions, seed and hashes."""
+        return self.run.record
 
     @property
     def posterior(self) -> "Dataset":
@@ -102,7 +102,7 @@ class Calibration:
     @property
     def prior(self) -> "Prior":
         """Prior of the parameters."""
-        return read_prior(self.record["settings"]["prior"])
+        return self.run.prior
 
     @property
     def added(self) -> tuple[str, ...]:
@@ -181,26 +181,3 @@ class Calibration:
     def draws(self, count: int, seed: int = 0) -> dict[str, NDArray]:
         """A stratified sample of the posterior: parameter -> values, shape (count,)."""
         return pick_draws(self.posterior, count, seed)
-
-
-def _unpickled(values: dict[str, Any]) -> Calibration:
-    return Calibration(**{**values, "record": MappingProxyType(values["record"])})
-
-
-def given_options(record: Mapping[str, Any]) -> list[str]:
-    """Options of `calibrate` with which a run was started, where they are not the default."""
-    settings, usual = record.get("settings", {}), asdict(CalibrationSettings())
-    given = {name: settings.get(name, usual[name]) for name in RESUMED_OPTIONS}
-    changed = {name: value for name, value in given.items() if value != usual[name]}
-    return [word for name, value in changed.items() for word in (f"--{name}", str(value))]
-
-
-def finished_calibration(run: Path) -> Calibration | None:
-    """The calibration of a run; None if it was not finished."""
-    from .posterior_file import read_tree
-
-    path = run / POSTERIOR
-    if not path.is_file() or (summary := CalibrationSummary.read(run)) is None:
-        return None
-    tree = read_tree(path, fix="delete it and go on with --resume: no simulation is lost")
-    return Calibration(run, tree, MappingProxyType(read_run(run)), summary)

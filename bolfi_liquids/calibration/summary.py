@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import computed_field
@@ -118,15 +118,12 @@ class CalibrationSummary(Section):
         seed: Of all random draws.
         version: Of this package.
         model_error_deg: RMS error of the simulator that the intervals allow for [deg]; 0 with the
-            paper's surrogate and in former versions.
+            paper's surrogate.
         clean: Names of the recordings from which it was learned.
-        confirmed: Whether simulations at posterior draws left the posterior where it was; None in
-            former versions.
+        confirmed: Whether simulations at posterior draws left the posterior where it was.
         frame_faults: Recordings whose inclination and positions are not told in one frame, and how
             it is mended; see `inputs.frame`.
     """
-
-    SECTION: ClassVar[str] = "calibrate"
 
     parameters: Mapping[str, ParameterSummary]
     least_viscosity: Number
@@ -145,10 +142,10 @@ class CalibrationSummary(Section):
     seconds: Seconds
     seed: int
     version: str
-    frame_faults: tuple[str, ...] = ()
-    model_error_deg: Number = 0.0
-    clean: tuple[str, ...] = ()
-    confirmed: bool | None = None
+    frame_faults: tuple[str, ...]
+    model_error_deg: Number
+    clean: tuple[str, ...]
+    confirmed: bool
 
     @classmethod
     def from_fit(
@@ -185,7 +182,7 @@ class CalibrationSummary(Section):
             frame_faults=named_faults(stirring.recordings),
             model_error_deg=0.0 if error is None else float(np.degrees(error.rms)),
             clean=() if error is None else error.clean,
-            confirmed=fit.confirmed,
+            confirmed=bool(fit.confirmed),
         )
 
     def of_posterior(

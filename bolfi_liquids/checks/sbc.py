@@ -31,9 +31,8 @@ from ..inputs.settings import (
     SbcSettings,
 )
 from ..progress import progress_bar
-from ..run.directory import SIMULATIONS, enter_run
-from ..run.entering import working_in
 from ..run.provenance import LIBRARIES, versions
+from ..run.run import SIMULATIONS, Run
 from ..run.workers import open_workers
 from ..seeds import Phase, generator, simulation_seeds
 from .sbc_file import SurrogateCheck, checked, write_results
@@ -86,8 +85,7 @@ def check_sbc(
     prior, out = default_prior(), given_path(out, Argument("out"))
     record = _record(settings, prior, stirring)
     found = {}
-    with open_workers(executor, timeout) as workers, working_in(out):
-        enter_run(out, record, resume=True)
+    with open_workers(executor, timeout) as workers, Run.begun(out, record, resume=True):
         study = SbcStudy(out, stirring, prior, settings, workers, timeout, progress)
         for name in SURROGATES:
             if settings.replicates[name]:

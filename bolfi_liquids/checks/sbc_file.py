@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..calibration.posterior_file import write_tree
 from ..drawing import new_figure, styled, write_figure
+from ..run.result_file import write_result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -101,7 +101,7 @@ def write_results(
         write_figure(_figure(check), out, name)
     tree = DataTree.from_dict(groups)
     tree.attrs["made_with"] = json.dumps(record)
-    write_tree(tree, out / RESULTS)
+    write_result(tree, out / RESULTS)
 
 
 def _figure(check: SurrogateCheck) -> "Figure":

@@ -9,7 +9,7 @@ import typer
 
 from .. import __version__
 from ..inputs.settings import CalibrationSettings, PourSettings
-from ..run.directory import check_resumable
+from ..run.run import check_resumable
 from . import check as cli_check
 from . import guide, import_table, reproduce
 from . import record as cli_record
@@ -100,8 +100,8 @@ def calibrate(
 ) -> None:
     """Learn a liquid's parameters from recordings of stirs."""
     from ..calibration.calibrate import calibrate as run_calibrate
-    from ..criticism.result import criticism_of
     from ..inputs.open import open_recordings
+    from ..reporting.warnings import Results
 
     settings = CalibrationSettings(**asdict(options))
     if resume:
@@ -119,12 +119,10 @@ def calibrate(
             timeout=compute.timeout,
             **asdict(settings),
         )
-    from ..reporting.warnings import results_of
-
-    criticism = criticism_of(calibration)
+    results = Results.of(calibration.run)
     print_calibration(calibration)
-    print_warnings(results_of(calibration, criticism))
-    print_next_pour(criticism.calibration if criticism else calibration, "criticise")
+    print_warnings(results)
+    print_next_pour(results.latest, "criticise")
 
 
 @app.command(
@@ -188,22 +186,17 @@ def pour(
             )
         cli_record.execute(run, execution)
         return
-    from ..calibration.result import Calibration
-    from ..criticism.result import criticism_of
     from ..inputs.cups import cups_of
     from ..pouring.choose import choose_pour
-    from ..reporting.warnings import results_of
-    from ..run.entering import working_in_run
+    from ..reporting.warnings import Results
+    from ..run.run import Run
 
     # refused before anything of the run is read
     PourSettings(budget=options.budget, iterations=options.iterations, risk=options.risk)
     cups, table = cups_of(options.cups), options.table
-    with working_in_run(run):
-        calibration = Calibration.open(run)
-        criticism = criticism_of(calibration)
     with compute.executor() as executor:
         chosen = choose_pour(
-            criticism or calibration,
+            run,
             cups,
             given=table,
             budget=options.budget,
@@ -214,7 +207,7 @@ def pour(
             timeout=compute.timeout,
         )
     print_pour(chosen)
-    print_warnings(results_of(calibration, criticism, chosen))
+    print_warnings(Results.of(Run.open(run)))
     print_next(run, "report")
 
 
@@ -249,14 +242,14 @@ def demo(
 ) -> None:
     """Calibrate, criticise, pour and report on bundled recordings."""
     from ..demo import run_demo
-    from ..reporting.warnings import results_of
+    from ..reporting.warnings import Results
 
     with complaints_among_results(), compute.executor() as executor:
         made = run_demo(out, executor=executor, timeout=compute.timeout, fitted=print_calibration)
     print_findings(made.criticism)
     typer.echo(f"pour before criticism: {made.pour_before.chosen}")
     print_pour(made.pour)
-    print_warnings(results_of(made.calibration, made.criticism, made.pour))
+    print_warnings(Results.of(made.calibration.run))
     print_seconds(made.seconds)
     typer.echo(f"report: {made.report}")
 

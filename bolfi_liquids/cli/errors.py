@@ -15,7 +15,7 @@ from typer.exceptions import TyperException
 
 from ..errors import InputError
 from ..files import disk_errno
-from ..run.directory import RUN_TOML
+from ..run.run import RUN_TOML
 from ..wording import command
 
 FAILED = 1

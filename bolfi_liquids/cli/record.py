@@ -116,7 +116,7 @@ def record(
     from ..calibration.result import Calibration
     from ..inputs.rigs import rig_of
     from ..online.record import record_online
-    from ..reporting.warnings import results_of
+    from ..reporting.warnings import Results
     from ..robot.record import record as run_record
     from .printed import print_calibration, print_warnings
     from .tables import print_recording
@@ -137,7 +137,7 @@ def record(
     if choice is not None:
         calibration = Calibration.open(Path(choice.run))
         print_calibration(calibration)
-        print_warnings(results_of(calibration))
+        print_warnings(Results.of(calibration.run))
     if recording.attrs["status"] == "aborted":
         reason = recording.attrs.get("reason") or "no reason is told"
         raise Aborted(f"{recording.path}: the recording was aborted: {reason}")

@@ -32,7 +32,6 @@ def print_calibration(summary: "CalibrationSummary", console: Console) -> None:
         table.add_row(f"{name} {LIQUID_UNITS.get(name, '')}".strip(), *(f"{v:.3g}" for v in row))
     seconds = summary.seconds
     confirm = {
-        None: "",
         True: ", which confirm the posterior",
         False: ", which do not confirm the posterior",
     }

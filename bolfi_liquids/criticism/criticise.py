@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..calibration.baseline import Clean, clean_residuals, usual_elsewhere, usual_for
-from ..calibration.former_model import refuse_other_model
-from ..calibration.posterior_file import write_tree
 from ..calibration.result import Calibration
 from ..calibration.stir_simulator import Stirring, stirring_of
 from ..calibration.stirs import camera_noise, effects_of, held_out_noise, stir_experiment
@@ -20,16 +18,15 @@ from ..inputs.pour_table import Pours, PourTable
 from ..inputs.recording import Recording, aborted_recordings
 from ..inputs.settings import CriticismSettings
 from ..progress import phases
-from ..run.directory import CRITICISM, Run, open_bank, run_path
-from ..run.entering import working_in_run
 from ..run.given_pours import keep_pours
+from ..run.run import Run, RunOrPath
 from ..run.workers import open_workers
 from .criticism_file import criticism_tree
 from .findings import Findings
 from .inputs import Given, Inputs, check_effects, open_inputs
 from .pours import as_prior, pour_experiment
 from .proposals import pour_proposals, stir_proposals
-from .result import Criticism, base_calibration, finished_criticism
+from .result import Criticism
 from .summary import CriticismSummary
 
 if TYPE_CHECKING:
@@ -41,7 +38,7 @@ logger = logging.getLogger(__name__)
 
 
 def criticise(  # noqa: PLR0913  the one call that most users make
-    calibration: Run,
+    calibration: RunOrPath,
     *,
     held_out: Source | Sequence[Source] = (),
     baseline: Source | Sequence[Source] = (),
@@ -95,33 +92,30 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         open_recordings(baseline, Argument("baseline")),
         *(pours, held_out_pours, cups),
     )
-    run = run_path(calibration)
-    with working_in_run(run):
-        calibration = base_calibration(calibration)
-        refuse_other_model(calibration)
-        inputs = open_inputs(calibration, settings, given)
+    with Run.entered(calibration) as run:
+        base = Calibration.of(run)
+        inputs = open_inputs(base, settings, given)
         if inputs.table is not None:
-            keep_pours(run, inputs.table, inputs.cups)
+            keep_pours(run.path, inputs.table, inputs.cups)
         for notice in [*aborted_recordings(inputs.compared), *frame_warnings(inputs.compared)]:
             logger.warning(notice)
         for name in inputs.left_out:
             logger.warning("baseline %s: is criticised or held out, so it is not counted", name)
-        if finished := finished_criticism(calibration, inputs.made_from):
+        if (finished := Criticism.of(run)) and finished.made_from == inputs.made_from:
             return finished
         from ..inference.criticism import Keeping
 
         with (
             open_workers(executor, timeout) as workers,
-            open_bank(run) as bank,
+            run.bank() as bank,
             phases(shown=progress) as report,
         ):
             keeping = Keeping(bank, settings.batch, settings.seed, report, workers, timeout)
-            findings = _find(calibration, inputs, keeping)
+            findings = _find(base, inputs, keeping)
             tree = criticism_tree(findings)
-        write_tree(tree, run / CRITICISM)
         summary = CriticismSummary.from_findings(findings, tree, time.perf_counter() - started)
-        summary.write(run)
-        return Criticism(calibration, tree, summary)
+        run.keep("criticise", tree, inputs.made_from, summary.to_json())
+        return Criticism.made(base, tree)
 
 
 def _names(argument: str, given: str | Sequence[str] | None) -> tuple[str, ...] | None:

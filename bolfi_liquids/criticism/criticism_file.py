@@ -14,7 +14,6 @@ Its groups, under `stirs` and, where pours were given, under `pours`:
 `posterior` holds the draws of the extended model, or of the base model where there is none.
 """
 
-import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -49,7 +48,6 @@ def criticism_tree(findings: Findings) -> "DataTree":
             groups[f"/{name}/suggestions"] = _suggestions(source)
     tree = DataTree.from_dict(groups)
     tree.attrs.update(
-        made_from=json.dumps(findings.inputs.made_from),
         accepted=list(findings.accepted),
         requested=list(findings.requested),
         liquid_density=findings.calibration.liquid_density,

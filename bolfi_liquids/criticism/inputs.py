@@ -15,9 +15,6 @@ from ..errors import Argument, InputError
 from ..inputs.pour_table import Pours, PourTable, check_scene, table_and_cups, table_of
 from ..inputs.recording import Recording
 from ..inputs.settings import FALSE_ALARM_RATE, CriticismSettings
-from ..run.directory import CRITICISM_FORMAT
-from ..run.provenance import generations
-from ..run.recordings import kept_recordings
 
 if TYPE_CHECKING:
     from ..models import Cups
@@ -28,6 +25,7 @@ class Inputs:
     """What decides a criticism.
 
     Attributes:
+        after: Key of the posterior that is criticised.
         stirring: What the run was calibrated on.
         held_out: Recordings of the same liquid that nothing is fitted to.
         baseline: Recordings believed to lack nothing; none of those before.
@@ -38,6 +36,7 @@ class Inputs:
         settings: The rest.
     """
 
+    after: str
     stirring: Stirring
     held_out: tuple[Recording, ...]
     baseline: tuple[Recording, ...]
@@ -68,9 +67,8 @@ class Inputs:
             "held_out_pours": () if self.held_out_table is None else (self.held_out_table,),
         }
         made_from = {
+            "after": self.after,
             "version": version("bolfi-liquids"),
-            **generations(),
-            "format": CRITICISM_FORMAT,
             "settings": asdict(self.settings),
             **{
                 group: {one.path.name: one.hash for one in files} for group, files in groups.items()
@@ -97,10 +95,8 @@ def open_inputs(calibration: Calibration, settings: CriticismSettings, given: Gi
     Raises:
         InputError: Something cannot be used.
     """
-    record = dict(calibration.record)
-    stirring = stirring_of(
-        kept_recordings(calibration.path, record), int(record["settings"]["particles"])
-    )
+    particles = int(calibration.record["settings"]["particles"])
+    stirring = stirring_of(calibration.run.recordings, particles)
     kept_back, believed = given.held_out, given.baseline
     _check_held_out(stirring, kept_back)
     others = _others(believed, [*stirring.recordings, *kept_back])
@@ -111,6 +107,7 @@ def open_inputs(calibration: Calibration, settings: CriticismSettings, given: Gi
     if held_out_table is not None:
         check_scene(held_out_table, cups)
     return Inputs(
+        after=calibration.key,
         stirring=stirring,
         held_out=tuple(kept_back),
         baseline=others,

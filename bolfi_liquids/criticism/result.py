@@ -1,19 +1,15 @@
 """What a criticism found: verdict, evidence, extended calibration, plots."""
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..calibration.posterior_file import read_tree
 from ..calibration.result import Calibration
 from ..calibration.summary import Fitted
 from ..drawing import given_or_shown
-from ..errors import InputError
-from ..run.directory import CRITICISM, CRITICISM_FORMAT, Run, run_path
-from ..run.summary import SUMMARY_FILE, made_by, read_summary
-from ..wording import command, html_table, sentence, spoken
+from ..run.run import Run, RunOrPath, key_of
+from ..wording import html_table, sentence, spoken
 from .summary import CriticismSummary
 from .verdict import Verdict
 
@@ -59,20 +55,30 @@ class Criticism:
         return html_table("Criticism", rows | {"next": self.verdict.advice})
 
     @classmethod
-    def open(cls, run: str | Path) -> "Criticism":
+    def open(cls, run: RunOrPath) -> "Criticism":
         """Read a finished criticism.
 
         Raises:
-            InputError: There is none in the directory, or not one whole of this version's form.
+            InputError: There is none in the directory, or it is of another posterior.
         """
-        run = run_path(run)
-        if (found := criticism_of(Calibration.open(run))) is None:
-            raise InputError(
-                "the calibration in it was not criticised",
-                where=str(run),
-                fix=f"run: {command('criticise', run)}",
-            )
-        return found
+        opened = Run.open(run)
+        return cls.made(Calibration.of(opened), opened.required("criticise"))
+
+    @classmethod
+    def of(cls, run: Run) -> "Criticism | None":
+        """The criticism of a run; None without a current one."""
+        tree = run.result("criticise")
+        return None if tree is None else cls.made(Calibration.of(run), tree)
+
+    @classmethod
+    def made(cls, base: Calibration, tree: "DataTree") -> "Criticism":
+        """The criticism of a calibration from its criticism.nc."""
+        return cls(base, tree, CriticismSummary.from_json(json.loads(tree.attrs["summary"])))
+
+    @property
+    def made_from(self) -> dict[str, Any]:
+        """Settings, and the SHA-256 of every file."""
+        return json.loads(self.tree.attrs["made_from"])
 
     @property
     def verdict(self) -> Verdict:
@@ -100,7 +106,7 @@ class Criticism:
         summary = self.base.summary.of_posterior(
             posterior, self.summary.parameters, self.summary.best, self._fitted
         )
-        return replace(self.base, tree=tree, summary=summary)
+        return replace(self.base, tree=tree, summary=summary, key=key_of(self.tree))
 
     @property
     def _fitted(self) -> Fitted:
@@ -179,68 +185,16 @@ class Criticism:
         return pour_residual_plot(self.tree.children["pours"], given_or_shown(axes)).grid
 
 
-def criticism_of(base: Calibration) -> Criticism | None:
-    """What was found out about a calibration; None if its run holds no finished criticism.
-
-    Raises:
-        InputError: It does, but damaged, in part, or in the form of another version.
-    """
-    run = base.path
-    section = read_summary(run).get(CriticismSummary.SECTION)
-    if section is None:
-        return None
-    if (section.get("made_from") or {}).get("format") != CRITICISM_FORMAT:
-        raise InputError(
-            f"its criticism has the form of {made_by(section)}",
-            where=str(run),
-            fix=f"{_again(run)}, or use that version",
-        )
-    if not (run / CRITICISM).is_file():
-        return None
-    tree = read_tree(run / CRITICISM, fix=_again(run))
-    summary = CriticismSummary.from_json(section, str(run / SUMMARY_FILE))
-    if json.loads(tree.attrs.get("made_from", "null")) != summary.made_from:
-        raise InputError(
-            f"is of another criticism than the section in {SUMMARY_FILE}: a call was killed",
-            where=str(run / CRITICISM),
-            fix=_again(run),
-        )
-    return Criticism(base, tree, summary)
-
-
-def finished_criticism(base: Calibration, made_from: Mapping[str, Any]) -> Criticism | None:
-    """The criticism of a calibration if it was finished and made from just this; else None."""
-    read_summary(base.path)  # a damaged one is refused now, not after the simulations
-    try:
-        found = criticism_of(base)
-    except InputError:  # of another version, damaged or unfinished: it is made again
-        return None
-    return found if found and found.summary.made_from == made_from else None
-
-
-def _again(run: Path) -> str:
-    return f"write it again: {command('criticise', run)}"
-
-
-def base_calibration(given: "Run") -> Calibration:
-    """The calibration of a run, without what a criticism accepted; read if it is not given."""
-    if isinstance(given, Criticism):
-        return given.base
-    if isinstance(given, Calibration) and not given.added:
-        return given
-    return Calibration.open(run_path(given))
-
-
-def latest_calibration(given: "Run") -> Calibration:
+def latest_calibration(given: RunOrPath) -> Calibration:
     """The calibration of a run, extended by what a criticism accepted.
 
     Args:
-        given: A calibration, which is returned as it is; a criticism; or a RUN directory.
+        given: A calibration, which is returned as it is; a criticism; or a run.
     """
     if isinstance(given, Calibration):
         return given
     if isinstance(given, Criticism):
         return given.calibration
-    calibration = base_calibration(given)
-    found = criticism_of(calibration)
-    return calibration if found is None else found.calibration
+    run = given if isinstance(given, Run) else Run.open(given)
+    found = Criticism.of(run)
+    return Calibration.of(run) if found is None else found.calibration

@@ -108,7 +108,7 @@ class Gap:
         held_out_before, held_out_after: The same on recordings that were not fitted.
         noise, held_out_noise: What cameras and simulator's seeds leave of a right model.
         usual, held_out_usual: What the simulator leaves of clean recordings besides, 0 where none
-            was given; None in a criticism of version 0.1, whose numbers are beyond noise alone.
+            was given; the latter is None where nothing was held out.
         rms_before, rms_after, held_out_rms_before, held_out_rms_after: The RMS itself.
     """
 
@@ -122,8 +122,8 @@ class Gap:
     held_out_rms_before: float | None
     held_out_rms_after: float | None
     held_out_noise: float | None
-    usual: float | None = None
-    held_out_usual: float | None = None
+    usual: float
+    held_out_usual: float | None
 
     @classmethod
     def of(cls, source: "inference.criticism.Criticism") -> Self:

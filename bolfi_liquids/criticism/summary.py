@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field
@@ -101,12 +101,10 @@ class CriticismSummary(Section):
         baseline_left_out: Recordings given as clean that are criticised or held out.
         noise: Of the cameras.
         seconds: That it took [s].
-        made_from: Version, format, settings and hashes of the files.
+        made_from: Posterior, version, settings and hashes of the files.
         frame_faults: Held-out and clean recordings whose inclination and positions are not told in
             one frame, and how it is mended; see `inputs.frame`.
     """
-
-    SECTION: ClassVar[str] = "criticise"
 
     verdict: Verdict
     effects: tuple[str, ...]
@@ -132,7 +130,7 @@ class CriticismSummary(Section):
     noise: CameraNoise
     seconds: Number
     made_from: Mapping[str, Any]
-    frame_faults: tuple[str, ...] = ()
+    frame_faults: tuple[str, ...]
 
     @classmethod
     def from_findings(cls, findings: "Findings", tree: "DataTree", seconds: float) -> Self:
@@ -174,14 +172,11 @@ class CriticismSummary(Section):
         )
 
     def to_json(self) -> dict[str, Any]:
-        """The section as `json.dumps` takes it; the window of a stroke has no `speed`, and a gap
-        of version 0.1 nothing usual."""
+        """The section as `json.dumps` takes it; the window of a stroke has no `speed`."""
         section = super().to_json()
         for window in section["where"]:
             if window["speed"] is None:
                 del window["speed"]
-        if self.gap.usual is None:
-            del section["gap_deg"]["usual"], section["gap_deg"]["held_out_usual"]
         return section
 
     @property

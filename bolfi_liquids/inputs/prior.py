@@ -52,8 +52,8 @@ def describe_prior(prior: "Prior") -> dict[str, Described]:
     return {name: _described(one) for name, one in prior.distributions.items()}
 
 
-def read_prior(described: Mapping[str, Described | str]) -> "Prior":
-    """The prior that `describe_prior` described, or version 0.1 by a text for each parameter.
+def read_prior(described: Mapping[str, Described]) -> "Prior":
+    """The prior that `describe_prior` described.
 
     Raises:
         ValueError: A distribution that numpyro does not know by that name.
@@ -61,22 +61,7 @@ def read_prior(described: Mapping[str, Described | str]) -> "Prior":
     """
     from ..inference import Prior
 
-    tables = {
-        name: table_of_text(one) if isinstance(one, str) else one for name, one in described.items()
-    }
-    return Prior({name: _distribution(name, table) for name, table in tables.items()})
-
-
-def table_of_text(text: str) -> Described:
-    """The table of a text such as "LogUniform(high=20.0, low=0.003)", which version 0.1 wrote.
-
-    Raises:
-        ValueError: The text has another form.
-    """
-    if not (found := TEXT_OF_VERSION_0_1.fullmatch(text)):
-        raise ValueError(f"a prior {text!r}, which no distribution describes")
-    pairs = dict(pair.split("=") for pair in found[2].split(", ") if pair)
-    return {"family": found[1], **{name: float(value) for name, value in pairs.items()}}
+    return Prior({name: _distribution(name, table) for name, table in described.items()})
 
 
 def check_prior(prior: "Prior") -> None:

@@ -33,8 +33,8 @@ from ..inputs.recording import Recording
 from ..pouring.design import joint_prior, whole
 from ..pouring.landed_pours import LandedPours, pours_in
 from ..progress import progress_bar
-from ..run.directory import RUN_TOML
-from ..run.entering import working_in
+from ..run.lock import alone_in
+from ..run.run import RUN_TOML
 from .learner import learn_online
 from .newest_message import Outbox
 from .online_choice import OnlineChoice
@@ -112,7 +112,7 @@ class OnlineCalibration:
         bank = out / BANK if choice.bank is None else Path(choice.bank)
         density = plan.number("liquid_density")
         with ExitStack() as alone:
-            alone.enter_context(working_in(out))
+            alone.enter_context(alone_in(out))
             if (out / RUN_TOML).exists():
                 raise InputError(
                     "holds a run already", where=str(out), fix="choose another directory"

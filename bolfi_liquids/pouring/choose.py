@@ -11,20 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.bad_fit import refuse_bad_fit
-from ..calibration.former_model import refuse_other_model
-from ..calibration.posterior_file import write_tree
 from ..calibration.result import Calibration
-from ..criticism.result import latest_calibration
+from ..criticism.result import Criticism, latest_calibration
 from ..errors import Argument, InputError
 from ..inputs.cups import cups_of
 from ..inputs.pour_table import Pours, PourTable, check_scene, table_of
 from ..inputs.prior import PARAMETERS
 from ..inputs.settings import PourSettings
 from ..progress import progress_bar
-from ..run.directory import GIVEN_POURS, POUR, Run, open_bank, run_path
-from ..run.entering import working_in_run
 from ..run.execution import Execution
-from ..run.given_pours import digest_of_pours, keep_pours, kept_pours
+from ..run.given_pours import GIVEN_POURS, digest_of_pours, keep_pours, kept_pours
+from ..run.run import Run, RunOrPath
 from ..run.workers import open_workers
 from .design import acting_in_pours, box_around, joint_prior
 from .draining import LIQUIDS, TENTH, Draining, Hold, hold_of
@@ -48,7 +45,7 @@ SEARCH_STRATUM = 1
 
 
 def choose_pour(  # noqa: PLR0913  the one call that most users make
-    calibration: Run,
+    calibration: RunOrPath,
     cups: "Cups | str | Path | None" = None,
     *,
     given: Pours | None = None,
@@ -99,18 +96,23 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     table = table_of(given, Argument("given"))
     if table is not None:
         check_scene(table, cups)
-    with working_in_run(run_path(calibration)):
-        latest = latest_calibration(calibration)
-        refuse_other_model(latest)
+    with Run.entered(calibration) as run:
+        opened = isinstance(calibration, Calibration | Criticism)
+        latest = latest_calibration(calibration if opened else run)
         if not force:
-            refuse_bad_fit(latest.summary, latest.path)
+            refuse_bad_fit(latest.summary, run.path)
         if table is not None:
-            keep_pours(latest.path, table, cups)
-        counted = _counted(latest.path, cups)
+            keep_pours(run.path, table, cups)
+        counted = _counted(run.path, cups)
         with open_workers(executor, timeout) as workers:
             pour = decided(latest, cups, settings, Execution(workers, timeout, progress), counted)
-        write_tree(pour.tree, pour.path / POUR)
-        pour.summary.write(pour.path)
+        made_from = {
+            "after": latest.key,
+            "given": digest_of_pours(run.path),
+            "settings": asdict(settings),
+            "cups": cups.settings(),
+        }
+        run.keep("pour", pour.tree, made_from, pour.summary.to_json())
         return pour
 
 
@@ -183,7 +185,7 @@ def _hold(
         return None
     draining = Draining(learned.cups, calibration.liquid_density, learned.box.effects)
     with (
-        open_bank(calibration.path) as bank,
+        calibration.run.bank() as bank,
         progress_bar("holding the source", LIQUIDS, shown=execution.progress) as advance,
     ):
         rate, keep = chosen.angular_velocity, execution.keep(bank)
@@ -199,7 +201,7 @@ def _learned(
     box = box_around(joint_prior(calibration.prior, effects, cups), draws, calibration.best)
     pours = LandedPours(cups, calibration.liquid_density, effects)
     with (
-        open_bank(calibration.path) as bank,
+        calibration.run.bank() as bank,
         progress_bar("pouring", settings.budget, shown=execution.progress) as advance,
     ):
         poured = pours_in(box, pours, settings.budget, execution.keep(bank), advance)
@@ -289,7 +291,6 @@ def _described(
         landing_sd=landing_sd(cups),
         map_error=learned.rms_error,
         fit_status=str(fit_status),  # a bad fit was poured by force
-        given_pours=digest_of_pours(calibration.path),
     )
     summary = PourSummary.from_judged(
         chosen,

@@ -1,20 +1,19 @@
 """A chosen pour: the action, what it spills, and where it lies among the actions."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration.posterior_file import read_tree
 from ..calibration.summary import FitStatus
-from ..errors import InputError
 from ..inputs.settings import PourSettings
-from ..run.directory import POUR, run_path
-from ..run.summary import SUMMARY_FILE, Number, Section
-from ..wording import command, html_table, spilled
+from ..run.run import Run, RunOrPath
+from ..run.summary import Number, Section
+from ..wording import html_table, spilled
 from .draining import Hold
 from .spillage import ACTION, FRACTIONS
 
@@ -101,21 +100,26 @@ class Pour:
         return html_table("Pour", rows)
 
     @classmethod
-    def open(cls, run: str | Path) -> "Pour":
+    def open(cls, run: RunOrPath) -> "Pour":
         """Read the pour that a run has chosen.
 
         Raises:
-            InputError: There is none in the directory, or a file is damaged.
+            InputError: There is none, or it was chosen over another posterior.
         """
-        run = run_path(run)
-        check_poured(run)
-        if (found := pour_of(run)) is None:
-            raise InputError(
-                f"has no section pour, though there is a {POUR}",
-                where=str(run / SUMMARY_FILE),
-                fix=f"choose the pour again: {command('pour', run)}",
-            )
-        return found
+        opened = Run.open(run)
+        return cls.made(opened.path, opened.required("pour"))
+
+    @classmethod
+    def of(cls, run: Run) -> "Pour | None":
+        """The pour of a run; None without a current one."""
+        tree = run.result("pour")
+        return None if tree is None else cls.made(run.path, tree)
+
+    @classmethod
+    def made(cls, path: Path, tree: "DataTree") -> "Pour":
+        """The pour of a RUN directory from its pour.nc."""
+        summary = PourSummary.from_json(json.loads(tree.attrs["summary"]))
+        return cls(path, judged(tree, "chosen"), judged(tree, "plug_in"), tree, summary)
 
     def plot_map(self, ax: "Axes | None" = None) -> "Axes":
         """Expected spillage over angular velocity and distance, with both actions.
@@ -137,9 +141,9 @@ class Pour:
             drawn.legend(*axes.get_legend_handles_labels())
         return axes
 
-    def check_current(self) -> None:
-        """Raise `ValueError` if another pour was chosen in the run since."""
-        there = read_pour(self.path)
+    def check_current(self, run: Run) -> None:
+        """Raise `ValueError` if another pour was chosen in its run since."""
+        there = run.required("pour")
         pairs = ((self.chosen, "chosen"), (self.plug_in, "plug_in"))
         if not all(one.equals(judged(there, name)) for one, name in pairs):
             raise ValueError(
@@ -158,7 +162,7 @@ class ActionSummary:
         expected_spillage: Mean spilled fraction.
         spillage_q95: Fraction that one outcome in twenty exceeds.
         expected_received, received_q05, received_q95: Mean and quantiles of the fraction that
-            arrives in the receiver; None where an older version chose.
+            arrives in the receiver.
         expected_retained, retained_q05, retained_q95: Likewise, of what stays in the source.
     """
 
@@ -166,12 +170,12 @@ class ActionSummary:
     distance_cm: Number
     expected_spillage: Number
     spillage_q95: Number
-    expected_received: Number | None = None
-    received_q05: Number | None = None
-    received_q95: Number | None = None
-    expected_retained: Number | None = None
-    retained_q05: Number | None = None
-    retained_q95: Number | None = None
+    expected_received: Number
+    received_q05: Number
+    received_q95: Number
+    expected_retained: Number
+    retained_q05: Number
+    retained_q95: Number
 
     @classmethod
     def of(cls, judged: Judged, **more) -> Self:
@@ -254,27 +258,24 @@ class PourSummary(ActionSummary, Section):
     Attributes:
         least_viscosity: Below it the simulator cannot distinguish liquids in this pour [Pa s].
         n_simulations: Pours that the map of landings was learned from.
-        map_error: RMS by which that map misses the spilled fraction of pours left out of it. None
-            where an older version chose, which had no map.
+        map_error: RMS by which that map misses the spilled fraction of pours left out of it.
         risk: "mean" or "cvar".
         seed: Of all random draws.
         plug_in: The action that would be best if theta* were the truth.
         fit_status: Of the calibration whose posterior it was chosen over; a bad fit's was chosen by
-            force. None where an older version chose.
+            force.
         given: Pours that were given, which correct the map; None without any.
         hold: How the source empties when it is held for longer; None unless more than a tenth of
             the liquid stays.
     """
-
-    SECTION: ClassVar[str] = "pour"
 
     least_viscosity: Number
     n_simulations: int
     risk: str
     seed: int
     plug_in: ActionSummary
-    fit_status: FitStatus | None = None
-    map_error: Number | None = None
+    fit_status: FitStatus
+    map_error: Number
     given: GivenSummary | None = None
     hold: Hold | None = None
 
@@ -290,48 +291,6 @@ class PourSummary(ActionSummary, Section):
             plug_in=ActionSummary.of(plug_in),
             **more,
         )
-
-
-def pour_of(run: Path) -> Pour | None:
-    """The pour that a run has chosen; None if it has none, or no section on it.
-
-    Raises:
-        InputError: A file is damaged.
-    """
-    if not (run / POUR).is_file() or (summary := PourSummary.read(run)) is None:
-        return None
-    tree = read_pour(run)
-    try:
-        return Pour(run, judged(tree, "chosen"), judged(tree, "plug_in"), tree, summary)
-    except (KeyError, TypeError, ValueError) as err:
-        raise InputError(
-            "damaged, it holds no whole pour",
-            where=str(run / POUR),
-            fix=f"choose the pour again: {command('pour', run)}",
-        ) from err
-
-
-def check_poured(run: Path) -> None:
-    """Refuse a run that has chosen no pour.
-
-    Raises:
-        InputError: It has not.
-    """
-    if not (run / POUR).is_file():
-        raise InputError(
-            "no pour was chosen",
-            where=str(run),
-            fix=f"choose one: {command('pour', run)}",
-        )
-
-
-def read_pour(run: Path) -> "DataTree":
-    """pour.nc of a run.
-
-    Raises:
-        InputError: The file is damaged.
-    """
-    return read_tree(run / POUR, fix=f"write it again: {command('pour', run)}")
 
 
 def judged(tree: "DataTree", name: str) -> Judged:

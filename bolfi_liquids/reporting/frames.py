@@ -6,22 +6,19 @@ and, where a pour was chosen, `poured` particles (pour_frame, pour_particle, axi
 they are past the receiver's rim, with the source's `angle` [rad] and the share `caught` so far.
 """
 
-import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration.posterior_file import read_tree, write_tree
 from ..inputs.cups import kept_cups
 from ..inputs.prior import split_parameters
 from ..inputs.recording import Recording
 from ..progress import Advance, progress_bar
-from ..run.directory import FRAMES
+from ..run.run import as_json
 from ..seeds import Phase, simulation_seeds
 from ..wording import unit_of
 from .scenes import FRAME_RATE, Draw, PourScene, PourShown, StirScene
@@ -39,10 +36,6 @@ N_DRAWS_SHOWN = 3
 
 MAX_STIR_SECONDS = 10.0
 """Of a stir that is shown [s]."""
-
-FRAMES_FORMAT = 1
-"""Of the file; another is made again."""
-
 
 T = TypeVar("T")
 
@@ -91,13 +84,13 @@ def frames_of(
     seed = int(calibration.record["settings"]["seed"])
     theta = calibration.draws(N_DRAWS_SHOWN, seed)
     seeds = simulation_seeds(seed, Phase.MOVING_PICTURES, N_DRAWS_SHOWN)
-    made_from = _digest(theta, seeds, recording, calibration.record["settings"], pour)
-    path = calibration.path / FRAMES
-    if path.is_file():
-        kept = read_tree(path, fix="delete it: it is made again").to_dataset()
-        if kept.attrs.get("made_from") == made_from:
-            return kept
+    made_from = _made_from(theta, seeds, recording, calibration.record["settings"], pour)
+    kept = calibration.run.result("frames")
+    if kept is not None and kept.attrs["made_from"] == as_json(made_from):
+        return kept.to_dataset()
     scenes = _scenes(calibration, recording, pour, timeout)
+    from xarray import DataTree
+
     try:
         frames = _simulated(scenes, _draws(theta, seeds), executor, progress)
     except TimeoutError as err:
@@ -107,7 +100,9 @@ def frames_of(
             f"a moving picture took longer than {timeout:g} s to simulate; allow more time, or "
             "leave the pictures out by --still, in Python by moving=False"
         ) from err
-    return _write(frames, theta, made_from, path)
+    dataset = _named(frames, theta)
+    calibration.run.keep("frames", DataTree(dataset), made_from)
+    return dataset
 
 
 class _Scenes(NamedTuple):
@@ -163,16 +158,12 @@ def _each(
     return counted()
 
 
-def _write(
-    frames: Mapping[str, Any], theta: Mapping[str, NDArray], made_from: str, path: Path
-) -> "Dataset":
-    from xarray import Dataset, DataTree
+def _named(frames: Mapping[str, Any], theta: Mapping[str, NDArray]) -> "Dataset":
+    from xarray import Dataset
 
     drawn = {name: ("draw", values, _unit(name)) for name, values in theta.items()}
     named: dict[Any, Any] = {**frames}
-    dataset = Dataset(named, coords=drawn, attrs={"made_from": made_from})
-    write_tree(DataTree(dataset), path)
-    return dataset
+    return Dataset(named, coords=drawn)
 
 
 def _unit(name: str) -> dict[str, str]:
@@ -181,20 +172,26 @@ def _unit(name: str) -> dict[str, str]:
     return {"units": unit} if unit else {}
 
 
-def _digest(
+def _made_from(
     theta: Mapping[str, NDArray],
     seeds: list[int],
     recording: Recording,
     settings: Mapping[str, Any],
     pour: Mapping[str, Any] | None,
-) -> str:
-    """SHA-256 of all that the frames show."""
+) -> dict[str, Any]:
+    """All that the frames show."""
     from ..models import MODEL_VERSION
 
-    liquids = {name: values.tolist() for name, values in theta.items()}
-    shown = [FRAMES_FORMAT, MODEL_VERSION, FRAME_RATE, MAX_STIR_SECONDS, settings["particles"]]
-    told = [*shown, liquids, seeds, recording.hash, pour]
-    return hashlib.sha256(json.dumps(told, sort_keys=True, default=float).encode()).hexdigest()
+    return {
+        "model": MODEL_VERSION,
+        "frame_rate": FRAME_RATE,
+        "seconds": MAX_STIR_SECONDS,
+        "particles": settings["particles"],
+        "liquids": {name: values.tolist() for name, values in theta.items()},
+        "seeds": seeds,
+        "recording": recording.hash,
+        "pour": pour,
+    }
 
 
 def _draws(theta: Mapping[str, NDArray], seeds: list[int]) -> list[Draw]:

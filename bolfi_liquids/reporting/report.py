@@ -9,22 +9,19 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from ..calibration.fit_figures import inclination_figure, stroke_figure
-from ..calibration.former_model import refuse_other_model
 from ..calibration.posterior_figure import posterior_figure
 from ..calibration.result import Calibration
 from ..calibration.search_figure import search_figure
 from ..calibration.summary import CalibrationSummary
-from ..criticism.result import Criticism, base_calibration, criticism_of
 from ..files import write_text
 from ..hover_labels import script_json
 from ..inputs.prior import Described
-from ..pouring.result import Pour, pour_of
-from ..run.directory import REPORT, Run, run_path
-from ..run.entering import working_in_run
+from ..pouring.result import Pour
+from ..run.run import REPORT, Run, RunOrPath
 from ..wording import LIQUID_UNITS, sentence
 from . import sentences
 from .criticism_chapter import criticism_context
-from .warnings import Results, results_of, stale_sentences, warnings_of
+from .warnings import Results, warnings_of
 
 if TYPE_CHECKING:
     from ..inference.simulations import Workers
@@ -33,7 +30,7 @@ PAGE_TEMPLATE = "report.html.jinja"
 
 
 def report(
-    run: Run,
+    run: RunOrPath,
     *,
     moving: bool = True,
     executor: "Workers | None" = None,
@@ -55,20 +52,13 @@ def report(
             command works in it.
         RuntimeError: A simulation took longer than `timeout`.
     """
-    with working_in_run(run_path(run)):
-        calibration = base_calibration(run)
-        refuse_other_model(calibration)
-        # before anything is simulated: a damaged file is refused
-        criticism = run if isinstance(run, Criticism) else criticism_of(calibration)
-        pour = run if isinstance(run, Pour) else pour_of(calibration.path)
+    with Run.entered(run) as opened:
         how = {"executor": executor, "timeout": timeout, "progress": progress}
-        return written(calibration, criticism, pour, moving=moving, **how)
+        return written(Results.of(opened), moving=moving, **how)
 
 
 def written(
-    calibration: Calibration,
-    criticism: Criticism | None,
-    pour: Pour | None,
+    results: Results,
     *,
     moving: bool = True,
     chapters: Mapping[str, Any] = MappingProxyType({}),
@@ -77,24 +67,22 @@ def written(
     """Write RUN/report.html from what was read or made, as its arguments.
 
     Args:
-        calibration: Without what a criticism accepted.
-        criticism, pour: Of its run.
+        results: What the run holds.
         moving: See `report`.
         chapters: What is drawn already, by the names of `CHAPTERS`.
         how: Further arguments of `frames_of`.
     """
-    latest = calibration if criticism is None else criticism.calibration
-    pictures = _moving(latest, pour, how) if moving else None
-    given = {"calibration": calibration, "criticism": criticism, "pour": pour}
+    calibration = results.calibration
+    pictures = _moving(results.latest, results.pour, how) if moving else None
+    given = {name: getattr(results, name) for name in CHAPTERS}
     drawn = {
         name: chapters.get(name) or (one and CHAPTERS[name](one)) for name, one in given.items()
     }
-    page = _page(calibration, drawn, results_of(calibration, criticism, pour), pictures)
+    page = _page(drawn, results, pictures)
     return write_text(calibration.path / REPORT, page)
 
 
 def _page(
-    calibration: Calibration,
     chapters: Mapping[str, Any],
     results: Results,
     pictures: dict[str, Any] | None,
@@ -112,13 +100,12 @@ def _page(
     return environment.get_template(PAGE_TEMPLATE).render(
         **chapters,
         warnings=warnings_of(results),
-        stale=stale_sentences(results),
         moving=pictures,
         moving_json=script_json(pictures),
         style=_text("report.css"),
         script=_text("report.js"),
-        record=calibration.record,
-        run=calibration.path,
+        record=results.calibration.record,
+        run=results.calibration.path,
     )
 
 
@@ -146,13 +133,8 @@ def calibration_context(calibration: Calibration) -> dict[str, Any]:
     }
 
 
-def prior_text(described: Described | str) -> str:
-    """A distribution of run.toml as Python writes it, such as `LogUniform(0.003, 20)`.
-
-    A text, as version 0.1 wrote it, stays.
-    """
-    if isinstance(described, str):
-        return described
+def prior_text(described: Described) -> str:
+    """A distribution of run.toml as Python writes it, such as `LogUniform(0.003, 20)`."""
     values = {
         name: prior_text(value) if isinstance(value, Mapping) else f"{value:g}"
         for name, value in described.items()
@@ -200,20 +182,12 @@ CHAPTERS: dict[str, Callable[[Any], dict[str, Any]]] = {
 """What the template needs of each result."""
 
 
-def _moving(
-    calibration: Calibration, pour: Pour | None, how: Mapping[str, Any]
-) -> dict[str, Any] | None:
+def _moving(calibration: Calibration, pour: Pour | None, how: Mapping[str, Any]) -> dict[str, Any] | None:
     """Moving pictures, simulated by the arguments `how` of `frames_of`."""
-    from ..run.recordings import RECORDINGS_FOLDER, kept_recordings
     from .frames import Shown, frames_of
     from .moving_pictures import moving_context
 
-    if not (
-        calibration.path / RECORDINGS_FOLDER
-    ).is_dir():  # of a run that was made before they were kept
-        return None
-    first, *_ = kept_recordings(calibration.path, dict(calibration.record))
-    shown = Shown(calibration, first, pour)
+    shown = Shown(calibration, calibration.run.recordings[0], pour)
     return moving_context(shown, frames_of(shown, **how))
 
 

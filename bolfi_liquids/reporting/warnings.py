@@ -12,13 +12,13 @@ import numpy as np
 from ..calibration.bad_fit import bad_fit
 from ..calibration.result import Calibration
 from ..calibration.summary import CalibrationSummary
-from ..criticism.result import Criticism, criticism_of
+from ..criticism.result import Criticism
 from ..criticism.summary import CriticismSummary
 from ..criticism.verdict import Verdict
 from ..pouring.draining import TENTH
-from ..pouring.result import Pour, PourSummary, pour_of
+from ..pouring.result import Pour
 from ..pouring.spillage import ACTION
-from ..run.given_pours import digest_of_pours
+from ..run.run import Run
 from ..wording import LEAST_SPILLED, Sentence, sentence
 from .criticism_sentences import verdict_sentence
 from .sentences import (
@@ -29,7 +29,7 @@ from .sentences import (
 )
 
 if TYPE_CHECKING:
-    from xarray import Dataset, DataTree
+    from xarray import DataTree
 
 MIN_SEARCHED = 3
 """Simulations that the engine chose, of which fewer are no search."""
@@ -51,62 +51,58 @@ class Results:
     """What a run holds.
 
     Attributes:
-        calibrated, criticised, poured: Sections of summary.json; None where there is none.
-        latest: Of the calibration that is poured, with what a criticism accepted.
-        pour: pour.nc; None where there is none.
-        given: Digest of the pours that the run was given; "" without any.
-        posterior: Draws of the latest calibration.
-        searched: Number of simulations at points that were chosen by what was learned.
-    """
-
-    calibrated: CalibrationSummary
-    latest: CalibrationSummary
-    criticised: CriticismSummary | None
-    poured: PourSummary | None
-    pour: "DataTree | None"
-    given: str
-    posterior: "Dataset"
-    searched: int
-
-
-def results_of(
-    calibration: Calibration, criticism: Criticism | None = None, pour: Pour | None = None
-) -> Results:
-    """What the run of a calibration holds.
-
-    Args:
         calibration: Without what a criticism accepted.
-        criticism, pour: Of its run; read if they are not given, where there are any.
-
-    Raises:
-        InputError: A file is damaged, or of another version.
+        criticism, pour: None where there is none of the latest posterior.
+        outdated: Why a criticism or a pour that is there does not count.
+        remedies: The command that makes each of these again.
     """
-    criticism, pour = criticism or criticism_of(calibration), pour or pour_of(calibration.path)
-    summary = calibration.summary
-    latest = calibration if criticism is None else criticism.calibration
-    return Results(
-        calibrated=summary,
-        latest=latest.summary,
-        criticised=None if criticism is None else criticism.summary,
-        poured=None if pour is None else pour.summary,
-        pour=None if pour is None else pour.tree,
-        given=digest_of_pours(calibration.path),
-        posterior=latest.posterior,
-        searched=summary.n_simulations - int(calibration.tree.attrs["initial"]),
-    )
+
+    calibration: Calibration
+    criticism: Criticism | None
+    pour: Pour | None
+    outdated: tuple[str, ...] = ()
+    remedies: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, run: Run) -> "Results":
+        """Everything that is current.
+
+        Raises:
+            InputError: There is no finished calibration.
+        """
+        calibration = Calibration.of(run)
+        old = {step: why for step in ("criticise", "pour") if (why := run.why_not(step))}
+        remedies = tuple(map(run.again, old))
+        found = Criticism.of(run), Pour.of(run)
+        return cls(calibration, *found, tuple(old.values()), remedies)
+
+    @property
+    def latest(self) -> Calibration:
+        """What is poured: the calibration, with what a criticism accepted."""
+        return self.calibration if self.criticism is None else self.criticism.calibration
 
 
 def warnings_of(run: Results) -> list[Sentence]:
     """The gravest first; none if nothing is known to be wrong."""
+    summary, latest = run.calibration.summary, run.latest.summary
+    searched = summary.n_simulations - int(run.calibration.tree.attrs["initial"])
     return [
-        *filter(None, [bad_fit(run.latest)]),
-        *sampler_sentences(run.latest),
-        *surrogate_sentences(run.calibrated),
-        *_of_the_search(run.calibrated, run.searched),
-        *stale_sentences(run),
-        *_of_the_model(run.calibrated, run.criticised),
-        *least_viscosity_sentences(run.latest),
-        *_of_the_pour(run.poured, run.pour),
+        *filter(None, [bad_fit(latest)]),
+        *sampler_sentences(latest),
+        *surrogate_sentences(summary),
+        *_of_the_search(summary, searched),
+        *outdated_sentences(run),
+        *_of_the_model(summary, run.criticism and run.criticism.summary),
+        *least_viscosity_sentences(latest),
+        *([] if run.pour is None else _of_the_pour(run.pour)),
+    ]
+
+
+def outdated_sentences(run: Results) -> list[Sentence]:
+    """What does not count any more, and how it is made again."""
+    return [
+        sentence("warning.outdated", why=why, remedy=remedy)
+        for why, remedy in zip(run.outdated, run.remedies, strict=True)
     ]
 
 
@@ -114,27 +110,6 @@ def _of_the_search(calibrated: CalibrationSummary, searched: int) -> list[Senten
     if searched >= MIN_SEARCHED:
         return []
     return [sentence("warning.no_search", total=calibrated.n_simulations, searched=searched)]
-
-
-def stale_sentences(run: Results) -> list[Sentence]:
-    """That the pour was chosen over another posterior than the latest, or with other given pours
-    than the run holds, where it was."""
-    if run.pour is None:
-        return []
-    found = []
-    if not was_poured_over(run.pour, run.posterior):
-        found.append(sentence("warning.stale_pour"))
-    if run.pour.attrs.get("given_pours", "") != run.given:
-        found.append(sentence("warning.stale_given"))
-    return found
-
-
-def was_poured_over(pour: "DataTree", posterior: "Dataset") -> bool:
-    """Whether a pour was chosen over draws of this posterior."""
-    liquids = pour["liquids"].to_dataset()
-    if set(liquids.data_vars) != set(posterior.data_vars):
-        return False
-    return all(np.isin(liquids[name], posterior[name]).all() for name in liquids.data_vars)
 
 
 def _of_the_model(
@@ -163,9 +138,8 @@ def _of_the_model(
     return found
 
 
-def _of_the_pour(poured: PourSummary | None, pour: "DataTree | None") -> list[Sentence]:
-    if poured is None or pour is None:
-        return []
+def _of_the_pour(chosen: Pour) -> list[Sentence]:
+    poured, pour = chosen.summary, chosen.tree
     found = _of_the_edge(pour) if poured.spillage_q95 >= LEAST_SPILLED else []
     if poured.expected_spillage > MUCH_SPILLED:
         found.append(sentence("warning.much_spilled", share=poured.expected_spillage))

@@ -9,8 +9,7 @@ import numpy as np
 from ..errors import InputError
 from ..inputs.rigs import rig_of
 from ..pouring.result import Pour
-from ..run.directory import Run, run_path
-from ..run.entering import working_in_run
+from ..run.run import Run, RunOrPath
 from .armed_session import (
     Ask,
     Emulation,
@@ -18,7 +17,7 @@ from .armed_session import (
     armed_session,
     check_one,
 )
-from .chosen_pour import ChosenPour, chosen_pour
+from .chosen_pour import BAD_FIT, ChosenPour, chosen_pour
 from .live_view import SessionView
 
 if TYPE_CHECKING:
@@ -61,7 +60,7 @@ def plan_pour(run: Run, rig: "Rig") -> PourPlan:
     from ..hardware import check_path
     from ..hardware.motion import pour_path, ready_to_pour
 
-    chosen = chosen_pour(run_path(run))
+    chosen = chosen_pour(run)
     _check_receiver(chosen, rig)
     action, turn = chosen.judged, chosen.cups.pour
     place = {"distance": action.distance, "lip_height": turn.lip_height}
@@ -89,7 +88,7 @@ def _check_receiver(chosen: ChosenPour, rig: "Rig") -> None:
 
 
 def execute_pour(
-    run: Run,
+    run: RunOrPath,
     rig: "Rig | str | Path | None" = None,
     *,
     ask: Ask | None = None,
@@ -123,16 +122,15 @@ def execute_pour(
     """
     check_one(ask, emulate, "execute_pour")
     rig = rig_of(rig)
-    with working_in_run(run_path(run)):
-        plan = plan_pour(run, rig)
+    with Run.entered(run) as opened:
+        plan = plan_pour(opened, rig)
         if isinstance(run, Pour):
-            run.check_current()
+            run.check_current(opened)
         if ask is not None:
-            plan.chosen.check_fresh()
             plan.chosen.check_fit(despite_bad_fit=despite_bad_fit)
         else:  # nobody is asked, who would read it first
-            for sentence in plan.chosen.wrong:
-                logger.warning(sentence)
+            if plan.chosen.fit_is_bad:
+                logger.warning(BAD_FIT)
             logger.info(plan.chosen.expected)
         return _carried_out(plan, rig, ask, emulate, progress)
 
@@ -144,7 +142,7 @@ def _carried_out(
     from ..hardware import SessionInterrupted, emulated
     from ..hardware.motion import approach_pour
 
-    out = _next_directory(plan.chosen.run)
+    out = _next_directory(plan.chosen.run.path)
     task = Task(rig, "pouring", [plan.path], out, about=str(plan.chosen))
     emulation = None
     if emulate:
@@ -172,7 +170,7 @@ def dry_pour(run: str | Path, rig: "Rig", out: Path) -> "tuple[str, list[Check]]
     from ..hardware import Session, SessionSetup
     from ..hardware.session.confirmation import describe
 
-    plan = plan_pour(run, rig)
+    plan = plan_pour(Run.open(run), rig)
     setup = SessionSetup(rig, out, tool="pouring", plan=[plan.path])
     with Session(setup) as session:
         text = f"{plan.chosen}\n{describe([plan.path], rig, 'pouring')}"

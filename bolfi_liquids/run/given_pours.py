@@ -11,22 +11,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..files import write_netcdf
 from ..inputs.pour_table import PourTable
-from .directory import GIVEN_POURS
+from .result_file import read_result, write_result
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
     from ..models import Cups
 
+GIVEN_POURS = "given_pours.nc"
 FRACTIONS = ("spilled", "received", "retained")
 UNITS = {"angular_velocity": "rad s-1", "distance": "m", **dict.fromkeys(FRACTIONS, "1")}
 
 
 def keep_pours(run: Path, table: PourTable, cups: "Cups") -> None:
     """Keep pours that were made with these cups, and no others."""
-    from xarray import Dataset
+    from xarray import Dataset, DataTree
 
     values = [table.angular_velocity, table.distance, *table.fractions.T]
     columns = {
@@ -40,7 +40,7 @@ def keep_pours(run: Path, table: PourTable, cups: "Cups") -> None:
         "cups": json.dumps(_scene(cups)),
     }
     coordinates = {"line": ("row", table.lines)}
-    write_netcdf(Dataset(columns, coordinates, attributes), run / GIVEN_POURS)
+    write_result(DataTree(Dataset(columns, coordinates, attributes)), run / GIVEN_POURS)
 
 
 def kept_pours(run: Path, cups: "Cups") -> PourTable | None:
@@ -74,17 +74,14 @@ def digest_of_pours(run: Path) -> str:
 
 
 def _held(run: Path) -> "Dataset | None":
-    import xarray
-
     path = run / GIVEN_POURS
     if not path.is_file():
         return None
     try:
-        with xarray.open_dataset(path, engine="h5netcdf") as held:
-            return held.load()
-    except (OSError, ValueError, KeyError) as err:
+        return read_result(path).to_dataset()
+    except (OSError, ValueError) as err:
         fix = "delete it, and give the table of pours again"
-        raise InputError("damaged, cannot be read", where=str(path), fix=fix) from err
+        raise InputError("is damaged", where=str(path), fix=fix) from err
 
 
 def _scene(cups: "Cups") -> dict[str, Any]:

@@ -43,7 +43,7 @@ def keep_recordings(run: Path, recordings: tuple[Recording, ...]) -> None:
             write_whole(copy, lambda path, content=content: path.write_bytes(content))
 
 
-def kept_recordings(run: Path, record: dict[str, Any]) -> list[Recording]:
+def kept_recordings(run: Path, record: Mapping[str, Any]) -> list[Recording]:
     """The recordings that a run was calibrated on.
 
     Args:
@@ -70,8 +70,8 @@ def kept_recordings(run: Path, record: dict[str, Any]) -> list[Recording]:
 
 
 def kept_paths(run: Path, record: Mapping[str, Any]) -> tuple[Path, ...]:
-    """Of those copies that are there; none in runs from before they were kept."""
-    names = enumerate(record["files"]["recordings"], start=1)
+    """Of those copies that are there."""
+    names = enumerate(record.get("files", {}).get("recordings", ()), start=1)
     paths = [run / RECORDINGS_FOLDER / _name(number, name) for number, name in names]
     return tuple(path for path in paths if path.is_file())
 

@@ -1,0 +1,454 @@
+"""A RUN directory: inputs and settings, simulations, results.
+
+A command opens one `Run` and asks nothing but it. run.toml holds what decides the results; the
+bank every finished simulation; and each step's result is a tree that says what it was made from.
+It is current if that is what the run holds now, and None otherwise.
+"""
+
+import json
+import sqlite3
+import tomllib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from difflib import get_close_matches
+from functools import cached_property
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import tomli_w
+
+from ..errors import Argument, InputError
+from ..files import as_path, write_text
+from ..inputs.prior import read_prior
+from ..inputs.recording import Recording
+from ..inputs.settings import CalibrationSettings
+from ..wording import command
+from .given_pours import digest_of_pours
+from .lock import alone_in
+from .provenance import generations
+from .recordings import kept_paths, kept_recordings
+from .result_file import read_result, write_result
+from .summary import SUMMARY_FILE, write_summary
+
+if TYPE_CHECKING:
+    from xarray import DataTree
+
+    from ..inference import Prior, SimulationBank
+
+RUN_TOML = "run.toml"
+SIMULATIONS = "simulations.sqlite"
+REPORT = "report.html"
+RESULTS = {
+    "calibrate": "posterior.nc",
+    "criticise": "criticism.nc",
+    "pour": "pour.nc",
+    "frames": "frames.nc",
+}
+"""File of each step's result, in the order of the steps."""
+
+MUST_AGREE = ("settings", "inputs", "simulator", "engine")
+"""Sections of run.toml that decide the results; dates, names and libraries may differ."""
+
+RESUMED_OPTIONS = ("budget", "surrogate", "sampler", "seed", "particles", "batch")
+"""Of the command `calibrate`."""
+
+ABSENT = {
+    "calibrate": "the calibration in it is not finished",
+    "criticise": "the calibration in it was not criticised",
+    "pour": "no pour was chosen",
+    "frames": "it has no moving pictures",
+}
+
+
+class HasRun(Protocol):
+    """A result that knows its RUN directory: a calibration, a criticism or a pour."""
+
+    @property
+    def path(self) -> Path:
+        """The RUN directory."""
+        ...
+
+
+RunOrPath = str | Path | HasRun
+"""A RUN directory, or what was opened from one."""
+
+
+def run_path(given: RunOrPath) -> Path:
+    """The directory itself.
+
+    Raises:
+        InputError: It is neither a directory's path nor a result.
+    """
+    return as_path(getattr(given, "path", given), Argument("run"))
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A run as it was when it was opened.
+
+    Attributes:
+        path: The RUN directory.
+        record: run.toml.
+    """
+
+    path: Path
+    record: Mapping[str, Any]
+
+    @classmethod
+    def open(cls, given: RunOrPath) -> "Run":
+        """Read the settings of a run.
+
+        Raises:
+            InputError: There is none, or another version of fluid or engine made it.
+        """
+        run = cls(path := run_path(given), _read(path))
+        run._check_generation()
+        return run
+
+    @classmethod
+    @contextmanager
+    def entered(cls, given: RunOrPath) -> "Iterator[Run]":
+        """Work in a run, alone.
+
+        Raises:
+            InputError: There is none, or another command works in it.
+        """
+        _read(run_path(given))  # before a mistyped name becomes a directory
+        with alone_in(run_path(given)):
+            yield cls.open(given)
+
+    @classmethod
+    @contextmanager
+    def begun(
+        cls, path: Path, record: Mapping[str, Any], *, resume: bool, growing: str = ""
+    ) -> "Iterator[Run]":
+        """Work alone in a run that is new, or goes on with the same settings.
+
+        run.toml is written before anything else, so that whatever is found later in the directory
+        can be traced to its settings.
+
+        Args:
+            path: The directory; made if missing.
+            record: Of the run, in the sections that `MUST_AGREE` names and others.
+            resume: Whether the directory may hold a run, to go on with.
+            growing: Field of `record`, if any, that may be larger than in the run that is gone on
+                with; its results are not current then, and all simulations are kept.
+
+        Raises:
+            InputError: Another command works there; the directory holds a run and `resume` is
+                false; or the run was made with another setting, seed or input.
+        """
+        if not resume and (path / RUN_TOML).exists():
+            raise _held(path)
+        with alone_in(path):
+            yield cls(path, _begin(path, record, resume=resume, growing=growing))
+
+    @cached_property
+    def recordings(self) -> list[Recording]:
+        """The run's own copies of what it was calibrated on.
+
+        Raises:
+            InputError: A copy is missing, or is another recording.
+        """
+        return kept_recordings(self.path, self.record)
+
+    @cached_property
+    def prior(self) -> "Prior":
+        """Of the parameters, before stirring."""
+        return read_prior(self.record["settings"]["prior"])
+
+    @contextmanager
+    def bank(self) -> "Iterator[SimulationBank]":
+        """Every finished simulation.
+
+        Raises:
+            InputError: The file is damaged or cannot be written.
+            OSError: The disk is full or fails.
+        """
+        from ..inference import SimulationBank
+
+        path = self.path / SIMULATIONS
+        try:
+            bank = SimulationBank(path)
+        except (ValueError, sqlite3.Error) as err:
+            raise _unusable(path, err) from err
+        with bank:
+            try:
+                yield bank
+            except sqlite3.Error as err:
+                raise _unusable(path, err) from err
+
+    def result(self, step: str) -> "DataTree | None":
+        """What a step has concluded, if it was made from what the run holds now; else None."""
+        return self._look(step)[0]
+
+    def why_not(self, step: str) -> str:
+        """Why a step's result is not current, though there is one; "" where it is, or is none."""
+        there = (self.path / RESULTS[step]).is_file()
+        return self._look(step)[1] if there else ""
+
+    def required(self, step: str) -> "DataTree":
+        """The same as `result`.
+
+        Raises:
+            InputError: There is none; the message says why, and which command makes it.
+        """
+        tree, why = self._look(step)
+        if tree is None:
+            raise InputError(why, where=str(self.path), fix=f"run: {self.again(step)}")
+        return tree
+
+    def keep(
+        self,
+        step: str,
+        tree: "DataTree",
+        made_from: Mapping[str, Any],
+        summary: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Write a step's result, and with its numbers summary.json.
+
+        Args:
+            step: Of `RESULTS`.
+            tree: What it has concluded; gets the attributes `made_from` and `summary`.
+            made_from: All that decides it, as JSON.
+            summary: Its section of summary.json.
+        """
+        tree.attrs["made_from"] = as_json(made_from)
+        if summary is not None:
+            tree.attrs["summary"] = json.dumps(summary)
+        write_result(tree, self.path / RESULTS[step])
+        self.write_summary()
+
+    def write_summary(self) -> None:
+        """Write summary.json from the current results: it is for people and other programs."""
+        trees = {step: self.result(step) for step in RESULTS}
+        found = {
+            step: tree.attrs["summary"]
+            for step, tree in trees.items()
+            if tree is not None and "summary" in tree.attrs
+        }
+        write_summary(self.path / SUMMARY_FILE, {s: json.loads(text) for s, text in found.items()})
+
+    @property
+    def made_from(self) -> dict[str, Any]:
+        """What decides the calibration."""
+        return {name: self.record.get(name) for name in (*MUST_AGREE, "files")}
+
+    def posterior_key(self) -> str:
+        """Of the latest posterior: the criticism's where it has added an effect."""
+        criticism = self.result("criticise")
+        if criticism is not None and json.loads(criticism.attrs["summary"])["accepted"]:
+            return key_of(criticism)
+        return key_of(self.required("calibrate"))
+
+    def again(self, step: str) -> str:
+        """The command that makes a step's result."""
+        if step == "calibrate":
+            words = ("calibrate", "RECORDING...", "--out", self.path, "--resume")
+            return command(*words, *self._options())
+        return command("report" if step == "frames" else step, self.path)
+
+    def _look(self, step: str) -> "tuple[DataTree | None, str]":
+        """A step's current result, or why there is none."""
+        path = self.path / RESULTS[step]
+        if not path.is_file():
+            return None, ABSENT[step]
+        try:
+            tree = read_result(path)
+        except (OSError, ValueError):
+            return None, f"{path.name} is damaged"
+        why = self._stale(step, json.loads(tree.attrs["made_from"]))
+        return (None, f"{path.name} {why}") if why else (tree, "")
+
+    def _stale(self, step: str, made_from: Mapping[str, Any]) -> str:
+        """In what a result differs from what the run holds; "" where it is current."""
+        if step == "calibrate":
+            same = as_json(made_from) == as_json(self.made_from)
+            return "" if same else f"was made by other settings than {RUN_TOML} holds"
+        if step == "frames":  # whoever shows them compares what they were made from
+            return ""
+        calibration, why = self._look("calibrate")
+        if calibration is None:
+            return f"cannot be used: {why}"
+        after = key_of(calibration) if step == "criticise" else self.posterior_key()
+        if made_from["after"] != after:
+            return "was made from another posterior"
+        if step == "pour" and made_from["given"] != digest_of_pours(self.path):
+            return "was made with other given pours"
+        return ""
+
+    def _options(self) -> list[str]:
+        """Options with which the run was started, where they are not the default."""
+        settings, usual = self.record.get("settings", {}), asdict(CalibrationSettings())
+        given = {name: settings.get(name, usual[name]) for name in RESUMED_OPTIONS}
+        changed = {name: value for name, value in given.items() if value != usual[name]}
+        return [word for name, value in changed.items() for word in (f"--{name}", str(value))]
+
+    def _check_generation(self) -> None:
+        """Refuse a run of another fluid or engine, from which nothing follows today.
+
+        Raises:
+            InputError: It is one; the message has the command that calibrates on its recordings.
+        """
+        now, simulators = generations(), self.record.get("simulator", {}).values()
+        held = {
+            "model": {str(one.get("model", "unknown")) for one in simulators},
+            "engine": {str(self.record.get("engine", {}).get("version", "unknown"))},
+        }
+        for part, versions in held.items():
+            if versions != {str(now[part])}:
+                recordings = kept_paths(self.path, self.record) or ("RECORDING...",)
+                anew = self.path.with_name(f"{self.path.name}_{part}_{now[part]}")
+                words = ("calibrate", *recordings, "--out", anew, *self._options())
+                raise InputError(
+                    f"was made by {part} {', '.join(sorted(versions))}, and this is {now[part]}",
+                    where=str(self.path),
+                    fix=f"calibrate again: {command(*words)}",
+                )
+
+
+def as_json(made_from: Mapping[str, Any]) -> str:
+    """One text for equal content."""
+    return json.dumps(made_from, sort_keys=True)
+
+
+def key_of(tree: "DataTree") -> str:
+    """Digest of all that a result was made from."""
+    return sha256(tree.attrs["made_from"].encode()).hexdigest()
+
+
+def check_resumable(path: Path) -> None:
+    """Refuse to go on where nothing has begun, as with a mistyped name.
+
+    Raises:
+        InputError: There is no run; the message names one that may have been meant.
+    """
+    if (path / RUN_TOML).exists():
+        return
+    near = _run_near(path)
+    fix = f"did you mean {near}? To begin" if near else "to begin"
+    raise InputError(
+        "holds no run to resume", where=str(path), fix=f"{fix} a new run, leave --resume out"
+    )
+
+
+def _run_near(path: Path) -> Path | None:
+    """A run that may have been meant: within the directory, around it, or of a name like it."""
+    around = (*sorted(path.glob(f"*/{RUN_TOML}")), path.parent / RUN_TOML)
+    if found := [one.parent for one in around if one.exists()]:
+        return found[0]
+    beside = {one.parent.name: one.parent for one in path.parent.glob(f"*/{RUN_TOML}")}
+    return next((beside[name] for name in get_close_matches(path.name, beside, n=1)), None)
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """run.toml.
+
+    Raises:
+        InputError: There is none, or it is not TOML.
+    """
+    file = path / RUN_TOML
+    if not file.is_file():
+        raise InputError(
+            f"no {RUN_TOML} in it",
+            where=str(path),
+            fix="give the directory of a run, as made by: bolfi-liquids calibrate ... --out RUN",
+        )
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as err:
+        raise InputError(f"not TOML ({err})", where=str(file), fix="restore the file") from err
+
+
+def _begin(
+    path: Path, record: Mapping[str, Any], *, resume: bool, growing: str
+) -> Mapping[str, Any]:
+    """run.toml of a run that begins, or goes on; see `Run.begun`."""
+    if (path / RUN_TOML).exists():
+        if not resume:  # another command has begun here meanwhile
+            raise _held(path)
+        held = _read(path)
+        differing = _differences(held, record)
+        if grows := growing in differing and _larger(*differing[growing]):
+            del differing[growing]
+        if differing:
+            raise _refused(differing, held, path, growing)
+        made = {**record, "created": held.get("created", "")} if grows else held
+        limits = dict.fromkeys([*held.get("timeouts", ()), *record.get("timeouts", ())])
+        record = {**made, **({"timeouts": list(limits)} if limits else {})}
+        if record == held:
+            return held
+    elif orphans := [n for n in (SIMULATIONS, *RESULTS.values()) if (path / n).exists()]:
+        raise InputError(
+            f"holds {orphans[0]} without {RUN_TOML}",
+            where=str(path),
+            fix="choose another `out`; nothing was overwritten",
+        )
+    text = tomli_w.dumps(record)
+    write_text(path / RUN_TOML, text)
+    return tomllib.loads(text)  # as it will be read
+
+
+def _held(path: Path) -> InputError:
+    """A refusal to begin where a run is."""
+    fix = "give `resume` to go on with it, or another `out`"
+    return InputError("holds a run already", where=str(path), fix=fix)
+
+
+def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+    """Fields that decide the results -> their values in both records, where these differ."""
+    written = tomllib.loads(tomli_w.dumps(new))  # a tuple compares as what was written
+    wanted, held = (
+        dict(_fields({name: one.get(name) for name in MUST_AGREE})) for one in (written, old)
+    )
+    fields = [*wanted, *(held.keys() - wanted.keys())]
+    both = {field: (held.get(field), wanted.get(field)) for field in fields}
+    return {field: values for field, values in both.items() if values[0] != values[1]}
+
+
+def _fields(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in table.items():
+        name = f"{path}.{key}" if path else str(key)
+        if isinstance(value, Mapping):
+            yield from _fields(value, name)
+        else:
+            yield name, value
+
+
+def _larger(held: Any, wanted: Any) -> bool:
+    return isinstance(held, int) and isinstance(wanted, int) and wanted > held
+
+
+def _refused(
+    differing: Mapping[str, tuple[Any, Any]], record: Mapping[str, Any], path: Path, growing: str
+) -> InputError:
+    """A refusal that names the first field that differs from the run's `record`."""
+    field, (held, wanted) = next(iter(differing.items()))
+    if field.startswith("inputs."):
+        what = "is of other recordings"
+        fix = f"give those that {RUN_TOML} names under files, unchanged, or choose another `out`"
+        return InputError(what, where=str(path), fix=fix)
+    if field.startswith(("engine.", "simulator.")):  # settings and recordings are the same
+        made_by = record.get("versions", {}).get("bolfi-liquids")
+        what = f"{field} was {held!r} and is {wanted!r} now"
+        fix = "begin again with another `out`"
+        if made_by not in (None, version("bolfi-liquids")):
+            fix += f", or go on with version {made_by}, which made the run"
+    else:
+        what = f"{field} is {held!r} in the run, but {wanted!r} was asked"
+        own = "the run's own value" + (" or a larger one" if field == growing else "")
+        fix = f"resume with {own}, or choose another `out`"
+    return InputError(what, where=f"{path / RUN_TOML}", fix=fix)
+
+
+def _unusable(path: Path, err: Exception) -> InputError:
+    # the bank's own error names the path and another cure
+    cause = err.__cause__ if isinstance(err.__cause__, sqlite3.Error) else err
+    return InputError(
+        f"cannot be used ({cause})",
+        where=str(path),
+        fix="make it writable, restore it from a copy, or start again with another --out",
+    )
