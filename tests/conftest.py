@@ -68,28 +68,53 @@ def importable(monkeypatch):
 @pytest.fixture
 def poured_run(made_poured_run, tmp_path):
     """A run that has chosen a pour, to be altered."""
-    return shutil.copytree(made_poured_run, tmp_path / "run_0_1")
+    return shutil.copytree(made_poured_run, tmp_path / "poured_run")
 
 
 @pytest.fixture(scope="session")
 def made_poured_run(tmp_path_factory):
-    """A small run of version 0.1, without its criticism.
+    """A small run of `tests/data`, as if today's fluid and engine had made it.
 
-    It names today's model, for a pour over another model's liquid is not executed.
+    Of the first 60 samples of the bundled glycerin_v10.nc, without its simulations:
+
+        run = bl.calibrate(short, out=..., budget=8, batch=2, particles=200, seed=5, chains=2,
+                           draws=100)
+        bl.choose_pour(run, budget=24, iterations=7, draws=16)
     """
-    folder = tmp_path_factory.mktemp("poured_run")
-    with tarfile.open(Path(__file__).parent / "data" / "run_0_1.tar.xz") as archive:
-        archive.extractall(folder, filter="data")
-    run = folder / "run_0_1"
-    summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
-    del summary["criticise"]
-    (run / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
-    from bolfi_liquids.models import MODEL_VERSION
+    from bolfi_liquids.run.provenance import generations
+    from bolfi_liquids.run.result_file import read_result
+    from bolfi_liquids.run.run import RESULTS, RUN_TOML, Run
 
-    record = tomllib.loads((run / "run.toml").read_text(encoding="utf-8"))
-    record["simulator"]["recording_1"]["model"] = MODEL_VERSION
-    (run / "run.toml").write_text(tomli_w.dumps(record), encoding="utf-8")
-    return run
+    folder = tmp_path_factory.mktemp("poured_run")
+    with tarfile.open(Path(__file__).parent / "data" / "poured_run.tar.xz") as archive:
+        archive.extractall(folder, filter="data")
+    path, now = folder / "poured_run", generations()
+    record = tomllib.loads((path / RUN_TOML).read_text(encoding="utf-8"))
+    record["simulator"]["recording_1"]["model"] = now["model"]
+    record["engine"]["version"] = now["engine"]
+    (path / RUN_TOML).write_text(tomli_w.dumps(record), encoding="utf-8")
+    run = Run.open(path)
+    trees = {step: read_result(path / RESULTS[step]) for step in ("calibrate", "pour")}
+    summaries = {step: json.loads(tree.attrs["summary"]) for step, tree in trees.items()}
+    run.keep("calibrate", trees["calibrate"], run.made_from, summaries["calibrate"])
+    made_from = json.loads(trees["pour"].attrs["made_from"]) | {"after": run.posterior_key()}
+    run.keep("pour", trees["pour"], made_from, summaries["pour"])
+    return path
+
+
+@pytest.fixture(scope="session")
+def with_numbers():
+    """Changes numbers of a result, as a step would have written them; the path of the run."""
+    from bolfi_liquids.run.run import Run
+
+    def change(run, step="calibrate", /, **numbers):
+        opened = Run.open(run)
+        tree = opened.required(step)
+        summary = json.loads(tree.attrs["summary"]) | numbers
+        opened.keep(step, tree, json.loads(tree.attrs["made_from"]), summary)
+        return opened.path
+
+    return change
 
 
 @pytest.fixture(autouse=True)

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,14 +14,14 @@ from ..files import given_path
 from ..inputs.frame import frame_warnings
 from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import Pours, table_and_cups
-from ..inputs.prior import check_prior, default_prior, describe_prior
+from ..inputs.prior import check_prior, default_prior, describe_prior, read_prior
 from ..inputs.recording import Recording, aborted_recordings
 from ..inputs.settings import (
     CalibrationSettings,
     CriticismSettings,
 )
 from ..inputs.start import check_start
-from ..progress import Advance, progress_bar
+from ..progress import Advance, after_first, progress_bar
 from ..run.execution import Execution
 from ..run.given_pours import keep_pours
 from ..run.provenance import LIBRARIES, versions
@@ -182,10 +183,10 @@ def _calibrate(
     from .posterior_file import results_tree
 
     needed = settings.budget + CLEAN_RUNS * len(baseline) + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
-    with (
-        run.bank() as bank,
-        progress_bar("simulating stirs", needed, shown=execution.progress) as advance,
-    ):
+    with run.bank() as bank, ExitStack() as stack:
+        kept = min(len(bank), needed)
+        bar = progress_bar("simulating stirs", needed, shown=execution.progress, done=kept)
+        advance = after_first(kept, stack.enter_context(bar))
         keep = execution.keep(bank, stirring.identity, settings.batch)
         # the paper's surrogate has no noise to which an error adds
         allows = settings.surrogate == "signal"
@@ -244,7 +245,9 @@ def _clean_residuals(
 
 def _usual_prior(path: Path, resume: bool) -> "Prior":
     """That of a run that goes on, or else the default."""
-    return Run.open(path).prior if resume and (path / RUN_TOML).exists() else default_prior()
+    begun = resume and (path / RUN_TOML).exists()
+    settings = Run.open(path).record.get("settings", {}) if begun else {}
+    return read_prior(settings["prior"]) if "prior" in settings else default_prior()
 
 
 def _open_clean(

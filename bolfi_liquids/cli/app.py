@@ -9,7 +9,6 @@ import typer
 
 from .. import __version__
 from ..inputs.settings import CalibrationSettings, PourSettings
-from ..run.run import check_resumable
 from . import check as cli_check
 from . import guide, import_table, reproduce
 from . import record as cli_record
@@ -102,6 +101,7 @@ def calibrate(
     from ..calibration.calibrate import calibrate as run_calibrate
     from ..inputs.open import open_recordings
     from ..reporting.warnings import Results
+    from ..run.run import check_resumable
 
     settings = CalibrationSettings(**asdict(options))
     if resume:

@@ -15,7 +15,6 @@ from typer.exceptions import TyperException
 
 from ..errors import InputError
 from ..files import disk_errno
-from ..run.run import RUN_TOML
 from ..wording import command
 
 FAILED = 1
@@ -140,6 +139,8 @@ def _say(line: str) -> None:
 
 
 def _how_to_go_on(arguments: list[str]) -> str:
+    from ..run.run import RUN_TOML
+
     again, begun = command(*arguments), True
     if "calibrate" in arguments and "--resume" not in arguments:
         out = _value_of("--out", arguments)

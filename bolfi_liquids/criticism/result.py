@@ -190,11 +190,17 @@ def latest_calibration(given: RunOrPath) -> Calibration:
 
     Args:
         given: A calibration, which is returned as it is; a criticism; or a run.
+
+    Raises:
+        InputError: The run has a criticism that is damaged or of another posterior: what it
+            accepted is part of what is known.
     """
     if isinstance(given, Calibration):
         return given
     if isinstance(given, Criticism):
         return given.calibration
     run = given if isinstance(given, Run) else Run.open(given)
+    if run.why_not("criticise"):
+        run.required("criticise")
     found = Criticism.of(run)
     return Calibration.of(run) if found is None else found.calibration

@@ -1,6 +1,5 @@
 """The prior of the liquid's parameters."""
 
-import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -20,7 +19,6 @@ TRUNCATED = (
     "RightTruncatedDistribution",
     "TwoSidedTruncatedDistribution",
 )
-TEXT_OF_VERSION_0_1 = re.compile(r"(\w+)\((.*)\)")
 V = TypeVar("V")
 
 

@@ -182,7 +182,9 @@ CHAPTERS: dict[str, Callable[[Any], dict[str, Any]]] = {
 """What the template needs of each result."""
 
 
-def _moving(calibration: Calibration, pour: Pour | None, how: Mapping[str, Any]) -> dict[str, Any] | None:
+def _moving(
+    calibration: Calibration, pour: Pour | None, how: Mapping[str, Any]
+) -> dict[str, Any] | None:
     """Moving pictures, simulated by the arguments `how` of `frames_of`."""
     from .frames import Shown, frames_of
     from .moving_pictures import moving_context

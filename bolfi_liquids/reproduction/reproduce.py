@@ -9,10 +9,10 @@ from pathlib import Path
 from ..errors import Argument, InputError
 from ..files import given_path
 from ..inference.simulations import Workers
-from ..run.directory import open_bank
-from ..run.entering import working_in
 from ..run.execution import Execution
+from ..run.lock import alone_in
 from ..run.provenance import LIBRARIES, generations, versions
+from ..run.run import Run
 from ..run.workers import open_workers
 from .figure import Drawn
 from .figure_of_adhesion import adhesion
@@ -78,7 +78,7 @@ def draw_figures(
     """As `reproduce`, each figure with its name as soon as it is written."""
     chosen = _chosen(names)
     made_with = {"scale": asdict(scale), **generations(), "versions": versions(LIBRARIES)}
-    with working_in(out), open_bank(out) as bank:
+    with alone_in(out), Run(out, {}).bank() as bank:
         shared = SharedSimulations(out, scale, bank, execution)
         if "adhesion" in chosen:
             shared.begin_sticky()

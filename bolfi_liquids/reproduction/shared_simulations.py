@@ -14,9 +14,9 @@ from ..inputs.prior import default_prior
 from ..pouring.landed_pours import LandedPours
 from ..pouring.landing_map import LandingMap, map_of_prior
 from ..progress import progress_bar
-from ..run.directory import SIMULATIONS
 from ..run.execution import HERE, Execution
 from ..run.provenance import generations
+from ..run.run import SIMULATIONS
 from .learners import after_strokes, by_stirring_and_pouring
 from .sticky_study import Stuck, spilled_where_it_sticks
 from .study import spillage_study

@@ -10,8 +10,9 @@ from ..criticism.criticise import criticise
 from ..pouring.choose import choose_pour
 from ..pouring.spillage import pour_all, surface
 from ..progress import silent
-from ..run.directory import GIVEN_POURS, open_bank
 from ..run.execution import HERE, Execution
+from ..run.given_pours import GIVEN_POURS
+from ..run.run import Run
 from ..seeds import Phase
 from .decisions import executions, spilled_by
 from .sticky import Sticky, draw_sticky, poured, recipe, stirred, waxed_cups
@@ -71,7 +72,7 @@ def spilled_where_it_sticks(
     flows = executions(truth.liquid, density, cups, truth.seed)
     rehearsed = executions(truth.theta, density, cups, truth.seed, Phase.REHEARSAL)
     rates = np.geomspace(*cups.angular_velocity_range, scale.rates)
-    with open_bank(out) as bank:
+    with Run(out, {}).bank() as bank:
         keep = execution.keep(bank)
         known = surface(pour_all(rehearsed, rates, keep, silent), cups).least("mean")
         actions = [before.chosen.action, after.chosen.action, known]

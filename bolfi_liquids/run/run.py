@@ -14,7 +14,6 @@ from dataclasses import asdict, dataclass
 from difflib import get_close_matches
 from functools import cached_property
 from hashlib import sha256
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -295,11 +294,11 @@ class Run:
         """
         now, simulators = generations(), self.record.get("simulator", {}).values()
         held = {
-            "model": {str(one.get("model", "unknown")) for one in simulators},
-            "engine": {str(self.record.get("engine", {}).get("version", "unknown"))},
+            "model": {str(one.get("model")) for one in simulators if "model" in one},
+            "engine": {str(one) for one in [self.record.get("engine", {}).get("version")] if one},
         }
         for part, versions in held.items():
-            if versions != {str(now[part])}:
+            if not versions <= {str(now[part])}:
                 recordings = kept_paths(self.path, self.record) or ("RECORDING...",)
                 anew = self.path.with_name(f"{self.path.name}_{part}_{now[part]}")
                 words = ("calibrate", *recordings, "--out", anew, *self._options())
@@ -370,12 +369,12 @@ def _begin(
     if (path / RUN_TOML).exists():
         if not resume:  # another command has begun here meanwhile
             raise _held(path)
-        held = _read(path)
+        held = Run.open(path).record
         differing = _differences(held, record)
         if grows := growing in differing and _larger(*differing[growing]):
             del differing[growing]
         if differing:
-            raise _refused(differing, held, path, growing)
+            raise _refused(differing, path, growing)
         made = {**record, "created": held.get("created", "")} if grows else held
         limits = dict.fromkeys([*held.get("timeouts", ()), *record.get("timeouts", ())])
         record = {**made, **({"timeouts": list(limits)} if limits else {})}
@@ -422,25 +421,16 @@ def _larger(held: Any, wanted: Any) -> bool:
     return isinstance(held, int) and isinstance(wanted, int) and wanted > held
 
 
-def _refused(
-    differing: Mapping[str, tuple[Any, Any]], record: Mapping[str, Any], path: Path, growing: str
-) -> InputError:
-    """A refusal that names the first field that differs from the run's `record`."""
+def _refused(differing: Mapping[str, tuple[Any, Any]], path: Path, growing: str) -> InputError:
+    """A refusal that names the first field that differs from the run's."""
     field, (held, wanted) = next(iter(differing.items()))
     if field.startswith("inputs."):
         what = "is of other recordings"
         fix = f"give those that {RUN_TOML} names under files, unchanged, or choose another `out`"
         return InputError(what, where=str(path), fix=fix)
-    if field.startswith(("engine.", "simulator.")):  # settings and recordings are the same
-        made_by = record.get("versions", {}).get("bolfi-liquids")
-        what = f"{field} was {held!r} and is {wanted!r} now"
-        fix = "begin again with another `out`"
-        if made_by not in (None, version("bolfi-liquids")):
-            fix += f", or go on with version {made_by}, which made the run"
-    else:
-        what = f"{field} is {held!r} in the run, but {wanted!r} was asked"
-        own = "the run's own value" + (" or a larger one" if field == growing else "")
-        fix = f"resume with {own}, or choose another `out`"
+    what = f"{field} is {held!r} in the run, but {wanted!r} was asked"
+    own = "the run's own value" + (" or a larger one" if field == growing else "")
+    fix = f"resume with {own}, or choose another `out`"
     return InputError(what, where=f"{path / RUN_TOML}", fix=fix)
 
 

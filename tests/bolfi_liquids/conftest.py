@@ -1,9 +1,8 @@
 import fcntl
-import hashlib
-import json
 import os
 import shutil
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -18,29 +17,11 @@ from bolfi_liquids.criticism.summary import CameraNoise, CriticismSummary
 from bolfi_liquids.criticism.verdict import Verdict
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.reporting.frames import Shown, frames_of
-from bolfi_liquids.run.directory import CRITICISM_FORMAT
-from bolfi_liquids.run.recordings import kept_recordings
+from bolfi_liquids.run.run import Run, as_json
 
 BUNDLED = Path(str(files("bolfi_liquids.data"))) / "glycerin_v10.nc"
 SHORT = 60  # samples, 2 s: the pause and the first strokes
 SETTINGS = {"budget": 8, "batch": 2, "particles": 200, "seed": 5}
-
-
-@pytest.fixture(scope="session", autouse=True)
-def _equal_files_are_read_once():
-    """Copies of few trees are read hundreds of times, and each takes half a second."""
-    read, known = xr.open_datatree, {}
-
-    def opened(path, **options):
-        key = hashlib.sha256(Path(path).read_bytes()).digest(), *options.items()
-        if key not in known:
-            with read(path, **options) as tree:
-                known[key] = tree.load()
-        return known[key].copy(deep=True)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(xr, "open_datatree", opened)
-        yield
 
 
 @pytest.fixture
@@ -122,7 +103,7 @@ def pour(calibration, pour_settings, tmp_path_factory):
 def shown(pour):
     """What a report shows of the pour's run, which was not criticised."""
     calibration = bl.Calibration.open(pour.path)
-    (recording,) = kept_recordings(pour.path, dict(calibration.record))
+    (recording,) = calibration.run.recordings
     return Shown(calibration, recording, pour)
 
 
@@ -188,7 +169,8 @@ def criticism_summary():
         baseline_left_out=(),
         noise=CameraNoise(sd_deg=0.2, sd_uncertainty=0.4, correlation=0.25, samples=32),
         seconds=8.0,
-        made_from={"settings": {"effects": None}, "format": CRITICISM_FORMAT},
+        made_from={"settings": {"effects": None}},
+        frame_faults=(),
     )
 
 
@@ -246,7 +228,6 @@ def _held_out(holds):
 
 MADE_FROM = {
     "version": bl.__version__,
-    "format": CRITICISM_FORMAT,
     "settings": {"effects": ["camera_delay", "camera_tilt"], "seed": 3},
     "held_out": {},
     "baseline": {"clean.nc": "abc123"},
@@ -301,7 +282,7 @@ def _made(*, after=True, held=None, pours=False, status=("named", "rejected", "r
         groups["/pours/effects"], groups["/pours/confusion"] = found, confusion
     tree = xr.DataTree.from_dict(groups)
     tree.attrs.update(
-        made_from=json.dumps(MADE_FROM),
+        made_from=as_json(MADE_FROM),
         accepted=["camera_delay"],
         requested=[],
     )
@@ -312,3 +293,17 @@ def _made(*, after=True, held=None, pours=False, status=("named", "rejected", "r
 def made():
     """Makes a tree as `criticise` writes it, see `_made`."""
     return _made
+
+
+@pytest.fixture
+def keep_criticism(made, made_from, criticism_summary):
+    """Keeps a criticism in a calibrated run, with other numbers where they are given."""
+
+    def keep(path, **numbers):
+        run, tree = Run.open(path), made(held=True)
+        source = made_from | {"after": run.posterior_key()}
+        summary = replace(criticism_summary, made_from=source, **numbers)
+        run.keep("criticise", tree, source, summary.to_json())
+        return run.path
+
+    return keep

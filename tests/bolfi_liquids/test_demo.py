@@ -13,7 +13,7 @@ from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.open import open_recording
 from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.inputs.settings import CalibrationSettings
-from bolfi_liquids.run.directory import RUN_TOML
+from bolfi_liquids.run.run import RUN_TOML
 
 
 def of_the_demo(**changes):

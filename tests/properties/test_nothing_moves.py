@@ -19,13 +19,11 @@ import pytest
 import typer.main
 from bolfi_liquids.hardware.session.confirmation import CONFIRMATION, Confirmation
 from pexpect.fdpexpect import fdspawn
-from xarray import DataTree, load_datatree
 
 import bolfi_liquids as bl
 from bolfi_liquids import hardware
-from bolfi_liquids.calibration.posterior_file import write_tree
 from bolfi_liquids.cli.app import app
-from bolfi_liquids.wording import sentence
+from bolfi_liquids.run.run import Run
 
 # a dry run of them looks at the arm, whose controller may not be silent for long
 LOOKS = ("record", "pour")
@@ -237,19 +235,17 @@ def test_armed_without_the_sentence_moves_nothing(
 
 @pytest.mark.slow
 @pytest.mark.alone  # a look at an arm, whose controller may not be silent for long
-def test_a_stale_pour_is_refused_and_a_dry_run_begins_with_that(poured_run, rig_file, emulator):
+def test_a_stale_pour_is_refused(poured_run, rig_file, emulator):
     before = emulator.admin.motions()
-    tree = load_datatree(poured_run / "posterior.nc", engine="h5netcdf")
-    tree["posterior"] = DataTree(tree["posterior"].to_dataset() * 1.001)
-    write_tree(tree, poured_run / "posterior.nc")
+    run = Run.open(poured_run)
+    tree = run.required("pour")
+    run.keep("pour", tree, {"after": "another posterior", "given": ""}, {})
     command = ["pour", poured_run, "--execute", "--rig", rig_file]
-    dry = bolfi_liquids(*command)
-    assert dry.stdout.startswith(str(sentence("warning.stale_pour"))), dry.stderr
-    assert "nothing was moved" in dry.stdout
-    armed = bolfi_liquids(*command, "--arm", typed=f"{CONFIRMATION}\n")
-    # refused before the plan, not for want of a terminal
-    assert armed.returncode == REFUSED and armed.stdout == ""
-    assert "bolfi-liquids pour" in armed.stderr and "terminal" not in armed.stderr
+    for armed in ([], ["--arm"]):
+        told = bolfi_liquids(*command, *armed, typed=f"{CONFIRMATION}\n")
+        # refused before the plan, not for want of a terminal
+        assert told.returncode == REFUSED and told.stdout == ""
+        assert "bolfi-liquids pour" in told.stderr and "terminal" not in told.stderr
     assert emulator.admin.motions() == before
 
 

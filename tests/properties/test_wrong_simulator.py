@@ -17,7 +17,7 @@ from bolfi_liquids.criticism.pours import Pouring
 from bolfi_liquids.inputs.bundled import bundled_pours
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.pour_table import open_pours
-from bolfi_liquids.reporting.warnings import results_of, warnings_of
+from bolfi_liquids.reporting.warnings import Results, warnings_of
 
 WRONG = Path(__file__).parents[1] / "data" / "wrong_simulator"
 SETTINGS = {"budget": 12, "batch": 4, "chains": 2, "draws": 200, "sampler": "emcee"}
@@ -48,7 +48,7 @@ def test_a_posterior_that_misses_the_truth_comes_with_a_warning(liquid, warned, 
     )
     viscosity = calibration.summary.parameters["viscosity"]
     assert not viscosity.q05 <= TRUTHS[liquid] <= viscosity.q95
-    keys = [sentence.key for sentence in warnings_of(results_of(calibration))]
+    keys = [sentence.key for sentence in warnings_of(Results.of(calibration.run))]
     assert any(key.startswith(warned) for key in keys)
     if warned == BAD_FIT:
         assert keys[0] == BAD_FIT

@@ -10,7 +10,7 @@ import bolfi_liquids as bl
 from bolfi_liquids.calibration.bad_fit import bad_fit
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.recording import along_path, recording_dataset
-from bolfi_liquids.reporting.warnings import results_of, warnings_of
+from bolfi_liquids.reporting.warnings import Results, warnings_of
 
 SETTINGS = {"budget": 12, "batch": 4, "chains": 2, "draws": 200, "seed": 3, "sampler": "emcee"}
 REFERENCE = Path(__file__).parents[2] / "data/stirring_reference"
@@ -39,7 +39,7 @@ def test_a_wrong_frame_is_never_passed_on(tmp_path, caplog, change, fault):
     warned = [record.getMessage() for record in caplog.records]
     found = bad_fit(calibration.summary)
     assert (found is not None) == (fault is not None)
-    assert (found in warnings_of(results_of(calibration))) == (fault is not None)
+    assert (found in warnings_of(Results.of(calibration.run))) == (fault is not None)
     if fault is None:
         assert not any("stir.nc" in text for text in warned)
         return

@@ -22,6 +22,7 @@ from bolfi_liquids.calibration.check import PREDICTIVE_DRAWS, THETA_STAR_REPLICA
 from bolfi_liquids.calibration.posterior_figure import grid_density, marginal
 from bolfi_liquids.calibration.stir_simulator import Stirring, stirring_of
 from bolfi_liquids.drawing import new_figure
+from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.prior import default_prior
 
 
@@ -188,7 +189,8 @@ def test_an_aborted_recording_is_logged(short_recording, tmp_path, monkeypatch, 
     with xr.open_dataset(short_recording, decode_times=False) as whole:
         whole.assign_attrs(status="aborted", reason="protective stop").to_netcdf(aborted)
     monkeypatch.setattr(calibrating, "_calibrate", lambda *_: None)
-    bl.calibrate([short_recording, aborted], out=tmp_path / "run", progress=False)
+    with pytest.raises(InputError, match="not finished"):
+        bl.calibrate([short_recording, aborted], out=tmp_path / "run", progress=False)
     (notice,) = caplog.records
     assert str(aborted) in notice.getMessage() and "protective stop" in notice.getMessage()
 
@@ -238,10 +240,11 @@ def test_without_a_directory_a_run_is_among_the_temporary_files(short_recording,
     found = []
 
     def begun(run, *_):
-        found.append((run, (run / "run.toml").is_file()))
+        found.append((run.path, (run.path / "run.toml").is_file()))
 
     monkeypatch.setattr(calibrating, "_calibrate", begun)
-    bl.calibrate(short_recording, progress=False)
+    with pytest.raises(InputError, match="not finished"):
+        bl.calibrate(short_recording, progress=False)
     ((run, has_begun),) = found
     assert has_begun
     assert str(run).startswith(tempfile.gettempdir())

@@ -31,12 +31,12 @@ def test_what_stirs_taught_becomes_a_prior_of_the_same_mean_and_spread():
 
 
 def test_a_run_keeps_its_recordings(calibration):
-    (kept,) = kept_recordings(calibration.path, dict(calibration.record))
+    (kept,) = calibration.run.recordings
     assert [kept.hash] == calibration.record["inputs"]["sha256"]
 
 
 def test_a_changed_copy_is_refused(calibration, tmp_path):
-    (kept,) = kept_recordings(calibration.path, dict(calibration.record))
+    (kept,) = calibration.run.recordings
     folder = tmp_path / "recordings"
     folder.mkdir()
     (folder / kept.path.name).write_bytes(kept.path.read_bytes())
@@ -93,7 +93,7 @@ def test_what_is_held_out_or_clean_in_a_wrong_frame_is_told(calibration, caplog)
 
 
 def test_data_that_were_fitted_prove_nothing(calibration):
-    (kept,) = kept_recordings(calibration.path, dict(calibration.record))
+    (kept,) = calibration.run.recordings
     with pytest.raises(InputError, match="is what the run was calibrated on"):
         bl.criticise(calibration, held_out=kept, progress=False)
 

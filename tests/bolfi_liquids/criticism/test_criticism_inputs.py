@@ -11,7 +11,6 @@ from bolfi_liquids.calibration.baseline import Clean, apart, usual_elsewhere, us
 from bolfi_liquids.calibration.stir_simulator import stirring_of
 from bolfi_liquids.calibration.stirs import camera_noise, held_out_noise, stir_experiment
 from bolfi_liquids.criticism.inputs import Given, check_effects, open_inputs
-from bolfi_liquids.criticism.result import finished_criticism
 from bolfi_liquids.errors import Argument, InputError
 from bolfi_liquids.inputs.cups import open_cups
 from bolfi_liquids.inputs.open import open_recordings
@@ -160,17 +159,6 @@ def test_pours_need_an_effect_that_acts_in_them(calibration, table):
         settings=CriticismSettings(effects=("camera_delay",)),
         pours=table("p.csv"),
     )
-
-
-def test_a_run_that_was_not_criticised_holds_no_finished_criticism(calibration):
-    assert finished_criticism(calibration, {}) is None
-
-
-def test_a_damaged_summary_is_refused_before_anything_is_simulated(calibration, tmp_path):
-    damaged = replace(calibration, path=tmp_path)
-    (tmp_path / "summary.json").write_text('{"criticise": ')
-    with pytest.raises(InputError, match=r"summary\.json"):
-        finished_criticism(damaged, {})
 
 
 # What the recordings themselves tell of their noise.

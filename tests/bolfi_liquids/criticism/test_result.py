@@ -1,22 +1,20 @@
 """A criticism as it is opened, and the calibration that it extends."""
 
+import json
 import pickle
 import shutil
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import bolfi_liquids as bl
 from bolfi_liquids.calibration.bad_fit import bad_fit
-from bolfi_liquids.calibration.posterior_file import write_tree
 from bolfi_liquids.criticism.criticise import _learned_from
-from bolfi_liquids.criticism.result import finished_criticism, latest_calibration
+from bolfi_liquids.criticism.result import latest_calibration
 from bolfi_liquids.drawing import new_figure
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.settings import CriticismSettings
-from bolfi_liquids.run.directory import CRITICISM
-from bolfi_liquids.run.summary import read_summary, write_section
+from bolfi_liquids.run.run import Run
 
 
 @pytest.fixture
@@ -25,22 +23,14 @@ def run(calibration, tmp_path):
 
 
 @pytest.fixture
-def criticised(run, made, made_from, criticism_summary):
+def criticised(run, keep_criticism):
     """A copy of a run, with a criticism that accepted an effect."""
-    write_tree(made(held=True), run / CRITICISM)
-    replace(criticism_summary, made_from=made_from).write(run)
-    return run
+    return keep_criticism(run)
 
 
 @pytest.fixture
 def extended(criticised):
     return bl.Criticism.open(criticised).calibration
-
-
-def changed(run, **made_from):
-    """Write down that the section was made from something else."""
-    section = read_summary(run)["criticise"]
-    write_section(run, "criticise", section | {"made_from": section["made_from"] | made_from})
 
 
 def test_an_extended_calibration_shows_its_own_parameters(extended, calibration, criticised):
@@ -60,25 +50,25 @@ def test_its_search_is_that_of_the_base(extended):
     assert extended.plot_search(figure.subplots(3, 1, squeeze=False)).shape == (3, 1)
 
 
+BAD = {"fit_rms_deg": 2.0, "noise_deg": 0.2}
+
+
 @pytest.mark.slow
-def test_an_effect_that_was_accepted_is_judged_by_the_fit_that_it_leaves(criticised):
-    calibration = bl.Calibration.open(criticised)
-    replace(calibration.summary, fit_rms_deg=2.0, noise_deg=0.2).write(criticised)
+def test_an_effect_that_was_accepted_is_judged_by_the_fit_that_it_leaves(criticised, with_numbers):
+    with_numbers(criticised, **BAD)
     assert bad_fit(bl.Calibration.open(criticised).summary) is not None
     assert bad_fit(latest_calibration(criticised).summary) is None
+    gap = bl.Criticism.open(criticised).summary.to_json()["gap_deg"]
     for change in ({"rms_after": 2.0}, {"rms_after": None}):
-        section = read_summary(criticised)["criticise"]
-        section["gap_deg"] |= change
-        write_section(criticised, "criticise", section)
+        with_numbers(criticised, "criticise", gap_deg=gap | change)
         assert bad_fit(latest_calibration(criticised).summary) is not None
 
 
-def test_an_effect_of_pours_alone_mends_no_stir(criticised):
-    calibration = bl.Calibration.open(criticised)
-    replace(calibration.summary, fit_rms_deg=2.0, noise_deg=0.2).write(criticised)
-    section = read_summary(criticised)["criticise"]
-    section["stirs"] |= {"verdict": "tie", "effects": ["stick_mass", "camera_tilt"]}
-    write_section(criticised, "criticise", section)
+def test_an_effect_of_pours_alone_mends_no_stir(criticised, with_numbers):
+    with_numbers(criticised, **BAD)
+    stirs = bl.Criticism.open(criticised).summary.to_json()["stirs"]
+    tied = stirs | {"verdict": "tie", "effects": ["stick_mass", "camera_tilt"]}
+    with_numbers(criticised, "criticise", stirs=tied)
     assert bad_fit(latest_calibration(criticised).summary) is not None
 
 
@@ -102,45 +92,23 @@ def test_results_travel(extended, criticised, pour):
         assert repr(pickle.loads(pickle.dumps(one))) == repr(one)
     again = pickle.loads(pickle.dumps(extended))
     np.testing.assert_array_equal(again.posterior["viscosity"], extended.posterior["viscosity"])
-    with pytest.raises(TypeError):
-        again.record["settings"] = {}
 
 
-@pytest.mark.parametrize("read", [latest_calibration, bl.Criticism.open])
-def test_a_criticism_of_another_form_is_refused_by_its_version(criticised, read):
-    changed(criticised, format=99, version="7.8.9")
-    with pytest.raises(InputError) as refused:
-        read(criticised)
-    assert "7.8.9" in str(refused.value) and "\n" not in str(refused.value)
-    made_from = read_summary(criticised)["criticise"]["made_from"]
-    assert (
-        finished_criticism(bl.Calibration.open(criticised), made_from) is None
-    )  # it is made again
-
-
-def test_no_pour_is_chosen_from_half_of_what_is_known(criticised):
-    changed(criticised, format=99)
-    with pytest.raises(InputError):
-        bl.choose_pour(criticised, progress=False)
-
-
-def test_a_tree_beside_the_section_of_another_criticism_is_seen(criticised):
-    """As after a kill between the two."""
-    changed(criticised, settings={"effects": None})
-    for read in (bl.Criticism.open, latest_calibration):
-        with pytest.raises(InputError) as refused:
+def test_a_criticism_of_another_posterior_does_not_count(criticised):
+    run = Run.open(criticised)
+    tree = run.required("criticise")
+    summary = json.loads(tree.attrs["summary"])
+    run.keep("criticise", tree, {"after": "another"}, summary)
+    for read in (latest_calibration, bl.Criticism.open, bl.choose_pour):
+        with pytest.raises(InputError, match="another posterior.*bolfi-liquids criticise"):
             read(criticised)
-        assert refused.value.where == str(criticised / CRITICISM)
-    made_from = read_summary(criticised)["criticise"]["made_from"]
-    assert finished_criticism(bl.Calibration.open(criticised), made_from) is None
 
 
-def test_a_section_that_lacks_a_field_says_its_version(criticised):
-    section = read_summary(criticised)["criticise"]
-    del section["noise"]
-    write_section(criticised, "criticise", section)
-    with pytest.raises(InputError, match=f"criticise.noise.*{bl.__version__}"):
-        bl.Criticism.open(criticised)
+def test_a_damaged_criticism_does_not_count(criticised):
+    (criticised / "criticism.nc").write_bytes(b"cut off")
+    for read in (latest_calibration, bl.Criticism.open, bl.choose_pour):
+        with pytest.raises(InputError, match=r"criticism\.nc is damaged"):
+            read(criticised)
 
 
 def test_integers_of_numpy_are_settings():

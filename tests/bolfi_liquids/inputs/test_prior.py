@@ -15,7 +15,6 @@ from bolfi_liquids.inputs.prior import (
     describe_prior,
     read_prior,
 )
-from bolfi_liquids.run.formats import upgraded
 
 U = np.random.default_rng(0).random((16, 2))
 
@@ -57,18 +56,7 @@ def test_a_person_may_write_any_function_of_numpyro():
     np.testing.assert_array_equal(values, expected["viscosity"])
 
 
-def test_the_text_of_version_0_1_is_the_same_prior():
-    viscosity, cohesion = "LogUniform(high=20.0, low=0.0003)", "Uniform(high=1.0, low=0.0)"
-    text = {"viscosity": viscosity, "cohesion": cohesion}
-    for name, values in default_prior().from_unit(U).items():
-        np.testing.assert_array_equal(read_prior(text).from_unit(U)[name], values)
-    record = upgraded({"settings": {"seed": 1, "prior": text}})
-    assert record["settings"] == {"seed": 1, "prior": describe_prior(default_prior())}
-
-
 def test_a_prior_that_nothing_describes_is_refused():
-    with pytest.raises(ValueError, match="Mine"):
-        read_prior({"viscosity": "Mine(low=1)"})
     with pytest.raises(ValueError, match="Mine"):
         read_prior({"viscosity": {"family": "Mine", "low": 1.0}})
 

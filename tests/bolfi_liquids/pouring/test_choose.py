@@ -18,8 +18,8 @@ from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.pouring.choose import strata
 from bolfi_liquids.pouring.landing_map import LANDINGS_PER_DRAW
-from bolfi_liquids.pouring.result import PourSummary, read_pour
-from bolfi_liquids.run.directory import SIMULATIONS
+from bolfi_liquids.pouring.result import PourSummary
+from bolfi_liquids.run.run import SIMULATIONS, Run
 
 
 def rows(run):
@@ -30,12 +30,10 @@ def rows(run):
 
 
 @pytest.fixture
-def far_off(pour, tmp_path):
+def far_off(pour, tmp_path, with_numbers):
     """A run with a pour, whose fit is bad."""
     run = shutil.copytree(pour.path, tmp_path / "far")
-    calibration = bl.Calibration.open(run)
-    replace(calibration.summary, fit_rms_deg=2.1, noise_deg=0.24).write(run)
-    return run
+    return with_numbers(run, fit_rms_deg=2.1, noise_deg=0.24)
 
 
 def test_no_pour_is_chosen_over_a_bad_fit(far_off):
@@ -56,7 +54,8 @@ def test_a_person_may_insist(far_off, pour, pour_settings):
     assert again.chosen.action == pour.chosen.action
     assert rows(far_off) == rows(pour.path)
     for run, status in ((far_off, "bad"), (pour.path, "acceptable")):
-        assert PourSummary.read(run).fit_status == read_pour(run).attrs["fit_status"] == status
+        tree = Run.open(run).required("pour")
+        assert bl.Pour.open(run).summary.fit_status == tree.attrs["fit_status"] == status
 
 
 def test_fractions_add_up_and_the_action_is_allowed(pour, pour_settings):
@@ -227,7 +226,7 @@ def test_a_pour_is_read_as_it_was_written(pour):
         judged, read = getattr(pour, name), getattr(again, name)
         assert read.action == judged.action
         np.testing.assert_array_equal(read.fractions, judged.fractions)
-    summary = PourSummary.read(pour.path)
+    summary = again.summary
     assert summary.expected_spillage == pour.chosen.expected_spillage
     assert PourSummary.from_json(summary.to_json()) == summary
 
@@ -258,9 +257,9 @@ def test_a_pour_that_is_not_the_run_s_own_is_refused(pour):
     )
     for other in others:
         with pytest.raises(ValueError, match="another pour"):
-            replace(pour, chosen=other).check_current()
+            replace(pour, chosen=other).check_current(Run.open(pour.path))
 
 
-def test_a_run_without_a_pour_says_how_to_choose_one(tmp_path):
+def test_a_run_without_a_pour_says_how_to_choose_one(calibration):
     with pytest.raises(InputError, match="bolfi-liquids pour"):
-        bl.Pour.open(tmp_path)
+        bl.Pour.open(calibration.path)

@@ -14,10 +14,9 @@ from bolfi_liquids.cli.app import app
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.pouring.draining import Draining, hold_of
-from bolfi_liquids.pouring.result import PourSummary, read_pour
-from bolfi_liquids.reporting.warnings import results_of, warnings_of
-from bolfi_liquids.run.directory import GIVEN_POURS
-from bolfi_liquids.run.given_pours import kept_pours
+from bolfi_liquids.reporting.warnings import Results, warnings_of
+from bolfi_liquids.run.given_pours import GIVEN_POURS, kept_pours
+from bolfi_liquids.run.run import Run
 
 HEADER = "angular_velocity_deg_s,distance_cm,spilled,received,retained"
 MORE = {"force": True, "progress": False}
@@ -72,7 +71,7 @@ def test_expectation_and_interval_are_those_of_what_was_seen(chosen, tmp_path, c
     assert judged.expected_retained == pytest.approx(kept + 0.05, abs=0.015)
     assert 0.11 < judged.spillage_q95 < 0.16
     # the choice was made by the same expectation
-    actions = read_pour(pour.path)["actions"].to_dataset()
+    actions = Run.open(pour.path).required("pour")["actions"].to_dataset()
     place = actions["risk"].sel(
         angular_velocity=np.radians(at[0]), distance=at[1] / 100.0, method="nearest"
     )
@@ -123,25 +122,25 @@ def test_section_and_file_say_which_pours_count(chosen, tmp_path):
     assert section["sha256"] == opened.hash and section["file"] == table.name
     assert section["lines"] == [2, 3, 4, 5, 6, 7]
     assert section["contradicting"]["line"] in (2, 3, 4, 5, 6, 7)
-    kept = read_pour(pour.path)["given"].to_dataset()
+    kept = Run.open(pour.path).required("pour")["given"].to_dataset()
     np.testing.assert_array_equal(kept["spilled"], opened.fractions[:6, 0])
     np.testing.assert_array_equal(kept["line"], section["lines"])
-    assert PourSummary.read(pour.path) == pour.summary
+    assert bl.Pour.open(pour.path).summary == pour.summary
 
 
 def test_a_pour_of_another_table_is_out_of_date(chosen, tmp_path):
     first = contradicting(chosen, tmp_path)
     bl.choose_pour(chosen.path, given=first, **MORE)
-    assert "warning.stale_given" not in keys(chosen.path)
+    assert "warning.outdated" not in keys(chosen.path)
     (chosen.path / GIVEN_POURS).unlink()
-    assert "warning.stale_given" in keys(chosen.path)
+    assert "warning.outdated" in keys(chosen.path)
     bl.choose_pour(chosen.path, **MORE)
-    assert "warning.stale_given" not in keys(chosen.path)
+    assert "warning.outdated" not in keys(chosen.path)
 
 
 def keys(run):
     """Of the run's warnings."""
-    return [one.key for one in warnings_of(results_of(bl.Calibration.open(run)))]
+    return [one.key for one in warnings_of(Results.of(Run.open(run)))]
 
 
 def test_pours_of_other_cups_do_not_count(chosen, tmp_path, caplog):
@@ -210,7 +209,7 @@ def test_how_long_the_source_must_be_held(monkeypatch, power):
 def test_what_stays_is_told_with_the_hold_where_it_is_much(chosen, monkeypatch):
     share, hold = chosen.chosen.fractions[:, 2].mean(), chosen.summary.hold
     assert chosen.summary.expected_retained == share > 0.1
-    told = {one.key: one for one in warnings_of(results_of(bl.Calibration.open(chosen.path)))}
+    told = {one.key: one for one in warnings_of(Results.of(Run.open(chosen.path)))}
     text = str(told["warning.much_retained"])
     assert f"{100.0 * share:.0f} %" in text
     assert f"{hold.until_tenth_s:.2g} s" in text and "0.9 s" in text

@@ -3,24 +3,22 @@
 import html
 import re
 import shutil
-from collections import Counter
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from html.parser import HTMLParser
 from multiprocessing import get_context
-from pathlib import Path
 
 import pytest
 import xarray as xr
 
 import bolfi_liquids as bl
-from bolfi_liquids.calibration.posterior_file import write_tree
 from bolfi_liquids.calibration.summary import ParameterSummary
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.pouring.result import ActionSummary, PourSummary
 from bolfi_liquids.reporting import criticism_sentences, frames, sentences
 from bolfi_liquids.reporting.report import prior_text
-from bolfi_liquids.run.directory import CRITICISM
+from bolfi_liquids.run.result_file import _parsed
+from bolfi_liquids.run.run import Run
 
 FIGURES = {
     "inclination [deg]": "inclination against time",
@@ -91,7 +89,6 @@ def test_report_shows_the_runs_numbers(pour, calibration):
             },
             "TruncatedDistribution(base_dist=Normal(loc=0, scale=1), high=2, low=0)",
         ),
-        ("a text of version 0.1", "a text of version 0.1"),
     ],
 )
 def test_a_prior_is_written_as_in_python(described, text):
@@ -104,7 +101,6 @@ def calibrated(calibration, tmp_path_factory):
     run = tmp_path_factory.mktemp("calibrated")
     for name in ("run.toml", "posterior.nc"):
         shutil.copy(calibration.path / name, run)
-    calibration.summary.write(run)
     return bl.report(run, moving=False)
 
 
@@ -137,15 +133,16 @@ def test_a_report_says_where_its_pictures_are_simulated(unseen, monkeypatch):
 
 
 def test_no_result_is_opened_twice(pour, frames, monkeypatch):
-    opened, read = Counter(), xr.open_datatree
+    opened, read = [], xr.open_datatree
 
-    def counted(path, **options):
-        opened[Path(path).name] += 1
-        return read(path, **options)
+    def counted(file, **options):
+        opened.append(file)
+        return read(file, **options)
 
     monkeypatch.setattr(xr, "open_datatree", counted)
+    _parsed.cache_clear()
     bl.report(bl.Pour.open(pour.path), progress=False)
-    assert opened == {"posterior.nc": 1, "pour.nc": 1, "frames.nc": 1}
+    assert len(opened) == len(("posterior.nc", "pour.nc", "frames.nc"))
 
 
 @pytest.mark.slow
@@ -158,7 +155,7 @@ def test_pictures_that_take_too_long_leave_nothing(unseen):
 @pytest.mark.minutes
 def test_pictures_by_processes_have_the_same_bits(unseen, shown):
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        elsewhere = replace(shown.calibration, path=unseen)
+        elsewhere = replace(shown.calibration, run=Run.open(unseen))
         there = frames.frames_of(
             shown._replace(calibration=elsewhere), executor=pool, progress=False
         )
@@ -166,12 +163,11 @@ def test_pictures_by_processes_have_the_same_bits(unseen, shown):
 
 
 @pytest.mark.slow
-def test_report_says_below_which_viscosity_liquids_look_alike(calibration, tmp_path):
-    run = tmp_path / "run"
-    shutil.copytree(calibration.path, run)
+def test_report_says_below_which_viscosity_liquids_look_alike(calibration, tmp_path, with_numbers):
+    run = shutil.copytree(calibration.path, tmp_path / "run")
     for share, told in ((0.3, True), (0.0, False)):
         summary = replace(calibration.summary, below_least_viscosity=share)
-        summary.write(run)
+        with_numbers(run, below_least_viscosity=share)
         text, _ = read(bl.report(run, moving=False))
         assert f"{summary.least_viscosity:.2g} (stir)" in text
         told_sentences = sentences.least_viscosity_sentences(summary)
@@ -187,11 +183,14 @@ def test_report_without_a_pour_says_how_to_get_one(calibrated):
 
 @pytest.mark.slow
 def test_file_names_are_escaped(calibration, tmp_path):
-    run = tmp_path / "run"
-    shutil.copytree(calibration.path, run)
-    record = run / "run.toml"
+    path = shutil.copytree(calibration.path, tmp_path / "run")
+    before = Run.open(path)
+    tree, summary = before.required("calibrate"), calibration.summary.to_json()
+    record = path / "run.toml"
     record.write_text(record.read_text().replace("short.nc", "<script>alert(1)</script>.nc"))
-    text, _ = read(bl.report(run, moving=False))
+    run = Run.open(path)
+    run.keep("calibrate", tree, run.made_from, summary)
+    text, _ = read(bl.report(path, moving=False))
     assert "<script>alert" not in text
     assert "&lt;script&gt;alert" in text
 
@@ -224,8 +223,9 @@ def test_sentence_measures_the_fit_by_noise_and_error(calibration, viscosity, fi
 
 
 def test_sentence_repeats_no_action():
-    chosen = ActionSummary(30.0, 1.234, 0.006, 0.01)
+    chosen = ActionSummary(30.0, 1.234, 0.006, 0.01, 0.9, 0.8, 1.0, 0.1, 0.0, 0.2)
     more = {"least_viscosity": 0.01, "n_simulations": 100, "risk": "mean", "seed": 0}
+    more |= {"fit_status": "acceptable", "map_error": 0.01}
     summary = PourSummary(**vars(chosen), **more, plug_in=chosen)
     assert sentences.plug_in_sentence(summary).key == "pour.plug_in_same"
     other = replace(summary, plug_in=replace(chosen, distance_cm=1.236, expected_spillage=0.02))
@@ -243,19 +243,12 @@ def test_the_contact_angle_is_named_where_the_pour_had_one():
 
 
 @pytest.fixture
-def criticised(calibration, criticism_summary, tmp_path, made, made_from):
+def criticised(calibration, criticism_summary, tmp_path, keep_criticism):
     """A copy of a calibrated run with a criticism in it."""
-    run = tmp_path / "run"
-    shutil.copytree(calibration.path, run)
+    run = shutil.copytree(calibration.path, tmp_path / "run")
     of_a_delay = criticism_summary.coefficient["camera_delay"]
     parameters = dict.fromkeys(calibration.summary.parameters, of_a_delay)
-    replace(
-        criticism_summary,
-        parameters=parameters | dict(criticism_summary.coefficient),
-        made_from=made_from,
-    ).write(run)
-    write_tree(made(held=True), run / CRITICISM)
-    return run
+    return keep_criticism(run, parameters=parameters | dict(criticism_summary.coefficient))
 
 
 @pytest.mark.slow

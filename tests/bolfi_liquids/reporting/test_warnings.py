@@ -1,18 +1,21 @@
 """What a report warns of."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
 
 from bolfi_liquids.calibration.fit_figures import _rms_by
+from bolfi_liquids.calibration.summary import CalibrationSummary, FitStatus
 from bolfi_liquids.criticism.source_summary import PourVerdict
+from bolfi_liquids.criticism.summary import CriticismSummary
 from bolfi_liquids.criticism.verdict import Verdict
 from bolfi_liquids.pouring.draining import Hold
 from bolfi_liquids.pouring.figures import not_surely_worse
 from bolfi_liquids.pouring.result import ActionSummary, GivenPour, GivenSummary, PourSummary
-from bolfi_liquids.reporting.warnings import Results, warnings_of
+from bolfi_liquids.reporting.warnings import warnings_of
 
 FINE = {
     "fit_rms_deg": 0.3,
@@ -28,9 +31,18 @@ FINE = {
 AGREES = {"verdict": Verdict.NONE, "effects": (), "accepted": ()}
 CONFIRMED = {"verdict": Verdict.EFFECT, "effects": ("stick_mass",), "accepted": ("stick_mass",)}
 UNCONFIRMED = CONFIRMED | {"held_out": 0}
-ACTION = ActionSummary(60.0, 3.0, 0.01, 0.05)
+FATE = {"expected_received": 0.9, "received_q05": 0.85, "received_q95": 0.95}
+FATE |= {"expected_retained": 0.05, "retained_q05": 0.0, "retained_q95": 0.1}
+ACTION = ActionSummary(60.0, 3.0, 0.01, 0.05, **FATE)
 POURED = PourSummary(
-    **vars(ACTION), least_viscosity=0.01, n_simulations=99, risk="mean", seed=0, plug_in=ACTION
+    **vars(ACTION),
+    least_viscosity=0.01,
+    n_simulations=99,
+    risk="mean",
+    seed=0,
+    plug_in=ACTION,
+    fit_status=FitStatus.ACCEPTABLE,
+    map_error=0.01,
 )
 
 
@@ -42,32 +54,55 @@ def poured(rate=1.0, distance=0.03, retained=0.05):
         {"retained": ("outcome", [0.0, 2.0 * retained])},
         attrs={"angular_velocity": rate, "distance": distance},
     )
-    liquids = xr.Dataset({"viscosity": ("draw", [1.0, 3.0])})
-    tree = xr.DataTree.from_dict({"/actions": actions, "/chosen": chosen, "/liquids": liquids})
-    tree.attrs.update(cups='{"pour": {"hold": 0.9}}', given_pours="")
+    tree = xr.DataTree.from_dict({"/actions": actions, "/chosen": chosen})
+    tree.attrs.update(cups='{"pour": {"hold": 0.9}}')
     return tree
 
 
-POSTERIOR = xr.Dataset({"viscosity": (("chain", "draw"), [[1.0, 2.0, 3.0]])})
+@dataclass(frozen=True)
+class Parts:
+    """All that warnings follow from."""
+
+    calibrated: CalibrationSummary
+    latest: CalibrationSummary
+    criticised: CriticismSummary | None
+    poured: PourSummary | None
+    pour: xr.DataTree | None
+    searched: int
+    outdated: tuple[str, ...] = ()
+
+
+def warned(parts):
+    """The warnings of a run that holds these parts."""
+    initial = parts.calibrated.n_simulations - parts.searched
+    found = SimpleNamespace(
+        calibration=SimpleNamespace(
+            summary=parts.calibrated, tree=SimpleNamespace(attrs={"initial": initial})
+        ),
+        latest=SimpleNamespace(summary=parts.latest),
+        criticism=parts.criticised and SimpleNamespace(summary=parts.criticised),
+        pour=parts.poured and SimpleNamespace(summary=parts.poured, tree=parts.pour),
+        outdated=parts.outdated,
+        remedies=("bolfi-liquids pour RUN",) * len(parts.outdated),
+    )
+    return warnings_of(found)
 
 
 @pytest.fixture
 def fine(calibration, criticism_summary):
     """Results without anything to warn of."""
-    return Results(
+    return Parts(
         calibrated=replace(calibration.summary, **FINE),
         latest=replace(calibration.summary, **FINE),
         criticised=replace(criticism_summary, **AGREES),
         poured=POURED,
         pour=poured(),
-        given="",
-        posterior=POSTERIOR,
         searched=13,
     )
 
 
 def test_nothing_is_said_where_nothing_is_wrong(fine):
-    assert warnings_of(fine) == []
+    assert warned(fine) == []
 
 
 @pytest.mark.parametrize(
@@ -101,7 +136,7 @@ def test_nothing_is_said_where_nothing_is_wrong(fine):
 )
 def test_each_warning_is_given_alone(fine, field, changes, key, values):
     changed = changes and replace(getattr(fine, field), **changes)
-    (sentence,) = warnings_of(replace(fine, **{field: changed}))
+    (sentence,) = warned(replace(fine, **{field: changed}))
     assert sentence.key == key
     assert values.items() <= sentence.values.items()
     assert str(sentence)
@@ -120,7 +155,7 @@ def test_each_warning_is_given_alone(fine, field, changes, key, values):
     ],
 )
 def test_each_warning_of_the_chosen_action(fine, action, key, values):
-    (sentence,) = warnings_of(replace(fine, pour=poured(**action)))
+    (sentence,) = warned(replace(fine, pour=poured(**action)))
     assert (sentence.key, sentence.values) == (f"warning.{key}", values)
 
 
@@ -134,74 +169,65 @@ def test_each_warning_of_the_chosen_action(fine, action, key, values):
 )
 def test_the_hold_that_leaves_a_tenth_is_said(fine, hold, said):
     much = replace(fine, poured=replace(fine.poured, hold=hold), pour=poured(retained=0.54))
-    (sentence,) = warnings_of(much)
+    (sentence,) = warned(much)
     assert said in str(sentence) and "54 %" in str(sentence) and "0.9 s" in str(sentence)
 
 
 def test_a_pour_that_contradicts_the_simulator_is_said(fine):
     row = GivenPour(2, 30.0, 1.2, 0.127, 0.02, 0.001, 0.02)
     given = GivenSummary("oil.csv", "0", "", (2,), (row,), row, ACTION)
-    (sentence,) = warnings_of(replace(fine, poured=replace(fine.poured, given=given)))
+    (sentence,) = warned(replace(fine, poured=replace(fine.poured, given=given)))
     assert sentence.key == "warning.given_contradict"
     assert "line 2" in str(sentence) and "13 %" in str(sentence)
 
 
-def test_a_pour_with_other_given_pours_is_said_to_be_one(fine):
-    (sentence,) = warnings_of(replace(fine, given="abc oil"))
-    assert sentence.key == "warning.stale_given"
+def test_what_does_not_count_any_more_is_said_with_its_remedy(fine):
+    (sentence,) = warned(replace(fine, outdated=("pour.nc was made from another posterior",)))
+    assert sentence.key == "warning.outdated"
+    assert "pour.nc" in str(sentence) and "bolfi-liquids pour RUN" in str(sentence)
 
 
 def test_an_end_of_the_range_is_no_loss_where_nothing_is_spilled(fine):
     nothing = replace(fine.poured, spillage_q95=0.0)
-    assert not warnings_of(replace(fine, pour=poured(rate=0.5), poured=nothing))
+    assert not warned(replace(fine, pour=poured(rate=0.5), poured=nothing))
 
 
 def test_a_misfit_that_was_not_criticised_is_told(fine):
     far = replace(fine.calibrated, fit_rms_deg=0.9)
-    (sentence,) = warnings_of(replace(fine, calibrated=far, criticised=None))
+    (sentence,) = warned(replace(fine, calibrated=far, criticised=None))
     assert sentence.key == "warning.misfit_not_criticised"
 
 
 def test_pours_that_nothing_explains_are_told_beside_an_effect_of_the_stirs(fine):
     unexplained = PourVerdict(Verdict.UNKNOWN, (), 0.003, (), 0, before=0.4, after=None)
     found = replace(fine.criticised, held_out=1, pours=unexplained, **CONFIRMED)
-    (sentence,) = warnings_of(replace(fine, criticised=found))
+    (sentence,) = warned(replace(fine, criticised=found))
     assert sentence.key == "criticism.unexplained" and sentence.values["data"] == "pours"
 
 
 def test_an_effect_that_held_out_data_confirm_is_nothing_to_warn_of(fine):
     confirmed = replace(fine.criticised, held_out=1, **CONFIRMED)
-    assert warnings_of(replace(fine, criticised=confirmed)) == []
+    assert warned(replace(fine, criticised=confirmed)) == []
 
 
 def test_a_bad_fit_is_told_first(fine):
     """Of the calibration that is poured: an effect that was accepted may have mended it."""
     far = replace(fine.calibrated, fit_rms_deg=0.902)
-    first, *_ = warnings_of(replace(fine, calibrated=far, latest=far, criticised=None))
+    first, *_ = warned(replace(fine, calibrated=far, latest=far, criticised=None))
     assert (first.key, first.values) == ("calibration.bad_fit", {"summary": far})
     assert "3.0 times" in str(first)
     mended = replace(fine, calibrated=far)
-    assert "calibration.bad_fit" not in [one.key for one in warnings_of(mended)]
-
-
-@pytest.mark.parametrize(
-    "posterior",
-    [POSTERIOR.assign(adhesion=POSTERIOR["viscosity"]), POSTERIOR + 0.5],
-    ids=["extended", "other"],
-)
-def test_a_pour_of_another_posterior_is_said_to_be_one(fine, posterior):
-    (sentence,) = warnings_of(replace(fine, posterior=posterior))
-    assert sentence.key == "warning.stale_pour"
+    assert "calibration.bad_fit" not in [one.key for one in warned(mended)]
 
 
 def test_a_search_of_no_more_than_its_start_is_none(fine):
-    (sentence,) = warnings_of(replace(fine, searched=1))
+    (sentence,) = warned(replace(fine, searched=1))
     assert sentence.key == "warning.no_search"
     assert sentence.values == {"total": 20, "searched": 1}
 
 
 def test_a_run_without_a_pour_has_nothing_to_worry_about_in_it(fine):
-    assert warnings_of(replace(fine, poured=None, pour=None)) == []
+    assert warned(replace(fine, poured=None, pour=None)) == []
 
 
 def test_an_action_is_surely_worse_only_as_far_as_paired_draws_tell(rng):

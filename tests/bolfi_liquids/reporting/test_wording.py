@@ -61,7 +61,7 @@ def test_a_value_that_is_missing_or_unknown_is_refused():
     with pytest.raises(UndefinedError):
         str(sentence("warning.no_search", total=20))
     with pytest.raises(TypeError, match="shown"):
-        str(sentence("warning.stale_pour", shown=1))
+        str(sentence("warning.not_criticised", shown=1))
 
 
 def test_numbers_carry_their_units():

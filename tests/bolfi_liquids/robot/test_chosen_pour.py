@@ -5,57 +5,41 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
-import xarray
 from bolfi_liquids.hardware import MotionRejected, RigError, bundled_rig
 from typer.testing import CliRunner
 
 import bolfi_liquids as bl
-from bolfi_liquids.calibration.posterior_file import write_tree
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.cli.printed import print_next_pour
 from bolfi_liquids.cli.record import next_commands
 from bolfi_liquids.criticism.result import latest_calibration
 from bolfi_liquids.errors import InputError
-from bolfi_liquids.reporting.warnings import results_of, warnings_of
+from bolfi_liquids.reporting.warnings import Results, warnings_of
 from bolfi_liquids.robot.chosen_pour import BAD_FIT, chosen_pour
 from bolfi_liquids.robot.pour import plan_pour
 from bolfi_liquids.robot.stir import plan_stir
-from bolfi_liquids.wording import sentence, spilled
+from bolfi_liquids.run.run import Run
+from bolfi_liquids.wording import spilled
 
 
-def rewritten(run, change):
-    """The pour of a run, its file changed within."""
-    with h5py.File(run / "pour.nc", "r+") as file:
-        change(file)
-
-
-def with_section(run, **fields):
-    """Fields of the section pour of summary.json, changed."""
-    path = run / "summary.json"
-    summary = json.loads(path.read_text(encoding="utf-8"))
-    summary["pour"] |= fields
-    path.write_text(json.dumps(summary), encoding="utf-8")
+def rewritten(path, change=lambda tree: None, **made_from):
+    """The pour of a run, as if it had been concluded otherwise."""
+    run = Run.open(path)
+    tree = run.required("pour")
+    change(tree)
+    held = json.loads(tree.attrs["made_from"]) | made_from
+    run.keep("pour", tree, held, json.loads(tree.attrs["summary"]))
 
 
 def with_action(run, **action):
-    """Another action in both files."""
-    values = {name: [value] for name, value in action.items()}
-    rewritten(run, lambda file: file["chosen"].attrs.update(values))
-    told = {}
-    if "distance" in action:
-        told["distance_cm"] = 100.0 * action["distance"]
-    if "angular_velocity" in action:
-        told["angular_velocity_deg_s"] = float(np.degrees(action["angular_velocity"]))
-    with_section(run, **told)
+    """Another action."""
+    rewritten(run, lambda tree: tree["chosen"].attrs.update(action))
 
 
-def of_another_posterior(run):
-    tree = xarray.load_datatree(run / "posterior.nc", engine="h5netcdf")
-    tree["posterior"] = xarray.DataTree(tree["posterior"].to_dataset() * 1.001)
-    write_tree(tree, run / "posterior.nc")
+def chosen_in(path):
+    return chosen_pour(Run.open(path))
 
 
 def refused(*_):
@@ -64,33 +48,15 @@ def refused(*_):
 
 def test_the_action_is_that_of_pour_nc_to_the_last_digit(poured_run):
     chosen = bl.Pour.open(poured_run).chosen
-    plan = plan_pour(poured_run, bundled_rig())
+    plan = plan_pour(Run.open(poured_run), bundled_rig())
     assert plan.chosen.judged.action == chosen.action
     turned = plan.path.pose[:, 3:]
     assert np.ptp(turned, axis=0).max() > 1.0  # it does pour
-    # what a person would read elsewhere moves nothing
-    with_section(poured_run, risk="cvar", n_simulations=1)
-    assert np.array_equal(plan_pour(poured_run, bundled_rig()).path.pose, plan.path.pose)
-
-
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [
-        ("distance_cm", -5.0),
-        ("angular_velocity_deg_s", 31.4),
-        ("expected_spillage", 0.0),
-        ("spillage_q95", 0.5),
-    ],
-)
-def test_files_that_contradict_each_other_are_refused(poured_run, field, value):
-    with_section(poured_run, **{field: value})
-    with pytest.raises(InputError, match=rf"summary\.json: pour\.{field} is .*bolfi-liquids pour"):
-        bl.execute_pour(poured_run, ask=refused)
 
 
 def test_a_receiver_that_overlaps_the_stirred_cup_is_refused_with_its_own_radius(poured_run):
     """rig.toml does not say how wide the receiver is; the cups of the pour do."""
-    rig, receiver = bundled_rig(), chosen_pour(poured_run).cups.receiver
+    rig, receiver = bundled_rig(), chosen_in(poured_run).cups.receiver
     apart = rig.cup.radius + receiver.radius
 
     def beside(gap):
@@ -99,18 +65,9 @@ def test_a_receiver_that_overlaps_the_stirred_cup_is_refused_with_its_own_radius
         return rig.model_copy(update={"pouring": rig.pouring.model_copy(update=place)})
 
     with pytest.raises(InputError, match="stands in the stirred cup"):
-        plan_pour(poured_run, beside(-0.001))
+        plan_pour(Run.open(poured_run), beside(-0.001))
     with suppress(MotionRejected):  # so near, a pour leaves its box
-        plan_pour(poured_run, beside(0.001))
-
-
-def test_a_summary_without_the_pour_is_refused(poured_run):
-    path = poured_run / "summary.json"
-    summary = json.loads(path.read_text(encoding="utf-8"))
-    del summary["pour"]
-    path.write_text(json.dumps(summary), encoding="utf-8")
-    with pytest.raises(InputError, match=r"summary\.json"):
-        bl.execute_pour(poured_run, ask=refused)
+        plan_pour(Run.open(poured_run), beside(0.001))
 
 
 @pytest.mark.parametrize(
@@ -129,67 +86,43 @@ def test_an_action_outside_of_what_the_cups_allow_is_refused(poured_run, name, v
     for who in ({"ask": refused}, {"emulate": True}):
         with pytest.raises(InputError) as caught:
             bl.execute_pour(poured_run, **who)
-        # a number that JSON does not know damages the summary already
-        assert (name if np.isfinite(value) else "summary.json") in str(caught.value)
+        assert name in str(caught.value)
 
 
 def test_both_ends_of_what_the_cups_allow_may_be_poured(poured_run):
-    cups = chosen_pour(poured_run).cups
+    cups = chosen_in(poured_run).cups
     ranges = {"distance": cups.distance_range, "angular_velocity": cups.angular_velocity_range}
     for name, ends in ranges.items():
         for value in ends:
             with_action(poured_run, **{name: value})
-            assert chosen_pour(poured_run).judged.action[name] == value
+            assert chosen_in(poured_run).judged.action[name] == value
 
 
-SPOILED = {
-    "no chosen": lambda file: file.__delitem__("chosen"),
-    "no liquids": lambda file: file.__delitem__("liquids"),
-    "no cups": lambda file: file.attrs.__delitem__("cups"),
-    "cups are no JSON": lambda file: file.attrs.update(cups="{"),
-    "cups are a list": lambda file: file.attrs.update(cups="[]"),
-    "cups without a pour": lambda file: file.attrs.update(cups='{"source": 1}'),
-    "action is a word": lambda file: file["chosen"].attrs.update(distance="near"),
-}
+@pytest.mark.parametrize("made_from", [{"after": "another"}, {"given": "other pours"}])
+def test_a_stale_pour_is_never_carried_out(poured_run, made_from):
+    assert chosen_in(poured_run)
+    rewritten(poured_run, **made_from)
+    for who in ({"ask": refused}, {"emulate": True}):
+        with pytest.raises(InputError, match=r"pour\.nc was made .*run: bolfi-liquids pour"):
+            bl.execute_pour(poured_run, **who)
 
 
-@pytest.mark.parametrize("what", SPOILED)
-def test_a_pour_nc_that_is_not_whole_is_one_line(poured_run, what):
-    rewritten(poured_run, SPOILED[what])
-    with pytest.raises(InputError, match=r"pour\.nc") as caught:
+def test_a_damaged_pour_is_one_line(poured_run):
+    whole = (poured_run / "pour.nc").read_bytes()
+    (poured_run / "pour.nc").write_bytes(whole[:5000] + bytes([whole[5000] ^ 1]) + whole[5001:])
+    with pytest.raises(InputError, match=r"pour\.nc is damaged") as caught:
         bl.execute_pour(poured_run, ask=refused)
     assert "\n" not in str(caught.value)
 
 
-def test_a_stale_pour_is_never_asked_about(poured_run):
-    assert chosen_pour(poured_run).stale == ()
-    of_another_posterior(poured_run)
-    chosen = chosen_pour(poured_run)
-    assert [one.key for one in chosen.stale] == ["warning.stale_pour"]
-    with pytest.raises(InputError, match="bolfi-liquids pour"):
-        bl.execute_pour(poured_run, ask=refused)
-    # what a dry run tells begins with it, and does not say it twice
-    stale = str(sentence("warning.stale_pour"))
-    assert str(chosen).startswith(stale) and str(chosen).count(stale) == 1
+BAD = {"calibrate": {"fit_rms_deg": 2.1, "noise_deg": 0.24}, "pour": {"fit_status": "bad"}}
 
 
-def with_status(run, status):
-    rewritten(run, lambda file: file.attrs.update(fit_status=status))
-
-
-def with_a_bad_fit(run):
-    replace(bl.Calibration.open(run).summary, fit_rms_deg=2.1, noise_deg=0.24).write(run)
-
-
-@pytest.mark.parametrize(
-    "make",
-    [lambda run: with_status(run, "bad"), with_a_bad_fit],
-    ids=["as written", "as the fit is now, of an older version"],
-)
-def test_a_pour_over_a_bad_fit_needs_its_own_word(poured_run, make):
-    assert not chosen_pour(poured_run).fit_is_bad
-    make(poured_run)
-    assert chosen_pour(poured_run).fit_is_bad
+@pytest.mark.parametrize("step", BAD)
+def test_a_pour_over_a_bad_fit_needs_its_own_word(poured_run, with_numbers, step):
+    assert not chosen_in(poured_run).fit_is_bad
+    with_numbers(poured_run, step, **BAD[step])
+    assert chosen_in(poured_run).fit_is_bad
     with pytest.raises(InputError, match="--despite-bad-fit"):
         bl.execute_pour(poured_run, ask=refused)
     plans = []
@@ -204,23 +137,23 @@ def test_a_pour_over_a_bad_fit_needs_its_own_word(poured_run, make):
 
 
 @pytest.mark.slow
-def test_an_emulated_pour_tells_the_plan_and_that_the_fit_is_bad(poured_run):
-    with_status(poured_run, "bad")
+def test_an_emulated_pour_tells_the_plan_and_that_the_fit_is_bad(poured_run, with_numbers):
+    with_numbers(poured_run, "pour", **BAD["pour"])
     result = CliRunner().invoke(app, ["pour", str(poured_run), "--execute", "--emulator"])
     assert result.exit_code == 0
     assert BAD_FIT in result.stderr and "expected to spill" in result.stderr
 
 
-def test_what_follows_a_bad_fit_is_no_pour(poured_run, capsys):
+def test_what_follows_a_bad_fit_is_no_pour(poured_run, with_numbers, capsys):
     print_next_pour(latest_calibration(poured_run), "criticise")
     assert "bolfi-liquids pour" in capsys.readouterr().out
-    with_a_bad_fit(poured_run)
+    with_numbers(poured_run, **BAD["calibrate"])
     print_next_pour(latest_calibration(poured_run), "criticise")
     assert "bolfi-liquids pour" not in capsys.readouterr().out
 
 
-def test_an_arm_refuses_a_pour_over_a_bad_fit_on_the_command_line(poured_run):
-    with_status(poured_run, "bad")
+def test_an_arm_refuses_a_pour_over_a_bad_fit_on_the_command_line(poured_run, with_numbers):
+    with_numbers(poured_run, "pour", **BAD["pour"])
     execute = ["pour", str(poured_run), "--execute", "--arm"]
     result = CliRunner().invoke(app, execute)
     assert result.exit_code == 2
@@ -233,7 +166,7 @@ def test_an_arm_refuses_a_pour_over_a_bad_fit_on_the_command_line(poured_run):
     assert result.exit_code == 2 and "--execute" in result.stderr
 
 
-def test_a_person_reads_the_pour_and_the_worries_before_the_question(poured_run):
+def test_a_person_reads_the_pour_and_the_warnings_before_the_question(poured_run):
     read = []
 
     def ask(plan):
@@ -243,7 +176,7 @@ def test_a_person_reads_the_pour_and_the_worries_before_the_question(poured_run)
     with pytest.raises(RigError, match="confirmation"):
         bl.execute_pour(poured_run, ask=ask)
     (plan,) = read
-    chosen = chosen_pour(poured_run)
+    chosen = chosen_in(poured_run)
     judged = chosen.judged
     for text in (
         f"{np.degrees(judged.angular_velocity):.1f} deg/s",
@@ -252,9 +185,9 @@ def test_a_person_reads_the_pour_and_the_worries_before_the_question(poured_run)
         f"{spilled(judged.spillage_q95)} in 95 %",
     ):
         assert text in plan.split("allowed")[0]
-    told = warnings_of(results_of(bl.Calibration.open(poured_run)))
-    assert chosen.worries == tuple(told) and told  # as the report has them
-    assert all(str(worry) in plan for worry in chosen.worries)
+    told = warnings_of(Results.of(Run.open(poured_run)))
+    assert chosen.warnings == tuple(told) and told  # as the report has them
+    assert all(str(one) in plan for one in told)
     assert "emergency stop" in plan
 
 
@@ -298,5 +231,4 @@ def test_what_comes_next_fits_what_was_done_and_any_path(tmp_path):
     ]
     empty = tmp_path / "a b"
     empty.mkdir()
-    with pytest.raises(InputError, match="bolfi-liquids pour '.*a b'$"):
-        bl.Pour.open(empty)
+    assert Run(empty, {}).again("pour") == f"bolfi-liquids pour '{empty}'"

@@ -1,7 +1,5 @@
 """Whatever writes into a run keeps others out of it, so that nothing of either is lost."""
 
-import json
-import os
 import shutil
 import signal
 import subprocess
@@ -16,9 +14,8 @@ from typer.testing import CliRunner
 import bolfi_liquids as bl
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.errors import InputError
-from bolfi_liquids.run.directory import RUN_TOML, enter_run
-from bolfi_liquids.run.entering import LOCK, working_in
-from bolfi_liquids.run.summary import read_summary
+from bolfi_liquids.run.lock import LOCK, alone_in
+from bolfi_liquids.run.run import RUN_TOML, Run
 
 RECORD = {"settings": {"budget": 20, "seed": 0}, "inputs": {"sha256": ["ab"]}}
 
@@ -48,19 +45,20 @@ def contents(run):
 @pytest.mark.parametrize("command", commands_in(Path()))
 def test_what_writes_into_a_run_keeps_out_while_another_command_works_there(tmp_path, command):
     run = tmp_path / "run"
-    enter_run(run, RECORD, resume=False)
+    with Run.begun(run, RECORD, resume=False):
+        pass
     call, typed = commands_in(run)[command]
-    with working_in(run):
+    with alone_in(run):
         before = contents(run)
-        with pytest.raises(InputError, match=f"process {os.getpid()} on ") as refused:
+        with pytest.raises(InputError, match="another command works in it") as refused:
             call()
         assert refused.value.where == str(run)
         result = CliRunner().invoke(app, typed)
         assert result.exit_code == 2
         (line,) = result.stderr.strip().splitlines()
-        assert f"process {os.getpid()} on " in line
+        assert "another command works in it" in line
         assert contents(run) == before
-    assert contents(run).keys() == {RUN_TOML}
+    assert contents(run).keys() == {RUN_TOML, LOCK}
 
 
 @pytest.mark.parametrize("command", [one for one in commands_in(Path()) if one != "calibrate"])
@@ -78,12 +76,13 @@ bl.report(sys.argv[1], moving=False)
 """
 
 
-def is_signed(lock):
-    """Whether a lock says already who holds it."""
+def is_held(run):
+    """Whether a command works in a run."""
     try:
-        return bool(json.loads(lock.read_text(encoding="utf-8")))
-    except (FileNotFoundError, ValueError):
-        return False
+        with alone_in(run):
+            return False
+    except InputError:
+        return True
 
 
 @pytest.mark.slow
@@ -92,17 +91,17 @@ def test_of_two_commands_at_once_one_is_refused_and_nothing_is_lost(calibration,
     run = shutil.copytree(calibration.path, tmp_path / "run")
     report = [sys.executable, "-c", REPORT, str(run)]
     with subprocess.Popen(report, stderr=subprocess.DEVNULL) as first:
-        while not is_signed(run / LOCK):
+        while not is_held(run):
             assert first.poll() is None
             time.sleep(0.01)
         first.send_signal(signal.SIGSTOP)
         try:
             for call, typed in commands_in(run).values():
-                with pytest.raises(InputError, match=f"process {first.pid} on "):
+                with pytest.raises(InputError, match="another command"):
                     call()
                 assert CliRunner().invoke(app, typed).exit_code == 2
         finally:
             first.send_signal(signal.SIGCONT)
         assert first.wait() == 0
-    assert (run / "report.html").exists() and not (run / LOCK).exists()
-    assert read_summary(run) == read_summary(calibration.path)
+    assert (run / "report.html").exists()
+    assert (run / "summary.json").read_bytes() == (calibration.path / "summary.json").read_bytes()

@@ -1,7 +1,6 @@
 """A run that is killed and resumed is the run that was not."""
 
 import os
-import re
 import shutil
 import signal
 import sqlite3
@@ -12,10 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bolfi_liquids.inference import engine_version
 
 import bolfi_liquids as bl
-from bolfi_liquids.run.directory import SIMULATIONS
+from bolfi_liquids.run.run import SIMULATIONS
 
 # On two cores, 24 processes beside it, a criticism began to simulate after 127 s; with a patience
 # of 120 s it was killed before, and the test failed.
@@ -105,30 +103,16 @@ def test_another_seed_is_refused_and_changes_nothing(short_recording, calibratio
     assert bl.Calibration.open(calibration.path).summary == calibration.summary
 
 
-def test_another_engine_is_refused(short_recording, calibration, settings, monkeypatch):
-    monkeypatch.setattr(engine_version, "ENGINE_VERSION", "0")
-    with pytest.raises(ValueError, match=r"engine\.version was '.' and is '0' now"):
-        bl.calibrate(short_recording, out=calibration.path, resume=True, progress=False, **settings)
-
-
 @pytest.mark.slow
 def test_a_larger_budget_goes_on_from_a_smaller_one(
-    short_recording, calibration, settings, tmp_path, capsys, caplog
+    short_recording, calibration, settings, tmp_path
 ):
     grown, larger = tmp_path / "grown", settings | {"budget": 14}
     shutil.copytree(calibration.path, grown)
     before = finished(grown)
-    (grown / "pour.nc").write_bytes(b"chosen over what fewer simulations taught")
-    again = bl.calibrate(short_recording, out=grown, resume=True, **larger)
+    again = bl.calibrate(short_recording, out=grown, resume=True, progress=False, **larger)
     after = finished(grown)
     assert {key: after[key] for key in before} == before  # none was simulated again
-    told = capsys.readouterr().err
-    assert f"simulating stirs: {len(after) - len(before)} to run" in told
-    (notice,) = [one.getMessage() for one in caplog.records if one.name.endswith(".calibrate")]
-    removed = re.search("removed (.*), concluded from fewer simulations", notice)[1].split(", ")
-    assert {"posterior.nc", "pour.nc", "summary.json"} <= set(removed)  # and a report, if any was
-    assert not (grown / "pour.nc").exists()
-
     whole = bl.calibrate(short_recording, out=tmp_path / "whole", progress=False, **larger)
     assert after.keys() >= finished(whole.path).keys()
     for name, draws in whole.posterior.items():

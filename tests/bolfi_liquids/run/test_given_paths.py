@@ -1,0 +1,75 @@
+"""What is given to be written to is checked before anything is written."""
+
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bolfi_liquids as bl
+from bolfi_liquids.errors import InputError
+from bolfi_liquids.inputs.settings import (
+    CalibrationSettings,
+    CriticismSettings,
+    PourSettings,
+    SbcSettings,
+)
+from bolfi_liquids.online.settings import OnlineSettings
+
+
+def bundled(name):
+    return Path(str(files("bolfi_liquids.data"))) / name
+
+
+def test_a_recording_whose_copy_would_have_too_long_a_name_is_refused_first(
+    short_recording, settings, tmp_path
+):
+    long = tmp_path / f"{'a' * 245}.nc"
+    long.write_bytes(Path(short_recording).read_bytes())
+    with pytest.raises(InputError, match="248 bytes"):
+        bl.calibrate(long, out=tmp_path / "run", progress=False, **settings)
+    assert not (tmp_path / "run").exists()
+
+
+def given_nothing(out):
+    """Each function that writes, with `out` for its path."""
+    from bolfi_liquids.checks.physics import check_physics
+    from bolfi_liquids.checks.sbc import check_sbc
+    from bolfi_liquids.demo import run_demo
+    from bolfi_liquids.inputs import rigs, table_import
+    from bolfi_liquids.reproduction.reproduce import reproduce
+
+    stir = bundled("glycerin_v10.nc")
+    return {
+        "calibrate": lambda: bl.calibrate(stir, out=out, progress=False),
+        "check physics": lambda: check_physics(out, progress=False),
+        "check sbc": lambda: check_sbc(out, progress=False),
+        "demo": lambda: run_demo(out),
+        "reproduce": lambda: reproduce(["inclination"], out, progress=False),
+        "record": lambda: bl.record(out=out, emulate=True, progress=False),
+        "simulate stir": lambda: bl.simulate_stir(out=out, progress=False),
+        "simulate pour": lambda: bl.simulate_pour(movie=out, progress=False),
+        "import": lambda: bl.import_table(stir, "columns.toml", out),
+        "import --template": lambda: table_import.write_template(out),
+        "rig template": lambda: rigs.write_template(out),
+    }
+
+
+@pytest.mark.parametrize("function", given_nothing(""))
+@pytest.mark.parametrize("out", ["", " "])
+def test_an_empty_path_is_not_the_current_directory(monkeypatch, tmp_path, function, out):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="is empty"):
+        given_nothing(out)[function]()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "settings", [CalibrationSettings, SbcSettings, PourSettings, CriticismSettings, OnlineSettings]
+)
+def test_seeds_are_those_that_every_generator_takes(settings):
+    for seed in (0, 2**31 - 1, np.int64(7), np.uint8(7), np.array(7)):
+        assert type(settings(seed=seed).seed) is int
+    for seed in (-1, 2**31, 2**80, np.uint64(2**63), 1.0, "7", True, None):
+        with pytest.raises(InputError, match="seed"):
+            settings(seed=seed)

@@ -1,0 +1,294 @@
+"""A run is never overwritten, goes on with its own settings alone, and its results are current."""
+
+import copy
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from functools import partial
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+import tomli_w
+from bolfi_liquids.inference import engine_version
+from bolfi_liquids.inference.simulations.bank import Simulation
+
+import bolfi_liquids as bl
+from bolfi_liquids.errors import InputError
+from bolfi_liquids.run.lock import LOCK, alone_in
+from bolfi_liquids.run.result_file import read_result, write_result
+from bolfi_liquids.run.run import RESULTS, RUN_TOML, SIMULATIONS, Run, check_resumable
+
+RECORD = {
+    "created": "2026-01-01T00:00:00+00:00",
+    "settings": {"budget": 20, "seed": 0, "prior": {"viscosity": {"family": "Uniform"}}},
+    "simulator": {"recording_1": {"particles": 1000, "cup": {"radius": 0.04}}},
+    "inputs": {"sha256": ["ab"]},
+    "versions": {"numpy": "2.0"},
+}
+
+
+def begin(path, record=RECORD, *, resume=False, growing=""):
+    with Run.begun(path, record, resume=resume, growing=growing) as run:
+        return run
+
+
+def changed(section, **fields):
+    """`RECORD` with other fields in one section."""
+    other = copy.deepcopy(RECORD)
+    other[section] |= fields
+    return other
+
+
+def written(path):
+    return (path / RUN_TOML).read_bytes()
+
+
+def test_a_run_is_not_overwritten(tmp_path):
+    run = tmp_path / "a" / "run"
+    begin(run)
+    before = written(run)
+    with pytest.raises(InputError, match="holds a run already.*`resume`"):
+        begin(run)
+    assert written(run) == before
+
+
+@pytest.mark.parametrize(
+    ("section", "field", "value"),
+    [
+        ("settings", "seed", 1),
+        ("settings", "prior", {"viscosity": {"family": "Normal"}}),
+        ("simulator", "recording_1", {"particles": 500, "cup": {"radius": 0.04}}),
+        ("simulator", "recording_2", {"particles": 1000}),
+        ("inputs", "sha256", ["cd"]),
+    ],
+)
+def test_a_run_goes_on_with_its_own_settings_alone(tmp_path, section, field, value):
+    begin(tmp_path)
+    before = written(tmp_path)
+    with pytest.raises(InputError) as refused:
+        begin(tmp_path, changed(section, **{field: value}), resume=True)
+    assert section == "inputs" or f"{section}.{field}" in str(refused.value)
+    assert written(tmp_path) == before
+
+
+def test_dates_and_versions_may_be_others(tmp_path):
+    begin(tmp_path)
+    later = RECORD | {"created": "2027-01-01T00:00:00+00:00", "versions": {"numpy": "3.0"}}
+    assert begin(tmp_path, later, resume=True).record == RECORD
+
+
+def test_a_run_grows_in_the_field_that_may_grow(tmp_path):
+    begin(tmp_path)
+    larger, growing = changed("settings", budget=30), "settings.budget"
+    with pytest.raises(InputError, match=r"settings\.budget is 20 in the run, but 30"):
+        begin(tmp_path, larger, resume=True)
+    grown = begin(tmp_path, larger, resume=True, growing=growing)
+    assert grown.record == larger
+    for other in (changed("settings", budget=40, seed=1), RECORD):
+        with pytest.raises(InputError):
+            begin(tmp_path, other, resume=True, growing=growing)
+
+
+def test_time_limits_are_listed_and_need_not_agree(tmp_path):
+    for limits in ([], [60.0], [5.0], [60.0]):
+        begin(tmp_path, RECORD | ({"timeouts": limits} if limits else {}), resume=True)
+    assert begin(tmp_path, resume=True).record == RECORD | {"timeouts": [60.0, 5.0]}
+
+
+@pytest.mark.parametrize("name", [SIMULATIONS, *RESULTS.values()])
+def test_results_without_settings_are_left_alone(tmp_path, name):
+    (tmp_path / name).write_bytes(b"precious")
+    with pytest.raises(InputError, match=f"holds {name} without run.toml"):
+        begin(tmp_path, resume=True)
+    assert (tmp_path / name).read_bytes() == b"precious"
+
+
+@pytest.mark.parametrize("content", [b'created = "\xe9"', b"= 1"])
+def test_a_record_that_is_no_toml_is_named(tmp_path, content):
+    (tmp_path / RUN_TOML).write_bytes(content)
+    with pytest.raises(InputError, match="run.toml: not TOML"):
+        Run.open(tmp_path)
+
+
+def test_resuming_where_no_run_is_names_the_nearest(tmp_path):
+    for name in ("mine", "yours_of_monday"):
+        begin(tmp_path / name)
+    with pytest.raises(InputError, match="no run to resume") as caught:
+        check_resumable(tmp_path / "mien")
+    assert str(tmp_path / "mine") in caught.value.fix and "yours" not in caught.value.fix
+    with pytest.raises(InputError) as caught:
+        check_resumable(tmp_path)  # the directory of all runs
+    assert str(tmp_path) in caught.value.fix
+    for other in ("nothing_like_them", "mine/elsewhere/far"):
+        with pytest.raises(InputError, match="; to begin a new run"):
+            check_resumable(tmp_path / other)
+    check_resumable(tmp_path / "mine")
+
+
+def twin(path, together, answers):
+    together.wait()
+    try:
+        with Run.begun(path, RECORD, resume=False):
+            answers.put("")
+            together.wait()  # until the other was refused
+    except InputError as err:
+        answers.put(str(err))
+        together.wait()
+
+
+@pytest.mark.parametrize("count", [8, pytest.param(200, marks=pytest.mark.slow)])
+def test_of_two_commands_that_start_together_exactly_one_enters(tmp_path, importable, count):
+    spawn = get_context("fork" if count > 8 else "spawn")
+    for number in range(count):
+        together, answers = spawn.Barrier(2, timeout=60), spawn.Queue()
+        given = (tmp_path / f"run_{number}", together, answers)
+        twins = [spawn.Process(target=twin, args=given) for _ in range(2)]
+        for one in twins:
+            one.start()
+        told = sorted(answers.get(timeout=60) for _ in twins)
+        for one in twins:
+            one.join()
+        assert told[0] == "" and str(given[0]) in told[1]
+        assert Run(given[0], {}).path.joinpath(RUN_TOML).exists()
+
+
+HOLDER = """
+import sys, time
+from pathlib import Path
+from bolfi_liquids.run.lock import alone_in
+
+with alone_in(Path(sys.argv[1])):
+    print("entered", flush=True)
+    time.sleep(600.0)
+"""
+
+
+def test_a_lock_ends_with_its_process(tmp_path):
+    run = tmp_path / "run"
+    begin(run)
+    command = [sys.executable, "-c", HOLDER, str(run)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as holder:
+        assert holder.stdout.readline().strip() == "entered"
+        with pytest.raises(InputError, match="another command works in it"):
+            begin(run, resume=True)
+        os.kill(holder.pid, signal.SIGKILL)
+        holder.wait()
+    assert (run / LOCK).exists()  # it locks nobody out
+    assert begin(run, resume=True).record == RECORD
+
+
+def test_one_process_keeps_itself_out_too(tmp_path):
+    with alone_in(tmp_path), pytest.raises(InputError, match="another command"):
+        with alone_in(tmp_path):
+            raise AssertionError("two are in it")
+
+
+def test_what_is_no_directory_is_refused_at_once(tmp_path):
+    (tmp_path / "file").touch()
+    (tmp_path / "dangling").symlink_to(tmp_path / "nowhere")
+    for out in ("file", "file/below", "dangling"):
+        with pytest.raises(InputError, match="not a directory"):
+            with alone_in(tmp_path / out):
+                raise AssertionError("it was entered")
+
+
+def test_what_was_simulated_is_kept_when_a_command_fails(tmp_path):
+    with pytest.raises(KeyboardInterrupt), Run.begun(tmp_path, RECORD, resume=False) as run:
+        with run.bank() as bank:
+            bank.put("stir", {}, 0, Simulation(np.zeros(1), None, 1.0))
+        raise KeyboardInterrupt
+    with begin(tmp_path, resume=True).bank() as bank:
+        assert len(bank) == 1
+
+
+# results
+
+
+@pytest.fixture
+def run(calibration, tmp_path):
+    """A copy of a calibrated run."""
+    return Run.open(shutil.copytree(calibration.path, tmp_path / "run"))
+
+
+def rewritten(run, change):
+    """The run after its run.toml was changed by hand."""
+    record = copy.deepcopy(dict(run.record))
+    change(record)
+    (run.path / RUN_TOML).write_text(tomli_w.dumps(record), encoding="utf-8")
+    return run.path
+
+
+def poured(run, after, given=""):
+    """Keep a result as `pour` keeps one."""
+    tree = run.required("calibrate").copy()
+    run.keep("pour", tree, {"after": after, "given": given}, {"distance_cm": 2.0})
+
+
+def test_a_result_is_current_as_long_as_what_it_was_made_from_is_there(run):
+    assert run.result("pour") is None and run.why_not("pour") == ""
+    poured(run, run.posterior_key())
+    assert run.result("pour") is not None
+    poured(run, "of another posterior")
+    assert run.result("pour") is None and "posterior" in run.why_not("pour")
+    poured(run, run.posterior_key(), given="of other pours")
+    assert run.result("pour") is None and "given pours" in run.why_not("pour")
+    with pytest.raises(InputError, match="run: bolfi-liquids pour "):
+        run.required("pour")
+
+
+def test_summary_has_the_sections_of_what_is_current(run):
+    before = json.loads((run.path / "summary.json").read_text(encoding="utf-8"))
+    poured(run, run.posterior_key())
+    summary = json.loads((run.path / "summary.json").read_text(encoding="utf-8"))
+    assert summary == before | {"pour": {"distance_cm": 2.0}}
+    (run.path / "summary.json").write_text("{", encoding="utf-8")  # nothing reads it
+    assert bl.Calibration.open(run.path).summary.to_json() == before["calibrate"]
+
+
+def test_a_posterior_of_other_settings_is_not_current(run):
+    path = rewritten(run, lambda record: record["settings"].update(seed=99))
+    with pytest.raises(InputError, match="other settings than run.toml holds.*--resume"):
+        bl.Calibration.open(path)
+
+
+@pytest.mark.parametrize("part", ["model", "engine"])
+def test_a_run_of_another_generation_is_refused_with_the_way_out(run, part):
+    def change(record):
+        table = record["simulator"]["recording_1"] if part == "model" else record["engine"]
+        table["model" if part == "model" else "version"] = "0"
+
+    path = rewritten(run, change)
+    execute = partial(bl.execute_pour, emulate=True)
+    for read in (bl.Calibration.open, bl.criticise, bl.choose_pour, bl.report, execute):
+        with pytest.raises(InputError, match=f"made by {part} 0.*calibrate again: ") as refused:
+            read(path)
+        assert "recordings/1-short.nc" in refused.value.fix
+
+
+def test_another_engine_goes_on_with_no_run(run, short_recording, settings, monkeypatch):
+    monkeypatch.setattr(engine_version, "ENGINE_VERSION", "0")
+    with pytest.raises(InputError, match=r"engine"):
+        bl.calibrate(short_recording, out=run.path, resume=True, progress=False, **settings)
+
+
+def test_every_byte_of_a_result_counts(run, tmp_path):
+    tree, path = run.required("calibrate"), tmp_path / "tree.nc"
+    write_result(tree, path)
+    whole = path.read_bytes()
+    for at in np.random.default_rng(0).integers(0, len(whole), 40):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
+        with pytest.raises(ValueError, match="damaged"):
+            read_result(path)
+    path.write_bytes(whole)
+    assert read_result(path).identical(tree)
+
+
+def test_a_damaged_result_is_not_current(run):
+    posterior = run.path / RESULTS["calibrate"]
+    posterior.write_bytes(posterior.read_bytes()[:-99])
+    with pytest.raises(InputError, match=r"posterior\.nc is damaged.*calibrate"):
+        bl.Calibration.open(run.path)
