@@ -128,8 +128,8 @@ class CalibrationSummary(Section):
     parameters: Mapping[str, ParameterSummary]
     least_viscosity: Number
     below_least_viscosity: Number
-    best: Mapping[str, float]
-    closest: Mapping[str, float]
+    best: Mapping[str, Number]
+    closest: Mapping[str, Number]
     n_simulations: int
     n_check_simulations: int
     fit_rms_deg: Number

@@ -10,7 +10,6 @@ import numpy as np
 from ..simulations.database import disk_errors, opened_database
 from .one_replicate import Replicate
 
-MARK = 0x424C4652  # "BLFR"
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS settings (name TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS replicate (
@@ -21,7 +20,6 @@ CREATE TABLE IF NOT EXISTS replicate (
     error     TEXT
 );
 """
-FORMAT = {"format": "2"}  # of the settings' texts; stores of version 0.1 have none
 ARRAYS = ("truth", "observed", "draws", "log_density")
 
 
@@ -43,10 +41,10 @@ class ReplicateStore:
 
     def __init__(self, path: str | Path, settings: Mapping[str, str]):
         self.path = str(path)
-        self._connection = opened_database(path, MARK, SCHEMA, "replicate store")
+        self._connection = opened_database(path, SCHEMA, "replicate store")
         try:
             with disk_errors(path):
-                self._agree_on({**settings, **FORMAT})
+                self._agree_on(dict(settings))
         except BaseException:
             self._connection.close()
             raise
@@ -105,8 +103,6 @@ def _from_row(
 
 def _difference(path: str, stored: Mapping[str, str], settings: Mapping[str, str]) -> str:
     """Why a store is refused."""
-    if stored.get("format") != settings["format"]:
-        return f"{path} was made by version 0.1, whose replicates differ; choose another file"
     unlike = [
         f"{name}: stored {json.dumps(stored.get(name))}, now {json.dumps(settings.get(name))}"
         for name in sorted(set(stored) | set(settings))

@@ -1,12 +1,14 @@
 """Every finished simulation, kept on disk and reused."""
 
 import json
+import logging
 import os
 import sqlite3
 import threading
 import time
 from collections.abc import Mapping
 from contextlib import ExitStack
+from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,8 +19,9 @@ from ..notebook_display import as_html, as_text
 from .database import disk_errors, opened_database
 from .simulation_locks import Claims
 
+logger = logging.getLogger(__name__)
+
 LARGEST_SEED = 2**63 - 1  # that SQLite can hold
-MARK = 0x424C4651  # "BLFQ"
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS simulation (
     identity TEXT NOT NULL,
@@ -30,6 +33,7 @@ CREATE TABLE IF NOT EXISTS simulation (
     error    TEXT,
     seconds  REAL NOT NULL,
     created  REAL NOT NULL,
+    digest   BLOB NOT NULL,
     PRIMARY KEY (identity, theta, seed)
 );
 """
@@ -57,7 +61,8 @@ class SimulationBank:
     What was simulated depends on no observation, so runs and observations may share a bank,
     also at the same time: a write is one committed transaction in WAL mode, and who claims a
     simulation before making it keeps the threads and processes of one machine from making it
-    twice. Claims are locks on the file `<path>-claims`, which stays behind empty.
+    twice. Claims are locks on the file `<path>-claims`, which stays behind empty. Each row holds a
+    digest of itself; one that is damaged counts as not simulated, and is said in the log.
 
     Args:
         path: File, created if missing; ":memory:" keeps nothing.
@@ -70,7 +75,7 @@ class SimulationBank:
         self.path = str(path)
         # one connection for all threads of the process, guarded by a lock
         self._lock = threading.Lock()
-        self._connection = opened_database(path, MARK, SCHEMA, "simulation bank")
+        self._connection = opened_database(path, SCHEMA, "simulation bank")
         self._resources = ExitStack()
         self._resources.callback(self._connection.close)
         self._claims = Claims.share(None if self.in_memory else f"{self.path}-claims")
@@ -110,18 +115,31 @@ class SimulationBank:
 
     def get(self, identity: str, theta: Mapping[str, float], seed: int) -> Simulation | None:
         """The run of exactly this simulator, theta and seed, or None."""
+        key = _key(identity, theta, seed)
         with self._lock:
             row = self._connection.execute(
-                "SELECT signal, dtype, shape, error, seconds FROM simulation "
+                "SELECT signal, dtype, shape, error, seconds, digest FROM simulation "
                 "WHERE identity = ? AND theta = ? AND seed = ?",
-                _key(identity, theta, seed),
+                key,
             ).fetchone()
         if row is None:
             return None
-        blob, dtype, shape, error, seconds = row
-        if blob is None:
-            return Simulation(None, error, seconds)
-        return Simulation(_signal(blob, dtype, shape), error, seconds)
+        *kept, digest = row
+        if not self._is_whole((*key, *kept), digest):
+            with self._lock:  # else it could not be put again
+                self._connection.execute("DELETE FROM simulation WHERE digest = ?", (digest,))
+            return None
+        blob, dtype, shape, error, seconds = kept
+        signal = None if blob is None else _signal(blob, dtype, shape)
+        return Simulation(signal, error, seconds)
+
+    def _is_whole(self, row: tuple, digest: bytes) -> bool:
+        """Whether a row, (identity, theta, seed, signal, dtype, shape, error, seconds), is as it
+        was stored."""
+        if whole := _digest(row) == digest:
+            return whole
+        logger.warning("%s: a damaged row counts as not simulated: %s", self.path, row[1:3])
+        return False
 
     def put(
         self, identity: str, theta: Mapping[str, float], seed: int, simulation: Simulation
@@ -140,17 +158,16 @@ class SimulationBank:
         if simulation.signal is not None:
             signal = np.ascontiguousarray(simulation.signal)
             blob, dtype, shape = signal.tobytes(), signal.dtype.str, json.dumps(signal.shape)
-        row = (
-            *(*_key(identity, theta, seed), blob, dtype, shape),
-            *(simulation.error, simulation.seconds, time.time()),
-        )
+        seconds = float(simulation.seconds)
+        row = (*_key(identity, theta, seed), blob, dtype, shape, simulation.error, seconds)
         with self._lock, disk_errors(self.path):
             self._connection.execute(
-                "INSERT INTO simulation VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?) "
+                "INSERT INTO simulation VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) "
                 "ON CONFLICT DO UPDATE SET signal = excluded.signal, dtype = excluded.dtype, "
                 "shape = excluded.shape, error = excluded.error, seconds = excluded.seconds, "
-                "created = excluded.created WHERE simulation.signal IS NULL",
-                row,
+                "created = excluded.created, digest = excluded.digest "
+                "WHERE simulation.signal IS NULL",
+                (*row, time.time(), _digest(row)),
             )
 
     def holds(self, identity: str) -> bool:
@@ -175,10 +192,11 @@ class SimulationBank:
         check_text("identity", identity)
         with self._lock:
             rows = self._connection.execute(
-                "SELECT theta, seed, signal, dtype, shape FROM simulation "
+                "SELECT theta, seed, signal, dtype, shape, error, seconds, digest FROM simulation "
                 "WHERE identity = ? AND signal IS NOT NULL ORDER BY theta, seed",
                 (identity,),
             ).fetchall()
+        rows = [row for row in rows if self._is_whole((identity, *row[:-1]), row[-1])]
         theta = [json.loads(row[0]) for row in rows]
         kinds = {(tuple(names), row[4]) for names, row in zip(theta, rows, strict=True)}
         if len(kinds) != 1:
@@ -189,7 +207,7 @@ class SimulationBank:
             )
         return Simulations(
             {name: np.array([row[name] for row in theta]) for name in theta[0]},
-            np.stack([_signal(*row[2:]) for row in rows]),
+            np.stack([_signal(*row[2:5]) for row in rows]),
             np.array([row[1] for row in rows], np.int64),
         )
 
@@ -248,6 +266,12 @@ def _key(identity: str, theta: Mapping[str, float], seed: int) -> tuple[str, str
     check_text("identity", identity)
     whole = checked_integer("seed", seed, -LARGEST_SEED - 1, LARGEST_SEED)
     return identity, theta_key(theta), whole
+
+
+def _digest(row: tuple) -> bytes:
+    """Of identity, theta, seed, signal, dtype, shape, error and seconds."""
+    signal = row[3] or b""
+    return sha256(repr((*row[:3], *row[4:])).encode() + signal).digest()
 
 
 def _signal(blob: bytes, dtype: str, shape: str) -> np.ndarray:

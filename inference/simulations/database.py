@@ -1,4 +1,4 @@
-"""SQLite files of our own, told from all others by a mark."""
+"""SQLite files of our own, told from all others by a digest of their tables."""
 
 import errno
 import os
@@ -6,6 +6,7 @@ import sqlite3
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from zlib import crc32
 
 BUSY_MS = 60_000  # wait this long for another process's write
 
@@ -34,13 +35,13 @@ def disk_errors(path: object) -> Iterator[None]:
         raise OSError(number, told, str(path)) from error
 
 
-def opened_database(path: object, mark: int, schema: str, what: str) -> sqlite3.Connection:
+def opened_database(path: object, schema: str, what: str) -> sqlite3.Connection:
     """A connection in WAL mode, where what is committed survives the death of the process.
 
     Args:
         path: File, created if missing; ":memory:" keeps nothing.
-        mark: The file's `application_id`.
-        schema: Statements, each ended by ";", that do nothing where they were done before.
+        schema: Statements, each ended by ";", that do nothing where they were done before. A
+            digest of them is the file's `application_id`: another schema is another kind of file.
         what: Is kept in the file, for messages.
 
     Raises:
@@ -55,7 +56,7 @@ def opened_database(path: object, mark: int, schema: str, what: str) -> sqlite3.
         with disk_errors(path), ExitStack() as undo:
             connection = sqlite3.connect(str(path), **options)
             undo.callback(connection.close)
-            _prepare(connection, mark, schema, f"{path} is an SQLite file but not a {what}")
+            _prepare(connection, schema, f"{path} is an SQLite file but not a {what}")
             undo.pop_all()
     except sqlite3.OperationalError as error:
         raise ValueError(
@@ -67,8 +68,8 @@ def opened_database(path: object, mark: int, schema: str, what: str) -> sqlite3.
     return connection
 
 
-def _prepare(connection: sqlite3.Connection, mark: int, schema: str, foreign: str) -> None:
-    execute = connection.execute
+def _prepare(connection: sqlite3.Connection, schema: str, foreign: str) -> None:
+    execute, mark = connection.execute, crc32(schema.encode()) & 0x7FFFFFFF
     execute("BEGIN IMMEDIATE")  # two processes may create the file together
     found = execute("PRAGMA application_id").fetchone()[0]
     tables = execute("SELECT count(*) FROM sqlite_master").fetchone()[0]

@@ -231,17 +231,6 @@ def test_more_time_is_no_other_setting(tmp_path):
     np.testing.assert_array_equal(run(n=4, store=store).draws, first.draws)
 
 
-def test_a_store_of_version_0_1_is_refused_by_its_version(tmp_path):
-    store = tmp_path / "r.sqlite"
-    run(n=2, store=store)
-    with closing(sqlite3.connect(store)) as connection:
-        connection.execute("DELETE FROM settings WHERE name = 'format'")
-        connection.commit()
-    with pytest.raises(ValueError, match=r"version 0\.1") as caught:
-        run(n=2, store=store)
-    assert len(str(caught.value).splitlines()) == 1 and len(str(caught.value)) < 200
-
-
 def test_progress_is_told_of_every_replicate(capsys):
     told = []
     run(n=3, progress=told.append)

@@ -3,6 +3,7 @@ import sqlite3
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -286,3 +287,27 @@ def test_the_same_job_twice_in_a_batch_is_simulated_once():
         batch = [simulations.Job(THETA, seed) for seed in (0, 1, 0)]
         found = run_missing(simulate, batch, Keep(bank), (1,))
     assert calls == [0, 1] and [result.signal[0] for result in found] == [THETA["a"]] * 3
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "signal = zeroblob(length(signal))",
+        "seconds = 2 * seconds",
+        "error = 'raised'",
+        "shape='[1]'",
+    ],
+)
+def test_a_damaged_row_counts_as_not_simulated(tmp_path, caplog, change):
+    path, made = tmp_path / "bank.sqlite", simulations.Simulation(np.arange(3.0) + 1.0, None, 0.5)
+    with inference.SimulationBank(path) as bank:
+        for seed in (0, 1):
+            bank.put("line", THETA, seed, made)
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute(f"UPDATE simulation SET {change} WHERE seed = 0")
+    with inference.SimulationBank(path) as bank:
+        assert len(bank.simulations("line").seeds) == 1
+        assert bank.get("line", THETA, 0) is None and bank.get("line", THETA, 1) is not None
+        assert "damaged row" in caplog.text
+        bank.put("line", THETA, 0, made)
+        np.testing.assert_array_equal(bank.get("line", THETA, 0).signal, made.signal)
