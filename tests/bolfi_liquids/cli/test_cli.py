@@ -180,8 +180,6 @@ def test_resuming_where_no_run_is_is_refused(short_recording, tmp_path):
         ["simulate", "pour", "--movie="],
         ["reproduce", "--quick", "--out", ""],
         ["check", "sbc", "--out", ""],
-        ["check", "physics", "--out", ""],
-        ["check", "physics", "--against", ""],
         ["demo", "--out", ""],
         ["import", "stir.csv", "--columns", "columns.toml", "--out", ""],
         ["import", "--template", ""],
