@@ -50,10 +50,12 @@ def test_a_figure_has_a_panel_for_each(tmp_path):
     assert text.count("ours") == 2
 
 
-def test_what_is_no_number_is_kept_as_null(tmp_path):
+def test_a_record_has_plain_numbers_and_null(tmp_path):
     path = tmp_path / "diverged.json"
-    write_record(path, "case", {"rows": (Row.absolute("speed [m/s]", 1.0, np.nan, 0.5),)})
+    rows = Row.absolute("speed [m/s]", 1.0, np.nan, 0.5), Row("x", 1.0, 1.0, np.float64(0.0), 0.1)
+    write_record(path, "case", {"rows": rows})
     record = json.loads(path.read_text())
     assert record["name"] == "diverged" and record["kind"] == "case" and record["model"]
-    (row,) = record["rows"]
-    assert row["ours"] is None and row["passed"] is False
+    speed, place = record["rows"]
+    assert speed["ours"] is None and speed["passed"] is False
+    assert place["error"] == 0.0 and place["passed"] is True

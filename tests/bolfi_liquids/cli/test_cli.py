@@ -208,7 +208,6 @@ def test_a_variable_that_was_not_set_is_no_path(monkeypatch, tmp_path, command):
     [
         ["calibrate", "{recording}", "--out", "run"],
         ["check", "sbc", "--out", "run"],
-        ["check", "physics", "--out", "run"],
         ["simulate", "stir", "--out", "stir.nc"],
         ["simulate", "pour", "--out", "pour.nc"],
     ],
