@@ -64,7 +64,7 @@ def _made(kind: str, group: Iterable[Record]) -> dict[str, str]:
 
 
 def _cases(group: Iterable[Record]) -> dict[str, Any]:
-    about = ("title", "truth", "source", "unit", "rows")
+    about = ("truth", "source", "unit", "rows")
     return {"cases": {one["name"]: _only(one, about) for one in group}}
 
 

@@ -18,7 +18,7 @@ def row(quantity, error, tolerance):
 
 
 def case(*rows, unit=""):
-    about = {"title": "Rest", "truth": "nothing | moves", "source": "Stevin 1586"}
+    about = {"truth": "nothing | moves", "source": "Stevin 1586"}
     return {**about, "unit": unit, "rows": list(rows)}
 
 

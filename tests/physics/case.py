@@ -102,14 +102,12 @@ class Case(NamedTuple):
     """A simulation with a known outcome.
 
     Attributes:
-        title: In a few words.
         truth: What is expected, in a sentence or less.
         source: Where that is known from.
         unit: Of the errors: "relative", "deg"; "" where each quantity names its own.
         run: The comparison itself, from the seed of its initial packings.
     """
 
-    title: str
     truth: str
     source: str
     unit: str

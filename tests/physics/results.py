@@ -1,6 +1,5 @@
 """What is left of comparisons: a table, a figure, and a file for the guide's page of accuracy."""
 
-import io
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -30,18 +29,15 @@ def table(rows: Iterable[Row]) -> str:
     return "\n".join("{:>10} {:>10} {:>10} {:>9}  {:4}  {}".format(*line) for line in lines)
 
 
-def write_figure(path: Path, title: str, panels: Sequence[Panel]) -> None:
+def write_figure(path: Path, panels: Sequence[Panel]) -> None:
     """Draw panels side by side into an SVG file: truths as pale lines, ours on top of them."""
     with styled(path.stem):
         figure = new_figure(PANEL_SIZE[0] * len(panels), PANEL_SIZE[1])
-        figure.suptitle(title, fontsize=10, color=INK)
-        for axes, panel in zip(
-            figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True
-        ):
+        figure.suptitle(path.stem, fontsize=10, color=INK)
+        row = figure.subplots(1, len(panels), squeeze=False)[0]
+        for axes, panel in zip(row, panels, strict=True):
             _draw(axes, panel)
-        text = io.StringIO()
-        figure.savefig(text, format="svg", metadata={"Date": None})
-    path.write_text(text.getvalue(), encoding="utf-8")
+        figure.savefig(path, metadata={"Date": None})
 
 
 def write_record(path: Path, kind: str, record: Mapping[str, Any]) -> None:

@@ -43,10 +43,10 @@ def test_a_table_has_a_line_for_each_row():
 
 def test_a_figure_has_a_panel_for_each(tmp_path):
     path = tmp_path / "good.svg"
-    write_figure(path, "A good one", [panel(), panel(log="xy")])
+    write_figure(path, [panel(), panel(log="xy")])
     svg = ET.parse(path).getroot()
     text = " ".join(svg.itertext())
-    assert svg.tag.endswith("svg") and "A good one" in text
+    assert svg.tag.endswith("svg") and "good" in text
     assert text.count("ours") == 2
 
 

@@ -1,5 +1,7 @@
 """Every case of the fluid keeps its tolerances; `make physics` shows the tables."""
 
+from pathlib import Path
+
 import pytest
 from cases import (
     camera_effects,
@@ -84,15 +86,18 @@ def test_a_case_keeps_its_tolerances(name, case, results_folder):
     print(f"\n{name}: {case.truth} ({case.source}){unit}\n{table(result.rows)}")
     for note, value in result.notes.items():
         print(f"{note}: {value}")
-    write_figure(results_folder / f"{name}.svg", case.title, result.panels)
-    about = {"title": case.title, "truth": case.truth, "source": case.source, "unit": case.unit}
+    write_figure(results_folder / f"{name}.svg", result.panels)
+    about = {"truth": case.truth, "source": case.source, "unit": case.unit}
     write_record(results_folder / f"{name}.json", "case", {**about, "rows": result.rows})
     missed = [row for row in result.rows if not row.passed]
     assert not missed, f"\n{table(missed)}"
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_a_case_says_what_it_is(name):
-    case, _ = CASES[name]
-    assert case.title and case.truth and case.source
-    assert not case.truth.endswith(".") and not case.title.endswith(".")
+def test_no_case_is_forgotten():
+    folders = (Path(__file__).parent / name for name in ("cases", "cup_cases", "wet_cases"))
+    assert {path.stem for folder in folders for path in folder.glob("[!_]*.py")} == set(CASES)
+
+
+def test_a_case_says_what_is_true_and_whence():
+    for case, _ in CASES.values():
+        assert case.truth and case.source and not case.truth.endswith(".")

@@ -65,7 +65,7 @@ def test_a_stir_is_repeated(stir, results_folder):
     rows, effects = stir_rows(stir, signals), sorted(stir.effects)
     print(f"\n{stir.name}, {stir.viscosity:g} Pa s {' '.join(effects)}: {cpu_s} CPU s a stir")
     print(table(rows))
-    write_figure(results_folder / f"{stir.name}.svg", stir.name, stir_panels(stir, signals))
+    write_figure(results_folder / f"{stir.name}.svg", stir_panels(stir, signals))
     about = {"viscosity": stir.viscosity, "effects": effects, "cpu_s": cpu_s}
     write_record(results_folder / f"{stir.name}.json", "stir", {**about, "rows": rows})
     assert_passed(rows)
@@ -86,7 +86,7 @@ def test_the_pours_of_a_liquid_are_repeated(liquid, results_folder):
     print(f"\n{liquid.name}, {liquid.viscosity:g} Pa s: {cpu_s} CPU s a pour")
     print(HEAD, *pours, table(rows), sep="\n")
     panels = [pour_panel(*pair) for pair in zip(liquid.pours, pours, strict=True)]
-    write_figure(results_folder / f"{liquid.name}.svg", liquid.name, panels)
+    write_figure(results_folder / f"{liquid.name}.svg", panels)
     record = {
         "cell_mm": 1e3 * cell_width(liquid.cups, CELL),
         "liquid": liquid.liquid,

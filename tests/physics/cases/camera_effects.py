@@ -71,7 +71,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Effects in the cameras",
     truth="the same stir, seen late or in a frame that is turned",
     source="rotation of the stick's direction",
     unit="deg",

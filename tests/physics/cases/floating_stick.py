@@ -47,7 +47,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Light stick that floats up, or down",
     truth="the torques of weight and lift cancel at one angle",
     source="Archimedes, On Floating Bodies; a thin rod on a pivot",
     unit="deg",

@@ -56,7 +56,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Stick that swings in air",
     truth="a rigid rod's period by its amplitude, and the pivot's friction as its only loss",
     source="Landau & Lifshitz, Mechanics, section 11",
     unit="relative",

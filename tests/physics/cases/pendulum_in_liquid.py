@@ -56,7 +56,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Steel stick that swings in a liquid",
     truth="a small swing with Archimedes' lift and Stokes' added mass and friction",
     source="Stokes 1851, Trans. Camb. Phil. Soc. 9, 8; walls in potential flow",
     unit="relative",

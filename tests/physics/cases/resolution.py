@@ -41,7 +41,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Cells of 5 mm against cells of 3.6 mm",
     truth="the inclination does not depend on the size of cells",
     source="the same stir in smaller cells",
     unit="deg",

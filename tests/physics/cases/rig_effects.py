@@ -110,7 +110,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Effects in the rig",
     truth="Archimedes' angle, and what dry friction takes from the energy of each swing",
     source="Archimedes, On Floating Bodies; Landau & Lifshitz, Mechanics, section 25",
     unit="",

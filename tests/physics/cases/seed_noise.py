@@ -49,7 +49,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Stirs that differ in their packing alone",
     truth="a liquid has no memory of how it was poured in",
     source="the same inputs with other seeds",
     unit="deg",

@@ -48,7 +48,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Volume of a liquid that was stirred",
     truth="the volume that was filled in",
     source="incompressibility; particles that stand still fill the cup to its mark",
     unit="relative",

@@ -58,7 +58,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Lift on sticks that float",
     truth="weight and lift cancel at one angle; at the liquid's density, at any",
     source="Archimedes, On Floating Bodies; a thin rod on a pivot",
     unit="relative",

@@ -46,7 +46,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Liquid at rest in a cup",
     truth="it stays at rest, at its level",
     source="hydrostatics",
     unit="",

@@ -119,7 +119,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Gels and shear-thinning liquids that a force turns",
     truth="the profile that carries a stress as the distance from the axis squared",
     source="momentum; the laws of Papanastasiou 1987 (J. Rheol. 31, 385) and Carreau 1972",
     unit="relative",

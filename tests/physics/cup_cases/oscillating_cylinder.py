@@ -91,7 +91,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Stick that is moved to and fro",
     truth="added mass and drag of a cylinder that oscillates within another",
     source="Stokes 1851; Chen, Wambsganss & Jendrzejczyk 1976 for the outer cylinder",
     unit="",

@@ -19,7 +19,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Liquid that a driven ring drags around",
     truth="rigid rotation within the ring, R²/r - r outside, as fast as torque over viscosity",
     source="Batchelor 1967, section 4.5: flow between cylinders",
     unit="relative",

@@ -53,7 +53,6 @@ def _centre(position: np.ndarray, velocity: np.ndarray) -> float:
 
 
 CASE = Case(
-    title="Wave from side to side",
     truth="the period of the lowest wave in a cylinder, ω² = g k tanh(k h), k = 1.841/R",
     source="Lamb, Hydrodynamics, section 191",
     unit="relative",

@@ -85,7 +85,6 @@ def _added_viscosity(seed: int) -> dict[str, float]:
 
 
 CASE = Case(
-    title="Swirl that comes to rest",
     truth="the slowest turning flow decays at ν (3.83/R)², as implicit steps of that rate do",
     source="Batchelor 1967, section 4.5; the floor does not rub",
     unit="relative",

@@ -17,7 +17,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Swirl that a force keeps up",
     truth="a profile R² r - r³, of a size as the force over the viscosity",
     source="Batchelor 1967, section 4.5, for a force that grows with the radius",
     unit="relative",

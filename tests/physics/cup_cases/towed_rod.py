@@ -61,7 +61,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Rod towed through a wide cup",
     truth="the drag of a long cylinder in a steady stream",
     source="Incompressible Flow, 4th ed., fitted by Sharpe; a prototype's line on plane grids",
     unit="relative",

@@ -44,7 +44,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Swirl in a liquid that gets warmer",
     truth="the slowest turning flow decays at ν(t) (3.83/R)², as implicit steps of that rate do",
     source="Batchelor 1967, section 4.5, with a viscosity that is the same everywhere",
     unit="relative",

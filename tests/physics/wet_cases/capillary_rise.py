@@ -64,7 +64,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Columns of different width that share a floor",
     truth="levels differ by 2 σ cos a / (ρ g) (1/d1 - 1/d2)",
     source="Jurin 1718; de Gennes, Brochard-Wyart & Quéré 2004, section 2.4",
     unit="",

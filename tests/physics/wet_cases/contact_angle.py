@@ -67,7 +67,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Drop at rest on a floor",
     truth="a cap of a circle that meets the floor at the contact angle",
     source="Young 1805; geometry",
     unit="relative",

@@ -95,7 +95,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Column of water that collapses",
     truth="the front's run and the column's fall, after one shift of time",
     source="Martin & Moyce 1952, Phil. Trans. R. Soc. A 244, 312, tables 2 and 6",
     unit="relative",

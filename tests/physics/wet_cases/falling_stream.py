@@ -61,7 +61,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Piece of a stream that falls freely",
     truth="it falls as a stone, keeps its speed aside, its width and its turning",
     source="Galilei; conservation of momentum",
     unit="relative",

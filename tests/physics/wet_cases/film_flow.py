@@ -65,7 +65,6 @@ def _film(thickness: float, viscosity: float, seed: int) -> Body:
 
 
 CASE = Case(
-    title="Film that runs down a wall",
     truth="the speed that weight and friction give it: ρ g h² / (3 μ) on average",
     source="Nusselt 1916; Batchelor 1967, section 4.2",
     unit="log of the ratio",

@@ -55,7 +55,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Surface between two walls",
     truth="the curve whose pressure bears its weight and that meets the walls at the contact angle",
     source="Landau & Lifshitz, Fluid Mechanics, section 61",
     unit="",

@@ -46,7 +46,6 @@ def _stretch(position: np.ndarray, velocity: np.ndarray) -> float:
 
 
 CASE = Case(
-    title="Drop that swings",
     truth="the period of a round column's lowest swing, ω² = 6 σ / (ρ R³)",
     source="Rayleigh 1879, Proc. R. Soc. 29, 71",
     unit="relative",

@@ -60,7 +60,6 @@ def run(seed: int) -> CaseResult:
 
 
 CASE = Case(
-    title="Film that drains down a wall",
     truth="a film that thins as the root of the time, thicker with the root of the viscosity",
     source="Jeffreys 1930, Proc. Camb. Phil. Soc. 26, 204",
     unit="relative",
