@@ -24,7 +24,7 @@ PEERS_SUPPORTED := import sys, ensurepip; sys.exit(not (3, 9) <= sys.version_inf
 
 .DELETE_ON_ERROR:
 
-.PHONY: setup demo browser test test-long lint peers clean
+.PHONY: setup demo browser test test-long physics against lint peers clean
 
 setup: $(INSTALLED)
 
@@ -65,6 +65,19 @@ test: setup
 
 test-long: setup
 	$(BIN)/pytest -m minutes -o faulthandler_timeout=0
+
+# cases of the fluid with their tables, or those whose names hold CASE; figures lie in RESULTS
+physics: setup
+	RESULTS=$(or $(RESULTS),runs/physics) $(BIN)/pytest -s -m "slow or minutes" \
+		-o faulthandler_timeout=0 $(if $(CASE),-k "$(CASE)") tests/physics/test_physics.py
+
+# stirs and pours of the reference in the directory REFERENCE; CELL is the width of pours' cells [mm]
+against: setup
+	@test -n "$(REFERENCE)" || { echo "make: name a directory of stirs or pours:" \
+		"make against REFERENCE=tests/data/stirring_reference" >&2; exit 1; }
+	REFERENCE="$(REFERENCE)" CELL="$(CELL)" RESULTS=$(or $(RESULTS),runs/against) $(BIN)/pytest -s \
+		-m benchmark -o faulthandler_timeout=0 $(if $(CASE),-k "$(CASE)") \
+		tests/benchmarks/against/test_against.py
 
 lint: setup
 	$(BIN)/ruff check

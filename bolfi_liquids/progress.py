@@ -59,32 +59,3 @@ def phases(*, shown: bool) -> Iterator[Callable[[str, int], None]]:
             bar.update(handle, description=f"{phase} ({count} simulations)")
 
         yield report
-
-
-@contextmanager
-def fraction_bar(task: str, *, shown: bool) -> Iterator[Callable[[float], None]]:
-    """A bar that the yielded function sets to a fraction; without a terminal, one line.
-
-    Args:
-        task: What is being done, in a few words.
-        shown: False for silence.
-    """
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    if not shown or not console.is_terminal:
-        if shown:
-            console.print(task, highlight=False)
-        yield lambda fraction: None
-        return
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=console) as bar:
-        handle = bar.add_task(task, total=1.0)
-        yield lambda fraction: bar.update(handle, completed=min(max(fraction, 0.0), 1.0))
-        bar.update(handle, completed=1.0)

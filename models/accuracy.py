@@ -8,7 +8,7 @@ Steps = tuple[tuple[float, float], ...]
 USUAL_ERRORS: Steps = ((0.03, 0.5), (0.08, 0.45), (0.2, 0.3), (np.inf, 0.05))
 """As measured on stars at 5 to 10 cm/s; a circle in water leaves 1.0."""
 LARGEST_ERRORS: Steps = ((0.03, 0.6), (0.08, 0.55), (0.2, 0.36), (np.inf, 0.1))
-"""What `check physics --against` allows."""
+"""What `make against` allows."""
 
 
 def stirring_error(viscosity: float, errors: Steps = USUAL_ERRORS) -> float:

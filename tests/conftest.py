@@ -17,7 +17,7 @@ from _pytest.runner import runtestprotocol
 APPLICATION = "bolfi_liquids"
 POURED = {"pour", "frames"}  # its fixtures that take a minute where nothing is compiled yet
 SIMULATED = {"calibration", *POURED}
-SIMULATING = ("models", "simulation")  # folders of tests
+SIMULATING = ("models", "physics", "simulation")  # folders of tests
 CONTROLLED = {"arm", "emulator", "robot"}  # fixtures of tests that talk to an emulated controller
 MOST_REPEATS = 3  # of a session; with more of them, tests hide what fails
 CALM, MOST_CALM = 1.0, 30.0  # s, without a stall before a repetition; and waited for at most
@@ -63,6 +63,14 @@ def _simulates(item):
 def importable(monkeypatch):
     """Started processes find the modules of tests, however pytest was started."""
     monkeypatch.syspath_prepend(Path(__file__).parents[1])
+
+
+@pytest.fixture
+def results_folder(tmp_path):
+    """Where figures and records go: the directory that RESULTS names, or a temporary one."""
+    folder = Path(os.environ.get("RESULTS") or tmp_path)
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 @pytest.fixture

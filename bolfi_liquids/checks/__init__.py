@@ -1,1 +1,1 @@
-"""The commands `check sbc` and `check physics`."""
+"""The command `check sbc`."""

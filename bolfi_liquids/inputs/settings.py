@@ -119,22 +119,6 @@ def checked(where: str = "") -> Callable[[type[T]], type[T]]:
 
 
 @checked()
-class SeedSetting:
-    """The seed of a command that has no other setting."""
-
-    seed: Seed
-
-
-def checked_seed(value: Any) -> int:
-    """`value` as a seed.
-
-    Raises:
-        InputError: It is no integer from 0 to `LARGEST_SEED`.
-    """
-    return SeedSetting(value).seed
-
-
-@checked()
 class CalibrationSettings:
     """What decides a calibration besides its recordings and prior.
 

@@ -2,20 +2,21 @@
 
     .venv/bin/python tests/benchmarks/accuracy_page.py RECORD...
 
-A RECORD is a results file: physics.json of `check physics`; against.json of `check physics
---against`, of stirs or of pours in cells of any width; calibrations.json of
-calibrate_references.py. Each replaces what was kept of its kind in tests/data/accuracy.json, from
-which the page is written by accuracy.md.jinja. Without a RECORD the page is written again. A file
-of a few cases replaces all: give the results of a whole check.
+A RECORD is a file that `make physics` or `make against` left, of pours in cells of any width, or
+calibrations.json of calibrate_references.py. Those of a kind replace all that was kept of it in
+tests/data/accuracy.json, from which the page is written by accuracy.md.jinja: give the records of a
+whole run. Without a RECORD the page is written again.
 """
 
 import json
 import sys
-from collections.abc import Iterable, Mapping
-from datetime import date
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from against import neighbours, pour_bars
+from bolfi_liquids.models.accuracy import LARGEST_ERRORS
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from machine import processor
 
@@ -26,56 +27,77 @@ TEMPLATE = "accuracy.md.jinja"
 DIGITS = 4  # that are kept of each figure
 KINDS = ("physics", "stirs", "pours", "calibrations")
 PERCENT = "relative"  # unit of a case whose errors are fractions of the truth
-RESULT = ("quantity", "truth", "ours", "error", "tolerance", "passed")
 
 Record = Mapping[str, Any]
 
 
-def kept(record: Record) -> dict[str, Any]:
-    """What the page needs of a results file, by kind.
+def kept(records: Iterable[Record]) -> dict[str, Any]:
+    """What the page needs of records, by kind.
 
     Raises:
-        ValueError: It is no results file, or holds no results.
+        ValueError: Those of a kind are of several models, or one is no record.
     """
+    groups: dict[tuple[str, str], list[Record]] = {}
+    for record in records:
+        kind = PARTS.get(str(record.get("kind")))
+        if kind is None:
+            raise ValueError(f"no record of a kind of {', '.join(PARTS)}: {str(record):.80}")
+        width = f"{record['cell_mm']:.3g}" if kind == "pours" else ""
+        groups.setdefault((kind, width), []).append(record)
     found: dict[str, Any] = {}
-    if cases := record.get("cases"):
-        about = ("title", "truth", "source", "unit", "error")
-        found["physics"] = {
-            "cases": {
-                name: {key: case[key] for key in about} | {"rows": _rows(case["rows"])}
-                for name, case in cases.items()
-            }
-        }
-    if recordings := record.get("recordings"):
-        pairs = [_only(one, ("ratio", "judged", "passed")) for one in record["neighbours"]]
-        bars = _only(record["settings"], ("max_ratio_difference", "least_judged_deg", "rms_bars"))
-        found["stirs"] = {
-            "recordings": {name: _replayed(one) for name, one in recordings.items()},
-            "neighbours": pairs,
-            "bars": bars,
-        }
-    if pours := record.get("pours"):
-        width = next(iter(pours.values()))["settings"]["cups"]["numerics"]["cell"]
-        found["pours"] = {
-            f"{1e3 * width:.3g}": {
-                "liquids": {name: _poured(one) for name, one in pours.items()},
-                "across": _rows(record["across_pours"]),
-                "bars": record["settings"]["pours"],
-            }
-        }
-    if calibrations := record.get("calibrations"):
-        found["calibrations"] = {"budget": record["budget"], "of": _rounded(calibrations)}
-    if not found:
-        raise ValueError(
-            "holds none of cases, recordings, pours and calibrations; give physics.json, "
-            "against.json or calibrations.json of a finished check"
-        )
-    for kind, one in found.items():
-        day = str(record.get("created", date.today()))[:10]
-        made = {"model": record.get("model"), "on": f"{day}, {processor()}"}
-        for part in one.values() if kind == "pours" else (one,):
-            part["made"] = made
+    for (kind, width), group in groups.items():
+        part = {**_rounded(COLLECTED[kind](group)), "made": _made(kind, group)}
+        if kind == "pours":
+            found.setdefault(kind, {})[width] = part
+        else:
+            found[kind] = part
     return found
+
+
+def _made(kind: str, group: Iterable[Record]) -> dict[str, str]:
+    """The model of all records, and when and where they were made."""
+    models = {str(record["model"]) for record in group}
+    if len(models) > 1:
+        raise ValueError(f"{kind} of the models {', '.join(sorted(models))}: repeat the older ones")
+    day = max(str(record["created"]) for record in group)
+    return {"model": models.pop(), "on": f"{day}, {processor()}"}
+
+
+def _cases(group: Iterable[Record]) -> dict[str, Any]:
+    about = ("truth", "source", "unit", "rows")
+    return {"cases": {one["name"]: _only(one, about) for one in group}}
+
+
+def _stirs(group: Sequence[Record]) -> dict[str, Any]:
+    stirs = {one["name"]: _replayed(one) for one in group if one["kind"] == "stir"}
+    ratios = [one["rows"][0]["ours"] for one in group if one["kind"] == "neighbours"]
+    return {"recordings": stirs, "ratios": ratios}
+
+
+def _pours(group: Sequence[Record]) -> dict[str, Any]:
+    about = ("liquid", "viscosity", "contact_angle_deg", "cpu_s", "excess", "rows")
+    poured = [one for one in group if one["kind"] == "poured"]
+    poured.sort(key=lambda one: (one["viscosity"], one["contact_angle_deg"]))
+    liquids = {one["name"]: _only(one, about) for one in poured}
+    across = [row for one in group if one["kind"] == "across" for row in one["rows"]]
+    across.sort(key=lambda row: row["quantity"].startswith("shift"))  # means first
+    return {"liquids": liquids, "across": across}
+
+
+def _calibrations(group: Sequence[Record]) -> dict[str, Any]:
+    return {"budget": group[-1]["budget"], "of": group[-1]["calibrations"]}
+
+
+PARTS = {
+    "case": "physics",
+    "stir": "stirs",
+    "neighbours": "stirs",
+    "poured": "pours",
+    "across": "pours",
+    "calibrations": "calibrations",
+}
+"""Kind of a record -> part of the page."""
+COLLECTED = {"physics": _cases, "stirs": _stirs, "pours": _pours, "calibrations": _calibrations}
 
 
 def merged(measured: Record, found: Record) -> dict[str, Any]:
@@ -103,8 +125,9 @@ def page(measured: Record) -> str:
     usual = max(pours, key=float)  # the simulator's own cells; others are finer
     return environment.get_template(TEMPLATE).render(
         stirs=_by_liquid(measured["stirs"]["recordings"]),
-        ratios=sorted(one["ratio"] for one in measured["stirs"]["neighbours"] if one["judged"]),
-        bars=measured["stirs"]["bars"],
+        ratios=sorted(measured["stirs"]["ratios"]),
+        neighbour_bars=neighbours,
+        rms_bars=LARGEST_ERRORS,
         calibrated=_by_liquid(measured["calibrations"]["of"]),
         budget=measured["calibrations"]["budget"],
         cases=measured["physics"]["cases"],
@@ -112,7 +135,8 @@ def page(measured: Record) -> str:
         cell=usual,
         pours=pours[usual]["liquids"],
         across=pours[usual]["across"],
-        pour_bars=pours[usual]["bars"],
+        pour_bars=pour_bars,
+        any_viscosity=np.inf,
         finer={width: one["across"] for width, one in pours.items() if width != usual},
         made=measured["physics"]["made"],
         timed=measured["stirs"]["made"],
@@ -143,14 +167,13 @@ def missed(cases: Record, pours: Record, stirs: Record) -> list[str]:
         *((name, row) for name, one in pours["liquids"].items() for row in one["rows"]),
         *(("pours", row) for row in pours["across"]),
     ]
-    failed = [f"{name}: {case['error']}" for name, case in cases.items() if case["error"]]
     stirred = [name for name, one in stirs["recordings"].items() if not one["passed"]]
     beyond = [
         f"{name}: {row['quantity']}, {number(row['error'])} (bar {number(row['tolerance'])})"
         for name, row in rows
         if not row["passed"]
     ]
-    return [*failed, *stirred, *beyond]
+    return [*stirred, *beyond]
 
 
 def number(value: float | None, percent: bool = False) -> str:
@@ -218,31 +241,13 @@ def _liquid(name: str, one: Record) -> str:
 def _replayed(record: Record) -> dict[str, Any]:
     rms, spread = record["rows"]
     return {
-        "viscosity": record["settings"]["viscosity"],
-        "effects": sorted(record["settings"]["effects"]),
-        "rms": _rounded(rms["ours"]),
+        **_only(record, ("viscosity", "effects", "cpu_s")),
+        "rms": rms["ours"],
         "bar": rms["tolerance"],
-        "spread": _rounded(spread["ours"]),
+        "spread": spread["ours"],
         "spread_bar": spread["tolerance"],
-        "cpu_s": record["notes"]["cpu_s"],
-        "passed": record["passed"],
+        "passed": rms["passed"] and spread["passed"],
     }
-
-
-def _poured(record: Record) -> dict[str, Any]:
-    title, settings = record["title"], record["settings"]
-    return {
-        "liquid": title.partition(",")[0],
-        "viscosity": settings["viscosity"],
-        "contact_angle_deg": settings["cups"]["source"]["contact_angle_deg"],
-        "cpu_s": record["notes"]["cpu_s"],
-        "excess": [_rounded(one["excess"]) for one in record["notes"]["pours"]],
-        "rows": _rows(record["rows"]),
-    }
-
-
-def _rows(rows: Iterable[Record]) -> list[dict[str, Any]]:
-    return [_rounded(_only(row, RESULT)) for row in rows]
 
 
 def _only(record: Record, names: Iterable[str]) -> dict[str, Any]:
@@ -260,12 +265,9 @@ def _rounded(value: Any) -> Any:
 
 def main(paths: Iterable[str]) -> None:
     measured = json.loads(MEASURED.read_text(encoding="utf-8")) if MEASURED.exists() else {}
-    for path in paths:
-        try:
-            measured = merged(measured, kept(json.loads(Path(path).read_text(encoding="utf-8"))))
-        except ValueError as err:
-            raise SystemExit(f"error: {path}: {err}") from err
+    records = [json.loads(Path(path).read_text(encoding="utf-8")) for path in paths]
     try:
+        measured = merged(measured, kept(records))
         text = page(measured)
     except ValueError as err:
         raise SystemExit(f"error: {err}") from err

@@ -9,13 +9,14 @@ RUNS/calibrations.json holds what accuracy_page.py tells of them.
 
 import json
 import sys
+from datetime import date
 from pathlib import Path
 
 import numpy as np
+from against.stirs import open_reference_stirs
 from bolfi_liquids.models import MODEL_VERSION
 
 import bolfi_liquids as bl
-from bolfi_liquids.checks.reference import open_reference
 
 BUDGET = 20
 LEAST_VISCOSITY = 0.01  # Pa s; thinner liquids look alike
@@ -25,7 +26,7 @@ HELD, ERROR = 11 / 14, 0.2  # bars: share of intervals that hold the truth, and 
 def main(folder: Path, runs: Path) -> None:
     held, errors, found = [], [], {}
     print(f"{'recording':20} {'Pa s':>6} {'5 %':>8} {'50 %':>8} {'95 %':>8}  holds")
-    for reference in open_reference(folder).stirs:
+    for reference in open_reference_stirs(folder).stirs:
         if reference.effects:
             continue
         truth = reference.viscosity
@@ -44,7 +45,13 @@ def main(folder: Path, runs: Path) -> None:
         errors.append(abs(middle / truth - 1.0))
         interval = {"q05": float(low), "q50": float(middle), "q95": float(high)}
         found[reference.name] = {"viscosity": truth, **interval}
-        results = {"budget": BUDGET, "model": MODEL_VERSION, "calibrations": found}
+        results = {
+            "kind": "calibrations",
+            "created": str(date.today()),
+            "model": MODEL_VERSION,
+            "budget": BUDGET,
+            "calibrations": found,
+        }
         (runs / "calibrations.json").write_text(json.dumps(results, indent=2) + "\n")
         print(
             f"{reference.name:20} {truth:6g} {low:8.3g} {middle:8.3g} {high:8.3g}  {held[-1]}",

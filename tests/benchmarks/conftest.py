@@ -1,6 +1,10 @@
-"""Makes the tasks importable as `tasks`, as they are for the scripts of this directory."""
+"""Makes the tasks importable as `tasks`, as they are for the scripts of this directory.
+
+Truths, rows and tables of the physics' cases are importable, too.
+"""
 
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE), str(HERE.parent / "physics")]

@@ -13,11 +13,11 @@ import time
 from pathlib import Path
 
 import numpy as np
+from against.pours import PouredLiquid, open_poured_liquids
+from against.stirs import open_reference_stirs
 from machine import machine
 
 import bolfi_liquids as bl
-from bolfi_liquids.checks.reference import open_reference
-from bolfi_liquids.checks.reference_pours import PouredLiquid, open_poured_liquids
 
 BUDGET = 10
 HOLD = 2.1  # s
@@ -35,7 +35,7 @@ def main(data: Path, runs: Path) -> None:
     }
     print(f"{machine()}\n{HEAD}", flush=True)
     spilled = []
-    for stir in open_reference(data / "stirring_reference").stirs:
+    for stir in open_reference_stirs(data / "stirring_reference").stirs:
         if stir.effects or stir.viscosity not in poured:
             continue
         liquid, out = poured[stir.viscosity], runs / stir.name

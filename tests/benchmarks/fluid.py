@@ -3,7 +3,7 @@
     .venv/bin/python tests/benchmarks/fluid.py --only speed start
 
 The comparison with SPlisHSPlasH needs an environment of its own: `make peers`. Times are true only
-on a machine that does nothing else. How well pours land is judged by `check physics --against`.
+on a machine that does nothing else. How well pours land is judged by `make against`.
 """
 
 import argparse

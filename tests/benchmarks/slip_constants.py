@@ -26,13 +26,13 @@ def errors(folder: Path, constant: str, factor: float) -> list[float]:
     from bolfi_liquids.models.stirs import slip_law
 
     setattr(slip_law, constant, factor * getattr(slip_law, constant))
-    from bolfi_liquids.checks.reference import open_reference
-    from bolfi_liquids.checks.replay import repeated
+    from against.stir_replay import simulate_stir
+    from against.stirs import open_reference_stirs
 
-    stirs = {stir.name: stir for stir in open_reference(folder).stirs}
+    stirs = {stir.name: stir for stir in open_reference_stirs(folder).stirs}
     found = []
     for name in RECORDINGS:
-        signal = np.degrees(repeated(stirs[name], np.zeros(1, int))[0])
+        signal = np.degrees(simulate_stir(stirs[name], np.zeros(1, int))[0])
         squared = np.mean((signal - np.degrees(stirs[name].recording.inclination)) ** 2)
         found.append(float(np.sqrt(max(squared - CAMERA_NOISE**2, 0.0))))
     return found

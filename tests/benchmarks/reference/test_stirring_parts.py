@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from bolfi_liquids.models.validation.truths import pendulum
 from stirring_reference import (
     Motion,
     StirScene,
@@ -20,6 +19,7 @@ from stirring_reference.box import (
     inside,
     projected,
 )
+from truths import pendulum
 
 BOX = Box((8, 6, 5), 2e-3)
 

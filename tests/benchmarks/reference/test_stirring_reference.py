@@ -5,8 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bolfi_liquids.models.validation.truths.cylinder_drag import DENNIS_CHANG
-from bolfi_liquids.models.validation.truths.oscillating_rod import stokes_reaction_in_cup
 from scipy.interpolate import CubicSpline
 from stirring_reference import (
     CylinderScene,
@@ -22,6 +20,8 @@ from stirring_reference import (
     star,
 )
 from stirring_reference import stir as stir_module
+from truths.cylinder_drag import DENNIS_CHANG
+from truths.oscillating_rod import stokes_reaction_in_cup
 
 from bolfi_liquids.inputs.open import open_recording
 

@@ -180,8 +180,6 @@ def test_resuming_where_no_run_is_is_refused(short_recording, tmp_path):
         ["simulate", "pour", "--movie="],
         ["reproduce", "--quick", "--out", ""],
         ["check", "sbc", "--out", ""],
-        ["check", "physics", "--out", ""],
-        ["check", "physics", "--against", ""],
         ["demo", "--out", ""],
         ["import", "stir.csv", "--columns", "columns.toml", "--out", ""],
         ["import", "--template", ""],
@@ -210,7 +208,6 @@ def test_a_variable_that_was_not_set_is_no_path(monkeypatch, tmp_path, command):
     [
         ["calibrate", "{recording}", "--out", "run"],
         ["check", "sbc", "--out", "run"],
-        ["check", "physics", "--out", "run"],
         ["simulate", "stir", "--out", "stir.nc"],
         ["simulate", "pour", "--out", "pour.nc"],
     ],

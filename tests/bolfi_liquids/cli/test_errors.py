@@ -37,7 +37,6 @@ TYPED = {
     "calibrate": (["stir.nc", "--out", "r", "--budget", "1"], "--budget: 1;"),
     "simulate pour": (["--angular-velocity", "0"], "--angular-velocity: 0;"),
     "check sbc": (["--noise", "-1", "--out", "r"], "--noise: -1.0;"),
-    "check physics": (["--case", "none", "--out", "r"], "--case: no case"),
     "pour": (["r", "--iterations", "1"], "--iterations: 1;"),
     "record": (["--cycles", "0", "--out", "r"], "--cycles: 0;"),
 }

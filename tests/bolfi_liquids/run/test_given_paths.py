@@ -33,7 +33,6 @@ def test_a_recording_whose_copy_would_have_too_long_a_name_is_refused_first(
 
 def given_nothing(out):
     """Each function that writes, with `out` for its path."""
-    from bolfi_liquids.checks.physics import check_physics
     from bolfi_liquids.checks.sbc import check_sbc
     from bolfi_liquids.demo import run_demo
     from bolfi_liquids.inputs import rigs, table_import
@@ -42,7 +41,6 @@ def given_nothing(out):
     stir = bundled("glycerin_v10.nc")
     return {
         "calibrate": lambda: bl.calibrate(stir, out=out, progress=False),
-        "check physics": lambda: check_physics(out, progress=False),
         "check sbc": lambda: check_sbc(out, progress=False),
         "demo": lambda: run_demo(out),
         "reproduce": lambda: reproduce(["inclination"], out, progress=False),

@@ -9,6 +9,11 @@ surface is a flat lid that slips: waves are left out, and so is a stick's bounce
 solutions and published drag are known.
 """
 
+import sys
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).parents[3] / "physics"))  # where truths are, for scripts, too
+
 from .cylinder import CylinderForce, CylinderScene, force_on_cylinder
 from .gripper_paths import GripperPath, Motion, circle, polygon, star
 from .scene import Liquid, Resolution, StirScene

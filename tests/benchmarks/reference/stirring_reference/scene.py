@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from bolfi_liquids.models.validation.truths.pendulum import Rod
+from truths.pendulum import Rod
 
 
 @dataclass(frozen=True)

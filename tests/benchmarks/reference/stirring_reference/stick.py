@@ -4,8 +4,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from bolfi_liquids.models.validation.truths.pendulum import GRAVITY
 from numpy.typing import NDArray
+from truths.pendulum import GRAVITY
 
 from . import immersed_boundary as immersed
 from .box import Box

@@ -1,1 +1,0 @@
-"""One module a case; see `bolfi_liquids.models.validation`."""

@@ -1,1 +1,0 @@
-"""Scenes for validation alone: the fluid between other walls than cups."""

@@ -1,0 +1,1 @@
+"""One module a case of a whole stir; each defines `CASE`."""

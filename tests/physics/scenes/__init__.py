@@ -1,0 +1,1 @@
+"""Scenes of the cases alone: the fluid between other walls than cups."""
