@@ -24,7 +24,7 @@ PEERS_SUPPORTED := import sys, ensurepip; sys.exit(not (3, 9) <= sys.version_inf
 
 .DELETE_ON_ERROR:
 
-.PHONY: setup demo browser test test-long lint peers clean
+.PHONY: setup demo browser test test-long lint paper peers clean
 
 setup: $(INSTALLED)
 
@@ -69,6 +69,10 @@ test-long: setup
 lint: setup
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
+
+# `make paper FIGURES="inclination posterior" QUICK=1`: some figures, of fewer liquids
+paper: $(RUNS)
+	$(BIN)/python -m tests.benchmarks.paper $(FIGURES) $(if $(QUICK),--quick)
 
 # ELFI and sbi cannot be installed beside us, nor beside each other: each has its own old Python.
 # SPlisHSPlasH, for tests/benchmarks/fluid.py, is kept apart like them.
