@@ -46,8 +46,8 @@ def draw_least_figures(out):
 @pytest.mark.parametrize(
     "path", [pytest.param(path, id=path.stem, marks=marks(path)) for path in NOTEBOOKS]
 )
-# Jupyter's own, about its event loop
-@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
+# Jupyter's own, about its event loop, and the engine's, of fits to too few simulations
+@pytest.mark.filterwarnings("ignore")
 def test_notebook_runs(path, tmp_path, monkeypatch):
     import nbformat
     from nbclient import NotebookClient

@@ -26,8 +26,9 @@ from bolfi_liquids.inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from bolfi_liquids.progress import Simulate
 from bolfi_liquids.run.fluid_simulator import FluidSimulator
 from bolfi_liquids.run.simulations import keeping
-from bolfi_liquids.seeds import Phase, generator
+from bolfi_liquids.seeds import generator
 
+from .phases import Phase
 from .truths import DENSITY
 
 DRAWS_EACH = 16  # of each posterior

@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from bolfi_liquids.pouring.landing_map import LandingMap
 from bolfi_liquids.pouring.spillage import (
     DISTANCE_STEP,
-    Outcomes,
     Profiles,
     Surface,
-    pour_all,
 )
 from bolfi_liquids.progress import Advance, silent
-from bolfi_liquids.seeds import Phase, generator, simulation_seeds
+from bolfi_liquids.seeds import generator, simulation_seeds
 
 from .calibrations import PARAMETER_NAMES
+from .outcomes import Outcomes, pour_all
+from .phases import Phase
 from .truths import DENSITY, Truths
 
 RULES = ("plug_in", "mean", "cvar")

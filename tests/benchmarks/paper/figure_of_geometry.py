@@ -17,9 +17,10 @@ from bolfi_liquids.pouring.spillage import DISTANCE_STEP, landing_sd
 from bolfi_liquids.progress import progress_bar
 from bolfi_liquids.run.fluid_simulator import FluidSimulator
 from bolfi_liquids.run.simulations import simulate_kept
-from bolfi_liquids.seeds import Phase, simulation_seeds
+from bolfi_liquids.seeds import simulation_seeds
 
 from .figure import Drawn
+from .phases import Phase
 from .shared_simulations import SharedSimulations
 from .truths import DENSITY
 

@@ -66,10 +66,10 @@ def posterior(shared: SharedSimulations) -> Drawn:
                 found.append(tree["surface"].to_dataset().assign_coords(liquid=liquid))
             axes.set(xlabel=AXIS_LABELS["viscosity"], title=f"{surrogate}, N = {budget}")
             plain_log_ticks(axes, "x")
-            kept.append(concat(found, "liquid").assign_coords(surrogate=surrogate))
+            kept.append(concat(found, "liquid", join="outer").assign_coords(surrogate=surrogate))
         panels[0].set_ylabel(AXIS_LABELS["cohesion"])
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    data = cast(Dataset, concat(kept, "surrogate"))
+    data = cast(Dataset, concat(kept, "surrogate", join="outer"))
     return Drawn(
         data, figure, f"posteriors of {', '.join(RECORDED_LIQUIDS)} after {budget} simulations"
     )

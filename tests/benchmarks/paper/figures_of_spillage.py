@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 from xarray import DataArray, Dataset
 
 from bolfi_liquids.drawing import GREY, PALETTE, new_figure, plain_log_ticks, styled
-from bolfi_liquids.seeds import Phase, generator
+from bolfi_liquids.seeds import generator
 
 from .figure import Drawn
+from .phases import Phase
 from .shared_simulations import SharedSimulations
 from .truths import LIQUIDS
 

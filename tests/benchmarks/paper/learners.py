@@ -9,7 +9,7 @@ from bolfi_liquids.calibration.stir_simulator import Stirring, stirring_of
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.inputs.recording import Recording
-from bolfi_liquids.inputs.strokes import until_stroke
+from bolfi_liquids.inputs.strokes import strokes
 
 from .calibrations import ByPouring, ByStirring, Learner
 from .study_size import Scale
@@ -42,6 +42,18 @@ def after_strokes(scale: Scale, bank: str | Path) -> dict[str, Learner]:
         )
         for number in scale.strokes
     }
+
+
+def until_stroke(recording: Recording, number: int) -> Recording:
+    """The recording as it would be if stirring had ended after a stroke, counted from 1.
+
+    Raises:
+        ValueError: There are fewer strokes.
+    """
+    found = {stroke.number: stroke.samples for stroke in strokes(recording)}
+    if number not in found:
+        raise ValueError(f"stroke must be one of {', '.join(map(str, found))}, got {number}")
+    return recording.first(int(np.flatnonzero(found[number])[-1]) + 1)
 
 
 def _star(recording: Recording, scale: Scale) -> Stirring:

@@ -22,9 +22,10 @@ from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.inputs.open import open_recording
 from bolfi_liquids.inputs.recording import Recording, along_path, recording_dataset
-from bolfi_liquids.seeds import Phase, generator, simulation_seeds
+from bolfi_liquids.seeds import generator, simulation_seeds
 
 from .calibrations import CAMERA_NOISE
+from .phases import Phase
 from .truths import LIQUIDS, LOG_VISCOSITY_SD
 
 STICKY_LIQUID = "oil"  # thicker liquids heed the wetting less, and thinner ones spill as little

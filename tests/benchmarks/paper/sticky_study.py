@@ -9,12 +9,13 @@ from bolfi_liquids.inference.simulations import Keep
 from bolfi_liquids.calibration.calibrate import calibrate
 from bolfi_liquids.criticism.criticise import criticise
 from bolfi_liquids.pouring.choose import choose_pour
-from bolfi_liquids.pouring.spillage import pour_all, surface
+from bolfi_liquids.pouring.spillage import surface
 from bolfi_liquids.progress import silent
 from bolfi_liquids.run.directory import GIVEN_POURS, open_bank
-from bolfi_liquids.seeds import Phase
 
 from .decisions import executions, spilled_by
+from .outcomes import pour_all
+from .phases import Phase
 from .sticky import Sticky, draw_sticky, poured, recipe, stirred, waxed_cups
 from .study_size import Scale
 
