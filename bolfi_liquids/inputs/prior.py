@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 
@@ -21,10 +21,9 @@ TRUNCATED = (
     "TwoSidedTruncatedDistribution",
 )
 TEXT_OF_VERSION_0_1 = re.compile(r"(\w+)\((.*)\)")
-V = TypeVar("V")
 
 
-def split_parameters(theta: Mapping[str, V]) -> tuple[dict[str, V], dict[str, V]]:
+def split_parameters[V](theta: Mapping[str, V]) -> tuple[dict[str, V], dict[str, V]]:
     """Parameters of the liquid, and coefficients of effects."""
     liquid = {name: value for name, value in theta.items() if name in PARAMETERS}
     return liquid, {name: value for name, value in theta.items() if name not in PARAMETERS}

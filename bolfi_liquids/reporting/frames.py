@@ -11,7 +11,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,9 +42,6 @@ MAX_STIR_SECONDS = 10.0
 
 FRAMES_FORMAT = 1
 """Of the file; another is made again."""
-
-
-T = TypeVar("T")
 
 
 class Shown(NamedTuple):
@@ -149,7 +146,7 @@ def _simulated(
         return frames if pours is None else frames | _poured(list(pours))
 
 
-def _each(
+def _each[T](
     scene: Callable[[Draw], T], draws: list[Draw], workers: Executor | None, advance: Advance
 ) -> Iterator[T]:
     """What is seen of each draw, in order; an executor begins with all of them at once."""

@@ -30,7 +30,7 @@ def draw_least_figures(out):
         repetitions=1,
         budgets=(7,),
         recorded=(7,),
-        rates=5,
+        rates=7,
         surrogates=("discrepancy",),
         lips=(0.14,),
         particles=300,
