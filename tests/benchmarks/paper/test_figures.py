@@ -2,6 +2,7 @@
 
 import pickle
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from bolfi_liquids.inputs.pour_table import open_pours
 
 from . import shared_simulations, sticky
 from .figure_of_adhesion import adhesion
+from .figures import FIGURES
 from .figures_of_spillage import interval
 from .learners import by_stirring_and_pouring
 from .shared_simulations import SharedSimulations
@@ -22,6 +24,11 @@ from .sticky_study import Stuck
 from .study import conclusions
 from .study_size import FULL
 from .truths import draw_truths
+
+
+def test_the_readme_tells_each_figure_and_its_file():
+    told = (Path(__file__).parent / "README.md").read_text(encoding="utf-8")
+    assert all(f"`{name}`" in told and f"`{name}.nc`" in told for name in FIGURES)
 
 
 def test_the_interval_covers_the_mean_as_often_as_it_says():
