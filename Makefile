@@ -9,8 +9,8 @@ RUNS := $(VENV)/.runs
 INSTALLED := $(VENV)/.installed
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 PYENV_VERSIONS := $(or $(PYENV_ROOT),$(HOME)/.pyenv)/versions
-# ArviZ 1 needs Python 3.12; pyenv's command `python3.12` fails where that version is not selected
-SUPPORTED := import sys, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
+# pyenv's command `python3.12` fails where that version is not selected
+SUPPORTED := import sys, ensurepip; sys.exit(not (3, 12) <= sys.version_info[:2] <= (3, 13))
 
 # `make test ALSO=slow` adds the slow tests to the same session, as .ci/run does
 SELECTED := $(if $(filter slow,$(ALSO)),,not slow and )not minutes and not hardware and not benchmark
@@ -24,19 +24,18 @@ PEERS_SUPPORTED := import sys, ensurepip; sys.exit(not (3, 9) <= sys.version_inf
 
 .DELETE_ON_ERROR:
 
-.PHONY: setup demo browser test test-long physics against lint peers clean
+.PHONY: setup demo browser test test-long physics against paper lint peers clean
 
 setup: $(INSTALLED)
 
 $(MADE): pyproject.toml constraints.txt
 	@python=; \
 	for candidate in $(PYTHON) python3.12 "$(PYENV_VERSIONS)"/3.12.*/bin/python \
-		python3.13 "$(PYENV_VERSIONS)"/3.13.*/bin/python \
-		python3.11 "$(PYENV_VERSIONS)"/3.11.*/bin/python python3 python; do \
+		python3.13 "$(PYENV_VERSIONS)"/3.13.*/bin/python python3 python; do \
 		if "$$candidate" -c "$(SUPPORTED)" >/dev/null 2>&1; then python=$$candidate; break; fi; \
 	done; \
 	if [ -z "$$python" ]; then \
-		echo "make: no Python 3.11, 3.12 or 3.13 found; install one, or name it: make PYTHON=/path/to/python" >&2; \
+		echo "make: no Python 3.12 or 3.13 found; install one, or name it: make PYTHON=/path/to/python" >&2; \
 		exit 1; \
 	fi; \
 	echo "Setting up $(VENV) with $$("$$python" --version)"; \
@@ -82,6 +81,10 @@ against: setup
 lint: setup
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
+
+# `make paper FIGURES="inclination posterior" QUICK=1`: some figures, of fewer liquids
+paper: $(RUNS)
+	$(BIN)/python -m tests.benchmarks.paper $(FIGURES) $(if $(QUICK),--quick)
 
 # ELFI and sbi cannot be installed beside us, nor beside each other: each has its own old Python.
 # SPlisHSPlasH, for tests/benchmarks/fluid.py, is kept apart like them.

@@ -9,10 +9,7 @@ class Phase(Enum):
     """What random numbers are for; its text is part of their seed and must not change."""
 
     BOOTSTRAP = "bootstrap"
-    CAMERA_NOISE = "camera noise"
     DRAINING = "pours whose source is held for long"
-    EXECUTION = "execution of a chosen pour"
-    GEOMETRY = "pours of other cups"
     GIVEN_POURS = "errors of given pours that outcomes meet"
     MOVING_PICTURES = "moving pictures"
     MAP_DESIGN = "design of the map of landings"
@@ -21,21 +18,14 @@ class Phase(Enum):
     ONLINE_SEARCH = "search while the robot stirs"
     ONLINE_STIRS = "stirs while the robot stirs"
     POSTERIOR_DRAWS = "posterior draws"
-    REHEARSAL = "rehearsal of a chosen pour"
     REPLICATES = "replicates at the best parameters"
     RUNS_OF_POURS = "packings of a table's pours"
     SBC_DESIGN = "design that calibrations share"
     SBC_SEARCH = "search among shared stirs"
     SBC_STIRS = "stirs that calibrations share"
-    STICKY_POURS = "pours of a liquid that sticks"
-    STICKY_STIR = "stir of a liquid that sticks"
-    STICKY_TRUTHS = "liquids that stick"
-    TRUTHS = "liquids of the study"
-    TRUTH_STIRS = "stirs and pours of a liquid of the study"
-    UNKNOWING = "draws of the prior"
 
 
-def generator(seed: int, phase: Phase, *numbers: int) -> np.random.Generator:
+def generator(seed: int, phase: Enum, *numbers: int) -> np.random.Generator:
     """Random numbers of a phase.
 
     Args:
@@ -46,7 +36,7 @@ def generator(seed: int, phase: Phase, *numbers: int) -> np.random.Generator:
     return np.random.default_rng(_sequence(seed, phase, numbers))
 
 
-def simulation_seeds(seed: int, phase: Phase, count: int, *numbers: int) -> list[int]:
+def simulation_seeds(seed: int, phase: Enum, count: int, *numbers: int) -> list[int]:
     """Seeds of simulations in [0, 2^31), others for every phase; the first do not depend on count.
 
     Args:
@@ -59,6 +49,6 @@ def simulation_seeds(seed: int, phase: Phase, count: int, *numbers: int) -> list
     return [int(word >> 1) for word in words]
 
 
-def _sequence(seed: int, phase: Phase, numbers: tuple[int, ...]) -> np.random.SeedSequence:
+def _sequence(seed: int, phase: Enum, numbers: tuple[int, ...]) -> np.random.SeedSequence:
     text = " ".join([phase.value, *map(str, numbers)])
     return np.random.SeedSequence([seed, *text.encode()])

@@ -5,14 +5,11 @@ import functools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Lock
-from typing import Any, ParamSpec, TypeVar
+from typing import Any
 
 import jax
 import numpy as np
 from threadpoolctl import OpenBLASController, ThreadpoolController
-
-P = ParamSpec("P")
-R = TypeVar("R")
 
 NUMPY_DEFAULTS: dict[str, Any] = {
     "divide": "warn",
@@ -22,7 +19,7 @@ NUMPY_DEFAULTS: dict[str, Any] = {
 }
 
 
-def in_float64(function: Callable[P, R]) -> Callable[P, R]:
+def in_float64[**P, R](function: Callable[P, R]) -> Callable[P, R]:
     """Run `function` with 64-bit JAX types, one thread of BLAS, and the default handling of
     numerical errors by NumPy and JAX.
 

@@ -138,10 +138,7 @@ def add_checks(
 
 
 def finished(tree: xr.DataTree, attributes: Mapping[str, object]) -> xr.DataTree:
-    """The tree with how it was made at its root, and in each group which dimensions are draws.
-
-    ArviZ 1 writes and reads that as `sample_dims`; earlier versions, which Python 3.11 has, do not.
-    """
+    """The tree with how it was made at its root, and in each group ArviZ's `sample_dims`."""
     for group in tree.children.values():
         sampled = [name for name in SAMPLE_DIMS if name in group.dims]
         group.attrs.pop("sample_dims", None)

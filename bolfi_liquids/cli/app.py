@@ -10,7 +10,7 @@ import typer
 from .. import __version__
 from ..inputs.settings import CalibrationSettings, PourSettings
 from . import check as cli_check
-from . import guide, import_table, reproduce
+from . import guide, import_table
 from . import record as cli_record
 from . import rig as cli_rig
 from . import simulate as cli_simulate
@@ -258,7 +258,6 @@ def demo(
 app.command("import", epilog=import_table.EPILOG)(import_table.import_table)
 app.command(epilog=cli_record.EPILOG)(cli_record.record)
 app.command(epilog=cli_trim.EPILOG)(cli_trim.trim)
-app.command(epilog=reproduce.EPILOG)(reproduce.reproduce)
 app.command(epilog=guide.EPILOG)(guide.guide)
 app.add_typer(cli_simulate.app, name="simulate")
 app.add_typer(cli_rig.app, name="rig")

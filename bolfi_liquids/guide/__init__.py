@@ -12,7 +12,7 @@ PAGES = {
     "liquids": "simulated stirs and pours, effects, movies",
     "robot": "arm, cameras, safety, online calibration",
     "accuracy": "measured errors of fluid, posterior, pours and criticism",
-    "reproduce": "the paper's figures and simulation-based calibration",
+    "sbc": "whether intervals hold the truth: simulation-based calibration",
     "files": "every file that is written: variables, units, attributes, fields",
     "troubleshooting": "messages by their first line, with cause and cure",
 }

@@ -1,7 +1,7 @@
 """The prior of the liquid's parameters."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 
@@ -19,10 +19,9 @@ TRUNCATED = (
     "RightTruncatedDistribution",
     "TwoSidedTruncatedDistribution",
 )
-V = TypeVar("V")
 
 
-def split_parameters(theta: Mapping[str, V]) -> tuple[dict[str, V], dict[str, V]]:
+def split_parameters[V](theta: Mapping[str, V]) -> tuple[dict[str, V], dict[str, V]]:
     """Parameters of the liquid, and coefficients of effects."""
     liquid = {name: value for name, value in theta.items() if name in PARAMETERS}
     return liquid, {name: value for name, value in theta.items() if name not in PARAMETERS}

@@ -64,15 +64,3 @@ def stroke_numbers(recording: Recording) -> NDArray[np.int64]:
     for stroke in strokes(recording):
         numbers[stroke.samples] = stroke.number
     return numbers
-
-
-def until_stroke(recording: Recording, number: int) -> Recording:
-    """The recording as it would be if stirring had ended after a stroke, counted from 1.
-
-    Raises:
-        ValueError: There are fewer strokes.
-    """
-    found = {stroke.number: stroke.samples for stroke in strokes(recording)}
-    if number not in found:
-        raise ValueError(f"stroke must be one of {', '.join(map(str, found))}, got {number}")
-    return recording.first(int(np.flatnonzero(found[number])[-1]) + 1)

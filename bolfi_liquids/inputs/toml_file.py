@@ -2,17 +2,14 @@
 
 import tomllib
 from pathlib import Path
-from typing import TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from ..errors import InputError
 from ..files import existing_file
 
-Model = TypeVar("Model", bound=BaseModel)
 
-
-def read_toml(path: str | Path, model: type[Model], fix: str) -> Model:
+def read_toml[Model: BaseModel](path: str | Path, model: type[Model], fix: str) -> Model:
     """Read a file and check it.
 
     Args:

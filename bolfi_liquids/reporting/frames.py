@@ -9,7 +9,7 @@ they are past the receiver's rim, with the source's `angle` [rad] and the share 
 import json
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,8 +36,6 @@ N_DRAWS_SHOWN = 3
 
 MAX_STIR_SECONDS = 10.0
 """Of a stir that is shown [s]."""
-
-T = TypeVar("T")
 
 
 class Shown(NamedTuple):
@@ -144,7 +142,7 @@ def _simulated(
         return frames if pours is None else frames | _poured(list(pours))
 
 
-def _each(
+def _each[T](
     scene: Callable[[Draw], T], draws: list[Draw], workers: Executor | None, advance: Advance
 ) -> Iterator[T]:
     """What is seen of each draw, in order; an executor begins with all of them at once."""

@@ -245,6 +245,6 @@ def _interface(module: str) -> Any:
         if sys.version_info >= (3, 13):
             raise ImportError(
                 "the robot needs ur-rtde, which has no wheel for Python 3.13; "
-                "use Python 3.11 or 3.12 and: pip install 'bolfi-liquids[robot]'"
+                "use Python 3.12 and: pip install 'bolfi-liquids[robot]'"
             ) from err
         raise missing_extra("ur-rtde", "robot", "the robot") from err

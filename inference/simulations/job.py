@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from .bank import Simulation
 from .failures import Failure, kind, raised, timed_out, unusable
 from .returned import commonest, signals_of
 
-R = TypeVar("R")
 BATCH = 4  # runs in one call, or in flight, where nobody says how many
 
 Limit = Callable[[float], AbstractContextManager[object]]
@@ -259,7 +258,7 @@ def _told_by(simulate: Simulator | SingleSimulator, name: str, default: Any) -> 
     return getattr(getattr(simulate, "__self__", simulate), name, default)
 
 
-def within(timeout: float | None, call: Callable[[], R], limit: Limit | None = None) -> R:
+def within[R](timeout: float | None, call: Callable[[], R], limit: Limit | None = None) -> R:
     """What `call` returns or raises, if it does so in `timeout` seconds.
 
     With a `limit` the call stops itself, in this thread. Else it runs in a thread of its own.

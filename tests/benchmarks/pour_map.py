@@ -19,6 +19,7 @@ from bolfi_liquids.inference import SimulationBank
 from bolfi_liquids.inference.simulations import Keep
 from machine import machine
 from numpy.typing import NDArray
+from paper.outcomes import Outcomes, pour_all
 from scipy.ndimage import gaussian_filter1d
 
 from bolfi_liquids.inputs.cups import bundled_cups
@@ -26,7 +27,7 @@ from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.pouring.design import RATE, box_around, joint_prior
 from bolfi_liquids.pouring.landed_pours import LandedPours, Poured, pours_in
 from bolfi_liquids.pouring.landing_map import learn_map
-from bolfi_liquids.pouring.spillage import Outcomes, Surface, pour_all, surface
+from bolfi_liquids.pouring.spillage import Surface, surface
 from bolfi_liquids.progress import silent
 
 DENSITY = 1000.0  # kg/m3

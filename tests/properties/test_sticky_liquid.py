@@ -9,7 +9,7 @@ import xarray as xr
 
 import bolfi_liquids as bl
 from bolfi_liquids import models
-from bolfi_liquids.reproduction.sticky import waxed_cups
+from bolfi_liquids.inputs.cups import bundled_cups
 
 TEMPLATE = files("bolfi_liquids.data") / "oil_v10.nc"
 LIQUID = {"viscosity": 0.15, "cohesion": 0.8}
@@ -18,6 +18,13 @@ STIRRED, POURED = 1100, 8000  # particles of what is data; models have others
 ACTIONS = [(rate, distance) for rate in (40.0, 70.0, 110.0) for distance in (0.5, 1.5, 2.5, 4.0)]
 REPEATS = 16
 COLUMNS = ("angular_velocity_deg_s", "distance_cm", "received", "retained", "spilled")
+
+
+def waxed_cups():
+    """The bundled cups, whose file says the contact angle of wax."""
+    cups = bundled_cups()
+    waxed = cups.source.model_copy(update={"contact_angle_deg": 110.0})
+    return cups.model_copy(update={"source": waxed})
 
 
 def stirred(path):

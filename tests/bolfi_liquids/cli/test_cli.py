@@ -11,7 +11,6 @@ from typer.testing import CliRunner
 
 import bolfi_liquids as bl
 from bolfi_liquids.cli.app import app
-from bolfi_liquids.reproduction.reproduce import FIGURES
 
 
 def bolfi_liquids(*arguments):
@@ -62,12 +61,6 @@ def test_help_is_no_error(command):
     result = CliRunner().invoke(app, [*command, "--help"])
     assert (result.exit_code, result.stderr) == (0, "")
     assert "Usage" in result.stdout
-
-
-def test_the_help_of_reproduce_has_a_line_for_each_figure():
-    lines = CliRunner().invoke(app, ["reproduce", "--help"]).stdout.splitlines()
-    listed = [line.split("`")[1] for line in lines if line.startswith("  - `")]
-    assert listed == [*FIGURES]
 
 
 @pytest.mark.parametrize("group", [[], ["rig"], ["check"], ["simulate"]])
@@ -178,7 +171,6 @@ def test_resuming_where_no_run_is_is_refused(short_recording, tmp_path):
         ["record", "--emulator", "--calibrate", ""],
         ["simulate", "stir", "--out", ""],
         ["simulate", "pour", "--movie="],
-        ["reproduce", "--quick", "--out", ""],
         ["check", "sbc", "--out", ""],
         ["demo", "--out", ""],
         ["import", "stir.csv", "--columns", "columns.toml", "--out", ""],

@@ -40,7 +40,6 @@ STIR = str(files("bolfi_liquids.data") / "oil_v10.nc")
         ("import missing.csv --columns columns.toml", "missing.csv: no such file"),
         ("trim missing.nc", "missing.nc: no such file"),
         ("check sbc --runs -1", "--runs: -1"),
-        ("reproduce magic", "no figure 'magic'"),
     ],
 )
 def test_a_refusal_loads_neither_engine_nor_fluid_nor_plots(typed, told, tmp_path):

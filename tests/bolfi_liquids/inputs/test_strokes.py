@@ -4,10 +4,8 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-import pytest
 from bolfi_liquids.hardware.motion import circle, star
 
-from bolfi_liquids.calibration.stir_simulator import stirring_of
 from bolfi_liquids.inputs.bundled import bundled_recording
 from bolfi_liquids.inputs.recording import Recording, Trajectory
 from bolfi_liquids.inputs.strokes import (
@@ -16,7 +14,6 @@ from bolfi_liquids.inputs.strokes import (
     speed,
     stroke_numbers,
     strokes,
-    until_stroke,
 )
 
 
@@ -50,19 +47,3 @@ def test_numbers_of_samples_are_those_of_their_strokes():
     assert (np.diff(numbers) >= 0).all()
     for stroke in strokes(recording):
         assert (numbers[stroke.samples] == stroke.number).all()
-
-
-def test_stirring_that_ends_early_is_the_beginning_of_the_same_stirring():
-    longer = until_stroke(bundled_recording("water"), 3)
-    first = until_stroke(longer, 2)
-    theta = {"viscosity": np.array([0.1]), "cohesion": np.array([0.3])}
-    short, full = (stirring_of([one], 0).simulate(theta, np.array([4])) for one in (first, longer))
-    assert short.shape[1] < full.shape[1]
-    same = short.shape[1] - 3  # the curve through the samples bends by those that follow
-    assert 20 < same < 60
-    np.testing.assert_array_equal(short[0, :same], full[0, :same])
-
-
-def test_a_stroke_that_is_not_there_is_refused():
-    with pytest.raises(ValueError, match="stroke must be one of 0, 1, .*, got 40"):
-        until_stroke(bundled_recording("water"), 40)

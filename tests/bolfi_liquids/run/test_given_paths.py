@@ -36,14 +36,12 @@ def given_nothing(out):
     from bolfi_liquids.checks.sbc import check_sbc
     from bolfi_liquids.demo import run_demo
     from bolfi_liquids.inputs import rigs, table_import
-    from bolfi_liquids.reproduction.reproduce import reproduce
 
     stir = bundled("glycerin_v10.nc")
     return {
         "calibrate": lambda: bl.calibrate(stir, out=out, progress=False),
         "check sbc": lambda: check_sbc(out, progress=False),
         "demo": lambda: run_demo(out),
-        "reproduce": lambda: reproduce(["inclination"], out, progress=False),
         "record": lambda: bl.record(out=out, emulate=True, progress=False),
         "simulate stir": lambda: bl.simulate_stir(out=out, progress=False),
         "simulate pour": lambda: bl.simulate_pour(movie=out, progress=False),

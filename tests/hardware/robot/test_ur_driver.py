@@ -232,7 +232,7 @@ def test_no_controller_is_a_plain_error():
 
 
 @pytest.mark.parametrize(
-    ("version", "words"), [((3, 11), r"bolfi-liquids\[robot\]"), ((3, 13), "no wheel for Python")]
+    ("version", "words"), [((3, 12), r"bolfi-liquids\[robot\]"), ((3, 13), "no wheel for Python")]
 )
 def test_without_ur_rtde_the_message_says_what_to_install(monkeypatch, version, words):
     monkeypatch.setitem(sys.modules, "rtde_receive", None)

@@ -10,8 +10,9 @@ from bolfi_liquids.inputs.prior import default_prior
 from bolfi_liquids.pouring.landed_pours import LandedPours
 from bolfi_liquids.pouring.landing_map import map_of_prior
 from bolfi_liquids.progress import silent
-from bolfi_liquids.reproduction.decisions import decide, decide_unknowing, execute
-from bolfi_liquids.reproduction.truths import DENSITY, draw_truths
+
+from .decisions import decide, decide_unknowing, execute
+from .truths import DENSITY, draw_truths
 
 HALF_STREAM = 0.03  # m, of what lands evenly about its middle
 

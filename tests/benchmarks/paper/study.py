@@ -1,96 +1,61 @@
 """Spillage after calibrating in several ways, on truths that are known."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from bolfi_liquids.inference.simulations import Keep, jobs, run_missing
 from numpy.typing import NDArray
+from xarray import Dataset
 
-from ..inputs.prior import default_prior
-from ..progress import progress_bar
-from ..run.execution import HERE, Execution
-from .calibrations import Learner
+from bolfi_liquids.inputs.prior import default_prior
+from bolfi_liquids.pouring.landing_map import LandingMap
+from bolfi_liquids.progress import progress_bar
+
+from .calibrations import DRAWS_EACH, PARAMETER_NAMES, Learner
 from .decisions import RULES, Action, decide, decide_unknowing, execute, tried
+from .study_size import Scale
 from .truths import Truths, draw_truths
-
-if TYPE_CHECKING:
-    from xarray import Dataset
-
-    from ..inference import SimulationBank
-    from ..pouring.landing_map import LandingMap
-    from .study_size import Scale
-
-
-@dataclass(frozen=True, eq=False)
-class Tasks:
-    """What all learners share.
-
-    Attributes:
-        truths: The liquids.
-        landing_map: By which actions are chosen.
-        bank: Where all simulations are kept.
-    """
-
-    truths: Truths
-    landing_map: "LandingMap"
-    bank: "SimulationBank"
 
 
 def spillage_study(
-    learners: Mapping[str, Learner],
-    bank: "SimulationBank",
-    landing_map: "LandingMap",
-    scale: "Scale",
-    execution: Execution = HERE,
-) -> "Dataset":
+    learners: Mapping[str, Learner], landing_map: LandingMap, scale: Scale, keep: Keep
+) -> Dataset:
     """Spilled fractions over (learned_by, rule, truth, budget).
 
     Beside them `known`, with the liquid known, and `unknown`, without any calibration.
 
     Args:
         learners: By name, with the same budgets.
-        bank: Where all simulations and calibrations are kept.
         landing_map: By which actions are chosen, and with whose cups they are carried out.
         scale: How many of what.
-        execution: How simulations and calibrations are made.
+        keep: Where simulations and calibrations are made and kept.
     """
-    tasks = Tasks(draw_truths(scale.repetitions, scale.seed), landing_map, bank)
+    truths = draw_truths(scale.repetitions, scale.seed)
     unknowing = decide_unknowing(landing_map, default_prior(), scale.seed)
     concluded = {
-        name: conclusions(learner, name, tasks, execution) for name, learner in learners.items()
+        name: conclusions(learner, name, truths, keep) for name, learner in learners.items()
     }
     (budgets,) = {learner.budgets for learner in learners.values()}
-    return _judged(tasks, unknowing, concluded, budgets, execution)
+    return _judged(truths, landing_map, unknowing, concluded, budgets, keep)
 
 
-def conclusions(
-    learner: Learner, name: str, tasks: Tasks, execution: Execution
-) -> list[NDArray | None]:
-    """Of each truth; None where its calibration failed.
-
-    The learner itself knows for how long its simulations may take.
-    """
-    from ..inference.simulations import Keep, jobs, run_missing
-
-    truths = tasks.truths
+def conclusions(learner: Learner, name: str, truths: Truths, keep: Keep) -> list[NDArray | None]:
+    """Of each truth; None where its calibration failed."""
     asked = jobs(truths.theta, truths.seed)
-    with progress_bar(f"calibrating ({name})", len(asked), shown=execution.progress) as advance:
-        keep = Keep(tasks.bank, learner.identity, 1, execution.executor)
-        found = run_missing(learner.simulate, asked, keep, advance=advance)
+    with progress_bar(f"calibrating ({name})", len(asked), shown=True) as advance:
+        one_each = keep._replace(identity=learner.identity, batch=1)
+        found = run_missing(learner.simulate, asked, one_each, advance=advance)
     return [result.signal for result in found]
 
 
 def _judged(
-    tasks: Tasks,
+    truths: Truths,
+    landing_map: LandingMap,
     unknowing: Action,
     concluded: Mapping[str, list[NDArray | None]],
     budgets: tuple[int, ...],
-    execution: Execution,
-) -> "Dataset":
-    from xarray import Dataset
-
-    truths, landing_map = tasks.truths, tasks.landing_map
+    keep: Keep,
+) -> Dataset:
     shape = len(concluded), len(RULES), len(truths.seed), len(budgets)
     chosen = [
         (learner, rule, at, n, action)
@@ -105,10 +70,8 @@ def _judged(
         own = {name: values[at : at + 1] for name, values in truths.theta.items()}
         mine = [action for _, _, truth, _, action in chosen if truth == at]
         actions.append([tried(landing_map, own).least("mean"), unknowing, *mine])
-    with progress_bar(
-        "pouring what was chosen", len(truths.seed), shown=execution.progress
-    ) as advance:
-        spilled = execute(truths, actions, landing_map, execution.keep(tasks.bank), advance)
+    with progress_bar("pouring what was chosen", len(truths.seed), shown=True) as advance:
+        spilled = execute(truths, actions, landing_map, keep, advance)
     values, rates, distances = (np.full(shape, np.nan) for _ in range(3))
     for at, outcome in enumerate(spilled):
         mine = [row for row in chosen if row[2] == at]
@@ -142,7 +105,5 @@ def _judged(
 
 def _stacked(found: Sequence[NDArray | None], budgets: int) -> NDArray[np.float64]:
     """Conclusions with NaN in the place of failed ones."""
-    from .calibrations import DRAWS_EACH, PARAMETER_NAMES
-
     empty = np.full((budgets, 1 + DRAWS_EACH, len(PARAMETER_NAMES)), np.nan)
     return np.stack([empty if one is None else one for one in found])

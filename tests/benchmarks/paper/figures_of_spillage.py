@@ -1,20 +1,18 @@
 """The paper's figure 2, right: spillage against the number of simulations, and by liquid; and what
 it left open: whether deciding over the posterior is better, and which surrogate."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.axes import Axes
 from numpy.typing import NDArray
+from xarray import DataArray, Dataset
 
-from ..drawing import GREY, PALETTE, new_figure, plain_log_ticks, styled
-from ..seeds import Phase, generator
+from bolfi_liquids.drawing import GREY, PALETTE, new_figure, plain_log_ticks, styled
+from bolfi_liquids.seeds import generator
+
 from .figure import Drawn
+from .phases import Phase
 from .shared_simulations import SharedSimulations
 from .truths import LIQUIDS
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from xarray import DataArray, Dataset
 
 SHOWN_LEARNERS = {
     ("discrepancy", "plug_in"): "stirring, the paper's: Φ, best at θ*",
@@ -66,7 +64,7 @@ def spillage(shared: SharedSimulations) -> Drawn:
     return Drawn(study, figure, _table(study))
 
 
-def _against_budget(axes: "Axes", spilled: "DataArray", way: tuple[str, str], at: int) -> None:
+def _against_budget(axes: Axes, spilled: DataArray, way: tuple[str, str], at: int) -> None:
     """Means, with 90 % intervals, side by side for those that are compared."""
     percent = 100.0 * spilled.transpose("budget", "truth").to_numpy()
     means, ends = percent.mean(axis=1), np.array([interval(row) for row in percent])
@@ -79,7 +77,7 @@ def _against_budget(axes: "Axes", spilled: "DataArray", way: tuple[str, str], at
     )
 
 
-def _table(study: "Dataset") -> str:
+def _table(study: Dataset) -> str:
     lines = ["spilled [%], mean over liquids and repetitions:"]
     for (method, rule), label in SHOWN_LEARNERS.items():
         means = 100.0 * study["spilled"].sel(learned_by=method, rule=rule).mean("truth")
@@ -95,7 +93,7 @@ def _table(study: "Dataset") -> str:
     return "\n".join(lines)
 
 
-def complete(study: "Dataset") -> "Dataset":
+def complete(study: Dataset) -> Dataset:
     """The truths of which every calibration and every pour succeeded, so that means compare equals.
 
     How many are not is its attribute `left_out`.
@@ -148,8 +146,6 @@ def liquids(shared: SharedSimulations) -> Drawn:
 
 def decision(shared: SharedSimulations) -> Drawn:
     """What deciding over the posterior saves against the plug-in at theta*, paired by truth."""
-    from xarray import Dataset
-
     study = complete(shared.study)
     spilled = 100.0 * study["spilled"]
     apart = spilled.sel(rule=["mean", "cvar"]) - spilled.sel(rule="plug_in", drop=True)
@@ -193,8 +189,6 @@ def decision(shared: SharedSimulations) -> Drawn:
 
 def surrogates(shared: SharedSimulations) -> Drawn:
     """Error of the viscosity at equal N: the signal surrogate against the paper's."""
-    from xarray import DataArray, Dataset
-
     study = complete(shared.study)
     drawn = study["concluded"].sel(parameter="viscosity").isel(draw=slice(1, None))
     dims = ("learned_by", "truth", "budget")

@@ -8,25 +8,28 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from bolfi_liquids.inference import Bolfi, Fit, Prior, SimulationBank, engine_version
+from bolfi_liquids.inference.simulations import Keep
+from bolfi_liquids.models import Cups
 from numpy.typing import NDArray
 
-from ..calibration.draws import pick_draws
-from ..calibration.engine_fit import engine_options
-from ..calibration.stir_simulator import Stirring
-from ..checks.sbc_pipelines import SAMPLING, CameraNoise
-from ..inputs.prior import describe_prior
-from ..inputs.settings import MIN_SIMULATIONS, PAPER_RULES
-from ..progress import Simulate
-from ..run.fluid_simulator import FluidSimulator
-from ..seeds import Phase, generator
-from .truths import DENSITY
+from bolfi_liquids import models
+from bolfi_liquids.calibration.draws import pick_draws
+from bolfi_liquids.calibration.engine_fit import engine_options
+from bolfi_liquids.calibration.stir_simulator import Stirring
+from bolfi_liquids.checks.sbc_pipelines import SAMPLING, CameraNoise
+from bolfi_liquids.inputs.prior import describe_prior
+from bolfi_liquids.inputs.settings import MIN_SIMULATIONS, PAPER_RULES
+from bolfi_liquids.progress import Simulate
+from bolfi_liquids.run.fluid_simulator import FluidSimulator
+from bolfi_liquids.run.simulations import keeping
+from bolfi_liquids.seeds import generator
 
-if TYPE_CHECKING:
-    from ..inference import Bolfi, Fit, Prior
-    from ..models import Cups
+from .phases import Phase
+from .truths import DENSITY
 
 DRAWS_EACH = 16  # of each posterior
 BATCH = 4  # simulations at the same time
@@ -44,28 +47,22 @@ class ByStirring:
         surrogate: "signal", or "discrepancy": the paper's.
         budgets: Ascending; a larger one goes on from a smaller one's simulations.
         bank: Where finished simulations are kept.
-        timeout: Seconds that one simulation may take; None sets no limit.
     """
 
     stirring: Stirring
-    prior: "Prior"
+    prior: Prior
     surrogate: str
     budgets: tuple[int, ...]
-    bank: str | Path = ":memory:"
-    timeout: float | None = None
+    bank: str | Path
 
     def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         """theta*, then draws, of viscosity and cohesion: (B, budgets, 1 + DRAWS_EACH, 2)."""
         return np.stack([self._one(truth, int(seed)) for truth, seed in _each(theta, seeds)])
 
     def _one(self, truth: dict[str, NDArray], seed: int) -> NDArray[np.float64]:
-        from ..inference import Bolfi, SimulationBank
-        from ..inference.simulations import Keep
-        from ..run.simulations import keeping
-
         stirring = self.stirring
         with SimulationBank(self.bank) as bank:
-            keep = Keep(bank, stirring.identity, BATCH, timeout=self.timeout)
+            keep = Keep(bank, stirring.identity, BATCH)
             simulate = keeping(stirring.simulate, stirring.observed.shape, keep)
             clean = simulate(truth, np.array([seed]))[0]
             engine = Bolfi(
@@ -93,30 +90,25 @@ class ByPouring(FluidSimulator):
         cups: Of training pour and task alike.
         prior: Of the parameters.
         angular_velocity, distance: The training pour [rad/s], [m].
-        budgets, bank, timeout: See `ByStirring`.
+        budgets, bank: See `ByStirring`.
     """
 
-    cups: "Cups"
-    prior: "Prior"
+    cups: Cups
+    prior: Prior
     angular_velocity: float
     distance: float
     budgets: tuple[int, ...]
-    bank: str | Path = ":memory:"
-    timeout: float | None = None
+    bank: str | Path
 
     def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         """As `ByStirring.simulate`."""
         return np.stack([self._one(truth, int(seed)) for truth, seed in _each(theta, seeds)])
 
     def _one(self, truth: dict[str, NDArray], seed: int) -> NDArray[np.float64]:
-        from ..inference import Bolfi, SimulationBank
-        from ..inference.simulations import Keep
-        from ..run.simulations import keeping
-
         rules: dict[str, Any] = {**PAPER_RULES}
         with SimulationBank(self.bank) as bank:
             identity = json.dumps(["training pour", *self._pour], sort_keys=True)
-            keep = Keep(bank, identity, BATCH, timeout=self.timeout)
+            keep = Keep(bank, identity, BATCH)
             simulate = keeping(self._spilled, (1,), keep)
             engine = Bolfi(
                 self.prior,
@@ -131,8 +123,6 @@ class ByPouring(FluidSimulator):
 
     def _spilled(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         """Fraction that the training pour spills, shape (B, 1)."""
-        from .. import models
-
         action = models.PourAction(self.angular_velocity, self.distance)
         made = models.pour(models.Liquid(**theta, density=DENSITY), action, self.cups, seeds)
         return np.asarray(made.spilled, np.float64)[:, None]
@@ -152,15 +142,14 @@ class ByPouring(FluidSimulator):
 Learner = ByStirring | ByPouring
 
 
-def _made_by(prior: "Prior") -> list[Any]:
+def _made_by(prior: Prior) -> list[Any]:
     """What the conclusions of all learners depend on."""
-    from ..inference.engine_version import ENGINE_VERSION
-
-    learned_by = [ENGINE_VERSION, describe_prior(prior), BATCH, PAPER_RULES, MIN_SIMULATIONS]
+    learned_by = [engine_version.ENGINE_VERSION, describe_prior(prior), BATCH]
+    learned_by += [PAPER_RULES, MIN_SIMULATIONS]
     return [*learned_by, SAMPLING, DRAWS_EACH, CAMERA_NOISE.sd, DENSITY]
 
 
-def after_each(engine: "Bolfi", simulate: Simulate, budgets: Sequence[int]) -> "Iterator[Fit]":
+def after_each(engine: Bolfi, simulate: Simulate, budgets: Sequence[int]) -> Iterator[Fit]:
     """The fits of one search after each number of simulations, ascending.
 
     Points are asked in batches that end at each budget, so the budgets affect the points slightly.
@@ -180,7 +169,7 @@ def after_each(engine: "Bolfi", simulate: Simulate, budgets: Sequence[int]) -> "
         yield engine.fit(warn=False)
 
 
-def concluded(fit: "Fit", seed: int) -> NDArray[np.float64]:
+def concluded(fit: Fit, seed: int) -> NDArray[np.float64]:
     """theta* and draws, shape (1 + DRAWS_EACH, 2)."""
     sampled = fit.sample(seed=seed, warn=False, **SAMPLING)
     drawn = pick_draws(sampled["posterior"].to_dataset(), DRAWS_EACH, seed)

@@ -1,29 +1,26 @@
 """Pours chosen from posteriors, and what they spill when they are carried out."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from bolfi_liquids.inference import Prior
+from bolfi_liquids.inference.simulations import Keep
+from bolfi_liquids.models import Cups
 from numpy.typing import NDArray
 
-from ..pouring.spillage import (
+from bolfi_liquids.pouring.landing_map import LandingMap
+from bolfi_liquids.pouring.spillage import (
     DISTANCE_STEP,
-    Outcomes,
     Profiles,
     Surface,
-    pour_all,
 )
-from ..progress import silent
-from ..seeds import Phase, generator, simulation_seeds
-from .calibrations import PARAMETER_NAMES
-from .truths import DENSITY, Truths
+from bolfi_liquids.progress import Advance, silent
+from bolfi_liquids.seeds import generator, simulation_seeds
 
-if TYPE_CHECKING:
-    from ..inference import Prior
-    from ..inference.simulations import Keep
-    from ..models import Cups
-    from ..pouring.landing_map import LandingMap
-    from ..progress import Advance
+from .calibrations import PARAMETER_NAMES
+from .outcomes import Outcomes, pour_all
+from .phases import Phase
+from .truths import DENSITY, Truths
 
 RULES = ("plug_in", "mean", "cvar")
 """The best pour at theta*, as in the paper; least expected spillage over the posterior; least mean
@@ -36,7 +33,7 @@ EXECUTION_SEEDS = 4  # seeds with which a chosen pour is carried out
 Action = Mapping[str, float]
 
 
-def decide(concluded: NDArray, landing_map: "LandingMap") -> dict[str, Action]:
+def decide(concluded: NDArray, landing_map: LandingMap) -> dict[str, Action]:
     """The action of each rule, from theta* and draws, shape (1 + draws, 2)."""
     liquids = dict(zip(PARAMETER_NAMES, concluded.T, strict=True))
     best = {name: values[:1] for name, values in liquids.items()}
@@ -48,7 +45,7 @@ def decide(concluded: NDArray, landing_map: "LandingMap") -> dict[str, Action]:
     }
 
 
-def decide_unknowing(landing_map: "LandingMap", prior: "Prior", seed: int) -> dict[str, float]:
+def decide_unknowing(landing_map: LandingMap, prior: Prior, seed: int) -> dict[str, float]:
     """The action that spills least in expectation over the prior."""
     drawn = prior.from_unit(
         generator(seed, Phase.UNKNOWING).uniform(size=(PRIOR_DRAWS, len(prior)))
@@ -56,7 +53,7 @@ def decide_unknowing(landing_map: "LandingMap", prior: "Prior", seed: int) -> di
     return tried(landing_map, drawn).least("mean")
 
 
-def tried(landing_map: "LandingMap", liquids: Mapping[str, NDArray]) -> Surface:
+def tried(landing_map: LandingMap, liquids: Mapping[str, NDArray]) -> Surface:
     """What the actions spill that a study chooses among."""
     return landing_map.surface(liquids, rates=RATES)
 
@@ -64,9 +61,9 @@ def tried(landing_map: "LandingMap", liquids: Mapping[str, NDArray]) -> Surface:
 def execute(
     truths: Truths,
     actions: Iterable[Iterable[Action]],
-    landing_map: "LandingMap",
-    keep: "Keep",
-    advance: "Advance",
+    landing_map: LandingMap,
+    keep: Keep,
+    advance: Advance,
 ) -> list[NDArray[np.float64]]:
     """Spilled fraction of each action, the mean over seeds that nothing else uses.
 
@@ -89,7 +86,7 @@ def execute(
 def executions(
     theta: Mapping[str, float],
     density: float,
-    cups: "Cups",
+    cups: Cups,
     seed: int,
     purpose: Phase = Phase.EXECUTION,
 ) -> Outcomes:
@@ -107,7 +104,7 @@ def executions(
     return Outcomes(tiled, density, cups, seeds)
 
 
-def spilled_by(outcomes: Outcomes, actions: Sequence[Action], keep: "Keep") -> NDArray[np.float64]:
+def spilled_by(outcomes: Outcomes, actions: Sequence[Action], keep: Keep) -> NDArray[np.float64]:
     """Spilled fraction of each action, the mean over the outcomes' seeds."""
     rates = np.unique([action["angular_velocity"] for action in actions])
     made = pour_all(outcomes, rates, keep, silent)

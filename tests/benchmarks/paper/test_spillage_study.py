@@ -4,29 +4,29 @@ Every action has one liquid that it suits, and spills the square of the distance
 miss the truth by known factors. So each number of the study and of its figures is known.
 """
 
-from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bolfi_liquids.inference.simulations import Keep
 
 from bolfi_liquids import inference
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.pouring.spillage import Surface
-from bolfi_liquids.reproduction import figure_of_recordings, study
-from bolfi_liquids.reproduction.calibrations import DRAWS_EACH
-from bolfi_liquids.reproduction.decisions import RULES
-from bolfi_liquids.reproduction.figure_of_strokes import strokes
-from bolfi_liquids.reproduction.figures_of_spillage import (
+
+from . import figure_of_recordings, study
+from .calibrations import DRAWS_EACH
+from .decisions import RULES
+from .figure_of_strokes import strokes
+from .figures_of_spillage import (
     complete,
     decision,
     liquids,
     spillage,
     surrogates,
 )
-from bolfi_liquids.reproduction.study_size import Scale
-from bolfi_liquids.reproduction.truths import draw_truths
-from bolfi_liquids.run.execution import Execution
+from .study_size import Scale
+from .truths import draw_truths
 
 RATES, DISTANCES = np.array([1.0]), np.linspace(0.0, 0.07, 24)  # one: neighbours are averaged
 SUITED = np.linspace(-3.0, 1.5, 24)[None]  # log10 of the viscosity that an action suits
@@ -35,7 +35,6 @@ OFF = {"signal": 0.1, "discrepancy": -0.3, "pour": 0.6}  # log10, of what is con
 SPREAD = np.r_[
     -0.8, np.full(DRAWS_EACH - 1, 0.8 / (DRAWS_EACH - 1))
 ]  # a draw far off; their mean is right
-SILENT = Execution(progress=False)
 SCALE = Scale(repetitions=2, budgets=BUDGETS, strokes=(1, 3, 10))
 
 
@@ -88,21 +87,7 @@ def made(monkeypatch):
     monkeypatch.setattr(study, "execute", lambda *given: list(execute(*given)))
     learners = {name: Learner(name, 3 if name == "pour" else None) for name in OFF}
     with inference.SimulationBank() as bank:
-        return study.spillage_study(learners, bank, Map(), SCALE, SILENT)
-
-
-def test_chosen_pours_are_simulated_where_calibrations_are(monkeypatch):
-    kept = []
-
-    def recorded(truths, actions, landing_map, keep, advance):
-        kept.append(keep)
-        return list(execute(truths, actions, landing_map, keep, advance))
-
-    monkeypatch.setattr(study, "execute", recorded)
-    with inference.SimulationBank() as bank, ThreadPoolExecutor(2) as pool:
-        execution = Execution(pool, timeout=60.0, progress=False)
-        study.spillage_study({"signal": Learner("signal")}, bank, Map(), SCALE, execution)
-    assert [(one.executor, one.timeout) for one in kept] == [(pool, 60.0)]
+        return study.spillage_study(learners, Map(), SCALE, Keep(bank))
 
 
 def expected(name, rule, viscosity, budget):
@@ -190,7 +175,7 @@ def test_what_was_concluded_before_a_kill_is_not_concluded_again(tmp_path, monke
 
     def run(path, learner):
         with inference.SimulationBank(path) as bank:
-            return study.spillage_study({"signal": learner}, bank, Map(), SCALE, SILENT)
+            return study.spillage_study({"signal": learner}, Map(), SCALE, Keep(bank))
 
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path / "bank.sqlite", Killed("signal"))

@@ -2,8 +2,10 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from xarray import Dataset
 
-from ..drawing import BLUE, GREY, ORANGE, PALETTE, new_figure, styled
+from bolfi_liquids.drawing import BLUE, GREY, ORANGE, PALETTE, new_figure, styled
+
 from .figure import Drawn
 from .figures_of_spillage import interval
 from .shared_simulations import SharedSimulations
@@ -19,8 +21,6 @@ ADHESION_CASES = {
 
 def adhesion(shared: SharedSimulations) -> Drawn:
     """Spilled by liquids like oil that stick to their cup."""
-    from xarray import Dataset
-
     found = shared.sticky
     truths = [one.truth for one in found]
     spilled = np.array([one.spilled for one in found])

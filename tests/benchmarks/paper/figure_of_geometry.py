@@ -3,24 +3,26 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from bolfi_liquids.models import Cups
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+from xarray import Dataset
 
-from ..drawing import INK, new_figure, styled
-from ..inputs.cups import bundled_cups
-from ..pouring.spillage import DISTANCE_STEP, landing_sd
-from ..progress import progress_bar
-from ..run.fluid_simulator import FluidSimulator
-from ..run.simulations import simulate_kept
-from ..seeds import Phase, simulation_seeds
+from bolfi_liquids import models
+from bolfi_liquids.drawing import INK, new_figure, styled
+from bolfi_liquids.inputs.cups import bundled_cups
+from bolfi_liquids.pouring.spillage import DISTANCE_STEP, landing_sd
+from bolfi_liquids.progress import progress_bar
+from bolfi_liquids.run.fluid_simulator import FluidSimulator
+from bolfi_liquids.run.simulations import simulate_kept
+from bolfi_liquids.seeds import simulation_seeds
+
 from .figure import Drawn
+from .phases import Phase
 from .shared_simulations import SharedSimulations
 from .truths import DENSITY
-
-if TYPE_CHECKING:
-    from ..models import Cups
 
 VISCOSITIES = np.geomspace(5e-3, 15.0, 9)  # Pa s, those of the liquids that come
 TURN_RATES = 7
@@ -37,12 +39,10 @@ class Poured(FluidSimulator):
         cups: With the lip's height.
     """
 
-    cups: "Cups"
+    cups: Cups
 
     def simulate(self, theta: Mapping[str, NDArray], seeds: NDArray) -> NDArray[np.float64]:
         """Spilled fractions (rates, radii, liquids, DISTANCES)."""
-        from .. import models
-
         liquid = models.Liquid(VISCOSITIES, COHESION, DENSITY)
         own = np.array(simulation_seeds(0, Phase.GEOMETRY, len(VISCOSITIES)), np.int64)
         made = []
@@ -62,8 +62,6 @@ class Poured(FluidSimulator):
 
 def geometry(shared: SharedSimulations) -> Drawn:
     """The regret of the best single action, over heights of the lip and radii of the receiver."""
-    from xarray import Dataset
-
     lips = np.array(shared.scale.lips)
     regret = _regrets(shared, lips)
     with styled():
@@ -93,11 +91,8 @@ def geometry(shared: SharedSimulations) -> Drawn:
 
 def _regrets(shared: SharedSimulations, lips: NDArray) -> NDArray[np.float64]:
     """By height of the lip and radius of the receiver."""
-    execution, rows = shared.execution, []
-    total, one_call = len(lips) * TURN_RATES, execution
-    if execution.timeout is not None:  # a call pours all liquids
-        one_call = execution._replace(timeout=execution.timeout * len(VISCOSITIES))
-    with progress_bar("pouring from several heights", total, shown=execution.progress) as advance:
+    rows, total = [], len(lips) * TURN_RATES
+    with progress_bar("pouring from several heights", total, shown=True) as advance:
         for lip in lips:
             cups = bundled_cups()
             cups = cups.model_copy(
@@ -105,17 +100,15 @@ def _regrets(shared: SharedSimulations, lips: NDArray) -> NDArray[np.float64]:
             )
             poured = Poured(cups)
             rates = np.geomspace(*cups.angular_velocity_range, TURN_RATES)
-            keep = one_call.keep(shared.bank, poured.identity, 1)
+            keep = shared.keep._replace(identity=poured.identity, batch=1)
             theta = {"angular_velocity": rates}
             made = simulate_kept(poured.simulate, theta, [0] * TURN_RATES, keep, advance=advance)
             rows.append(_regret(made.signals, cups))
     return np.stack(rows)
 
 
-def _regret(spilled: NDArray, cups: "Cups") -> NDArray[np.float64]:
+def _regret(spilled: NDArray, cups: Cups) -> NDArray[np.float64]:
     """By radius, from fractions (rates, radii, liquids, distances)."""
-    from scipy.ndimage import gaussian_filter1d
-
     blurred = gaussian_filter1d(spilled, landing_sd(cups) / DISTANCE_STEP, axis=-1, mode="nearest")
     low, high = cups.distance_range
     inside = (DISTANCES >= low - DISTANCE_STEP / 2) & (DISTANCES <= high + DISTANCE_STEP / 2)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ..inputs.settings import PRIOR_POURS
+from bolfi_liquids.inputs.settings import PRIOR_POURS
 
 
 @dataclass(frozen=True)

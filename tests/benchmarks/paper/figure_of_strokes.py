@@ -1,18 +1,15 @@
 """How many strokes of the stirring are enough."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.axes import Axes
+from xarray import Dataset
 
-from ..drawing import GREY, INK, PALETTE, new_figure, styled
+from bolfi_liquids.drawing import GREY, INK, PALETTE, new_figure, styled
+
 from .figure import Drawn
 from .figures_of_spillage import FEW_PERCENT, complete, interval
 from .shared_simulations import SharedSimulations
 from .truths import LIQUIDS
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from xarray import Dataset
 
 ENOUGH_SPILLED = (0.05, 0.01)  # spilled, on average over the liquids
 
@@ -39,7 +36,7 @@ def strokes(shared: SharedSimulations) -> Drawn:
     return Drawn(study, figure, _says(study, spilled.to_numpy(), shared.scale.few))
 
 
-def _by_liquid(axes: "Axes", values: np.ndarray, study: "Dataset") -> None:
+def _by_liquid(axes: Axes, values: np.ndarray, study: Dataset) -> None:
     """A line for each liquid, and the mean of all with its interval; values (truth, strokes)."""
     numbers = study["strokes"].to_numpy()
     for liquid, colour in zip(LIQUIDS, PALETTE, strict=False):
@@ -55,7 +52,7 @@ def _by_liquid(axes: "Axes", values: np.ndarray, study: "Dataset") -> None:
     axes.set_xlabel("strokes")
 
 
-def _says(study: "Dataset", spilled: np.ndarray, budget: int) -> str:
+def _says(study: Dataset, spilled: np.ndarray, budget: int) -> str:
     numbers, means = study["strokes"].to_numpy(), spilled.mean(axis=0)
     told = ", ".join(f"{k}: {100 * mean:.2f}" for k, mean in zip(numbers, means, strict=True))
     lines = [f"spilled [%] after strokes, signal surrogate, N = {budget}, least expected: {told}"]

@@ -1,25 +1,21 @@
 """From recordings of stirs to what the chosen pours spill in the reference solver."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from xarray import DataArray, Dataset
 
-from ..drawing import GREY, INK, PALETTE, new_figure, styled
-from ..inputs.bundled import POURED_LIQUIDS, bundled_pours
-from ..inputs.prior import default_prior
-from ..pouring.choose import choose_pour
-from ..pouring.spillage import ACTION, Surface
+from bolfi_liquids.drawing import GREY, INK, PALETTE, new_figure, styled
+from bolfi_liquids.inputs.bundled import POURED_LIQUIDS, bundled_pours
+from bolfi_liquids.inputs.prior import default_prior
+from bolfi_liquids.pouring.choose import choose_pour
+from bolfi_liquids.pouring.result import Pour
+from bolfi_liquids.pouring.spillage import ACTION, Surface
+from bolfi_liquids.pouring.table_interpolation import between
+
 from .decisions import RULES, Action, decide_unknowing
 from .figure import Drawn
 from .shared_simulations import SharedSimulations
-from .table_interpolation import between
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from xarray import DataArray, Dataset
-
-    from ..pouring.result import Pour
 
 OTHER_CHOICES = {
     "plug_in": ("x", "best at θ* alone"),
@@ -34,9 +30,7 @@ def recordings(shared: SharedSimulations) -> Drawn:
     return Drawn(data, _figure(data), _says(data))
 
 
-def _judged(shared: SharedSimulations) -> "Dataset":
-    from xarray import Dataset
-
+def _judged(shared: SharedSimulations) -> Dataset:
     scale = shared.scale
     runs = [(surrogate, n) for surrogate in scale.surrogates for n in scale.recorded]
     shape = len(POURED_LIQUIDS), len(runs), len(RULES)
@@ -83,7 +77,7 @@ def _chosen(
         iterations=scale.rates,
         seed=scale.seed,
         force=True,  # the choice over a bad fit is judged, too
-        **shared.execution._asdict(),
+        executor=shared.executor,
     )
     return {
         "plug_in": pour.plug_in.action,
@@ -92,13 +86,13 @@ def _chosen(
     }
 
 
-def _least(pour: "Pour", risk: str) -> dict[str, float]:
+def _least(pour: Pour, risk: str) -> dict[str, float]:
     """The action at which another measure of risk is least, over the same draws."""
     actions = pour.tree["actions"]
     return Surface(*(actions[name].to_numpy() for name in Surface._fields)).least(risk)
 
 
-def _figure(data: "Dataset") -> "Figure":
+def _figure(data: Dataset) -> Figure:
     labels = data["run"].to_numpy().tolist()
     expected = data.sel(rule="mean")
     bars = [("table's best", 100.0 * data["best"], None, GREY)]
@@ -128,13 +122,13 @@ def _figure(data: "Dataset") -> "Figure":
     return figure
 
 
-def _whiskers(axes: "Axes", x: np.ndarray, percent: "DataArray", error: "DataArray") -> None:
+def _whiskers(axes: Axes, x: np.ndarray, percent: DataArray, error: DataArray) -> None:
     """Errors of the table; no less than nothing is spilled."""
     off = np.stack([np.minimum(error, percent), error])
     axes.errorbar(x, percent, off, fmt="none", ecolor=INK, elinewidth=0.8, alpha=0.6)
 
 
-def _says(data: "Dataset") -> str:
+def _says(data: Dataset) -> str:
     lines = ["spilled by the reference solver [%], its table interpolated:"]
     for liquid in data["liquid"].to_numpy():
         for run in data["run"].to_numpy():

@@ -6,7 +6,8 @@ import pytest
 
 from bolfi_liquids import inference
 from bolfi_liquids.inputs.settings import MIN_SIMULATIONS, PAPER_RULES
-from bolfi_liquids.reproduction.calibrations import after_each
+
+from .calibrations import after_each
 
 
 def line(theta, seeds):

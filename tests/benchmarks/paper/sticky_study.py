@@ -4,17 +4,19 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from bolfi_liquids.inference.simulations import Keep
 
-from ..calibration.calibrate import calibrate
-from ..criticism.criticise import criticise
-from ..pouring.choose import choose_pour
-from ..pouring.spillage import pour_all, surface
-from ..progress import silent
-from ..run.execution import HERE, Execution
-from ..run.given_pours import GIVEN_POURS
-from ..run.run import Run
-from ..seeds import Phase
+from bolfi_liquids.calibration.calibrate import calibrate
+from bolfi_liquids.criticism.criticise import criticise
+from bolfi_liquids.pouring.choose import choose_pour
+from bolfi_liquids.pouring.spillage import surface
+from bolfi_liquids.progress import silent
+from bolfi_liquids.run.given_pours import GIVEN_POURS
+from bolfi_liquids.run.run import Run
+
 from .decisions import executions, spilled_by
+from .outcomes import pour_all
+from .phases import Phase
 from .sticky import Sticky, draw_sticky, poured, recipe, stirred, waxed_cups
 from .study_size import Scale
 
@@ -34,17 +36,16 @@ class Stuck(NamedTuple):
     named: str
 
 
-def spilled_where_it_sticks(
-    out: Path, runs: Path, scale: Scale, number: int, execution: Execution = HERE
-) -> Stuck:
+def spilled_where_it_sticks(out: Path, runs: Path, scale: Scale, number: int) -> Stuck:
     """Stir a liquid, choose its pour, criticise, choose again, and carry all of it out.
+
+    In this process and without bars, since several liquids are made at once.
 
     Args:
         out: Where pours are kept.
         runs: Where the run is kept.
         scale: How much is simulated.
         number: Of the liquid.
-        execution: How simulations are made.
     """
     cups, seed, particles = waxed_cups(), scale.seed, scale.drawn_particles
     truth = draw_sticky(number, seed)
@@ -59,21 +60,21 @@ def spilled_where_it_sticks(
         particles=particles,
         seed=seed,
         resume=True,
-        **execution._asdict(),
+        progress=False,
     )
-    tried = {"iterations": scale.rates, "seed": seed, "force": True, **execution._asdict()}
+    tried = {"iterations": scale.rates, "seed": seed, "force": True, "progress": False}
     # of a study that goes on: before criticism no pour is known
     (calibration.path / GIVEN_POURS).unlink(missing_ok=True)
     before = choose_pour(calibration, cups, **tried)
     given = {"pours": table, "cups": cups, "effects": scale.considered, "seed": seed}
-    criticism = criticise(calibration, **given, **execution._asdict())
+    criticism = criticise(calibration, **given, progress=False)
     after = choose_pour(criticism.calibration, cups, **tried)
     sticks = executions(truth.theta, density, cups, truth.seed)
     flows = executions(truth.liquid, density, cups, truth.seed)
     rehearsed = executions(truth.theta, density, cups, truth.seed, Phase.REHEARSAL)
     rates = np.geomspace(*cups.angular_velocity_range, scale.rates)
     with Run(out, {}).bank() as bank:
-        keep = execution.keep(bank)
+        keep = Keep(bank)
         known = surface(pour_all(rehearsed, rates, keep, silent), cups).least("mean")
         actions = [before.chosen.action, after.chosen.action, known]
         spilled = [*spilled_by(flows, actions[:1], keep), *spilled_by(sticks, actions, keep)]

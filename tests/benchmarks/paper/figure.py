@@ -2,14 +2,12 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from ..drawing import write_figure
-from ..files import write_netcdf
+from matplotlib.figure import Figure
+from xarray import Dataset
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-    from xarray import Dataset
+from bolfi_liquids.drawing import write_figure
+from bolfi_liquids.files import write_netcdf
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,8 +20,8 @@ class Drawn:
         says: Its numbers, in a few lines.
     """
 
-    data: "Dataset"
-    figure: "Figure"
+    data: Dataset
+    figure: Figure
     says: str
 
     def write(self, out: Path, name: str, made_with: str) -> None:

@@ -1,23 +1,29 @@
 """The paper's figure 2, left and middle: the closest hypothesis, and what stirring teaches."""
 
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
+from xarray import Dataset, concat
 
-from ..calibration.posterior_figure import AXIS_LABELS, contour_levels, grid_density
-from ..drawing import GREY, INK, LIGHT, ORANGE, PALETTE, new_figure, plain_log_ticks, styled
-from ..inputs.bundled import RECORDED_LIQUIDS
+from bolfi_liquids.calibration.posterior_figure import AXIS_LABELS, contour_levels, grid_density
+from bolfi_liquids.drawing import (
+    GREY,
+    INK,
+    LIGHT,
+    ORANGE,
+    PALETTE,
+    new_figure,
+    plain_log_ticks,
+    styled,
+)
+from bolfi_liquids.inputs.bundled import RECORDED_LIQUIDS
+
 from .figure import Drawn
 from .shared_simulations import SharedSimulations
-
-if TYPE_CHECKING:
-    from xarray import Dataset
 
 
 def inclination(shared: SharedSimulations) -> Drawn:
     """Inclination against time with the closest hypothesis; the discrepancy is what is shaded."""
-    from xarray import Dataset
-
     budget = shared.scale.recorded[-1]
     tree = shared.calibration("water", budget, "discrepancy").tree
     recorded, closest = (tree[name]["inclination"] for name in ("recorded", "closest"))
@@ -47,8 +53,6 @@ def inclination(shared: SharedSimulations) -> Drawn:
 
 def posterior(shared: SharedSimulations) -> Drawn:
     """Contours of the posteriors of the recorded liquids, one panel for each surrogate."""
-    from xarray import concat
-
     budget, surrogates = shared.scale.recorded[-1], shared.scale.surrogates
     kept = []
     with styled():
@@ -62,16 +66,16 @@ def posterior(shared: SharedSimulations) -> Drawn:
                 found.append(tree["surface"].to_dataset().assign_coords(liquid=liquid))
             axes.set(xlabel=AXIS_LABELS["viscosity"], title=f"{surrogate}, N = {budget}")
             plain_log_ticks(axes, "x")
-            kept.append(concat(found, "liquid").assign_coords(surrogate=surrogate))
+            kept.append(concat(found, "liquid", join="outer").assign_coords(surrogate=surrogate))
         panels[0].set_ylabel(AXIS_LABELS["cohesion"])
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    data = cast("Dataset", concat(kept, "surrogate"))
+    data = cast(Dataset, concat(kept, "surrogate", join="outer"))
     return Drawn(
         data, figure, f"posteriors of {', '.join(RECORDED_LIQUIDS)} after {budget} simulations"
     )
 
 
-def _contours(axes, surface: "Dataset", liquid: str, colour: str) -> None:
+def _contours(axes, surface: Dataset, liquid: str, colour: str) -> None:
     density, coordinates = grid_density(surface)
     cells = np.outer(*(np.gradient(values) for values in coordinates))
     levels = contour_levels(density * cells, density)

@@ -9,24 +9,24 @@ import json
 from collections.abc import Mapping
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from bolfi_liquids.models import Cups
 from numpy.typing import NDArray
+from xarray import Dataset
 
-from ..files import write_netcdf, write_whole
-from ..inputs.bundled import bundled_recording
-from ..inputs.cups import bundled_cups
-from ..inputs.open import open_recording
-from ..inputs.recording import Recording, along_path, recording_dataset
-from ..seeds import Phase, generator, simulation_seeds
+from bolfi_liquids import models
+from bolfi_liquids.files import write_netcdf, write_whole
+from bolfi_liquids.inputs.bundled import bundled_recording
+from bolfi_liquids.inputs.cups import bundled_cups
+from bolfi_liquids.inputs.open import open_recording
+from bolfi_liquids.inputs.recording import Recording, along_path, recording_dataset
+from bolfi_liquids.seeds import generator, simulation_seeds
+
 from .calibrations import CAMERA_NOISE
+from .phases import Phase
 from .truths import LIQUIDS, LOG_VISCOSITY_SD
-
-if TYPE_CHECKING:
-    from xarray import Dataset
-
-    from ..models import Cups
 
 STICKY_LIQUID = "oil"  # thicker liquids heed the wetting less, and thinner ones spill as little
 WRITTEN_ANGLE_DEG = 110.0  # contact angle in the cups file, as of wax
@@ -55,7 +55,7 @@ class Sticky(NamedTuple):
         return {name: value for name, value in self.theta.items() if name != "adhesion"}
 
 
-def waxed_cups() -> "Cups":
+def waxed_cups() -> Cups:
     """The bundled cups with `WRITTEN_ANGLE_DEG`."""
     cups = bundled_cups()
     waxed = cups.source.model_copy(update={"contact_angle_deg": WRITTEN_ANGLE_DEG})
@@ -74,7 +74,7 @@ def draw_sticky(repetition: int, seed: int) -> Sticky:
     return Sticky(theta, int(rng.integers(2**31)))
 
 
-def recipe(cups: "Cups", particles: int, seed: int) -> str:
+def recipe(cups: Cups, particles: int, seed: int) -> str:
     """Short hash of what determines the drawn liquid and its pours.
 
     Runs of another model are kept elsewhere.
@@ -101,7 +101,7 @@ def stirred(truth: Sticky, particles: int, path: Path) -> Recording:
     return open_recording(path)
 
 
-def poured(truth: Sticky, density: float, cups: "Cups", path: Path) -> Path:
+def poured(truth: Sticky, density: float, cups: Cups, path: Path) -> Path:
     """A table of the pours `TRAINING` of it, each made once, written to `path` unless it is
     there."""
     if not path.exists():
@@ -110,9 +110,7 @@ def poured(truth: Sticky, density: float, cups: "Cups", path: Path) -> Path:
     return path
 
 
-def _dataset(like: Recording, truth: Sticky, particles: int) -> "Dataset":
-    from .. import models
-
+def _dataset(like: Recording, truth: Sticky, particles: int) -> Dataset:
     setup = models.StirSetup.from_recording(like, particles=particles)
     liquid = models.Liquid(**truth.liquid, density=like.number("liquid_density"))
     effects = {"adhesion": truth.theta["adhesion"]}
@@ -123,10 +121,8 @@ def _dataset(like: Recording, truth: Sticky, particles: int) -> "Dataset":
     return recording_dataset(along_path(like, noisy), attrs)
 
 
-def _pours(truth: Sticky, density: float, cups: "Cups") -> NDArray[np.float64]:
+def _pours(truth: Sticky, density: float, cups: Cups) -> NDArray[np.float64]:
     """Rows of the table."""
-    from .. import models
-
     rate, distance = np.array(TRAINING).T
     own = simulation_seeds(truth.seed, Phase.STICKY_POURS, len(TRAINING))
     made = models.pour(

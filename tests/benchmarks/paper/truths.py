@@ -5,7 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..seeds import Phase, generator
+from bolfi_liquids.seeds import generator
+
+from .phases import Phase
 
 LIQUIDS = {"water": 0.005, "thin oil": 0.03, "oil": 0.15, "glycerin": 1.0, "gel": 10.0}
 """Median viscosity [Pa s] of each kind."""

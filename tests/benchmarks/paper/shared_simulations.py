@@ -1,0 +1,110 @@
+"""Simulations and calibrations that figures share; each is made once and kept."""
+
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+
+from bolfi_liquids.inference import SimulationBank
+from bolfi_liquids.inference.simulations import Keep
+from xarray import Dataset
+
+from bolfi_liquids.calibration.calibrate import calibrate
+from bolfi_liquids.calibration.result import Calibration
+from bolfi_liquids.inputs.bundled import bundled_recording
+from bolfi_liquids.inputs.cups import bundled_cups
+from bolfi_liquids.inputs.prior import default_prior
+from bolfi_liquids.pouring.landed_pours import LandedPours
+from bolfi_liquids.pouring.landing_map import LandingMap, map_of_prior
+from bolfi_liquids.progress import progress_bar
+from bolfi_liquids.run.provenance import generations
+from bolfi_liquids.run.run import SIMULATIONS
+
+from .learners import after_strokes, by_stirring_and_pouring
+from .sticky_study import Stuck, spilled_where_it_sticks
+from .study import spillage_study
+from .study_size import Scale
+from .truths import DENSITY
+
+
+@dataclass(frozen=True, eq=False)
+class SharedSimulations:
+    """Simulations and calibrations that figures share.
+
+    Attributes:
+        out: Directory of the results.
+        scale: How much is simulated.
+        bank: Every finished simulation and calibration; in `out`.
+        executor: Processes that share the work; None is this process.
+    """
+
+    out: Path
+    scale: Scale
+    bank: SimulationBank
+    executor: Executor | None = None
+
+    @property
+    def keep(self) -> Keep:
+        """Where simulations are made and kept."""
+        return Keep(self.bank, executor=self.executor)
+
+    @cached_property
+    def landing_map(self) -> LandingMap:
+        """Of all liquids and the bundled cups, by which actions are chosen."""
+        count = self.scale.pours
+        with progress_bar("pouring", count, shown=True) as advance:
+            pours = LandedPours(bundled_cups(), DENSITY)
+            return map_of_prior(default_prior(), pours, count, self.keep, advance)
+
+    @cached_property
+    def study(self) -> Dataset:
+        """Spillage after stirring and after pouring; see `spillage_study`."""
+        cups, bank = self.landing_map.cups, self.out / SIMULATIONS
+        learners = by_stirring_and_pouring(cups, self.scale, bank)
+        return spillage_study(learners, self.landing_map, self.scale, self.keep)
+
+    @cached_property
+    def strokes(self) -> Dataset:
+        """The same after stirring for some strokes only."""
+        learners = after_strokes(self.scale, self.out / SIMULATIONS)
+        return spillage_study(learners, self.landing_map, self.scale, self.keep)
+
+    def begin_sticky(self) -> None:
+        """Start the sticky liquids in the pool: they take longest and depend on nothing else."""
+        _ = self._sticking
+
+    @cached_property
+    def sticky(self) -> list[Stuck]:
+        """Adhesive liquids and their spillage."""
+        found = []
+        with progress_bar("liquids that stick", self.scale.sticky, shown=True) as advance:
+            for one in self._sticking:
+                found.append(one)
+                advance(1)
+        return found
+
+    @cached_property
+    def _sticking(self) -> Iterator[Stuck]:
+        """Results as they come; a process takes whole liquids."""
+        one = partial(spilled_where_it_sticks, self.out, self.runs, self.scale)
+        return (self.executor.map if self.executor else map)(one, range(self.scale.sticky))
+
+    @property
+    def runs(self) -> Path:
+        """Where calibrations on recordings are kept; another version's are left alone."""
+        made_by = "_".join(f"{part}_{number}" for part, number in generations().items())
+        return self.out / "runs" / made_by
+
+    def calibration(self, liquid: str, budget: int, surrogate: str) -> Calibration:
+        """Of a bundled recording, in a run of its own; a finished one is opened."""
+        return calibrate(
+            bundled_recording(liquid),
+            out=self.runs / f"{liquid}_{budget}_{surrogate}",
+            budget=budget,
+            surrogate=surrogate,
+            particles=self.scale.particles,
+            seed=self.scale.seed,
+            resume=True,
+            executor=self.executor,
+        )
