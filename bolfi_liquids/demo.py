@@ -20,14 +20,12 @@ from .models import runtime
 from .pouring.choose import choose_pour, decided
 from .reporting.report import CHAPTERS, written
 from .reporting.warnings import Results
-from .run.execution import Execution
+from .run.compute import HERE, Compute
 from .run.run import RUN_TOML, Run
-from .run.workers import open_workers
 
 if TYPE_CHECKING:
     from .calibration.result import Calibration
     from .criticism.result import Criticism
-    from .inference.simulations import Workers
     from .inputs.recording import Recording
     from .pouring.result import Pour
 
@@ -57,8 +55,7 @@ class Demo(NamedTuple):
 def run_demo(
     out: Path,
     *,
-    executor: "Workers | None" = None,
-    timeout: float | None = None,
+    compute: Compute = HERE,
     fitted: "Callable[[Calibration], None]" = lambda _: None,
 ) -> Demo:
     """Calibrate on the bundled recording, find what is hidden in it, pour and write the report.
@@ -68,7 +65,7 @@ def run_demo(
 
     Args:
         out: The RUN directory.
-        executor, timeout: See `calibrate`.
+        compute: Where simulations run.
         fitted: Called with the calibration once there is one.
 
     Raises:
@@ -80,10 +77,10 @@ def run_demo(
         as_file(data / RECORDING) as recording,
         as_file(data / HELD_OUT) as held_out,
         as_file(data / CLEAN) as clean,
-        open_workers(executor, timeout) as workers,
         ThreadPoolExecutor(1) as thread,
     ):
-        where: dict[str, Any] = {"executor": workers, "timeout": timeout}
+        workers, quiet = compute.executor, compute._replace(progress=False)
+        where: dict[str, Any] = {"executor": workers, "timeout": compute.timeout}
 
         def beside(make: Callable[..., Any], *given: Any) -> Future[Any]:
             if workers is not None:
@@ -101,7 +98,7 @@ def run_demo(
         ends["calibrate"] = time.perf_counter()
         fitted(calibration)
         # the fit is bad, and without criticism nobody should pour after it
-        few, quiet = PourSettings(budget=POURS), Execution(workers, timeout, progress=False)
+        few = PourSettings(budget=POURS)
         before = beside(decided, calibration, bundled_cups(), few, quiet)
         chapter = beside(CHAPTERS["calibration"], calibration)
         criticism = criticise(calibration, held_out=held_out, baseline=clean, **where)
@@ -112,7 +109,7 @@ def run_demo(
         ends["pour"] = time.perf_counter()
         chapters = {"calibration": chapter.result(), "criticism": found.result()}
         with Run.entered(out) as run:
-            page = written(Results.of(run), chapters=chapters, **where)
+            page = written(Results.of(run), compute, chapters=chapters)
         ends["report"] = time.perf_counter()
     seconds = {phase: end - before for (_, before), (phase, end) in pairwise(ends.items())}
     return Demo(calibration, criticism, pour, pour_before, page, seconds)

@@ -22,13 +22,12 @@ from ..inputs.settings import (
 )
 from ..inputs.start import check_start
 from ..progress import Advance, after_first, progress_bar
-from ..run.execution import Execution
+from ..run.compute import Compute, open_compute
 from ..run.given_pours import keep_pours
 from ..run.provenance import LIBRARIES, versions
 from ..run.recordings import check_names, keep_recordings
 from ..run.run import RUN_TOML, Run
 from ..run.simulations import warn_of_failures
-from ..run.workers import open_workers
 from .baseline import CLEAN_RUNS, Clean, check_baseline, clean_residuals
 from .engine_fit import confirmed, fit_recordings
 from .model_error import model_error, noise_beside
@@ -96,11 +95,10 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         draws: Number of draws that each chain keeps.
         resume: Whether `out` may hold a run of the same settings, but for a smaller budget, to go
             on with.
-        executor: Where simulations run: a pool of processes, a Dask client or the address of a
-            Dask scheduler, whose workers have one thread each; None is this process. The result
-            has the same bits.
-        timeout: Seconds that one simulation may take; one that takes longer counts as failed.
-            None sets no limit.
+        executor, timeout: Where simulations run: a pool of processes, a Dask client or the address
+            of a Dask scheduler, whose workers have one thread each; None is this process. The
+            result has the same bits. And seconds that one simulation may take; one that takes
+            longer counts as failed. None sets no limit.
         progress: Whether to show bars on stderr.
 
     Raises:
@@ -131,7 +129,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     prior = _usual_prior(path, resume) if prior is None else prior
     record = run_record(settings, prior, stirring, clean, timeout)
     with (
-        open_workers(executor, timeout) as workers,
+        open_compute(executor, timeout, progress=progress) as compute,
         Run.begun(path, record, resume=resume, growing="settings.budget") as run,
     ):
         keep_recordings(path, stirring.recordings)
@@ -140,7 +138,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         for notice in [*aborted_recordings(opened), *frame_warnings(opened)]:
             logger.warning(notice)
         if run.result("calibrate") is None:
-            _calibrate(run, stirring, clean, prior, settings, Execution(workers, timeout, progress))
+            _calibrate(run, stirring, clean, prior, settings, compute)
         return Calibration.of(run)
 
 
@@ -176,7 +174,7 @@ def _calibrate(
     baseline: tuple[Recording, ...],
     prior: "Prior",
     settings: CalibrationSettings,
-    execution: Execution,
+    compute: Compute,
 ) -> None:
     """Search, confirm, judge, and keep the result in the run."""
     from .check import PREDICTIVE_DRAWS, THETA_STAR_REPLICATES, check_of
@@ -185,9 +183,9 @@ def _calibrate(
     needed = settings.budget + CLEAN_RUNS * len(baseline) + PREDICTIVE_DRAWS + THETA_STAR_REPLICATES
     with run.bank() as bank, ExitStack() as stack:
         kept = min(len(bank), needed)
-        bar = progress_bar("simulating stirs", needed, shown=execution.progress, done=kept)
+        bar = progress_bar("simulating stirs", needed, shown=compute.progress, done=kept)
         advance = after_first(kept, stack.enter_context(bar))
-        keep = execution.keep(bank, stirring.identity, settings.batch)
+        keep = compute.keep(bank, stirring.identity, settings.batch)
         # the paper's surrogate has no noise to which an error adds
         allows = settings.surrogate == "signal"
         # beside the largest error the search does not settle on one liquid too early
@@ -205,10 +203,10 @@ def _calibrate(
         )
         error = None
         if allows:
-            clean = _clean_residuals(baseline, prior, settings, bank, execution, advance)
+            clean = _clean_residuals(baseline, prior, settings, bank, compute, advance)
             error = model_error(stirring, fit.best["viscosity"], clean)
         fit = confirmed(fit, error, stirring, keep, settings, advance)
-        warn_of_failures(fit.history.errors.tolist(), execution.timeout)
+        warn_of_failures(fit.history.errors.tolist(), compute.timeout)
         sampled = fit.sample(
             settings.sampler, chains=settings.chains, draws=settings.draws, seed=settings.seed
         )
@@ -223,7 +221,7 @@ def _clean_residuals(
     prior: "Prior",
     settings: CalibrationSettings,
     bank: "SimulationBank",
-    execution: Execution,
+    compute: Compute,
     advance: Advance,
 ) -> list[Clean]:
     """What the simulator leaves of clean recordings; criticise finds the same simulations."""
@@ -236,8 +234,8 @@ def _clean_residuals(
         bank,
         CriticismSettings.batch,
         report=report,
-        executor=execution.executor,
-        timeout=execution.timeout,
+        executor=compute.executor,
+        timeout=compute.timeout,
     )
     effects = effects_of("stir")
     return clean_residuals(baseline, settings.particles, prior, effects, keeping=keeping)

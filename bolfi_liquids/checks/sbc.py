@@ -8,7 +8,6 @@ weakly dependent. Another seed draws another set.
 """
 
 from collections.abc import Mapping
-from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,9 +30,9 @@ from ..inputs.settings import (
     SbcSettings,
 )
 from ..progress import progress_bar
+from ..run.compute import HERE, Compute
 from ..run.provenance import LIBRARIES, versions
 from ..run.run import SIMULATIONS, Run
-from ..run.workers import open_workers
 from ..seeds import Phase, generator, simulation_seeds
 from .sbc_file import SurrogateCheck, checked, write_results
 from .sbc_pipelines import (
@@ -46,7 +45,6 @@ from .sbc_pipelines import (
 if TYPE_CHECKING:
     from ..inference import Prior
     from ..inference.checks import Replicates
-    from ..inference.simulations import Workers
 
 STIRS_PER_CALL = 16  # of the simulator, where there is no executor
 
@@ -56,9 +54,7 @@ def check_sbc(
     recording: str | Path | Recording | None = None,
     *,
     settings: SbcSettings | None = None,
-    executor: "Workers | None" = None,
-    timeout: float | None = None,
-    progress: bool = True,
+    compute: Compute = HERE,
 ) -> dict[str, SurrogateCheck]:
     """Simulation-based calibration and coverage of both surrogates with the particle fluid.
 
@@ -68,9 +64,7 @@ def check_sbc(
         out: Directory of results; made if missing.
         recording: Whose gripper path and rig are simulated; None is the bundled stir of water.
         settings: How many of what; None is the default.
-        executor: Shares the work, see `calibrate`; None is this process.
-        timeout: Seconds that one simulation may take; None sets no limit.
-        progress: Whether to show bars on stderr.
+        compute: Where simulations run.
 
     Returns:
         By the surrogate's name.
@@ -85,8 +79,8 @@ def check_sbc(
     prior, out = default_prior(), given_path(out, Argument("out"))
     record = _record(settings, prior, stirring)
     found = {}
-    with open_workers(executor, timeout) as workers, Run.begun(out, record, resume=True):
-        study = SbcStudy(out, stirring, prior, settings, workers, timeout, progress)
+    with Run.begun(out, record, resume=True):
+        study = SbcStudy(out, stirring, prior, settings, compute)
         for name in SURROGATES:
             if settings.replicates[name]:
                 made = study.replicates(name)
@@ -119,18 +113,14 @@ class SbcStudy:
         stirring: The simulator.
         prior: Prior of the parameters.
         settings: How many of what.
-        executor: Shares the work; None is this process.
-        timeout: Seconds that one simulation may take; None sets no limit.
-        progress: Whether to show bars on stderr.
+        compute: Where simulations run.
     """
 
     out: Path
     stirring: Stirring
     prior: "Prior"
     settings: SbcSettings
-    executor: Executor | None = None
-    timeout: float | None = None
-    progress: bool = True
+    compute: Compute = HERE
 
     def replicates(self, name: str) -> "Replicates":
         """Calibrations of stirs whose truths are known, by one of `SURROGATES`."""
@@ -142,7 +132,7 @@ class SbcStudy:
                 self.stirring, self.prior, *self.stirs_everywhere(), calibration
             )
         else:
-            pipeline = Calibrate(self.stirring, self.prior, calibration, self.timeout)
+            pipeline = Calibrate(self.stirring, self.prior, calibration, self.compute.timeout)
         return inference.replicates(
             pipeline,
             self.stirring.simulate,
@@ -150,10 +140,10 @@ class SbcStudy:
             self.settings.replicates[name],
             seed=self.settings.seed,
             observe=CameraNoise(np.radians(self.settings.noise_deg)),
-            executor=self.executor,
+            executor=self.compute.executor,
             store=self.out / f"{name}.sqlite",
             identity=self.stirring.identity,
-            progress=self.progress,
+            progress=self.compute.progress,
         )
 
     def stirs_everywhere(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -165,7 +155,7 @@ class SbcStudy:
         from scipy.stats import qmc
 
         from ..inference import SimulationBank
-        from ..inference.simulations import Keep, jobs, run_missing, stacked
+        from ..inference.simulations import jobs, run_missing, stacked
 
         stirring, design = self.stirring, self.settings.design
         rng = generator(self.settings.seed, Phase.SBC_DESIGN)
@@ -176,9 +166,9 @@ class SbcStudy:
         repeated = {name: np.repeat(values, RUNS_PER_POINT) for name, values in theta.items()}
         with (
             SimulationBank(self.out / SIMULATIONS) as bank,
-            progress_bar("simulating stirs for all", count, shown=self.progress) as advance,
+            progress_bar("simulating stirs for all", count, shown=self.compute.progress) as advance,
         ):
-            keep = Keep(bank, stirring.identity, STIRS_PER_CALL, self.executor, self.timeout)
+            keep = self.compute.keep(bank, stirring.identity, STIRS_PER_CALL)
             made = run_missing(stirring.simulate, jobs(repeated, seeds), keep, advance=advance)
         shape = stirring.observed.shape
         signals = stacked(made, shape).reshape(design, RUNS_PER_POINT, *shape)

@@ -15,7 +15,7 @@ from . import record as cli_record
 from . import rig as cli_rig
 from . import simulate as cli_simulate
 from . import trim as cli_trim
-from .compute import Compute, StudyCompute
+from .compute import ComputeOptions, StudyComputeOptions
 from .errors import OneLineErrors
 from .examples import examples, session
 from .grouped import grouped
@@ -89,7 +89,7 @@ def calibrate(
     out: Annotated[Path, typer.Option(metavar="RUN", help="Directory of the run.")],
     options: CalibrationOptions,
     given: CalibrationData,
-    compute: Compute,
+    compute: ComputeOptions,
     resume: Annotated[
         bool,
         typer.Option(
@@ -107,7 +107,7 @@ def calibrate(
     if resume:
         check_resumable(out)
     opened, table = open_recordings(recordings), given.table
-    with complaints_among_results(), compute.executor() as executor:
+    with complaints_among_results(), compute.arguments() as where:
         calibration = run_calibrate(
             opened,
             out=out,
@@ -115,8 +115,7 @@ def calibrate(
             pours=table,
             cups=given.cups,
             resume=resume,
-            executor=executor,
-            timeout=compute.timeout,
+            **where,
             **asdict(settings),
         )
     results = Results.of(calibration.run)
@@ -137,13 +136,13 @@ def criticise(
     data: CriticismData,
     poured: PourData,
     options: EffectOptions,
-    compute: Compute,
+    compute: ComputeOptions,
 ) -> None:
     """Find which effect the model lacks, where it misses the data."""
     from ..criticism.criticise import criticise as run_criticise
 
     table, held_out_table = poured.table, poured.held_out_table
-    with compute.executor() as executor:
+    with compute.arguments() as where:
         criticism = run_criticise(
             run,
             held_out=data.held_out or (),
@@ -154,8 +153,7 @@ def criticise(
             effects=options.effects or None,
             accept=options.accept or None,
             seed=options.seed,
-            executor=executor,
-            timeout=compute.timeout,
+            **where,
         )
     print_findings(criticism)
     print_next_pour(criticism.calibration)
@@ -170,7 +168,7 @@ def criticise(
 )
 @grouped
 def pour(
-    run: RunArgument, options: PourOptions, execution: ExecutionOptions, compute: Compute
+    run: RunArgument, options: PourOptions, execution: ExecutionOptions, compute: ComputeOptions
 ) -> None:
     """Choose the pour that spills least over the posterior.
 
@@ -194,7 +192,7 @@ def pour(
     # refused before anything of the run is read
     PourSettings(budget=options.budget, iterations=options.iterations, risk=options.risk)
     cups, table = cups_of(options.cups), options.table
-    with compute.executor() as executor:
+    with compute.arguments() as where:
         chosen = choose_pour(
             run,
             cups,
@@ -203,8 +201,7 @@ def pour(
             iterations=options.iterations,
             risk=options.risk,
             force=options.force,
-            executor=executor,
-            timeout=compute.timeout,
+            **where,
         )
     print_pour(chosen)
     print_warnings(Results.of(Run.open(run)))
@@ -215,7 +212,7 @@ def pour(
 @grouped
 def report(
     run: RunArgument,
-    compute: Compute,
+    compute: ComputeOptions,
     moving: Annotated[
         bool,
         typer.Option(
@@ -227,15 +224,15 @@ def report(
     """Write RUN/report.html, one file that shows it all."""
     from ..reporting.report import report as write_report
 
-    with compute.executor() as executor:
-        path = write_report(run, moving=moving, executor=executor, timeout=compute.timeout)
+    with compute.arguments() as where:
+        path = write_report(run, moving=moving, **where)
     typer.echo(path)
 
 
 @app.command(epilog=examples("demo --out runs/demo"))
 @grouped
 def demo(
-    compute: StudyCompute,
+    compute: StudyComputeOptions,
     out: Annotated[Path, typer.Option(metavar="RUN", help="Directory of the run.")] = Path(
         "runs/demo"
     ),
@@ -244,8 +241,8 @@ def demo(
     from ..demo import run_demo
     from ..reporting.warnings import Results
 
-    with complaints_among_results(), compute.executor() as executor:
-        made = run_demo(out, executor=executor, timeout=compute.timeout, fitted=print_calibration)
+    with complaints_among_results(), compute.opened() as opened:
+        made = run_demo(out, compute=opened, fitted=print_calibration)
     print_findings(made.criticism)
     typer.echo(f"pour before criticism: {made.pour_before.chosen}")
     print_pour(made.pour)

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from ..inputs.settings import SbcSettings
-from .compute import StudyCompute
+from .compute import StudyComputeOptions
 from .errors import FAILED
 from .examples import examples
 from .grouped import grouped
@@ -22,7 +22,7 @@ app = typer.Typer(help="Long checks; a killed one goes on.", no_args_is_help=Tru
 @grouped
 def sbc(
     options: SbcOptions,
-    compute: StudyCompute,
+    compute: StudyComputeOptions,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Directory of the results.")] = Path(
         "runs/sbc"
     ),
@@ -40,10 +40,8 @@ def sbc(
     from ..checks.sbc import check_sbc
 
     settings = SbcSettings(**asdict(options))
-    with compute.executor() as executor:
-        found = check_sbc(
-            out, recording, settings=settings, executor=executor, timeout=compute.timeout
-        )
+    with compute.opened() as opened:
+        found = check_sbc(out, recording, settings=settings, compute=opened)
     for name, check in found.items():
         typer.echo(f"{name}\n\n{check}\n")
     typer.echo(f"results: {out}")

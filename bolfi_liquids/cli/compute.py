@@ -3,12 +3,14 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
+
+    from ..run.compute import Compute
 
 WorkersOption = Annotated[
     int | None,
@@ -28,7 +30,7 @@ TimeoutOption = Annotated[
 
 
 @dataclass(frozen=True)
-class Compute:
+class ComputeOptions:
     """Where simulations run, and for how long at the most.
 
     Attributes:
@@ -42,20 +44,28 @@ class Compute:
     timeout: TimeoutOption = None
 
     def __post_init__(self) -> None:
-        from ..run.workers import check_timeout
+        from ..run.compute import check_timeout
 
         check_timeout(self.timeout)
 
     @contextmanager
-    def executor(self) -> "Iterator[Executor | None]":
-        """The executor that `workers` and `dask` name; it is closed afterwards."""
+    def opened(self) -> "Iterator[Compute]":
+        """With the executor that `workers` and `dask` name; it is closed afterwards."""
+        from ..run.compute import Compute
+
         with open_executor_of(self.workers, self.dask) as executor:
-            yield executor
+            yield Compute(executor, self.timeout)
+
+    @contextmanager
+    def arguments(self) -> "Iterator[dict[str, Any]]":
+        """The same as `executor` and `timeout` of a function."""
+        with self.opened() as compute:
+            yield {"executor": compute.executor, "timeout": compute.timeout}
 
 
 @dataclass(frozen=True)
-class StudyCompute(Compute):
-    """`Compute` of the demo or a long study, which take all processors unless told otherwise."""
+class StudyComputeOptions(ComputeOptions):
+    """Those of the demo or a long study, which take all processors unless told otherwise."""
 
     workers: WorkersOption = None
 
@@ -78,7 +88,7 @@ def open_executor_of(workers: int | None, dask: str | None) -> "Iterator[Executo
         return
     if workers not in (None, 1):
         raise typer.BadParameter("--workers and --dask name two places to simulate: give one")
-    from ..run.workers import open_workers
+    from ..run.compute import open_compute
 
-    with open_workers(dask) as executor:
-        yield executor
+    with open_compute(dask) as compute:
+        yield compute.executor

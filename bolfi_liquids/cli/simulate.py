@@ -11,7 +11,7 @@ from ..inputs.described_liquid import (
     DENSITY,
     VISCOSITY,
 )
-from .compute import Compute
+from .compute import ComputeOptions
 from .examples import examples
 from .grouped import grouped
 from .options import CupsOption, ParticlesOption
@@ -93,7 +93,7 @@ class ActionOptions:
 def stir(
     liquid: LiquidOptions,
     files: FileOptions,
-    compute: Compute,
+    compute: ComputeOptions,
     density: Annotated[
         float | None, typer.Option(help="Of the liquid, in kg/m³; else the recording's.")
     ] = None,
@@ -112,14 +112,13 @@ def stir(
 
     from ..simulation.simulate import simulate_stir
 
-    with compute.executor() as executor:
+    with compute.arguments() as where:
         made = simulate_stir(
             **liquid.given("stir"),
             density=density,
             particles=particles,
             recording=recording,
-            executor=executor,
-            timeout=compute.timeout,
+            **where,
             movie=files.movie,
             out=files.out,
         )
@@ -142,7 +141,7 @@ def pour(
     liquid: LiquidOptions,
     action: ActionOptions,
     files: FileOptions,
-    compute: Compute,
+    compute: ComputeOptions,
     density: Annotated[float, typer.Option(help="Of the liquid, in kg/m³.")] = DENSITY,
     particles: ParticlesOption = 0,
 ) -> None:
@@ -156,7 +155,7 @@ def pour(
     from ..pouring.spillage import FRACTIONS
     from ..simulation.simulate import simulate_pour
 
-    with compute.executor() as executor:
+    with compute.arguments() as where:
         made = simulate_pour(
             **liquid.given("pour"),
             angular_velocity=float(np.radians(action.angular_velocity)),
@@ -164,8 +163,7 @@ def pour(
             density=density,
             cups=action.cups,
             particles=particles,
-            executor=executor,
-            timeout=compute.timeout,
+            **where,
             movie=files.movie,
             out=files.out,
         )

@@ -18,9 +18,9 @@ from ..inputs.pour_table import Pours, PourTable
 from ..inputs.recording import Recording, aborted_recordings
 from ..inputs.settings import CriticismSettings
 from ..progress import phases
+from ..run.compute import open_compute
 from ..run.given_pours import keep_pours
 from ..run.run import Run, RunOrPath
-from ..run.workers import open_workers
 from .criticism_file import criticism_tree
 from .findings import Findings
 from .inputs import Given, Inputs, check_effects, open_inputs
@@ -70,8 +70,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         effects: Names in `models.EFFECTS` to consider; None is all of them.
         accept: Effects that join the model whatever the verdict.
         seed: Seed of all random draws.
-        executor: Where simulations run, see `calibrate`; the result has the same bits.
-        timeout: Seconds that one simulation may take; None sets no limit.
+        executor, timeout: See `calibrate`.
         progress: Whether to show phases on stderr.
 
     Raises:
@@ -106,11 +105,11 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         from ..inference.criticism import Keeping
 
         with (
-            open_workers(executor, timeout) as workers,
+            open_compute(executor, timeout) as compute,
             run.bank() as bank,
             phases(shown=progress) as report,
         ):
-            keeping = Keeping(bank, settings.batch, settings.seed, report, workers, timeout)
+            keeping = Keeping(bank, settings.batch, settings.seed, report, *compute[:2])
             findings = _find(base, inputs, keeping)
             tree = criticism_tree(findings)
         summary = CriticismSummary.from_findings(findings, tree, time.perf_counter() - started)

@@ -19,10 +19,9 @@ from ..inputs.pour_table import Pours, PourTable, check_scene, table_of
 from ..inputs.prior import PARAMETERS
 from ..inputs.settings import PourSettings
 from ..progress import progress_bar
-from ..run.execution import Execution
+from ..run.compute import Compute, open_compute
 from ..run.given_pours import GIVEN_POURS, digest_of_pours, keep_pours, kept_pours
 from ..run.run import Run, RunOrPath
-from ..run.workers import open_workers
 from .design import acting_in_pours, box_around, joint_prior
 from .draining import LIQUIDS, TENTH, Draining, Hold, hold_of
 from .landed_pours import LandedPours, pours_in
@@ -81,9 +80,7 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         risk: "mean", or "cvar": the mean over the worst tenth of the draws.
         seed: Seed of all random draws; the pours do not depend on it.
         force: Whether to choose even though the fit is bad, see `calibration.bad_fit`.
-        executor: Where pours are simulated, see `calibrate`; the result has the same bits.
-        timeout: Seconds that one pour may take; None sets no limit.
-        progress: Whether to show a bar on stderr.
+        executor, timeout, progress: See `calibrate`.
 
     Raises:
         InputError: A setting, `timeout` or the file of the cups cannot be used; the fit is bad; the
@@ -104,8 +101,8 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         if table is not None:
             keep_pours(run.path, table, cups)
         counted = _counted(run.path, cups)
-        with open_workers(executor, timeout) as workers:
-            pour = decided(latest, cups, settings, Execution(workers, timeout, progress), counted)
+        with open_compute(executor, timeout, progress=progress) as compute:
+            pour = decided(latest, cups, settings, compute, counted)
         made_from = {
             "after": latest.key,
             "given": digest_of_pours(run.path),
@@ -143,20 +140,20 @@ def decided(
     calibration: Calibration,
     cups: "Cups",
     settings: PourSettings,
-    execution: Execution,
+    compute: Compute,
     given: PourTable | None = None,
 ) -> Pour:
     """The pour of a posterior; pours are kept in the run's bank, and nothing else is written.
 
     Args:
-        calibration, cups, settings, execution: See `choose_pour`.
+        calibration, cups, settings, compute: See `choose_pour`.
         given: Pours of the liquid that were made, all of them within the range of the cups.
 
     Raises:
         InputError, RuntimeError: See `choose_pour`.
     """
     drawn = strata(calibration, settings.draws, settings.seed)
-    simulated = _learned(calibration, cups, settings, execution)
+    simulated = _learned(calibration, cups, settings, compute)
     learned = simulated
     if given is not None:
         learned = simulated.corrected(given, drawn.search, seed=settings.seed)
@@ -165,7 +162,7 @@ def decided(
         learned.judge(action, drawn.judge, seed=settings.seed)
         for action in (choice.chosen, choice.plug_in)
     )
-    more: dict[str, Any] = {"hold": _hold(calibration, chosen, choice, simulated, execution)}
+    more: dict[str, Any] = {"hold": _hold(calibration, chosen, choice, simulated, compute)}
     if learned.given is not None:
         otherwise = simulated.surface(drawn.search, rates=settings.iterations, seed=settings.seed)
         without = learned.judge(otherwise.least(settings.risk), drawn.judge, seed=settings.seed)
@@ -178,7 +175,7 @@ def _hold(
     chosen: Judged,
     choice: "_Choice",
     learned: LandingMap,
-    execution: Execution,
+    compute: Compute,
 ) -> Hold | None:
     """How the source of the chosen pour empties, where much stays in it."""
     if chosen.fractions[:, 2].mean() <= TENTH:
@@ -186,14 +183,14 @@ def _hold(
     draining = Draining(learned.cups, calibration.liquid_density, learned.box.effects)
     with (
         calibration.run.bank() as bank,
-        progress_bar("holding the source", LIQUIDS, shown=execution.progress) as advance,
+        progress_bar("holding the source", LIQUIDS, shown=compute.progress) as advance,
     ):
-        rate, keep = chosen.angular_velocity, execution.keep(bank)
+        rate, keep = chosen.angular_velocity, compute.keep(bank)
         return hold_of(draining, rate, choice.liquids, keep, advance)
 
 
 def _learned(
-    calibration: Calibration, cups: "Cups", settings: PourSettings, execution: Execution
+    calibration: Calibration, cups: "Cups", settings: PourSettings, compute: Compute
 ) -> LandingMap:
     """The map of landings around a posterior; what the run's bank holds is not poured again."""
     draws = {str(name): v.to_numpy().ravel() for name, v in calibration.posterior.items()}
@@ -202,9 +199,9 @@ def _learned(
     pours = LandedPours(cups, calibration.liquid_density, effects)
     with (
         calibration.run.bank() as bank,
-        progress_bar("pouring", settings.budget, shown=execution.progress) as advance,
+        progress_bar("pouring", settings.budget, shown=compute.progress) as advance,
     ):
-        poured = pours_in(box, pours, settings.budget, execution.keep(bank), advance)
+        poured = pours_in(box, pours, settings.budget, compute.keep(bank), advance)
     return learn_map(box, cups, poured)
 
 

@@ -18,6 +18,7 @@ from ..inputs.cups import kept_cups
 from ..inputs.prior import split_parameters
 from ..inputs.recording import Recording
 from ..progress import Advance, progress_bar
+from ..run.compute import HERE, Compute
 from ..run.run import as_json
 from ..seeds import Phase, simulation_seeds
 from ..wording import unit_of
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
     from ..calibration.result import Calibration
-    from ..inference.simulations import Workers
     from ..models import StirFrames
     from ..pouring.result import Pour
 
@@ -59,23 +59,15 @@ class Shown(NamedTuple):
         return {**self.pour.chosen.action, "cups": json.loads(self.pour.tree.attrs["cups"])}
 
 
-def frames_of(
-    shown: Shown,
-    *,
-    executor: "Workers | None" = None,
-    timeout: float | None = None,
-    progress: bool = True,
-) -> "Dataset":
+def frames_of(shown: Shown, compute: Compute = HERE) -> "Dataset":
     """The run's frames; simulated if there are none of this calibration and pour.
 
     Args:
         shown: What they are of.
-        executor: Where draws are simulated, see `calibrate`; the result has the same bits.
-        timeout: Seconds that one simulation may take; None sets no limit.
-        progress: Whether to show a bar on stderr.
+        compute: Where draws are simulated.
 
     Raises:
-        RuntimeError: A simulation took longer than `timeout`; nothing was written.
+        RuntimeError: A simulation took longer than the timeout; nothing was written.
     """
     calibration, whole, pour = shown.calibration, shown.recording, shown.action
     recording = whole.first(int(np.sum(whole.time - whole.time[0] <= MAX_STIR_SECONDS)))
@@ -86,17 +78,17 @@ def frames_of(
     kept = calibration.run.result("frames")
     if kept is not None and kept.attrs["made_from"] == as_json(made_from):
         return kept.to_dataset()
-    scenes = _scenes(calibration, recording, pour, timeout)
+    scenes = _scenes(calibration, recording, pour, compute.timeout)
     from xarray import DataTree
 
     try:
-        frames = _simulated(scenes, _draws(theta, seeds), executor, progress)
+        frames = _simulated(scenes, _draws(theta, seeds), compute)
     except TimeoutError as err:
-        if timeout is None:
+        if compute.timeout is None:
             raise
         raise RuntimeError(
-            f"a moving picture took longer than {timeout:g} s to simulate; allow more time, or "
-            "leave the pictures out by --still, in Python by moving=False"
+            f"a moving picture took longer than {compute.timeout:g} s to simulate; allow more "
+            "time, or leave the pictures out by --still, in Python by moving=False"
         ) from err
     dataset = _named(frames, theta)
     calibration.run.keep("frames", DataTree(dataset), made_from)
@@ -125,17 +117,11 @@ def _scenes(
     return _Scenes(stir, PourScene(cups, *action, density, timeout))
 
 
-def _simulated(
-    scenes: _Scenes, draws: list[Draw], executor: "Workers | None", progress: bool
-) -> dict[str, Any]:
+def _simulated(scenes: _Scenes, draws: list[Draw], compute: Compute) -> dict[str, Any]:
     """All of the file's variables but theta."""
-    from ..run.workers import open_workers
-
     steps = len(draws) * sum(scene is not None for scene in scenes)
-    with (
-        open_workers(executor) as workers,
-        progress_bar("moving pictures", steps, shown=progress) as advance,
-    ):
+    workers = compute.executor
+    with progress_bar("moving pictures", steps, shown=compute.progress) as advance:
         stirs = _each(scenes.stir, draws, workers, advance)
         pours = None if scenes.pour is None else _each(scenes.pour, draws, workers, advance)
         frames = _stirred(list(stirs), scenes.stir.stirring.time)

@@ -17,6 +17,7 @@ from ..files import write_text
 from ..hover_labels import script_json
 from ..inputs.prior import Described
 from ..pouring.result import Pour
+from ..run.compute import Compute, open_compute
 from ..run.run import REPORT, Run, RunOrPath
 from ..wording import LIQUID_UNITS, sentence
 from . import sentences
@@ -43,37 +44,37 @@ def report(
         run: A RUN directory with a finished calibration; or a calibration, criticism or pour.
         moving: Whether it has moving pictures, of a few stirs and pours that are simulated for
             them once and kept in RUN/frames.nc; nothing else is simulated.
-        executor: Where they are simulated, see `calibrate`; the result has the same bits.
-        timeout: Seconds that one simulation may take; None sets no limit.
-        progress: Whether to show a bar on stderr while they are.
+        executor, timeout, progress: Of their simulations, see `calibrate`.
 
     Raises:
         InputError: The directory holds no finished calibration, or one of another model, or another
             command works in it.
         RuntimeError: A simulation took longer than `timeout`.
     """
-    with Run.entered(run) as opened:
-        how = {"executor": executor, "timeout": timeout, "progress": progress}
-        return written(Results.of(opened), moving=moving, **how)
+    with (
+        Run.entered(run) as opened,
+        open_compute(executor, timeout, progress=progress) as compute,
+    ):
+        return written(Results.of(opened), compute, moving=moving)
 
 
 def written(
     results: Results,
+    compute: Compute,
     *,
     moving: bool = True,
     chapters: Mapping[str, Any] = MappingProxyType({}),
-    **how: Any,
 ) -> Path:
     """Write RUN/report.html from what was read or made, as its arguments.
 
     Args:
         results: What the run holds.
+        compute: Where moving pictures are simulated.
         moving: See `report`.
         chapters: What is drawn already, by the names of `CHAPTERS`.
-        how: Further arguments of `frames_of`.
     """
     calibration = results.calibration
-    pictures = _moving(results.latest, results.pour, how) if moving else None
+    pictures = _moving(results, compute) if moving else None
     given = {name: getattr(results, name) for name in CHAPTERS}
     drawn = {
         name: chapters.get(name) or (one and CHAPTERS[name](one)) for name, one in given.items()
@@ -182,15 +183,14 @@ CHAPTERS: dict[str, Callable[[Any], dict[str, Any]]] = {
 """What the template needs of each result."""
 
 
-def _moving(
-    calibration: Calibration, pour: Pour | None, how: Mapping[str, Any]
-) -> dict[str, Any] | None:
-    """Moving pictures, simulated by the arguments `how` of `frames_of`."""
+def _moving(results: Results, compute: Compute) -> dict[str, Any] | None:
+    """Moving pictures of the latest posterior and the pour."""
     from .frames import Shown, frames_of
     from .moving_pictures import moving_context
 
-    shown = Shown(calibration, calibration.run.recordings[0], pour)
-    return moving_context(shown, frames_of(shown, **how))
+    latest = results.latest
+    shown = Shown(latest, latest.run.recordings[0], results.pour)
+    return moving_context(shown, frames_of(shown, compute))
 
 
 def _text(name: str) -> str:

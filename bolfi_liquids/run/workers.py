@@ -11,13 +11,8 @@ from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
 from multiprocessing.process import BaseProcess
 from threading import Thread
-from typing import TYPE_CHECKING
 
-from ..errors import Argument, InputError
 from ..models.runtime import THREADS
-
-if TYPE_CHECKING:
-    from ..inference.simulations import Workers
 
 
 @contextmanager
@@ -50,43 +45,6 @@ def processes(count: int | None = None) -> Iterator[Executor | None]:
         pool.shutdown(cancel_futures=True)
         raise
     pool.shutdown()
-
-
-@contextmanager
-def open_workers(
-    executor: "Workers | None", timeout: float | None = None
-) -> Iterator[Executor | None]:
-    """Where the fluid is simulated; None is this process. To be opened before anything is written.
-
-    Args:
-        executor: Of processes with one thread each: a pool, a Dask client or the address of a Dask
-            scheduler; None is this process.
-        timeout: Seconds that one simulation may take; None sets no limit.
-
-    Raises:
-        InputError: `timeout` is no positive number.
-        ValueError: `executor` is something else, or has several threads in a process.
-        ImportError, ConnectionError: Dask is not installed, or no scheduler answers.
-    """
-    from ..inference.simulations import open_executor
-
-    check_timeout(timeout)
-    with open_executor(executor, one_thread=True) as workers:
-        yield workers
-
-
-def check_timeout(timeout: float | None) -> None:
-    """Raise `InputError` unless it is a positive number of seconds, or None."""
-    from ..inference import arguments
-
-    try:
-        arguments.check_timeout(timeout)
-    except ValueError as refused:
-        raise InputError(
-            f"{timeout!r:.80}",
-            where=Argument("timeout"),
-            fix="give a positive number of seconds, or none",
-        ) from refused
 
 
 def _begin(threads: int) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,12 +11,9 @@ from ..errors import Argument, InputError
 from ..inference.arguments import checked_array
 from ..inputs.described_liquid import Described
 from ..progress import Simulate
+from ..run.compute import Compute
 from ..run.fluid_simulator import FluidSimulator
-from ..run.workers import open_workers
 from .movies import failures_raised
-
-if TYPE_CHECKING:
-    from ..inference.simulations import Workers
 
 
 class Batch(NamedTuple):
@@ -43,13 +40,6 @@ class Batch(NamedTuple):
     def shaped(self, values: NDArray) -> NDArray:
         """Values of all simulations, without that axis where there is one simulation."""
         return values[0] if self.single else values
-
-
-class Where(NamedTuple):
-    """Where simulations run: see `calibrate`."""
-
-    executor: "Workers | None" = None
-    timeout: float | None = None
 
 
 def batch_of(
@@ -133,30 +123,28 @@ class Raising(FluidSimulator):
 
 
 def simulated(
-    simulate: Simulate, batch: Batch, where: Where, needed: slice = slice(None)
+    simulate: Simulate, batch: Batch, compute: Compute, needed: slice = slice(None)
 ) -> NDArray[np.float64]:
     """Signals of all liquids, shape (simulations, ...).
 
     Args:
         simulate: As given to `inference.fit`.
         batch: The liquids; their density is the simulator's.
-        where: Where simulations run.
+        compute: Where simulations run.
         needed: Part of a signal that is finite in all simulations that succeed.
 
     Raises:
-        InputError, ValueError: `where` cannot be used.
         RuntimeError: A simulation failed.
     """
     from ..inference import SimulationBank
-    from ..inference.simulations import Job, Keep, run_missing
+    from ..inference.simulations import Job, run_missing
 
     jobs = [
         Job({"viscosity": one.viscosity, "cohesion": one.cohesion, **one.effects}, one.seed)
         for one in batch.liquids
     ]
-    with open_workers(where.executor, where.timeout) as workers, SimulationBank() as bank:
-        keep = Keep(bank, "", None, workers, where.timeout)
-        made = run_missing(Raising(simulate).simulate, jobs, keep)
+    with SimulationBank() as bank:
+        made = run_missing(Raising(simulate).simulate, jobs, compute.keep(bank))
     for job, one in zip(jobs, made, strict=True):
         if one.signal is None:
             raise RuntimeError(f"the simulation of {job.theta} failed: {one.error}")

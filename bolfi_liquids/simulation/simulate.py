@@ -26,8 +26,9 @@ from ..inputs.open import Source, open_recordings
 from ..inputs.pour_table import check_distance, check_rate
 from ..inputs.prior import split_parameters
 from ..inputs.recording import Recording, Trajectory
+from ..run.compute import open_compute
 from ..run.fluid_simulator import FluidSimulator
-from .batch import Where, batch_of, simulated
+from .batch import batch_of, simulated
 from .files import check_targets, pour_dataset, stir_dataset
 from .movies import film_pour, film_stir
 
@@ -84,8 +85,7 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
         recording: Whose path and rig are used, or its file; None is a bundled stir of glycerin.
         particles: Number of particles of the simulated liquid; 0: cells follow the stick.
         seed: Seed of the packing; an integer or shape (B,).
-        executor: Where simulations run, see `calibrate`; the result has the same bits.
-        timeout: Seconds that one simulation may take; None sets no limit.
+        executor, timeout: See `calibrate`.
         movie: File to show it in; .mp4, .gif or .webp.
         out: File of the simulated recording, .nc: one that can be calibrated on.
         progress: Whether to show a bar on stderr while a movie is drawn.
@@ -120,7 +120,8 @@ def simulate_stir(  # noqa: PLR0913  the one call that most users make
     batch = batch_of(liquid, effects, count, seed)
     targets.check_single(batch.single)
     setup = StirSetup.from_recording(plan, particles=batch.one.particles)
-    angles = simulated(Stirring((plan,), (setup,)).simulate, batch, Where(executor, timeout))
+    with open_compute(executor, timeout) as compute:
+        angles = simulated(Stirring((plan,), (setup,)).simulate, batch, compute)
     found = stir_dataset(batch, plan, angles)
     if targets.out is not None:
         write_netcdf(found, targets.out)
@@ -271,8 +272,9 @@ def simulate_pour(  # noqa: PLR0913  the one call that most users make
     batch = batch_of(liquid, check_effects(effects, "pour"), particles, seed)
     targets.check_single(batch.single)
     simulator = PourSimulator(angular_velocity, cups, density, batch.one.particles)
-    where, retained = Where(executor, timeout), slice(0, 1)  # what has not landed is NaN
-    signals = simulated(simulator.simulate, batch, where, retained)
+    retained = slice(0, 1)  # what has not landed is NaN
+    with open_compute(executor, timeout) as compute:
+        signals = simulated(simulator.simulate, batch, compute, retained)
     position = signals[:, 1:].reshape(len(signals), -1, 2).astype(np.float32)
     landings = Landings(position, signals[:, 0])
     action = PourAction(angular_velocity, distance)

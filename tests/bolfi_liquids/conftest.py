@@ -17,6 +17,7 @@ from bolfi_liquids.criticism.summary import CameraNoise, CriticismSummary
 from bolfi_liquids.criticism.verdict import Verdict
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.reporting.frames import Shown, frames_of
+from bolfi_liquids.run.compute import Compute
 from bolfi_liquids.run.run import Run, as_json
 
 BUNDLED = Path(str(files("bolfi_liquids.data"))) / "glycerin_v10.nc"
@@ -110,7 +111,7 @@ def shown(pour):
 @pytest.fixture(scope="session")
 def frames(shown):
     """What draws of the calibration look like, stirred and poured."""
-    return frames_of(shown, progress=False)
+    return frames_of(shown, Compute(progress=False))
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ValidationError
 Truth = TypeVar("Truth", bound=BaseModel)
 
 
-def read_truths(path: Path, model: type[Truth]) -> list[Truth]:
+def read_truths[Truth: BaseModel](path: Path, model: type[Truth]) -> list[Truth]:
     """Read a CSV file with a row for each truth; columns that the model lacks are not read.
 
     Args:

@@ -9,7 +9,7 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 from bolfi_liquids.cli.app import app
-from bolfi_liquids.cli.compute import Compute, open_executor_of
+from bolfi_liquids.cli.compute import ComputeOptions, open_executor_of
 from bolfi_liquids.cli.grouped import grouped
 
 ELSEWHERE = {"import", "guide", "record", "trim"}
@@ -40,8 +40,8 @@ def test_commands_are_found_in_their_groups():
 
 
 def test_one_worker_is_this_process():
-    with Compute().executor() as executor:
-        assert executor is None
+    with ComputeOptions().opened() as compute:
+        assert compute.executor is None
 
 
 def test_two_places_at_once_are_refused():

@@ -17,6 +17,7 @@ from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.pouring.result import ActionSummary, PourSummary
 from bolfi_liquids.reporting import criticism_sentences, frames, sentences
 from bolfi_liquids.reporting.report import prior_text
+from bolfi_liquids.run.compute import Compute
 from bolfi_liquids.run.result_file import _parsed
 from bolfi_liquids.run.run import Run
 
@@ -122,14 +123,14 @@ def unseen(pour, tmp_path):
 def test_a_report_says_where_its_pictures_are_simulated(unseen, monkeypatch):
     seen = []
 
-    def simulated(scenes, draws, executor, progress):
-        seen.append((executor, scenes.stir.timeout, scenes.pour.timeout, progress))
+    def simulated(scenes, draws, compute):
+        seen.append((compute, scenes.stir.timeout, scenes.pour.timeout))
         raise TimeoutError
 
     monkeypatch.setattr(frames, "_simulated", simulated)
     with ThreadPoolExecutor(1) as pool, pytest.raises(RuntimeError, match="60 s"):
         bl.report(unseen, executor=pool, timeout=60.0, progress=False)
-    assert seen == [(pool, 60.0, 60.0, False)]
+    assert seen == [(Compute(pool, 60.0, False), 60.0, 60.0)]
 
 
 def test_no_result_is_opened_twice(pour, frames, monkeypatch):
@@ -156,10 +157,9 @@ def test_pictures_that_take_too_long_leave_nothing(unseen):
 def test_pictures_by_processes_have_the_same_bits(unseen, shown):
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         elsewhere = replace(shown.calibration, run=Run.open(unseen))
-        there = frames.frames_of(
-            shown._replace(calibration=elsewhere), executor=pool, progress=False
-        )
-    assert there.identical(frames.frames_of(shown, progress=False))
+        given = shown._replace(calibration=elsewhere)
+        there = frames.frames_of(given, Compute(pool, progress=False))
+    assert there.identical(frames.frames_of(shown, Compute(progress=False)))
 
 
 @pytest.mark.slow

@@ -40,7 +40,7 @@ def given_nothing(out):
     stir = bundled("glycerin_v10.nc")
     return {
         "calibrate": lambda: bl.calibrate(stir, out=out, progress=False),
-        "check sbc": lambda: check_sbc(out, progress=False),
+        "check sbc": lambda: check_sbc(out),
         "demo": lambda: run_demo(out),
         "record": lambda: bl.record(out=out, emulate=True, progress=False),
         "simulate stir": lambda: bl.simulate_stir(out=out, progress=False),

@@ -14,7 +14,8 @@ from distributed import LocalCluster
 import bolfi_liquids as bl
 from bolfi_liquids.cli.compute import open_executor_of
 from bolfi_liquids.errors import InputError
-from bolfi_liquids.run.workers import open_workers, processes
+from bolfi_liquids.run.compute import open_compute
+from bolfi_liquids.run.workers import processes
 
 WORKING = """
 import os, signal, time
@@ -104,10 +105,10 @@ def test_workers_of_dask_have_one_thread_each(threads):
     with cluster, cluster.get_client() as client:
         for given in (client, client.get_executor(), cluster.scheduler_address):
             if threads == 1:
-                with open_workers(given) as workers:
-                    assert workers.submit(pow, 2, 3).result(60.0) == 8
+                with open_compute(given) as compute:
+                    assert compute.executor.submit(pow, 2, 3).result(60.0) == 8
                 continue
-            with pytest.raises(ValueError, match="--nthreads 1"), open_workers(given):
+            with pytest.raises(ValueError, match="--nthreads 1"), open_compute(given):
                 pass
         if threads > 1:
             with pytest.raises(ValueError, match="--nthreads 1"):
