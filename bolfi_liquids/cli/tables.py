@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Column, Table
 
-from ..criticism.verdict import Verdict
+from ..inference.criticism.verdict_kind import VerdictKind
 from ..reporting import criticism_sentences as criticism
 from ..reporting.sentences import fate_sentences, given_sentences, model_error_sentence
 from ..wording import LIQUID_UNITS, Sentence, percent, spilled
@@ -110,7 +110,7 @@ def print_criticism(
         sentences.append(criticism.where_sentence(summary.where))
     if effects is not None:
         sentences.append(criticism.detectable_sentence(effects))
-        if summary.verdict in (Verdict.TIE, Verdict.UNKNOWN):
+        if summary.verdict in (VerdictKind.TIE, VerdictKind.UNKNOWN):
             sentences += criticism.largest_gains_sentences(effects)
     if summary.pours is not None:
         sentences += criticism.stirs_sentences(summary)

@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..inference.criticism.verdict_kind import VerdictKind
 from ..inputs.fields import PLANE_NAMES
+from .effect_status import EffectStatus
 from .findings import Findings
-from .verdict import EffectStatus, Verdict
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
@@ -163,7 +164,7 @@ def _status(
 ) -> EffectStatus:
     """What became of an explanation by one effect."""
     if candidate.names[0] in source.verdict.effects:
-        named = source.verdict.kind == Verdict.EFFECT
+        named = source.verdict.kind == VerdictKind.EFFECT
         return EffectStatus.NAMED if named else EffectStatus.POSSIBLE
     if not candidate.passes:
         return EffectStatus.REJECTED

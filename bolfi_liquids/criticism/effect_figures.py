@@ -17,7 +17,7 @@ from ..drawing import (
     styled,
 )
 from ..wording import spoken, unit_of
-from .verdict import EffectStatus
+from .effect_status import EffectStatus
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

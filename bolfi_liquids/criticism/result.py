@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 from ..calibration.result import Calibration
 from ..calibration.summary import Fitted
 from ..drawing import given_or_shown
+from ..inference.criticism.verdict_kind import VerdictKind
 from ..run.run import Run, RunOrPath, key_of
 from ..wording import html_table, sentence, spoken
 from .summary import CriticismSummary
-from .verdict import Verdict
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -81,7 +81,7 @@ class Criticism:
         return json.loads(self.tree.attrs["made_from"])
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> VerdictKind:
         """The conclusion; equal to "none", "effect", "tie" or "unknown"."""
         return self.summary.verdict
 
@@ -115,7 +115,7 @@ class Criticism:
         Effects that pours alone have shown bring it no nearer; what is told then is of ties.
         """
         gap, before = self.summary.gap, self.base.summary
-        of_a_tie = self.summary.stirs.verdict is Verdict.TIE and not self.summary.requested
+        of_a_tie = self.summary.stirs.verdict is VerdictKind.TIE and not self.summary.requested
         if gap.rms_after is None or of_a_tie:
             return Fitted(before.fit_rms_deg, before.noise_deg)
         return Fitted(gap.rms_after, gap.noise)

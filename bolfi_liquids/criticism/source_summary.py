@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from ..calibration.noise import rms
+from ..inference.criticism.verdict_kind import VerdictKind
 from ..inputs.settings import FALSE_ALARM_RATE
 from ..run.summary import Number
-from .verdict import Verdict
 
 if TYPE_CHECKING:
     from .. import inference
@@ -26,7 +26,7 @@ class SourceVerdict:
         held_out: Number of held-out data on which something was tried.
     """
 
-    verdict: Verdict
+    verdict: VerdictKind
     effects: tuple[str, ...]
     p_value: Number
     refuted: tuple[str, ...]
@@ -37,7 +37,7 @@ class SourceVerdict:
         """From what the engine concluded."""
         verdict = source.verdict
         return cls(
-            Verdict(verdict.kind),
+            VerdictKind(verdict.kind),
             tuple(verdict.effects),
             verdict.p_value,
             refuted_by_held_out(source),

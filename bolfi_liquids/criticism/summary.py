@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from ..calibration.summary import ParameterSummary
+from ..inference.criticism.verdict_kind import VerdictKind
 from ..inputs.frame import named_faults
 from ..run.summary import Number, Section
 from .source_summary import (
@@ -19,7 +20,6 @@ from .source_summary import (
     refuted_by_held_out,
     significant_windows,
 )
-from .verdict import Verdict
 
 if TYPE_CHECKING:
     from xarray import DataTree
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .. import inference
     from .findings import Findings
 
-GRAVEST_FIRST = (Verdict.EFFECT, Verdict.TIE, Verdict.UNKNOWN)
+GRAVEST_FIRST = (VerdictKind.EFFECT, VerdictKind.TIE, VerdictKind.UNKNOWN)
 """Order in which the verdicts on several sources decide the one on all of them."""
 
 
@@ -106,7 +106,7 @@ class CriticismSummary(Section):
             one frame, and how it is mended; see `inputs.frame`.
     """
 
-    verdict: Verdict
+    verdict: VerdictKind
     effects: tuple[str, ...]
     accepted: tuple[str, ...]
     requested: tuple[str, ...]
@@ -187,16 +187,16 @@ class CriticismSummary(Section):
 
 def _together(
     sources: "Sequence[inference.criticism.Criticism]",
-) -> tuple[Verdict, tuple[str, ...]]:
+) -> tuple[VerdictKind, tuple[str, ...]]:
     """One verdict on all data: what was named anywhere, or else the gravest."""
     for verdict in GRAVEST_FIRST:
         if named := _concluding(verdict, sources):
             return verdict, tuple(name for source in named for name in source.verdict.effects)
-    return Verdict.NONE, ()
+    return VerdictKind.AGREEMENT, ()
 
 
 def _concluding(
-    verdict: Verdict, sources: "Sequence[inference.criticism.Criticism]"
+    verdict: VerdictKind, sources: "Sequence[inference.criticism.Criticism]"
 ) -> "list[inference.criticism.Criticism]":
     """The sources of this verdict."""
     return [source for source in sources if source.verdict.kind == verdict]

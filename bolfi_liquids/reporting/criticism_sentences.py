@@ -10,7 +10,7 @@ import numpy as np
 
 from ..criticism.source_summary import Gap, PourVerdict, SourceVerdict, Window
 from ..criticism.summary import CriticismSummary
-from ..criticism.verdict import Verdict
+from ..inference.criticism.verdict_kind import VerdictKind
 from ..wording import Sentence, sentence
 
 if TYPE_CHECKING:
@@ -36,14 +36,14 @@ def verdict_sentence(found: CriticismSummary | SourceVerdict, data: str = "all")
     """
     values = {"data": data, "p_value": found.p_value}
     match found.verdict:
-        case Verdict.NONE:
+        case VerdictKind.AGREEMENT:
             return sentence("criticism.agree", **values)
-        case Verdict.EFFECT:
+        case VerdictKind.EFFECT:
             key = "criticism.effect" if found.held_out else "criticism.effect_unconfirmed"
             return sentence(key, **values, effects=found.effects)
-        case Verdict.TIE:
+        case VerdictKind.TIE:
             return sentence("criticism.tie", **values, effects=found.effects)
-        case Verdict.UNKNOWN:
+        case VerdictKind.UNKNOWN:
             if found.refuted:
                 return sentence("criticism.refuted", **values, refuted=found.refuted)
             return sentence("criticism.unexplained", **values)

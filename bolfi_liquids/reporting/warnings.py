@@ -14,7 +14,7 @@ from ..calibration.result import Calibration
 from ..calibration.summary import CalibrationSummary
 from ..criticism.result import Criticism
 from ..criticism.summary import CriticismSummary
-from ..criticism.verdict import Verdict
+from ..inference.criticism.verdict_kind import VerdictKind
 from ..pouring.draining import TENTH
 from ..pouring.result import Pour
 from ..pouring.spillage import ACTION
@@ -124,14 +124,15 @@ def _of_the_model(
         found.append(sentence("warning.compared_in_a_wrong_frame", faults=criticised.frame_faults))
     # an effect can take up any error that looks like it, also the simulator's own
     confirmed = criticised.accepted and criticised.held_out
-    if criticised.verdict != Verdict.NONE and not confirmed:
+    if criticised.verdict != VerdictKind.AGREEMENT and not confirmed:
         found.append(verdict_sentence(criticised))
-    if criticised.verdict != Verdict.UNKNOWN:  # what one source named explains nothing of the other
+    # what one source named explains nothing of the other
+    if criticised.verdict != VerdictKind.UNKNOWN:
         sources = {"stirs": criticised.stirs, "pours": criticised.pours}
         found += [
             verdict_sentence(one, data)
             for data, one in sources.items()
-            if one is not None and one.verdict == Verdict.UNKNOWN
+            if one is not None and one.verdict == VerdictKind.UNKNOWN
         ]
     if not criticised.baseline:
         found.append(sentence("criticism.no_baseline"))

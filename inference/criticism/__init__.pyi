@@ -27,4 +27,4 @@ from .usual_residual import rhythm as rhythm
 from .usual_residual import usual_residual as usual_residual
 from .verdict import Candidate as Candidate
 from .verdict import Verdict as Verdict
-from .verdict import VerdictKind as VerdictKind
+from .verdict_kind import VerdictKind as VerdictKind

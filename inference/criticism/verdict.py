@@ -2,37 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 
 from .hypothesis import Hypothesis
 from .misfit import Check
+from .verdict_kind import VerdictKind
 
 REJECTION_LEVEL = 0.05  # p-value below which the base model is rejected
 ACCEPTANCE_LEVEL = 0.01  # p-value above which an extended model is not
 MIN_GAIN = 2.0  # log likelihood below which an effect explains nothing
 FAR_BEHIND = 0.5  # of the best gain, below which one that does not pass is not worth more runs
 TIE_MARGIN = 4.0  # log likelihood by which one explanation must excel another
-
-
-class VerdictKind(StrEnum):
-    """What a criticism concludes; `advice` is what to do about it."""
-
-    AGREEMENT = "none"
-    EFFECT = "effect"
-    TIE = "tie"
-    UNKNOWN = "unknown"
-
-    @property
-    def advice(self) -> str:
-        return _ADVICE[self]
-
-
-_ADVICE = {
-    VerdictKind.AGREEMENT: "Nothing needs to be added; more data may show a smaller difference.",
-    VerdictKind.EFFECT: "Calibrate anew with the named effect.",
-    VerdictKind.TIE: "Make the suggested experiment, which tells the named effects apart.",
-    VerdictKind.UNKNOWN: "Look where model and data differ, and add an extension that acts there.",
-}
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from bolfi_liquids.inference.criticism.verdict_kind import VerdictKind
 
 import bolfi_liquids as bl
 from bolfi_liquids.calibration.summary import ParameterSummary
 from bolfi_liquids.criticism.source_summary import Gap, SourceVerdict, Window
 from bolfi_liquids.criticism.summary import CameraNoise, CriticismSummary
-from bolfi_liquids.criticism.verdict import Verdict
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.reporting.frames import Shown, frames_of
 from bolfi_liquids.run.compute import Compute
@@ -133,7 +133,7 @@ def criticism_summary():
     """Of a criticism that names and accepts one effect."""
     nowhere = {"channel": None, "start_s": None, "stop_s": None, "stroke": None}
     stroke = {"channel": "xz", "start_s": 1.0, "stop_s": 2.0, "stroke": 1}
-    verdict = SourceVerdict(Verdict.EFFECT, ("camera_delay",), 0.002, (), 1)
+    verdict = SourceVerdict(VerdictKind.EFFECT, ("camera_delay",), 0.002, (), 1)
     return CriticismSummary(
         **vars(verdict),
         accepted=("camera_delay",),

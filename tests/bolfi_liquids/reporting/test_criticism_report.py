@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bolfi_liquids.inference.criticism.verdict_kind import VerdictKind
 from rich.console import Console
 
 from bolfi_liquids.calibration.summary import ParameterSummary
 from bolfi_liquids.cli.tables import print_criticism
+from bolfi_liquids.criticism.effect_status import EffectStatus
 from bolfi_liquids.criticism.source_summary import PourVerdict, SourceVerdict
 from bolfi_liquids.criticism.summary import Suggestion
-from bolfi_liquids.criticism.verdict import EffectStatus, Verdict
 from bolfi_liquids.reporting import criticism_sentences as sentences
 from bolfi_liquids.reporting.criticism_chapter import criticism_chapter
 
@@ -19,15 +20,15 @@ EFFECTS = ("camera_delay", "gripper_scale", "stick_mass")
 CIRCLES = Suggestion("four circles", EFFECTS[:2], 1.0)
 STAR = Suggestion("the star", EFFECTS[:2], 5.5)
 TIED = {
-    "verdict": Verdict.TIE,
+    "verdict": VerdictKind.TIE,
     "effects": EFFECTS[:2],
     "accepted": (),
     "coefficient": {},
     "suggestions": (CIRCLES, STAR),
 }
-UNKNOWN = {"verdict": Verdict.UNKNOWN, "effects": (), "accepted": (), "coefficient": {}}
+UNKNOWN = {"verdict": VerdictKind.UNKNOWN, "effects": (), "accepted": (), "coefficient": {}}
 REFUTED = {**UNKNOWN, "refuted": ("camera_delay",)}
-NONE = {**UNKNOWN, "verdict": Verdict.NONE, "p_value": 0.4, "where": ()}
+NONE = {**UNKNOWN, "verdict": VerdictKind.AGREEMENT, "p_value": 0.4, "where": ()}
 LIQUID = {"viscosity": ParameterSummary(mean=1.0, sd=0.1, q05=0.8, q50=1.0, q95=1.2)}
 
 
@@ -162,8 +163,8 @@ def test_effects_that_could_not_be_simulated_are_named(criticism_summary):
 
 
 def test_pours_have_their_own_verdict(criticism_summary, made, calibrated):
-    stirs = SourceVerdict(Verdict.UNKNOWN, (), 0.01, (), 0)
-    pours = PourVerdict(Verdict.NONE, (), 0.3, (), 0, before=0.051, after=None)
+    stirs = SourceVerdict(VerdictKind.UNKNOWN, (), 0.01, (), 0)
+    pours = PourVerdict(VerdictKind.AGREEMENT, (), 0.3, (), 0, before=0.051, after=None)
     summary = replace(criticism_summary, stirs=stirs, pours=pours)
     chapter = criticism_chapter(summary, made(pours=True), calibrated)
     assert chapter["results"][1].values == {"data": "stirs", "p_value": 0.01}

@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
+from bolfi_liquids.inference.criticism.verdict_kind import VerdictKind
 
 from bolfi_liquids.calibration.fit_figures import _rms_by
 from bolfi_liquids.calibration.summary import CalibrationSummary, FitStatus
 from bolfi_liquids.criticism.source_summary import PourVerdict
 from bolfi_liquids.criticism.summary import CriticismSummary
-from bolfi_liquids.criticism.verdict import Verdict
 from bolfi_liquids.pouring.draining import Hold
 from bolfi_liquids.pouring.figures import not_surely_worse
 from bolfi_liquids.pouring.result import ActionSummary, GivenPour, GivenSummary, PourSummary
@@ -28,8 +28,8 @@ FINE = {
     "n_simulations": 20,
     "emulator_warnings": (),
 }
-AGREES = {"verdict": Verdict.NONE, "effects": (), "accepted": ()}
-CONFIRMED = {"verdict": Verdict.EFFECT, "effects": ("stick_mass",), "accepted": ("stick_mass",)}
+AGREES = {"verdict": VerdictKind.AGREEMENT, "effects": (), "accepted": ()}
+CONFIRMED = {"verdict": VerdictKind.EFFECT, "effects": ("stick_mass",), "accepted": ("stick_mass",)}
 UNCONFIRMED = CONFIRMED | {"held_out": 0}
 FATE = {"expected_received": 0.9, "received_q05": 0.85, "received_q95": 0.95}
 FATE |= {"expected_retained": 0.05, "retained_q05": 0.0, "retained_q95": 0.1}
@@ -129,7 +129,7 @@ def test_nothing_is_said_where_nothing_is_wrong(fine):
             "warning.compared_in_a_wrong_frame",
             {"faults": ("other.nc: turned",)},
         ),
-        ("criticised", {"verdict": Verdict.UNKNOWN}, "criticism.unexplained", {}),
+        ("criticised", {"verdict": VerdictKind.UNKNOWN}, "criticism.unexplained", {}),
         ("criticised", UNCONFIRMED, "criticism.effect_unconfirmed", {"effects": ("stick_mass",)}),
         ("poured", {"expected_spillage": 0.12}, "warning.much_spilled", {"share": 0.12}),
     ],
@@ -199,7 +199,7 @@ def test_a_misfit_that_was_not_criticised_is_told(fine):
 
 
 def test_pours_that_nothing_explains_are_told_beside_an_effect_of_the_stirs(fine):
-    unexplained = PourVerdict(Verdict.UNKNOWN, (), 0.003, (), 0, before=0.4, after=None)
+    unexplained = PourVerdict(VerdictKind.UNKNOWN, (), 0.003, (), 0, before=0.4, after=None)
     found = replace(fine.criticised, held_out=1, pours=unexplained, **CONFIRMED)
     (sentence,) = warned(replace(fine, criticised=found))
     assert sentence.key == "criticism.unexplained" and sentence.values["data"] == "pours"

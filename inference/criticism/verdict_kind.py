@@ -1,0 +1,29 @@
+"""What a criticism may conclude."""
+
+from enum import StrEnum
+
+
+class VerdictKind(StrEnum):
+    """The conclusion of a criticism, equal to its spelling."""
+
+    AGREEMENT = "none"
+    EFFECT = "effect"
+    TIE = "tie"
+    UNKNOWN = "unknown"
+
+    @property
+    def advice(self) -> str:
+        """What it means and what to do next."""
+        return _ADVICE[self]
+
+
+_ADVICE = {
+    VerdictKind.AGREEMENT: "No missing effect was detected. The SNR of an effect shows whether "
+    "these data could have revealed it.",
+    VerdictKind.EFFECT: "The named effect explains the difference. Use the extended model, and "
+    "confirm the effect on held-out data.",
+    VerdictKind.TIE: "Several effects explain the data equally well. Make the suggested experiment "
+    "and criticise again.",
+    VerdictKind.UNKNOWN: "Model and data differ and no known effect explains it. Look where they "
+    "differ, and add an extension that acts there.",
+}
