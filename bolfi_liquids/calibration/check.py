@@ -18,7 +18,7 @@ PREDICTIVE_DRAWS = 8
 THETA_STAR_REPLICATES = 4  # seeds at theta*, for the noise between seeds
 
 
-class Check(NamedTuple):
+class PosteriorCheck(NamedTuple):
     """Signals of the simulations that judge a calibration.
 
     `closest` of them judges the fit, not the closest of the search: among few of these none may be
@@ -33,7 +33,7 @@ class Check(NamedTuple):
 
 def check_of(
     fit: "Fit", stirring: Stirring, seed: int, keep: Keep, *, advance: Advance = silent
-) -> Check:
+) -> PosteriorCheck:
     """Simulations at draws of a fit's posterior, which it has seen, and new ones at theta*.
 
     Args:
@@ -56,7 +56,7 @@ def check_of(
     at_best = {name: np.full(THETA_STAR_REPLICATES, value) for name, value in fit.best.items()}
     seeds = simulation_seeds(seed, Phase.REPLICATES, THETA_STAR_REPLICATES)
     replicates = simulate_kept(stirring.simulate, at_best, seeds, keep, advance=advance)
-    return Check(
+    return PosteriorCheck(
         _closest(stirring, fit, good),
         fit.history.signals[good],
         replicates.signals,

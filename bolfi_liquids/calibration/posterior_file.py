@@ -18,7 +18,7 @@ import numpy as np
 
 from ..inputs.fields import PLANE_NAMES
 from ..inputs.strokes import stroke_numbers
-from .check import Check
+from .check import PosteriorCheck
 from .stir_simulator import Stirring
 
 if TYPE_CHECKING:
@@ -29,7 +29,9 @@ if TYPE_CHECKING:
 GRID_POINTS = 61  # of either half of an axis
 
 
-def results_tree(sampled: "DataTree", fit: "Fit", stirring: Stirring, check: Check) -> "DataTree":
+def results_tree(
+    sampled: "DataTree", fit: "Fit", stirring: Stirring, check: PosteriorCheck
+) -> "DataTree":
     """The engine's tree with the groups of this module."""
     from xarray import Dataset, DataTree
 

@@ -12,7 +12,7 @@ from pydantic import computed_field
 from ..inputs.frame import named_faults
 from ..models import stirring_error
 from ..run.summary import Number, Section
-from .check import Check
+from .check import PosteriorCheck
 from .model_error import ModelError
 from .noise import irreducible_rms, rms
 from .stir_simulator import Stirring
@@ -153,7 +153,7 @@ class CalibrationSummary(Section):
         tree: "DataTree",
         fit: "Fit",
         stirring: Stirring,
-        check: Check,
+        check: PosteriorCheck,
         error: ModelError | None,
         budget: int,
     ) -> Self:

@@ -38,8 +38,8 @@ from .sbc_file import SurrogateCheck, checked, write_results
 from .sbc_pipelines import (
     SAMPLING,
     Calibrate,
-    CameraNoise,
     FromBank,
+    SampleNoise,
 )
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ class SbcStudy:
             self.prior,
             self.settings.replicates[name],
             seed=self.settings.seed,
-            observe=CameraNoise(np.radians(self.settings.noise_deg)),
+            observe=SampleNoise(np.radians(self.settings.noise_deg)),
             executor=self.compute.executor,
             store=self.out / f"{name}.sqlite",
             identity=self.stirring.identity,

@@ -24,7 +24,7 @@ same quadrature."""
 
 
 @dataclass(frozen=True)
-class CameraNoise:
+class SampleNoise:
     """Independent Gaussian noise in every sample.
 
     Attributes:

@@ -63,7 +63,7 @@ LiquidOption = Annotated[
 
 
 @dataclass(frozen=True)
-class GivenPours:
+class GivenPourOptions:
     """Pours of the liquid that were made, and the cups."""
 
     pours: Annotated[
@@ -92,7 +92,7 @@ BaselineOption = Annotated[
 
 
 @dataclass(frozen=True)
-class CalibrationData(GivenPours):
+class CalibrationData(GivenPourOptions):
     """The same, and what the simulator's error is learned from."""
 
     baseline: BaselineOption = None
@@ -110,7 +110,7 @@ class CriticismData:
 
 
 @dataclass(frozen=True)
-class PourData(GivenPours):
+class PourData(GivenPourOptions):
     """The same, and pours that nothing is fitted to."""
 
     held_out_pours: Annotated[

@@ -23,7 +23,7 @@ from ..run.given_pours import keep_pours
 from ..run.run import Run, RunOrPath
 from .criticism_file import criticism_tree
 from .findings import Findings
-from .inputs import Given, Inputs, check_effects, open_inputs
+from .inputs import ComparedData, Inputs, check_effects, open_inputs
 from .pours import as_prior, pour_experiment
 from .proposals import pour_proposals, stir_proposals
 from .result import Criticism
@@ -86,7 +86,7 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         seed=seed,
     )
     check_effects(settings)
-    given = Given(
+    given = ComparedData(
         open_recordings(held_out, Argument("held_out")),
         open_recordings(baseline, Argument("baseline")),
         *(pours, held_out_pours, cups),

@@ -79,7 +79,7 @@ class Inputs:
         return json.loads(json.dumps(made_from))  # as it will be read
 
 
-class Given(NamedTuple):
+class ComparedData(NamedTuple):
     """Data beside the calibrated recordings; see `criticise`."""
 
     held_out: list[Recording]
@@ -89,7 +89,9 @@ class Given(NamedTuple):
     cups: "Cups | str | Path | None" = None
 
 
-def open_inputs(calibration: Calibration, settings: CriticismSettings, given: Given) -> Inputs:
+def open_inputs(
+    calibration: Calibration, settings: CriticismSettings, given: ComparedData
+) -> Inputs:
     """Read what is given as a path, and check all of it.
 
     Raises:

@@ -66,7 +66,7 @@ class PourVerdict(SourceVerdict):
 
 
 @dataclass(frozen=True)
-class Window:
+class DifferingWindow:
     """Part of a recording in which the base model and the data differ significantly.
 
     Attributes:
@@ -97,7 +97,7 @@ class Window:
 
 
 @dataclass(frozen=True)
-class Gap:
+class GapSummary:
     """RMS of recorded less expected inclination [deg], before and after an effect was added.
 
     After: by what was accepted, or else by the best of what is tied; None where nothing was tried
@@ -163,11 +163,11 @@ def held_out_count(source: "inference.criticism.Criticism") -> int:
     return max(map(len, source.gaps.values()), default=0)
 
 
-def significant_windows(source: "inference.criticism.Criticism") -> tuple[Window, ...]:
+def significant_windows(source: "inference.criticism.Criticism") -> tuple[DifferingWindow, ...]:
     """The windows in which the base model and the data differ, most significant first."""
     found = [window for window in source.before if window.p_value < FALSE_ALARM_RATE]
     ordered = sorted(found, key=lambda window: (window.p_value, -abs(window.z)))
-    return tuple(Window.of(window) for window in ordered)
+    return tuple(DifferingWindow.of(window) for window in ordered)
 
 
 def _rms(hypothesis: "inference.criticism.Hypothesis") -> float:

@@ -12,10 +12,10 @@ from ..inference.criticism.verdict_kind import VerdictKind
 from ..inputs.frame import named_faults
 from ..run.summary import Number, Section
 from .source_summary import (
-    Gap,
+    DifferingWindow,
+    GapSummary,
     PourVerdict,
     SourceVerdict,
-    Window,
     held_out_count,
     refuted_by_held_out,
     significant_windows,
@@ -32,7 +32,7 @@ GRAVEST_FIRST = (VerdictKind.EFFECT, VerdictKind.TIE, VerdictKind.UNKNOWN)
 
 
 @dataclass(frozen=True)
-class Suggestion:
+class SuggestedExperiment:
     """A further experiment.
 
     Attributes:
@@ -115,15 +115,15 @@ class CriticismSummary(Section):
     held_out: int
     reason: str
     p_value: Number
-    where: tuple[Window, ...]
+    where: tuple[DifferingWindow, ...]
     coefficient: Mapping[str, ParameterSummary]
     parameters: Mapping[str, ParameterSummary]
     best: Mapping[str, float]
     n_simulations: int
-    gap: Annotated[Gap, Field(alias="gap_deg")]
+    gap: Annotated[GapSummary, Field(alias="gap_deg")]
     stirs: SourceVerdict
     pours: PourVerdict | None
-    suggestions: tuple[Suggestion, ...]
+    suggestions: tuple[SuggestedExperiment, ...]
     untested: tuple[str, ...]
     baseline: int
     baseline_left_out: tuple[str, ...]
@@ -154,11 +154,11 @@ class CriticismSummary(Section):
             parameters={str(name): ParameterSummary.of(of) for name, of in posterior.items()},
             best=findings.best,
             n_simulations=made,
-            gap=Gap.of(findings.stirs),
+            gap=GapSummary.of(findings.stirs),
             stirs=SourceVerdict.of(findings.stirs),
             pours=None if findings.pours is None else PourVerdict.of(findings.pours),
             suggestions=tuple(
-                Suggestion(one.label, tuple(one.between), one.snr)
+                SuggestedExperiment(one.label, tuple(one.between), one.snr)
                 for source in sources
                 for one in source.suggestions
             ),

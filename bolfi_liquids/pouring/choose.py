@@ -205,7 +205,7 @@ def _learned(
     return learn_map(box, cups, poured)
 
 
-class Drawn(NamedTuple):
+class SplitDraws(NamedTuple):
     """Posterior draws, name -> (draws,); the two groups share none.
 
     Attributes:
@@ -217,7 +217,7 @@ class Drawn(NamedTuple):
     judge: dict[str, NDArray]
 
 
-def strata(calibration: Calibration, draws: int, seed: int) -> Drawn:
+def strata(calibration: Calibration, draws: int, seed: int) -> SplitDraws:
     """Distinct strata of the posterior, so that the draws that judge have chosen nothing.
 
     Raises:
@@ -237,7 +237,7 @@ def strata(calibration: Calibration, draws: int, seed: int) -> Drawn:
     def of(chosen: NDArray[np.bool_]) -> dict[str, NDArray]:
         return {name: values[chosen] for name, values in drawn.items()}
 
-    return Drawn(of(search), of(~search))
+    return SplitDraws(of(search), of(~search))
 
 
 class _Choice(NamedTuple):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..criticism.source_summary import Gap, PourVerdict, SourceVerdict, Window
+from ..criticism.source_summary import DifferingWindow, GapSummary, PourVerdict, SourceVerdict
 from ..criticism.summary import CriticismSummary
 from ..inference.criticism.verdict_kind import VerdictKind
 from ..wording import Sentence, sentence
@@ -140,7 +140,7 @@ def parameter_sentences(summary: CriticismSummary) -> list[Sentence]:
     ]
 
 
-def gap_sentences(gap: Gap, accepted: Sequence[str]) -> list[Sentence]:
+def gap_sentences(gap: GapSummary, accepted: Sequence[str]) -> list[Sentence]:
     """How far stirs and model are apart, before and after, fitted and held out."""
     known = {"noise": gap.noise, "usual": gap.usual}
     if gap.after is None:
@@ -160,7 +160,7 @@ def gap_sentences(gap: Gap, accepted: Sequence[str]) -> list[Sentence]:
     return [fitted, held_out]
 
 
-def where_sentence(where: Sequence[Window]) -> Sentence:
+def where_sentence(where: Sequence[DifferingWindow]) -> Sentence:
     """Where model and data differ significantly."""
     if not where:
         return sentence("criticism.nowhere")

@@ -13,7 +13,7 @@ from bolfi_liquids.inference.criticism.verdict_kind import VerdictKind
 
 import bolfi_liquids as bl
 from bolfi_liquids.calibration.summary import ParameterSummary
-from bolfi_liquids.criticism.source_summary import Gap, SourceVerdict, Window
+from bolfi_liquids.criticism.source_summary import DifferingWindow, GapSummary, SourceVerdict
 from bolfi_liquids.criticism.summary import CameraNoise, CriticismSummary
 from bolfi_liquids.inputs.cups import bundled_cups
 from bolfi_liquids.reporting.frames import Shown, frames_of
@@ -141,14 +141,16 @@ def criticism_summary():
         unsupported=(),
         reason="",
         where=(
-            Window(**stroke, recording=FILES[0], rms_deg=2.5, p_value=0.01),
-            Window(**nowhere, recording=FILES[1], speed="0 to 3 cm/s", rms_deg=1.5, p_value=0.02),
+            DifferingWindow(**stroke, recording=FILES[0], rms_deg=2.5, p_value=0.01),
+            DifferingWindow(
+                **nowhere, recording=FILES[1], speed="0 to 3 cm/s", rms_deg=1.5, p_value=0.02
+            ),
         ),
         coefficient={"camera_delay": spread(0.05)},
         parameters={"viscosity": spread(0.1), "camera_delay": spread(0.05)},
         best={"viscosity": 0.1, "camera_delay": 0.05},
         n_simulations=77,
-        gap=Gap(
+        gap=GapSummary(
             before=1.25,
             after=0.31,
             held_out_before=1.5,

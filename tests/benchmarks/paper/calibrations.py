@@ -20,7 +20,7 @@ from bolfi_liquids import models
 from bolfi_liquids.calibration.draws import pick_draws
 from bolfi_liquids.calibration.engine_fit import engine_options
 from bolfi_liquids.calibration.stir_simulator import Stirring
-from bolfi_liquids.checks.sbc_pipelines import SAMPLING, CameraNoise
+from bolfi_liquids.checks.sbc_pipelines import SAMPLING, SampleNoise
 from bolfi_liquids.inputs.prior import describe_prior
 from bolfi_liquids.inputs.settings import MIN_SIMULATIONS, PAPER_RULES
 from bolfi_liquids.progress import Simulate
@@ -33,7 +33,7 @@ from .truths import DENSITY
 
 DRAWS_EACH = 16  # of each posterior
 BATCH = 4  # simulations at the same time
-CAMERA_NOISE = CameraNoise(np.radians(0.1))
+CAMERA_NOISE = SampleNoise(np.radians(0.1))
 PARAMETER_NAMES = ("viscosity", "cohesion")
 
 

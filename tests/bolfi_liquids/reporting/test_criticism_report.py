@@ -12,13 +12,13 @@ from bolfi_liquids.calibration.summary import ParameterSummary
 from bolfi_liquids.cli.tables import print_criticism
 from bolfi_liquids.criticism.effect_status import EffectStatus
 from bolfi_liquids.criticism.source_summary import PourVerdict, SourceVerdict
-from bolfi_liquids.criticism.summary import Suggestion
+from bolfi_liquids.criticism.summary import SuggestedExperiment
 from bolfi_liquids.reporting import criticism_sentences as sentences
 from bolfi_liquids.reporting.criticism_chapter import criticism_chapter
 
 EFFECTS = ("camera_delay", "gripper_scale", "stick_mass")
-CIRCLES = Suggestion("four circles", EFFECTS[:2], 1.0)
-STAR = Suggestion("the star", EFFECTS[:2], 5.5)
+CIRCLES = SuggestedExperiment("four circles", EFFECTS[:2], 1.0)
+STAR = SuggestedExperiment("the star", EFFECTS[:2], 5.5)
 TIED = {
     "verdict": VerdictKind.TIE,
     "effects": EFFECTS[:2],
