@@ -13,7 +13,7 @@ def bad_fit(summary: CalibrationSummary) -> Sentence | None:
     """What is likely wrong with a fit; None where it is as close as can be asked for.
 
     Args:
-        summary: Of the calibration that counts, `criticism.result.latest_calibration(run).summary`.
+        summary: Of the calibration that counts, with what a criticism accepted.
     """
     if summary.fit_status is FitStatus.ACCEPTABLE:
         return None

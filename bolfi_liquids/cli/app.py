@@ -187,7 +187,6 @@ def pour(
     from ..inputs.cups import cups_of
     from ..pouring.choose import choose_pour
     from ..reporting.warnings import Results
-    from ..run.run import Run
 
     # refused before anything of the run is read
     PourSettings(budget=options.budget, iterations=options.iterations, risk=options.risk)
@@ -204,7 +203,7 @@ def pour(
             **where,
         )
     print_pour(chosen)
-    print_warnings(Results.of(Run.open(run)))
+    print_warnings(Results.of(chosen.run))
     print_next(run, "report")
 
 

@@ -185,21 +185,13 @@ class Criticism:
         return pour_residual_plot(self.tree.children["pours"], given_or_shown(axes)).grid
 
 
-def latest_calibration(given: RunOrPath) -> Calibration:
+def calibration_to_pour(run: Run) -> Calibration:
     """The calibration of a run, extended by what a criticism accepted.
-
-    Args:
-        given: A calibration, which is returned as it is; a criticism; or a run.
 
     Raises:
         InputError: The run has a criticism that is damaged or of another posterior: what it
             accepted is part of what is known.
     """
-    if isinstance(given, Calibration):
-        return given
-    if isinstance(given, Criticism):
-        return given.calibration
-    run = given if isinstance(given, Run) else Run.open(given)
     if run.why_not("criticise"):
         run.required("criticise")
     found = Criticism.of(run)

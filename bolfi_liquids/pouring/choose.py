@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..calibration.bad_fit import refuse_bad_fit
 from ..calibration.result import Calibration
-from ..criticism.result import Criticism, latest_calibration
+from ..criticism.result import calibration_to_pour
 from ..errors import Argument, InputError
 from ..inputs.cups import cups_of
 from ..inputs.pour_table import Pours, PourTable, check_scene, table_of
@@ -94,8 +94,9 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     if table is not None:
         check_scene(table, cups)
     with Run.entered(calibration) as run:
-        opened = isinstance(calibration, Calibration | Criticism)
-        latest = latest_calibration(calibration if opened else run)
+        given_one = getattr(calibration, "calibration", calibration)  # of a criticism
+        opened = isinstance(given_one, Calibration)
+        latest = given_one if opened else calibration_to_pour(run)
         if not force:
             refuse_bad_fit(latest.summary, run.path)
         if table is not None:
@@ -299,4 +300,4 @@ def _described(
         fit_status=fit_status,
         **more,
     )
-    return Pour(calibration.path, chosen, plug_in, tree, summary)
+    return Pour(calibration.run, chosen, plug_in, tree, summary)

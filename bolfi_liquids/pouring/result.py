@@ -79,14 +79,14 @@ class Pour:
     """The chosen pour, and beside it the plug-in: the best one if theta* were the truth.
 
     Attributes:
-        path: The RUN directory.
+        run: Whose pour it is.
         chosen: Found over the posterior draws.
         plug_in: Found at theta* alone, judged over the same draws as `chosen`.
         tree: pour.nc; its groups are listed in `pouring.pour_file`.
         summary: The section "pour" of summary.json.
     """
 
-    path: Path
+    run: Run
     chosen: Judged
     plug_in: Judged
     tree: "DataTree"
@@ -107,19 +107,24 @@ class Pour:
             InputError: There is none, or it was chosen over another posterior.
         """
         opened = Run.open(run)
-        return cls.made(opened.path, opened.required("pour"))
+        return cls.made(opened, opened.required("pour"))
 
     @classmethod
     def of(cls, run: Run) -> "Pour | None":
         """The pour of a run; None without a current one."""
         tree = run.result("pour")
-        return None if tree is None else cls.made(run.path, tree)
+        return None if tree is None else cls.made(run, tree)
 
     @classmethod
-    def made(cls, path: Path, tree: "DataTree") -> "Pour":
-        """The pour of a RUN directory from its pour.nc."""
+    def made(cls, run: Run, tree: "DataTree") -> "Pour":
+        """The pour of a run from its pour.nc."""
         summary = PourSummary.from_json(json.loads(tree.attrs["summary"]))
-        return cls(path, judged(tree, "chosen"), judged(tree, "plug_in"), tree, summary)
+        return cls(run, judged(tree, "chosen"), judged(tree, "plug_in"), tree, summary)
+
+    @property
+    def path(self) -> Path:
+        """The RUN directory."""
+        return self.run.path
 
     def plot_map(self, ax: "Axes | None" = None) -> "Axes":
         """Expected spillage over angular velocity and distance, with both actions.

@@ -81,7 +81,7 @@ def chosen_pour(run: Run) -> ChosenPour:
         InputError: The run has chosen none over its latest posterior and given pours, or one that
             lies outside of what its cups allow.
     """
-    pour = Pour.made(run.path, run.required("pour"))
+    pour = Pour.made(run, run.required("pour"))
     results = Results.of(run)
     chosen, cups = pour.chosen, kept_cups(json.loads(pour.tree.attrs["cups"]))
     _check_ranges(run, chosen, cups)

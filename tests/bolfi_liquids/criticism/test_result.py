@@ -10,7 +10,7 @@ import pytest
 import bolfi_liquids as bl
 from bolfi_liquids.calibration.bad_fit import bad_fit
 from bolfi_liquids.criticism.criticise import _learned_from
-from bolfi_liquids.criticism.result import latest_calibration
+from bolfi_liquids.criticism.result import calibration_to_pour
 from bolfi_liquids.drawing import new_figure
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.inputs.settings import CriticismSettings
@@ -31,6 +31,10 @@ def criticised(run, keep_criticism):
 @pytest.fixture
 def extended(criticised):
     return bl.Criticism.open(criticised).calibration
+
+
+def latest_of(path):
+    return calibration_to_pour(Run.open(path))
 
 
 def test_an_extended_calibration_shows_its_own_parameters(extended, calibration, criticised):
@@ -57,11 +61,11 @@ BAD = {"fit_rms_deg": 2.0, "noise_deg": 0.2}
 def test_an_effect_that_was_accepted_is_judged_by_the_fit_that_it_leaves(criticised, with_numbers):
     with_numbers(criticised, **BAD)
     assert bad_fit(bl.Calibration.open(criticised).summary) is not None
-    assert bad_fit(latest_calibration(criticised).summary) is None
+    assert bad_fit(calibration_to_pour(Run.open(criticised)).summary) is None
     gap = bl.Criticism.open(criticised).summary.to_json()["gap_deg"]
     for change in ({"rms_after": 2.0}, {"rms_after": None}):
         with_numbers(criticised, "criticise", gap_deg=gap | change)
-        assert bad_fit(latest_calibration(criticised).summary) is not None
+        assert bad_fit(calibration_to_pour(Run.open(criticised)).summary) is not None
 
 
 def test_an_effect_of_pours_alone_mends_no_stir(criticised, with_numbers):
@@ -69,7 +73,7 @@ def test_an_effect_of_pours_alone_mends_no_stir(criticised, with_numbers):
     stirs = bl.Criticism.open(criticised).summary.to_json()["stirs"]
     tied = stirs | {"verdict": "tie", "effects": ["stick_mass", "camera_tilt"]}
     with_numbers(criticised, "criticise", stirs=tied)
-    assert bad_fit(latest_calibration(criticised).summary) is not None
+    assert bad_fit(calibration_to_pour(Run.open(criticised)).summary) is not None
 
 
 def test_plots_of_the_base_model_are_refused(extended, criticised):
@@ -99,14 +103,14 @@ def test_a_criticism_of_another_posterior_does_not_count(criticised):
     tree = run.required("criticise")
     summary = json.loads(tree.attrs["summary"])
     run.keep("criticise", tree, {"after": "another"}, summary)
-    for read in (latest_calibration, bl.Criticism.open, bl.choose_pour):
+    for read in (latest_of, bl.Criticism.open, bl.choose_pour):
         with pytest.raises(InputError, match="another posterior.*bolfi-liquids criticise"):
             read(criticised)
 
 
 def test_a_damaged_criticism_does_not_count(criticised):
     (criticised / "criticism.nc").write_bytes(b"cut off")
-    for read in (latest_calibration, bl.Criticism.open, bl.choose_pour):
+    for read in (latest_of, bl.Criticism.open, bl.choose_pour):
         with pytest.raises(InputError, match=r"criticism\.nc is damaged"):
             read(criticised)
 

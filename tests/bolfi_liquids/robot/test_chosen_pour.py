@@ -14,7 +14,7 @@ import bolfi_liquids as bl
 from bolfi_liquids.cli.app import app
 from bolfi_liquids.cli.printed import print_next_pour
 from bolfi_liquids.cli.record import next_commands
-from bolfi_liquids.criticism.result import latest_calibration
+from bolfi_liquids.criticism.result import calibration_to_pour
 from bolfi_liquids.errors import InputError
 from bolfi_liquids.reporting.warnings import Results, warnings_of
 from bolfi_liquids.robot.chosen_pour import BAD_FIT, chosen_pour
@@ -145,10 +145,10 @@ def test_an_emulated_pour_tells_the_plan_and_that_the_fit_is_bad(poured_run, wit
 
 
 def test_what_follows_a_bad_fit_is_no_pour(poured_run, with_numbers, capsys):
-    print_next_pour(latest_calibration(poured_run), "criticise")
+    print_next_pour(calibration_to_pour(Run.open(poured_run)), "criticise")
     assert "bolfi-liquids pour" in capsys.readouterr().out
     with_numbers(poured_run, **BAD["calibrate"])
-    print_next_pour(latest_calibration(poured_run), "criticise")
+    print_next_pour(calibration_to_pour(Run.open(poured_run)), "criticise")
     assert "bolfi-liquids pour" not in capsys.readouterr().out
 
 
