@@ -67,6 +67,10 @@ class OneThread:
         self._lock.release()
 
 
+NO_TAICHI = (
+    "the fluid needs Taichi, which has no package for Python 3.14 and later; use Python 3.12 or "
+    "3.13, or the inference alone, which works without it"
+)
 APART = (
     "Taichi has one state in a process: simulate in another process than code that calls ti.init, "
     "such as one of a ProcessPoolExecutor with the start method 'spawn'"
@@ -168,8 +172,12 @@ def start() -> None:
 
     Raises:
         ForeignTaichi: other code has started it, whose fields this would delete.
+        ImportError: it is not installed.
     """
-    import taichi as ti
+    try:
+        import taichi as ti
+    except ModuleNotFoundError as missing:
+        raise ImportError(NO_TAICHI) from missing
     from taichi.lang.impl import default_cfg
 
     if _taichi().prog is not None:
