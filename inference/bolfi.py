@@ -36,7 +36,7 @@ from .sobol import sobol, start_size
 from .surrogates.base import Acquisition, Learnable, Measured
 from .surrogates.families import Family, checked_observed, resolve
 from .surrogates.outliers import sane
-from .surrogates.success import Runs
+from .surrogates.success import RunOutcomes
 from .surrogates.warnings import complain
 from .types import Theta
 
@@ -231,10 +231,10 @@ class Bolfi:
         history = self._state.history
         return history.distinct & sane(history.discrepancy)
 
-    def _runs(self) -> Runs:
+    def _runs(self) -> RunOutcomes:
         """Where runs succeeded; those that blew up did not."""
         history = self._state.history
-        return Runs(history.u, history.succeeded & sane(history.discrepancy))
+        return RunOutcomes(history.u, history.succeeded & sane(history.discrepancy))
 
     def _known(self) -> Learnable:
         history = self._state.history

@@ -35,7 +35,7 @@ class Task(NamedTuple):
     about: str = ""
 
 
-class Emulation(NamedTuple):
+class EmulatedRobot(NamedTuple):
     """What to use in place of a robot.
 
     Attributes:
@@ -75,7 +75,7 @@ def check_one(ask: Ask | None, emulate: object, where: str) -> None:
 
 @contextmanager
 def armed_session(
-    task: Task, *, ask: Ask | None = None, emulation: Emulation | None = None
+    task: Task, *, ask: Ask | None = None, emulation: EmulatedRobot | None = None
 ) -> "Iterator[Session]":
     """Ask a person, or start an emulator; then a session that may move the arm.
 

@@ -19,7 +19,7 @@ from ..surrogates.output_vectors import Output
 from ..surrogates.signal import SignalSurrogate
 from ..surrogates.signal_likelihood import SignalState, eliminate, scores
 from .measurement_noise import Noise, samples
-from .prior_boxes import LATER_HALF_WIDTH, Box, around, intersection
+from .prior_boxes import LATER_HALF_WIDTH, PriorBox, around, intersection
 from .run_noise import own_errors, resized, smooth_covariance
 from .run_table import Runs
 from .usual_residual import usual_in
@@ -49,7 +49,7 @@ class Hypothesis:
 
     names: tuple[str, ...]
     fit: Fit
-    within: Box
+    within: PriorBox
     u: np.ndarray
     difference: np.ndarray
     latent: np.ndarray
@@ -136,7 +136,7 @@ def hypothesise(
     runs: Runs,
     observed: np.ndarray,
     noise: Noise,
-    within: Box,
+    within: PriorBox,
 ) -> Hypothesis:
     """Fit the model in which the named effects act to what was observed.
 
@@ -189,7 +189,7 @@ def hypothesise(
 
 
 def _nearest(
-    surrogate: SignalSurrogate, errors: np.ndarray, within: Box
+    surrogate: SignalSurrogate, errors: np.ndarray, within: PriorBox
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where in a box the expected output is nearest to what was observed, prior quantiles [d], and
     the covariance [m, m] of the simulator's own noise, of which there are draws [n, m]."""

@@ -15,7 +15,7 @@ from .model_extension import extended
 from .prior_boxes import (
     FIRST_HALF_WIDTH,
     LATER_HALF_WIDTH,
-    Box,
+    PriorBox,
     around,
     everywhere,
     fill,
@@ -83,12 +83,12 @@ class Study(NamedTuple):
     def seed(self) -> int:
         return self.laboratory.seed
 
-    def hypothesis(self, names: tuple[str, ...], runs: Runs, within: Box) -> Hypothesis:
+    def hypothesis(self, names: tuple[str, ...], runs: Runs, within: PriorBox) -> Hypothesis:
         """The model in which the named effects act, fitted where it was simulated."""
         prior = extended(self.laboratory.prior, self.laboratory.extensions, names)
         return hypothesise(names, prior, runs, self.observed, self.noise, within)
 
-    def points(self, box: Box, names: tuple[str, ...], count: int) -> dict[str, np.ndarray]:
+    def points(self, box: PriorBox, names: tuple[str, ...], count: int) -> dict[str, np.ndarray]:
         """Parameters all over a box, name -> [count]."""
         prior = extended(self.laboratory.prior, self.laboratory.extensions, names)
         return fill(box, prior, self.seed, count)
@@ -115,11 +115,11 @@ class Base(NamedTuple):
     null: np.ndarray  # [m, n], residuals of a right model
     signatures: dict[str, Signature]
     singles: dict[str, Hypothesis]
-    box: Box  # in which effects were simulated
+    box: PriorBox  # in which effects were simulated
     runs: Runs
 
 
-def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Box]:
+def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, PriorBox]:
     """Fit the base model near its optimum. Return the fit, its runs and the box of the first."""
     whole, laboratory = everywhere(len(study.laboratory.prior)), study.laboratory
     start = study.points(whole, (), study.plan.start)
@@ -136,7 +136,7 @@ def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Box]
     return fitted, runs, first
 
 
-def settled(gained: float, fitted: Hypothesis, box: Box) -> bool:
+def settled(gained: float, fitted: Hypothesis, box: PriorBox) -> bool:
     """Whether the runs in a box left a fit as good as it was, well known and inside of them."""
     doubt = np.trace(fitted.whiten(fitted.whiten(fitted.latent)))
     return abs(gained) <= TIE_MARGIN and doubt <= MAX_DOUBT and box.encloses(fitted.u)
@@ -245,7 +245,7 @@ class Search:
 
     def visit(
         self, phase: str, candidates: Sequence[Candidate], count: int
-    ) -> dict[tuple[str, ...], Box]:
+    ) -> dict[tuple[str, ...], PriorBox]:
         """Simulate each of them near its optimum, all in one call, and fit it again.
 
         Returns:
@@ -308,7 +308,7 @@ class Search:
         study, base, box = self.study, self.base, self.base.box
         for name in names:
             within = self.found[(name,)].hypothesis.within
-            box = hull(box, Box(*(end[: len(box.low)] for end in within)))
+            box = hull(box, PriorBox(*(end[: len(box.low)] for end in within)))
         hypothesis = study.hypothesis(names, self.runs, with_whole_priors(box, len(names)))
         return study.candidate(base, hypothesis)
 

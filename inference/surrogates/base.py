@@ -8,7 +8,7 @@ import numpy as np
 from ..gp.process import GP
 from ..prior import Prior
 from ..types import LogLikelihood, LogSecondMoment, Theta
-from .success import Runs
+from .success import RunOutcomes
 
 
 class Learnable(NamedTuple):
@@ -18,7 +18,7 @@ class Learnable(NamedTuple):
     features: np.ndarray  # [n, m]
     discrepancy: np.ndarray  # [n]
     normal: np.ndarray | None  # bool [d], see `Prior.normal`
-    runs: Runs  # all, failed ones too
+    runs: RunOutcomes  # all, failed ones too
 
 
 class Measured(NamedTuple):

@@ -43,7 +43,7 @@ LOW = 3.0  # sds of a new discrepancy by which a threshold lies too low
 TRANSFORM_GROWTH = 1.3  # the transform is chosen anew when data have grown by this factor
 
 
-class Scale(NamedTuple):
+class DiscrepancyScale(NamedTuple):
     """From the discrepancy to the process's targets: (g(Delta) - location) / spread."""
 
     transform: Transform
@@ -75,7 +75,7 @@ class DiscrepancySurrogate:
     """
 
     gp: GP
-    scale: Scale
+    scale: DiscrepancyScale
     discrepancy: np.ndarray
     threshold: float
     learned_at: int
@@ -279,7 +279,7 @@ def with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> Discrepanc
     return replace(learned, threshold=threshold, width=0.0, noisy=False)
 
 
-def _standardise(transform: Transform, values: np.ndarray) -> Scale:
+def _standardise(transform: Transform, values: np.ndarray) -> DiscrepancyScale:
     transformed = transform(values)
     size = float(np.abs(transformed).max())
     with np.errstate(over="ignore"):
@@ -287,10 +287,12 @@ def _standardise(transform: Transform, values: np.ndarray) -> Scale:
     if not np.isfinite(spread):  # the squares of large numbers overflow
         spread = size * float((transformed / size).std())
     # all equal: nothing to standardise
-    return Scale(transform, float(transformed.mean()), spread if spread > rounding else 1.0)
+    return DiscrepancyScale(
+        transform, float(transformed.mean()), spread if spread > rounding else 1.0
+    )
 
 
-def _score(gp: GP, scale: Scale, values: np.ndarray) -> float:
+def _score(gp: GP, scale: DiscrepancyScale, values: np.ndarray) -> float:
     """Leave-one-out log predictive density of the discrepancy under the scale, summed over the
     better half of the runs: with a wide prior the others only tell that they are bad."""
     mean, variance = (moment[0] for moment in leave_one_out(gp))

@@ -13,11 +13,11 @@ from ..simulations.failures import not_finite
 from ..types import Discrepancy
 from .base import Learnable, Measured, Surrogate
 from .discrepancy import DiscrepancySurrogate, learn, with_threshold
-from .emulator import PREDICTED_SHARE, Emulator, Limits, emulate, goes_on, resized
-from .given_noise import Covariance, Noise, check_noise, given_noise
+from .emulator import PREDICTED_SHARE, Emulator, EmulatorLimits, emulate, goes_on, resized
+from .given_noise import Covariance, NoiseModel, check_noise, given_noise
 from .log_likelihood import LogLikelihoodFamily, LogLikelihoodLearner
 from .noise.by_mean import ByMean, SdOfMean, law_of
-from .noise.scales import Plain, Scale, comparable
+from .noise.scales import OutputScale, Plain, comparable
 from .output_vectors import Output, Summary, describe, infinities, summarise
 from .signal import MIN_FREEDOM, SignalSurrogate, observe
 from .squared_difference import evaluate, failed_on, independent, numbers, squared_difference
@@ -190,7 +190,7 @@ class SignalFamily:
         distance = self.discrepancy or partial(_of_summaries, self.summary)
         return SignalLearner(self, output, distance, observed, values, self._scale(output, values))
 
-    def _scale(self, output: Output, values: np.ndarray) -> Scale:
+    def _scale(self, output: Output, values: np.ndarray) -> OutputScale:
         """On which outputs are emulated, `values` [m] being observed."""
         law = law_of(self.noise)
         if law is not None:
@@ -208,7 +208,7 @@ class SignalLearner:
     distance: Discrepancy
     observed: np.ndarray
     values: np.ndarray
-    scale: Scale
+    scale: OutputScale
 
     @property
     def features(self) -> int:
@@ -260,7 +260,7 @@ class SignalLearner:
         def compared(at: np.ndarray | None) -> SignalSurrogate:
             """With what was observed, its noise being right around the features `at` [m]."""
             seen, given = scale.seen(at)
-            noise = Noise(given, self.family.misfit)
+            noise = NoiseModel(given, self.family.misfit)
             found = observe(emulator, self.output, seen, noise, previous)
             return replace(found, success=success, scale=scale)
 
@@ -269,17 +269,17 @@ class SignalLearner:
             found = compared(found.best_features)
         return found
 
-    def _fitting(self, u: np.ndarray, values: np.ndarray) -> Scale:
+    def _fitting(self, u: np.ndarray, values: np.ndarray) -> OutputScale:
         """The scale for runs of values [n, m] at u [n, d]."""
         if not (self.family.varying_noise and isinstance(self.scale, Plain)):
             return self.scale
         return self.scale.fitting(u, values, self.output.layout.channel)
 
     def _emulator(
-        self, known: Learnable, scale: Scale, previous: SignalSurrogate | None
+        self, known: Learnable, scale: OutputScale, previous: SignalSurrogate | None
     ) -> Emulator:
         left = LEFT_OF_NOISE if isinstance(scale, ByMean) else np.inf
-        limits = Limits(self.family.components, self.family.predicted, left)
+        limits = EmulatorLimits(self.family.components, self.family.predicted, left)
         features, units = scale.of(known.features), comparable(scale, self.output)
         old = None if previous is None else previous.emulator
         found = emulate(known.u, features, units, limits, old, known.normal)

@@ -41,7 +41,7 @@ class GivenNoise(NamedTuple):
         )
 
 
-class Noise(NamedTuple):
+class NoiseModel(NamedTuple):
     """What is believed of the noise between the simulator and the data.
 
     Attributes:

@@ -41,7 +41,7 @@ MAX_SD = 1.5  # of a log likelihood that is known, in nats
 MAX_UNCERTAIN_SHARE = 0.2  # of what may be the posterior, from which a fit warns
 
 
-class Scale(NamedTuple):
+class LogLikelihoodScale(NamedTuple):
     """From log likelihoods to the process's targets: (compressed depth - location) / spread.
 
     A depth below the top, in nats, is itself down to `linear`; beyond it grows as its logarithm.
@@ -86,7 +86,7 @@ class LevelState(NamedTuple):
     """
 
     gp: GP
-    scale: Scale
+    scale: LogLikelihoodScale
     success: GP | None = None  # see `success.learn_success`
     doubt: np.ndarray = np.ones(())  # the part of the latent variance that counts against a place
     optimism: np.ndarray = np.zeros(())
@@ -297,20 +297,20 @@ def learn(
     return LogLikelihoodSurrogate(state, values, learned_at)
 
 
-def _scales(values: np.ndarray) -> list[Scale]:
+def _scales(values: np.ndarray) -> list[LogLikelihoodScale]:
     """Those that differ for these log likelihoods."""
     depth, found = values.max() - values, []
     for linear in LINEAR:
         heights = compressed(depth, linear)
         top, location = np.asarray(values.max()), np.asarray(heights.mean())
         spread = np.asarray(heights.std() or 1.0)
-        found.append(Scale(top, np.asarray(linear), location, spread))
+        found.append(LogLikelihoodScale(top, np.asarray(linear), location, spread))
         if depth.max() < linear:
             break
     return found
 
 
-def _score(gp: GP, scale: Scale, values: np.ndarray) -> float:
+def _score(gp: GP, scale: LogLikelihoodScale, values: np.ndarray) -> float:
     """Leave-one-out log predictive density of the log likelihoods that count, or of the best
     quarter, in nats."""
     mean, variance = (moment[0] for moment in leave_one_out(gp))
@@ -320,7 +320,11 @@ def _score(gp: GP, scale: Scale, values: np.ndarray) -> float:
 
 
 def _data(
-    u: np.ndarray, values: np.ndarray, sd: np.ndarray, scale: Scale, normal: np.ndarray | None
+    u: np.ndarray,
+    values: np.ndarray,
+    sd: np.ndarray,
+    scale: LogLikelihoodScale,
+    normal: np.ndarray | None,
 ) -> Data:
     """Targets of the process; where some sds are known, its noise varies as they do."""
     usual = np.nanmedian(sd) if np.isfinite(sd).any() else 0.0
