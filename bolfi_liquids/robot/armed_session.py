@@ -59,7 +59,7 @@ def hidden_liquid(emulate: "HiddenLiquid | bool") -> "HiddenLiquid | None":
     return emulate
 
 
-def check_one(ask: Ask | None, emulate: object, where: str) -> None:
+def check_consent(ask: Ask | None, emulate: object, where: str) -> None:
     """Refuse a motion that nobody is asked about, or that is both real and emulated.
 
     Raises:
@@ -91,7 +91,7 @@ def armed_session(
     from ..hardware import Session, SessionSetup, confirm, confirm_emulated, webcams
     from ..hardware.session.confirmation import describe
 
-    check_one(ask, emulation, "armed_session")
+    check_consent(ask, emulation, "armed_session")
     text = f"{task.about}\n{describe(task.paths, task.rig, task.tool)}".lstrip()
     with ExitStack() as stack:
         if emulation is not None:

@@ -15,7 +15,7 @@ from .armed_session import (
     EmulatedRobot,
     Task,
     armed_session,
-    check_one,
+    check_consent,
 )
 from .chosen_pour import BAD_FIT, ChosenPour, chosen_pour
 from .live_view import SessionView
@@ -120,7 +120,7 @@ def execute_pour(
         MotionRejected: The motion breaks one of the rig's limits.
         SessionStopped: The arm was stopped.
     """
-    check_one(ask, emulate, "execute_pour")
+    check_consent(ask, emulate, "execute_pour")
     rig = rig_of(rig)
     with Run.entered(run) as opened:
         plan = plan_pour(opened, rig)

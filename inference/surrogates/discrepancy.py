@@ -11,14 +11,14 @@ from ..gp.optimise import minimise_in_box
 from ..gp.process import (
     GP,
     Data,
-    believe,
     condition,
+    fantasize,
     leave_one_out,
     predict,
     predict_points,
 )
 from ..types import LogLikelihood, LogSecondMoment
-from .outliers import sane
+from .outliers import is_outlier
 from .threshold import (
     Matched,
     Threshold,
@@ -150,9 +150,9 @@ class DiscrepancySurrogate:
         return minimise_in_box(surely, self.gp.data.u.shape[1])
 
     @in_float64
-    def believe(self, u: np.ndarray) -> "DiscrepancySurrogate":
+    def fantasize(self, u: np.ndarray) -> "DiscrepancySurrogate":
         """Condition on the predicted means at u [n, d], for points still being simulated."""
-        return replace(self, gp=believe(self.gp, u)) if len(u) else self
+        return replace(self, gp=fantasize(self.gp, u)) if len(u) else self
 
     def constants(self) -> dict[str, np.ndarray]:
         """What a reader of the posterior must know of the likelihood."""
@@ -222,7 +222,7 @@ def learn(
     Raises:
         ValueError: bad transform.
     """
-    values = np.minimum(discrepancy, discrepancy[sane(discrepancy)].max())
+    values = np.minimum(discrepancy, discrepancy[~is_outlier(discrepancy)].max())
     n = len(u)
     with np.errstate(divide="ignore", invalid="ignore"):  # where the transform is undefined
         old = previous is not None and np.isfinite(previous.scale(values)).all()

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..arguments import check_callable, check_flag, checked_array, checked_integer, checked_number
 from ..simulations.failures import not_finite
 from ..types import Discrepancy
-from .base import Learnable, Measured, Surrogate
+from .base import Measured, Surrogate, TrainingData
 from .discrepancy import DiscrepancySurrogate, learn, with_threshold
 from .emulator import PREDICTED_SHARE, Emulator, EmulatorLimits, emulate, goes_on, resized
 from .given_noise import Covariance, NoiseModel, check_noise, given_noise
@@ -94,32 +94,32 @@ class DiscrepancyLearner:
         return Measured(features, *evaluate(self.distance, self.observed, signals))
 
     def learn(
-        self, known: Learnable, previous: DiscrepancySurrogate | None
+        self, known: TrainingData, previous: DiscrepancySurrogate | None
     ) -> DiscrepancySurrogate:
         """To search with: errors count as independent, lest a poor start leave it undecided."""
         return self._learn(known, previous, self._rule(known, numbers))
 
     def _learn(
-        self, known: Learnable, previous: DiscrepancySurrogate | None, rule: Threshold
+        self, known: TrainingData, previous: DiscrepancySurrogate | None, rule: Threshold
     ) -> DiscrepancySurrogate:
         transform = self.family.transform
         learned = learn(known.u, known.discrepancy, transform, previous, known.normal)
         learned = replace(learned, success=learn_success(known.runs, known.normal))
         return learned if rule is None else with_threshold(learned, rule)
 
-    def _rule(self, known: Learnable, number: Callable[..., float]) -> Threshold:
+    def _rule(self, known: TrainingData, number: Callable[..., float]) -> Threshold:
         """The threshold that was given, or the one that fits the closest run's residual."""
         residual = self._residual(known)
         if self.family.threshold is not None or numbers(residual) - known.u.shape[1] < MIN_FREEDOM:
             return self.family.threshold
         return Matched(number(residual))
 
-    def _residual(self, known: Learnable) -> np.ndarray:
+    def _residual(self, known: TrainingData) -> np.ndarray:
         """By which the closest run misses what was observed, NaN where nothing can be said."""
         closest = known.features[np.argmin(known.discrepancy)]
         return closest.reshape(self.observed.shape) - self.observed
 
-    def finish(self, known: Learnable) -> Surrogate:
+    def finish(self, known: TrainingData) -> Surrogate:
         """The surrogate on which a fit rests."""
         rule = self._rule(known, independent)
         learned = self._learn(known, None, rule)
@@ -249,7 +249,7 @@ class SignalLearner:
             "" if np.isfinite(values).all() else not_finite(f"summary returns {infinities(values)}")
         )
 
-    def learn(self, known: Learnable, previous: SignalSurrogate | None) -> SignalSurrogate:
+    def learn(self, known: TrainingData, previous: SignalSurrogate | None) -> SignalSurrogate:
         u, values = known.u, known.features
         if previous is not None and not goes_on(previous.emulator, previous.scale.of(values)):
             previous = None
@@ -276,7 +276,7 @@ class SignalLearner:
         return self.scale.fitting(u, values, self.output.layout.channel)
 
     def _emulator(
-        self, known: Learnable, scale: OutputScale, previous: SignalSurrogate | None
+        self, known: TrainingData, scale: OutputScale, previous: SignalSurrogate | None
     ) -> Emulator:
         left = LEFT_OF_NOISE if isinstance(scale, ByMean) else np.inf
         limits = EmulatorLimits(self.family.components, self.family.predicted, left)
@@ -285,7 +285,7 @@ class SignalLearner:
         found = emulate(known.u, features, units, limits, old, known.normal)
         return found if old or not self.family.varying_noise else resized(found, units)
 
-    def finish(self, known: Learnable) -> Surrogate:
+    def finish(self, known: TrainingData) -> Surrogate:
         """The surrogate on which a fit rests."""
         return self.learn(known, None)
 

@@ -42,7 +42,7 @@ class GivenNoise(NamedTuple):
 
 
 class NoiseModel(NamedTuple):
-    """What is believed of the noise between the simulator and the data.
+    """What is known of the noise between the simulator and the data.
 
     Attributes:
         given: The measurement noise; None where it is unknown.

@@ -14,8 +14,8 @@ from ..gp.optimise import minimise_in_box
 from ..gp.process import (
     GP,
     Data,
-    believe,
     condition,
+    fantasize,
     leave_one_out,
     padded,
     padded_rows,
@@ -26,7 +26,7 @@ from ..sampling.importance import explore
 from ..sampling.target import Target
 from ..simulations.failures import impossible, incomparable, not_finite
 from ..types import LogLikelihood, LogSecondMoment
-from .base import Learnable, Measured
+from .base import Measured, TrainingData
 from .success import learn_success, log_success, padded_success
 from .warnings import EQUAL, UNCERTAIN, complaints
 
@@ -194,13 +194,13 @@ class LogLikelihoodSurrogate:
         return minimise_in_box(surely, self.gp.data.u.shape[1])
 
     @in_float64
-    def believe(self, u: np.ndarray) -> "LogLikelihoodSurrogate":
+    def fantasize(self, u: np.ndarray) -> "LogLikelihoodSurrogate":
         """Condition on the predicted means at u [n, d], for points still being simulated."""
         if not len(u):
             return self
         noise = self.gp.data.spread
         usual = None if noise is None else np.full(len(u), np.median(noise))
-        return replace(self, state=self.state._replace(gp=believe(self.gp, u, usual)))
+        return replace(self, state=self.state._replace(gp=fantasize(self.gp, u, usual)))
 
     @in_float64
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -370,7 +370,7 @@ class LogLikelihoodLearner:
         return Measured(found[:, 1:], -found[:, 0], errors)
 
     def learn(
-        self, known: Learnable, previous: LogLikelihoodSurrogate | None
+        self, known: TrainingData, previous: LogLikelihoodSurrogate | None
     ) -> LogLikelihoodSurrogate:
         """To search with: where a run was unlucky others are to be made."""
         values, sd = -known.discrepancy, known.features[:, 0]
@@ -378,7 +378,7 @@ class LogLikelihoodLearner:
         success = learn_success(known.runs, known.normal)
         return replace(learned, state=learned.state._replace(success=success))
 
-    def finish(self, known: Learnable) -> LogLikelihoodSurrogate:
+    def finish(self, known: TrainingData) -> LogLikelihoodSurrogate:
         """The surrogate on which a fit rests."""
         return self.learn(known, None).cautious
 

@@ -8,7 +8,7 @@ import numpy as np
 from .._float64 import in_float64
 from .._lazy import stats
 from ..gp.optimise import minimise_in_box
-from ..gp.process import GP, believe
+from ..gp.process import GP, fantasize
 from ..sobol import sobol
 from ..types import LogLikelihood, LogSecondMoment
 from .emulator import (
@@ -151,12 +151,12 @@ class SignalSurrogate:
         return minimise_in_box(lambda u: -log_likelihood(state, u), len(state.low), *self.box or ())
 
     @in_float64
-    def believe(self, u: np.ndarray) -> "SignalSurrogate":
+    def fantasize(self, u: np.ndarray) -> "SignalSurrogate":
         """Condition on the predicted means at u [n, d], for points still being simulated."""
         if len(u) == 0:
             return self
-        believed = believe(self.gp, u, run_spread(self.emulator.size, u))
-        return replace(self, emulator=self.emulator._replace(gp=believed))
+        fantasized = fantasize(self.gp, u, run_spread(self.emulator.size, u))
+        return replace(self, emulator=self.emulator._replace(gp=fantasized))
 
     @property
     @in_float64
@@ -324,7 +324,7 @@ def observe(
     nothing would explain what no run explains.
 
     Args:
-        noise: What is believed of it.
+        noise: What is known of it.
         previous: Its nodes are kept.
     """
     basis, remainder = emulator.basis, emulator.remainder

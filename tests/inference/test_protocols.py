@@ -221,7 +221,7 @@ def check_minimum(of):
 
 def check_believe(of):
     """Its own predictions teach it nothing new but certainty."""
-    after = of.believe(POINTS[:2])
+    after = of.fantasize(POINTS[:2])
     np.testing.assert_allclose(after.predict(POINTS)[0], of.predict(POINTS)[0], atol=1e-6)
     assert (after.predict(POINTS)[1] <= of.predict(POINTS)[1] + 1e-9).all()
     assert len(after.gp.data.u) == RUNS + 2 and len(of.gp.data.u) == RUNS

@@ -8,7 +8,7 @@ from bolfi_liquids.inference.criticism.hypothesis import hypothesise
 from bolfi_liquids.inference.criticism.posterior import weighted_posterior
 from bolfi_liquids.inference.criticism.prior_boxes import PriorBox, fill, hull, intersection, sides
 from bolfi_liquids.inference.criticism.search import Study, examine, explain
-from bolfi_liquids.inference.criticism.simulate import Laboratory
+from bolfi_liquids.inference.criticism.simulate import SimulatorRuns
 
 from bolfi_liquids import inference
 
@@ -25,9 +25,9 @@ def ramp(theta, seeds):
 
 
 @pytest.fixture
-def laboratory():
+def simulator():
     with criticism.Keeping(batch=64).opened("") as keep:
-        yield Laboratory(ramp, PRIOR, EXTENSIONS, keep)
+        yield SimulatorRuns(ramp, PRIOR, EXTENSIONS, keep)
 
 
 def observed(level, size=0.0):
@@ -64,10 +64,10 @@ def test_effects_are_tried_on_both_sides_of_neutral_or_on_the_only_one(prior, ne
 
 
 @pytest.mark.slow
-def test_best_fit_and_posterior_stay_where_the_model_was_simulated(laboratory):
+def test_best_fit_and_posterior_stay_where_the_model_was_simulated(simulator):
     """Data that lie beyond draw both to the end and no further."""
     within = PriorBox(np.array([0.2]), np.array([0.5]))
-    runs = laboratory.run("start", fill(within, PRIOR, 0, 12))
+    runs = simulator.run("start", fill(within, PRIOR, 0, 12))
     found = hypothesise((), PRIOR, runs, observed(1.5), NOISE, within)
     assert found.u[0] == pytest.approx(0.5, abs=0.01)
     level = weighted_posterior(found).draw(0, 200)["level"]
@@ -75,9 +75,9 @@ def test_best_fit_and_posterior_stay_where_the_model_was_simulated(laboratory):
 
 
 @pytest.mark.slow
-def test_a_truth_outside_of_the_box_of_the_model_without_the_effect_is_reached(laboratory):
+def test_a_truth_outside_of_the_box_of_the_model_without_the_effect_is_reached(simulator):
     """The base model fits best at 1.6, half of the prior's range away."""
-    study = Study(laboratory, observed(0.0, 1.4), NOISE, criticism.Plan())
+    study = Study(simulator, observed(0.0, 1.4), NOISE, criticism.Plan())
     base, _ = examine(study, None)
     assert not base.box.encloses(np.array([0.5]))
     _, accepted = explain(study, base)

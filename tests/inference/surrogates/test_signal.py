@@ -11,7 +11,7 @@ from bolfi_liquids.inference.gp.hyperparameters import NOISE
 from bolfi_liquids.inference.gp.process import predict
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.emulator import EmulatorLimits, emulate, noise_share
-from bolfi_liquids.inference.surrogates.families import Learnable, SignalFamily
+from bolfi_liquids.inference.surrogates.families import SignalFamily, TrainingData
 from bolfi_liquids.inference.surrogates.signal_likelihood import log_likelihood, log_second_moment
 from bolfi_liquids.inference.surrogates.success import RunOutcomes
 from bolfi_liquids.inference.surrogates.warnings import UNREPEATED
@@ -38,7 +38,7 @@ def learned(u, signals, observed, **options):
     learner = SignalFamily(**options).learner(observed)
     measured = learner.measure(signals)
     runs = RunOutcomes(u, np.isfinite(measured.discrepancy))
-    known = Learnable(u, measured.features, measured.discrepancy, None, runs)
+    known = TrainingData(u, measured.features, measured.discrepancy, None, runs)
     return learner.learn(known, None)
 
 
