@@ -13,7 +13,7 @@ ESS_PER_CHAIN = 100.0
 DIVERGENT_SHARE = 0.01
 
 
-class SamplerStatus(StrEnum):
+class ConvergenceStatus(StrEnum):
     """What came of sampling; each text is what to do about it."""
 
     CONVERGED = "converged"
@@ -110,12 +110,14 @@ def describe(short: Sequence[Shortfall], steps: int) -> str:
                 f"{bound} {worst.limit:{digits}}"
             )
     listed = "; ".join(parts)
-    return f"not converged after {steps} draws per chain: {listed}. {SamplerStatus.TOO_FEW_DRAWS}"
+    return (
+        f"not converged after {steps} draws per chain: {listed}. {ConvergenceStatus.TOO_FEW_DRAWS}"
+    )
 
 
 def describe_divergences(share: float) -> str:
     """The same for a share of divergent transitions."""
     return (
         f"not converged: {share:.1%} of the transitions diverged, above {DIVERGENT_SHARE:.0%}. "
-        f"{SamplerStatus.DIVERGENT}"
+        f"{ConvergenceStatus.DIVERGENT}"
     )

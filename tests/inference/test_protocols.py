@@ -219,7 +219,7 @@ def check_minimum(of):
     np.testing.assert_array_equal(best, of.minimum())
 
 
-def check_believe(of):
+def check_fantasize(of):
     """Its own predictions teach it nothing new but certainty."""
     after = of.fantasize(POINTS[:2])
     np.testing.assert_allclose(after.predict(POINTS)[0], of.predict(POINTS)[0], atol=1e-6)

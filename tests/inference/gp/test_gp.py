@@ -125,7 +125,7 @@ def test_joint_prediction_agrees_with_dense_algebra(rows, hyper):
     np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-10)
 
 
-def test_believing_agrees_with_conditioning_on_the_mean(rows, hyper):
+def test_fantasizing_agrees_with_conditioning_on_the_mean(rows, hyper):
     u, y = rows
     fitted = condition(hyper, Data(u, y))
     new = np.array([[0.4, 0.7], [0.1, 0.2]])

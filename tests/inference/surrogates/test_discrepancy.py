@@ -103,7 +103,7 @@ def test_the_threshold_is_not_taken_where_nothing_was_simulated():
     assert fitted.predict(np.ones((1, 2)))[0] < 0.0 < fitted.threshold
 
 
-def test_believing_keeps_the_mean_and_shrinks_the_variance():
+def test_fantasizing_keeps_the_mean_and_shrinks_the_variance():
     u = sobol(0, 0, 10, 2)
     fitted = learn(u, bowl(u, np.random.default_rng(0), 1.0))
     new = np.array([[0.9, 0.1]])
