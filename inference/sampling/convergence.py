@@ -109,10 +109,8 @@ def describe(short: Sequence[Shortfall], steps: int) -> str:
                 f"{meaning} of {worst.parameter!r} is {worst.value:{digits}}, "
                 f"{bound} {worst.limit:{digits}}"
             )
-    listed = "; ".join(parts)
-    return (
-        f"not converged after {steps} draws per chain: {listed}. {ConvergenceStatus.TOO_FEW_DRAWS}"
-    )
+    advice = ConvergenceStatus.TOO_FEW_DRAWS
+    return f"not converged after {steps} draws per chain: {'; '.join(parts)}. {advice}"
 
 
 def describe_divergences(share: float) -> str:
