@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import ValidationInfo, model_validator
 
-from .rig_limits import Box as Box
+from .rig_limits import AxisLimits as AxisLimits
 from .rig_limits import Limits
 from .rig_numbers import (
     Acceleration,
@@ -16,7 +16,7 @@ from .rig_numbers import (
     Mass,
     Number,
     Point,
-    Section,
+    RigSection,
     Speed,
     Tcp,
     Turn,
@@ -60,7 +60,7 @@ def _odd(points: int) -> int:
 View = Literal["xz", "yz"]
 
 
-class Robot(Section, frozen=True):
+class Robot(RigSection, frozen=True):
     """The arm and what is mounted on its flange.
 
     Attributes:
@@ -101,7 +101,7 @@ class Robot(Section, frozen=True):
             )
 
 
-class Cup(Section, frozen=True):
+class CupSettings(RigSection, frozen=True):
     """The cup that is stirred: where it stands in the base frame, and its sizes [m]."""
 
     position: Point
@@ -118,7 +118,7 @@ class Cup(Section, frozen=True):
             raise ValueError(f"fill {self.fill} m is not below height {self.height} m")
 
 
-class Stick(Section, frozen=True):
+class StickSettings(RigSection, frozen=True):
     """The stick that hangs in the gripper; `colour` tells it from the background."""
 
     radius: Annotated[Length, within(0.001, 0.03, "m", "a stick is no wire and no post")]
@@ -142,13 +142,13 @@ class Stick(Section, frozen=True):
         return self.mass / (np.pi * self.radius**2 * self.length)
 
 
-class Liquid(Section, frozen=True):
+class LiquidSettings(RigSection, frozen=True):
     """What is known of the liquid before it is stirred: its weighed density [kg/m3]."""
 
     density: Annotated[Number, within(50.0, 20_000.0, "kg/m3", "no liquid is as light or as heavy")]
 
 
-class Stirring(Section, frozen=True):
+class StirringSettings(RigSection, frozen=True):
     """The plan of a stir, in the cup's frame.
 
     Attributes:
@@ -181,7 +181,7 @@ class Stirring(Section, frozen=True):
     cycles: Annotated[int, unless_recorded(checked_cycles)] = 1
 
 
-class Camera(Section, frozen=True):
+class Camera(RigSection, frozen=True):
     """A webcam: where it stands and looks, in the cup's frame.
 
     Attributes:
@@ -235,7 +235,7 @@ class Camera(Section, frozen=True):
             raise ValueError(f"position and target are less than {MIN_LOOK:g} m apart")
 
 
-class Pouring(Section, frozen=True):
+class PouringSettings(RigSection, frozen=True):
     """Where a pour happens, in the base frame.
 
     Attributes:
@@ -253,17 +253,17 @@ class Pouring(Section, frozen=True):
     approach_speed: Speed = 0.05
 
 
-class Rig(Section, frozen=True):
+class Rig(RigSection, frozen=True):
     """All of a rig.toml."""
 
     robot: Robot
-    cup: Cup
-    stick: Stick
-    liquid: Liquid
-    stirring: Stirring
+    cup: CupSettings
+    stick: StickSettings
+    liquid: LiquidSettings
+    stirring: StirringSettings
     limits: Limits
     cameras: tuple[Camera, Camera]
-    pouring: Pouring
+    pouring: PouringSettings
 
     @model_validator(mode="after")
     def _fits_together(self, info: ValidationInfo) -> "Rig":

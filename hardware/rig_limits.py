@@ -12,14 +12,14 @@ from .rig_numbers import (
     Coordinate,
     Length,
     Number,
-    Section,
+    RigSection,
     Speed,
     contradiction,
     within,
 )
 
 
-class Box(Section, frozen=True):
+class AxisLimits(RigSection, frozen=True):
     """A range for each axis [m], in the cup's frame."""
 
     x: tuple[Coordinate, Coordinate]
@@ -46,14 +46,14 @@ class Box(Section, frozen=True):
 
 LARGEST_BOX = {
     # above a cup of a hand's size, with a stick of a forearm's length
-    "stirring": Box(x=(-0.2, 0.2), y=(-0.2, 0.2), z=(0.05, 1.0)),
+    "stirring": AxisLimits(x=(-0.2, 0.2), y=(-0.2, 0.2), z=(0.05, 1.0)),
     # an arm's length about the cup, never below the table
-    "pouring": Box(x=(-1.0, 1.0), y=(-1.0, 1.0), z=(0.0, 1.0)),
+    "pouring": AxisLimits(x=(-1.0, 1.0), y=(-1.0, 1.0), z=(0.0, 1.0)),
 }
 """Where a tool may be let go at most, in the cup's frame."""
 
 
-class Limits(Section, frozen=True):
+class Limits(RigSection, frozen=True):
     """What a commanded motion and a running one must keep.
 
     Attributes:
@@ -71,8 +71,8 @@ class Limits(Section, frozen=True):
         reduced_mode: Whether the controller's reduced safety mode is good enough.
     """
 
-    stirring: Box
-    pouring: Box
+    stirring: AxisLimits
+    pouring: AxisLimits
     speed: Speed = 0.15
     acceleration: Acceleration = 0.5
     tilt_rate_deg_s: Annotated[
@@ -113,7 +113,7 @@ class Limits(Section, frozen=True):
     @contradiction
     def _boxes_are_small(self) -> None:
         for name, most in LARGEST_BOX.items():
-            box: Box = getattr(self, name)
+            box: AxisLimits = getattr(self, name)
             for axis in ("x", "y", "z"):
                 (low, high), (least, largest) = getattr(box, axis), getattr(most, axis)
                 if low < least or high > largest:

@@ -21,7 +21,7 @@ def is_recorded(info: ValidationInfo) -> bool:
     return info.context is not None and info.context == RECORDED
 
 
-class Section(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+class RigSection(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Part of a file that a person writes: no unknown fields, no change after reading."""
 
     @model_validator(mode="before")

@@ -121,16 +121,16 @@ def add_surrogate(
 def add_checks(
     tree: xr.DataTree,
     checks: Mapping[str, np.ndarray],
-    learned_from: np.ndarray,
+    training_mask: np.ndarray,
     warnings: Sequence[str],
 ) -> None:
     """Add emulator_checks, whose first axis is the simulation, with rows of NaN where nothing was
-    learned from one (`learned_from`, bool [n]). The attribute `warnings` joins what the fit
+    learned from one (`training_mask`, bool [n]). The attribute `warnings` joins what the fit
     complains of, one per line, and is empty where there is nothing."""
     columns = {}
     for name, values in checks.items():
-        of_all = np.full((len(learned_from), *values.shape[1:]), np.nan)
-        of_all[learned_from] = values
+        of_all = np.full((len(training_mask), *values.shape[1:]), np.nan)
+        of_all[training_mask] = values
         axes = (f"{name}_dim_{i}" for i in range(values.ndim - 1))
         columns[name] = (["simulation", *axes], of_all)
     attributes = {"warnings": "\n".join(warnings)}

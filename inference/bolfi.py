@@ -33,10 +33,10 @@ from .simulations.failures import Failure, incomparable, kind, unusable
 from .simulations.job import BATCH
 from .simulations.returned import told_signals
 from .sobol import sobol, start_size
-from .surrogates.base import Acquisition, Learnable, Measured
+from .surrogates.base import Acquisition, Measured, TrainingData
 from .surrogates.families import Family, checked_observed, resolve
-from .surrogates.outliers import sane
-from .surrogates.success import Runs
+from .surrogates.outliers import is_outlier
+from .surrogates.success import RunOutcomes
 from .surrogates.warnings import complain
 from .types import Theta
 
@@ -212,35 +212,35 @@ class Bolfi:
         """theta [n, d] of the engine's choice, `designed` [m, d] being asked with them."""
         history = self._state.history
         pending = np.concatenate([self._state.pending, designed])
-        self._learned = self._learner.learn(self._known(), self._learned)
+        self._learned = self._learner.learn(self._training_data(), self._learned)
         repeated = next_replicate(history, pending) if self.family.replicates else None
         parts = [] if repeated is None else [repeated[None]]
         if n > len(parts):
             # made by NumPy: JAX would compile for half a second
             words = np.random.SeedSequence([self.seed, self._state.asked]).generate_state(2)
             key = jax.random.wrap_key_data(jax.device_put(words), impl="threefry2x32")
-            believing = self._learned.believe(self.prior.to_unit(self.prior.to_dict(pending)))
+            fantasized = self._learned.fantasize(self.prior.to_unit(self.prior.to_dict(pending)))
             shape = n - len(parts), len(self.prior)
-            u = chosen(in_float64(self._acquire)(key, believing, shape[0]), shape)
+            u = chosen(in_float64(self._acquire)(key, fantasized, shape[0]), shape)
             parts.append(self.prior.to_array(self.prior.from_unit(u)))
         return np.concatenate(parts)
 
     @property
-    def _learnable(self) -> np.ndarray:
+    def _training_mask(self) -> np.ndarray:
         """Which runs are learned from, bool [n]: no copies, nor what blew up."""
         history = self._state.history
-        return history.distinct & sane(history.discrepancy)
+        return history.distinct & ~is_outlier(history.discrepancy)
 
-    def _runs(self) -> Runs:
+    def _runs(self) -> RunOutcomes:
         """Where runs succeeded; those that blew up did not."""
         history = self._state.history
-        return Runs(history.u, history.succeeded & sane(history.discrepancy))
+        return RunOutcomes(history.u, history.succeeded & ~is_outlier(history.discrepancy))
 
-    def _known(self) -> Learnable:
+    def _training_data(self) -> TrainingData:
         history = self._state.history
-        good = self._learnable
+        good = self._training_mask
         known = history.u[good], history.features[good], history.discrepancy[good]
-        return Learnable(*known, self.prior.normal, self._runs())
+        return TrainingData(*known, self.prior.normal, self._runs())
 
     def tell(
         self,
@@ -369,7 +369,7 @@ class Bolfi:
                 f"{self.told} told; tell more{last}"
             )
         started = time.perf_counter()
-        known, history = self._known(), self._state.history
+        known, history = self._training_data(), self._state.history
         fitted = self._learner.finish(known)
         self._seconds += time.perf_counter() - started
         made = Fit(
@@ -377,7 +377,7 @@ class Bolfi:
             observed=self.observed,
             history=history,
             learned=fitted,
-            learned_from=self._learnable,
+            training_mask=self._training_mask,
             settings=self.settings,
             seconds={"simulator": 0.0, **measured, "engine": self._seconds},
             before=self._before,

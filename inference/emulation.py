@@ -8,7 +8,7 @@ from .arguments import checked_array
 from .prior import Prior
 from .regression import finite_runs
 from .surrogates import emulator as vectors
-from .surrogates.emulator import Emulator, Limits
+from .surrogates.emulator import Emulator, EmulatorLimits
 from .types import Theta
 
 COMPONENTS = 6  # at most; of smooth outputs later ones are noise
@@ -58,6 +58,6 @@ def emulate(prior: Prior, theta: Theta, outputs: ArrayLike, scale: ArrayLike) ->
             f"scale must hold {known.shape[1]} positive numbers, one per output, got shape "
             f"{weights.shape} and least {weights.min(initial=np.inf)}"
         )
-    limits = Limits(COMPONENTS, predicted=None)
+    limits = EmulatorLimits(COMPONENTS, predicted=None)
     learned = vectors.emulate(u, known, lambda _: weights, limits, None, prior.normal)
     return Emulation(prior, learned)

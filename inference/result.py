@@ -58,7 +58,7 @@ class Fit:
         prior, observed: As given.
         history: Every simulation, in the order told.
         learned: The surrogate over prior quantiles.
-        learned_from: Which simulations it knows, bool [n].
+        training_mask: Which simulations it knows, bool [n].
         settings: How the run was made.
         seconds: Time in the "simulator" and in the "engine" [s].
         before: The posterior of which `Bolfi.confirm` drew last; None where it never did.
@@ -68,7 +68,7 @@ class Fit:
     observed: np.ndarray
     history: History
     learned: Surrogate
-    learned_from: np.ndarray
+    training_mask: np.ndarray
     settings: Mapping[str, object]
     seconds: Mapping[str, float]
     before: Before | None = None
@@ -81,7 +81,7 @@ class Fit:
 
     def _shown(self) -> list[tuple[str, str]]:
         failed = ", ".join(f"{n} {kind}" for kind, n in self.failures.items())
-        surrogate = f"{self.settings['surrogate']!r}, of {self.learned_from.sum()} simulations"
+        surrogate = f"{self.settings['surrogate']!r}, of {self.training_mask.sum()} simulations"
         return [
             ("parameters", ", ".join(self._quantiles())),
             ("simulations", f"{len(self.history.theta)}, failed: {failed or 'none'}"),
@@ -125,7 +125,7 @@ class Fit:
             said += unconfirmed_warnings(self.history, self.confirming)
         if self._collapsed:
             said.append(COLLAPSED)
-        learned, needed = int(self.learned_from.sum()), 2 * len(self.prior) + 2
+        learned, needed = int(self.training_mask.sum()), 2 * len(self.prior) + 2
         if learned < needed:
             said.append(
                 f"the surrogate is learned from {learned} simulations, fewer than the {needed} "
@@ -204,7 +204,7 @@ class Fit:
             return []
         values = self.learned.scale.observed
         noise = float(self.learned.scale.sds(values[None])[0, 0])
-        return unreached_warnings(values, self.history.features[self.learned_from], noise)
+        return unreached_warnings(values, self.history.features[self.training_mask], noise)
 
     @property
     def surrogate(self) -> SurrogateView:
@@ -326,7 +326,7 @@ class Fit:
         tree["posterior"].attrs.update(status=made.status, draws_made=made.steps, **made.checks)
         rng = np.random.default_rng([seed, *b"predictive"])
         add_surrogate(tree, self.learned, made.chains.u, rng)
-        add_checks(tree, self.learned.checks(), self.learned_from, self.warnings)
+        add_checks(tree, self.learned.checks(), self.training_mask, self.warnings)
         attributes: dict[str, object] = {
             **self.settings,
             **{"sampler": sampler, **length._asdict(), "extend": extend, "sampling_seed": seed},

@@ -14,7 +14,7 @@ from .pours.vessel import turned
 from .runtime import Watch
 from .stir_setup import StirSetup
 from .stirring import watched_stir
-from .trajectory import Trajectory
+from .trajectory import PivotPath
 
 FRAME_RATE = 25.0  # frames/s
 
@@ -58,7 +58,7 @@ class PourFrames:
 
 def stir_frames(
     liquid: Liquid,
-    gripper: Trajectory,
+    gripper: PivotPath,
     setup: StirSetup,
     seed: int,
     *,

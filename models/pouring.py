@@ -17,7 +17,7 @@ from .effect_coefficients import Acting, acting_in, changed_wetting, liquid_sets
 from .liquid import TENSION_AT_ONE, Liquid
 from .number_checks import check_numbers, checked_seeds
 from .pours.flights import Flights, landing_of
-from .pours.march import Pours, Turn, march
+from .pours.march import PourRotation, Pours, march
 from .pours.resolution import steps_for
 from .pours.vessel import vessel_of
 from .runtime import Watch
@@ -197,7 +197,7 @@ def _flights(batch: PourBatch, watch: Watch | None = None) -> list[Flights]:
         for kinds, rows, coefficients in liquid_sets(acting, len(seeds)):
             for step in np.unique(steps[rows]):
                 part = rows[steps[rows] == step]
-                turn = Turn(cups.pour.final_angle, cups.pour.hold, float(step))
+                turn = PourRotation(cups.pour.final_angle, cups.pour.hold, float(step))
                 alike = pours._replace(coefficients=coefficients).rows(part)
                 for at, flights in zip(part, march(vessel, alike, turn, kinds, watch), strict=True):
                     found[at] = flights

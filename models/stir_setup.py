@@ -8,7 +8,7 @@ import numpy as np
 
 from .number_checks import check_numbers
 from .numerics import LEAST_VISCOSITY, MODEL_VERSION, Numerics, check_resolution
-from .trajectory import Trajectory, top_speed
+from .trajectory import PivotPath, top_speed
 
 MAX_FILL_RATIO = 1.5  # times the setup's fill is the largest
 MAX_TILT = 1.5  # rad
@@ -21,7 +21,7 @@ class HasRig(Protocol):
     @property
     def attrs(self) -> Mapping[str, Any]: ...
     @property
-    def gripper(self) -> Trajectory: ...
+    def gripper(self) -> PivotPath: ...
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ class StirSetup:
         """Particle spacing [m], the cube root of the liquid's volume per particle."""
         return self.cell / self.per_cell ** (1.0 / 3.0)
 
-    def step(self, gripper: Trajectory) -> float:
+    def step(self, gripper: PivotPath) -> float:
         """Step of time [s] for a path of the gripper."""
         longest = self.numerics.step(self.cell, 0.0)
         return self.numerics.step(self.cell, top_speed(gripper, longest))

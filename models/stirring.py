@@ -13,12 +13,12 @@ from .rig import Rig, check_rig
 from .runtime import Watch
 from .stir_setup import StirSetup, hanging
 from .stirs.march import Stirs, march
-from .trajectory import Trajectory, step_path
+from .trajectory import PivotPath, step_path
 
 
 def stir(
     liquid: Liquid,
-    gripper: Trajectory,
+    gripper: PivotPath,
     setup: StirSetup,
     seeds: ArrayLike,
     effects: Mapping[str, ArrayLike] | None = None,
@@ -49,7 +49,7 @@ def stir(
 
 def watched_stir(
     liquid: Liquid,
-    gripper: Trajectory,
+    gripper: PivotPath,
     setup: StirSetup,
     seeds: ArrayLike,
     effects: Mapping[str, ArrayLike] | None,

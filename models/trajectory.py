@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 
 
-class Trajectory(Protocol):
+class PivotPath(Protocol):
     """Times [T] in s and pivot positions [T, 3] in m; rows that are not finite are skipped."""
 
     @property
@@ -14,7 +14,7 @@ class Trajectory(Protocol):
     def position(self) -> np.ndarray: ...
 
 
-def step_path(gripper: Trajectory, step: float) -> np.ndarray:
+def step_path(gripper: PivotPath, step: float) -> np.ndarray:
     """Pivot at the start and at the end of each step [m], shape [steps + 1, 3].
 
     Each is the mean, over one step, of a smooth curve through the samples. So slow recordings are
@@ -36,13 +36,13 @@ def step_path(gripper: Trajectory, step: float) -> np.ndarray:
     return np.diff(travelled(inside) + held, axis=0) / step
 
 
-def top_speed(gripper: Trajectory, step: float) -> float:
+def top_speed(gripper: PivotPath, step: float) -> float:
     """Of the pivot [m/s], over intervals of a step [s] or a sample, whichever is longer."""
     path = step_path(gripper, step)
     return float(np.linalg.norm(np.diff(path, axis=0), axis=1).max(initial=0.0) / step)
 
 
-def finite_samples(gripper: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+def finite_samples(gripper: PivotPath) -> tuple[np.ndarray, np.ndarray]:
     """Times [n] and positions [n, 3] of the finite samples, two at least."""
     time, position = np.asarray(gripper.time), np.asarray(gripper.position)
     if position.shape != (len(time), 3):

@@ -42,7 +42,7 @@ MAX_TURN_ERRORS = 3.0
 """Standard errors by which a turn must differ from none."""
 
 
-class Turn(NamedTuple):
+class FrameRotation(NamedTuple):
     """How the frame of the inclination lies to that of the positions.
 
     Attributes:
@@ -65,7 +65,7 @@ def _whole(angle_deg: float) -> int:
     return round(angle_deg)
 
 
-def found_turn(recording: Recording) -> Turn | None:
+def found_turn(recording: Recording) -> FrameRotation | None:
     """The turn of a recording's frame; None where its path does not tell it."""
     pair = _pair(recording)
     if pair is None:
@@ -77,7 +77,9 @@ def found_turn(recording: Recording) -> Turn | None:
     if best.residual > MAX_RESIDUAL_RATIO * best.worst or best.followed < MIN_FOLLOWED:
         return None
     seen = inclination.conj() if is_mirrored else inclination
-    return Turn(float(np.degrees(best.angle)), _error_deg(seen, delayed, best.angle), is_mirrored)
+    return FrameRotation(
+        float(np.degrees(best.angle)), _error_deg(seen, delayed, best.angle), is_mirrored
+    )
 
 
 def trailing(recording: Recording) -> tuple[float, ...]:
@@ -141,7 +143,7 @@ def frame_faults(recording: Recording) -> Iterator[str]:
         )
 
 
-def _is_turned(turn: Turn) -> bool:
+def _is_turned(turn: FrameRotation) -> bool:
     return abs(turn.angle_deg) > max(MAX_TURN_DEG, MAX_TURN_ERRORS * turn.error_deg)
 
 
@@ -166,7 +168,7 @@ def _at(wanted: NDArray, time: NDArray, values: NDArray) -> NDArray:
     return np.interp(wanted, time[known], values[known])
 
 
-class _Fit(NamedTuple):
+class _RotationFit(NamedTuple):
     """Angle [rad]; residual sums of squares at it and at its worst; share that it explains."""
 
     angle: float
@@ -175,7 +177,7 @@ class _Fit(NamedTuple):
     followed: float
 
 
-def _fit(inclination: NDArray, delayed: NDArray) -> _Fit:
+def _fit(inclination: NDArray, delayed: NDArray) -> _RotationFit:
     """Inclination = phase x (real response to the delayed positions).
 
     Turned back by an angle, the inclination is linear in its cosine and sine, and so is what a real
@@ -195,7 +197,7 @@ def _fit(inclination: NDArray, delayed: NDArray) -> _Fit:
         angle += np.pi
     wrapped = float(np.pi - (np.pi - angle) % (2.0 * np.pi))
     residual, worst = (max(float(value), floor) for value in (least, most))
-    return _Fit(wrapped, residual, worst, 1.0 - residual / power)
+    return _RotationFit(wrapped, residual, worst, 1.0 - residual / power)
 
 
 def _real(values: NDArray) -> NDArray:

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .surface import Surface
-from .view import View
+from .surface import VisibleSurface
+from .view import OrthographicView
 
 Picture = NDArray[np.floating]
 """Red, green and blue from 0 to 1, shape [height, width, 3]."""
@@ -42,7 +42,10 @@ def over(below: Picture, colour: Picture, cover: NDArray) -> Picture:
 
 
 def through_liquid(
-    view: View, behind: Picture, liquid: Surface | None, stick: Layer | None = None
+    view: OrthographicView,
+    behind: Picture,
+    liquid: VisibleSurface | None,
+    stick: Layer | None = None,
 ) -> Picture:
     """The picture with the liquid in it, and a stick that dips into it.
 
@@ -56,7 +59,7 @@ def through_liquid(
     if liquid is None or not liquid.cover.any():
         return base
     part = _window(liquid.cover)  # light takes time to compute
-    seen = Surface(*(field[part] for field in liquid))
+    seen = VisibleSurface(*(field[part] for field in liquid))
     bent = _bent(view, seen, part)
     depth = seen.thickness[..., None]
     passed = behind[bent] * np.exp(-ABSORPTION * depth)
@@ -79,7 +82,9 @@ def _window(cover: NDArray) -> tuple[slice, slice]:
     return rows, columns
 
 
-def _bent(view: View, seen: Surface, part: tuple[slice, slice]) -> tuple[NDArray, NDArray]:
+def _bent(
+    view: OrthographicView, seen: VisibleSurface, part: tuple[slice, slice]
+) -> tuple[NDArray, NDArray]:
     """Row and column of what is seen through each pixel of a window: towards the thicker side."""
     bend = (
         REFRACTION_SHIFT * view.scale * np.minimum(seen.thickness, MAX_BENDING_DEPTH) * seen.cover

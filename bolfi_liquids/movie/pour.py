@@ -26,7 +26,7 @@ from .solids import (
 )
 from .surface import Glass, surface
 from .text import written
-from .view import View
+from .view import OrthographicView
 
 if TYPE_CHECKING:
     from ..models import Cups, Landings, PourFrames
@@ -55,7 +55,7 @@ def receiver_glass(cups: "Cups", distance: float) -> Glass:
     return Glass(cups.receiver.radius, cups.receiver.height, floor, UP)
 
 
-def pour_view(cups: "Cups", distance: float) -> View:
+def pour_view(cups: "Cups", distance: float) -> OrthographicView:
     """A camera that sees the source at any angle, the receiver and the table around it."""
     source, receiver = cups.source, cups.receiver
     high = np.hypot(2.0 * source.radius, source.height)
@@ -65,7 +65,7 @@ def pour_view(cups: "Cups", distance: float) -> View:
     right = max(distance + receiver.radius, source.height)
     scale = min(PICTURE_SIZE[1] / (high - low), PICTURE_SIZE[0] / (right - left)) / 1.12
     centre = float(left + right) / 2.0, 0.0, float(high + low) / 2.0
-    return View(*PICTURE_SIZE, float(scale), centre, AZIMUTH, ELEVATION)
+    return OrthographicView(*PICTURE_SIZE, float(scale), centre, AZIMUTH, ELEVATION)
 
 
 def pour_pictures(
@@ -120,7 +120,9 @@ def _behind(view, source: Glass, receiver: Glass, below: Landed, cups: "Cups") -
     return shapes + glass_behind(source, view)
 
 
-def with_puddle(view: View, below: Picture, lying: Landed, cups: "Cups", count: int) -> Picture:
+def with_puddle(
+    view: OrthographicView, below: Picture, lying: Landed, cups: "Cups", count: int
+) -> Picture:
     """What was spilled, as a film on the table of the volume that lies there."""
     if not len(lying.spilled):
         return below

@@ -10,7 +10,7 @@ from scipy.ndimage import gaussian_filter
 
 from .light import Layer, Picture, over
 from .surface import Glass
-from .view import View
+from .view import OrthographicView
 
 LINE_SUPERSAMPLING = 2  # lines are drawn this many times finer than shown
 EDGE, FAINT = (92, 112, 130, 210), (92, 112, 130, 110)
@@ -29,7 +29,7 @@ class Shape(NamedTuple):
     width: int = 0  # in pixels of the finer picture
 
 
-def drawn(view: View, below: Picture, shapes: Sequence[Shape]) -> Picture:
+def drawn(view: OrthographicView, below: Picture, shapes: Sequence[Shape]) -> Picture:
     """A picture with shapes over it, in their order."""
     if not shapes:
         return below
@@ -48,7 +48,7 @@ def drawn(view: View, below: Picture, shapes: Sequence[Shape]) -> Picture:
     return below * (1.0 - small[..., 3:]) + small[..., :3]
 
 
-def ring(glass: Glass, height: float, view: View, part: str = "all") -> NDArray:
+def ring(glass: Glass, height: float, view: OrthographicView, part: str = "all") -> NDArray:
     """Points of a cup's circle at `height` above its floor; `part` is all, near or far."""
     side = np.cross(glass.axis, view.axes[2])
     side /= max(np.linalg.norm(side), 1e-9)
@@ -59,7 +59,7 @@ def ring(glass: Glass, height: float, view: View, part: str = "all") -> NDArray:
     return glass.floor + height * glass.axis + glass.radius * circle
 
 
-def glass_behind(glass: Glass, view: View) -> list[Shape]:
+def glass_behind(glass: Glass, view: OrthographicView) -> list[Shape]:
     """The part of a cup behind its contents."""
     floor, rim = ring(glass, 0.0, view, "far"), ring(glass, glass.height, view, "far")
     return [
@@ -70,7 +70,7 @@ def glass_behind(glass: Glass, view: View) -> list[Shape]:
     ]
 
 
-def glass_before(glass: Glass, view: View) -> list[Shape]:
+def glass_before(glass: Glass, view: OrthographicView) -> list[Shape]:
     """The part of a cup in front of its contents."""
     rim, floor = ring(glass, glass.height, view, "near"), ring(glass, 0.0, view, "near")
     glint = [at + share * (to - at) for at, to in [(floor[58], rim[58])] for share in (0.12, 0.9)]
@@ -84,7 +84,7 @@ def glass_before(glass: Glass, view: View) -> list[Shape]:
     ]
 
 
-def stick_layer(view: View, pivot: NDArray, tip: NDArray, radius: float) -> Layer:
+def stick_layer(view: OrthographicView, pivot: NDArray, tip: NDArray, radius: float) -> Layer:
     """A round stick from the pivot to the tip."""
     start, end = view.camera(np.stack([tip, pivot]))
     right, up = view.metres()
@@ -103,7 +103,7 @@ def stick_layer(view: View, pivot: NDArray, tip: NDArray, radius: float) -> Laye
     return Layer(*(part.astype(np.float32) for part in (colour, cover, front)))
 
 
-def room(view: View, cups: Sequence[Glass]) -> Picture:
+def room(view: OrthographicView, cups: Sequence[Glass]) -> Picture:
     """An empty room with the shadows of upright cups on its table."""
     fade = np.linspace(0.0, 1.0, view.height, dtype=np.float32)[:, None, None]
     picture = np.broadcast_to(WALL + fade * (TABLE - WALL), (view.height, view.width, 3))

@@ -16,7 +16,7 @@ from .solids import (
 )
 from .surface import Glass, surface
 from .text import written
-from .view import View
+from .view import OrthographicView
 
 if TYPE_CHECKING:
     from ..models import StirFrames, StirSetup
@@ -25,11 +25,11 @@ PICTURE_SIZE = 640, 480
 AZIMUTH, ELEVATION = np.radians(25.0), np.radians(22.0)
 
 
-def stir_view(setup: "StirSetup") -> View:
+def stir_view(setup: "StirSetup") -> OrthographicView:
     """A camera that sees the cup, and the stick's lower half."""
     tall = setup.cup.height + 0.9 * setup.cup.radius
     scale = PICTURE_SIZE[1] / (1.3 * tall + 2.0 * setup.cup.radius * np.sin(ELEVATION))
-    return View(*PICTURE_SIZE, float(scale), (0.0, 0.0, tall / 2.0), AZIMUTH, ELEVATION)
+    return OrthographicView(*PICTURE_SIZE, float(scale), (0.0, 0.0, tall / 2.0), AZIMUTH, ELEVATION)
 
 
 def stir_pictures(

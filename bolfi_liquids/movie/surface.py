@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import affine_transform, gaussian_filter, map_coordinates
 
-from .view import View
+from .view import OrthographicView
 
 CELLS_PER_SPACING = 2.5  # grid cells a particle spacing
 SMEAR_SD = 0.9  # sd of a smeared particle, by the spacing: particles on a grid lie unevenly
@@ -49,7 +49,7 @@ class Glass:
         return self.radius - across, along
 
 
-class Surface(NamedTuple):
+class VisibleSurface(NamedTuple):
     """What each pixel shows of the liquid, arrays of shape [height, width].
 
     Attributes:
@@ -100,7 +100,9 @@ class _Grid(NamedTuple):
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
 
 
-def surface(view: View, points: NDArray, spacing: float, glass: Glass) -> Surface | None:
+def surface(
+    view: OrthographicView, points: NDArray, spacing: float, glass: Glass
+) -> VisibleSurface | None:
     """The liquid's surface.
 
     Args:
@@ -120,7 +122,7 @@ def surface(view: View, points: NDArray, spacing: float, glass: Glass) -> Surfac
     return _looked_at(view, grid, density)
 
 
-def _density(view: View, points, seen, grid: _Grid, given) -> NDArray:
+def _density(view: OrthographicView, points, seen, grid: _Grid, given) -> NDArray:
     """Density over the grid: full up to the glass, and none beyond on account of what is inside."""
     spacing, glass = given
     side, up = glass.within(points)
@@ -150,7 +152,7 @@ def _share_within(distance: NDArray) -> NDArray:
     return np.clip(0.5 + distance / 2.5, 0.0, 1.0)
 
 
-def _looked_at(view: View, grid: _Grid, density: NDArray) -> Surface:
+def _looked_at(view: OrthographicView, grid: _Grid, density: NDArray) -> VisibleSurface:
     """The grid's columns, each as one line of sight, brought to the picture's pixels."""
     solid = density > SURFACE_LEVEL
     crossing = solid.any(axis=2)
@@ -187,4 +189,4 @@ def _looked_at(view: View, grid: _Grid, density: NDArray) -> Surface:
     across, down = np.gradient(most)
     steep = np.hypot(across, down)
     cover = np.clip((most - SURFACE_LEVEL) / np.maximum(steep, 1e-3) + 0.5, 0.0, 1.0)
-    return Surface(cover, front, normal, thickness)
+    return VisibleSurface(cover, front, normal, thickness)

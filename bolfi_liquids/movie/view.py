@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 
 @dataclass(frozen=True)
-class View:
+class OrthographicView:
     """An orthographic camera: it looks from infinitely far, so lengths keep their ratio.
 
     Attributes:

@@ -169,7 +169,7 @@ def estimate(
     Raises:
         ValueError: Fewer than three simulations succeeded, or nothing was seen.
     """
-    from ..inference.sampling.convergence import Status
+    from ..inference.sampling.convergence import ConvergenceStatus
 
     engine = _told(problem, made, followed.observed, problem.settings.seed)
     fit = engine.fit(warn=False)  # warnings are among the estimate's complaints
@@ -192,7 +192,7 @@ def estimate(
         lag=time.monotonic() - ended,
         delay=followed.delay,
         apart=followed.apart,
-        complaints=(*fit.warnings, *([] if status == Status.CONVERGED else [status])),
+        complaints=(*fit.warnings, *([] if status == ConvergenceStatus.CONVERGED else [status])),
         fit_to_noise=fit_to_noise(followed.observed, fit.history.signals[good], viscosity[good]),
         frame_faults=tuple(frame_faults(replace(plan, inclination=followed.observed))),
     )

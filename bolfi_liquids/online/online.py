@@ -43,7 +43,7 @@ from .request import PARTNER_GONE, OnlinePhase, Request, Status
 from .simulator import simulate_plan
 
 if TYPE_CHECKING:
-    from ..models.trajectory import Trajectory
+    from ..models.trajectory import PivotPath
     from .estimate import OnlineEstimate
 
 BANK, LOG = "online.sqlite", "online.jsonl"
@@ -76,7 +76,7 @@ class OnlineCalibration:
     @classmethod
     def start(
         cls,
-        path: "Trajectory",
+        path: "PivotPath",
         attrs: Mapping[str, float | str],
         choice: OnlineChoice,
         *,

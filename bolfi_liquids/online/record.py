@@ -11,10 +11,10 @@ from ..errors import Argument
 from ..files import given_path
 from ..inputs.recording import Recording
 from ..inputs.rigs import rig_of
-from ..robot.armed_session import Ask, check_one, hidden_liquid
+from ..robot.armed_session import Ask, check_consent, hidden_liquid
 from ..robot.hidden_stir import with_stir
 from ..robot.live_view import SessionView
-from ..robot.record import check_new, finished, kept
+from ..robot.record import check_new, finished, save_on_stop
 from ..robot.stir import (
     PATHS_AHEAD,
     StirPlan,
@@ -76,7 +76,7 @@ def record_online(
     """
     from ..hardware.recorder.finalise import rig_attributes
 
-    check_one(ask, emulate, "record")
+    check_consent(ask, emulate, "record")
     rig, hidden = rig_of(rig), hidden_liquid(emulate)
     plan, out = plan_stir(rig, online.cycles), given_path(out, Argument("out"))
     check_new(out)
@@ -90,7 +90,7 @@ def record_online(
         if not calibration.wait_until_ready():
             raise RuntimeError(f"the calibration is not ready: {calibration.status.detail}")
         with (
-            kept(out),
+            save_on_stop(out),
             stir_session(rig, plan, out, ask=ask, emulate=hidden) as session,
             SessionView("stirring and calibrating", shown=progress) as view,
         ):

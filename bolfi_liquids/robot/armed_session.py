@@ -35,7 +35,7 @@ class Task(NamedTuple):
     about: str = ""
 
 
-class Emulation(NamedTuple):
+class EmulatedRobot(NamedTuple):
     """What to use in place of a robot.
 
     Attributes:
@@ -59,7 +59,7 @@ def hidden_liquid(emulate: "HiddenLiquid | bool") -> "HiddenLiquid | None":
     return emulate
 
 
-def check_one(ask: Ask | None, emulate: object, where: str) -> None:
+def check_consent(ask: Ask | None, emulate: object, where: str) -> None:
     """Refuse a motion that nobody is asked about, or that is both real and emulated.
 
     Raises:
@@ -75,7 +75,7 @@ def check_one(ask: Ask | None, emulate: object, where: str) -> None:
 
 @contextmanager
 def armed_session(
-    task: Task, *, ask: Ask | None = None, emulation: Emulation | None = None
+    task: Task, *, ask: Ask | None = None, emulation: EmulatedRobot | None = None
 ) -> "Iterator[Session]":
     """Ask a person, or start an emulator; then a session that may move the arm.
 
@@ -91,7 +91,7 @@ def armed_session(
     from ..hardware import Session, SessionSetup, confirm, confirm_emulated, webcams
     from ..hardware.session.confirmation import describe
 
-    check_one(ask, emulation, "armed_session")
+    check_consent(ask, emulation, "armed_session")
     text = f"{task.about}\n{describe(task.paths, task.rig, task.tool)}".lstrip()
     with ExitStack() as stack:
         if emulation is not None:

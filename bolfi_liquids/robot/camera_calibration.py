@@ -23,13 +23,13 @@ def write_board(path: Path) -> Path:
     Raises:
         InputError: There is a file already, or none can be written.
     """
-    from ..hardware.vision import Board
+    from ..hardware.vision import CharucoBoard
     from ..hardware.vision.opencv import opencv
 
     if path.exists():
         raise InputError("exists already", where=str(path), fix="name a file that does not")
     can_be = path.suffix.lower() == ".png" and path.parent.is_dir()
-    if not (can_be and opencv().imwrite(str(path), Board().print_image())):
+    if not (can_be and opencv().imwrite(str(path), CharucoBoard().print_image())):
         raise InputError("cannot be written", where=str(path), fix="name a .png that can be")
     return path
 
@@ -69,7 +69,7 @@ def calibrate_view(
         take_pictures,
         write_lens,
     )
-    from ..hardware.vision import Board
+    from ..hardware.vision import CharucoBoard
 
     if view not in VIEWS:
         raise InputError(f"{view!r}", where=Argument("view"), fix="give xz or yz")
@@ -81,7 +81,9 @@ def calibrate_view(
             fix="give the side of a printed square in cm",
         )
     camera = rig_of(rig).camera("xz" if view == "xz" else "yz")
-    board = Board(square=square, marker=square * Board().marker / Board().square)
+    board = CharucoBoard(
+        square=square, marker=square * CharucoBoard().marker / CharucoBoard().square
+    )
     live = boards is None and plumb is None
     on_board = pictures_in(boards) if boards is not None else []
     hanging = pictures_in(plumb)[0] if plumb is not None else None

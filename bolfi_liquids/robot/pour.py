@@ -12,10 +12,10 @@ from ..pouring.result import Pour
 from ..run.run import Run, RunOrPath
 from .armed_session import (
     Ask,
-    Emulation,
+    EmulatedRobot,
     Task,
     armed_session,
-    check_one,
+    check_consent,
 )
 from .chosen_pour import BAD_FIT, ChosenPour, chosen_pour
 from .live_view import SessionView
@@ -29,7 +29,7 @@ logger = logging.getLogger(__name__)
 POURS_FOLDER = "pours"  # directories of what the arm did, in the RUN
 
 
-class PourPlan(NamedTuple):
+class PourMotion(NamedTuple):
     """A pour as a motion.
 
     Attributes:
@@ -49,7 +49,7 @@ class PourPlan(NamedTuple):
         return {"distance": self.chosen.judged.distance, "lip_height": lip_height}
 
 
-def plan_pour(run: Run, rig: "Rig") -> PourPlan:
+def plan_pour(run: Run, rig: "Rig") -> PourMotion:
     """The motion of the pour that a run has chosen.
 
     Raises:
@@ -72,7 +72,7 @@ def plan_pour(run: Run, rig: "Rig") -> PourPlan:
         **place,
     )
     check_path(path, rig, "pouring")
-    return PourPlan(chosen, ready_to_pour(rig, **place), path)
+    return PourMotion(chosen, ready_to_pour(rig, **place), path)
 
 
 def _check_receiver(chosen: ChosenPour, rig: "Rig") -> None:
@@ -120,7 +120,7 @@ def execute_pour(
         MotionRejected: The motion breaks one of the rig's limits.
         SessionStopped: The arm was stopped.
     """
-    check_one(ask, emulate, "execute_pour")
+    check_consent(ask, emulate, "execute_pour")
     rig = rig_of(rig)
     with Run.entered(run) as opened:
         plan = plan_pour(opened, rig)
@@ -136,7 +136,7 @@ def execute_pour(
 
 
 def _carried_out(
-    plan: PourPlan, rig: "Rig", ask: Ask | None, emulate: object, progress: bool
+    plan: PourMotion, rig: "Rig", ask: Ask | None, emulate: object, progress: bool
 ) -> Path:
     """The directory of what an arm, or its emulator, did."""
     from ..hardware import SessionInterrupted, emulated
@@ -147,7 +147,7 @@ def _carried_out(
     emulation = None
     if emulate:
         start = emulated(rig, plan.ready, tool="pouring")
-        emulation = Emulation(start, source="emulated UR arm")
+        emulation = EmulatedRobot(start, source="emulated UR arm")
     try:
         with (
             armed_session(task, ask=ask, emulation=emulation) as session,

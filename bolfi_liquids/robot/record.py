@@ -11,7 +11,7 @@ from ..inputs.open import check_recording, read_recording
 from ..inputs.recording import Recording
 from ..inputs.rigs import rig_of
 from ..wording import command
-from .armed_session import Ask, check_one, hidden_liquid
+from .armed_session import Ask, check_consent, hidden_liquid
 from .hidden_stir import with_stir
 from .live_view import SessionView
 from .stir import follow_plan, plan_stir, stir_session
@@ -53,14 +53,14 @@ def record(
         MotionRejected: The plan breaks one of the rig's limits.
         SessionStopped: The arm was stopped; the message says why.
     """
-    check_one(ask, emulate, "record")
+    check_consent(ask, emulate, "record")
     opened, hidden = rig_of(rig), hidden_liquid(emulate)
     plan, out = plan_stir(opened, cycles), given_path(out, Argument("out"))
     check_new(out)
     title = "stirring" if hidden is None else "stirring, emulated"
     hidden = None if hidden is None else with_stir(opened, plan, hidden)
     with (
-        kept(out),
+        save_on_stop(out),
         stir_session(opened, plan, out, ask=ask, emulate=hidden) as session,
         SessionView(title, shown=progress) as view,
     ):
@@ -101,7 +101,7 @@ def finished(directory: Path) -> Recording:
 
 
 @contextmanager
-def kept(directory: Path) -> Iterator[None]:
+def save_on_stop(directory: Path) -> Iterator[None]:
     """What is left of a session that is stopped within becomes a recording.
 
     Raises:

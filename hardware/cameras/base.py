@@ -12,7 +12,7 @@ class CameraError(RuntimeError):
     """A camera cannot be used; the message names it and says what to do."""
 
 
-class Camera(Protocol):
+class FrameSource(Protocol):
     """Anything that delivers frames."""
 
     def read(self) -> Frame | None:

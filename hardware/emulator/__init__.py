@@ -8,8 +8,8 @@ force mode, servoC, moveP, freedrive, scripts other than ur_rtde's. Passing here
 test of a robot.
 """
 
-from .admin_client import Admin, State
+from .admin_client import Admin, EmulatedArmState
 from .process import EmulatorProcess
 from .servers.network import check_address
 
-__all__ = ["Admin", "EmulatorProcess", "State", "check_address"]
+__all__ = ["Admin", "EmulatedArmState", "EmulatorProcess", "check_address"]

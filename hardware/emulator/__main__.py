@@ -13,7 +13,7 @@ from ..errors import RigError
 from ..motion.kinematics import ARMS
 from ..priority import hurry
 from .controller import HOME_JOINTS, MODELS, Options
-from .loop import Emulator
+from .loop import ControllerServer
 from .stick_motion import read
 
 
@@ -22,7 +22,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = _parser()
     given = parser.parse_args(arguments)
     try:
-        emulator = Emulator(given.address, _options(given))
+        emulator = ControllerServer(given.address, _options(given))
     except (RigError, TypeError, ValueError) as err:
         print(f"emulator: {err}", file=sys.stderr)
         return 2

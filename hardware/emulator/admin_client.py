@@ -8,7 +8,7 @@ from typing import NamedTuple
 from .servers.network import ADMIN
 
 
-class State(NamedTuple):
+class EmulatedArmState(NamedTuple):
     """State of the emulated arm.
 
     Attributes:
@@ -52,10 +52,10 @@ class Admin:
         self._address = address
         self._timeout = timeout
 
-    def state(self) -> State:
+    def state(self) -> EmulatedArmState:
         return _state(self._ask("state"))
 
-    def stream(self) -> Iterator[State]:
+    def stream(self) -> Iterator[EmulatedArmState]:
         """The state of every tick; ends when the emulator does. Close the iterator after use."""
         with self._connect() as link, link.makefile("rw", encoding="utf-8") as lines:
             lines.write('{"command": "stream"}\n')
@@ -106,9 +106,9 @@ class Admin:
         return answer
 
 
-def _state(reply: dict) -> State:
+def _state(reply: dict) -> EmulatedArmState:
     stick = reply["stick"]
-    return State(
+    return EmulatedArmState(
         time=reply["time"],
         pose=tuple(reply["pose"]),
         speed=tuple(reply["speed"]),

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..motion.kinematics import DhArm
-from .motion import ArmState, Motion, MotionError, Plan, Reactive, Timed, Tool, joint_speed
+from .motion import JointState, Motion, MotionError, Plan, Reactive, Timed, Tool, joint_speed
 
 RESTING_RATE = 1e-4  # rad/s; under 0.2 mm/s at the TCP
 _REST = np.zeros(6)
@@ -23,7 +23,7 @@ class Arm:
     """
 
     def __init__(self, model: DhArm, joints: np.ndarray, *, tcp_speed: float = 1.5):
-        self.state = ArmState(np.array(joints, dtype=float), _REST)
+        self.state = JointState(np.array(joints, dtype=float), _REST)
         self.tool = Tool(model, np.zeros(6))
         self.tcp_speed = tcp_speed
         self.pose = self.tool.pose(joints)
@@ -57,7 +57,7 @@ class Arm:
     def place(self, joints: np.ndarray) -> None:
         """Put the arm at rest at other joints, without a motion."""
         self.begin([])
-        self.state = ArmState(np.array(joints, dtype=float), _REST)
+        self.state = JointState(np.array(joints, dtype=float), _REST)
         self._look()
 
     def mount(self, tcp: np.ndarray) -> None:
@@ -76,7 +76,7 @@ class Arm:
             self._motion, self._elapsed = self._plans.pop(0)(self.state), 0.0
         if self._motion is None:
             if self.state.speed.any():
-                self.state = ArmState(self.state.joints, _REST)
+                self.state = JointState(self.state.joints, _REST)
                 self._look()
             return
         state = self._next(self._motion, dt, scale)
@@ -86,16 +86,16 @@ class Arm:
         if was_resting and not self.resting:
             self.started += 1
 
-    def _next(self, motion: Motion, dt: float, scale: float) -> ArmState:
+    def _next(self, motion: Motion, dt: float, scale: float) -> JointState:
         if isinstance(motion, Timed):
             self._elapsed += dt * scale
             joints = motion.joints(self._elapsed, self.state.joints)
             if self._elapsed >= motion.duration:
                 self._over()
-            return ArmState(joints, (joints - self.state.joints) / dt)
+            return JointState(joints, (joints - self.state.joints) / dt)
         return self._react(motion, dt, scale)
 
-    def _react(self, motion: Reactive, dt: float, scale: float) -> ArmState:
+    def _react(self, motion: Reactive, dt: float, scale: float) -> JointState:
         # a brake is not slowed down by the slider
         if motion.ends or scale == 1.0:
             state = motion.step(self.state, dt)
@@ -105,19 +105,19 @@ class Arm:
             self._over()
         return state
 
-    def _slowed(self, motion: Reactive, dt: float, scale: float) -> ArmState:
+    def _slowed(self, motion: Reactive, dt: float, scale: float) -> JointState:
         if scale <= 0.0:
-            return ArmState(self.state.joints, _REST)
+            return JointState(self.state.joints, _REST)
         # the same motion in a time that runs slower
-        own = ArmState(self.state.joints, self.state.speed / scale)
+        own = JointState(self.state.joints, self.state.speed / scale)
         state = motion.step(own, dt * scale)
-        return ArmState(state.joints, state.speed * scale)
+        return JointState(state.joints, state.speed * scale)
 
     def _over(self) -> None:
         self._motion = None
         self.index += 1
 
-    def _check(self, state: ArmState) -> None:
+    def _check(self, state: JointState) -> None:
         # in plain floats: every tick, a fifth of what NumPy's functions take for six numbers
         model, joints, speed = self.tool.arm, state.joints.tolist(), state.speed.tolist()
         if not all(map(math.isfinite, (*joints, *speed))):

@@ -9,7 +9,7 @@ from ..motion.poses import compose
 from .arm import Arm
 from .machine import ProgramError, RunningScript
 from .motion import (
-    ArmState,
+    JointState,
     Motion,
     Plan,
     joint_move,
@@ -36,7 +36,7 @@ def within_limits(arm: Arm, pose: np.ndarray) -> bool:
 def _plan(arm: Arm, waypoint: Waypoint) -> Plan:
     target = np.array(waypoint.target)
 
-    def plan(state: ArmState) -> Motion:
+    def plan(state: JointState) -> Motion:
         profile = (waypoint.speed, waypoint.acceleration)
         if waypoint.kind == "movej":
             joints = arm.tool.joints(target, state.joints) if waypoint.is_pose else target

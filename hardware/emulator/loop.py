@@ -14,7 +14,7 @@ from .servers.script import ScriptSession
 MAX_LATENESS = 0.05  # s; ticks that are later are left out, not made up for
 
 
-class Emulator:
+class ControllerServer:
     """A controller with its four ports open.
 
     Attributes:

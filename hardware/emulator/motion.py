@@ -24,7 +24,7 @@ class MotionError(Exception):
     """The arm cannot do what it was told; the controller answers with a protective stop."""
 
 
-class ArmState(NamedTuple):
+class JointState(NamedTuple):
     """Joints [rad] and their speeds [rad/s], each of shape [6]."""
 
     joints: np.ndarray
@@ -93,7 +93,7 @@ class Timed(NamedTuple):
     joints: Callable[[float, np.ndarray], np.ndarray]
 
 
-Step = Callable[[ArmState, float], ArmState]
+Step = Callable[[JointState, float], JointState]
 
 
 class Reactive(NamedTuple):
@@ -107,7 +107,7 @@ class Reactive(NamedTuple):
 
 
 Motion = Timed | Reactive
-Plan = Callable[[ArmState], Motion]
+Plan = Callable[[JointState], Motion]
 
 
 def line(tool: Tool, start: np.ndarray, pose: np.ndarray, speed: float, rate: float) -> Timed:
@@ -176,7 +176,7 @@ def servo(arm: DhArm, target: np.ndarray, lookahead: float, gain: float, limit: 
         raise MotionError(f"joints {np.round(target, 3).tolist()} are beyond the joint limits")
     fastest = np.array(arm.joint_speed)
 
-    def step(state: ArmState, dt: float) -> ArmState:
+    def step(state: JointState, dt: float) -> JointState:
         stay, push, swing, keep = oscillator(gain, gain * lookahead, dt)
         away = state.joints - target
         wanted = swing * away + keep * state.speed
@@ -187,8 +187,8 @@ def servo(arm: DhArm, target: np.ndarray, lookahead: float, gain: float, limit: 
         else:
             joints = state.joints + 0.5 * dt * (state.speed + speed)
         if np.abs(joints - target).max() < 1e-8 and np.abs(speed).max() < 1e-6:
-            return ArmState(target, np.zeros(6))
-        return ArmState(joints, speed)
+            return JointState(target, np.zeros(6))
+        return JointState(joints, speed)
 
     return Reactive(step)
 
@@ -218,9 +218,9 @@ def joint_speed(arm: DhArm, target: np.ndarray, rate: float, *, ends: bool = Fal
     if rate <= 0.0:
         raise MotionError(f"acceleration {rate} must be positive")
 
-    def step(state: ArmState, dt: float) -> ArmState:
+    def step(state: JointState, dt: float) -> JointState:
         speed = approached(state.speed, target, rate * dt, largest=True)
-        return ArmState(state.joints + 0.5 * dt * (state.speed + speed), speed)
+        return JointState(state.joints + 0.5 * dt * (state.speed + speed), speed)
 
     return Reactive(step, ends)
 
@@ -234,7 +234,7 @@ def twist(tool: Tool, target: np.ndarray, rate: float, *, ends: bool = False) ->
     if rate <= 0.0:
         raise MotionError(f"acceleration {rate} must be positive")
 
-    def step(state: ArmState, dt: float) -> ArmState:
+    def step(state: JointState, dt: float) -> JointState:
         moving = tool.jacobian(state.joints) @ state.speed
         next_twist = np.concatenate(
             [
@@ -243,13 +243,13 @@ def twist(tool: Tool, target: np.ndarray, rate: float, *, ends: bool = False) ->
             ]
         )
         if not next_twist.any():
-            return ArmState(state.joints + 0.5 * dt * state.speed, np.zeros(6))
+            return JointState(state.joints + 0.5 * dt * state.speed, np.zeros(6))
         ahead = state.joints + dt * state.speed
         try:
             speed = np.linalg.solve(tool.jacobian(ahead), next_twist)
         except np.linalg.LinAlgError as err:
             raise MotionError("the arm is in a singular configuration") from err
-        return ArmState(state.joints + 0.5 * dt * (state.speed + speed), speed)
+        return JointState(state.joints + 0.5 * dt * (state.speed + speed), speed)
 
     return Reactive(step, ends)
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..rig import Cup
+from ..rig import CupSettings
 
 
 class CupFrame(NamedTuple):
@@ -27,7 +27,7 @@ class CupFrame(NamedTuple):
         return np.concatenate([(pose[..., :3] - self.origin) @ self.axes, pose[..., 3:]], axis=-1)
 
 
-def cup_frame(cup: Cup) -> CupFrame:
+def cup_frame(cup: CupSettings) -> CupFrame:
     """The frame of a rig's cup."""
     yaw = np.radians(cup.yaw_deg)
     cos, sin = np.cos(yaw), np.sin(yaw)

@@ -80,7 +80,7 @@ class Inverse(NamedTuple):
     status: Literal["ok", "singular", "unreachable"]
 
 
-class Followed(NamedTuple):
+class JointPath(NamedTuple):
     """Joints along a path of poses.
 
     Attributes:
@@ -268,7 +268,7 @@ def follow(
     times: np.ndarray | None = None,
     tcp: Numbers | None = None,
     largest_step: float = 0.3,
-) -> Followed:
+) -> JointPath:
     """Joints along a whole path, each nearest to the one before, and whether the arm can go it.
 
     Call it before any motion: a path of which every pose can be reached may still ask for a jump
@@ -310,9 +310,9 @@ def follow(
         share = (speeds / arm.joint_speed).max(axis=1)
     fastest = float("nan") if spans is None else float(share.max(initial=0.0))
     if reached < len(poses):
-        return Followed(joints, "unreachable", reached, step, fastest)
+        return JointPath(joints, "unreachable", reached, step, fastest)
     if step > largest_step:
-        return Followed(joints, "jump", int(np.argmax(steps > largest_step)), step, fastest)
+        return JointPath(joints, "jump", int(np.argmax(steps > largest_step)), step, fastest)
     if fastest > 1.0:
-        return Followed(joints, "too fast", int(np.argmax(share > 1.0)) + 1, step, fastest)
-    return Followed(joints, "ok", None, step, fastest)
+        return JointPath(joints, "too fast", int(np.argmax(share > 1.0)) + 1, step, fastest)
+    return JointPath(joints, "ok", None, step, fastest)

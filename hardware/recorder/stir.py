@@ -11,8 +11,7 @@ from ..motion.trajectory import Trajectory
 from ..rig import View
 from ..vision.clock import Clock, ClockError, fit_clock
 from ..vision.frame_measurement import BAD_LINE
-from ..vision.joined_views import View as JoinedView
-from ..vision.joined_views import join
+from ..vision.joined_views import MeasuredView, join
 from ..vision.measurement_series import FrameSeries
 from .directory import VIEWS
 from .raw import Columns, Raw, frame_series
@@ -82,7 +81,7 @@ def extract_stir(
     _check_length(span, where)
     time = np.arange(np.floor((span.last - span.first) * TABLE_RATE + 1e-6) + 1) / TABLE_RATE
     times = span.first + time
-    xz, yz = (JoinedView(series[v], fitted[v], raw.provenance.cameras[v]) for v in VIEWS)
+    xz, yz = (MeasuredView(series[v], fitted[v], raw.provenance.cameras[v]) for v in VIEWS)
     joined = join(xz, yz, times)
     position = [np.interp(times, raw.samples["time"], raw.samples[axis]) for axis in "xyz"]
     unknown = _in_gap(raw.samples["time"], times)

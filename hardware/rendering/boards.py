@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..vision.camera_model import CameraModel
-from ..vision.charuco import Board
+from ..vision.charuco import CharucoBoard
 from ..vision.opencv import opencv
 from .coverage import bar_coverage, blend, window_around
 from .faults import noise_pool
@@ -15,7 +15,7 @@ INK, PAPER = 30.0, 220.0
 
 
 def render_board(
-    board: Board,
+    board: CharucoBoard,
     camera: CameraModel,
     rotation: np.ndarray,
     position: np.ndarray,

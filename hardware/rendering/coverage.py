@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 
-class Window(NamedTuple):
+class PixelWindow(NamedTuple):
     """A part of the picture: rows and columns from the first to before the last."""
 
     top: int
@@ -19,14 +19,14 @@ class Window(NamedTuple):
         return self.bottom <= self.top or self.right <= self.left
 
 
-def window_around(points: np.ndarray, size: tuple[int, int], margin: float = 2.0) -> Window:
+def window_around(points: np.ndarray, size: tuple[int, int], margin: float = 2.0) -> PixelWindow:
     """The part of a picture of `size` (width, height) that holds points [px], shape (N, 2)."""
     if not np.isfinite(points).all():
-        return Window(0, 0, 0, 0)
+        return PixelWindow(0, 0, 0, 0)
     left, top = np.floor(points.min(axis=0) - margin)
     right, bottom = np.ceil(points.max(axis=0) + margin) + 1
     width, height = size
-    return Window(
+    return PixelWindow(
         int(np.clip(top, 0, height)),
         int(np.clip(bottom, 0, height)),
         int(np.clip(left, 0, width)),
@@ -34,7 +34,7 @@ def window_around(points: np.ndarray, size: tuple[int, int], margin: float = 2.0
     )
 
 
-def bar_coverage(sides: np.ndarray, window: Window) -> np.ndarray:
+def bar_coverage(sides: np.ndarray, window: PixelWindow) -> np.ndarray:
     """Covered share of each pixel of a window by a bar, float32.
 
     Exact for an edge along the pixel's sides, and for other directions of mean error zero, so
@@ -52,7 +52,7 @@ def bar_coverage(sides: np.ndarray, window: Window) -> np.ndarray:
     return np.maximum(inside[0] + inside[1] - 1.0, 0.0) * ends[0] * ends[1]
 
 
-def _half_plane(edge: np.ndarray, inwards: np.ndarray, window: Window) -> np.ndarray:
+def _half_plane(edge: np.ndarray, inwards: np.ndarray, window: PixelWindow) -> np.ndarray:
     """Covered share on the side of an edge, through points of shape (K, 2), that is inwards."""
     columns = np.arange(window.left, window.right)
     rows = np.arange(window.top, window.bottom)
@@ -75,7 +75,7 @@ def _outer_sum(down: np.ndarray, across: np.ndarray) -> np.ndarray:
     return np.add.outer(down.astype(np.float32), across.astype(np.float32))
 
 
-def disc_coverage(centre: np.ndarray, radius: float, window: Window) -> np.ndarray:
+def disc_coverage(centre: np.ndarray, radius: float, window: PixelWindow) -> np.ndarray:
     """Covered share of each pixel of a window by a disc [px], float32."""
     columns = np.arange(window.left, window.right, dtype=np.float32) - np.float32(centre[0])
     rows = np.arange(window.top, window.bottom, dtype=np.float32) - np.float32(centre[1])
@@ -83,7 +83,7 @@ def disc_coverage(centre: np.ndarray, radius: float, window: Window) -> np.ndarr
     return np.clip(radius + 0.5 - distance, 0.0, 1.0)
 
 
-def blend(image: np.ndarray, window: Window, coverage: np.ndarray, grey: float) -> None:
+def blend(image: np.ndarray, window: PixelWindow, coverage: np.ndarray, grey: float) -> None:
     """Paint a grey level over a part of the picture, in place."""
     part = image[window.top : window.bottom, window.left : window.right]
     part[...] = np.rint(part + coverage * (np.float32(grey) - part)).astype(np.uint8)

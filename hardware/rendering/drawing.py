@@ -7,8 +7,8 @@ import numpy as np
 
 from ..vision.camera_model import CameraModel
 from ..vision.opencv import opencv
-from .coverage import Window, bar_coverage, blend, disc_coverage, window_around
-from .faults import Fault, Noise, draw_fault, noise_pool
+from .coverage import PixelWindow, bar_coverage, blend, disc_coverage, window_around
+from .faults import Fault, PixelNoise, draw_fault, noise_pool
 from .scene import Look, Scene, circle
 from .stick_shape import bar_sides, submerged_outline, surface_share
 from .world import WorldState
@@ -38,8 +38,8 @@ class Stage:
     backdrop: np.ndarray
     glass: tuple[np.ndarray, ...]
     liquid: np.ndarray
-    noise: Noise
-    area: Window
+    noise: PixelNoise
+    area: PixelWindow
 
 
 def prepare(scene: Scene, camera: CameraModel, look: Look, seed: int = 0) -> Stage:

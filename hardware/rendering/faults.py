@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..vision.opencv import opencv
-from .coverage import Window
+from .coverage import PixelWindow
 
 FRAMES_PER_FAULT = 3  # what gets in the way stays for a tenth of a second
 
@@ -29,7 +29,7 @@ class Fault(NamedTuple):
     grey: float
 
 
-def fault_of(index: int, share: float, area: Window, seed: int) -> Fault | None:
+def fault_of(index: int, share: float, area: PixelWindow, seed: int) -> Fault | None:
     """The fault in frame `index`, None for most; the same seed gives the same faults.
 
     Args:
@@ -81,7 +81,7 @@ def _draw_glare(image: np.ndarray, fault: Fault) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Noise:
+class PixelNoise:
     """Read and shot noise from a pool of normal numbers, cut out at a random place each time.
 
     Attributes:
@@ -103,7 +103,7 @@ class Noise:
         return cv2.add(image, noisy, dtype=cv2.CV_8U)
 
 
-def noise_pool(size: tuple[int, int], read: float, shot: float, seed: int) -> Noise:
+def noise_pool(size: tuple[int, int], read: float, shot: float, seed: int) -> PixelNoise:
     """Prepare noise for pictures of `size` (width, height).
 
     Args:
@@ -114,4 +114,4 @@ def noise_pool(size: tuple[int, int], read: float, shot: float, seed: int) -> No
     """
     rng = np.random.default_rng(seed)
     pool = rng.standard_normal((size[1] + 397, size[0] + 499), dtype=np.float32)
-    return Noise(pool, np.sqrt(read**2 + shot * np.arange(256)).astype(np.float32))
+    return PixelNoise(pool, np.sqrt(read**2 + shot * np.arange(256)).astype(np.float32))

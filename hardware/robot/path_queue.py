@@ -39,7 +39,7 @@ class Course(NamedTuple):
     played: int = 0
 
 
-class Turn(NamedTuple):
+class LegChange(NamedTuple):
     """What a period brought: the path that ended, the path that began."""
 
     done: Leg | None
@@ -51,13 +51,13 @@ def queued(course: Course, leg: Leg) -> Course:
     return course._replace(waiting=(*course.waiting, leg))
 
 
-def advanced(course: Course) -> tuple[Course, Turn]:
+def advanced(course: Course) -> tuple[Course, LegChange]:
     """One period later. A tick that came late delays the path; it never hurries it."""
     leg = course.leg
     if leg is not None and course.at + 1 < len(leg.base):
         at = course.at + 1
         moved = course._replace(at=at, hold=leg.base[at], played=course.played + 1)
-        return moved, Turn(None, None)
+        return moved, LegChange(None, None)
     if course.waiting:
         first, *rest = course.waiting
         # what is commanded already is not commanded again: joined paths keep their time
@@ -65,8 +65,8 @@ def advanced(course: Course) -> tuple[Course, Turn]:
         moved = course._replace(
             leg=first, at=at, hold=first.base[at], waiting=tuple(rest), played=course.played + 1
         )
-        return moved, Turn(leg, first)
-    return course._replace(leg=None), Turn(leg, None)
+        return moved, LegChange(leg, first)
+    return course._replace(leg=None), LegChange(leg, None)
 
 
 class Trail:

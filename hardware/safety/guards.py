@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from ..arm import ArmState
 from ..board import Row, Trouble, Who
-from ..rig import Box, Limits
+from ..rig import AxisLimits, Limits
 
 NORMAL, REDUCED = 1 << 0, 1 << 1
 RUNNING_MODE, PLAYING = 7, 2
@@ -52,7 +52,7 @@ GUARD_MESSAGES = {
 CAMERAS = {Who.CAMERA_XZ: "camera xz", Who.CAMERA_YZ: "camera yz"}
 
 
-class Watch(NamedTuple):
+class GuardState(NamedTuple):
     """What is remembered from tick to tick.
 
     Attributes:
@@ -84,7 +84,7 @@ class Seen(NamedTuple):
     """
 
     state: ArmState
-    watch: Watch
+    watch: GuardState
     position: tuple[float, float, float]
     error: float
     turn_error: float
@@ -98,7 +98,7 @@ class Rules(NamedTuple):
     """What the guards hold a tick against: the rig's limits and the box of the tool."""
 
     limits: Limits
-    box: Box
+    box: AxisLimits
 
 
 class Reading(NamedTuple):
@@ -127,12 +127,12 @@ class Trip(NamedTuple):
     reason: str
 
 
-def first_watch(state: ArmState, now: float, wrench: tuple[float, ...]) -> Watch:
+def first_watch(state: ArmState, now: float, wrench: tuple[float, ...]) -> GuardState:
     """Nothing seen but one state."""
-    return Watch(state.time, now, now - state.time, wrench)
+    return GuardState(state.time, now, now - state.time, wrench)
 
 
-def watched(watch: Watch, state: ArmState, now: float, period: float) -> Watch:
+def watched(watch: GuardState, state: ArmState, now: float, period: float) -> GuardState:
     """What is remembered after another state, read at host time `now` [s]."""
     if state.time <= watch.time:
         return watch
@@ -214,7 +214,7 @@ def safety_text(safety_bits: int) -> str:
     return f"safety_status_bits = {safety_bits} ({', '.join(said) or 'normal'})"
 
 
-def _outside(position: tuple[float, float, float], box: Box) -> float:
+def _outside(position: tuple[float, float, float], box: AxisLimits) -> float:
     """Distance from the box's middle, as a share of the way to its side; largest of the axes."""
     shares = [
         abs(value - 0.5 * (low + high)) / (0.5 * (high - low))

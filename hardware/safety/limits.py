@@ -18,7 +18,7 @@ from ..motion.kinematics import (
     inverse,
 )
 from ..motion.stir_paths import PosePath
-from ..rig import Box, Limits, Rig
+from ..rig import AxisLimits, Limits, Rig
 
 Tool = Literal["stirring", "pouring"]
 ARMS = {"cb3": UR10, "e-series": UR10E}
@@ -44,7 +44,7 @@ class Workspace(NamedTuple):
         start: Joints near which it works [rad].
     """
 
-    box: Box
+    box: AxisLimits
     tcp: np.ndarray
     orientation: np.ndarray
     tilt: float
@@ -238,7 +238,7 @@ def _check_turns(part: _Part, space: Workspace, limits: Limits) -> None:
         _bound(part.time[1:], np.degrees(rate), most, "tilt rate", "deg/s")
 
 
-def _check_box(part: _Part, box: Box, limits: Limits) -> None:
+def _check_box(part: _Part, box: AxisLimits, limits: Limits) -> None:
     speed = np.linalg.norm(np.diff(part.pose[:, :3], axis=0), axis=1) / _period(part.time)
     fastest = np.maximum(np.append(speed, 0.0), np.insert(speed, 0, 0.0))
     kept = np.asarray(margin(fastest, limits))

@@ -8,13 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..cameras import Camera as OpenCamera
-from ..cameras import CameraError, FilesCamera
+from ..cameras import CameraError, FilesCamera, FrameSource
 from ..errors import RigError
 from ..recorder.views import camera_model
 from ..rig import Camera
 from ..vision.camera_model import CameraModel, write_camera
-from ..vision.charuco import Board, CalibrationError, Intrinsics, calibrate_intrinsics
+from ..vision.charuco import CalibrationError, CharucoBoard, Intrinsics, calibrate_intrinsics
 from ..vision.plumb_line import PlumbLineError, level_camera
 from .cameras import RigCamera
 
@@ -36,7 +35,7 @@ class CalibratedCamera(NamedTuple):
 
 
 def calibrate_camera(
-    camera: Camera, boards: Sequence[np.ndarray], board: Board, plumb_line: np.ndarray | None
+    camera: Camera, boards: Sequence[np.ndarray], board: CharucoBoard, plumb_line: np.ndarray | None
 ) -> CalibratedCamera:
     """Lens and roll of a rig's camera.
 
@@ -104,7 +103,7 @@ def take_pictures(camera: Camera, count: int, ask: Callable[[int], object]) -> l
         raise RigError(str(err), where=where, fix="correct rig.toml") from err
 
 
-def _after(ask: Callable[[int], object], number: int, source: OpenCamera) -> np.ndarray:
+def _after(ask: Callable[[int], object], number: int, source: FrameSource) -> np.ndarray:
     ask(number)
     source.read()  # what the driver has kept from before
     frame = source.read()

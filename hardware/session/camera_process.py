@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..board import Board, Row, Trouble, Who, host_time
-from ..cameras.base import Camera, CameraError
+from ..cameras.base import CameraError, FrameSource
 from ..priority import come_first
 from ..recorder.csv_file import CsvAppender
 from ..recorder.disk import Disk, told_if_fails
@@ -36,7 +36,7 @@ WHO: dict[View, Who] = {"xz": Who.CAMERA_XZ, "yz": Who.CAMERA_YZ}
 def run_camera(
     rig: Rig,
     view: View,
-    make_camera: Callable[[], Camera],
+    make_camera: Callable[[], FrameSource],
     board: Board,
     main: Connection,
     directory: Path,
@@ -128,7 +128,7 @@ class _CameraProcess:
         self._video: VideoWriter | None = None
         disk.write(frames_file(view), partial(self._open, rig, directory))
 
-    def follow(self, make_camera: Callable[[], Camera], leaving: Event) -> None:
+    def follow(self, make_camera: Callable[[], FrameSource], leaving: Event) -> None:
         """Take pictures until the end, or until the camera gives no more."""
         try:
             with closing(make_camera()) as camera:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from ..cameras.base import Camera as OpenCamera
+from ..cameras.base import FrameSource
 from ..rig import Camera, Rig, View
 
 
@@ -12,7 +12,7 @@ class RigCamera(NamedTuple):
 
     camera: Camera
 
-    def __call__(self) -> OpenCamera:
+    def __call__(self) -> FrameSource:
         from ..cameras import FilesCamera, Webcam, WebcamSettings
 
         camera = self.camera
@@ -22,6 +22,6 @@ class RigCamera(NamedTuple):
         return FilesCamera(str(camera.source), rate=camera.rate)
 
 
-def webcams(rig: Rig) -> dict[View, Callable[[], OpenCamera]]:
+def webcams(rig: Rig) -> dict[View, Callable[[], FrameSource]]:
     """By view, what opens the camera that the rig's file names."""
     return {camera.view: RigCamera(camera) for camera in rig.cameras}

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..board import check_can_start
-from ..cameras.base import Camera
+from ..cameras.base import FrameSource
 from ..emulator.process import EmulatorProcess
 from ..emulator.stick_motion import StickMotion, checked, hanging_still
 from ..errors import RigError
@@ -58,7 +58,7 @@ class EmulatedRig(NamedTuple):
     """
 
     emulator: EmulatorProcess
-    make_cameras: dict[View, Callable[[], Camera]]
+    make_cameras: dict[View, Callable[[], FrameSource]]
 
 
 @contextmanager
@@ -96,7 +96,7 @@ def emulated(
         stick=_stick(rig, pose, liquid) if tool == "stirring" else None,
         options={"seed": liquid.seed, "tcp": json.dumps(list(workspace(rig, tool).tcp))},
     ) as emulator:
-        cameras: dict[View, Callable[[], Camera]] = {
+        cameras: dict[View, Callable[[], FrameSource]] = {
             view: RenderedView(rig, view, emulator.address, liquid.seed, truth) for view in _SEEDS
         }
         yield EmulatedRig(emulator, cameras)
@@ -111,7 +111,7 @@ class RenderedView(NamedTuple):
     seed: int
     truth: Path | None
 
-    def __call__(self) -> Camera:
+    def __call__(self) -> FrameSource:
         from ..cameras.rendered import RenderedCamera, Timing
         from ..rendering import BRIGHT_STICK, CupPlace, Look, Scene, StreamedWorld, prepare
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..board import SPAWN, Board, Who, host_time
-from ..cameras.base import Camera
+from ..cameras.base import FrameSource
 from ..recorder.events import EventLog
 from ..recorder.process import run_recorder
 from ..rig import View
@@ -40,7 +40,7 @@ class Processes:
         self._supervisor: threading.Thread | None = None
 
     def start(
-        self, assignment: Assignment, make_cameras: Mapping[View, Callable[[], Camera]]
+        self, assignment: Assignment, make_cameras: Mapping[View, Callable[[], FrameSource]]
     ) -> None:
         """Start them all; those that were started before an error are among `children`."""
         board, directory = self._board, Path(assignment.directory)
@@ -61,7 +61,7 @@ class Processes:
             writing.close()
 
     def _start_camera(
-        self, assignment: Assignment, view: View, make: Callable[[], Camera]
+        self, assignment: Assignment, view: View, make: Callable[[], FrameSource]
     ) -> Child:
         rig, board, directory = assignment.rig, self._board, Path(assignment.directory)
         return start(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..cameras.base import Camera
+from ..cameras.base import FrameSource
 from ..errors import RigError
 from ..motion.cup_frame import cup_frame
 from ..motion.stir_paths import PosePath
@@ -45,7 +45,7 @@ class SessionSetup:
     rig: Rig
     directory: Path
     address: str | None = None
-    make_cameras: Mapping[View, Callable[[], Camera]] = field(default_factory=dict)
+    make_cameras: Mapping[View, Callable[[], FrameSource]] = field(default_factory=dict)
     tool: Tool = "stirring"
     armed: bool = False
     confirmation: Confirmation | None = None

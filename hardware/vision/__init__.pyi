@@ -3,8 +3,8 @@ from .camera_model import CameraModelError as CameraModelError
 from .camera_model import look_at as look_at
 from .camera_model import read_camera as read_camera
 from .camera_model import write_camera as write_camera
-from .charuco import Board as Board
 from .charuco import CalibrationError as CalibrationError
+from .charuco import CharucoBoard as CharucoBoard
 from .charuco import Intrinsics as Intrinsics
 from .charuco import calibrate_intrinsics as calibrate_intrinsics
 from .clock import Clock as Clock
@@ -20,7 +20,7 @@ from .inclination import ViewLines as ViewLines
 from .inclination import direction as direction
 from .inclination import inclination as inclination
 from .joined_views import JoinedInclination as JoinedInclination
-from .joined_views import View as View
+from .joined_views import MeasuredView as MeasuredView
 from .joined_views import join as join
 from .measurement_series import FrameSeries as FrameSeries
 from .measurement_series import as_series as as_series

@@ -21,7 +21,7 @@ class CalibrationError(ValueError):
 
 
 @dataclass(frozen=True)
-class Board:
+class CharucoBoard:
     """A printed ChArUco board, markers of OpenCV's dictionary 5X5_100.
 
     Attributes:
@@ -63,7 +63,7 @@ class Intrinsics(NamedTuple):
         rms: Root mean square distance between corners seen and corners expected [px].
         focal_error: Standard errors of `focal` [px].
         views: Number of pictures used.
-        legacy: Whether the board's pattern was found to be the older one, see `Board`.
+        legacy: Whether the board's pattern was found to be the older one, see `CharucoBoard`.
     """
 
     focal: tuple[float, float]
@@ -92,7 +92,7 @@ class _View(NamedTuple):
     pixels: np.ndarray  # (N, 1, 2)
 
 
-def calibrate_intrinsics(images: Sequence[np.ndarray], board: Board) -> Intrinsics:
+def calibrate_intrinsics(images: Sequence[np.ndarray], board: CharucoBoard) -> Intrinsics:
     """Focal lengths, centre and distortion from pictures of a board.
 
     Both patterns of boards are tried, that of `board` first. Pictures with fewer than 8 corners are
@@ -133,7 +133,7 @@ def calibrate_intrinsics(images: Sequence[np.ndarray], board: Board) -> Intrinsi
     return intrinsics._replace(legacy=legacy)
 
 
-def _views(images: Sequence[np.ndarray], board: Board) -> tuple[bool, list[_View]]:
+def _views(images: Sequence[np.ndarray], board: CharucoBoard) -> tuple[bool, list[_View]]:
     """Whether the older pattern is seen in more pictures, and those that show enough of it."""
     found: dict[bool, list[_View]] = {}
     for legacy in (board.legacy, not board.legacy):
@@ -146,7 +146,7 @@ def _views(images: Sequence[np.ndarray], board: Board) -> tuple[bool, list[_View
     return best, found[best]
 
 
-def _corners(image: np.ndarray, board: Board) -> _View | None:
+def _corners(image: np.ndarray, board: CharucoBoard) -> _View | None:
     printed = board.opencv_board()
     corners, ids, _, _ = opencv().aruco.CharucoDetector(printed).detectBoard(image)
     if ids is None or len(ids) < LEAST_CORNERS:

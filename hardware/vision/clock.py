@@ -104,7 +104,7 @@ def fit_clock(
     )
 
 
-class _Fit(NamedTuple):
+class _ClockStep(NamedTuple):
     """Step of offset and drift, their covariance, and what is left [px]."""
 
     step: np.ndarray
@@ -113,7 +113,7 @@ class _Fit(NamedTuple):
     misfit: float
 
 
-def _as_clock(state: np.ndarray, reference: float, fit: _Fit) -> Clock:
+def _as_clock(state: np.ndarray, reference: float, fit: _ClockStep) -> Clock:
     return Clock(
         offset=float(state[0]),
         drift=float(state[1]),
@@ -188,7 +188,7 @@ def _search(time: np.ndarray, pixels: np.ndarray, path: _Path) -> float:
 
 def _linear_fit(
     state: np.ndarray, elapsed: np.ndarray, stamp: np.ndarray, pixels: np.ndarray, path: _Path
-) -> _Fit:
+) -> _ClockStep:
     """One round: the problem made linear about `state`, solved with Huber's weights."""
     time = stamp + state[0] + state[1] * elapsed
     target = (pixels - path.pixels(time)).T.ravel()
@@ -208,7 +208,7 @@ def _linear_fit(
         solution = np.linalg.solve(normal, right)
         left = target - columns @ solution
     kept = weight > 0
-    return _Fit(
+    return _ClockStep(
         step=solution[:2],
         covariance=np.linalg.inv(normal)[:2, :2],
         residual=float(np.sqrt(np.mean(left[kept] ** 2))),

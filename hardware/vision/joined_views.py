@@ -25,7 +25,7 @@ class JoinedInclination(NamedTuple):
     flags: np.ndarray
 
 
-class View(NamedTuple):
+class MeasuredView(NamedTuple):
     """One camera's share: its measurements, clock and model."""
 
     series: FrameSeries
@@ -33,7 +33,7 @@ class View(NamedTuple):
     camera: CameraModel
 
 
-def join(xz: View, yz: View, times: np.ndarray) -> JoinedInclination:
+def join(xz: MeasuredView, yz: MeasuredView, times: np.ndarray) -> JoinedInclination:
     """Inclination of the stick from two cameras that do not take their frames together.
 
     Each view's line is interpolated to the wanted times, then both are joined.

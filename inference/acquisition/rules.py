@@ -1,7 +1,7 @@
 """Acquisition rules: where to simulate next.
 
-Every rule scores in logs, so that nothing underflows far from the posterior, and believes each
-point of a batch before it chooses the next (see `believe` of the surrogates).
+Every rule scores in logs, so that nothing underflows far from the posterior, and fantasizes each
+point of a batch before it chooses the next (see `fantasize` of the surrogates).
 """
 
 from collections.abc import Callable
@@ -70,14 +70,14 @@ class LowerConfidenceBound:
 
     @in_float64
     def __call__(self, key: jax.Array, surrogate: Surrogate, n: int) -> np.ndarray:
-        """n points u [n, d]; each is believed before the next is chosen."""
+        """n points u [n, d]; each is fantasized before the next is chosen."""
         rng, points = generator(key), []
         while len(points) < n:
             bound = partial(lower_confidence_bound, surrogate)
             centre = minimise_in_box(bound, surrogate.gp.data.u.shape[1])
             points.append(truncated_normal(rng, centre, self.jitter))
             if len(points) < n:
-                surrogate = surrogate.believe(points[-1][None])
+                surrogate = surrogate.fantasize(points[-1][None])
         return np.stack(points)
 
 
@@ -142,7 +142,7 @@ Score = Callable[[np.random.Generator, Surrogate, Candidates], np.ndarray]
 
 @in_float64
 def best_candidates(score: Score, key: jax.Array, surrogate: Surrogate, n: int) -> np.ndarray:
-    """The candidates of highest score, each believed before the next is scored: [n, d].
+    """The candidates of highest score, each fantasized before the next is scored: [n, d].
 
     The score is lowered by the log chance that a run succeeds.
     """
@@ -157,7 +157,7 @@ def best_candidates(score: Score, key: jax.Array, surrogate: Surrogate, n: int) 
             scores = np.where(_taken(found.u, points), -np.inf, rng.uniform(size=len(found.u)))
         points.append(found.u[np.argmax(scores)])
         if len(points) < n:
-            surrogate = surrogate.believe(points[-1][None])
+            surrogate = surrogate.fantasize(points[-1][None])
     return np.stack(points)
 
 
@@ -255,7 +255,7 @@ class CautiousDraws:
             points = PosteriorDraws()(key, surrogate.cautious, first)
         if first == n:
             return points
-        more = ExpectedIntegratedVariance()(key, surrogate.believe(points), n - first)
+        more = ExpectedIntegratedVariance()(key, surrogate.fantasize(points), n - first)
         return np.concatenate([points, more])
 
 

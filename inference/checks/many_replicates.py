@@ -26,7 +26,7 @@ from ..simulations.failures import Failure, kind, unusable
 from ..simulations.job import BATCH
 from ..types import Simulator
 from .finished_replicates import Replicates
-from .one_replicate import Observe, Pipeline, Plan, Replicate, run_replicate
+from .one_replicate import Observe, Pipeline, Replicate, ReplicatePlan, run_replicate
 from .store import ReplicateStore
 
 BLOCK = 256  # truths are made in blocks of one shape, so that JAX seldom compiles
@@ -96,7 +96,9 @@ def replicates(  # noqa: PLR0913  one flat place for what defines a check
     check_executor(executor)
     n, seed = checked_integer("n", n), checked_integer("seed", seed, 0)
     draws = checked_integer("draws", draws)
-    plan = Plan(pipeline, simulator, observe, prior.names, seed, draws, independent, timeout)
+    plan = ReplicatePlan(
+        pipeline, simulator, observe, prior.names, seed, draws, independent, timeout
+    )
     settings = _settings(plan, prior) | {"identity": identity}
     truths = _truths(prior, n, seed)
     with ExitStack() as stack:
@@ -150,7 +152,7 @@ def check_level(alpha: object) -> None:
     checked_number("alpha", alpha, lambda a: 0.0 < a < 1.0, "a number between 0 and 1")
 
 
-def _settings(plan: Plan, prior: Prior) -> dict[str, str]:
+def _settings(plan: ReplicatePlan, prior: Prior) -> dict[str, str]:
     """All that a replicate's draws depend on, as text."""
     given = plan._asdict()
     del given["timeout"]
@@ -172,7 +174,7 @@ def _own(pipeline: Pipeline, name: str, given: Any) -> Any:
 
 
 def _run(
-    plan: Plan, numbers: list[int], truths: np.ndarray, executor: Executor | None
+    plan: ReplicatePlan, numbers: list[int], truths: np.ndarray, executor: Executor | None
 ) -> Generator[Replicate, None, None]:
     """Replicates as they finish."""
     if executor is None:

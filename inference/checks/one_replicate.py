@@ -35,7 +35,7 @@ class Pipeline(Protocol):
         ...
 
 
-class Plan(NamedTuple):
+class ReplicatePlan(NamedTuple):
     """What all replicates have in common."""
 
     pipeline: Pipeline
@@ -70,7 +70,7 @@ def _seed(seed: int, number: int, part: int) -> int:
     return int(stream(seed, number, part).generate_state(1)[0] >> 1)
 
 
-def run_replicate(plan: Plan, number: int, truth: np.ndarray) -> Replicate:
+def run_replicate(plan: ReplicatePlan, number: int, truth: np.ndarray) -> Replicate:
     """Simulate at `truth` [d], run the pipeline, thin its draws.
 
     An exception of the simulator, of `observe` or of the pipeline is kept, and so are draws
@@ -122,7 +122,7 @@ def run_replicate(plan: Plan, number: int, truth: np.ndarray) -> Replicate:
     return Replicate(number, truth, observed, kept, densities, effective, seconds, None)
 
 
-def _simulated(plan: Plan, number: int, truth: np.ndarray) -> np.ndarray:
+def _simulated(plan: ReplicatePlan, number: int, truth: np.ndarray) -> np.ndarray:
     # copies: a simulator may write into what it is given
     theta = {name: truth[j : j + 1].copy() for j, name in enumerate(plan.names)}
     seeds = np.array([_data_seed(plan, number)], np.int64)
@@ -133,11 +133,11 @@ def _simulated(plan: Plan, number: int, truth: np.ndarray) -> np.ndarray:
     )
 
 
-def _data_seed(plan: Plan, number: int) -> int:
+def _data_seed(plan: ReplicatePlan, number: int) -> int:
     return _seed(plan.seed, number, SIMULATOR)
 
 
-def _observed(plan: Plan, number: int, signal: np.ndarray) -> np.ndarray:
+def _observed(plan: ReplicatePlan, number: int, signal: np.ndarray) -> np.ndarray:
     if plan.observe is None:
         return signal
     rng = np.random.default_rng(stream(plan.seed, number, NOISE))
@@ -145,7 +145,7 @@ def _observed(plan: Plan, number: int, signal: np.ndarray) -> np.ndarray:
 
 
 def _densities(
-    plan: Plan, log_density: LogDensity | None, truth: np.ndarray, draws: np.ndarray
+    plan: ReplicatePlan, log_density: LogDensity | None, truth: np.ndarray, draws: np.ndarray
 ) -> np.ndarray | None:
     if log_density is None:
         return None

@@ -10,7 +10,7 @@ from .model_extension import Extensions
 from .prior_boxes import everywhere
 from .run_table import joined
 from .search import Plan, Study
-from .simulate import Keeping, Laboratory
+from .simulate import Keeping, SimulatorRuns
 
 CLEAN_PASSES = 2  # of runs where the model fits best: so far, and with what the first taught
 CLEAN_RUNS = 2  # of each; the mean of the last is free of the emulator's error
@@ -44,7 +44,7 @@ def own_residual(
         RuntimeError: every simulation failed, or the executor lost its workers.
     """
     with keeping.opened(experiment.identity) as keep:
-        laboratory = Laboratory(
+        simulator = SimulatorRuns(
             simulate=experiment.simulate,
             prior=prior,
             extensions=extensions,
@@ -53,14 +53,14 @@ def own_residual(
             report=keeping.report,
             shape=experiment.shape,
         )
-        study = Study(laboratory, experiment.observed, experiment.noise, Plan(start=start))
+        study = Study(simulator, experiment.observed, experiment.noise, Plan(start=start))
         whole = everywhere(len(prior))
-        made = laboratory.run("start", study.points(whole, (), start))
+        made = simulator.run("start", study.points(whole, (), start))
         runs = [made]
         fits = [study.hypothesis((), made, whole)]
         for attempt in range(CLEAN_PASSES):
             at_best = {name: np.full(CLEAN_RUNS, value) for name, value in fits[-1].best.items()}
-            made = laboratory.run(f"best {attempt}", at_best)
+            made = simulator.run(f"best {attempt}", at_best)
             runs.append(made)
             fits.append(study.hypothesis((), joined(runs), whole))
         before, fitted = fits[-2:]

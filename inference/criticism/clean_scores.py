@@ -9,7 +9,7 @@ from .._float64 import in_float64
 from .hypothesis import Hypothesis, values_of
 from .measurement_noise import Noise, samples
 from .signatures import Signature
-from .usual_residual import usual_in, without_usual
+from .usual_residual import model_error_part, without_model_error
 
 
 @in_float64
@@ -23,14 +23,14 @@ def scored_on_clean(
     one way in one regime may err the other way in another. The mean square is by how alike the
     regimes are, with a score of 1 besides.
     """
-    usual = usual_in(noise)
-    if usual is None:
+    error = model_error_part(noise)
+    if error is None:
         return dict(signatures)
     output, at = base.surrogate.output, samples(base.fit.observed)
-    measured = without_usual(noise).covariance(at)
+    measured = without_model_error(noise).covariance(at)
     squares = dict.fromkeys(signatures, 1.0)
     counted = 1.0
-    for clean, weight, taught in usual.leave_one_out():
+    for clean, weight, taught in error.leave_one_out():
         covariance = output.average_covariance(measured + taught.covariance(at))
         others = replace(base, noise=covariance)
         unexpected = values_of(output, (clean.values(at) - taught.mean(at))[None])

@@ -20,8 +20,8 @@ from .next_experiment import Suggestion, suggest
 from .posterior import Interval, Weighted, weighted_posterior
 from .search import Base, Plan, Study, examine, explain
 from .signatures import confusion
-from .simulate import AllRunsFailed, Keeping, Laboratory
-from .usual_residual import usual_rms, without_usual
+from .simulate import AllRunsFailed, Keeping, SimulatorRuns
+from .usual_residual import model_error_rms, without_model_error
 from .verdict import REJECTION_LEVEL, Candidate, Verdict, VerdictKind, conclude, tied
 
 
@@ -123,13 +123,13 @@ class Criticism:
     @property
     def measurement(self) -> np.ndarray:
         """Covariance of the data's own noise, without what is usual for the simulator [n, n]."""
-        return without_usual(self.noise).covariance(samples(self.observed))
+        return without_model_error(self.noise).covariance(samples(self.observed))
 
     @property
     def usual(self) -> float:
         """RMS over the data of what is usual for the simulator besides what it is known to leave
         of them, 0 where that is not known."""
-        return usual_rms(self.noise, self.observed)
+        return model_error_rms(self.noise, self.observed)
 
     @property
     def confusion(self) -> np.ndarray:
@@ -201,16 +201,16 @@ def criticise(  # noqa: PLR0913  the one call that most users make
         kept.report(phase, finished)
 
     with kept.opened(experiment.identity) as keep:
-        laboratory = Laboratory(
+        simulator = SimulatorRuns(
             experiment.simulate, prior, extensions, keep, kept.seed, counted, experiment.shape
         )
-        study = Study(laboratory, experiment.corrected, experiment.noise, plan or Plan())
-        base, untested = examine(study, None if earlier is None else laboratory.table(*earlier))
+        study = Study(simulator, experiment.corrected, experiment.noise, plan or Plan())
+        base, untested = examine(study, None if earlier is None else simulator.table(*earlier))
         tried = Tried([], [], {}, ())
         if accept is not None or base.check.p_value < level:
             tried = _try(study, base, accept, held_out)
         verdict = conclude(base.check, tried.members, level)
-        suggestions = suggest(laboratory, proposals, _rivals(verdict, tried))
+        suggestions = suggest(simulator, proposals, _rivals(verdict, tried))
     accepted = tuple(accept) if accept is not None else _named(verdict)
     leading = _among(tried.candidates, accepted)
     extended = leading.hypothesis if leading else None
@@ -306,7 +306,7 @@ def _gaps(
     drawn = [weighted_posterior(model, seed).draw(seed, count) for model in models]
     gaps: dict[tuple[str, ...], tuple[Gap, ...]] = {model.names: () for model in models[1:]}
     for one in held_out:
-        before, *after = predict(study.laboratory, one, drawn)
+        before, *after = predict(study.simulator, one, drawn)
         if isinstance(before, AllRunsFailed):
             raise before
         gaps = {

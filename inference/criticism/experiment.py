@@ -8,7 +8,7 @@ from ..arguments import check_function, check_kind, check_text, checked_array, c
 from ..types import Simulator
 from .measurement_noise import Noise
 from .misfit import Window
-from .usual_residual import expected_usual
+from .usual_residual import expected_model_error
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Experiment:
     @property
     def corrected(self) -> np.ndarray:
         """What was observed, less what the simulator is known to leave of it [*signal_shape]."""
-        return self.observed - expected_usual(self.noise, self.observed)
+        return self.observed - expected_model_error(self.noise, self.observed)
 
 
 @dataclass(frozen=True)

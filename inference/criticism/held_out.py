@@ -12,8 +12,8 @@ from .measurement_noise import gaussian, samples
 from .misfit import MODES_PER_CHANNEL, exceedance, orthonormal, slow_modes
 from .run_noise import errors_of, smooth_covariance
 from .run_table import Runs
-from .simulate import AllRunsFailed, Laboratory
-from .usual_residual import usual_rms, without_usual
+from .simulate import AllRunsFailed, SimulatorRuns
+from .usual_residual import model_error_rms, without_model_error
 from .verdict import ACCEPTANCE_LEVEL
 
 NOISE_QUANTILE = 0.99  # quantile of the noise's RMS below which a gap may be noise
@@ -80,11 +80,11 @@ def holds(gaps: Sequence[Gap]) -> bool:
 
 
 def predict(
-    laboratory: Laboratory, experiment: Experiment, thetas: Sequence[Mapping[str, np.ndarray]]
+    simulator: SimulatorRuns, experiment: Experiment, thetas: Sequence[Mapping[str, np.ndarray]]
 ) -> list[np.ndarray | AllRunsFailed]:
     """Simulated outputs of another experiment at each model's posterior draws, finite samples only
     [k, n]; why there are none where all runs failed."""
-    made = laboratory.of(experiment).run_each(f"held out {experiment.label}", thetas)
+    made = simulator.of(experiment).run_each(f"held out {experiment.label}", thetas)
     there = np.isfinite(experiment.observed)
     return [of.signals[:, there] if isinstance(of, Runs) else of for of in made]
 
@@ -102,7 +102,7 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
     series = len(experiment.observed) >= MIN_LONG
     simulated = fewer * smooth_covariance(errors_of([before, after]), at, series)
     covariance = experiment.noise.covariance(at) + simulated
-    measured = without_usual(experiment.noise)
+    measured = without_model_error(experiment.noise)
     factor = np.linalg.cholesky(covariance)
     rng = np.random.default_rng(seed)
     runs = gaussian(rng, simulated, REPLICATES)
@@ -126,7 +126,7 @@ def gap(experiment: Experiment, before: np.ndarray, after: np.ndarray, seed: int
         before=sizes[0],
         after=sizes[1],
         noise=float(np.sqrt(np.trace(measured.covariance(at) + simulated) / len(observed))),
-        usual=usual_rms(experiment.noise, experiment.observed),
+        usual=model_error_rms(experiment.noise, experiment.observed),
         floor=float(np.quantile(np.sqrt(np.mean(noise**2, axis=1)), NOISE_QUANTILE)),
         p_value=min(1.0, 2.0 * float(exceedance(measures(null), left).min())),
         lpd_gain=density(means[1]) - density(means[0]),

@@ -19,10 +19,10 @@ from ..surrogates.output_vectors import Output
 from ..surrogates.signal import SignalSurrogate
 from ..surrogates.signal_likelihood import SignalState, eliminate, scores
 from .measurement_noise import Noise, samples
-from .prior_boxes import LATER_HALF_WIDTH, Box, around, intersection
+from .prior_boxes import LATER_HALF_WIDTH, PriorBox, around, intersection
 from .run_noise import own_errors, resized, smooth_covariance
 from .run_table import Runs
-from .usual_residual import usual_in
+from .usual_residual import model_error_part
 
 COMPONENTS = 10
 SIZES = 12  # of the usual residual, that the likelihood is averaged over
@@ -49,7 +49,7 @@ class Hypothesis:
 
     names: tuple[str, ...]
     fit: Fit
-    within: Box
+    within: PriorBox
     u: np.ndarray
     difference: np.ndarray
     latent: np.ndarray
@@ -136,7 +136,7 @@ def hypothesise(
     runs: Runs,
     observed: np.ndarray,
     noise: Noise,
-    within: Box,
+    within: PriorBox,
 ) -> Hypothesis:
     """Fit the model in which the named effects act to what was observed.
 
@@ -163,7 +163,7 @@ def hypothesise(
     errors = own_errors(emulator)
     near, _ = _nearest(surrogate, errors, within)
     # now that it is known where it fits best, so is how noisy the simulator is there
-    errors = resized(errors, prior.to_unit(theta)[fit.learned_from], near)
+    errors = resized(errors, prior.to_unit(theta)[fit.training_mask], near)
     u, own = _nearest(surrogate, errors, within)
     found = Hypothesis(
         names=names,
@@ -189,7 +189,7 @@ def hypothesise(
 
 
 def _nearest(
-    surrogate: SignalSurrogate, errors: np.ndarray, within: Box
+    surrogate: SignalSurrogate, errors: np.ndarray, within: PriorBox
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where in a box the expected output is nearest to what was observed, prior quantiles [d], and
     the covariance [m, m] of the simulator's own noise, of which there are draws [n, m]."""
@@ -208,11 +208,11 @@ def _sized(
     Few clean data tell how large the usual residual is; the residual of these data tells more.
     """
     assert surrogate.known is not None
-    known, usual = surrogate.known.covariance, usual_in(noise)
-    if usual is None:
+    known, error = surrogate.known.covariance, model_error_part(noise)
+    if error is None:
         return [known], np.zeros(1)
-    part = surrogate.output.average_covariance(usual.covariance(samples(observed)))
-    sizes, log_weight = usual.sizes(SIZES)
+    part = surrogate.output.average_covariance(error.covariance(samples(observed)))
+    sizes, log_weight = error.sizes(SIZES)
     return [known + (size - 1.0) * part for size in sizes], log_weight
 
 

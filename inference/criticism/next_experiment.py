@@ -13,7 +13,7 @@ from .experiment import Proposal
 from .measurement_noise import samples
 from .misfit import MODES_PER_CHANNEL, orthonormal, slow_modes
 from .run_noise import errors_of, smooth_covariance
-from .simulate import AllRunsFailed, Laboratory
+from .simulate import AllRunsFailed, SimulatorRuns
 from .verdict import Candidate
 
 RUNS_EACH = 3  # of each explanation in each proposed experiment
@@ -34,7 +34,7 @@ class Suggestion(NamedTuple):
 
 
 def suggest(
-    laboratory: Laboratory, proposals: Sequence[Proposal], rivals: Sequence[Candidate]
+    simulator: SimulatorRuns, proposals: Sequence[Proposal], rivals: Sequence[Candidate]
 ) -> list[Suggestion]:
     """Proposals by how well they separate the worst separated rivals, best first.
 
@@ -45,14 +45,14 @@ def suggest(
     made = []
     for proposal in proposals:
         with suppress(AllRunsFailed):
-            made.append(_separation(laboratory, proposal, rivals))
+            made.append(_separation(simulator, proposal, rivals))
     return sorted(made, key=lambda suggestion: -suggestion.snr)
 
 
 def _separation(
-    laboratory: Laboratory, proposal: Proposal, rivals: Sequence[Candidate]
+    simulator: SimulatorRuns, proposal: Proposal, rivals: Sequence[Candidate]
 ) -> Suggestion:
-    elsewhere = laboratory.of(proposal)
+    elsewhere = simulator.of(proposal)
     names = [" with ".join(rival.names) for rival in rivals]
     signals = []
     for name, rival in zip(names, rivals, strict=True):

@@ -16,7 +16,7 @@ WALL_SHARE = 0.02  # of a box's width, within which a point lies at its wall
 PRIOR_END = 0.02  # quantiles from an end of a prior to neutral, within which it is one-sided
 
 
-class Box(NamedTuple):
+class PriorBox(NamedTuple):
     """low, high: prior quantiles [d]."""
 
     low: np.ndarray
@@ -33,28 +33,30 @@ class Box(NamedTuple):
         return bool(np.all((u >= low) & (u <= high)))
 
 
-def everywhere(dimension: int) -> Box:
+def everywhere(dimension: int) -> PriorBox:
     """All prior quantiles."""
-    return Box(np.zeros(dimension), np.ones(dimension))
+    return PriorBox(np.zeros(dimension), np.ones(dimension))
 
 
-def hull(one: Box, other: Box) -> Box:
+def hull(one: PriorBox, other: PriorBox) -> PriorBox:
     """The smallest box that holds both."""
-    return Box(np.minimum(one.low, other.low), np.maximum(one.high, other.high))
+    return PriorBox(np.minimum(one.low, other.low), np.maximum(one.high, other.high))
 
 
-def intersection(one: Box, other: Box) -> Box:
+def intersection(one: PriorBox, other: PriorBox) -> PriorBox:
     """Where both are."""
-    return Box(np.maximum(one.low, other.low), np.minimum(one.high, other.high))
+    return PriorBox(np.maximum(one.low, other.low), np.minimum(one.high, other.high))
 
 
-def around(centre: np.ndarray, sd: np.ndarray, least: float, most: float = MAX_HALF_WIDTH) -> Box:
+def around(
+    centre: np.ndarray, sd: np.ndarray, least: float, most: float = MAX_HALF_WIDTH
+) -> PriorBox:
     """The box about a posterior, from `least` to `most` to each side.
 
     A missing effect displaces the base parameters by many of their sds, so the first box is wide.
     """
     half = np.clip(MIN_POSTERIOR_SDS * sd, least, most)
-    return Box(np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0))
+    return PriorBox(np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0))
 
 
 def sides(extension: Extension, count: int, share: float) -> np.ndarray:
@@ -70,13 +72,13 @@ def sides(extension: Extension, count: int, share: float) -> np.ndarray:
     return prior.from_unit((neutral + shares * (end - neutral))[:, None])["coefficient"]
 
 
-def with_whole_priors(box: Box, count: int) -> Box:
+def with_whole_priors(box: PriorBox, count: int) -> PriorBox:
     """The box of the base parameters, and the priors of `count` coefficients, whose neutral values
     may be at an end."""
-    return Box(np.append(box.low, np.zeros(count)), np.append(box.high, np.ones(count)))
+    return PriorBox(np.append(box.low, np.zeros(count)), np.append(box.high, np.ones(count)))
 
 
-def fill(box: Box, prior: Prior, seed: int, count: int) -> dict[str, np.ndarray]:
+def fill(box: PriorBox, prior: Prior, seed: int, count: int) -> dict[str, np.ndarray]:
     """`count` points of the box in natural units, name -> [count]."""
     u = sobol(seed, 0, count, len(box.low))
     return prior.from_unit(box.low + (box.high - box.low) * u)

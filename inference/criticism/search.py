@@ -15,7 +15,7 @@ from .model_extension import extended
 from .prior_boxes import (
     FIRST_HALF_WIDTH,
     LATER_HALF_WIDTH,
-    Box,
+    PriorBox,
     around,
     everywhere,
     fill,
@@ -25,7 +25,7 @@ from .prior_boxes import (
 )
 from .run_table import Runs, joined
 from .signatures import Signature, signature
-from .simulate import AllRunsFailed, Laboratory
+from .simulate import AllRunsFailed, SimulatorRuns
 from .verdict import FAR_BEHIND, TIE_MARGIN, Candidate, near_best
 
 BASE_PASSES = 6  # of runs of the base model, those after the first only until the fit is settled
@@ -74,23 +74,23 @@ class Plan:
 class Study(NamedTuple):
     """Data, and the simulator that should explain them."""
 
-    laboratory: Laboratory
+    simulator: SimulatorRuns
     observed: np.ndarray
     noise: Noise
     plan: Plan
 
     @property
     def seed(self) -> int:
-        return self.laboratory.seed
+        return self.simulator.seed
 
-    def hypothesis(self, names: tuple[str, ...], runs: Runs, within: Box) -> Hypothesis:
+    def hypothesis(self, names: tuple[str, ...], runs: Runs, within: PriorBox) -> Hypothesis:
         """The model in which the named effects act, fitted where it was simulated."""
-        prior = extended(self.laboratory.prior, self.laboratory.extensions, names)
+        prior = extended(self.simulator.prior, self.simulator.extensions, names)
         return hypothesise(names, prior, runs, self.observed, self.noise, within)
 
-    def points(self, box: Box, names: tuple[str, ...], count: int) -> dict[str, np.ndarray]:
+    def points(self, box: PriorBox, names: tuple[str, ...], count: int) -> dict[str, np.ndarray]:
         """Parameters all over a box, name -> [count]."""
-        prior = extended(self.laboratory.prior, self.laboratory.extensions, names)
+        prior = extended(self.simulator.prior, self.simulator.extensions, names)
         return fill(box, prior, self.seed, count)
 
     def check(
@@ -115,19 +115,19 @@ class Base(NamedTuple):
     null: np.ndarray  # [m, n], residuals of a right model
     signatures: dict[str, Signature]
     singles: dict[str, Hypothesis]
-    box: Box  # in which effects were simulated
+    box: PriorBox  # in which effects were simulated
     runs: Runs
 
 
-def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Box]:
+def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, PriorBox]:
     """Fit the base model near its optimum. Return the fit, its runs and the box of the first."""
-    whole, laboratory = everywhere(len(study.laboratory.prior)), study.laboratory
+    whole, simulator = everywhere(len(study.simulator.prior)), study.simulator
     start = study.points(whole, (), study.plan.start)
-    runs = laboratory.run("start", start) if earlier is None else earlier
+    runs = simulator.run("start", start) if earlier is None else earlier
     fitted = study.hypothesis((), runs, whole)
     box = first = around(fitted.u, fitted.sd, FIRST_HALF_WIDTH)
     for attempt in range(BASE_PASSES):
-        made = laboratory.run(f"base {attempt}", study.points(box, (), study.plan.base))
+        made = simulator.run(f"base {attempt}", study.points(box, (), study.plan.base))
         runs = joined([runs, made])
         before, fitted = fitted, study.hypothesis((), runs, whole)
         if settled(0.5 * (before.misfit(fitted) - fitted.misfit(fitted)), fitted, box):
@@ -136,7 +136,7 @@ def fit_base(study: Study, earlier: Runs | None) -> tuple[Hypothesis, Runs, Box]
     return fitted, runs, first
 
 
-def settled(gained: float, fitted: Hypothesis, box: Box) -> bool:
+def settled(gained: float, fitted: Hypothesis, box: PriorBox) -> bool:
     """Whether the runs in a box left a fit as good as it was, well known and inside of them."""
     doubt = np.trace(fitted.whiten(fitted.whiten(fitted.latent)))
     return abs(gained) <= TIE_MARGIN and doubt <= MAX_DOUBT and box.encloses(fitted.u)
@@ -151,7 +151,7 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
     Returns:
         What was found, and the effects of which too few simulations succeeded to learn from.
     """
-    laboratory = study.laboratory
+    simulator = study.simulator
     base, runs, box = fit_base(study, earlier)
     neutral, known = _screen(study, base.best)
     runs = joined([runs, *neutral])
@@ -161,32 +161,32 @@ def examine(study: Study, earlier: Runs | None) -> tuple[Base, tuple[str, ...]]:
         name: study.hypothesis((name,), joined([runs, *of]), within) for name, of in known.items()
     }
     signatures = {
-        name: signature(base, single, laboratory.extensions[name])
+        name: signature(base, single, simulator.extensions[name])
         for name, single in singles.items()
     }
     signatures = scored_on_clean(base, study.noise, signatures)
     tested, null = study.check(base, signatures)
     every = joined([runs, *sum(known.values(), [])])
     found = Base(base, tested, null, signatures, singles, box, every)
-    return found, tuple(name for name in laboratory.extensions if name not in known)
+    return found, tuple(name for name in simulator.extensions if name not in known)
 
 
 def _screen(study: Study, best: Mapping[str, float]) -> tuple[list[Runs], dict[str, list[Runs]]]:
     """Runs of the base model at its best parameters, and beside them of each effect of which at
     least two succeed; where some fail, others are made nearer to neutral."""
-    laboratory, count = study.laboratory, study.plan.extension
+    simulator, count = study.simulator, study.plan.extension
     at_best = {name: np.full(count, value) for name, value in best.items()}
-    found: dict[str, list[Runs]] = {name: [] for name in ("", *laboratory.extensions)}
+    found: dict[str, list[Runs]] = {name: [] for name in ("", *simulator.extensions)}
     for attempt, share in enumerate(SIDE_SHARES):
         lacking = [name for name, of in found.items() if sum(map(len, of)) < count]
         if attempt and not any(lacking):
             break
         asked = [
-            at_best | ({name: sides(laboratory.extensions[name], count, share)} if name else {})
+            at_best | ({name: sides(simulator.extensions[name], count, share)} if name else {})
             for name in lacking
         ]
         for name, made in zip(
-            lacking, laboratory.run_each(f"effects {attempt}", asked), strict=True
+            lacking, simulator.run_each(f"effects {attempt}", asked), strict=True
         ):
             found[name] += [made] if isinstance(made, Runs) else []
     neutral = found.pop("")
@@ -245,7 +245,7 @@ class Search:
 
     def visit(
         self, phase: str, candidates: Sequence[Candidate], count: int
-    ) -> dict[tuple[str, ...], Box]:
+    ) -> dict[tuple[str, ...], PriorBox]:
         """Simulate each of them near its optimum, all in one call, and fit it again.
 
         Returns:
@@ -264,7 +264,7 @@ class Search:
         if self.limited:
             boxes = dict(list(boxes.items())[: max(left // count, 0)])
         asked = [study.points(box, names, count) for names, box in boxes.items()]
-        made = dict(zip(boxes, study.laboratory.run_each(phase, asked), strict=True))
+        made = dict(zip(boxes, study.simulator.run_each(phase, asked), strict=True))
         boxes = {names: box for names, box in boxes.items() if isinstance(made[names], Runs)}
         self.runs = joined([self.runs, *(of for of in made.values() if isinstance(of, Runs))])
         for one in candidates:
@@ -308,7 +308,7 @@ class Search:
         study, base, box = self.study, self.base, self.base.box
         for name in names:
             within = self.found[(name,)].hypothesis.within
-            box = hull(box, Box(*(end[: len(box.low)] for end in within)))
+            box = hull(box, PriorBox(*(end[: len(box.low)] for end in within)))
         hypothesis = study.hypothesis(names, self.runs, with_whole_priors(box, len(names)))
         return study.candidate(base, hypothesis)
 

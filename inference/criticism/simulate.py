@@ -78,7 +78,7 @@ class Keeping:
 
 
 @dataclass(frozen=True)
-class Laboratory:
+class SimulatorRuns:
     """A simulator whose runs are kept.
 
     Attributes:
@@ -100,7 +100,7 @@ class Laboratory:
     report: Report = silent
     shape: tuple[int, ...] | None = None
 
-    def of(self, experiment: Experiment | Proposal) -> "Laboratory":
+    def of(self, experiment: Experiment | Proposal) -> "SimulatorRuns":
         """The same for the simulator of another experiment."""
         keep = self.keep._replace(identity=experiment.identity)
         shape = experiment.shape

@@ -314,36 +314,36 @@ def _learned(clean: Sequence[CleanData]) -> UsualResidual:
     return UsualResidual(positive_autocovariance(mean), float(weight.sum()), tuple(clean))
 
 
-def without_usual(noise: Noise) -> Noise:
+def without_model_error(noise: Noise) -> Noise:
     """The noise that is not the simulator's fault."""
     if not isinstance(noise, SumOfNoises):
         return noise
     return SumOfNoises(tuple(p for p in noise.parts if not isinstance(p, UsualResidual)))
 
 
-def usual_in(noise: Noise) -> UsualResidual | None:
+def model_error_part(noise: Noise) -> UsualResidual | None:
     """The part of the noise that is the simulator's fault, if any is known."""
     parts = noise.parts if isinstance(noise, SumOfNoises) else ()
     return next((part for part in parts if isinstance(part, UsualResidual)), None)
 
 
-def usual_rms(noise: Noise, observed: np.ndarray) -> float:
-    """RMS of what a simulator may leave of data about `expected_usual`; 0 where nothing is known.
+def model_error_rms(noise: Noise, observed: np.ndarray) -> float:
+    """RMS of what a simulator may leave of data about `expected_model_error`; 0 if unknown.
 
     Args:
         observed: [*signal_shape], NaN where missing.
     """
-    usual = usual_in(noise)
-    if usual is None:
+    error = model_error_part(noise)
+    if error is None:
         return 0.0
-    return float(np.sqrt(np.mean(np.diag(usual.covariance(samples(observed))))))
+    return float(np.sqrt(np.mean(np.diag(error.covariance(samples(observed))))))
 
 
-def expected_usual(noise: Noise, observed: np.ndarray) -> np.ndarray:
+def expected_model_error(noise: Noise, observed: np.ndarray) -> np.ndarray:
     """What a simulator is expected to leave of data [*signal_shape]; 0 where nothing is known."""
-    usual, expected = usual_in(noise), np.zeros(observed.shape)
-    if usual is not None:
-        expected[np.isfinite(observed)] = usual.mean(samples(observed))
+    error, expected = model_error_part(noise), np.zeros(observed.shape)
+    if error is not None:
+        expected[np.isfinite(observed)] = error.mean(samples(observed))
     return expected
 
 

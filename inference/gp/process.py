@@ -127,7 +127,7 @@ def condition(hyper: Hyper, data: Data) -> GP:
     return GP(hyper, data, whitener, np.einsum("kij,ki->kj", whitener, white))
 
 
-def believe(gp: GP, u: np.ndarray, spread: np.ndarray | None = None) -> GP:
+def fantasize(gp: GP, u: np.ndarray, spread: np.ndarray | None = None) -> GP:
     """The processes after their own predictions at u [m, d] came true.
 
     The kriging believer of Ginsbourger et al. (2010): the mean stays, the variance shrinks.

@@ -13,7 +13,7 @@ ESS_PER_CHAIN = 100.0
 DIVERGENT_SHARE = 0.01
 
 
-class Status(StrEnum):
+class ConvergenceStatus(StrEnum):
     """What came of sampling; each text is what to do about it."""
 
     CONVERGED = "converged"
@@ -109,14 +109,13 @@ def describe(short: Sequence[Shortfall], steps: int) -> str:
                 f"{meaning} of {worst.parameter!r} is {worst.value:{digits}}, "
                 f"{bound} {worst.limit:{digits}}"
             )
-    return (
-        f"not converged after {steps} draws per chain: {'; '.join(parts)}. {Status.TOO_FEW_DRAWS}"
-    )
+    advice = ConvergenceStatus.TOO_FEW_DRAWS
+    return f"not converged after {steps} draws per chain: {'; '.join(parts)}. {advice}"
 
 
 def describe_divergences(share: float) -> str:
     """The same for a share of divergent transitions."""
     return (
         f"not converged: {share:.1%} of the transitions diverged, above {DIVERGENT_SHARE:.0%}. "
-        f"{Status.DIVERGENT}"
+        f"{ConvergenceStatus.DIVERGENT}"
     )

@@ -8,7 +8,7 @@ import numpy as np
 from . import quadrature
 from .convergence import (
     DIVERGENT_SHARE,
-    Status,
+    ConvergenceStatus,
     describe,
     describe_divergences,
     diagnose,
@@ -34,13 +34,13 @@ class Sampled(NamedTuple):
 
     chains: Chains
     steps: int  # draws per chain that were made; those kept are evenly spaced among them
-    found: dict[Status, str]  # what is wrong -> a sentence with its size and what to do
+    found: dict[ConvergenceStatus, str]  # what is wrong -> a sentence with its size and what to do
     checks: dict[str, float]  # results of the comparison with quadrature, where there was one
 
     @property
     def status(self) -> str:
         """ "converged", or all that is wrong, in sentences."""
-        return " ".join(self.found.values()) or Status.CONVERGED.value
+        return " ".join(self.found.values()) or ConvergenceStatus.CONVERGED.value
 
 
 def draw_posterior(
@@ -67,17 +67,17 @@ def draw_posterior(
             break
         parts += [next(source) for _ in range(len(parts))]
     steps = len(parts) * length.draws
-    found = {Status.TOO_FEW_DRAWS: describe(short, steps)} if short else {}
+    found = {ConvergenceStatus.TOO_FEW_DRAWS: describe(short, steps)} if short else {}
     flags = [part.stats["diverging"] for part in parts if "diverging" in part.stats]
     divergent = float(np.mean(flags)) if flags else 0.0
     if divergent > DIVERGENT_SHARE:
-        found[Status.DIVERGENT] = describe_divergences(divergent)
+        found[ConvergenceStatus.DIVERGENT] = describe_divergences(divergent)
     checks: dict[str, float] = {}
     if target.dimension in quadrature.FIRST_GRID and sampler != "quadrature":
         effective = min(min(m["ess_bulk"], m["ess_tail"]) for m in measures.values())
         checks, complaint = _cross_checked(chains.u, target, effective)
         if complaint:
-            found[Status.QUADRATURE_DIFFERS] = complaint
+            found[ConvergenceStatus.QUADRATURE_DIFFERS] = complaint
     return Sampled(chains, steps, found, checks)
 
 
@@ -110,6 +110,6 @@ def _cross_checked(u: np.ndarray, target: Target, effective: float) -> tuple[dic
         return checks, ""
     complaint = (
         f"disagrees with quadrature: total variation {distance:.3f} over {quadrature.BINS} bins, "
-        f"above {limit:.3f}. {Status.QUADRATURE_DIFFERS}"
+        f"above {limit:.3f}. {ConvergenceStatus.QUADRATURE_DIFFERS}"
     )
     return checks, complaint

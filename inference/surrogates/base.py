@@ -8,17 +8,17 @@ import numpy as np
 from ..gp.process import GP
 from ..prior import Prior
 from ..types import LogLikelihood, LogSecondMoment, Theta
-from .success import Runs
+from .success import RunOutcomes
 
 
-class Learnable(NamedTuple):
+class TrainingData(NamedTuple):
     """Successful simulations, as a family measured them."""
 
     u: np.ndarray  # [n, d]
     features: np.ndarray  # [n, m]
     discrepancy: np.ndarray  # [n]
     normal: np.ndarray | None  # bool [d], see `Prior.normal`
-    runs: Runs  # all, failed ones too
+    runs: RunOutcomes  # all, failed ones too
 
 
 class Measured(NamedTuple):
@@ -70,7 +70,7 @@ class Surrogate(Protocol):
         """The u [d] that fits best."""
         ...
 
-    def believe(self, u: np.ndarray) -> "Surrogate":
+    def fantasize(self, u: np.ndarray) -> "Surrogate":
         """The surrogate after its own predictions at u [n, d] came true (pending points)."""
         ...
 
@@ -122,7 +122,7 @@ class Acquisition(Protocol):
 
         Args:
             key: Fixes the choice.
-            surrogate: A `Surrogate` that already believes what is pending.
+            surrogate: A `Surrogate` to which pending points were added, see `fantasize`.
             n: Points wanted.
         """
         ...

@@ -11,14 +11,14 @@ from ..gp.optimise import minimise_in_box
 from ..gp.process import (
     GP,
     Data,
-    believe,
     condition,
+    fantasize,
     leave_one_out,
     predict,
     predict_points,
 )
 from ..types import LogLikelihood, LogSecondMoment
-from .outliers import sane
+from .outliers import is_outlier
 from .threshold import (
     Matched,
     Threshold,
@@ -43,7 +43,7 @@ LOW = 3.0  # sds of a new discrepancy by which a threshold lies too low
 TRANSFORM_GROWTH = 1.3  # the transform is chosen anew when data have grown by this factor
 
 
-class Scale(NamedTuple):
+class DiscrepancyScale(NamedTuple):
     """From the discrepancy to the process's targets: (g(Delta) - location) / spread."""
 
     transform: Transform
@@ -75,7 +75,7 @@ class DiscrepancySurrogate:
     """
 
     gp: GP
-    scale: Scale
+    scale: DiscrepancyScale
     discrepancy: np.ndarray
     threshold: float
     learned_at: int
@@ -150,9 +150,9 @@ class DiscrepancySurrogate:
         return minimise_in_box(surely, self.gp.data.u.shape[1])
 
     @in_float64
-    def believe(self, u: np.ndarray) -> "DiscrepancySurrogate":
+    def fantasize(self, u: np.ndarray) -> "DiscrepancySurrogate":
         """Condition on the predicted means at u [n, d], for points still being simulated."""
-        return replace(self, gp=believe(self.gp, u)) if len(u) else self
+        return replace(self, gp=fantasize(self.gp, u)) if len(u) else self
 
     def constants(self) -> dict[str, np.ndarray]:
         """What a reader of the posterior must know of the likelihood."""
@@ -222,7 +222,7 @@ def learn(
     Raises:
         ValueError: bad transform.
     """
-    values = np.minimum(discrepancy, discrepancy[sane(discrepancy)].max())
+    values = np.minimum(discrepancy, discrepancy[~is_outlier(discrepancy)].max())
     n = len(u)
     with np.errstate(divide="ignore", invalid="ignore"):  # where the transform is undefined
         old = previous is not None and np.isfinite(previous.scale(values)).all()
@@ -279,7 +279,7 @@ def with_threshold(learned: DiscrepancySurrogate, rule: Threshold) -> Discrepanc
     return replace(learned, threshold=threshold, width=0.0, noisy=False)
 
 
-def _standardise(transform: Transform, values: np.ndarray) -> Scale:
+def _standardise(transform: Transform, values: np.ndarray) -> DiscrepancyScale:
     transformed = transform(values)
     size = float(np.abs(transformed).max())
     with np.errstate(over="ignore"):
@@ -287,10 +287,12 @@ def _standardise(transform: Transform, values: np.ndarray) -> Scale:
     if not np.isfinite(spread):  # the squares of large numbers overflow
         spread = size * float((transformed / size).std())
     # all equal: nothing to standardise
-    return Scale(transform, float(transformed.mean()), spread if spread > rounding else 1.0)
+    return DiscrepancyScale(
+        transform, float(transformed.mean()), spread if spread > rounding else 1.0
+    )
 
 
-def _score(gp: GP, scale: Scale, values: np.ndarray) -> float:
+def _score(gp: GP, scale: DiscrepancyScale, values: np.ndarray) -> float:
     """Leave-one-out log predictive density of the discrepancy under the scale, summed over the
     better half of the runs: with a wide prior the others only tell that they are bad."""
     mean, variance = (moment[0] for moment in leave_one_out(gp))

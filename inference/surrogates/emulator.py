@@ -32,7 +32,7 @@ TOO_SMALL = 0.01  # probability that repeated runs differ by less than they may
 LEAST_OF_ERROR = 0.05  # of an expected squared error, added before its logarithm is taken
 
 
-class Limits(NamedTuple):
+class EmulatorLimits(NamedTuple):
     """How much an emulator may hold.
 
     Attributes:
@@ -70,7 +70,7 @@ class Emulator(NamedTuple):
     outputs: np.ndarray
     learned_at: int
     excess: np.ndarray
-    limits: Limits
+    limits: EmulatorLimits
     size: Size | None = None
 
     @property
@@ -91,7 +91,7 @@ def emulate(
     u: np.ndarray,
     outputs: np.ndarray,
     scale: Callable[[np.ndarray], np.ndarray],
-    limits: Limits,
+    limits: EmulatorLimits,
     previous: Emulator | None = None,
     normal: np.ndarray | None = None,
 ) -> Emulator:
@@ -117,7 +117,7 @@ def emulate(
 def _learned(
     known: Data,
     scale: Callable[[np.ndarray], np.ndarray],
-    limits: Limits,
+    limits: EmulatorLimits,
     size: Size | None = None,
 ) -> Emulator:
     """Components and hyperparameters of outputs known.y [m, n], the run-to-run noise being of a

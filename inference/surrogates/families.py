@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 from ..arguments import check_callable, check_flag, checked_array, checked_integer, checked_number
 from ..simulations.failures import not_finite
 from ..types import Discrepancy
-from .base import Learnable, Measured, Surrogate
+from .base import Measured, Surrogate, TrainingData
 from .discrepancy import DiscrepancySurrogate, learn, with_threshold
-from .emulator import PREDICTED_SHARE, Emulator, Limits, emulate, goes_on, resized
-from .given_noise import Covariance, Noise, check_noise, given_noise
+from .emulator import PREDICTED_SHARE, Emulator, EmulatorLimits, emulate, goes_on, resized
+from .given_noise import Covariance, NoiseModel, check_noise, given_noise
 from .log_likelihood import LogLikelihoodFamily, LogLikelihoodLearner
 from .noise.by_mean import ByMean, SdOfMean, law_of
-from .noise.scales import Plain, Scale, comparable
+from .noise.scales import OutputScale, Plain, comparable
 from .output_vectors import Output, Summary, describe, infinities, summarise
 from .signal import MIN_FREEDOM, SignalSurrogate, observe
 from .squared_difference import evaluate, failed_on, independent, numbers, squared_difference
@@ -94,32 +94,32 @@ class DiscrepancyLearner:
         return Measured(features, *evaluate(self.distance, self.observed, signals))
 
     def learn(
-        self, known: Learnable, previous: DiscrepancySurrogate | None
+        self, known: TrainingData, previous: DiscrepancySurrogate | None
     ) -> DiscrepancySurrogate:
         """To search with: errors count as independent, lest a poor start leave it undecided."""
         return self._learn(known, previous, self._rule(known, numbers))
 
     def _learn(
-        self, known: Learnable, previous: DiscrepancySurrogate | None, rule: Threshold
+        self, known: TrainingData, previous: DiscrepancySurrogate | None, rule: Threshold
     ) -> DiscrepancySurrogate:
         transform = self.family.transform
         learned = learn(known.u, known.discrepancy, transform, previous, known.normal)
         learned = replace(learned, success=learn_success(known.runs, known.normal))
         return learned if rule is None else with_threshold(learned, rule)
 
-    def _rule(self, known: Learnable, number: Callable[..., float]) -> Threshold:
+    def _rule(self, known: TrainingData, number: Callable[..., float]) -> Threshold:
         """The threshold that was given, or the one that fits the closest run's residual."""
         residual = self._residual(known)
         if self.family.threshold is not None or numbers(residual) - known.u.shape[1] < MIN_FREEDOM:
             return self.family.threshold
         return Matched(number(residual))
 
-    def _residual(self, known: Learnable) -> np.ndarray:
+    def _residual(self, known: TrainingData) -> np.ndarray:
         """By which the closest run misses what was observed, NaN where nothing can be said."""
         closest = known.features[np.argmin(known.discrepancy)]
         return closest.reshape(self.observed.shape) - self.observed
 
-    def finish(self, known: Learnable) -> Surrogate:
+    def finish(self, known: TrainingData) -> Surrogate:
         """The surrogate on which a fit rests."""
         rule = self._rule(known, independent)
         learned = self._learn(known, None, rule)
@@ -190,7 +190,7 @@ class SignalFamily:
         distance = self.discrepancy or partial(_of_summaries, self.summary)
         return SignalLearner(self, output, distance, observed, values, self._scale(output, values))
 
-    def _scale(self, output: Output, values: np.ndarray) -> Scale:
+    def _scale(self, output: Output, values: np.ndarray) -> OutputScale:
         """On which outputs are emulated, `values` [m] being observed."""
         law = law_of(self.noise)
         if law is not None:
@@ -208,7 +208,7 @@ class SignalLearner:
     distance: Discrepancy
     observed: np.ndarray
     values: np.ndarray
-    scale: Scale
+    scale: OutputScale
 
     @property
     def features(self) -> int:
@@ -249,7 +249,7 @@ class SignalLearner:
             "" if np.isfinite(values).all() else not_finite(f"summary returns {infinities(values)}")
         )
 
-    def learn(self, known: Learnable, previous: SignalSurrogate | None) -> SignalSurrogate:
+    def learn(self, known: TrainingData, previous: SignalSurrogate | None) -> SignalSurrogate:
         u, values = known.u, known.features
         if previous is not None and not goes_on(previous.emulator, previous.scale.of(values)):
             previous = None
@@ -260,7 +260,7 @@ class SignalLearner:
         def compared(at: np.ndarray | None) -> SignalSurrogate:
             """With what was observed, its noise being right around the features `at` [m]."""
             seen, given = scale.seen(at)
-            noise = Noise(given, self.family.misfit)
+            noise = NoiseModel(given, self.family.misfit)
             found = observe(emulator, self.output, seen, noise, previous)
             return replace(found, success=success, scale=scale)
 
@@ -269,23 +269,23 @@ class SignalLearner:
             found = compared(found.best_features)
         return found
 
-    def _fitting(self, u: np.ndarray, values: np.ndarray) -> Scale:
+    def _fitting(self, u: np.ndarray, values: np.ndarray) -> OutputScale:
         """The scale for runs of values [n, m] at u [n, d]."""
         if not (self.family.varying_noise and isinstance(self.scale, Plain)):
             return self.scale
         return self.scale.fitting(u, values, self.output.layout.channel)
 
     def _emulator(
-        self, known: Learnable, scale: Scale, previous: SignalSurrogate | None
+        self, known: TrainingData, scale: OutputScale, previous: SignalSurrogate | None
     ) -> Emulator:
         left = LEFT_OF_NOISE if isinstance(scale, ByMean) else np.inf
-        limits = Limits(self.family.components, self.family.predicted, left)
+        limits = EmulatorLimits(self.family.components, self.family.predicted, left)
         features, units = scale.of(known.features), comparable(scale, self.output)
         old = None if previous is None else previous.emulator
         found = emulate(known.u, features, units, limits, old, known.normal)
         return found if old or not self.family.varying_noise else resized(found, units)
 
-    def finish(self, known: Learnable) -> Surrogate:
+    def finish(self, known: TrainingData) -> Surrogate:
         """The surrogate on which a fit rests."""
         return self.learn(known, None)
 

@@ -41,8 +41,8 @@ class GivenNoise(NamedTuple):
         )
 
 
-class Noise(NamedTuple):
-    """What is believed of the noise between the simulator and the data.
+class NoiseModel(NamedTuple):
+    """What is known of the noise between the simulator and the data.
 
     Attributes:
         given: The measurement noise; None where it is unknown.

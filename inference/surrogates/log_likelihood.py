@@ -14,8 +14,8 @@ from ..gp.optimise import minimise_in_box
 from ..gp.process import (
     GP,
     Data,
-    believe,
     condition,
+    fantasize,
     leave_one_out,
     padded,
     padded_rows,
@@ -26,7 +26,7 @@ from ..sampling.importance import explore
 from ..sampling.target import Target
 from ..simulations.failures import impossible, incomparable, not_finite
 from ..types import LogLikelihood, LogSecondMoment
-from .base import Learnable, Measured
+from .base import Measured, TrainingData
 from .success import learn_success, log_success, padded_success
 from .warnings import EQUAL, UNCERTAIN, complaints
 
@@ -41,7 +41,7 @@ MAX_SD = 1.5  # of a log likelihood that is known, in nats
 MAX_UNCERTAIN_SHARE = 0.2  # of what may be the posterior, from which a fit warns
 
 
-class Scale(NamedTuple):
+class LogLikelihoodScale(NamedTuple):
     """From log likelihoods to the process's targets: (compressed depth - location) / spread.
 
     A depth below the top, in nats, is itself down to `linear`; beyond it grows as its logarithm.
@@ -86,7 +86,7 @@ class LevelState(NamedTuple):
     """
 
     gp: GP
-    scale: Scale
+    scale: LogLikelihoodScale
     success: GP | None = None  # see `success.learn_success`
     doubt: np.ndarray = np.ones(())  # the part of the latent variance that counts against a place
     optimism: np.ndarray = np.zeros(())
@@ -194,13 +194,13 @@ class LogLikelihoodSurrogate:
         return minimise_in_box(surely, self.gp.data.u.shape[1])
 
     @in_float64
-    def believe(self, u: np.ndarray) -> "LogLikelihoodSurrogate":
+    def fantasize(self, u: np.ndarray) -> "LogLikelihoodSurrogate":
         """Condition on the predicted means at u [n, d], for points still being simulated."""
         if not len(u):
             return self
         noise = self.gp.data.spread
         usual = None if noise is None else np.full(len(u), np.median(noise))
-        return replace(self, state=self.state._replace(gp=believe(self.gp, u, usual)))
+        return replace(self, state=self.state._replace(gp=fantasize(self.gp, u, usual)))
 
     @in_float64
     def predict(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -297,20 +297,20 @@ def learn(
     return LogLikelihoodSurrogate(state, values, learned_at)
 
 
-def _scales(values: np.ndarray) -> list[Scale]:
+def _scales(values: np.ndarray) -> list[LogLikelihoodScale]:
     """Those that differ for these log likelihoods."""
     depth, found = values.max() - values, []
     for linear in LINEAR:
         heights = compressed(depth, linear)
         top, location = np.asarray(values.max()), np.asarray(heights.mean())
         spread = np.asarray(heights.std() or 1.0)
-        found.append(Scale(top, np.asarray(linear), location, spread))
+        found.append(LogLikelihoodScale(top, np.asarray(linear), location, spread))
         if depth.max() < linear:
             break
     return found
 
 
-def _score(gp: GP, scale: Scale, values: np.ndarray) -> float:
+def _score(gp: GP, scale: LogLikelihoodScale, values: np.ndarray) -> float:
     """Leave-one-out log predictive density of the log likelihoods that count, or of the best
     quarter, in nats."""
     mean, variance = (moment[0] for moment in leave_one_out(gp))
@@ -320,7 +320,11 @@ def _score(gp: GP, scale: Scale, values: np.ndarray) -> float:
 
 
 def _data(
-    u: np.ndarray, values: np.ndarray, sd: np.ndarray, scale: Scale, normal: np.ndarray | None
+    u: np.ndarray,
+    values: np.ndarray,
+    sd: np.ndarray,
+    scale: LogLikelihoodScale,
+    normal: np.ndarray | None,
 ) -> Data:
     """Targets of the process; where some sds are known, its noise varies as they do."""
     usual = np.nanmedian(sd) if np.isfinite(sd).any() else 0.0
@@ -366,7 +370,7 @@ class LogLikelihoodLearner:
         return Measured(found[:, 1:], -found[:, 0], errors)
 
     def learn(
-        self, known: Learnable, previous: LogLikelihoodSurrogate | None
+        self, known: TrainingData, previous: LogLikelihoodSurrogate | None
     ) -> LogLikelihoodSurrogate:
         """To search with: where a run was unlucky others are to be made."""
         values, sd = -known.discrepancy, known.features[:, 0]
@@ -374,7 +378,7 @@ class LogLikelihoodLearner:
         success = learn_success(known.runs, known.normal)
         return replace(learned, state=learned.state._replace(success=success))
 
-    def finish(self, known: Learnable) -> LogLikelihoodSurrogate:
+    def finish(self, known: TrainingData) -> LogLikelihoodSurrogate:
         """The surrogate on which a fit rests."""
         return self.learn(known, None).cautious
 

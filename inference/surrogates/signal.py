@@ -8,7 +8,7 @@ import numpy as np
 from .._float64 import in_float64
 from .._lazy import stats
 from ..gp.optimise import minimise_in_box
-from ..gp.process import GP, believe
+from ..gp.process import GP, fantasize
 from ..sobol import sobol
 from ..types import LogLikelihood, LogSecondMoment
 from .emulator import (
@@ -21,7 +21,7 @@ from .emulator import (
     predictive_draws,
     smallest_misfit,
 )
-from .given_noise import GivenNoise, Noise
+from .given_noise import GivenNoise, NoiseModel
 from .measurement_noise import (
     CORRELATIONS,
     FEW_CORRELATIONS,
@@ -43,7 +43,7 @@ from .measurement_noise import (
     with_misfit,
 )
 from .noise.run_size import run_spread
-from .noise.scales import Plain, Scale, in_units
+from .noise.scales import OutputScale, Plain, in_units
 from .output_vectors import Output
 from .signal_likelihood import (
     SignalState,
@@ -104,7 +104,7 @@ class SignalSurrogate:
     reduced: Reduced
     box: tuple[np.ndarray, np.ndarray] | None = None
     success: GP | None = None
-    scale: Scale = Plain(np.zeros(0), None)
+    scale: OutputScale = Plain(np.zeros(0), None)
 
     @property
     def gp(self) -> GP:
@@ -131,7 +131,7 @@ class SignalSurrogate:
             remainder = Remainder(np.sqrt(share) * factors, share * white)
             noise = share * self.emulator.noise
             emulator = self.emulator._replace(noise=noise, remainder=remainder)
-            known = Noise(self.known, 0.0)
+            known = NoiseModel(self.known, 0.0)
             found = observe(emulator, self.output, self.observed, known, previous=self)
             found = replace(found, box=self.box, success=self.success)
         return found.state._replace(doubt=np.zeros(()))
@@ -151,12 +151,12 @@ class SignalSurrogate:
         return minimise_in_box(lambda u: -log_likelihood(state, u), len(state.low), *self.box or ())
 
     @in_float64
-    def believe(self, u: np.ndarray) -> "SignalSurrogate":
+    def fantasize(self, u: np.ndarray) -> "SignalSurrogate":
         """Condition on the predicted means at u [n, d], for points still being simulated."""
         if len(u) == 0:
             return self
-        believed = believe(self.gp, u, run_spread(self.emulator.size, u))
-        return replace(self, emulator=self.emulator._replace(gp=believed))
+        fantasized = fantasize(self.gp, u, run_spread(self.emulator.size, u))
+        return replace(self, emulator=self.emulator._replace(gp=fantasized))
 
     @property
     @in_float64
@@ -314,7 +314,7 @@ def observe(
     emulator: Emulator,
     output: Output,
     observed: np.ndarray,
-    noise: Noise,
+    noise: NoiseModel,
     previous: SignalSurrogate | None = None,
 ) -> SignalSurrogate:
     """Compare with the observed values [m].
@@ -324,7 +324,7 @@ def observe(
     nothing would explain what no run explains.
 
     Args:
-        noise: What is believed of it.
+        noise: What is known of it.
         previous: Its nodes are kept.
     """
     basis, remainder = emulator.basis, emulator.remainder
@@ -354,7 +354,7 @@ def observe(
 
 
 def _nodes(
-    emulator: Emulator, output: Output, observed: np.ndarray, noise: Noise
+    emulator: Emulator, output: Output, observed: np.ndarray, noise: NoiseModel
 ) -> tuple[Nodes, np.ndarray]:
     """Sizes and correlations that the unknown noise or misfit may have, and their log weights."""
     if emulator.equal or (noise.given is not None and not noise.misfit):

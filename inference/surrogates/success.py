@@ -26,7 +26,7 @@ STEPS, TOLERANCE = 50, 1e-6  # of Newton's method; the latent function is of ord
 LEAST_CURVATURE = 1e-6  # of a run's log likelihood, where its label is no surprise at all
 
 
-class Runs(NamedTuple):
+class RunOutcomes(NamedTuple):
     """Runs so far."""
 
     u: np.ndarray  # [p, d]
@@ -42,7 +42,7 @@ class _Laplace(NamedTuple):
 
 
 @in_float64
-def learn_success(runs: Runs, normal: np.ndarray | None) -> GP | None:
+def learn_success(runs: RunOutcomes, normal: np.ndarray | None) -> GP | None:
     """A process whose normal integral is the probability of success; None if no run failed.
 
     Probit classification by Laplace's approximation (Rasmussen and Williams 2006, section 3.4),

@@ -51,7 +51,7 @@ class Pours(NamedTuple):
         )
 
 
-class Turn(NamedTuple):
+class PourRotation(NamedTuple):
     """How cups turn: to `final_angle` [rad] and then for `hold` [s], in steps of `dt` [s]."""
 
     final_angle: float
@@ -62,7 +62,7 @@ class Turn(NamedTuple):
 def march(
     vessel: Vessel,
     pours: Pours,
-    turn: Turn,
+    turn: PourRotation,
     effects: tuple[Effect, ...] = (),
     watch: Watch | None = None,
 ) -> list[Flights]:
@@ -91,7 +91,7 @@ def _like(pours: Pours, size: int) -> Sequence[np.ndarray]:
     return [order[low : low + size] for low in range(0, len(order), size)]
 
 
-def _together(vessel, pours: Pours, turn: Turn, effects, watch) -> list[Flights]:
+def _together(vessel, pours: Pours, turn: PourRotation, effects, watch) -> list[Flights]:
     """What `march` returns, of at most as many pours as there are lanes."""
     from ..apic.lanes import LANES
 

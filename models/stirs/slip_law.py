@@ -20,7 +20,7 @@ LEAST_SEEN = 0.1  # full cells that a node reckons with, at least
 NODES_ABOVE = 4  # the surface at rest, for waves and for a stick that is lifted
 
 
-class Line(NamedTuple):
+class StickNodes(NamedTuple):
     """The nodes of a stick.
 
     Attributes:
@@ -36,11 +36,11 @@ class Line(NamedTuple):
     node_volume: float
 
 
-def line_of(radius: float, cell: float, depth: float) -> Line:
+def line_of(radius: float, cell: float, depth: float) -> StickNodes:
     """The line of a stick of `radius` in liquid of `depth`, on cells of `cell` [m]."""
     stretch = max(1.0, radius / (KERNEL * cell))
     nodes = math.ceil(depth / cell) + NODES_ABOVE
-    return Line(nodes, stretch, math.ceil(2.0 * stretch - 1e-9), node_volume(stretch))
+    return StickNodes(nodes, stretch, math.ceil(2.0 * stretch - 1e-9), node_volume(stretch))
 
 
 def peskin(r: np.ndarray) -> np.ndarray:

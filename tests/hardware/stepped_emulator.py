@@ -13,7 +13,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from bolfi_liquids.hardware.emulator.controller import Options
-from bolfi_liquids.hardware.emulator.loop import Emulator
+from bolfi_liquids.hardware.emulator.loop import ControllerServer
 from bolfi_liquids.hardware.emulator.process import free_address
 from bolfi_liquids.hardware.emulator.servers import wire
 from bolfi_liquids.hardware.emulator.servers.network import RTDE, SCRIPT
@@ -44,7 +44,7 @@ OUTPUT_FIELDS = [
 ]
 
 
-class SteppedEmulator(Emulator):
+class SteppedEmulator(ControllerServer):
     """An emulator whose ticks a stepped clock makes."""
 
     def __init__(self, options: Options, clock: SteppedClock):

@@ -8,7 +8,7 @@ import pytest
 from bolfi_liquids.hardware.errors import RigError
 from bolfi_liquids.hardware.rig import Rig, check_receiver
 from bolfi_liquids.hardware.rig_file import bundled_rig, open_rig
-from bolfi_liquids.hardware.rig_numbers import RECORDED, Section
+from bolfi_liquids.hardware.rig_numbers import RECORDED, RigSection
 from pydantic import Field, ValidationError, create_model
 
 TEXT = (files("bolfi_liquids.hardware.data") / "rig.toml").read_text(encoding="utf-8")
@@ -112,7 +112,7 @@ def ends(kind, way=""):
     """Each number of a rig's section whose type says more than one end, by its name."""
     for name, field in kind.model_fields.items():
         for inner in (field.annotation, *get_args(field.annotation)):
-            if isinstance(inner, type) and issubclass(inner, Section):
+            if isinstance(inner, type) and issubclass(inner, RigSection):
                 yield from ends(inner, f"{way}{name}.")
         texts = repr(field.metadata) + repr(field.annotation)
         if any(one in texts for one in ("Ge(", "Gt(", "Le(", "Lt(")):
@@ -122,7 +122,7 @@ def ends(kind, way=""):
 def test_each_end_of_a_number_stands_once():
     """An end in pydantic's own words stands beside one with a reason, or holds for recordings."""
     assert list(ends(Rig)) == []
-    twice = create_model("Twice", __base__=Section, one=(Annotated[float, Field(gt=0)], 1.0))
+    twice = create_model("Twice", __base__=RigSection, one=(Annotated[float, Field(gt=0)], 1.0))
     assert list(ends(twice)) == ["one"]
 
 

@@ -76,7 +76,7 @@ def test_a_copy_teaches_nothing(prior, observed, simulate):
     assert (engine.told, engine.succeeded) == (12, 6)
     fit = engine.fit()
     assert fit.best == plain.fit().best
-    np.testing.assert_array_equal(fit.learned_from, np.arange(12) < 6)
+    np.testing.assert_array_equal(fit.training_mask, np.arange(12) < 6)
     engine.tell(theta, simulate(theta, np.arange(6, 12)), np.arange(6, 12))
     engine.tell(theta, signals)
     assert engine.succeeded == 18

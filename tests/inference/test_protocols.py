@@ -219,9 +219,9 @@ def check_minimum(of):
     np.testing.assert_array_equal(best, of.minimum())
 
 
-def check_believe(of):
+def check_fantasize(of):
     """Its own predictions teach it nothing new but certainty."""
-    after = of.believe(POINTS[:2])
+    after = of.fantasize(POINTS[:2])
     np.testing.assert_allclose(after.predict(POINTS)[0], of.predict(POINTS)[0], atol=1e-6)
     assert (after.predict(POINTS)[1] <= of.predict(POINTS)[1] + 1e-9).all()
     assert len(after.gp.data.u) == RUNS + 2 and len(of.gp.data.u) == RUNS

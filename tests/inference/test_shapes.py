@@ -45,7 +45,7 @@ def test_a_signal_of_another_shape_condemns_no_other(prior, observed, simulate, 
         in_rounds=in_rounds,
         discrepancy=of_means,
     )
-    assert fit.failures == {} and fit.learned_from.all()
+    assert fit.failures == {} and fit.training_mask.all()
     assert fit.history.signal(first).shape == (29,) and fit.history.signals.shape == (BUDGET, 30)
     others = np.arange(BUDGET) != first
     assert np.isfinite(fit.history.signals[others]).all()

@@ -13,7 +13,7 @@ MOST_UNSENT = 1 << 18  # bytes; a client that reads no more than this loses what
 RTDE, SCRIPT, DASHBOARD, ADMIN = 30004, 30003, 29999, 29997
 
 
-class Session(Protocol):
+class ClientSession(Protocol):
     """One client of one port."""
 
     def received(self) -> None:
@@ -74,7 +74,7 @@ class Network:
     def __init__(
         self,
         address: str,
-        sessions: dict[int, Callable[[Connection], Session]],
+        sessions: dict[int, Callable[[Connection], ClientSession]],
         clock: HostClock = REAL_CLOCK,
     ):
         check_address(address)
@@ -82,7 +82,7 @@ class Network:
         self._factories = sessions
         self._selector = selectors.SelectSelector()
         self._listeners: dict[int, socket.socket] = {}
-        self._clients: dict[Connection, tuple[int, Session]] = {}
+        self._clients: dict[Connection, tuple[int, ClientSession]] = {}
         self._frozen_until: float | None = None
         try:
             for port in sessions:
@@ -93,7 +93,7 @@ class Network:
         for port, listener in self._listeners.items():
             self._selector.register(listener, selectors.EVENT_READ, port)
 
-    def sessions(self, port: int) -> list[Session]:
+    def sessions(self, port: int) -> list[ClientSession]:
         return [session for at, session in self._clients.values() if at == port]
 
     @property

@@ -14,7 +14,7 @@ NEEDED_NATS = 6.0  # log likelihood that noise which grows with the mean must ga
 ANSCOMBE = 3.0 / 8.0  # of a count, added before its root is taken (Anscombe 1948)
 
 
-class Scale(Protocol):
+class OutputScale(Protocol):
     """Values [n, m] of outputs as features [n, m], and back."""
 
     @property
@@ -56,13 +56,13 @@ class Scale(Protocol):
         ...
 
 
-def comparable(scale: Scale, output: Output) -> Callable[[np.ndarray], np.ndarray]:
+def comparable(scale: OutputScale, output: Output) -> Callable[[np.ndarray], np.ndarray]:
     """What makes features comparable: features [n, m] -> [m]."""
     unit = scale.unit
     return output.scale if unit is None else lambda _: unit
 
 
-def in_units(scale: Scale, features: np.ndarray, sd: np.ndarray) -> np.ndarray:
+def in_units(scale: OutputScale, features: np.ndarray, sd: np.ndarray) -> np.ndarray:
     """An sd of features [n, m] as one of their values, in the values' units."""
     if isinstance(scale, Plain) and scale.stretch is None:
         return sd

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 import bolfi_liquids as bl
 from bolfi_liquids import hardware
 from bolfi_liquids.cli.app import app
-from bolfi_liquids.robot.record import finished, kept
+from bolfi_liquids.robot.record import finished, save_on_stop
 
 REASON = "protective stop at 2.6 s"
 
@@ -66,7 +66,7 @@ def test_a_recording_that_was_aborted_too_early_to_be_used_is_aborted(
 def test_a_session_that_is_stopped_says_what_is_left(monkeypatch, tmp_path, stop, status):
     def session(*_, out, **__):
         out.mkdir()
-        with kept(out):
+        with save_on_stop(out):
             raise stop
 
     monkeypatch.setattr("bolfi_liquids.robot.record.record", session)

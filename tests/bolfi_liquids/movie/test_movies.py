@@ -21,11 +21,11 @@ from bolfi_liquids.movie.pour import (
 )
 from bolfi_liquids.movie.stir import stir_pictures, stir_view
 from bolfi_liquids.movie.surface import Glass, surface
-from bolfi_liquids.movie.view import View
+from bolfi_liquids.movie.view import OrthographicView
 
 UP = np.array([0.0, 0.0, 1.0])
 FAR = Glass(0.01, 0.01, np.array([9.0, 9.0, 9.0]), UP)  # holds nothing of what is drawn
-FRONT = View(161, 121, 1000.0, (0.0, 0.0, 0.0), 0.0, 0.0)
+FRONT = OrthographicView(161, 121, 1000.0, (0.0, 0.0, 0.0), 0.0, 0.0)
 SPACING = 0.005
 
 
@@ -47,14 +47,14 @@ def setup():
 
 def test_points_are_where_an_orthographic_camera_sees_them():
     """From the front; from the side; from above: written down by hand."""
-    view = View(201, 101, 500.0, (0.1, 0.2, 0.3), 0.0, 0.0)
+    view = OrthographicView(201, 101, 500.0, (0.1, 0.2, 0.3), 0.0, 0.0)
     point = np.array([0.1 + 0.02, 0.2 + 0.03, 0.3 + 0.04])
     assert view.pixels(point) == pytest.approx([100.0 + 10.0, 50.0 - 20.0])
-    side = View(201, 101, 500.0, (0.1, 0.2, 0.3), np.pi / 2.0, 0.0)
+    side = OrthographicView(201, 101, 500.0, (0.1, 0.2, 0.3), np.pi / 2.0, 0.0)
     assert side.pixels(point) == pytest.approx([100.0 + 15.0, 50.0 - 20.0])
-    above = View(201, 101, 500.0, (0.1, 0.2, 0.3), 0.0, np.pi / 2.0)
+    above = OrthographicView(201, 101, 500.0, (0.1, 0.2, 0.3), 0.0, np.pi / 2.0)
     assert above.pixels(point) == pytest.approx([100.0 + 10.0, 50.0 - 15.0])
-    tilted = View(201, 101, 500.0, (0.1, 0.2, 0.3), 0.0, np.radians(30.0))
+    tilted = OrthographicView(201, 101, 500.0, (0.1, 0.2, 0.3), 0.0, np.radians(30.0))
     up = 0.04 * np.cos(np.radians(30.0)) + 0.03 * np.sin(np.radians(30.0))
     assert tilted.pixels(point) == pytest.approx([110.0, 50.0 - 500.0 * up])
     assert tilted.world(tilted.camera(point)) == pytest.approx(point)

@@ -7,7 +7,7 @@ from bolfi_liquids.hardware.session.session import Session
 
 from bolfi_liquids import hardware
 from bolfi_liquids.robot.armed_session import Task, armed_session
-from bolfi_liquids.robot.record import kept
+from bolfi_liquids.robot.record import save_on_stop
 from bolfi_liquids.robot.stir import plan_stir
 
 NOBODY = "127.94.3.2"  # where no controller listens
@@ -62,7 +62,7 @@ def test_a_session_whose_processes_cannot_start_leaves_no_directory(task, monkey
 
 def test_a_session_that_was_stopped_before_any_motion_says_so(tmp_path):
     stopped = pytest.raises(hardware.SessionStopped, match="robot mode; nothing had moved")
-    with stopped, kept(tmp_path / "gone"):
+    with stopped, save_on_stop(tmp_path / "gone"):
         raise hardware.SessionStopped("robot mode")
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.emulator.arm import Arm
 from bolfi_liquids.hardware.emulator.motion import (
-    ArmState,
+    JointState,
     MotionError,
     Tool,
     Trapezoid,
@@ -43,14 +43,14 @@ def test_no_way_takes_no_time():
 def test_servo_steps_are_those_of_its_equation(lookahead, gain):
     target = HOME + 1e-3
     system = np.array([[0.0, 1.0], [-gain, -gain * lookahead]])
-    state = servo(UR10, target, lookahead, gain, 1e6).step(ArmState(HOME, ZERO + 0.01), DT)
+    state = servo(UR10, target, lookahead, gain, 1e6).step(JointState(HOME, ZERO + 0.01), DT)
     away, speed = expm(system * DT) @ [-1e-3, 0.01]
     assert state.joints == pytest.approx(target + away, abs=1e-9)
     assert state.speed == pytest.approx(ZERO + speed, abs=1e-7)
 
 
 def test_servo_lags_a_moving_target_by_its_lookahead():
-    state, speed = ArmState(HOME, ZERO), 0.1
+    state, speed = JointState(HOME, ZERO), 0.1
     for k in range(1, 500):
         target = HOME + speed * k * DT
         state = servo(UR10, target, 0.1, 300, 15.0).step(state, DT)
@@ -60,7 +60,7 @@ def test_servo_lags_a_moving_target_by_its_lookahead():
 
 
 def test_servo_keeps_to_the_joints_speeds_and_rests_on_its_target():
-    target, state, speeds = HOME + [2, 0, 0, 0, 0, 0], ArmState(HOME, ZERO), []
+    target, state, speeds = HOME + [2, 0, 0, 0, 0, 0], JointState(HOME, ZERO), []
     motion = servo(UR10, target, 0.1, 300, 15.0)
     for _ in range(1000):
         state = motion.step(state, DT)
@@ -73,7 +73,7 @@ def test_servo_keeps_to_the_joints_speeds_and_rests_on_its_target():
 
 
 def test_twist_moves_the_tcp_straight_and_stops_it():
-    state, rate = ArmState(HOME, ZERO), 0.5
+    state, rate = JointState(HOME, ZERO), 0.5
     start = TOOL.pose(HOME)
     for _ in range(50):
         state = twist(TOOL, np.array([0.05, 0, 0, 0, 0, 0]), rate).step(state, DT)
@@ -93,7 +93,7 @@ def test_twist_moves_the_tcp_straight_and_stops_it():
 
 def test_joint_speeds_reach_their_target_together():
     target = np.array([0.2, -0.1, 0, 0, 0, 0.4])
-    state = joint_speed(UR10, target, 1.0).step(ArmState(HOME, ZERO), 0.1)
+    state = joint_speed(UR10, target, 1.0).step(JointState(HOME, ZERO), 0.1)
     assert state.speed == pytest.approx(target / 4)
     assert state.joints == pytest.approx(HOME + target / 4 * 0.05)
 

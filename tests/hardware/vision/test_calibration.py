@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from bolfi_liquids.hardware.rendering import render_board, render_plumb_line
 from bolfi_liquids.hardware.vision import (
-    Board,
     CalibrationError,
     CameraModel,
+    CharucoBoard,
     PlumbLineError,
     calibrate_intrinsics,
     level_camera,
@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 cv2 = pytest.importorskip("cv2")
 
-BOARD = Board()
+BOARD = CharucoBoard()
 TRUTH = CameraModel(
     focal=(652.0, 648.0),
     centre=(330.0, 233.0),
@@ -29,7 +29,7 @@ TRUTH = CameraModel(
 )
 
 
-def board_picture(turn, place, seed: int, board: Board = BOARD) -> np.ndarray:
+def board_picture(turn, place, seed: int, board: CharucoBoard = BOARD) -> np.ndarray:
     """The board's middle at `place` [m] in the camera frame, turned by a rotation vector."""
     rotation = Rotation.from_rotvec(turn).as_matrix()
     middle = 0.5 * BOARD.square * np.array([BOARD.columns, BOARD.rows, 0.0])
@@ -37,7 +37,7 @@ def board_picture(turn, place, seed: int, board: Board = BOARD) -> np.ndarray:
     return render_board(board, TRUTH, rotation, np.array(place) - rotation @ middle, rng)
 
 
-def board_pictures(board: Board) -> list[np.ndarray]:
+def board_pictures(board: CharucoBoard) -> list[np.ndarray]:
     rng = np.random.default_rng(1)
     return [
         board_picture(

@@ -19,8 +19,8 @@ from bolfi_liquids.hardware.vision import (
     ClockError,
     FrameMeter,
     FrameSeries,
+    MeasuredView,
     PoseError,
-    View,
     ViewLines,
     as_series,
     fit_clock,
@@ -215,7 +215,7 @@ def joined_from_pictures(frames: int):
         clock = fit_clock(series, robot, camera, marker, guess=guess)
         host = 50.0 + (clock.reference - timing.offset - 50.0) / (1.0 + timing.drift)
         late.append(clock.to_robot(np.array(clock.reference)) - (host + START - 50.0))
-        views.append(View(series, clock, camera))
+        views.append(MeasuredView(series, clock, camera))
     times = START + np.arange(0.2, frames / 30 - 0.2, 1 / 30)
     return join(views[0], views[1], times), times, np.array(late)
 

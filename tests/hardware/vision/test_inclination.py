@@ -10,7 +10,7 @@ from bolfi_liquids.hardware.vision import (
     Clock,
     Flag,
     FrameMeasurement,
-    View,
+    MeasuredView,
     ViewLines,
     as_series,
     direction,
@@ -175,7 +175,7 @@ def test_cameras_out_of_step_are_joined_at_times_of_the_robot():
             frame(k, t, lines.angle[k])._replace(offset=lines.offset[k])
             for k, t in enumerate(stamps)
         ]
-        return View(as_series(frames), clock, camera)
+        return MeasuredView(as_series(frames), clock, camera)
 
     views = (
         view("xz", Clock(500.0, 1e-5, 3.0), np.arange(90) / 30, 2.0),

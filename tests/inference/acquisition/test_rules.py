@@ -16,7 +16,7 @@ from bolfi_liquids.inference.acquisition.rules import (
 from bolfi_liquids.inference.gp.process import predict
 from bolfi_liquids.inference.sobol import sobol
 from bolfi_liquids.inference.surrogates.discrepancy import learn, with_threshold
-from bolfi_liquids.inference.surrogates.success import Runs, learn_success, log_success
+from bolfi_liquids.inference.surrogates.success import RunOutcomes, learn_success, log_success
 from scipy.stats import kstest, multivariate_normal, norm, qmc, truncnorm
 
 from bolfi_liquids import inference
@@ -143,7 +143,7 @@ def test_regions_where_runs_fail_are_avoided():
     good = surrogate.gp.data.u
     bad = np.random.default_rng(0).normal([0.4, 0.4], 0.05, (24, 2))
     u, succeeded = np.concatenate([good, bad]), np.arange(48) < 24
-    success = learn_success(Runs(u, succeeded), None)
+    success = learn_success(RunOutcomes(u, succeeded), None)
     assert log_success(success, np.array([[0.4, 0.4]]))[0] < -1.5
     assert log_success(success, np.array([[0.95, 0.95]]))[0] > -0.3
     failing = replace(surrogate, success=success)

@@ -9,7 +9,7 @@ from bolfi_liquids.inference.criticism.measurement_noise import samples
 from bolfi_liquids.inference.criticism.misfit import locate, null_draws
 from bolfi_liquids.inference.criticism.posterior import weighted_posterior
 from bolfi_liquids.inference.criticism.prior_boxes import everywhere, fill
-from bolfi_liquids.inference.criticism.simulate import Laboratory
+from bolfi_liquids.inference.criticism.simulate import SimulatorRuns
 from bolfi_liquids.inference.surrogates import output_vectors
 from scipy.stats import binom, chi2, norm
 
@@ -33,8 +33,8 @@ def oscillate(theta, seeds):
 
 def fitted(simulate, observed, noise, bank, count=RUNS):
     with criticism.Keeping(batch=64).opened("") as keep:
-        laboratory = Laboratory(simulate, PRIOR, EXTENSIONS, keep, bank)
-        runs = laboratory.run("start", fill(everywhere(1), PRIOR, bank, count))
+        simulator = SimulatorRuns(simulate, PRIOR, EXTENSIONS, keep, bank)
+        runs = simulator.run("start", fill(everywhere(1), PRIOR, bank, count))
     return hypothesise((), PRIOR, runs, observed, noise, everywhere(1))
 
 
@@ -77,7 +77,7 @@ def test_a_run_that_blew_up_is_left_out():
 
     observed = oscillate({"rate": np.array([4.0])}, [0])[0]
     found = fitted(seldom, observed, NOISE, 0, count=12)
-    assert found.fit.learned_from.sum() == 11
+    assert found.fit.training_mask.sum() == 11
     assert found.best["rate"] == pytest.approx(4.0, abs=0.1)
 
 
@@ -169,8 +169,8 @@ def test_a_posterior_allows_for_what_is_not_known_of_the_usual_residuals_size(si
     noise = criticism.SumOfNoises((criticism.KnownNoise(1e-4), usual))
     observed = 0.3 + size * sd * rng.normal(size=n)
     with criticism.Keeping(batch=64).opened("") as keep:
-        laboratory = Laboratory(level, prior, EXTENSIONS, keep)
-        runs = laboratory.run("start", fill(everywhere(1), prior, 0, 12))
+        simulator = SimulatorRuns(level, prior, EXTENSIONS, keep)
+        runs = simulator.run("start", fill(everywhere(1), prior, 0, 12))
     found = weighted_posterior(hypothesise((), prior, runs, observed, noise, everywhere(1)))
     draws, weights = found.theta["level"], found.weights
     spread = np.sqrt(np.average((draws - np.average(draws, weights=weights)) ** 2, weights=weights))

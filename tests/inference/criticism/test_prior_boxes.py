@@ -6,9 +6,9 @@ import pytest
 from bolfi_liquids.inference import criticism
 from bolfi_liquids.inference.criticism.hypothesis import hypothesise
 from bolfi_liquids.inference.criticism.posterior import weighted_posterior
-from bolfi_liquids.inference.criticism.prior_boxes import Box, fill, hull, intersection, sides
+from bolfi_liquids.inference.criticism.prior_boxes import PriorBox, fill, hull, intersection, sides
 from bolfi_liquids.inference.criticism.search import Study, examine, explain
-from bolfi_liquids.inference.criticism.simulate import Laboratory
+from bolfi_liquids.inference.criticism.simulate import SimulatorRuns
 
 from bolfi_liquids import inference
 
@@ -25,9 +25,9 @@ def ramp(theta, seeds):
 
 
 @pytest.fixture
-def laboratory():
+def simulator():
     with criticism.Keeping(batch=64).opened("") as keep:
-        yield Laboratory(ramp, PRIOR, EXTENSIONS, keep)
+        yield SimulatorRuns(ramp, PRIOR, EXTENSIONS, keep)
 
 
 def observed(level, size=0.0):
@@ -36,7 +36,7 @@ def observed(level, size=0.0):
 
 
 def test_a_point_at_a_wall_is_not_enclosed_unless_the_prior_ends_there():
-    box = Box(np.array([0.0, 0.2]), np.array([0.5, 1.0]))
+    box = PriorBox(np.array([0.0, 0.2]), np.array([0.5, 1.0]))
     inside = [0.0, 0.6], [0.25, 1.0], [0.4, 0.9]
     outside = [0.499, 0.6], [0.25, 0.201], [0.6, 0.6], [0.25, 0.1]
     assert all(box.encloses(np.array(u)) for u in inside)
@@ -44,7 +44,7 @@ def test_a_point_at_a_wall_is_not_enclosed_unless_the_prior_ends_there():
 
 
 def test_a_hull_holds_both_boxes_and_an_intersection_is_in_both():
-    one, other = Box(np.zeros(2), np.full(2, 0.5)), Box(np.array([0.2, 0.4]), np.ones(2))
+    one, other = PriorBox(np.zeros(2), np.full(2, 0.5)), PriorBox(np.array([0.2, 0.4]), np.ones(2))
     np.testing.assert_array_equal(hull(one, other), [[0.0, 0.0], [1.0, 1.0]])
     np.testing.assert_array_equal(intersection(one, other), [[0.2, 0.4], [0.5, 0.5]])
 
@@ -64,10 +64,10 @@ def test_effects_are_tried_on_both_sides_of_neutral_or_on_the_only_one(prior, ne
 
 
 @pytest.mark.slow
-def test_best_fit_and_posterior_stay_where_the_model_was_simulated(laboratory):
+def test_best_fit_and_posterior_stay_where_the_model_was_simulated(simulator):
     """Data that lie beyond draw both to the end and no further."""
-    within = Box(np.array([0.2]), np.array([0.5]))
-    runs = laboratory.run("start", fill(within, PRIOR, 0, 12))
+    within = PriorBox(np.array([0.2]), np.array([0.5]))
+    runs = simulator.run("start", fill(within, PRIOR, 0, 12))
     found = hypothesise((), PRIOR, runs, observed(1.5), NOISE, within)
     assert found.u[0] == pytest.approx(0.5, abs=0.01)
     level = weighted_posterior(found).draw(0, 200)["level"]
@@ -75,9 +75,9 @@ def test_best_fit_and_posterior_stay_where_the_model_was_simulated(laboratory):
 
 
 @pytest.mark.slow
-def test_a_truth_outside_of_the_box_of_the_model_without_the_effect_is_reached(laboratory):
+def test_a_truth_outside_of_the_box_of_the_model_without_the_effect_is_reached(simulator):
     """The base model fits best at 1.6, half of the prior's range away."""
-    study = Study(laboratory, observed(0.0, 1.4), NOISE, criticism.Plan())
+    study = Study(simulator, observed(0.0, 1.4), NOISE, criticism.Plan())
     base, _ = examine(study, None)
     assert not base.box.encloses(np.array([0.5]))
     _, accepted = explain(study, base)

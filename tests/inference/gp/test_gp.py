@@ -10,8 +10,8 @@ from bolfi_liquids.inference.gp.process import (
     JITTER,
     Data,
     Hyper,
-    believe,
     condition,
+    fantasize,
     inverse_cholesky,
     leave_one_out,
     padded,
@@ -125,17 +125,17 @@ def test_joint_prediction_agrees_with_dense_algebra(rows, hyper):
     np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-10)
 
 
-def test_believing_agrees_with_conditioning_on_the_mean(rows, hyper):
+def test_fantasizing_agrees_with_conditioning_on_the_mean(rows, hyper):
     u, y = rows
     fitted = condition(hyper, Data(u, y))
     new = np.array([[0.4, 0.7], [0.1, 0.2]])
     mean = predict(fitted, new)[0]
     again = condition(hyper, Data(np.concatenate([u, new]), np.concatenate([y, mean], axis=1)))
-    believing = believe(fitted, new)
+    fantasized = fantasize(fitted, new)
     at = np.array([[0.3, 0.3]])
-    for one, other in zip(predict(believing, at), predict(again, at), strict=True):
+    for one, other in zip(predict(fantasized, at), predict(again, at), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-9)
-    np.testing.assert_allclose(predict(believing, at)[0], predict(fitted, at)[0], rtol=1e-9)
+    np.testing.assert_allclose(predict(fantasized, at)[0], predict(fitted, at)[0], rtol=1e-9)
 
 
 def test_coordinates_of_a_prior_that_fades_out_are_its_normal_scores(rows, hyper):

@@ -10,7 +10,7 @@ from bolfi_liquids.inference._float64 import in_float64
 from bolfi_liquids.inference.gp.namespaces import log_sum_exp, namespace
 from bolfi_liquids.inference.sampling import draw as sampling
 from bolfi_liquids.inference.sampling import nuts, quadrature
-from bolfi_liquids.inference.sampling.convergence import Status, limits
+from bolfi_liquids.inference.sampling.convergence import ConvergenceStatus, limits
 from bolfi_liquids.inference.sampling.target import Chains, Length, Target
 from scipy.stats import norm
 
@@ -207,7 +207,7 @@ def test_goes_on_until_it_suffices(monkeypatch):
 def test_says_so_when_the_budget_does_not_suffice(monkeypatch):
     monkeypatch.setitem(sampling.SAMPLERS, "slow", slow)
     made = sample("slow", uncorrelated(), Length(4, 1, 1000), extend=2)
-    assert [*made.found] == [Status.TOO_FEW_DRAWS]
+    assert [*made.found] == [ConvergenceStatus.TOO_FEW_DRAWS]
     assert "bulk effective sample size" in made.status and "2000" in made.status
     assert made.steps == 2000
 
@@ -215,7 +215,7 @@ def test_says_so_when_the_budget_does_not_suffice(monkeypatch):
 def test_stuck_chains_are_not_silent(monkeypatch):
     monkeypatch.setitem(sampling.SAMPLERS, "stuck", stuck)
     made = sample("stuck", bimodal(2), extend=4)
-    assert Status.TOO_FEW_DRAWS in made.found and "R-hat" in made.status
+    assert ConvergenceStatus.TOO_FEW_DRAWS in made.found and "R-hat" in made.status
     assert made.steps == 4000
 
 
@@ -223,14 +223,14 @@ def test_disagreement_with_quadrature_is_not_silent(monkeypatch):
     """Shifted by 0.7 sd, while R-hat and ESS are perfect."""
     monkeypatch.setitem(sampling.SAMPLERS, "biased", biased)
     made = sample("biased", uncorrelated())
-    assert [*made.found] == [Status.QUADRATURE_DIFFERS]
+    assert [*made.found] == [ConvergenceStatus.QUADRATURE_DIFFERS]
     assert made.checks["quadrature_total_variation"] > 0.2
 
 
 def test_divergences_are_not_silent(monkeypatch):
     monkeypatch.setitem(sampling.SAMPLERS, "divergent", divergent)
     made = sample("divergent", uncorrelated())
-    assert [*made.found] == [Status.DIVERGENT] and "5." in made.status
+    assert [*made.found] == [ConvergenceStatus.DIVERGENT] and "5." in made.status
 
 
 @pytest.mark.slow
@@ -248,7 +248,7 @@ def test_a_hole_in_the_likelihood_is_avoided_or_told():
     made = sample("emcee", target)
     assert not made.found
     assert_means(made.chains.u, [0.45 + 0.03 * np.sqrt(2.0 / np.pi), 0.45])
-    assert Status.DIVERGENT in sample("nuts", target).found
+    assert ConvergenceStatus.DIVERGENT in sample("nuts", target).found
 
 
 def right_half(state, u):
@@ -281,7 +281,7 @@ def test_a_fit_agrees_with_its_quadrature(line_fit, sampler):
     cells = in_float64(quadrature.integrate)(Target(learned.log_likelihood, learned.state, 2))
     assert quadrature.total_variation(u, cells) < 0.05
     assert_means(u.reshape(4, 1000, 2), cells.mean())
-    assert posterior.attrs["status"] == Status.CONVERGED
+    assert posterior.attrs["status"] == ConvergenceStatus.CONVERGED
 
 
 @pytest.mark.minutes

@@ -92,7 +92,7 @@ def test_unlike_signals_of_one_seed_are_runs_of_their_own(prior, observed, simul
         engine.tell(theta, simulate(theta, noise), same)
     assert (engine.told, engine.succeeded) == (24, 16)  # the last are copies
     fit = engine.fit(warn=False)
-    np.testing.assert_array_equal(fit.learned_from, np.arange(24) < 16)
+    np.testing.assert_array_equal(fit.training_mask, np.arange(24) < 16)
     (said,) = [said for said in fit.warnings if "seed" in said]
     assert said.startswith("8 of 24 simulations have theta and seed of an earlier one")
 

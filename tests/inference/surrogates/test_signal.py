@@ -10,10 +10,10 @@ from bolfi_liquids.inference.gp import process as gp
 from bolfi_liquids.inference.gp.hyperparameters import NOISE
 from bolfi_liquids.inference.gp.process import predict
 from bolfi_liquids.inference.sobol import sobol
-from bolfi_liquids.inference.surrogates.emulator import Limits, emulate, noise_share
-from bolfi_liquids.inference.surrogates.families import Learnable, SignalFamily
+from bolfi_liquids.inference.surrogates.emulator import EmulatorLimits, emulate, noise_share
+from bolfi_liquids.inference.surrogates.families import SignalFamily, TrainingData
 from bolfi_liquids.inference.surrogates.signal_likelihood import log_likelihood, log_second_moment
-from bolfi_liquids.inference.surrogates.success import Runs
+from bolfi_liquids.inference.surrogates.success import RunOutcomes
 from bolfi_liquids.inference.surrogates.warnings import UNREPEATED
 from scipy.stats import binom, multivariate_normal
 
@@ -37,8 +37,8 @@ def outputs(u, seeds=None):
 def learned(u, signals, observed, **options):
     learner = SignalFamily(**options).learner(observed)
     measured = learner.measure(signals)
-    runs = Runs(u, np.isfinite(measured.discrepancy))
-    known = Learnable(u, measured.features, measured.discrepancy, None, runs)
+    runs = RunOutcomes(u, np.isfinite(measured.discrepancy))
+    known = TrainingData(u, measured.features, measured.discrepancy, None, runs)
     return learner.learn(known, None)
 
 
@@ -315,7 +315,7 @@ def test_components_that_lean_towards_their_own_noise_do_not_steepen_the_emulato
     for seed in range(60):
         rng = np.random.default_rng(seed)
         outputs = theta[:, None] * shape + 0.8 * rng.normal(size=(20, 200))
-        found = emulate(u, outputs, lambda outputs: np.ones(200), Limits(1))
+        found = emulate(u, outputs, lambda outputs: np.ones(200), EmulatorLimits(1))
         expected = found.basis.scores((at - 0.5) * shape)[:, 0]
         mean = predict(found.gp, at)[0][0]
         slopes.append(np.diff(mean)[0] / np.diff(expected)[0])
@@ -337,12 +337,12 @@ def test_components_are_found_anew_where_what_they_came_from_changed():
     def unit(values):
         return values.std(0)
 
-    first = emulate(u[:20], signals[:20], unit, Limits(3))
-    grown = emulate(u, signals, unit, Limits(3), first)
+    first = emulate(u[:20], signals[:20], unit, EmulatorLimits(3))
+    grown = emulate(u, signals, unit, EmulatorLimits(3), first)
     assert grown.basis is first.basis
     left = np.delete(np.arange(21), 3)
-    again = emulate(u[left], signals[left], unit, Limits(3), first)
-    fresh = emulate(u[left], signals[left], unit, Limits(3))
+    again = emulate(u[left], signals[left], unit, EmulatorLimits(3), first)
+    fresh = emulate(u[left], signals[left], unit, EmulatorLimits(3))
     np.testing.assert_array_equal(again.basis.vectors, fresh.basis.vectors)
     np.testing.assert_array_equal(again.basis.scale, fresh.basis.scale)
 

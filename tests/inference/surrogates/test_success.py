@@ -3,14 +3,14 @@
 import numpy as np
 import numpyro.distributions as dist
 from bolfi_liquids.inference.sobol import sobol
-from bolfi_liquids.inference.surrogates.success import Runs, learn_success, log_success
+from bolfi_liquids.inference.surrogates.success import RunOutcomes, learn_success, log_success
 
 from bolfi_liquids import inference
 
 
 def test_a_border_is_found():
     u = sobol(0, 0, 40, 2)
-    border = learn_success(Runs(u, u.sum(1) < 1.0), None)
+    border = learn_success(RunOutcomes(u, u.sum(1) < 1.0), None)
     points = sobol(1, 0, 512, 2)
     clear = np.abs(points.sum(1) - 1.0) > 0.15
     probable = np.exp(log_success(border, points[clear]))
@@ -20,7 +20,7 @@ def test_a_border_is_found():
 
 def test_failures_by_chance_leave_every_place_possible():
     u = sobol(0, 0, 60, 2)
-    chance = learn_success(Runs(u, np.random.default_rng(0).random(60) < 0.8), None)
+    chance = learn_success(RunOutcomes(u, np.random.default_rng(0).random(60) < 0.8), None)
     probable = np.exp(log_success(chance, sobol(1, 0, 512, 2)))
     assert abs(probable.mean() - 0.8) < 0.1 and probable.min() > 0.3
 
