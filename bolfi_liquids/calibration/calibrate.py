@@ -68,9 +68,9 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
     """Learn a liquid's parameters from recordings of it being stirred.
 
     Everything is kept in `out` as it is finished, so an interrupted call can be repeated with
-    `resume`: it then concludes exactly what it would have concluded, and repeats no finished
-    simulation. The same call on a finished run only opens it. With a larger budget it goes on from
-    there, and removes what was concluded from fewer simulations.
+    `resume`: it gives the same result, and repeats no finished simulation. The same call on a
+    finished run only opens it. With a larger budget it goes on from there; what followed from
+    fewer simulations does not count any more.
 
     Args:
         recordings: One or several of one liquid, opened or as paths. Their discrepancies are
@@ -135,6 +135,7 @@ def calibrate(  # noqa: PLR0913  the one call that most users make
         keep_recordings(path, stirring.recordings)
         if table is not None:
             keep_pours(path, table, made_with)
+            run.write_summary()
         for notice in [*aborted_recordings(opened), *frame_warnings(opened)]:
             logger.warning(notice)
         if run.result("calibrate") is None:

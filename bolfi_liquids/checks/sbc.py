@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibration.model_error import model_error
 from ..calibration.stir_simulator import Stirring, stirring_of
 from ..errors import Argument
 from ..files import given_path
@@ -39,12 +40,14 @@ from .sbc_pipelines import (
     SAMPLING,
     Calibrate,
     FromBank,
+    Observed,
     SampleNoise,
 )
 
 if TYPE_CHECKING:
     from ..inference import Prior
     from ..inference.checks import Replicates
+    from ..inference.criticism import SumOfNoises
 
 STIRS_PER_CALL = 16  # of the simulator, where there is no executor
 
@@ -127,9 +130,12 @@ class SbcStudy:
         from .. import inference
 
         calibration = self.settings.calibration(name)
+        observe: Any = SampleNoise(np.radians(self.settings.noise_deg))
         if name == "signal":
+            # an error of the simulator is observed, and allowed for, as `calibrate` does
+            observe = Observed(self._noise)
             pipeline: Any = FromBank(
-                self.stirring, self.prior, *self.stirs_everywhere(), calibration
+                self.stirring, self.prior, *self.stirs_everywhere(), calibration, observe.noise
             )
         else:
             pipeline = Calibrate(self.stirring, self.prior, calibration, self.compute.timeout)
@@ -139,12 +145,20 @@ class SbcStudy:
             self.prior,
             self.settings.replicates[name],
             seed=self.settings.seed,
-            observe=SampleNoise(np.radians(self.settings.noise_deg)),
+            observe=observe,
             executor=self.compute.executor,
             store=self.out / f"{name}.sqlite",
             identity=self.stirring.identity,
             progress=self.compute.progress,
         )
+
+    @property
+    def _noise(self) -> "SumOfNoises":
+        """Of the cameras, and the largest error of the simulator."""
+        from ..inference.criticism import KnownNoise, SumOfNoises
+
+        cameras = KnownNoise(float(np.radians(self.settings.noise_deg)))
+        return SumOfNoises((cameras, model_error(self.stirring, 0.0).usual))
 
     def stirs_everywhere(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Points that fill the prior, and `RUNS_PER_POINT` stirs of each.

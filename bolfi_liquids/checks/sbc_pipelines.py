@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from xarray import DataTree
 
     from ..inference import Prior
+    from ..inference.criticism import SumOfNoises
 
 SAMPLING: dict[str, Any] = {"sampler": "quadrature", "chains": 2, "draws": 250}
 """Of the posterior: independent draws, which take less time; `calibrate` checks its own against the
@@ -35,6 +36,22 @@ class SampleNoise:
 
     def __call__(self, signal: NDArray, rng: np.random.Generator) -> NDArray[np.float64]:
         return signal + rng.normal(0.0, self.sd, signal.shape)
+
+
+@dataclass(frozen=True)
+class Observed:
+    """Draws of a noise model over a whole signal.
+
+    Attributes:
+        noise: Of the cameras and of the simulator's own error [rad].
+    """
+
+    noise: "SumOfNoises"
+
+    def __call__(self, signal: NDArray, rng: np.random.Generator) -> NDArray[np.float64]:
+        from ..inference.criticism.measurement_noise import samples
+
+        return signal + self.noise.draw(rng, samples(signal), 1).reshape(signal.shape)
 
 
 @dataclass(frozen=True)
@@ -80,6 +97,7 @@ class FromBank:
         theta: Points of the set [n, d].
         signals: Of their runs [n, RUNS_PER_POINT, T, 2].
         settings: Of a calibration.
+        noise: Of what is observed; None is estimated.
     """
 
     stirring: Stirring
@@ -87,6 +105,7 @@ class FromBank:
     theta: NDArray[np.float64]
     signals: NDArray[np.float64]
     settings: CalibrationSettings
+    noise: "SumOfNoises | None" = None
 
     def __call__(self, observed: NDArray, seed: int) -> "tuple[DataTree, Any]":
         from ..inference import Bolfi
@@ -98,7 +117,7 @@ class FromBank:
 
         def engine(seed: int) -> Bolfi:
             """An engine that was told all so far, with no point outstanding."""
-            made = Bolfi(self.prior, observed, seed=seed, **options)
+            made = Bolfi(self.prior, observed, seed=seed, noise=self.noise, **options)
             if told:
                 point, run = np.array(told).T
                 theta = self.prior.to_dict(self.theta[point])

@@ -94,24 +94,23 @@ def criticise(  # noqa: PLR0913  the one call that most users make
     with Run.entered(calibration) as run:
         base = Calibration.of(run)
         inputs = open_inputs(base, settings, given)
-        if inputs.table is not None:
-            keep_pours(run.path, inputs.table, inputs.cups)
         for notice in [*aborted_recordings(inputs.compared), *frame_warnings(inputs.compared)]:
             logger.warning(notice)
         for name in inputs.left_out:
             logger.warning("baseline %s: is criticised or held out, so it is not counted", name)
-        if (finished := Criticism.of(run)) and finished.made_from == inputs.made_from:
-            return finished
-        from ..inference.criticism import Keeping
+        with open_compute(executor, timeout) as compute:
+            if inputs.table is not None:
+                keep_pours(run.path, inputs.table, inputs.cups)
+            if (finished := Criticism.of(run)) and finished.made_from == inputs.made_from:
+                run.write_summary()
+                return finished
+            from ..inference.criticism import Keeping
 
-        with (
-            open_compute(executor, timeout) as compute,
-            run.bank() as bank,
-            phases(shown=progress) as report,
-        ):
-            keeping = Keeping(bank, settings.batch, settings.seed, report, *compute[:2])
-            findings = _find(base, inputs, keeping)
-            tree = criticism_tree(findings)
+            with run.bank() as bank, phases(shown=progress) as report:
+                where = {"executor": compute.executor, "timeout": compute.timeout}
+                keeping = Keeping(bank, settings.batch, settings.seed, report, **where)
+                findings = _find(base, inputs, keeping)
+                tree = criticism_tree(findings)
         summary = CriticismSummary.from_findings(findings, tree, time.perf_counter() - started)
         run.keep("criticise", tree, inputs.made_from, summary.to_json())
         return Criticism.made(base, tree)

@@ -70,6 +70,7 @@ class Inputs:
             "after": self.after,
             "version": version("bolfi-liquids"),
             "settings": asdict(self.settings),
+            "considered": [names_of_effects(s, self.settings.effects) for s in ("stir", "pour")],
             **{
                 group: {one.path.name: one.hash for one in files} for group, files in groups.items()
             },

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..calibration.bad_fit import refuse_bad_fit
 from ..calibration.result import Calibration
-from ..criticism.result import calibration_to_pour
+from ..criticism.result import Criticism, calibration_to_pour
 from ..errors import Argument, InputError
 from ..inputs.cups import cups_of
 from ..inputs.pour_table import Pours, PourTable, check_scene, table_of
@@ -94,15 +94,13 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
     if table is not None:
         check_scene(table, cups)
     with Run.entered(calibration) as run:
-        given_one = getattr(calibration, "calibration", calibration)  # of a criticism
-        opened = isinstance(given_one, Calibration)
-        latest = given_one if opened else calibration_to_pour(run)
+        latest = _posterior_of(calibration, run)
         if not force:
             refuse_bad_fit(latest.summary, run.path)
-        if table is not None:
-            keep_pours(run.path, table, cups)
-        counted = _counted(run.path, cups)
+        counted = _counted(run.path, cups, table)
         with open_compute(executor, timeout, progress=progress) as compute:
+            if table is not None:
+                keep_pours(run.path, table, cups)
             pour = decided(latest, cups, settings, compute, counted)
         made_from = {
             "after": latest.key,
@@ -114,13 +112,32 @@ def choose_pour(  # noqa: PLR0913  the one call that most users make
         return pour
 
 
-def _counted(run: Path, cups: "Cups") -> PourTable | None:
-    """The pours that a run was given and that count with these cups; what does not, is said.
+def _posterior_of(given: RunOrPath, run: Run) -> Calibration:
+    """The latest posterior of a run, as it was given or as the run holds it.
+
+    Raises:
+        InputError: What was given is not the latest: its pour would be out of date at once.
+    """
+    if isinstance(given, Criticism):
+        given = given.calibration
+    if not isinstance(given, Calibration):
+        return calibration_to_pour(run)
+    if given.key != run.posterior_key():
+        raise InputError(
+            "has another posterior since",
+            where=str(run.path),
+            fix="open it again, or give the RUN directory",
+        )
+    return given
+
+
+def _counted(run: Path, cups: "Cups", given: PourTable | None) -> PourTable | None:
+    """The given pours that count with these cups, or those that the run keeps; logs the others.
 
     Raises:
         InputError: They were made with these cups, but by none of the actions that may be chosen.
     """
-    if (table := kept_pours(run, cups)) is None:
+    if (table := given or kept_pours(run, cups)) is None:
         if (run / GIVEN_POURS).is_file():
             logger.warning("%s: its pours were made with other cups; not used", run / GIVEN_POURS)
         return None

@@ -170,7 +170,7 @@ def _pour_context(pour: Pour) -> dict[str, Any]:
         "limits": sentence("pour.limits"),
         "contact_angle": sentences.contact_angle_sentences(json.loads(tree.attrs["cups"])),
         "figure": pour_figure(tree),
-        "made_with": dict(tree.attrs),
+        "made_with": {k: v for k, v in tree.attrs.items() if k not in ("made_from", "summary")},
         "rows": [("chosen pour", summary), ("best at θ* alone", summary.plug_in)],
     }
 

@@ -112,10 +112,9 @@ def execute_pour(
         The directory of what the arm did.
 
     Raises:
-        InputError: The run has chosen no pour, its files contradict each other, its cups forbid
-            the pour, another command works in it, or neither or both of `ask` and `emulate` are
-            given. For a real arm also: the pour was chosen over another posterior than the latest,
-            or over a bad fit without `despite_bad_fit`.
+        InputError: The run has chosen no pour over its latest posterior and given pours, its cups
+            forbid the pour, another command works in it, or neither or both of `ask` and `emulate`
+            are given. For a real arm also: the fit was bad, without `despite_bad_fit`.
         ValueError: Another pour was chosen in the run than the one given.
         MotionRejected: The motion breaks one of the rig's limits.
         SessionStopped: The arm was stopped.

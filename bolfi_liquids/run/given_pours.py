@@ -4,6 +4,7 @@ Whichever command is given a table (`calibrate`, `criticise` or `pour`) keeps it
 of an earlier one.
 """
 
+import hashlib
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -64,13 +65,16 @@ def kept_pours(run: Path, cups: "Cups") -> PourTable | None:
 
 
 def digest_of_pours(run: Path) -> str:
-    """Digest of the table that the run was given, and the name of its liquid; "" without one.
+    """Digest of the table that the run was given, of its liquid's name and cups; "" without one.
 
     Raises:
         InputError: The file is damaged.
     """
     held = _held(run)
-    return "" if held is None else f"{held.attrs['sha256']} {held.attrs['liquid']}".strip()
+    if held is None:
+        return ""
+    told = [held.attrs[name] for name in ("sha256", "liquid", "cups")]
+    return hashlib.sha256(json.dumps(told).encode()).hexdigest()
 
 
 def _held(run: Path) -> "Dataset | None":

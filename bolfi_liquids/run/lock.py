@@ -1,15 +1,12 @@
 """One command at a time works in a directory."""
 
+import fcntl
+import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import InputError
-
-try:
-    import fcntl
-except ModuleNotFoundError:  # Windows: nothing keeps a second command out
-    fcntl = None
 
 LOCK = "run.lock"
 
@@ -18,8 +15,8 @@ LOCK = "run.lock"
 def alone_in(directory: Path) -> Iterator[None]:
     """Keep other commands out of a directory, which is made if it is missing.
 
-    The lock belongs to the process and ends with it, however it ends; its empty file stays. It is
-    not re-entrant.
+    The kernel releases the lock when the process ends; the empty file remains. It is not
+    re-entrant. A directory that is read-only, or on a disk without locks, is not locked.
 
     Raises:
         InputError: Another command works there, or it is no directory.
@@ -29,14 +26,24 @@ def alone_in(directory: Path) -> Iterator[None]:
     except (FileExistsError, NotADirectoryError) as err:
         fix = "choose another directory"
         raise InputError("not a directory", where=str(directory), fix=fix) from err
-    with open(directory / LOCK, "a", encoding="utf-8") as lock:
+    if not os.access(directory, os.W_OK):
+        yield
+        return
+    flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW  # a link may lead to somebody else's file
+    lock = os.open(directory / LOCK, flags, 0o666)
+    try:
+        with suppress(OSError):
+            os.fchmod(lock, 0o666)  # others of the group may work here next, whatever the umask
         try:
-            if fcntl is not None:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise InputError(
                 "another command works in it",
                 where=str(directory),
                 fix="wait until it has ended, or choose another directory",
             ) from None
+        except OSError:
+            pass  # a disk without locks
         yield
+    finally:
+        os.close(lock)

@@ -38,7 +38,7 @@ def keep_recordings(run: Path, recordings: tuple[Recording, ...]) -> None:
     folder.mkdir(exist_ok=True)
     for number, recording in enumerate(recordings, start=1):
         copy = folder / _name(number, recording.path.name)
-        if not copy.exists():
+        if not copy.exists() or hashlib.sha256(copy.read_bytes()).hexdigest() != recording.hash:
             content = recording.path.read_bytes()
             write_whole(copy, lambda path, content=content: path.write_bytes(content))
 

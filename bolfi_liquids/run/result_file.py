@@ -1,6 +1,6 @@
 """Results on disk: netCDF trees, each followed by the digest of all its bytes.
 
-HDF5 and xarray do not mind what follows a file's end, so that other programs read them, too.
+HDF5 ignores what follows its content, so other programs read these files, too.
 """
 
 from functools import lru_cache
@@ -29,14 +29,14 @@ def read_result(path: Path) -> "DataTree":
     """The tree that `write_result` wrote.
 
     Raises:
-        ValueError: A byte of the file is another.
+        ValueError: The digest does not match.
         OSError: It cannot be read.
     """
     written = path.read_bytes()
     content, end = written[:-END], written[-END:]
     if end != _end_of(content):
         raise ValueError(f"{path} is damaged")
-    return _parsed(content).copy()
+    return _parsed(content).copy(deep=True)  # what a caller changes is its own
 
 
 def _end_of(content: bytes) -> bytes:

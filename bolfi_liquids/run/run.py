@@ -1,8 +1,8 @@
 """A RUN directory: inputs and settings, simulations, results.
 
-A command opens one `Run` and asks nothing but it. run.toml holds what decides the results; the
-bank every finished simulation; and each step's result is a tree that says what it was made from.
-It is current if that is what the run holds now, and None otherwise.
+Each command opens one `Run` and reads nothing else. run.toml holds the settings, the bank every
+finished simulation. Each step's result is a tree that records what it was made from: it is current
+while the run holds the same, and None otherwise.
 """
 
 import json
@@ -10,7 +10,7 @@ import sqlite3
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from difflib import get_close_matches
 from functools import cached_property
 from hashlib import sha256
@@ -25,10 +25,10 @@ from ..inputs.prior import read_prior
 from ..inputs.recording import Recording
 from ..inputs.settings import CalibrationSettings
 from ..wording import command
-from .given_pours import digest_of_pours
+from .given_pours import GIVEN_POURS, digest_of_pours
 from .lock import alone_in
 from .provenance import generations
-from .recordings import kept_paths, kept_recordings
+from .recordings import RECORDINGS_FOLDER, kept_paths, kept_recordings
 from .result_file import read_result, write_result
 from .summary import SUMMARY_FILE, write_summary
 
@@ -47,6 +47,9 @@ RESULTS = {
     "frames": "frames.nc",
 }
 """File of each step's result, in the order of the steps."""
+
+OWN_FILES = (SIMULATIONS, *RESULTS.values(), GIVEN_POURS, RECORDINGS_FOLDER, REPORT)
+"""What only a run may hold."""
 
 MUST_AGREE = ("settings", "inputs", "simulator", "engine")
 """Sections of run.toml that decide the results; dates, names and libraries may differ."""
@@ -95,6 +98,7 @@ class Run:
 
     path: Path
     record: Mapping[str, Any]
+    _looked: "dict[str, tuple[DataTree | None, str]]" = field(default_factory=dict, repr=False)
 
     @classmethod
     def open(cls, given: RunOrPath) -> "Run":
@@ -110,7 +114,7 @@ class Run:
     @classmethod
     @contextmanager
     def entered(cls, given: RunOrPath) -> "Iterator[Run]":
-        """Work in a run, alone.
+        """Lock a run and open it.
 
         Raises:
             InputError: There is none, or another command works in it.
@@ -124,17 +128,17 @@ class Run:
     def begun(
         cls, path: Path, record: Mapping[str, Any], *, resume: bool, growing: str = ""
     ) -> "Iterator[Run]":
-        """Work alone in a run that is new, or goes on with the same settings.
+        """Lock a new run, or one with the same settings.
 
         run.toml is written before anything else, so that whatever is found later in the directory
         can be traced to its settings.
 
         Args:
             path: The directory; made if missing.
-            record: Of the run, in the sections that `MUST_AGREE` names and others.
+            record: Content of run.toml.
             resume: Whether the directory may hold a run, to go on with.
-            growing: Field of `record`, if any, that may be larger than in the run that is gone on
-                with; its results are not current then, and all simulations are kept.
+            growing: Field of `record`, if any, that may exceed the held value. run.toml changes
+                with the next result; until then the former ones are current.
 
         Raises:
             InputError: Another command works there; the directory holds a run and `resume` is
@@ -143,11 +147,14 @@ class Run:
         if not resume and (path / RUN_TOML).exists():
             raise _held(path)
         with alone_in(path):
-            yield cls(path, _begin(path, record, resume=resume, growing=growing))
+            run = cls(path, _begin(path, record, resume=resume, growing=growing))
+            if resume:
+                run.write_summary()  # a killed command may not have come to it
+            yield run
 
     @cached_property
     def recordings(self) -> list[Recording]:
-        """The run's own copies of what it was calibrated on.
+        """Copies of the calibrated recordings.
 
         Raises:
             InputError: A copy is missing, or is another recording.
@@ -181,11 +188,11 @@ class Run:
                 raise _unusable(path, err) from err
 
     def result(self, step: str) -> "DataTree | None":
-        """What a step has concluded, if it was made from what the run holds now; else None."""
+        """A step's result if it is current, else None."""
         return self._look(step)[0]
 
     def why_not(self, step: str) -> str:
-        """Why a step's result is not current, though there is one; "" where it is, or is none."""
+        """Why an existing result is not current, else an empty string."""
         there = (self.path / RESULTS[step]).is_file()
         return self._look(step)[1] if there else ""
 
@@ -197,7 +204,9 @@ class Run:
         """
         tree, why = self._look(step)
         if tree is None:
-            raise InputError(why, where=str(self.path), fix=f"run: {self.again(step)}")
+            stale = step != "calibrate" and self.why_not(step)
+            more = ", with the options it was made with" if stale else ""
+            raise InputError(why, where=str(self.path), fix=f"run{more}: {self.again(step)}")
         return tree
 
     def keep(
@@ -207,29 +216,37 @@ class Run:
         made_from: Mapping[str, Any],
         summary: Mapping[str, Any] | None = None,
     ) -> None:
-        """Write a step's result, and with its numbers summary.json.
+        """Write a result, and summary.json.
 
         Args:
             step: Of `RESULTS`.
             tree: What it has concluded; gets the attributes `made_from` and `summary`.
-            made_from: All that decides it, as JSON.
+            made_from: Inputs and settings that decide it, as JSON takes them.
             summary: Its section of summary.json.
         """
         tree.attrs["made_from"] = as_json(made_from)
         if summary is not None:
             tree.attrs["summary"] = json.dumps(summary)
         write_result(tree, self.path / RESULTS[step])
+        if step == "calibrate":  # of a run that has grown
+            _write(self.path, self.record)
+        self._looked.clear()
         self.write_summary()
 
     def write_summary(self) -> None:
         """Write summary.json from the current results: it is for people and other programs."""
-        trees = {step: self.result(step) for step in RESULTS}
+        trees = [(step, self.result(step)) for step in RESULTS]
         found = {
-            step: tree.attrs["summary"]
-            for step, tree in trees.items()
+            step: json.loads(tree.attrs["summary"])
+            for step, tree in trees
             if tree is not None and "summary" in tree.attrs
         }
-        write_summary(self.path / SUMMARY_FILE, {s: json.loads(text) for s, text in found.items()})
+        if found or (self.path / SUMMARY_FILE).exists():
+            write_summary(self.path / SUMMARY_FILE, found)
+
+    def __reduce__(self):
+        """Without the trees that were read."""
+        return Run, (self.path, self.record)
 
     @property
     def made_from(self) -> dict[str, Any]:
@@ -237,7 +254,7 @@ class Run:
         return {name: self.record.get(name) for name in (*MUST_AGREE, "files")}
 
     def posterior_key(self) -> str:
-        """Of the latest posterior: the criticism's where it has added an effect."""
+        """Key of the latest posterior: the criticism's where it has added an effect."""
         criticism = self.result("criticise")
         if criticism is not None and json.loads(criticism.attrs["summary"])["accepted"]:
             return key_of(criticism)
@@ -246,12 +263,19 @@ class Run:
     def again(self, step: str) -> str:
         """The command that makes a step's result."""
         if step == "calibrate":
-            words = ("calibrate", "RECORDING...", "--out", self.path, "--resume")
+            clean = ["--baseline", "CLEAN..."] if "baseline" in self.record["inputs"] else []
+            recordings = kept_paths(self.path, self.record) or ["RECORDING..."]
+            words = ("calibrate", *recordings, *clean, "--out", self.path, "--resume")
             return command(*words, *self._options())
         return command("report" if step == "frames" else step, self.path)
 
     def _look(self, step: str) -> "tuple[DataTree | None, str]":
-        """A step's current result, or why there is none."""
+        """A step's current result, or why there is none; read once."""
+        if step not in self._looked:
+            self._looked[step] = self._read(step)
+        return self._looked[step]
+
+    def _read(self, step: str) -> "tuple[DataTree | None, str]":
         path = self.path / RESULTS[step]
         if not path.is_file():
             return None, ABSENT[step]
@@ -263,7 +287,7 @@ class Run:
         return (None, f"{path.name} {why}") if why else (tree, "")
 
     def _stale(self, step: str, made_from: Mapping[str, Any]) -> str:
-        """In what a result differs from what the run holds; "" where it is current."""
+        """The first difference of a result from the run; "" where it is current."""
         if step == "calibrate":
             same = as_json(made_from) == as_json(self.made_from)
             return "" if same else f"was made by other settings than {RUN_TOML} holds"
@@ -272,11 +296,17 @@ class Run:
         calibration, why = self._look("calibrate")
         if calibration is None:
             return f"cannot be used: {why}"
+        if step == "pour" and (why := self.why_not("criticise")):
+            return f"cannot be used: {why}"
         after = key_of(calibration) if step == "criticise" else self.posterior_key()
         if made_from["after"] != after:
             return "was made from another posterior"
-        if step == "pour" and made_from["given"] != digest_of_pours(self.path):
-            return "was made with other given pours"
+        if step == "pour":
+            try:
+                if made_from["given"] != digest_of_pours(self.path):
+                    return "was made with other given pours"
+            except InputError:
+                return "cannot be compared: the given pours are damaged"
         return ""
 
     def _options(self) -> list[str]:
@@ -287,10 +317,10 @@ class Run:
         return [word for name, value in changed.items() for word in (f"--{name}", str(value))]
 
     def _check_generation(self) -> None:
-        """Refuse a run of another fluid or engine, from which nothing follows today.
+        """Refuse a run of another version of fluid or engine.
 
         Raises:
-            InputError: It is one; the message has the command that calibrates on its recordings.
+            InputError: Versions differ; the message has the command that calibrates anew.
         """
         now, simulators = generations(), self.record.get("simulator", {}).values()
         held = {
@@ -299,6 +329,9 @@ class Run:
         }
         for part, versions in held.items():
             if not versions <= {str(now[part])}:
+                if "files" not in self.record:  # of a check
+                    what, fix = f"was made by another {part}", "choose another `out`"
+                    raise InputError(what, where=str(self.path), fix=fix)
                 recordings = kept_paths(self.path, self.record) or ("RECORDING...",)
                 anew = self.path.with_name(f"{self.path.name}_{part}_{now[part]}")
                 words = ("calibrate", *recordings, "--out", anew, *self._options())
@@ -315,8 +348,11 @@ def as_json(made_from: Mapping[str, Any]) -> str:
 
 
 def key_of(tree: "DataTree") -> str:
-    """Digest of all that a result was made from."""
-    return sha256(tree.attrs["made_from"].encode()).hexdigest()
+    """Digest of a posterior's draws."""
+    draws, digest = tree["posterior"].to_dataset(), sha256()
+    for name in sorted(map(str, draws.data_vars)):
+        digest.update(name.encode() + draws[name].to_numpy().tobytes())
+    return digest.hexdigest()
 
 
 def check_resumable(path: Path) -> None:
@@ -375,20 +411,29 @@ def _begin(
             del differing[growing]
         if differing:
             raise _refused(differing, path, growing)
-        made = {**record, "created": held.get("created", "")} if grows else held
         limits = dict.fromkeys([*held.get("timeouts", ()), *record.get("timeouts", ())])
-        record = {**made, **({"timeouts": list(limits)} if limits else {})}
-        if record == held:
-            return held
-    elif orphans := [n for n in (SIMULATIONS, *RESULTS.values()) if (path / n).exists()]:
+        listed = {"timeouts": list(limits)} if limits else {}
+        if listed and listed["timeouts"] != held.get("timeouts"):
+            _write(path, {**held, **listed})
+        first = {"created": held["created"]} if "created" in held else {}
+        return _as_read({**(record if grows else held), **first, **listed})
+    elif orphans := [name for name in OWN_FILES if (path / name).exists()]:
         raise InputError(
             f"holds {orphans[0]} without {RUN_TOML}",
             where=str(path),
             fix="choose another `out`; nothing was overwritten",
         )
-    text = tomli_w.dumps(record)
-    write_text(path / RUN_TOML, text)
-    return tomllib.loads(text)  # as it will be read
+    _write(path, record)
+    return _as_read(record)
+
+
+def _write(path: Path, record: Mapping[str, Any]) -> None:
+    write_text(path / RUN_TOML, tomli_w.dumps(record))
+
+
+def _as_read(record: Mapping[str, Any]) -> dict[str, Any]:
+    """The record as it will be read: TOML has no tuples."""
+    return tomllib.loads(tomli_w.dumps(record))
 
 
 def _held(path: Path) -> InputError:
@@ -399,9 +444,8 @@ def _held(path: Path) -> InputError:
 
 def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
     """Fields that decide the results -> their values in both records, where these differ."""
-    written = tomllib.loads(tomli_w.dumps(new))  # a tuple compares as what was written
     wanted, held = (
-        dict(_fields({name: one.get(name) for name in MUST_AGREE})) for one in (written, old)
+        dict(_fields({name: one.get(name) for name in MUST_AGREE})) for one in (_as_read(new), old)
     )
     fields = [*wanted, *(held.keys() - wanted.keys())]
     both = {field: (held.get(field), wanted.get(field)) for field in fields}

@@ -177,7 +177,7 @@ def test_what_the_bank_holds_beside_stirs_is_not_counted(
     """A calibration whose results were deleted after a pour was chosen."""
     run = tmp_path / "run"
     shutil.copytree(pour.path, run)
-    (run / "summary.json").unlink()
+    (run / "posterior.nc").unlink()
     again = bl.calibrate(short_recording, out=run, resume=True, **settings)
     (count,) = re.findall(r"simulating stirs: (\S+) to run", capsys.readouterr().err)
     assert int(count) == 0

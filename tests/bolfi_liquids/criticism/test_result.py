@@ -117,3 +117,9 @@ def test_a_damaged_criticism_does_not_count(criticised):
 
 def test_integers_of_numpy_are_settings():
     assert CriticismSettings(seed=np.int64(3)).seed == 3
+
+
+def test_no_pour_is_chosen_over_a_posterior_that_is_not_the_latest(criticised):
+    base = bl.Criticism.open(criticised).base
+    with pytest.raises(InputError, match="another posterior since"):
+        bl.choose_pour(base, progress=False)

@@ -3,7 +3,7 @@
 import html
 import re
 import shutil
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from html.parser import HTMLParser
 from multiprocessing import get_context
@@ -128,7 +128,8 @@ def test_a_report_says_where_its_pictures_are_simulated(unseen, monkeypatch):
         raise TimeoutError
 
     monkeypatch.setattr(frames, "_simulated", simulated)
-    with ThreadPoolExecutor(1) as pool, pytest.raises(RuntimeError, match="60 s"):
+    spawn = get_context("spawn")
+    with ProcessPoolExecutor(1, spawn) as pool, pytest.raises(RuntimeError, match="60 s"):
         bl.report(unseen, executor=pool, timeout=60.0, progress=False)
     assert seen == [(Compute(pool, 60.0, False), 60.0, 60.0)]
 

@@ -103,7 +103,7 @@ def test_a_stale_pour_is_never_carried_out(poured_run, made_from):
     assert chosen_in(poured_run)
     rewritten(poured_run, **made_from)
     for who in ({"ask": refused}, {"emulate": True}):
-        with pytest.raises(InputError, match=r"pour\.nc was made .*run: bolfi-liquids pour"):
+        with pytest.raises(InputError, match=r"pour\.nc was made .*: bolfi-liquids pour"):
             bl.execute_pour(poured_run, **who)
 
 
