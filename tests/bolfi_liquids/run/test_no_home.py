@@ -117,3 +117,22 @@ def test_a_command_simulates(tmp_path):
     done = without_home("not writable", tmp_path, COMMAND, *stir)
     assert done.returncode == 0, done.stderr
     assert done.stderr == "" and (tmp_path / "stir.nc").exists()
+
+
+WRITES = """
+import os, sys
+
+def refuse(event, arguments):
+    made = event in {"os.mkdir", "os.remove", "os.rmdir", "os.rename"}
+    if made or event == "open" and arguments[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT):
+        raise AssertionError(f"{event} {arguments}")
+
+sys.dont_write_bytecode = True
+sys.addaudithook(refuse)
+import bolfi_liquids
+"""
+
+
+def test_an_import_writes_nothing():
+    done = subprocess.run([sys.executable, "-c", WRITES], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
